@@ -301,9 +301,9 @@ contains
          to_text(self%give, 3) // " of an edge: STIFFNESS or FACTOR of *CONSTRAINT METHOD is too " &
          // "small")
       if (stand_off_mean(self%stand_off) > told_stand_off) then
-         text = "contact forces act across gaps of " // to_text(stand_off_mean(self%stand_off), 2) &
-            // " edges in the mean over the impulse: smaller increments, GAP TOLERANCE or " // &
-            "TYPE=ADMISSIBLE or MASSLESS of *CONTACT INITIATION close them"
+         text = "contact forces act across gaps, " // to_text(stand_off_mean(self%stand_off), 2) &
+            // " of an edge in the mean over the impulse: smaller increments, GAP TOLERANCE, or " &
+            // "TYPE=ADMISSIBLE or MASSLESS of *CONTACT INITIATION close them"
          if (stand_off_mean(self%stand_off) > most_stand_off) then
             call note_add(self%reasons, text)
          else

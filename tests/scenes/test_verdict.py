@@ -1,5 +1,7 @@
 """How a run ends: NAME.json, the verdict in log and on the screen, exit codes, --strict."""
 
+import re
+
 import numpy as np
 import pytest
 from scene_tools import DECKS, Deck, emcon, run_deck
@@ -71,3 +73,121 @@ def test_verdict_of_an_earlier_run_goes(tmp_path):
 def test_option_strict_is_known_to_restart(ring):
     done = emcon("restart", ring.file(".rst.h5"), "--strict", "--quiet")
     assert done.returncode == 0 and done.stderr == ring.errors
+
+
+# ---- what is good, told or bad ------------------------------------------------------------------
+
+#: A block of one element on another that is held, `gap` apart.
+BLOCKS = """*NODE
+1, 0., 0.
+2, 1., 0.
+3, 1., 1.
+4, 0., 1.
+5, 0., {low}
+6, 1., {low}
+7, 1., {high}
+8, 0., {high}
+*ELEMENT, TYPE=CPE4, ELSET=LOWER
+1, 1, 2, 3, 4
+*ELEMENT, TYPE=CPE4, ELSET=UPPER
+2, 5, 6, 7, 8
+*NSET, NSET=HELD
+1, 2, 3, 4
+*NSET, NSET=FREE, ELSET=UPPER
+*MATERIAL, NAME=M
+*ELASTIC
+100., 0.
+*DENSITY
+1.
+*SOLID SECTION, ELSET=LOWER, MATERIAL=M
+*SOLID SECTION, ELSET=UPPER, MATERIAL=M
+*SURFACE, NAME=TOP
+1, S3
+*SURFACE, NAME=FOOT
+2, S1
+*SURFACE INTERACTION, NAME=I
+*CONTACT PAIR, INTERACTION=I
+FOOT, TOP
+*BOUNDARY
+HELD, 1, 2
+"""
+THROWN = "*INITIAL CONDITIONS, TYPE=VELOCITY\nFREE, 2, -1.\n"
+
+
+def blocks(cards, gap=0.0):
+    """The two blocks with cards of the model and one step of `cards`."""
+    model, _, step = cards.partition("*STEP")
+    return Deck(BLOCKS.format(low=1 + gap, high=2 + gap) + model + f"*STEP{step}\n*END STEP\n")
+
+
+def test_round_off_of_forces_at_rest_is_no_error(tmp_path):
+    """A rigid block that lies there: its energies are nothing but what its weight is rounded by."""
+    deck = blocks("*RIGID BODY, ELSET=UPPER, REF NODE=5\n*STEP, NLGEOM\n*DYNAMIC, DIRECT\n"
+                  "0.01, 3.\n*DLOAD\nUPPER, GRAV, 10., 0., -1.")
+    deck.move_nodes(lambda label, x, y: (x - 0.3*(label < 5), y/3))   # no dyadic heights
+    run = run_deck(deck, tmp_path)
+    assert run.verdict["verdict"] == "good", run.verdict["reasons"]
+    assert run.verdict["largest_energy"] < 1e-20
+    assert "round-off of the forces" in run.log
+
+
+@pytest.mark.parametrize("h, verdict, told", [(0.4, "good", 0), (5, "good", 1), (8, "bad", 0)])
+def test_air_that_holds_a_block(tmp_path, h, verdict, told):
+    """Thrown at 1 from a height of 5.3: what is left of it where the step of contact begins."""
+    run = run_deck(blocks(f"{THROWN}*STEP, NLGEOM\n*DYNAMIC, DIRECT\n{h}, 16.", gap=5.3), tmp_path)
+    found = run.verdict
+    assert found["mean_stand_off"] == pytest.approx(5.3 % h, rel=1e-6)
+    assert (found["verdict"], found["warning_count"]) == (verdict, told)
+    assert all("act across gaps" in text for text in found["reasons"] + found["warnings"])
+
+
+@pytest.mark.parametrize("how, verdict, told", [
+    ("EXPLICIT, DIRECT\n0.01, 0.5", "bad", "impacts have lost 50 % of the largest energy"),
+    ("DIRECT\n0.01, 0.5\n*CONTACT INITIATION, TYPE=ADMISSIBLE", "good", "impacts have lost "),
+    ("DIRECT\n0.01, 0.5", "good", "")])
+def test_what_impacts_take(tmp_path, how, verdict, told):
+    """Two of four equal masses stop: half of the energy is gone, at once and for good."""
+    run = run_deck(blocks(f"{THROWN}*STEP, NLGEOM\n*DYNAMIC, {how}", gap=0.01), tmp_path)
+    assert run.verdict["verdict"] == verdict
+    texts = run.verdict["reasons"] + run.verdict["warnings"]
+    assert len(texts) == (told != "") and all(text.startswith(told) for text in texts)
+
+
+@pytest.mark.parametrize("force, verdict", [(18.0, "good"), (22.0, "bad")])
+def test_linear_elements_that_turn(tmp_path, force, verdict):
+    """Sheared by gamma = F/(G A) with G = 50, which is a rotation by half of it."""
+    deck = blocks(f"*BOUNDARY\nFREE, 2\n5, 1\n6, 1\n*STEP, NLGEOM\n*STATIC\n1., 1.\n"
+                  f"*CLOAD\n7, 1, {force/2}\n8, 1, {force/2}", gap=0.5)
+    deck.replace("ELSET=UPPER, MATERIAL=M", "ELSET=UPPER, MATERIAL=M, KINEMATICS=LINEAR")
+    run = run_deck(deck, tmp_path)
+    assert run.verdict["linear_rotation"] == pytest.approx(force/100, rel=1e-9)
+    assert run.verdict["verdict"] == verdict
+    assert all("linear elements rotate" in text for text in run.verdict["reasons"])
+
+
+@pytest.mark.parametrize("away, told", [(4e7, 0), (5e7, 1)])
+def test_coordinates_that_leave_few_digits(tmp_path, away, told):
+    """Distances keep eight digits up to 1e-8 over epsilon, 4.5e7 edges of 1."""
+    deck = blocks(f"{THROWN}*STEP, NLGEOM\n*DYNAMIC, DIRECT\n0.01, 0.01", gap=0.5)
+    deck.move_nodes(lambda label, x, y: (x + away, y))
+    run = run_deck(deck, tmp_path)
+    assert [" keep 7 digits" in text for text in run.verdict["warnings"]] == [True]*told
+
+
+@pytest.mark.parametrize("initiation, told", [("PERSISTENT", True), ("MASSLESS", False)])
+def test_forces_that_are_a_comb(tmp_path, initiation, told):
+    """A bar thrown on a wall: its last node bounces off and comes back, unless it has no mass."""
+    run = run_deck(DECKS/"bouncing_bar.inp", tmp_path, t_end=1.5, initiation=initiation)
+    assert ("TYPE=MASSLESS makes it smooth" in run.log) == told
+    assert (run.verdict["force_scatter"] > 0.5) == told
+
+
+def test_a_node_inside_is_named(tmp_path):
+    """A plate of 3 falls by 0.125 onto a block of 1/2, 0.1 below, whose corners nobody holds."""
+    deck = blocks(f"{THROWN}*STEP, NLGEOM\n*DYNAMIC, DIRECT\n0.025, 0.125", gap=0.1)
+    deck.replace("*CONTACT PAIR, INTERACTION=I", "*CONTACT PAIR, INTERACTION=I, SIDES=ONE, GUARD=NO")
+    deck.move_nodes(lambda label, x, y: (3*x - 1, y) if label > 4 else (0.5*x, y))
+    found = run_deck(deck, tmp_path).verdict
+    assert found["penetration"] == pytest.approx(0.025/0.5, rel=1e-9)
+    assert re.fullmatch(r"bodies overlap by 0.05 of an edge at time 0.125, node [56] of body 2 is "
+                        r"0.025 behind the edge from node 3 to 4 of body 1", found["reasons"][0])
