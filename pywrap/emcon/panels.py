@@ -7,6 +7,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from matplotlib.axes import Axes
+from matplotlib.lines import Line2D
 from matplotlib.ticker import LogLocator, MaxNLocator, NullLocator
 from numpy.typing import NDArray
 
@@ -27,6 +28,8 @@ SMALL = 5e-3
 ROUND_OFF = 1e-9
 #: Increments whose convergence is shown at most; letters of a name in a legend.
 MOST_SOLVES, NAME_LENGTH = 7, 14
+#: Where a legend begins, by the width of its axes; rows that it may have above them.
+LEGEND_START, MOST_ROWS = -0.04, 3
 #: Increments up to which each has its step in the curve of a force; parts of a run with more.
 MOST_STEPS, PARTS = 200, 100
 #: An angular momentum that changes by less than this part is kept.
@@ -225,9 +228,23 @@ def draw_energies(axes: Axes, history: NDArray[np.void]) -> None:
 
 
 def _legend(axes: Axes) -> None:
-    """Above the axes, where no curve is."""
-    axes.legend(loc="lower left", bbox_to_anchor=(-0.04, 1.0), ncols=5, handlelength=1.1,
-                columnspacing=0.8, handletextpad=0.3, borderaxespad=0.1)
+    """Above the axes, where no curve is, and no wider: in rows, and what they do not hold counted."""
+    handles, labels = axes.get_legend_handles_labels()
+    if not handles:
+        return
+    width = (1.0 - LEGEND_START)*axes.get_window_extent().width
+    for columns in range(min(5, len(handles)), 0, -1):
+        shown, room = len(handles), MOST_ROWS*columns
+        if shown > room:
+            shown = room - 1
+        more = [f"and {len(handles) - shown} more"] if shown < len(handles) else []
+        nothing = [Line2D([], [], linestyle="none")]*len(more)
+        legend = axes.legend([*handles[:shown], *nothing], [*labels[:shown], *more],
+                             loc="lower left", bbox_to_anchor=(LEGEND_START, 1.0), ncols=columns,
+                             handlelength=1.1, columnspacing=0.8, handletextpad=0.3,
+                             borderaxespad=0.1)
+        if legend.get_window_extent().width <= width:
+            return
 
 
 def draw_drift(axes: Axes, history: NDArray[np.void]) -> None:
@@ -259,7 +276,9 @@ def draw_force(axes: Axes, force: Force) -> None:
     has_mean = False
     is_many = force.has_means and len(force.times) > MOST_STEPS + 1
     for (name, values), colour in zip(force.curves.items(), COLOURS*len(force.curves)):
-        shown = name if len(name) <= NAME_LENGTH else f"{name[:NAME_LENGTH - 1]}…"
+        surface, comma, axis = name.partition(", ")
+        shown = (surface if len(surface) <= NAME_LENGTH else f"{surface[:NAME_LENGTH - 1]}…") \
+            + comma + axis
         style = "steps-pre" if force.has_means or force.is_count else "default"
         axes.plot(force.times, values, color=colour, linewidth=0.5 if is_many else 0.8,
                   marker="o" if force.is_sampled else "", markersize=1.8, markeredgewidth=0.0,

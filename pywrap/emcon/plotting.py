@@ -26,7 +26,8 @@ N_TIMES = 6
 #: Sizes on paper [inch].
 WIDTH, LEFT, RIGHT, TOP, BOTTOM = 11.0, 0.62, 1.0, 0.30, 0.48
 MARGIN = 0.25                  # at the right, where nothing stands
-SCENE_GAP, PANEL_GAP, ROW_GAP, PANEL_HEIGHT = 0.07, 0.72, 0.86, 1.85
+SCENE_GAP, PANEL_GAP, ROW_GAP, PANEL_HEIGHT = 0.07, 0.72, 0.98, 1.85
+LEGEND_TOP = 0.62              # above panels without bodies
 SCENE_HEIGHT = (1.0, 4.2)      # least, largest
 RESOLUTION = 200               # dots per inch
 
@@ -110,7 +111,7 @@ def draw(paths: ResultPaths, view: View = View()) -> tuple[Figure, list[str]]:
         if scene is not None:
             _draw_scene(figure, scene, view.clim)
         else:
-            figure.set_size_inches(WIDTH, TOP + PANEL_HEIGHT + BOTTOM)
+            figure.set_size_inches(WIDTH, LEGEND_TOP + PANEL_HEIGHT + BOTTOM)
         panels = _add_panels(figure)
         if history is not None and is_static(history):
             _draw_statics(panels, history, force, load, read_residuals(paths))

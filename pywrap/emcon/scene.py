@@ -16,8 +16,9 @@ from .results import Array, FieldFile, ResultError
 SUPPORT_FRACTION = 0.1
 #: Room around the moving bodies, as a fraction of their extent; room for the supports below.
 MARGIN, SUPPORT_ROOM = 0.06, 0.30
-#: The view follows the bodies where their whole path is this much longer than they are.
-FOLLOW_RATIO = 1.25
+#: The view follows the bodies where their whole path is this much longer than they are; where a
+#: body is at rest, which would seem to move, only if it is much longer.
+FOLLOW_RATIO, FOLLOW_RATIO_AT_REST = 1.25, 5.0
 #: Lengths below this part of the size of the scene are round-off.
 ROUND_OFF = 1e-12
 
@@ -87,7 +88,8 @@ class Scene:
         # no margin where a support is cut: it goes on beyond the frame
         y_low = y_low if y_low < y_min else y_min - margin
         y_high = y_high if y_high > y_max else y_max + margin
-        return [(x0, x1, y_low, y_high) for x0, x1 in _windows(boxes[:, 0], boxes[:, 1])]
+        ratio = FOLLOW_RATIO_AT_REST if self.is_support.any() else FOLLOW_RATIO
+        return [(x0, x1, y_low, y_high) for x0, x1 in _windows(boxes[:, 0], boxes[:, 1], ratio)]
 
     def _heights(self, margin: float) -> tuple[float, float]:
         """The lowest and the highest place of all that is drawn, a margin beyond profiles [L]."""
@@ -139,15 +141,15 @@ def _extent(points: Array) -> View:
     return float(low[0]), float(high[0]), float(low[1]), float(high[1])
 
 
-def _windows(low: Array, high: Array) -> list[tuple[float, float]]:
+def _windows(low: Array, high: Array, ratio: float) -> list[tuple[float, float]]:
     """Intervals of one length that hold [low, high] of each frame, with margin.
 
-    They are one and the same unless the way is long: then they follow.
+    They are one and the same unless the way is `ratio` times as long: then they follow.
     """
     length = float(np.max(high - low))
     centre = 0.5*(low + high)
     path = float(high.max() - low.min())
-    if path <= FOLLOW_RATIO*length:
+    if path <= ratio*length:
         length = path
         centre = np.full(len(low), 0.5*float(low.min() + high.max()))
     half = 0.5*length*(1.0 + 2.0*MARGIN)

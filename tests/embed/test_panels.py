@@ -7,6 +7,7 @@ import subprocess
 import sys
 from pathlib import Path
 
+import matplotlib
 import numpy as np
 import pytest
 from embed_tools import ROOT
@@ -16,9 +17,10 @@ sys.path.insert(0, str(ROOT/"pywrap"))
 
 from emcon import FieldFile, locate, read_history  # noqa: E402
 from emcon.drawing import DIGIT_WIDTH, InnerLocator, scale_ticks, titles  # noqa: E402
-from emcon.panels import MOST_STEPS, PARTS, PAUSE, means, part_means  # noqa: E402
+from emcon.panels import (  # noqa: E402
+    MOST_STEPS, PARTS, PAUSE, Force, draw_force, means, part_means)
 from emcon.plotting import View, draw  # noqa: E402
-from emcon.scene import UNITS, outer_sides  # noqa: E402
+from emcon.scene import STYLE, UNITS, outer_sides, read_scene  # noqa: E402
 
 PROGRAM = ROOT/"build"/"release"/"emcon"
 
@@ -199,6 +201,38 @@ def test_walls_without_elements_are_drawn(tmp_path: Path) -> None:
         history = read_history(locate(base))
         told = np.interp(file.times, history["time"], history["strain"])
         assert energy == pytest.approx(told, rel=1e-9, abs=1e-9*told.max())
+
+
+def test_windows_stand_still_with_a_body_at_rest(tmp_path: Path) -> None:
+    """The ring flies over twice its width along the foundation; alone it is followed."""
+    _, base = panels(tmp_path, "ring", "--set", "h=0.05")
+    with FieldFile(base.with_suffix(".vtkhdf")) as file:
+        scene = read_scene(file, range(0, len(file.times), 20))
+    assert scene.is_support.any() and len(set(scene.views())) == 1
+    scene.is_support[:] = False
+    scene.cells = scene.cells[:256]                    # the elements of the ring
+    for position in scene.position:
+        position[scene.starts().max() + 1:] = position[0]
+    assert len(set(scene.views())) > 1
+
+
+@pytest.mark.parametrize("count", [1, 3, 6, 40])
+def test_legends_stay_within_their_panel(count: int) -> None:
+    """As wide as the axes at most, three rows; both names that differ along the axis alone."""
+    times = np.array([0.0, 1.0, 2.0])
+    curves = {f"on A_SURFACE_OF_A_LONG_NAME_{k}, ${axis}$": np.array([0.0, k + 1.0, 0.0])
+              for k in range(count) for axis in "xy"}
+    with matplotlib.rc_context(STYLE):
+        figure = Figure((11.0, 4.0))
+        axes = figure.add_axes((0.1, 0.1, 0.28, 0.5))
+        draw_force(axes, Force(times, curves, has_means=True))
+        legend, panel = axes.get_legend(), axes.get_window_extent()
+        box = legend.get_window_extent()
+    assert box.x1 <= panel.x1 and box.x0 >= panel.x0 - 0.05*panel.width
+    assert box.height <= 0.62*figure.dpi
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert texts[0] == "on A_SURFACE_…, $x$" and texts[2] == "on A_SURFACE_…, $y$"
+    assert (len(texts) == 2*count + 1) or texts[-1] == f"and {2*count + 2 - len(texts)} more"
 
 
 def test_outer_sides_are_those_of_one_element() -> None:
