@@ -70,11 +70,12 @@ BUILDING = +@flock build/.lock $(MAKE) --no-print-directory $(if $(V),,--silent)
 ROOMS := $(wildcard src_f90/*/)
 LIB_SRC := $(wildcard $(addsuffix *.f90,$(filter-out %/app/,$(ROOMS))) \
 	$(addsuffix *.F90,$(filter-out %/app/,$(ROOMS))))
-LIB_C := $(wildcard $(addsuffix *.c,$(ROOMS)))
+LIB_C := $(wildcard $(addsuffix *.c,$(filter-out %/app/,$(ROOMS))))
 BORDER := src_f90/border
 MADE := $(if $(wildcard $(BORDER)/emcon.h),$(addprefix $(BUILD)/made/,emcon_c_types.f90 emcon_c.f90))
 LIB_SRC += $(MADE)
 APP_SRC := $(wildcard src_f90/app/*.f90)
+APP_C := $(wildcard src_f90/app/*.c)
 KERNEL_SRC := $(wildcard tests/kernels/*.f90 tests/kernels/*.F90)
 ifeq ($(LICENSE),permissive)
 UMFPACK_CFLAGS :=
@@ -92,6 +93,7 @@ vpath %.F90 $(ROOMS) tests/kernels
 vpath %.c $(ROOMS)
 objects = $(addprefix $(O)/,$(addsuffix .o,$(basename $(notdir $(1)))))
 LIB_OBJ := $(call objects,$(LIB_SRC)) $(patsubst %,$(O)/%.o,$(notdir $(LIB_C)))
+APP_OBJ := $(call objects,$(APP_SRC)) $(patsubst %,$(O)/%.o,$(notdir $(APP_C)))
 
 # The C functions are made from the header and the procedures that they stand for: written only where
 # they differ, so that an edit of a body makes none of them new.
@@ -199,7 +201,7 @@ $(BUILD)/$(SHARED): $(LIB_OBJ) $(if $(MADE),$(SYMBOLS))
 		$(SHOWN) $(LIBS) $(THREAD_LIBS)
 	$(Q)ln -sf $(@F) $(BUILD)/libemcon.so
 
-$(BUILD)/emcon: $(call objects,$(APP_SRC)) $(BUILD)/libemcon.a
+$(BUILD)/emcon: $(APP_OBJ) $(BUILD)/libemcon.a
 	@echo "  LINK  $@"
 	$(Q)$(FC) $(LDFLAGS_$(MODE)) -o $@ $^ $(LIBS) $(THREAD_LIBS)
 
@@ -317,7 +319,7 @@ $(error Python and C see double: pywrap is for PRECISION=double; app, lib and ke
 endif
 endif
 # The program of the package, with its library beside it.
-$(P)/emcon: $(call objects,$(APP_SRC)) $(BUILD)/$(SHARED)
+$(P)/emcon: $(APP_OBJ) $(BUILD)/$(SHARED)
 	@echo "  LINK  $@"
 	$(Q)mkdir -p $(P) && $(FC) $(LDFLAGS_$(MODE)) -o $@ $^ $(THREAD_LIBS) -Wl,-rpath,'$$ORIGIN/..'
 

@@ -178,7 +178,8 @@ contains
 
       call restart_read(restart, path, error)
       if (.not. allocated(error)) call stepper_load(model%stepper, restart, error)
-      if (.not. allocated(error)) call conditions_exchange(model%stepper, restart, error)
+      if (allocated(error)) return
+      call conditions_exchange(model%stepper, restart, error)
       if (allocated(error)) model%stepper%is_read = .false.    ! there is nothing to work with
    end subroutine model_load
 

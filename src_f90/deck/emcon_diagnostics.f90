@@ -2,6 +2,7 @@
 module emcon_diagnostics
    use emcon_kinds, only : dp
    use emcon_origin, only : origin_t
+   use emcon_printable, only : printable
    use emcon_sort, only : sort_order
    use emcon_text, only : joined, nearest_word, string_t, to_text
    implicit none
@@ -120,19 +121,17 @@ contains
       else
          text = text // "warning: " // item%text
       end if
+      text = printable(text)
    end subroutine line_text
 
    !> `word` in quotes, for a message: cut if long, without what would upset a terminal.
    pure function quoted(word) result(text)
       character(len=*), intent(in) :: word
       character(len=quoted_length(word)) :: text
-      integer :: i
 
       text = adjustl(word)
       if (len_trim(adjustl(word)) > max_word) text(max_word + 1:) = "..."
-      do i = 1, len(text)
-         if (iachar(text(i:i)) < 32 .or. iachar(text(i:i)) == 127) text(i:i) = "?"
-      end do
+      text = printable(text)
       text = "'" // text(:len(text) - 2) // "'"
    end function quoted
 

@@ -1,8 +1,9 @@
-!> What a run will cost, by its first increments: a quarter of a second of them, or three.
+!> What a run will cost, by its first increments: a quarter of a second of them, or three, but no more
+!> than a second of work.
 module emcon_probe
    use, intrinsic :: iso_c_binding, only : c_int
    use emcon_bent_bodies, only : bent_body_find, bent_body_t
-   use emcon_errors, only : error_t
+   use emcon_errors, only : err_interrupt, error_t
    use emcon_files, only : file_remove
    use emcon_kinds, only : dp, int64, wp
    use emcon_march, only : increment_t
@@ -19,12 +20,15 @@ module emcon_probe
    !> So long the probe goes on, and until so many increments are made, but no longer than `most`.
    real(dp), parameter :: least_seconds = 0.25_dp, most_seconds = 1.0_dp
    integer, parameter :: least_increments = 3
+   !> With more entries of the matrix one correction alone may take longer than the probe.
+   integer, parameter :: most_entries = 3000000
    real(wp), parameter :: megabyte = 1024.0_wp**2
 
    !> What the probe has come to.
    type :: probe_t
       integer :: n = 0                           !! increments
       integer :: n_newton = 0
+      logical :: is_late = .false.               !! an increment was given up after `most_seconds`
       real(dp) :: begun = 0.0_dp                 !! CPU time before the first one [s]
       real(dp) :: first = 0.0_dp, last = 0.0_dp  !! of the first and of the last one [s]
       real(dp) :: spent = 0.0_dp                 !! of all [s]
@@ -53,12 +57,21 @@ contains
       logical :: has_files
 
       call row_begin(row, "cost", "cost:")
+      if (n_entry(stepper) > most_entries) then
+         call row_put(row, "not_predicted", n_entry(stepper), " not predicted: with # entries of " &
+            // "the matrix trying an increment takes long; run a few of them")
+         call rows_add(rows, row)
+         return
+      end if
       call scratch_base(base)
       call open_files(recorder, stepper, base, has_files)
       call go(stepper, recorder, has_files, probe, error)
       call remove_files(recorder, base, has_files, probe%ended)
       if (probe%n > 0 .and. .not. allocated(error)) call advise_bending(stepper, rows)
-      if (allocated(error)) then
+      if (probe%is_late .and. probe%n == 0) then
+         call row_put(row, "not_predicted", real(most_seconds, wp), " not predicted: the first " &
+            // "increment takes more than # s of CPU time; run a few of them")
+      else if (allocated(error)) then
          call row_put(row, "failure", error%message, " increment " // to_text(probe%n + 1) // &
             " of the probe fails: #")
       else if (probe%n > 0) then
@@ -95,9 +108,15 @@ contains
       type(increment_t) :: increment
 
       probe%begun = cpu_seconds()
+      stepper%march%newton%deadline = probe%begun + most_seconds
       do while (.not. stepper_is_done(stepper) .and. probe%spent < most_seconds)
          if (probe%spent >= least_seconds .and. probe%n >= least_increments) exit
          call stepper_advance(stepper, increment, error)
+         if (allocated(error)) probe%is_late = error%code == err_interrupt
+         if (probe%is_late) then
+            if (probe%n > 0) deallocate(error)       ! those before tell it
+            exit
+         end if
          if (has_files .and. .not. allocated(error)) call recorder_write(recorder, stepper, &
             increment, cpu_seconds(), error)
          if (allocated(error)) exit
@@ -176,6 +195,16 @@ contains
          ", # entries of the factor")
       call row_put(row, "probe_increments", probe%n, "; by the first # increments")
    end subroutine put_figures
+
+   !> Entries of the matrix of the first step; 0: there is none.
+   pure integer function n_entry(stepper)
+      type(stepper_t), intent(in) :: stepper
+
+      n_entry = 0
+      associate (matrix => stepper%march%system%matrix)
+         if (allocated(matrix%row_start)) n_entry = matrix%row_start(matrix%n_row + 1)
+      end associate
+   end function n_entry
 
    !> Increments of all steps, if none is cut.
    integer function count_all(stepper) result(n)

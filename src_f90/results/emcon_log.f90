@@ -4,6 +4,7 @@
 module emcon_log
    use emcon_errors, only : error_t
    use emcon_files, only : file_close, file_lock, file_open, file_put, file_t, file_truncate
+   use emcon_printable, only : printable
    use emcon_text, only : notes_t
    implicit none
    private
@@ -41,7 +42,7 @@ contains
       character(len=*), intent(in) :: text
 
       if (.not. self%is_open .or. allocated(self%failure)) return
-      call file_put(self%file, text // achar(10), self%failure)
+      call file_put(self%file, printable(text) // achar(10), self%failure)
    end subroutine log_line
 
    !> Append lines that begin with `start`.

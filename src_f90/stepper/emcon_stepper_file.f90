@@ -10,14 +10,16 @@ module emcon_stepper_file
    use emcon_host, only : host_count, host_count_conditions
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
-   use emcon_march, only : march_resume
+   use emcon_march, only : march_free, march_resume, march_t, march_watch
+   use emcon_newton, only : interrupt_interface
    use emcon_pair_record, only : pair_record_t
    use emcon_pair_sums, only : pair_sums_t
    use emcon_restart_data, only : restart_check, restart_exchange, restart_list, restart_offers, &
       restart_rewind, restart_size, restart_t
+   use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_build, stepper_read_source, stepper_t
-   use emcon_text, only : to_text
+   use emcon_text, only : notes_t, to_text
    use emcon_verdict_file, only : verdict_exchange
    implicit none
    private
@@ -38,12 +40,61 @@ contains
    end subroutine stepper_save
 
    !> Build the model of a restart file and put it into the state that was saved. Forces and mass
-   !> are not in the file: `self` has to have them, given for the same deck.
+   !> are not in the file: `self` has to have them, given for the same deck. What is refused leaves
+   !> `self` as it was.
    subroutine stepper_load(self, restart, error, further)
       type(stepper_t), intent(inout) :: self
       type(restart_t), intent(inout) :: restart      !! as it was
       type(error_t), allocatable, intent(out) :: error
       type(further_t), intent(in), optional :: further   !! what it is to do beside
+      type(deck_source_t) :: source
+      type(scene_t) :: scene
+      type(notes_t) :: notes
+      real(wp), allocatable :: until(:)
+      logical :: is_read
+
+      if (allocated(self%march%scheme)) call raise(error, err_input, "the model is built already")
+      if (allocated(error)) return
+      source = self%source
+      scene = self%scene
+      notes = self%notes
+      is_read = self%is_read
+      if (allocated(self%until)) until = self%until
+      call load(self, restart, error, further)
+      if (.not. allocated(error)) return
+      call march_free(self%march)
+      call forget_march(self%march)
+      self%source = source
+      self%scene = scene
+      self%notes = notes
+      self%is_read = is_read
+      call move_alloc(until, self%until)
+   end subroutine stepper_load
+
+   !> As if nothing had been built; who is asked whether to stop remains.
+   subroutine forget_march(march)
+      type(march_t), intent(inout) :: march
+      procedure(interrupt_interface), pointer :: is_interrupted
+
+      is_interrupted => march%is_interrupted
+      call clear(march)
+      if (associated(is_interrupted)) call march_watch(march, is_interrupted)
+
+   contains
+
+      subroutine clear(march)
+         type(march_t), intent(out) :: march     !! as it is by default
+
+         march%revision = 0
+      end subroutine clear
+
+   end subroutine forget_march
+
+   subroutine load(self, restart, error, further)
+      type(stepper_t), intent(inout) :: self
+      type(restart_t), intent(inout) :: restart
+      type(error_t), allocatable, intent(out) :: error
+      type(further_t), intent(in), optional :: further
       type(diagnostics_t) :: diagnostics
 
       call restart_rewind(restart)
@@ -73,7 +124,7 @@ contains
       ! What the last increment has measured, measured anew, differs by roundings.
       call restart_rewind(restart)
       call exchange_state(self, restart)
-   end subroutine stepper_load
+   end subroutine load
 
    !> A later end lies ahead.
    subroutine check_until(self, until, error)
