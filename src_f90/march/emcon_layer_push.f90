@@ -3,8 +3,8 @@
 !>
 !> Source: docs/theory.md, eq. (22c).
 module emcon_layer_push
-   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_force, &
-      constraints_rows, constraints_select
+   use emcon_constraints, only : constraint_place, constraint_set_t, constraints_evaluate, &
+      constraints_force, constraints_rows, constraints_select
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_solve
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
@@ -12,7 +12,7 @@ module emcon_layer_push
    use emcon_layer_type, only : layer_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_pair_sums, only : slave_pushes
-   use emcon_system, only : system_tangent_times
+   use emcon_system, only : system_t, system_tangent_times
    implicit none
    private
    public :: layer_find_push
@@ -34,6 +34,10 @@ contains
       associate (system => self%system, set => self%active%set)
          call constraints_select(opened, pack([(k, k = 1, size(weight))], &
             abs(weight) > 0.0_wp .and. .not. self%acts))
+         ! After a step that is far too large a contact may have nothing in front of it any more.
+         is_singular = .not. all(have_gaps(system, opened%id))
+         self%push = 0.0_wp
+         if (is_singular) return
          opened%lam = weight(opened%id)
          call constraints_evaluate(opened, system, self%motion)
          call constraints_force(opened, 1, self%push)
@@ -53,6 +57,20 @@ contains
          end do
       end associate
    end subroutine layer_find_push
+
+   !> Has each of these contacts an edge in front of it, as gaps were last measured?
+   pure function have_gaps(system, id)
+      type(system_t), intent(in) :: system
+      integer, intent(in) :: id(:)               !! (n) contacts
+      logical :: have_gaps(size(id))
+      integer :: k, pair, i
+
+      do k = 1, size(id)
+         call constraint_place(system, id(k), pair, i)
+         have_gaps(k) = pair == 0
+         if (pair > 0) have_gaps(k) = system%contact(pair)%contact%state(i)%is_near
+      end do
+   end function have_gaps
 
    !> How z moves, and which multipliers of the set that takes: those of contacts that have closed
    !> are `weight`, the others close no gap and open none.
