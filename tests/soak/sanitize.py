@@ -28,7 +28,7 @@ PARTS = {
     "programs": [*TESTS, *(EMBED / f"test_{name}.py" for name in PROGRAMS)],
     "decks": [*TESTS, ROOT / "tests/decks"],
     "runs": [*TESTS, f"{ROOT}/tests/scenes/test_input_decks.py::test_runs"],
-    "fuzzers": [*SOAK, "--cases=40", "decks", "restart"],
+    "fuzzers": [*SOAK, "--cases=40", "decks", "crossed", "restart"],
     "kills": [*SOAK, "--cases=5", "kill"],
 }
 

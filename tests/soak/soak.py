@@ -1,6 +1,6 @@
 """Seeded fuzzers: bad decks, damaged files, calls in any order, killed runs, scenes by chance.
 
-    .venv/bin/python tests/soak/soak.py [--seconds 600] [--seed 1] [decks restart calls kill scenes space]
+    .venv/bin/python tests/soak/soak.py [--seconds 600] [--seed 1] [decks crossed restart calls kill scenes space]
 
 Every case has a seed of its own, which is printed where the case fails: `--seed N --cases 1` and
 the name of the fuzzer repeat it. `make soak` runs all; a few cases of each are in the tests.
@@ -8,6 +8,7 @@ the name of the fuzzer repeat it. `make soak` runs all; a few cases of each are 
 
 import argparse
 import ctypes
+import os
 import pathlib
 import random
 import shutil
@@ -80,6 +81,66 @@ def fuzz_decks(chance, folder):
         out, err = process.communicate(timeout=60)
         assert process.returncode in (0, 2, 3, 130, -signal.SIGTERM), err
         assert_no_crash(max(0, process.returncode), out + err)
+
+
+# ---- crossed ------------------------------------------------------------------------------------
+
+#: Decks that one process reads, one after the other.
+PER_PROCESS = 25
+
+
+def cards(text):
+    """Lists of lines, each with its keyword first."""
+    found = [[]]
+    for line in text.split("\n"):
+        if line.startswith("*") and not line.startswith("**"):
+            found.append([])
+        found[-1].append(line)
+    return found
+
+
+def crossed(decks, chance):
+    """A deck with cards of others put in, in the place of its own, or with their data below its own."""
+    mine = list(chance.choice(decks))
+    for _ in range(chance.randint(1, 4)):
+        other = chance.choice(decks)
+        i, j, n = chance.randrange(len(other)), chance.randrange(len(mine)), chance.choice([1, 1, 1, 2, 4])
+        kind = chance.randrange(5)
+        if kind < 2:
+            mine[j:j] = other[i : i + n]
+        elif kind == 2:
+            mine[j : j + n] = other[i : i + n]
+        elif kind == 3:
+            mine[j] = mine[j][:1] + other[i][1:]
+        elif len(mine) > 1:
+            del mine[j]
+    return "\n".join("\n".join(card) for card in mine)
+
+
+def reader(folder):
+    """The program that reads decks by the library; made once."""
+    program = folder / "read_decks"
+    if not program.exists():
+        library = PROGRAM.parent
+        flags = ["-fsanitize=address,undefined"] if os.environ.get("MODE") == "sanitize" else []
+        subprocess.run(["cc", "-std=c99", *flags, f"-I{ROOT / 'src_f90/border'}",
+                        pathlib.Path(__file__).with_name("read_decks.c"), "-o", program, f"-L{library}",
+                        "-lemcon", f"-Wl,-rpath,{library}"], check=True, timeout=60)  # fmt: skip
+    return program
+
+
+def fuzz_crossed(chance, folder):
+    """Decks of unlike kinds put together are read or refused in words, many in one process."""
+    found = [*(ROOT / "tests/decks").glob("*.inp"), *DECKS.glob("*.inp")]
+    decks = [cards(p.read_text(encoding="latin-1")) for p in sorted(found) if p.stat().st_size < MOST_TEXT]
+    paths = [folder / f"deck{k}.inp" for k in range(PER_PROCESS)]
+    for path in paths:
+        path.write_text(crossed(decks, chance), encoding="latin-1")
+    done = subprocess.run([reader(folder.parent), *paths], capture_output=True, timeout=120,
+                          cwd=ROOT / "tests/decks")
+    said = done.stdout.decode(errors="replace") + done.stderr.decode(errors="replace")
+    assert_no_crash(done.returncode, said)
+    assert done.returncode == 0, said
 
 
 # ---- restart ------------------------------------------------------------------------------------
@@ -262,8 +323,8 @@ def fuzz_kill(chance, folder):
 
 # ---- driver -------------------------------------------------------------------------------------
 
-FUZZERS = {"decks": fuzz_decks, "restart": fuzz_restart, "calls": fuzz_calls, "kill": fuzz_kill,
-           "scenes": fuzz_scenes, "space": fuzz_space}
+FUZZERS = {"decks": fuzz_decks, "crossed": fuzz_crossed, "restart": fuzz_restart, "calls": fuzz_calls,
+           "kill": fuzz_kill, "scenes": fuzz_scenes, "space": fuzz_space}
 
 
 def soak(name, seed, folder, cases=None, seconds=None):

@@ -10,7 +10,7 @@ from random_space import FAULTS, fuzz_space
 from scene_tools import DECKS, PROGRAM, Run
 from soak import FUZZERS, soak
 
-CASES = {"decks": 25, "restart": 12, "calls": 4, "kill": 1, "scenes": 12, "space": 10}
+CASES = {"decks": 25, "crossed": 3, "restart": 12, "calls": 4, "kill": 1, "scenes": 12, "space": 10}
 
 
 @pytest.mark.parametrize("name", FUZZERS)
