@@ -1,6 +1,7 @@
 !> How many dimensions a deck has: those of its elements. What is of the plane alone is refused
 !> where there are three, and for solids of revolution.
 module emcon_deck_dimension
+   use emcon_deck_fields, only : data_open, data_t, next_line
    use emcon_deck_reader, only : card_error, card_t, option_name, reader_t
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
@@ -60,18 +61,41 @@ contains
       other_dimension = n_plane + n_space - n_dim
    end function other_dimension
 
-   !> Dimensions of the first element whose type tells; the plane if none does.
-   pure integer function find_dimension(reader) result(n_dim)
+   !> Dimensions of the first element whose type tells; the plane if none does. Where nodes have a z,
+   !> solids count before elements of the plane: these are then their faces, as generators write.
+   integer function find_dimension(reader) result(n_dim)
       type(reader_t), intent(in) :: reader
-      integer :: i
+      integer :: i, first, own
 
+      first = 0
+      n_dim = 0
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= "ELEMENT") cycle
-         n_dim = type_dimension(option_name(reader%card(i), "TYPE"))
-         if (n_dim > 0) return
+         own = type_dimension(option_name(reader%card(i), "TYPE"))
+         if (first == 0) first = own
+         n_dim = max(n_dim, own)
       end do
-      n_dim = n_plane
+      if (first == n_plane .and. n_dim == n_space) then
+         if (.not. have_z(reader)) n_dim = n_plane
+      end if
+      if (n_dim == 0) n_dim = n_plane
    end function find_dimension
+
+   !> Has the first node a third coordinate?
+   logical function have_z(reader)
+      type(reader_t), intent(in) :: reader
+      type(data_t) :: data
+      integer :: i
+
+      have_z = .false.
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name /= "NODE") cycle
+         call data_open(data, reader%card(i))
+         if (.not. next_line(reader, data)) cycle
+         have_z = data%n > n_space
+         return
+      end do
+   end function have_z
 
    !> Does it have elements of solids of revolution?
    pure logical function is_axial_deck(reader) result(is_axial)

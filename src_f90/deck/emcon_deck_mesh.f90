@@ -262,15 +262,17 @@ contains
          call need_name(reader, card, "TYPE", type_name)
          if (type_name /= "") kind = find_element_kind(kinds, type_name)
          if (kind > 0) return
-         if (type_dimension(type_name) == other_dimension(scene%n_dim)) then
-            call tell_mixed(reader, card, scene, n, type_name)
-            return
-         end if
          is_first = .true.
          do i = 1, i_card - 1
             if (reader%card(i)%name == "ELEMENT") is_first = is_first .and. &
                option_name(reader%card(i), "TYPE") /= type_name
          end do
+         if (type_dimension(type_name) == other_dimension(scene%n_dim)) then
+            if (is_first) call tell_mixed(reader, card, scene, n, type_name)
+            reader%doubt_elements = .true.
+            reader%doubt_names = .true.
+            return
+         end if
          if (any(line_types == type_name) .and. scene%n_dim /= n_space) then
             kind = kind_line
             if (is_first) call card_warning(reader, card, "elements of type " // type_name &
@@ -295,8 +297,6 @@ contains
       type(data_t) :: data
       integer :: label
 
-      reader%doubt_elements = .true.
-      reader%doubt_names = .true.
       own = "elements"
       call data_open(data, card)
       if (next_line(reader, data)) then
@@ -308,7 +308,8 @@ contains
          // trim(scene%kind(scene%element_kind(1))%name) // ","
       call card_error(reader, card, "element type " // type_name // " of " // own // " beside " &
          // first // " of " // to_text(scene%n_dim) // " dimensions: a deck has elements of the " &
-         // "plane or of space, not of both")
+         // "plane or of space, not of both (told once). What Gmsh writes as faces of solids " &
+         // "becomes surfaces by `emcon mesh FILE.msh OUT.inp`; or take these cards out")
    end subroutine tell_mixed
 
    subroutine refuse_type(reader, card, kinds, type_name)
