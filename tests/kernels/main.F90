@@ -61,6 +61,7 @@ program main
    use test_march_contact, only : collect_march_contact
    use test_mortar, only : collect_mortar
    use test_mortar_pair, only : collect_mortar_pair
+   use test_name_index, only : collect_name_index
    use test_newton, only : collect_newton
    use test_node_potential, only : collect_node_potential
    use test_nts, only : collect_nts
@@ -195,6 +196,7 @@ program main
    call run("reduction", collect_reduction)
    call run("system", collect_system)
    call run("line_search", collect_line_search)
+   call run("name_index", collect_name_index)
    call run("newton", collect_newton)
    call run("velocity_update", collect_velocity_update)
    call run("verdict", collect_verdict)

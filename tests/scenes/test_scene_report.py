@@ -2,6 +2,7 @@
 
 import json
 import math
+import resource
 import subprocess
 import sys
 
@@ -117,6 +118,27 @@ def test_a_probe_that_fails_says_why(tmp_path):
     (tmp_path/"hard.inp").write_text(deck)
     (cost,) = report(tmp_path/"hard.inp")["cost"]
     assert "of the probe fails: the analysis stops at time" in cost["text"]
+
+
+def block(n):
+    """A soft block of n by n elements, pulled at a corner by more than it can bear."""
+    node = "".join(f"{1 + i + (n + 1)*j}, {i/n}, {j/n}\n" for j in range(n + 1) for i in range(n + 1))
+    first = [(i, j, 1 + i + (n + 1)*j) for j in range(n) for i in range(n)]
+    element = "".join(f"{1 + i + n*j}, {k}, {k + 1}, {k + n + 2}, {k + n + 1}\n" for i, j, k in first)
+    return (f"*NODE\n{node}*ELEMENT, TYPE=CPE4, ELSET=E\n{element}*MATERIAL, NAME=M\n"
+            "*HYPERELASTIC, NEO HOOKE\n20., 0.01\n*SOLID SECTION, ELSET=E, MATERIAL=M\n"
+            f"*NSET, NSET=BASE, GENERATE\n1, {n + 1}\n*BOUNDARY\nBASE, 1, 2\n*STEP, NLGEOM\n*STATIC\n"
+            f"1., 1.\n*CLOAD\n{(n + 1)**2}, 1, 10.\n*END STEP\n")
+
+
+def test_a_probe_of_an_increment_that_takes_long_ends(tmp_path):
+    """A second of processor time, where the increment alone takes more than ten."""
+    (tmp_path/"long.inp").write_text(block(60))
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    (cost,) = report(tmp_path/"long.inp")["cost"]
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    assert "cpu_seconds" not in cost and "not predicted" in cost["text"]
+    assert after.ru_utime + after.ru_stime - before.ru_utime - before.ru_stime < 5
 
 
 def test_a_log_begins_with_it_and_makes_no_probe(ring, tmp_path):
