@@ -69,7 +69,7 @@ contains
 
       call weighted_init(self, scene, pair, error)
       if (allocated(error)) return
-      call near_list_init(self%near, self%slave%edge, self%master%edge, scene%u0, &
+      call near_list_init(self%near, self%slave%edge, self%master%edge, scene%x, scene%u0, &
          maxval(self%slave%length) + (self%offset + pair%damping%clearance))
       self%farthest_start = maxval(self%slave%length)
       allocate(self%start(self%slave%n_edge + 1), source=1)
@@ -85,7 +85,6 @@ contains
 
       self%options = options
       self%is_dual = options%multiplier == multiplier_dual
-      self%reach = 0.0_wp
       if (.not. allocated(self%slave_corner)) allocate(self%slave_corner(self%slave%n_edge), &
          self%master_corner(self%master%n_edge))
       call chain_corners(self%slave, x, options%normal_angle, self%slave_corner)

@@ -1,18 +1,20 @@
-!> Which master edges each slave node or edge may touch: kept over steps as long as that is safe.
+!> Which master edges are near each slave node or edge: what is near depends on the step alone, the
+!> list of what may be near is kept over steps as long as it is complete.
 !>
-!> Source: docs/theory.md, eq. (15j).
+!> Source: docs/theory.md, section 4.9.
 module emcon_near_list
    use emcon_kinds, only : wp
    use emcon_search, only : box_distance, candidates_t, search_candidates
    use emcon_sort, only : unique_sorted
    implicit none
    private
-   public :: near_list_t, near_list_init, near_list_update
+   public :: near_list_t, near_list_init, near_list_update, near_list_within
 
-   !> Reach of the candidate search as a fraction of the mean master edge, at least; and as a
-   !> multiple of the largest motion expected in one step, at least.
-   real(wp), parameter :: reach_per_edge = 0.5_wp, reach_per_motion = 8.0_wp
-
+   !> What is near lies within this fraction of the mean master edge, or within what two nodes can
+   !> close by the largest motion in the step.
+   real(wp), parameter :: near_per_edge = 0.5_wp, near_per_motion = 2.0_wp
+   !> A list reaches so far, so that it serves for several steps.
+   real(wp), parameter :: list_per_edge = 1.0_wp, list_per_motion = 8.0_wp
    !> Of a reach that round-off does not touch.
    real(wp), parameter :: surely = 0.99_wp
 
@@ -23,36 +25,39 @@ module emcon_near_list
       real(wp), allocatable :: u(:, :)           !! (2, size of `node`) when the list was made
       type(candidates_t) :: candidates
       integer :: n_list = 0                      !! lists made so far
-      !> Up to this distance the list is complete, whenever it was made [L].
-      real(wp) :: depth = 0.0_wp
-      !> As long as no node has moved farther since the last update, the list is empty and stays so
-      !> [L].
+      real(wp) :: reach = 0.0_wp                 !! of the list when it was made; 0: there is none [L]
+      real(wp) :: nearest = 0.0_wp               !! of it: distance along the axes, or `reach` [L]
+      real(wp) :: depth = 0.0_wp                 !! beyond the fractions above [L]
+      real(wp) :: edge_size = 0.0_wp             !! width plus height in the mean, at first [L]
+      !> As long as no node has moved farther since the last update, nothing touches [L].
       real(wp) :: clearance = 0.0_wp
-      real(wp) :: edge_reach = 0.0_wp            !! least reach of the last search, by the edges [L]
    end type near_list_t
 
 contains
 
-   pure subroutine near_list_init(self, item, edge, u0, depth)
+   pure subroutine near_list_init(self, item, edge, x, u0, depth)
       type(near_list_t), intent(out) :: self
       integer, intent(in) :: item(:, :)          !! (1 or 2, n_item) nodes of each slave item
       integer, intent(in) :: edge(:, :)          !! (2, n_edge) nodes of the master edges
-      real(wp), intent(in) :: u0(:, :)           !! (2, n_node)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (2, n_node) at first [L]
       real(wp), intent(in) :: depth              !! [L]
+      real(wp), allocatable :: box(:, :, :)
 
       self%depth = depth
       self%item = item
       self%edge = edge
       self%node = unique_sorted([reshape(item, [size(item)]), reshape(edge, [size(edge)])])
       self%u = u0(:, self%node)
+      call boxes(x, u0, self%edge, box)
+      self%edge_size = sum(box(:, :, 2) - box(:, :, 1))/real(size(box, 2), wp)
    end subroutine near_list_init
 
-   !> Make the list anew if something may have come near: `reach` is the reach of the last search,
-   !> 0 to search in any case.
-   pure subroutine near_list_update(self, x, u0, du, reach)
+   !> Let the list be complete for a motion `du` from `u0`, and `within` no less than up to where an
+   !> edge is near in it: that never falls within a step, so that what acts stays near.
+   pure subroutine near_list_update(self, x, u0, du, within)
       type(near_list_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
-      real(wp), intent(inout) :: reach           !! [L]
+      real(wp), intent(inout) :: within          !! 0 as a step begins [L]
       real(wp) :: step_motion, way
       integer :: i
 
@@ -64,26 +69,49 @@ contains
             way = max(way, w(1)**2 + w(2)**2)
          end associate
       end do
-      step_motion = sqrt(step_motion)
       way = sqrt(way)
-      if (.not. 2.0_wp*(way + step_motion) + self%depth < reach) then
-         call search(self, x, u0, step_motion, reach)
+      step_motion = sqrt(step_motion)
+      within = max(within, &
+         max(near_per_edge*self%edge_size, near_per_motion*step_motion) + self%depth)
+      if (.not. 2.0_wp*way + (within - self%depth) < surely*(self%reach - self%depth)) then
+         call search(self, x, u0, self%depth + max(list_per_edge*self%edge_size, &
+            list_per_motion*step_motion, 2.0_wp*(within - self%depth)))
          way = 0.0_wp
       end if
       self%clearance = 0.0_wp
-      if (size(self%candidates%edge) == 0) self%clearance = max(0.0_wp, &
-         0.5_wp*(surely*reach - self%depth) - way)
+      if (self%nearest - self%depth > near_per_edge*self%edge_size) self%clearance = max(0.0_wp, &
+         0.5_wp*surely*(self%nearest - self%depth) - way)
    end subroutine near_list_update
 
-   !> Surfaces far apart get a reach as large as their distance and an empty list: then nothing is
-   !> done until one has moved half of that.
-   pure subroutine search(self, x, u0, step_motion, reach)
+   !> Is edge `e` near item `i` at x + u: on each axis within `within`? Only edges of its list can
+   !> be.
+   pure logical function near_list_within(self, i, e, x, u, within) result(is_near)
+      type(near_list_t), intent(in) :: self
+      integer, intent(in) :: i                   !! item that is a node, 1..n_item
+      integer, intent(in) :: e                   !! master edge
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in) :: within             !! [L]
+      real(wp) :: at, a, b
+      integer :: k
+
+      is_near = .true.
+      do k = 1, size(x, 1)
+         at = x(k, self%item(1, i)) + u(k, self%item(1, i))
+         a = x(k, self%edge(1, e)) + u(k, self%edge(1, e))
+         b = x(k, self%edge(2, e)) + u(k, self%edge(2, e))
+         is_near = is_near .and. max(min(a, b) - at, at - max(a, b)) <= within
+      end do
+   end function near_list_within
+
+   !> List what lies within `reach`. Surfaces far apart get a reach as large as their distance and an
+   !> empty list: then nothing is done until one has moved half of that.
+   pure subroutine search(self, x, u0, reach)
       type(near_list_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      real(wp), intent(in) :: step_motion
-      real(wp), intent(out) :: reach
+      real(wp), intent(in) :: reach              !! [L]
       real(wp), allocatable :: item(:, :, :), edge(:, :, :)
       real(wp) :: apart
+      integer :: i, k
 
       self%u = u0(:, self%node)
       self%n_list = 1 + mod(self%n_list, huge(self%n_list) - 1)
@@ -91,10 +119,18 @@ contains
       call boxes(x, u0, self%edge, edge)
       apart = box_distance(minval(item(:, :, 1), 2), maxval(item(:, :, 2), 2), &
          minval(edge(:, :, 1), 2), maxval(edge(:, :, 2), 2))
-      self%edge_reach = reach_per_edge*sum(edge(:, :, 2) - edge(:, :, 1))/real(size(edge, 2), wp)
-      reach = max(self%edge_reach, reach_per_motion*step_motion, 0.99_wp*apart) + self%depth
-      call search_candidates(item(:, :, 1), item(:, :, 2), edge(:, :, 1), edge(:, :, 2), reach, &
-         self%candidates)
+      self%reach = max(reach, surely*apart)
+      call search_candidates(item(:, :, 1), item(:, :, 2), edge(:, :, 1), edge(:, :, 2), &
+         self%reach, self%candidates)
+      self%nearest = self%reach
+      associate (list => self%candidates)
+         do i = 1, size(list%start) - 1
+            do k = list%start(i), list%start(i + 1) - 1
+               self%nearest = min(self%nearest, box_distance(item(:, i, 1), item(:, i, 2), &
+                  edge(:, list%edge(k), 1), edge(:, list%edge(k), 2)))
+            end do
+         end do
+      end associate
    end subroutine search
 
    !> Low and high corners (2, n, 2) of the boxes around the nodes of each item.

@@ -38,7 +38,7 @@ module emcon_nts
 
    type, extends(nts_choice_t) :: nts_t
       type(stance_t) :: stance                        !! of the nodes as stencils were chosen:
-      integer :: n_list = 0                           !! by which list of candidates,
+      real(wp) :: chosen_reach = 0.0_wp               !! among edges up to there [L],
       logical :: were_sharp = .false.                 !! with which corners,
       type(start_t), allocatable :: start(:)          !! (n_constraint) and gaps if not smoothed
       real(wp), allocatable :: curvature(:)           !! (n_edge) of the arcs of the master if gaps
@@ -116,18 +116,19 @@ contains
    end subroutine nts_follow_arcs
 
    !> Choose for each slave node the nearest master edge at the start of the step. From the same
-   !> start and the same candidates the choice is the same.
+   !> start and up to the same reach the choice is the same.
    pure subroutine nts_begin_step(self, x, u0, du)
       class(nts_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       integer :: i
 
       call choice_look(self, x, u0, du)
-      if (self%n_list == self%near%n_list .and. (self%were_sharp .eqv. self%is_sharp)) then
+      if (abs(self%chosen_reach - self%reach) <= 0.0_wp .and. &
+         (self%were_sharp .eqv. self%is_sharp)) then
          if (stance_holds(self%stance, self%near%node, x, u0)) return
       end if
       call stance_take(self%stance, self%near%node, x, u0)
-      self%n_list = self%near%n_list
+      self%chosen_reach = self%reach
       self%were_sharp = self%is_sharp
       do i = 1, self%n_constraint
          call choice_make(self, i, x, u0)

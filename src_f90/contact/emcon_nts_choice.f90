@@ -10,7 +10,8 @@ module emcon_nts_choice
    use emcon_interactions, only : contact_pair_t, smoothing_hermite, smoothing_none
    use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
-   use emcon_near_list, only : near_list_init, near_list_t, near_list_update
+   use emcon_near_list, only : near_list_init, near_list_t, near_list_update, &
+      near_list_within
    use emcon_nts_stencil, only : edge_distance, edge_of_sector, is_outside, polygon_stencil, &
       polygon_stencil_t, smooth_stencil, smooth_stencil_t
    use emcon_scene, only : scene_t
@@ -86,7 +87,7 @@ contains
       associate (n => self%n_constraint/self%rule%n_class)
          self%near_item = [(1 + mod(i, n), i = 0, self%n_constraint - 1)]
          call near_list_init(self%near, reshape(self%node(:n), [1, n]), self%master%edge, &
-            scene%u0, self%offset + pair%damping%clearance)
+            scene%x, scene%u0, self%offset + pair%damping%clearance)
       end associate
    end subroutine choice_init
 
@@ -113,7 +114,7 @@ contains
       call self%has_looked(self%near%clearance)
    end subroutine choice_look
 
-   !> Choose for constraint `i` the nearest of its candidates at the start of the step.
+   !> Choose for constraint `i` the nearest of the edges that are near at the start of the step.
    pure subroutine choice_make(self, i, x, u0)
       class(nts_choice_t), intent(inout) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
@@ -125,6 +126,7 @@ contains
       best = huge(best)
       associate (near => self%near%candidates, item => self%near_item(i))
          do k = near%start(item), near%start(item + 1) - 1
+            if (.not. near_list_within(self%near, item, near%edge(k), x, u0, self%reach)) cycle
             call choice_take_nearer(self, i, near%edge(k), x, u0, best)
          end do
       end associate
@@ -151,6 +153,7 @@ contains
          near%start(size(near%start)) = n + 1
       end associate
       self%near%candidates%edge = self%near%candidates%edge(:n)
+      if (n == 0) self%near%nearest = self%near%reach
       self%n_sifted = self%near%n_list
    end subroutine sift
 

@@ -82,18 +82,13 @@ contains
       class(segment_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
 
-      ! Weights ask which nodes are near: a list from earlier steps would make them depend on these.
-      self%nts%reach = 0.0_wp
+      self%nts%reach = self%reach
       self%nts%rounding = self%rounding
       self%nts%is_sharp = self%is_sharp
       call self%nts%begin_step(x, u0, du)
       call weighted_slips(self, x, u0, du)
       self%reach = self%nts%reach
-      ! Searched anew, the list stays empty: its reach grows with the motion and with the edges.
-      associate (near => self%nts%near)
-         call self%has_looked(max(0.0_wp, min(0.2_wp*near%clearance, &
-            0.5_wp*near%clearance - 0.25_wp*near%edge_reach)))
-      end associate
+      call self%has_looked(self%nts%near%clearance)
    end subroutine segment_begin_step
 
    !> The slip of its own node where that is over the surface, else of the other ends of its edges

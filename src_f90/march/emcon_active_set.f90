@@ -6,7 +6,7 @@ module emcon_active_set
    use emcon_dashpots, only : dashpots_idle, dashpots_look, dashpots_restart, dashpots_select, &
       dashpots_t
    use emcon_friction, only : friction_begin, friction_init, friction_select, friction_t
-   use emcon_gaps, only : pair_measure, pair_search
+   use emcon_gaps, only : gaps_forget, pair_measure, pair_search
    use emcon_holding, only : holding_forget, holding_t
    use emcon_kinds, only : wp
    use emcon_motion, only : at_rest, motion_t
@@ -167,6 +167,7 @@ contains
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
 
+      call gaps_forget(system)
       call begin_contact(self, system, motion)
       call friction_begin(self%friction, system, motion, self%was_active)
       call holding_forget(self%holding)
@@ -226,7 +227,7 @@ contains
       integer, intent(in) :: pair
 
       associate (contact => system%contact(pair)%contact)
-         is_empty = contact%reach > 0.0_wp .and. contact%clearance > 0.0_wp &
+         is_empty = contact%clearance > 0.0_wp &
             .and. contact%n_look == self%outlook(pair)%n_look
       end associate
    end function is_empty

@@ -1,5 +1,5 @@
 !> The gaps of all possible contacts, in the order of the constraints: measured for a motion, by
-!> stencils that were chosen before, or by a search that does not depend on earlier ones.
+!> stencils that were chosen before, or by those of a search for it.
 module emcon_gaps
    use emcon_contact, only : gap_state_t
    use emcon_kinds, only : wp
@@ -68,7 +68,7 @@ contains
       end do
    end subroutine gaps_measure
 
-   !> Let the next search begin anew.
+   !> A step begins: nothing is near yet.
    subroutine gaps_forget(system)
       type(system_t), intent(inout) :: system                     !! its contacts
       integer :: i

@@ -681,7 +681,7 @@ contains
       call mortar%measure(scene%x, scene%u0, 0.0_wp*scene%x)
       call check_true(error, .not. any(mortar%state%is_near .or. mortar%state%is_over), "near")
       call check_near(error, mortar%state%gap1, spread(0.0_wp, 1, 3), 0.0_wp, 1.0_wp, "gaps")
-      call check_true(error, mortar%reach > 40.0_wp, "reach")
+      call check_true(error, mortar%near%reach > 40.0_wp, "reach")
       call mortar%area(scene%x, scene%u0, area, length)
       call check_true(error, minval(area) > 0.0_wp, "areas")
    end subroutine test_apart

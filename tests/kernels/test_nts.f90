@@ -285,25 +285,20 @@ contains
       type(block_t) :: lower, upper
       type(nts_t) :: nts
       real(wp), allocatable :: u(:, :), du(:, :)
-      integer :: step, n_list
-      real(wp) :: last
+      integer :: step
 
       call make_two_blocks(scene, 50.0_wp, lower, upper)
       call nts_init(nts, scene, scene%pair(1), error)
       if (allocated(error)) return
       allocate(u, du, source=0.0_wp*scene%x)
       du(2, 11:) = -0.1_wp
-      n_list = 0
-      last = 0.0_wp
       do step = 1, 450
          call nts%begin_step(scene%x, u, du)
-         if (abs(nts%reach - last) > 0.0_wp) n_list = n_list + 1
-         last = nts%reach
          call check_equal(error, size(nts%near%candidates%edge), 0, "candidates in step " &
             // to_text(step))
          u = u + du
       end do
-      call check_true(error, n_list <= 5, "few lists: " // to_text(n_list))
+      call check_true(error, nts%near%n_list <= 5, "few lists: " // to_text(nts%near%n_list))
    end subroutine test_apart
 
    !> Nodes 1/4 above edges of length 1 slide to a side. The first stands at 1/8 of its edge: after
