@@ -4,6 +4,7 @@
 !> later step changes them.
 module emcon_deck_step
    use emcon_amplitudes, only : amplitude_t
+   use emcon_corners, only : corners_find
    use emcon_deck_conditions, only : conditions_carry, conditions_init, conditions_store, &
       conditions_t
    use emcon_deck_contact_damping, only : check_contact_damping
@@ -91,6 +92,7 @@ contains
       call check_damping(reader, scene)
       call check_friction(reader, scene%pair, scene%step, scene%surface%is_nodal)
       call check_contact_damping(reader, scene%pair, scene%step)
+      call corners_find(scene)
       if (n_step == 0 .and. .not. reader%doubt_names) then
          call add_error(reader%log, origin_t(1, 0), "the deck has no *STEP: nothing is to be done")
       end if

@@ -14,10 +14,10 @@ module emcon_march
    use emcon_ledger, only : ledger_init, ledger_measure, ledger_t
    use emcon_march_begin, only : march_begin_step, march_renumber, march_resume
    use emcon_march_control, only : march_controlled
-   use emcon_march_grid, only : easy_increments, grid_whole, march_grid_time, march_is_done, &
-      march_set_time
+   use emcon_march_grid, only : easy_increments, march_grid_time, march_is_done, &
+      march_next_corner, march_set_time, march_span
    use emcon_march_parts, only : march_in_parts
-   use emcon_march_types, only : increment_t, march_t
+   use emcon_march_types, only : increment_t, march_t, watcher_t
    use emcon_motion, only : at_rest, motion_init
    use emcon_newton, only : interrupt_interface
    use emcon_options, only : option_words
@@ -108,11 +108,15 @@ contains
       call layer_free(self%layer)
    end subroutine march_free
 
-   !> From now on `is_interrupted` is asked before each iteration of Newton's method.
-   subroutine march_watch(self, is_interrupted)
+   !> From now on `is_interrupted` is asked before each iteration of Newton's method, and `watcher`,
+   !> which has to stay where it is, is told of each part of an increment.
+   subroutine march_watch(self, is_interrupted, watcher)
       type(march_t), intent(inout) :: self
       procedure(interrupt_interface) :: is_interrupted   !! has the user asked to stop?
+      class(watcher_t), target, optional, intent(inout) :: watcher   !! is told of parts of increments
 
+      nullify(self%watcher)
+      if (present(watcher)) self%watcher => watcher
       self%is_interrupted => is_interrupted
       self%newton%is_interrupted => is_interrupted
    end subroutine march_watch
@@ -140,7 +144,7 @@ contains
                " with a step of a size of its own")
             return
          end if
-         stride = min(state%grid_stride, self%n_grid - state%n_grid)
+         stride = min(state%grid_stride, march_next_corner(self, state%n_grid) - state%n_grid)
          if (self%is_controlled) then
             call march_controlled(self, scene, increment, error)
          else
@@ -222,9 +226,7 @@ contains
 
       associate (step => scene%step(self%state%i_step))
          t0 = march_grid_time(self, step, self%state%n_grid)
-         increment%h = march_grid_time(self, step, n_end) - t0
-         if (n_end < self%n_grid .or. abs(real(n_end, wp)*step%h - step%duration) &
-            <= grid_whole*step%duration) increment%h = real(n_end - self%state%n_grid, wp)*step%h
+         increment%h = march_span(self, step, self%state%n_grid, n_end)
       end associate
       if (allocated(self%before)) deallocate(self%before)
       call march_in_parts(self, scene, t0, increment, error)

@@ -10,7 +10,7 @@ module emcon_march_control
    use emcon_kinds, only : int64, wp
    use emcon_march_accuracy, only : accuracy_keep
    use emcon_march_events, only : events_tell
-   use emcon_march_grid, only : march_part_time, march_size
+   use emcon_march_grid, only : march_next_corner, march_part_time, march_size
    use emcon_march_parts, only : march_attempt, march_match, march_stop
    use emcon_march_types, only : increment_t, march_t, part_t, start_t
    use emcon_scene, only : scene_t
@@ -177,7 +177,7 @@ contains
       if (power < 0) size = size/2_int64**(-power)
       size = max(self%n_least, size)
       n = size - mod(from, size)
-      n = min(n, self%n_grid*self%n_unit - from)
+      n = min(n, march_next_corner(self, int(from/self%n_unit))*self%n_unit - from)
    end function next_units
 
    !> Do boxes about the bodies stay apart for a time `h`? Only then may increments be longer than

@@ -1,14 +1,14 @@
 !> The grid of increments of a step: times are counted in integers, and meet its end exactly.
 module emcon_march_grid
    use emcon_kinds, only : int64, wp
-   use emcon_march_types, only : march_t
+   use emcon_march_types, only : grid_corner_t, march_t
    use emcon_scene, only : scene_t
    use emcon_step_control, only : most_power
    use emcon_steps, only : step_t
    implicit none
    private
    public :: march_count_grid, march_count_increments, march_grid_time, march_is_done, &
-      march_set_time, march_part_time, march_size, grid_whole, easy_increments
+      march_next_corner, march_set_time, march_part_time, march_size, march_span, easy_increments
 
    !> An increment is halved so often at most, unless the deck gives h_min.
    integer, parameter :: default_levels = 12, most_levels = 24
@@ -25,12 +25,9 @@ contains
    pure subroutine march_count_grid(self, step)
       type(march_t), intent(inout) :: self
       type(step_t), intent(in) :: step
-      real(wp) :: ratio, h_max
+      real(wp) :: h_max
 
-      ratio = step%duration/step%h
-      self%n_grid = nint(ratio)
-      if (abs(ratio - real(self%n_grid, wp)) > grid_whole*ratio) self%n_grid = ceiling(ratio)
-      self%n_grid = max(1, self%n_grid)
+      call count_points(self, step)
       h_max = step%h_max
       if (.not. h_max > 0.0_wp) then
          h_max = merge(step%h, step%duration, step%scheme%masses_resist)
@@ -47,6 +44,80 @@ contains
       end if
       call count_units(self, step)
    end subroutine march_count_grid
+
+   !> Number the points of the grid: whole increments and the end of the step, and of increments
+   !> that are automatic the corners of amplitudes too, so that none of them passes one.
+   pure subroutine count_points(self, step)
+      type(march_t), intent(inout) :: self
+      type(step_t), intent(in) :: step
+      type(grid_corner_t) :: next
+      integer :: i
+
+      if (allocated(self%corner)) deallocate(self%corner)
+      allocate(self%corner(0))
+      if (allocated(step%corner) .and. .not. (step%is_direct .or. step%scheme%is_explicit)) then
+         do i = 1, size(step%corner)
+            next = point_at(self, step, step%corner(i))
+            if (next%n > last_point(self)) self%corner = [self%corner, next]
+         end do
+      end if
+      next = point_at(self, step, step%duration)
+      self%n_grid = max(1, next%n)
+      self%corner = pack(self%corner, self%corner%n < self%n_grid)
+   end subroutine count_points
+
+   !> The point of the grid at `time`, after all corners so far.
+   pure function point_at(self, step, time) result(point)
+      type(march_t), intent(in) :: self
+      type(step_t), intent(in) :: step
+      real(wp), intent(in) :: time               !! since the start of the step, > 0 [T]
+      type(grid_corner_t) :: point, base
+      real(wp) :: ratio
+      integer :: n
+
+      base = base_of(self, huge(n))
+      ratio = (time - base%time)/step%h
+      n = nint(ratio)
+      point%is_between = abs(ratio - real(n, wp)) > grid_whole*(time/step%h)
+      if (point%is_between) n = ceiling(ratio)
+      point%n = base%n + n
+      point%time = time
+   end function point_at
+
+   pure integer function last_point(self)
+      type(march_t), intent(in) :: self
+
+      last_point = 0
+      if (size(self%corner) > 0) last_point = self%corner(size(self%corner))%n
+   end function last_point
+
+   !> Where the whole increments begin that reach point `n`: the last corner between such, or the
+   !> start of the step.
+   pure function base_of(self, n) result(base)
+      type(march_t), intent(in) :: self
+      integer, intent(in) :: n                   !! >= 0
+      type(grid_corner_t) :: base
+      integer :: i
+
+      do i = size(self%corner), 1, -1
+         if (.not. self%corner(i)%is_between .or. self%corner(i)%n > n) cycle
+         base = self%corner(i)
+         return
+      end do
+   end function base_of
+
+   !> The first corner after grid point `n`, or the end of the step.
+   pure integer function march_next_corner(self, n) result(next)
+      type(march_t), intent(in) :: self
+      integer, intent(in) :: n                   !! >= 0
+      integer :: i
+
+      next = self%n_grid
+      do i = size(self%corner), 1, -1
+         if (self%corner(i)%n <= n) return
+         next = self%corner(i)%n
+      end do
+   end function march_next_corner
 
    !> Units of time of a step whose increments follow the error or end at events.
    pure subroutine count_units(self, step)
@@ -86,7 +157,7 @@ contains
       done = 0
       stride = 1
       do while (done < march%n_grid)
-         done = done + stride
+         done = min(done + stride, march_next_corner(march, done))
          n = n + 1
          if (mod(n, easy_increments) == 0) stride = min(2*stride, march%most_stride)
       end do
@@ -105,7 +176,10 @@ contains
       type(step_t), intent(in) :: step
       integer, intent(in) :: n                   !! >= 0
 
-      march_grid_time = real(n, wp)*step%h
+      type(grid_corner_t) :: base
+
+      base = base_of(self, n)
+      march_grid_time = base%time + real(n - base%n, wp)*step%h
       if (n >= self%n_grid) march_grid_time = step%duration
    end function march_grid_time
 
@@ -124,20 +198,35 @@ contains
       march_part_time = march_part_time + part*interval(self, step, whole)
    end function march_part_time
 
-   !> Size of the interval of the grid after point `n` [T]: the last one may be shorter than h.
+   !> Size of the interval of the grid after point `n` [T]: the last one, and one before a corner,
+   !> may be shorter than h.
    pure real(wp) function interval(self, step, n)
       type(march_t), intent(in) :: self
       type(step_t), intent(in) :: step
       integer, intent(in) :: n                   !! >= 0
 
+      real(wp) :: start, finish
+
       interval = step%h
-      if (n < self%n_grid - 1 .or. abs(real(self%n_grid, wp)*step%h - step%duration) &
-         <= grid_whole*step%duration) return
-      interval = step%duration - real(n, wp)*step%h
+      start = march_grid_time(self, step, n)
+      finish = march_grid_time(self, step, n + 1)
+      if (finish - start < step%h - grid_whole*finish) interval = finish - start
    end function interval
 
-   !> Size of an increment of `n` units after the first `from` [T]: where it can be without the
-   !> rounding of times.
+   !> Size of an increment from grid point `n` to `n_end`, with no corner between [T]: where it can
+   !> be without the rounding of times.
+   pure real(wp) function march_span(self, step, n, n_end) result(h)
+      type(march_t), intent(in) :: self
+      type(step_t), intent(in) :: step
+      integer, intent(in) :: n, n_end            !! >= 0, > n
+
+      h = real(n_end - n, wp)*step%h
+      if (interval(self, step, n_end - 1) < step%h) h = march_grid_time(self, step, n_end) &
+         - march_grid_time(self, step, n)
+   end function march_span
+
+   !> Size of an increment of `n` units after the first `from`, with no corner between [T]: where it
+   !> can be without the rounding of times.
    pure real(wp) function march_size(self, step, from, n) result(h)
       type(march_t), intent(in) :: self
       type(step_t), intent(in) :: step
@@ -147,7 +236,7 @@ contains
       first = int(from/self%n_unit)
       last = int((from + n - 1)/self%n_unit)
       h = real(n, wp)/real(self%n_unit, wp)*interval(self, step, last)
-      if (last == first .or. last < self%n_grid - 1) return
+      if (last == first) return
       if (interval(self, step, last) < step%h) h = march_part_time(self, step, from + n) &
          - march_part_time(self, step, from)
    end function march_size
@@ -158,11 +247,13 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: time               !! >= 0 [T]
+      type(grid_corner_t) :: base
       integer :: n
 
       associate (state => self%state, step => scene%step(self%state%i_step))
          n = self%n_grid
-         if (time < step%duration) n = min(n, nint(time/step%h))
+         base = base_before(time)
+         if (time < step%duration) n = min(n, base%n + nint((time - base%time)/step%h))
          if (n == self%n_grid - 1 .and. is_same(time, step%duration)) n = self%n_grid
          state%is_off_grid = .not. is_same(time, march_grid_time(self, step, n))
          state%step_time = time
@@ -174,6 +265,19 @@ contains
       end associate
 
    contains
+
+      !> Where the whole increments begin that lead to `time`.
+      pure function base_before(time) result(base)
+         real(wp), intent(in) :: time
+         type(grid_corner_t) :: base
+         integer :: i
+
+         do i = size(self%corner), 1, -1
+            base = base_of(self, self%corner(i)%n)
+            if (base%time <= (1.0_wp + grid_whole)*time) return
+         end do
+         base = grid_corner_t()
+      end function base_before
 
       pure logical function is_same(a, b)
          real(wp), intent(in) :: a, b

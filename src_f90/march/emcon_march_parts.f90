@@ -8,7 +8,7 @@ module emcon_march_parts
    use emcon_kinds, only : wp
    use emcon_locking, only : strainless_element
    use emcon_march_begin, only : march_renumber
-   use emcon_march_step, only : cycling_text, march_step
+   use emcon_march_step, only : cycling_text, march_step, nodes_text
    use emcon_march_types, only : increment_t, march_t, part_t, start_t
    use emcon_mass_return, only : mass_find_troubled, mass_match, mass_return
    use emcon_mechanism_text, only : free_motion_text
@@ -24,8 +24,18 @@ module emcon_march_parts
 
    !> Halvings of an increment after which nodes without mass take it back.
    integer, parameter :: return_level = 3
+   !> Parts of an increment that are tried at most.
+   integer, parameter :: most_parts = 500
    !> Nodes named in a message.
    integer, parameter :: most_named = 10
+
+   !> How an increment goes that is made in parts.
+   type :: parts_t
+      integer :: n = 0                           !! tried so far
+      real(wp) :: h_least = 0.0_wp               !! size of the smallest [T]
+      !> (n_constraint) what acted before the part, and what begins or ends in one of them
+      logical, allocatable :: was_active(:), changes(:)
+   end type parts_t
 
 contains
 
@@ -39,6 +49,7 @@ contains
       type(increment_t), intent(inout) :: increment
       type(error_t), allocatable, intent(out) :: error
       type(part_t) :: part
+      type(parts_t) :: parts
       character(len=:), allocatable :: reason
       integer :: level, place, status
 
@@ -55,19 +66,71 @@ contains
          part%level = level
          call march_attempt(self, scene, part, increment, status, reason, error)
          if (allocated(error)) return
+         call count_part(self, part, level > 0 .or. status /= step_done, parts)
          if (status == step_done) then
             place = place + 2**(self%n_level - level)
             increment%done = scale(real(place, wp), -self%n_level)*increment%h
             if (level > 0 .and. mod(place, 2**(self%n_level - level + 1)) == 0) level = level - 1
-            cycle
+         else
+            level = level + 1
          end if
-         level = level + 1
+         if (parts%n >= most_parts .and. place < 2**self%n_level) then
+            call stop_crawl(self, scene, increment, parts, error)
+            return
+         end if
+         if (status == step_done) cycle
          if (level <= self%n_level) cycle
          call march_stop(self, scene, part, "with h = " // to_text(part%h) // &
             ", the smallest allowed, " // reason, error)
          return
       end do
    end subroutine march_in_parts
+
+   !> A part was tried: count it, and tell of it if there are several.
+   subroutine count_part(self, part, is_cut, parts)
+      type(march_t), intent(inout) :: self
+      type(part_t), intent(in) :: part
+      logical, intent(in) :: is_cut              !! it is a part, or to be cut into some
+      type(parts_t), intent(inout) :: parts
+
+      parts%n = parts%n + 1
+      if (.not. is_cut) return
+      if (parts%n == 1 .or. part%h < parts%h_least) parts%h_least = part%h
+      associate (is_active => self%state%is_active)
+         if (.not. allocated(parts%changes)) then
+            parts%was_active = is_active
+            allocate(parts%changes(size(is_active)), source=.false.)
+         end if
+         parts%changes = parts%changes .or. (parts%was_active .neqv. is_active) .or. &
+            self%active%comes_and_goes
+         parts%was_active = is_active
+      end associate
+      if (associated(self%watcher)) call self%watcher%tell(self%state%increment + 1, &
+         part%start%total_time, parts%n, parts%h_least)
+   end subroutine count_part
+
+   !> The analysis ends, as an increment takes too many parts.
+   subroutine stop_crawl(self, scene, increment, parts, error)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      type(increment_t), intent(in) :: increment
+      type(parts_t), intent(in) :: parts
+      type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: nodes
+      type(part_t) :: last
+
+      last%start%total_time = self%state%time + increment%done
+      nodes = ""
+      if (any(parts%changes)) then
+         call nodes_text(self, scene, parts%changes, nodes)
+         nodes = "; in them contact begins and ends at slave nodes " // nodes
+      end if
+      call march_stop(self, scene, last, "an increment of h = " // to_text(increment%h) // &
+         " was tried in " // to_text(parts%n) // " parts, the smallest of h = " // &
+         to_text(parts%h_least) // ", and " // to_text(100.0_wp*increment%done/increment%h, 3) // &
+         " % of it are done" // nodes // "; give smaller increments from here on, or a coarser " // &
+         "way of contact there: *CONTACT INITIATION, TYPE=PERSISTENT, or less friction", error)
+   end subroutine stop_crawl
 
    !> One step. Where it fails because nodes without mass find no balance these take their mass back
    !> after some halvings, and it is tried again.

@@ -33,7 +33,7 @@ module emcon_march_step
    use emcon_travel, only : largest_motion
    implicit none
    private
-   public :: march_step, cycling_text
+   public :: march_step, cycling_text, nodes_text
 
    !> New overlap beyond this, by the edge, cuts an increment, down to this level of its halvings.
    real(wp), parameter :: deepest_new = 1.2_wp*guard_slack
@@ -319,7 +319,7 @@ contains
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       logical, intent(in) :: is_meant(:)         !! (n_constraint)
-      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable, intent(out) :: text   !! names nodes by their labels
       type(string_t) :: found(size(is_meant))
       integer :: id, n, pair, i
 

@@ -19,7 +19,34 @@ module emcon_march_types
    use emcon_velocity_update, only : velocity_update_t
    implicit none
    private
-   public :: march_t, increment_t, part_t, ending_t, start_t, finding_t
+   public :: march_t, increment_t, part_t, ending_t, start_t, finding_t, grid_corner_t, watcher_t
+
+   !> Somebody who is told how an increment goes that is made in parts.
+   type, abstract :: watcher_t
+   contains
+      procedure(tell_interface), deferred :: tell
+   end type watcher_t
+
+   abstract interface
+      !> A part was tried, in increment number `increment` at `time`: `n_part` of them so far, the
+      !> smallest of size `h_least`.
+      subroutine tell_interface(self, increment, time, n_part, h_least)
+         import :: watcher_t, wp
+         class(watcher_t), intent(inout) :: self
+         integer, intent(in) :: increment
+         real(wp), intent(in) :: time                !! [T]
+         integer, intent(in) :: n_part
+         real(wp), intent(in) :: h_least             !! [T]
+      end subroutine tell_interface
+   end interface
+
+   !> A point of the grid at a corner of an amplitude.
+   type :: grid_corner_t
+      integer :: n = 0                           !! number of the point
+      logical :: is_between = .false.            !! it lies between whole increments: the grid goes
+                                                 !! on from here
+      real(wp) :: time = 0.0_wp                  !! since the start of the step [T]
+   end type grid_corner_t
 
    !> What one increment took.
    type :: increment_t
@@ -94,6 +121,7 @@ module emcon_march_types
       !> Overlap per edge with which a step began that resolves it
       real(wp) :: meant_overlap = 0.0_wp
       integer :: n_grid = 0                      !! grid increments in the step
+      type(grid_corner_t), allocatable :: corner(:)   !! ascending, before its end
       integer :: most_stride = 1                 !! largest increment, in grid increments
       integer :: n_level = 0                     !! halvings allowed
       ! Of steps with increments that follow the error or end at events:
@@ -117,6 +145,7 @@ module emcon_march_types
       type(start_t), allocatable :: before       !! of an increment that was cut
       !> Asked before each iteration, if there is one.
       procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
+      class(watcher_t), pointer :: watcher => null()   !! told of each part, if there is one
    end type march_t
 
 end module emcon_march_types

@@ -21,6 +21,7 @@ module emcon_run
    use emcon_probe, only : probe_cost
    use emcon_report_row, only : report_row_t, rows_json
    use emcon_run_log, only : log_increment, log_start, model_lines
+   use emcon_run_watch, only : run_watch_t
    use emcon_run_phases, only : part_march, part_output, part_read, run_parts_mark, run_parts_t, &
       run_phases_json, run_phases_lines
    use emcon_scene_report, only : scene_report
@@ -295,18 +296,21 @@ contains
 
    !> The increments, from the present state to the end.
    subroutine march_on(run, options, is_interrupted, report, error)
-      type(run_t), intent(inout) :: run
+      type(run_t), intent(inout), target :: run
       type(run_options_t), intent(in) :: options
       procedure(interrupt_interface) :: is_interrupted
       type(run_report_t), intent(inout) :: report
       type(error_t), allocatable, intent(inout) :: error
       type(increment_t) :: increment
+      type(run_watch_t), target :: watch
       logical :: has_stopped
 
       has_stopped = .false.
       if (options%n_thread > 0 .and. .not. allocated(error)) call stepper_set_threads(run%stepper, &
          options%n_thread, error)
-      call march_watch(run%stepper%march, is_interrupted)
+      watch%progress => run%progress
+      watch%log => run%log
+      call march_watch(run%stepper%march, is_interrupted, watch)
       call phases_start(run%stepper%march%system%phases)
       call progress_start(run%progress, real(stepper_fraction(run%stepper), dp), options%is_quiet)
       do while (.not. allocated(error) .and. .not. stepper_is_done(run%stepper))

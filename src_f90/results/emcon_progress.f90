@@ -8,7 +8,7 @@ module emcon_progress
    use emcon_timer, only : wall_seconds
    implicit none
    private
-   public :: progress_t, progress_start, progress_show, progress_end
+   public :: progress_t, progress_start, progress_show, progress_say, progress_end, plain_interval
 
    !> Where the display stands.
    type :: progress_t
@@ -52,18 +52,27 @@ contains
       if (self%is_quiet) return
       now = wall_seconds()
       if (now - self%time_shown < merge(terminal_interval, plain_interval, self%is_terminal)) return
-      self%time_shown = now
       write(line, "(f5.1, '%  t = ', a, '  h = ', a, '  Newton ', i0, '  active ', i0, a)") &
          100.0_dp*fraction, trim(short(time)), trim(short(h)), n_newton, n_active, &
          trim(time_left(self, now, fraction))
+      call progress_say(self, trim(line))
+   end subroutine progress_show
+
+   !> Show a line of text.
+   subroutine progress_say(self, text)
+      type(progress_t), intent(inout) :: self
+      character(len=*), intent(in) :: text
+
+      if (self%is_quiet) return
+      self%time_shown = wall_seconds()
       if (self%is_terminal) then
          ! Blanks wipe what a longer line left.
-         call put(self, achar(13) // line(:max(len_trim(line), self%n_shown)))
-         self%n_shown = len_trim(line)
+         call put(self, achar(13) // text // repeat(" ", max(0, self%n_shown - len(text))))
+         self%n_shown = len(text)
       else
-         call put(self, trim(line) // new_line("a"))
+         call put(self, text // new_line("a"))
       end if
-   end subroutine progress_show
+   end subroutine progress_say
 
    !> ", 1:05 left", from the pace so far; nothing while there is none.
    function time_left(self, now, fraction) result(text)

@@ -4,7 +4,11 @@ module emcon_amplitudes
    use emcon_origin, only : origin_t
    implicit none
    private
-   public :: amplitude_t, find_amplitude_value
+   public :: amplitude_t, amplitude_corners, find_amplitude_value
+
+   !> Slopes that differ by no more than this, by the larger one, are one but for the rounding of
+   !> the table.
+   real(wp), parameter :: slope_noise = sqrt(epsilon(1.0_wp))
 
    !> Factor over time: linear between the points, constant outside.
    type :: amplitude_t
@@ -38,5 +42,22 @@ contains
          value = amplitude%value(i) + slope*(time - amplitude%time(i))
       end if
    end subroutine find_amplitude_value
+
+   !> At which points of its table does an amplitude change its slope?
+   pure function amplitude_corners(amplitude) result(is_corner)
+      type(amplitude_t), intent(in) :: amplitude
+      logical :: is_corner(size(amplitude%time))
+      real(wp) :: slope(0:size(amplitude%time))
+      integer :: i, n
+
+      n = size(amplitude%time)
+      slope = 0.0_wp
+      do i = 1, n - 1
+         slope(i) = (amplitude%value(i + 1) - amplitude%value(i)) &
+            /(amplitude%time(i + 1) - amplitude%time(i))
+      end do
+      is_corner = abs(slope(1:) - slope(:n - 1)) > slope_noise*max(abs(slope(1:)), &
+         abs(slope(:n - 1)))
+   end function amplitude_corners
 
 end module emcon_amplitudes

@@ -90,6 +90,9 @@ module emcon_steps
       logical :: is_direct = .false.                 !! increments as given
       real(wp) :: h = 1.0_wp                         !! first, or fixed, increment [T]
       real(wp) :: duration = 1.0_wp                  !! [T]
+      !> Times since its start at which amplitudes in use have corners, ascending [T]; not
+      !> allocated: there are none
+      real(wp), allocatable :: corner(:)
       real(wp) :: h_min = 0.0_wp                     !! 0: not given
       real(wp) :: h_max = 0.0_wp                     !! 0: not given
       real(wp) :: tolerance = 0.0_wp                 !! error of an increment, relative; 0: any
