@@ -185,8 +185,8 @@ contains
       if (found%body == 0) return
       text = "the body of element " // to_text(found%label) // " is bent"
       if (has_warning(self, text)) return
-      call add_warning(self, text // ", which elements with nodes at their corners alone resist: " &
-         // to_text(found%percent, 2) // " % of its strain energy is in that; " // found%advice)
+      call add_warning(self, text // " and made of linear elements, too stiff by about " // &
+         to_text(found%percent, 2) // " %; " // found%advice)
    end subroutine follow_bending
 
    !> Bodies in each other: the deepest overlap. Of those that no pair brings together a warning

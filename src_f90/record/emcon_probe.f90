@@ -93,8 +93,8 @@ contains
       if (found%body == 0) return
       call row_begin(row, "advice", "body")
       call row_put(row, "body", found%body, " #")
-      call row_put(row, "bending_percent", found%percent, " is bent, which elements with nodes " &
-         // "at their corners alone resist: # % of its strain energy is in that; " // found%advice)
+      call row_put(row, "bending_percent", found%percent, " is bent and made of linear elements, " &
+         // "too stiff by about # %; " // found%advice)
       call rows_add(rows, row)
    end subroutine advise_bending
 

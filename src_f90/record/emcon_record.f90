@@ -110,6 +110,7 @@ contains
       call verdict_end(verdict)
       call verdict_balance_lines(verdict, stepper%scene, stepper%march, lines)
       if (allocated(error)) call log_line(self%log, error%message)
+      call log_lines(self%log, "warning: ", verdict%warnings)
       call log_lines(self%log, "", lines)
       if (.not. allocated(error)) call verdict_write(verdict, stepper%march, &
          self%base // ".json", '"recorded": true', error)

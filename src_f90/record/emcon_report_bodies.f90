@@ -217,7 +217,7 @@ contains
          if (body(i)%mass > 0.0_wp) call put_inertia(body(i), row)
          if (body(i)%speed > 0.0_wp .and. body(i)%n_rigid < body(i)%n_element) then
             call row_put(row, "wave_speed", body(i)%speed, ", wave speed #")
-            call row_put(row, "shortest_transit", body(i)%transit, ", shortest transit #")
+            call row_put(row, "shortest_transit", body(i)%transit, ", wave transit time of the smallest element #")
          end if
          call rows_add(rows, row)
       end do
@@ -232,13 +232,13 @@ contains
       if (.not. allocated(body%low)) return
       do a = 1, size(body%low)
          call row_put(row, "low_" // axes(a:a), body%low(a), &
-            trim(merge(", from #", " #      ", a == 1)))
+            trim(merge(", box from #", " #          ", a == 1)))
       end do
       do a = 1, size(body%high)
          call row_put(row, "high_" // axes(a:a), body%high(a), &
             trim(merge(" to #", " #   ", a == 1)))
       end do
-      call row_put(row, "smallest_distance", body%apart, ", smallest distance of nodes #")
+      call row_put(row, "smallest_distance", body%apart, ", smallest distance between nodes of an element #")
    end subroutine put_place
 
    subroutine put_inertia(body, row)
@@ -287,7 +287,7 @@ contains
       type(body_t), intent(in) :: body
       character(len=:), allocatable, intent(out) :: name
 
-      name = "as the steps say"
+      name = "small or large displacements by NLGEOM"
       if (body%n_linear > 0) name = "linear in part"
       if (body%n_linear == body%n_element) name = "linear"
       if (body%n_corotated > 0) name = "corotated in part"

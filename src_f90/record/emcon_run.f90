@@ -363,6 +363,7 @@ contains
       if (run%saves_end .and. .not. allocated(error)) call save_state(run, error)
       if (allocated(error)) call log_line(run%log, error%message)
       call pass_verdict(run, is_strict, report, lines, error)
+      call log_lines(run%log, "warning: ", report%warnings)
       call log_lines(run%log, "", lines)
       report%closing = lines%item(:lines%n)
       call run_parts_mark(run%parts, part_output)

@@ -142,18 +142,18 @@ contains
          is_dynamic = any(scene%step%scheme%masses_resist)
          call choose("contact", size(system%contact) > 0, "no *CONTACT PAIR, no *CONTACT")
          call choose("guards", size(system%contact) > system%n_pair, &
-            "the pairs hold all nodes that may meet, or GUARD=NO, or there are none")
-         call choose("massless contact nodes", layer%is_on, "not asked for by " // &
-            "*CONTACT INITIATION, TYPE=MASSLESS, or no slave node can be without")
+            "no pairs, both sides of all pairs are held, or GUARD=NO")
+         call choose("massless contact nodes", layer%is_on, "no *CONTACT " // &
+            "INITIATION, TYPE=MASSLESS, or all slave nodes need their mass")
          call choose("velocity update", is_dynamic .and. any(scene%step%initiation == &
-            initiation_velocity_update), "not asked for by *CONTACT INITIATION")
+            initiation_velocity_update), "no *CONTACT INITIATION, TYPE=VELOCITY UPDATE")
          call choose("ties and equations", system%space%linear%n > 0, &
             "no *TIE, no *EQUATION, no *RIGID BODY")
          call choose("inertia", is_dynamic, "all steps are static")
          call choose("large displacements", any(scene%step%nlgeom), "no step has NLGEOM")
          call choose("pressure and other loads", has_loads(scene), "no *CLOAD, *DLOAD, *DSLOAD")
          call choose("stabilization of loose bodies", any(scene%step%stabilizes), &
-            "not asked for by *CONTACT CONTROLS")
+            "no *CONTACT CONTROLS, STABILIZE")
       end associate
 
    contains
@@ -194,7 +194,7 @@ contains
 
       associate (space => stepper%march%system%space, matrix => stepper%march%system%matrix)
          call row_begin(row, "sizes", "step 1:")
-         call row_put(row, "freedoms", count(space%is_alive), " # freedoms")
+         call row_put(row, "freedoms", count(space%is_alive), " # degrees of freedom")
          call row_put(row, "dependent", space%numbering%n_dependent, ", # eliminated")
          call row_put(row, "unknowns", space%numbering%n_unknown, ", # unknowns")
          if (allocated(matrix%row_start)) call row_put(row, "matrix_entries", &
@@ -222,8 +222,8 @@ contains
          call row_put(row, "h", step%h, ": h = #")
          if (step%scheme%is_explicit .and. march%state%i_step == k) call row_put(row, &
             "critical_h", march%state%critical_h, ", critical h = #")
-         call row_put(row, "courant_number", step%h/transit, ", # times the shortest transit")
-         call row_put(row, "recommended_h", transit, "; recommended where waves matter: h = #")
+         call row_put(row, "courant_number", step%h/transit, ", # wave transit times of the smallest element")
+         call row_put(row, "recommended_h", transit, "; to resolve waves: h = #")
          if (step%h > many_transits*transit) call row_put(row, "remark", &
             "waves are not resolved, rigid motion and bending are", "; #")
       end associate
@@ -298,9 +298,10 @@ contains
       transit = shortest_transit(body)
       if (.not. (transit < huge(transit) .and. scene%step(k)%h < transit)) return
       call row_begin(row, "advice", "h is")
-      call row_put(row, "courant_number", scene%step(k)%h/transit, " # of the shortest transit: " &
-         // "contact forces of slave nodes with mass alternate; *CONTACT INITIATION, " // &
-         "TYPE=MASSLESS has smooth ones, in bodies of at least two elements across")
+      call row_put(row, "courant_number", scene%step(k)%h/transit, " # of the wave transit time " &
+         // "of the smallest element: contact forces of nodes with mass jump up and down; " // &
+         "*CONTACT INITIATION, TYPE=MASSLESS makes them smooth on bodies at least two elements " // &
+         "thick")
       call rows_add(rows, row)
    end subroutine advise_massless
 

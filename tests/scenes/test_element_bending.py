@@ -88,7 +88,8 @@ def told_of_bending(runs, mesh, steps):
     path = runs.folder/f"bent{runs.count}.inp"
     path.write_text(mesh.deck("*ELASTIC\n1e4, 0.3\n", steps))
     warnings = elements.run_deck(path, runs.folder/f"bent{runs.count}").verdict["warnings"]
-    told = [re.search("is bent, .* resist: (.*) %", text) for text in warnings]
+    told = [re.search("is bent and made of linear elements, too stiff by about (.*) %", text)
+            for text in warnings]
     return sum(float(found[1])/100 for found in told if found), warnings
 
 
