@@ -267,8 +267,6 @@ contains
    subroutine verdict_end(self, message)
       type(verdict_t), intent(inout) :: self
       character(len=*), intent(in), optional :: message   !! present: the run failed
-      type(notes_t) :: late
-      integer :: i
 
       self%is_complete = .not. present(message)
       self%message = ""
@@ -282,11 +280,37 @@ contains
       if (self%unconverged > half_digits) call note_add(self%reasons, "a residual of " // &
          to_text(self%unconverged, 3) // " was accepted at time " // &
          to_text(self%unconverged_time, 9))
-      call energy_warnings(self%energy, late)
-      do i = 1, late%n
-         call add_warning(self, late%item(i)%text)
-      end do
+      if (self%is_complete) call warn_of_whole(self)
    end subroutine verdict_end
+
+   !> What may be wrong with the run as a whole.
+   subroutine warn_of_whole(self)
+      type(verdict_t), intent(inout) :: self
+      type(notes_t) :: found
+      character(len=:), allocatable :: text
+      integer :: i
+
+      call energy_warnings(self%energy, found)
+      associate (mean => stand_off_mean(self%stand_off))
+         if (mean > told_stand_off .and. mean <= most_stand_off) then
+            call stand_off_text(self, text)
+            call note_add(found, text)
+         end if
+      end associate
+      do i = 1, found%n
+         call add_warning(self, found%item(i)%text)
+      end do
+   end subroutine warn_of_whole
+
+   !> Air across which contact forces act, and what to do about it.
+   pure subroutine stand_off_text(self, text)
+      type(verdict_t), intent(in) :: self
+      character(len=:), allocatable, intent(out) :: text   !! a sentence
+
+      text = "contact forces act across gaps, " // to_text(stand_off_mean(self%stand_off), 2) // &
+         " of an edge in the mean over the impulse: smaller increments, GAP TOLERANCE, or " // &
+         "TYPE=ADMISSIBLE or MASSLESS of *CONTACT INITIATION close them"
+   end subroutine stand_off_text
 
    !> Where bodies are, what contact forces act across, and how far linear sections have turned.
    subroutine judge_geometry(self)
@@ -300,15 +324,9 @@ contains
       if (self%give > far_behind) call note_add(self%reasons, "contact gives way by up to " // &
          to_text(self%give, 3) // " of an edge: STIFFNESS or FACTOR of *CONSTRAINT METHOD is too " &
          // "small")
-      if (stand_off_mean(self%stand_off) > told_stand_off) then
-         text = "contact forces act across gaps, " // to_text(stand_off_mean(self%stand_off), 2) &
-            // " of an edge in the mean over the impulse: smaller increments, GAP TOLERANCE, or " &
-            // "TYPE=ADMISSIBLE or MASSLESS of *CONTACT INITIATION close them"
-         if (stand_off_mean(self%stand_off) > most_stand_off) then
-            call note_add(self%reasons, text)
-         else
-            call add_warning(self, text)
-         end if
+      if (stand_off_mean(self%stand_off) > most_stand_off) then
+         call stand_off_text(self, text)
+         call note_add(self%reasons, text)
       end if
       if (.not. allocated(self%small%rotation)) return
       do i = 1, size(self%small%rotation)

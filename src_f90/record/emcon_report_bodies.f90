@@ -217,7 +217,8 @@ contains
          if (body(i)%mass > 0.0_wp) call put_inertia(body(i), row)
          if (body(i)%speed > 0.0_wp .and. body(i)%n_rigid < body(i)%n_element) then
             call row_put(row, "wave_speed", body(i)%speed, ", wave speed #")
-            call row_put(row, "shortest_transit", body(i)%transit, ", wave transit time of the smallest element #")
+            call row_put(row, "shortest_transit", body(i)%transit, &
+               ", wave transit time of the smallest element #")
          end if
          call rows_add(rows, row)
       end do
@@ -238,7 +239,8 @@ contains
          call row_put(row, "high_" // axes(a:a), body%high(a), &
             trim(merge(" to #", " #   ", a == 1)))
       end do
-      call row_put(row, "smallest_distance", body%apart, ", smallest distance between nodes of an element #")
+      call row_put(row, "smallest_distance", body%apart, &
+         ", smallest distance between nodes of an element #")
    end subroutine put_place
 
    subroutine put_inertia(body, row)

@@ -222,7 +222,8 @@ contains
          call row_put(row, "h", step%h, ": h = #")
          if (step%scheme%is_explicit .and. march%state%i_step == k) call row_put(row, &
             "critical_h", march%state%critical_h, ", critical h = #")
-         call row_put(row, "courant_number", step%h/transit, ", # wave transit times of the smallest element")
+         call row_put(row, "courant_number", step%h/transit, &
+            ", # wave transit times of the smallest element")
          call row_put(row, "recommended_h", transit, "; to resolve waves: h = #")
          if (step%h > many_transits*transit) call row_put(row, "remark", &
             "waves are not resolved, rigid motion and bending are", "; #")
@@ -300,8 +301,8 @@ contains
       call row_begin(row, "advice", "h is")
       call row_put(row, "courant_number", scene%step(k)%h/transit, " # of the wave transit time " &
          // "of the smallest element: contact forces of nodes with mass jump up and down; " // &
-         "*CONTACT INITIATION, TYPE=MASSLESS makes them smooth on bodies at least two elements " // &
-         "thick")
+         "*CONTACT INITIATION, TYPE=MASSLESS makes them smooth on bodies at least two " // &
+         "elements thick")
       call rows_add(rows, row)
    end subroutine advise_massless
 

@@ -32,7 +32,7 @@ def contents(folder):
 
 
 def test_code_0(tmp_path):
-    done = emcon(DECK, "--output", tmp_path, *SHORT)
+    done = emcon(DECK, "--output", tmp_path, *SHORT, "--set=h=0.02")     # without a warning
     assert done.returncode == 0
     assert done.stdout == done.stderr == ""
 
