@@ -12,7 +12,7 @@ module emcon_arcs_plane
 
 contains
 
-   !> Curvature of the arc of an edge, > 0 where it bulges out of the body, 0 if there is none [1/L].
+   !> Curvature of the arc of an edge, > 0 where it bulges out of the body, 0 if it has none [1/L].
    !> At a corner or an end the node after next takes the place of the one that is not there.
    pure real(wp) function arc_curvature(way) result(curvature)
       !> (2, -2:2) from node to node along the surface, the edge itself at 0; 0 beyond a corner or

@@ -155,7 +155,7 @@ contains
       class(contact_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :)   !! (n_dim, n_node) reference positions [L]
       type(contact_options_t), intent(in) :: options   !! as `configure` had them
-      logical, intent(in) :: is_wanted
+      logical, intent(in) :: is_wanted           !! else between edges
 
       if (allocated(self%sagitta)) self%sagitta = 0.0_wp
    end subroutine follow_arcs

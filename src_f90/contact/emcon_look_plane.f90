@@ -6,7 +6,7 @@
 module emcon_look_plane
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
    use emcon_kinds, only : wp
-   use emcon_outline_curves_plane, only : outline_curves_behind, outline_curves_t
+   use emcon_outline_curves_plane, only : outline_curves_overlap, outline_curves_t
    use emcon_outline_plane, only : outline_init, outline_t
    use emcon_overlap_plane, only : crossing_find, length_of, nearest_depth, nearest_t, &
       nearest_update
@@ -344,9 +344,9 @@ contains
    end subroutine try_place
 
    !> Keep what is behind the edge `nearest` if it is the deepest so far. At the end of an outline
-   !> that is open there is no behind. Where edges stand for curves behind them, what is between an
-   !> edge and its curve is no overlap. An edge of a profile is a small part of a line or an arc: it
-   !> counts as no shorter than the edge that is in it.
+   !> that is open there is no behind. What edges overlap by because they stand for curves is taken
+   !> off. An edge of a profile is a small part of a line or an arc: it counts as no shorter than
+   !> the edge that is in it.
    pure subroutine take_deeper(self, x, nearest, e, share, overlap)
       type(look_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
@@ -370,8 +370,8 @@ contains
          if (self%outline%is_profile(nearest%edge)) length = max(length, &
             length_of(between(x, self%u, edge(1, e), edge(2, e))))
          if (.not. depth > overlap%depth*length) return
-         taken_off = outline_curves_behind(self%curves, e, share, x, self%u) &
-            + outline_curves_behind(self%curves, nearest%edge, nearest%share, x, self%u)
+         taken_off = outline_curves_overlap(self%curves, e, nearest%edge, &
+            [share, nearest%share], x, self%u)
          if (taken_off > 0.0_wp) overlap%of_edges = max(overlap%of_edges, depth/length)
          depth = depth - taken_off
          if (.not. depth > overlap%depth*length) return

@@ -104,7 +104,7 @@ contains
       class(mortar_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
       type(contact_options_t), intent(in) :: options
-      logical, intent(in) :: is_wanted
+      logical, intent(in) :: is_wanted           !! else between edges
 
       self%sagitta = 0.0_wp
       if (allocated(self%slave_curvature)) deallocate(self%slave_curvature, self%master_curvature)
@@ -141,7 +141,7 @@ contains
       type(mortar_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       type(frame_t) :: frame
-      real(wp) :: local(2, n_place), dlocal(2, n_place)
+      real(wp), dimension(size(x, 1), n_place) :: local, dlocal
       integer :: e, k, i
 
       do e = 1, self%slave%n_edge
@@ -165,7 +165,7 @@ contains
       integer, intent(in) :: e, k
       type(frame_t), intent(in) :: frame
       real(wp) :: moment(n_moment)
-      real(wp) :: low, high, part, xi, eta, gap, rise, lean(2)
+      real(wp) :: low, high, part, xi, eta, gap, rise, lean, master_lean
       integer :: i
 
       moment = 0.0_wp
@@ -179,10 +179,10 @@ contains
          if (.not. part > 0.0_wp) cycle
          xi = low + (high - low)*self%point(i)
          call frame_point(frame, self%pair(k), xi, eta, gap)
-         lean = frame_lean(frame, xi)
+         call frame_lean(frame, xi, lean, master_lean)
          associate (m => self%pair(k)%edge)
-            rise = arc_rise(self%slave_curvature(e), self%slave%length(e), xi, lean(1)) &
-               + arc_rise(self%master_curvature(m), self%master%length(m), eta, lean(2))
+            rise = arc_rise(self%slave_curvature(e), self%slave%length(e), xi, lean) &
+               + arc_rise(self%master_curvature(m), self%master%length(m), eta, master_lean)
          end associate
          moment = moment + part*frame%length*[rise, rise*xi, 1.0_wp, xi, 1.0_wp/frame%length]
       end do
@@ -318,7 +318,8 @@ contains
       class(mortar_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       type(frame_t) :: frame(0:1)
-      real(wp) :: local(2, n_place), dlocal(2, n_place), part(n_moment, 0:1)
+      real(wp), dimension(size(x, 1), n_place) :: local, dlocal
+      real(wp) :: part(n_moment, 0:1)
       integer :: e, k, i
 
       do e = 1, self%slave%n_edge

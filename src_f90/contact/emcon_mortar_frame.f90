@@ -166,19 +166,34 @@ contains
 
    !> How the ray from the slave point `xi` leans over the normals of both edges, of the master one
    !> as seen from there: sines, > 0 towards the last node.
-   pure function frame_lean(self, xi) result(lean)
+   pure subroutine frame_lean(self, xi, slave, master)
       type(frame_t), intent(in) :: self
       real(wp), intent(in) :: xi                 !! on the slave edge, 0 to 1
-      real(wp) :: lean(2)                        !! slave, master
-      real(wp) :: along(4), above(4), norm, weight(2), a(2)
+      real(wp), intent(out) :: slave, master     !! -1 to 1
+      real(wp), dimension(size(place_master)) :: along, above
+      real(wp) :: norm
 
       call look(self, xi, along, above, norm)
-      weight = [1.0_wp - xi, xi]
-      a = [dot_product(weight, self%edge_along), dot_product(weight, self%edge_above)]
-      lean(1) = a(2)/sqrt(dot_product(a, a))
-      a = [along(2) - along(1), above(2) - above(1)]
-      lean(2) = -a(2)/sqrt(dot_product(a, a))
-   end function frame_lean
+      slave = sine(dot_product([1.0_wp - xi, xi], self%edge_along), &
+         dot_product([1.0_wp - xi, xi], self%edge_above))
+      master = -sine(way(along), way(above))
+
+   contains
+
+      !> From the first node of the master edge to its last.
+      pure real(wp) function way(place)
+         real(wp), intent(in) :: place(:)        !! of master nodes
+
+         way = place(2) - place(1)
+      end function way
+
+      pure real(wp) function sine(beside, opposite)
+         real(wp), intent(in) :: beside, opposite   !! sides of a triangle with a right angle
+
+         sine = opposite/sqrt(beside**2 + opposite**2)
+      end function sine
+
+   end subroutine frame_lean
 
    !> The gap at the slave point `xi` over the master edge and, on a polygon, over its neighbours
    !> where the point looks past its ends: docs/theory.md, eq. (15h).

@@ -105,7 +105,7 @@ contains
       class(nts_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
       type(contact_options_t), intent(in) :: options
-      logical, intent(in) :: is_wanted
+      logical, intent(in) :: is_wanted           !! else between edges
 
       self%stance%is_known = .false.
       self%sagitta = 0.0_wp
@@ -142,7 +142,8 @@ contains
       type(nts_t), intent(in) :: self
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      real(wp) :: local(2, 5), dlocal(2, 5), gap, xi
+      real(wp), dimension(size(x, 1), most_nodes) :: local, dlocal
+      real(wp) :: gap, xi
 
       sagitta = 0.0_wp
       if (self%edge(i) == 0) return

@@ -1,7 +1,7 @@
-!> The curves that edges of outlines stand for: how far they lie inside the body, behind the edge.
+!> The curves that edges of outlines stand for: what polygons may overlap by where curves do not.
 !>
 !> Those of smoothed masters of contact pairs are what gaps are measured to; other edges are chords
-!> of arcs. In front of an edge nothing can be behind it that is not behind its curve.
+!> of arcs.
 !> Source: docs/theory.md, sections 4.3 and 4.11.
 module emcon_outline_curves_plane
    use emcon_arcs_plane, only : arc_curvature, arc_rise
@@ -16,7 +16,7 @@ module emcon_outline_curves_plane
    use emcon_scene, only : scene_t
    implicit none
    private
-   public :: outline_curves_t, outline_curves_init, outline_curves_behind
+   public :: outline_curves_t, outline_curves_init, outline_curves_overlap
 
    !> An edge and what its curve is joined to.
    type :: piece_t
@@ -151,22 +151,41 @@ contains
 
    end function piece_of
 
-   !> How far the curve lies behind its edge, 0 in front of it or where it is straight [L].
-   pure real(wp) function outline_curves_behind(self, e, share, x, u) result(behind)
+   !> What two polygons may overlap by where the curves that they stand for do not, at a place of
+   !> edge `e` and the place next to it of edge `f`, at parts `share` along them [L].
+   !>
+   !> A hollow curve lies behind its edges. Where it meets one that is not, its nodes rest on edges
+   !> of that: behind their curve, by up to their sagitta. It counts up to that of the hollow edge,
+   !> as on a flat one nothing has to overlap.
+   pure real(wp) function outline_curves_overlap(self, e, f, share, x, u) result(overlap)
+      type(outline_curves_t), intent(in) :: self
+      integer, intent(in) :: e, f                !! edges of the outline
+      real(wp), intent(in) :: share(2)           !! 0 to 1: along `e`, along `f`
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
+      real(wp) :: here(2), sagitta(2)
+
+      here = [rise(self, e, share(1), x, u), rise(self, f, share(2), x, u)]
+      sagitta = [rise(self, e, 0.5_wp, x, u), rise(self, f, 0.5_wp, x, u)]
+      overlap = sum(max(0.0_wp, -here))
+      overlap = overlap + max(0.0_wp, min(-minval(sagitta), maxval(sagitta)))
+   end function outline_curves_overlap
+
+   !> How far the curve lies in front of its edge, < 0 behind it [L].
+   pure real(wp) function rise(self, e, share, x, u)
       type(outline_curves_t), intent(in) :: self
       integer, intent(in) :: e                   !! edge of the outline
       real(wp), intent(in) :: share              !! place along it, 0 to 1
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
 
       if (self%number(e) > 0) then
-         behind = piece_behind(self%piece(self%number(e)), share, x, u)
+         rise = piece_rise(self%piece(self%number(e)), share, x, u)
       else
-         behind = arc_behind(self%row(:, e), share, x, u)
+         rise = row_rise(self%row(:, e), share, x, u)
       end if
-   end function outline_curves_behind
+   end function rise
 
-   !> How far the arc lies behind its edge.
-   pure real(wp) function arc_behind(row, share, x, u) result(behind)
+   !> How far the arc lies in front of its edge.
+   pure real(wp) function row_rise(row, share, x, u)
       integer, intent(in) :: row(-1:)            !! (-1:4) of nodes
       real(wp), intent(in) :: share              !! 0 to 1
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
@@ -179,18 +198,18 @@ contains
             if (a > 0 .and. b > 0) way(:, i) = (x(:, b) - x(:, a)) + (u(:, b) - u(:, a))
          end associate
       end do
-      behind = max(0.0_wp, -arc_rise(arc_curvature(way), &
-         sqrt(dot_product(way(:, 0), way(:, 0))), share, 0.0_wp))
-   end function arc_behind
+      row_rise = arc_rise(arc_curvature(way), sqrt(dot_product(way(:, 0), way(:, 0))), share, &
+         0.0_wp)
+   end function row_rise
 
-   !> How far the curve of a smoothed edge lies behind it.
-   pure real(wp) function piece_behind(piece, share, x, u) result(behind)
+   !> How far the curve of a smoothed edge lies in front of it.
+   pure real(wp) function piece_rise(piece, share, x, u)
       type(piece_t), intent(in) :: piece
       real(wp), intent(in) :: share              !! 0 to 1
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
       type(hermite_stencil_t) :: stencil
       type(hermite_point_t) :: point
-      real(wp) :: edge(2, 5), rise(2)
+      real(wp) :: edge(2, 5), way(2)
       integer :: i
 
       edge = 0.0_wp
@@ -204,9 +223,9 @@ contains
          end associate
       end do
       point = hermite_point(hermite_curve(stencil, joined_pieces), edge, share)
-      rise = point%y - share*edge(:, 3)
-      behind = max(0.0_wp, (edge(1, 3)*rise(2) - edge(2, 3)*rise(1)) &
-         /sqrt(dot_product(edge(:, 3), edge(:, 3))))
-   end function piece_behind
+      way = point%y - share*edge(:, 3)
+      piece_rise = -(edge(1, 3)*way(2) - edge(2, 3)*way(1)) &
+         /sqrt(dot_product(edge(:, 3), edge(:, 3)))
+   end function piece_rise
 
 end module emcon_outline_curves_plane

@@ -73,7 +73,7 @@ contains
       class(segment_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
       type(contact_options_t), intent(in) :: options
-      logical, intent(in) :: is_wanted
+      logical, intent(in) :: is_wanted           !! else between edges
 
       call self%nts%follow_arcs(x, options, is_wanted)
    end subroutine segment_follow_arcs

@@ -6,8 +6,8 @@ module emcon_deck_check_contact
    use emcon_deck_check_surfaces, only : mark_nodes
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
-   use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts, &
-      formulation_segment, multiplier_standard
+   use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_segment, &
+      multiplier_standard
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_scene, only : scene_t
@@ -146,9 +146,9 @@ contains
       end associate
    end subroutine check_common_nodes
 
-   !> Some node of each constraint must be free to fulfil it. With both sides a node that is held
-   !> need not: where its master is free that one gives way, and where it is not the nodes of the
-   !> master are slaves too.
+   !> A slave node that is prescribed in part is told. One that is wholly prescribed is where the
+   !> deck puts it: its master gives way, or where nothing can a step in which it is to act fails.
+   !> With both sides the nodes of the master are slaves too.
    subroutine check_freedom(reader, scene, pair)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
@@ -167,18 +167,6 @@ contains
          is_guided = is_guided .or. (is_slave .and. n_free < scene%n_dim)
       end do
       is_guided = is_guided .and. .not. is_held
-      if (any(is_held) .and. pair%formulation == formulation_nts) then
-         call add_error(reader%log, pair%origin, "*CONTACT PAIR: slave node " &
-            // label_list(pack(scene%node_label, is_held)) // " of surface " &
-            // scene%surface(pair%slave)%name // " is over-constrained: all its degrees of " &
-            // "freedom are prescribed, it cannot follow the master; take it off the surface")
-      else if (any(is_held)) then
-         call add_error(reader%log, pair%origin, "*CONTACT PAIR: slave node " &
-            // label_list(pack(scene%node_label, is_held)) // " of surface " &
-            // scene%surface(pair%slave)%name // " is over-constrained: it and the whole master " &
-            // "surface are prescribed, nothing can fulfil its constraint; take its faces off " &
-            // "the surface")
-      end if
       if (any(is_guided)) call add_warning(reader%log, pair%origin, "*CONTACT PAIR: slave node " &
          // label_list(pack(scene%node_label, is_guided)) // " of surface " &
          // scene%surface(pair%slave)%name // " is prescribed in one direction: contact moves it " &

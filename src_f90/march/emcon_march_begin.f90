@@ -2,7 +2,6 @@
 !> moves is held.
 module emcon_march_begin
    use emcon_active_set, only : active_set_overclosure, active_set_t
-   use emcon_contact, only : contact_t
    use emcon_correction, only : correction_reset
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_explicit, only : explicit_prepare
@@ -173,7 +172,6 @@ contains
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       real(dp) :: deadline
-      integer :: i
 
       associate (step => scene%step(self%state%i_step), state => self%state)
          call choose_scheme(self, step)
@@ -191,13 +189,7 @@ contains
          call begin_active(self%active, step, size(scene%rigid) > 0)
          if (.not. step%scheme%masses_resist) call holding_begin(self%active%holding, self%system, &
             scene, state%u)
-         do i = 1, size(self%system%contact)
-            associate (contact => self%system%contact(i)%contact)
-               call contact%suit_steps(any(.not. scene%step%scheme%masses_resist))
-               call contact%configure(scene%x, options_of(i))
-               if (scene%step(1)%resolves_overclosure) call follow_arcs(i, contact)
-            end associate
-         end do
+         call configure_contact(self, scene)
          call softness_begin_step(self%active%softness, self%system, scene, step, error)
          if (allocated(error)) return
          call dashpots_begin_step(self%active%dashpots, self%active%set, self%system, &
@@ -214,35 +206,37 @@ contains
       if (allocated(error)) return
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
       self%revision = self%revision + 1
+   end subroutine prepare
 
-   contains
+   !> Contacts by the options of the step, or of their pairs. What is closed as the analysis begins,
+   !> if that is to be resolved, says whether their gaps are those of arcs.
+   subroutine configure_contact(self, scene)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(contact_options_t) :: options
+      real(wp) :: change
+      integer :: i
 
-      !> The options of a pair, else those of the step.
-      type(contact_options_t) function options_of(i)
-         integer, intent(in) :: i                !! number of the contact
-
-         options_of = scene%step(self%state%i_step)%contact
-         if (i > size(scene%pair)) return
-         if (scene%pair(i)%has_options) options_of = scene%pair(i)%options
-      end function options_of
-
-      !> What is closed as the analysis begins says whether gaps are those of arcs.
-      subroutine follow_arcs(i, contact)
-         integer, intent(in) :: i                !! number of the contact
-         class(contact_t), intent(inout) :: contact
-         real(wp) :: sagitta
-
-         call overclosure_follow_arcs(contact, scene%x, scene%u0, options_of(i), sagitta)
-         if (i > size(scene%pair) .or. .not. sagitta > 0.0_wp .or. self%state%i_step > 1) return
+      do i = 1, size(self%system%contact)
+         options = scene%step(self%state%i_step)%contact
+         if (i <= size(scene%pair)) then
+            if (scene%pair(i)%has_options) options = scene%pair(i)%options
+         end if
+         associate (contact => self%system%contact(i)%contact)
+            call contact%suit_steps(any(.not. scene%step%scheme%masses_resist))
+            call contact%configure(scene%x, options)
+            if (.not. scene%step(1)%resolves_overclosure) cycle
+            call overclosure_follow_arcs(contact, scene%x, scene%u0, options, change)
+         end associate
+         if (i > size(scene%pair) .or. .not. change > 0.0_wp .or. self%state%i_step > 1) cycle
          associate (pair => scene%pair(i))
             call note_add(self%system%notes, "surfaces " // scene%surface(pair%slave)%name // &
                " and " // scene%surface(pair%master)%name // ": gaps are measured between the " // &
                "curves that edges are chords of, for *CONTACT INTERFERENCE; that changes them " // &
-               "by up to " // to_text(sagitta, 3))
+               "by up to " // to_text(change, 3))
          end associate
-      end subroutine follow_arcs
-
-   end subroutine prepare
+      end do
+   end subroutine configure_contact
 
    !> What is closed at the start, and what of it the step is to resolve.
    subroutine begin_overclosure(self, scene, step)

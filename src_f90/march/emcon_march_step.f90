@@ -4,8 +4,9 @@ module emcon_march_step
       step_unbalanced
    use emcon_active_set_solve, only : active_set_solve
    use emcon_amplitudes, only : find_amplitude_value
+   use emcon_blocked_contact, only : blocked_contact_text
    use emcon_constraints, only : constraint_place
-   use emcon_errors, only : error_t
+   use emcon_errors, only : err_analysis, error_t, raise
    use emcon_explicit, only : explicit_begin, explicit_end, explicit_fly
    use emcon_guards, only : guard_slack
    use emcon_judge, only : judge_step, overlap_t
@@ -81,6 +82,12 @@ contains
          "slide and open in turn: their laws were solved for the step linearised, times " // &
          to_text(self%active%friction%n_asked))
       if (any(self%active%is_dropped)) then
+         call blocked_contact_text(self%system, scene, self%active%is_dropped, text)
+         if (len(text) > 0) then
+            call raise(error, err_analysis, "at time " // to_text(part%start%total_time &
+               + part%h, 9) // " " // text)
+            return
+         end if
          call nodes_text(self, scene, self%active%is_dropped, text)
          call note_add(increment%notes, "contact is left out, as it follows from that of other " &
             // "nodes or has lost its surface, at slave nodes " // text)

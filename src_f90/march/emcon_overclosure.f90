@@ -21,7 +21,7 @@ contains
    !> x + u, by either measure.
    subroutine overclosure_follow_arcs(contact, x, u, options, largest)
       class(contact_t), intent(inout) :: contact !! configured
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) as the run begins [L]
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) as all begins [L]
       type(contact_options_t), intent(in) :: options         !! it was configured with
       real(wp), intent(out) :: largest           !! change of a gap that is closed; 0: none [L]
       real(wp), dimension(contact%n_constraint) :: chords, arcs

@@ -51,7 +51,7 @@ def tower(
     lines += ["*BOUNDARY", "BASE0, 2", "S0_MID, 1"]
     lines += [held.format(name=f"S{k}") for k in range(1, top + 1) if held]
     lines += ["*STEP, NLGEOM" if nlgeom else "*STEP", "*STATIC", "1., 1."]
-    if formulation[0] != "NODE TO SURFACE":
+    if formulation[1] and formulation[0] != "NODE TO SURFACE":
         lines += [f"*MORTAR, MULTIPLIER={formulation[1]}"]
     lines += ["*CLOAD"]
     for i in range(n + 1):
@@ -197,6 +197,28 @@ A, GRAV, {gravity}, 0., -1.
     assert ("BAD" in run.errors) == (word == "bad")
 
 
+# ---- slave nodes that the deck moves -------------------------------------------------------------
+
+
+def driven(way, whole):
+    """A square of two by two elements a tenth above another: its lower left node goes down by `way`,
+    the rest is pulled up by 1; the upper side of the other square is held, or free."""
+    text = tower([0.1], ("NODE TO SURFACE, SIDES=ONE", ""), held="", load=0.0)
+    lines = ["*BOUNDARY", "101, 1, 1", f"101, 2, 2, {-way}", "107, 1, 1", "102, 1, 1"]
+    lines += [f"{k}, 2, 2, 1." for k in (102, 103, 107, 108, 109)]
+    lines += [f"{k}, 1, 2" for k in (7, 8, 9) if whole]
+    return text.replace("*CLOAD\n", "\n".join([*lines, "*CLOAD", ""]), 1)
+
+
+def test_slave_node_that_is_driven(tmp_path):
+    """No fault where it does not meet its master, or that is free; what nothing can prevent is told."""
+    for name, way, whole in (("short", 0.09, True), ("free", 0.15, False)):
+        (tmp_path / name).mkdir()
+        assert solve(tmp_path / name, driven(way, whole)).verdict["verdict"] == "good"
+    run = solve(tmp_path, driven(0.15, True), code=3)
+    assert "slave node 101 of surface FOOT1" in run.errors and "behind surface HEAD0" in run.errors
+
+
 # ---- overclosure resolved -------------------------------------------------------------------------
 
 
@@ -299,8 +321,8 @@ def test_press_fit_of_smoothed_arcs(tmp_path):
 
 def test_overlap_of_arcs_is_told(tmp_path):
     """A pair of one node of the rim holds nothing: chords of one circle are no overlap, those of
-    circles that differ by a fortieth of an edge are."""
-    for interference, verdict in ((0.0, "good"), (0.01, "bad")):
+    circles that differ by three sagittas are."""
+    for interference, verdict in ((0.0, "good"), (0.03, "bad")):
         text = press_fit((8, 11), FORMULATIONS[0], interference)
         text = text.replace("*CONTACT INTERFERENCE, SHRINK\n", "")
         text = text.replace("*MATERIAL", "*SURFACE, NAME=RIM, TYPE=NODE\n10006\n*MATERIAL", 1)

@@ -1,0 +1,74 @@
+!> Contacts that nothing can fulfil: a slave node and its whole master are prescribed, and the deck
+!> moves them into each other.
+module emcon_blocked_contact
+   use emcon_active_set, only : touch_tol
+   use emcon_kinds, only : wp
+   use emcon_numbering, only : numbering_t
+   use emcon_scene, only : scene_t
+   use emcon_surface_edges, only : surface_edges
+   use emcon_system, only : system_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: blocked_contact_text
+
+contains
+
+   !> What to say of the first contact that closes at the end of the motion that was last measured,
+   !> but was left out since nothing in it is free.
+   subroutine blocked_contact_text(system, scene, is_dropped, text)
+      type(system_t), intent(in) :: system       !! numbered for the step
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: is_dropped(:)       !! (n_constraint)
+      character(len=:), allocatable, intent(out) :: text   !! empty: there is none
+      integer :: k, i
+
+      text = ""
+      do k = 1, system%n_pair
+         associate (contact => system%contact(k)%contact, pair => scene%pair(k), &
+               first => system%first_constraint(k))
+            do i = 1, contact%n_constraint
+               if (.not. is_dropped(first + i)) cycle
+               if (.not. contact%state(i)%gap1 < -touch_tol*contact%state(i)%size) cycle
+               if (.not. is_bound(system%space%numbering, contact%node(i))) cycle
+               if (.not. surface_is_bound(system, scene, pair%master)) cycle
+               text = "slave node " // to_text(scene%node_label(contact%node(i))) // &
+                  " of surface " // scene%surface(pair%slave)%name // " is " // &
+                  to_text(-contact%state(i)%gap1, 3) // " behind surface " // &
+                  scene%surface(pair%master)%name // &
+                  ": *BOUNDARY moves it and all of that surface into each other, and no contact " // &
+                  "can prevent it; free one of them, or take the node off the surface"
+               return
+            end do
+         end associate
+      end do
+   end subroutine blocked_contact_text
+
+   !> Are all nodes of surface `number` prescribed?
+   logical function surface_is_bound(system, scene, number)
+      type(system_t), intent(in) :: system
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: number              !! of the surface
+      integer, allocatable :: edge(:, :)
+      integer :: i
+
+      call surface_edges(scene, scene%surface(number), edge)
+      surface_is_bound = .true.
+      do i = 1, size(edge, 2)
+         surface_is_bound = surface_is_bound .and. is_bound(system%space%numbering, edge(1, i)) &
+            .and. is_bound(system%space%numbering, edge(size(edge, 1), i))
+      end do
+   end function surface_is_bound
+
+   !> Are all freedoms of a node prescribed, or follow from what is?
+   pure logical function is_bound(numbering, node)
+      type(numbering_t), intent(in) :: numbering
+      integer, intent(in) :: node                !! of the scene
+      integer :: n_dim
+
+      n_dim = size(numbering%unknown, 1)
+      is_bound = all(numbering%column(numbering%start(n_dim*(node - 1) + 1) + 1: &
+         numbering%start(n_dim*node + 1)) == 0)
+   end function is_bound
+
+end module emcon_blocked_contact
