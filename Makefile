@@ -33,7 +33,7 @@ Q := $(if $(V),,@)
 .DELETE_ON_ERROR:
 .SUFFIXES:
 .DEFAULT_GOAL := help
-.PHONY: run test lib app pywrap kernels benches lint bench trade extremes soak sanitize coverage mutants processors docs install uninstall status clean \
+.PHONY: run test lib app pywrap kernels benches lint bench trade extremes soak soak-scenes sanitize coverage mutants processors docs install uninstall status clean \
 	precisions help kernel_objects FORCE
 
 # ---- set-up -------------------------------------------------------------------------------------
@@ -392,6 +392,11 @@ soak: .venv/test.stamp  ## seeded fuzzers, SECONDS=600: decks, damaged files, ca
 	$(BUILDING) app lib
 	@$(PY) tests/soak/soak.py --seconds $(SECONDS)
 	@EMCON_OPENS=20000 $(PY) -m pytest -q tests/embed/test_threads.py
+
+SEEDS ?= 1 500
+soak-scenes: .venv/test.stamp  ## drawn scenes, SEEDS="1 500": verdicts beside a judge by fields
+	$(BUILDING) app
+	@$(PY) tests/soak/scene_table.py --seeds $(SEEDS)
 
 sanitize: .venv/test.stamp  ## build and run under the address and undefined-behaviour sanitizers
 	$(BUILDING) MODE=sanitize PRECISION=double app lib kernels

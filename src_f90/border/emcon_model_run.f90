@@ -153,7 +153,7 @@ contains
       as_increment%n_newton = made%n_newton
       as_increment%n_cut = made%n_cut
       as_increment%n_active = made%n_active
-      as_increment%penetration = real(made%overlap%depth, c_double)
+      as_increment%penetration = real(max(made%overlap%depth, made%stray%depth), c_double)
    end function as_increment
 
    subroutine model_save(model, path, error)

@@ -20,6 +20,8 @@ module emcon_look_plane
    !> On the way, overlap below the smaller of these, by the edge and by the thickness of the
    !> element behind it, is the straight way past a corner.
    real(wp), parameter :: passing = 0.1_wp, passing_thin = 0.2_wp
+   !> By the edge: less than this behind it, the middle of an edge that crosses nothing lies along it.
+   real(wp), parameter :: aligned = sqrt(epsilon(1.0_wp))
    !> Crossings of one edge that are told apart.
    integer, parameter :: most_crossings = 8
 
@@ -216,6 +218,7 @@ contains
       integer :: k, n_around
 
       call find_crossings(self, x, e, other, crossings)
+      if (crossings%n == 0 .and. .not. is_own) call try_middle(self, x, e, other, reach, overlap)
       if (crossings%n == 0) return
       if (is_own) call find_around(self, e, crossings%edge(:crossings%n), reach, n_around)
       do k = 0, crossings%n
@@ -245,6 +248,23 @@ contains
       end function is_inside
 
    end subroutine try_edge
+
+   !> An edge that crosses nothing lies in the other piece all the same where its ends stand exactly on
+   !> the sides of that.
+   pure subroutine try_middle(self, x, e, other, reach, overlap)
+      type(look_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :)
+      integer, intent(in) :: e
+      integer, intent(in) :: other(:)
+      real(wp), intent(in) :: reach              !! [L]
+      type(overlap_t), intent(inout) :: overlap
+      type(overlap_t) :: found
+
+      found = overlap
+      found%depth = max(aligned, overlap%depth)
+      call try_place(self, x, e, 0.5_wp, other, found, reach)
+      if (found%depth > max(aligned, overlap%depth)) overlap = found
+   end subroutine try_middle
 
    !> The edges `crossed`, and those along the outline on either side of them within `reach` of edge
    !> `e`: `self%around`.
@@ -321,13 +341,14 @@ contains
    end function are_neighbours
 
    !> How deep is the place `share` along edge `e` in `other` edges, that are not its neighbours?
-   pure subroutine try_place(self, x, e, share, other, overlap)
+   pure subroutine try_place(self, x, e, share, other, overlap, reach)
       type(look_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e
       real(wp), intent(in) :: share
       integer, intent(in) :: other(:)
       type(overlap_t), intent(inout) :: overlap
+      real(wp), intent(in), optional :: reach    !! nothing farther from an edge counts [L]
       type(nearest_t) :: nearest
       integer :: k
 
@@ -339,6 +360,9 @@ contains
                   + share*between(x, self%u, a(1), a(2)), between(x, self%u, b(1), b(2)))
             end associate
          end do
+         if (present(reach)) then
+            if (nearest%square > reach**2) return
+         end if
       end associate
       call take_deeper(self, x, nearest, e, share, overlap)
    end subroutine try_place

@@ -8,6 +8,7 @@ module emcon_nts
    use emcon_constraint, only : condition_t
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
+   use emcon_guard_slack, only : guard_slack_depth, guard_slack_init, guard_slack_t
    use emcon_hermite_gap_value, only : hermite_gap_value, hermite_slip_value
    use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite, &
       smoothing_none
@@ -37,6 +38,7 @@ module emcon_nts
    end type start_t
 
    type, extends(nts_choice_t) :: nts_t
+      type(guard_slack_t), allocatable :: guard       !! only of a guard
       type(stance_t) :: stance                        !! of the nodes as stencils were chosen:
       real(wp) :: chosen_reach = 0.0_wp               !! among edges up to there [L],
       logical :: were_sharp = .false.                 !! with which corners,
@@ -75,6 +77,10 @@ contains
       allocate(self%sagitta(self%n_constraint), source=0.0_wp)
       self%deepest_start = touch_tol
       self%slack = pair%slack
+      if (pair%slack > 0.0_wp) then
+         allocate(self%guard)
+         call guard_slack_init(self%guard, self%slave, self%master, scene%x, pair%slack)
+      end if
       self%restitution = pair%restitution
       if (.not. pair%slack > 0.0_wp) then
          self%friction = pair%friction
@@ -221,7 +227,8 @@ contains
             stencil%rounding, state%gap0, start%xi, stencil%goes_around)
          state%gap0 = state%gap0 - self%offset - self%sagitta(i)
          state%size = stencil_length(x, stencil%node)
-         state%closed = -self%slack*min(state%size, self%own_size(i))
+         if (allocated(self%guard)) state%closed = -guard_slack_depth(self%guard, &
+            self%chain_node(i), self%edge(i), self%own_size(i), state%size)
          state%is_near = .true.
       end associate
    end function polygon_start

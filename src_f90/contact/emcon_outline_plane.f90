@@ -1,10 +1,11 @@
-!> The outlines of the pieces of a mesh that meet in contact, whatever surfaces the deck names.
+!> The outlines of the pieces of a mesh, whatever surfaces the deck names, and which of them contact
+!> pairs bring together.
 !>
 !> A piece is what hangs together by elements; its outline are the faces that one element alone has,
 !> the body to the left. What a tie covers is no outline; where it ends, two pieces meet in one
 !> place, as neighbours do. Surfaces of edges without elements stand for themselves.
 module emcon_outline_plane
-   use emcon_bodies, only : bodies_find
+   use emcon_bodies, only : bodies_find, bodies_find_tied
    use emcon_chain, only : chain_init, chain_t
    use emcon_errors, only : error_t
    use emcon_joints, only : chain_join
@@ -24,7 +25,8 @@ module emcon_outline_plane
    end type pieces_t
 
    type :: outline_t
-      integer :: n_piece = 0                     !! pieces that meet others or themselves
+      integer :: n_piece = 0                     !! 0: nothing can meet
+      integer, allocatable :: body(:)            !! (n_piece) number of what ties hold together
       integer, allocatable :: start(:)           !! (n_piece + 1) first edge of each piece
       integer, allocatable :: edge(:, :)         !! (2, n_edge) first and last node, piece by piece
       !> (2, n_edge) the ends by their places: nodes, but one number for both nodes of a joint
@@ -53,6 +55,7 @@ contains
       call connect(scene, connected)
       call bodies_find(connected, size(scene%x, 2), piece, n_body)
       call find_meetings(self, scene, piece, number)
+      call find_bodies(self, scene, connected(:, size(scene%element_node, 2) + 1:), piece, number)
       allocate(self%start(self%n_piece + 1), source=1)
       if (self%n_piece > 0) then
          call find_edges(scene, edge, thickness)
@@ -110,7 +113,7 @@ contains
       end do
    end subroutine connect
 
-   !> Which pieces have a part in contact pairs, and which surfaces meet there.
+   !> The pieces, unless there is a single one and no pair, and which surfaces meet.
    subroutine find_meetings(self, scene, piece, number)
       type(outline_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
@@ -121,13 +124,13 @@ contains
       associate (pair => scene%pair)
          self%pair = reshape([pair%slave, pair%master], [2, size(pair)], order=[2, 1])
       end associate
-      allocate(self%on(size(scene%surface)), number(0))
+      allocate(self%on(size(scene%surface)))
       do s = 1, size(scene%surface)
          allocate(self%on(s)%piece(0))
-         if (.not. any(self%pair == s)) cycle
-         call pieces_of(scene, scene%surface(s), piece, self%on(s)%piece)
-         number = unique_sorted([number, self%on(s)%piece])
+         if (any(self%pair == s)) call pieces_of(scene, scene%surface(s), piece, self%on(s)%piece)
       end do
+      number = unique_sorted(pack(piece, piece > 0))
+      if (scene%n_dim /= 2 .or. (size(scene%pair) == 0 .and. size(number) < 2)) number = [integer ::]
       self%n_piece = size(number)
       do s = 1, size(scene%surface)
          associate (on => self%on(s)%piece)
@@ -135,6 +138,25 @@ contains
          end associate
       end do
    end subroutine find_meetings
+
+   !> The bodies of the pieces: what hangs together by ties, too.
+   subroutine find_bodies(self, scene, lone, piece, number)
+      type(outline_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: lone(:, :)          !! (n, n_edge) edges of surfaces; 0: no node
+      integer, intent(in) :: piece(:)            !! (n_node)
+      integer, intent(in) :: number(:)           !! (n_piece) as in `piece`, ascending
+      integer, allocatable :: body(:)
+      integer :: n_body, i, p
+
+      allocate(self%body(self%n_piece), source=0)
+      if (self%n_piece == 0) return
+      call bodies_find_tied(scene, lone(:2, :), body, n_body)
+      do i = 1, size(piece)
+         p = find_sorted(number, piece(i))
+         if (p > 0) self%body(p) = body(i)
+      end do
+   end subroutine find_bodies
 
    !> Does a contact pair bring pieces `p` and `q` together?
    pure logical function outline_meets(self, p, q) result(meets)

@@ -60,7 +60,7 @@ contains
       if (is_done) return
       ! What is damped only grows within a step: the same contacts beside more of it are no cycle.
       if (has_more) self%n_tried = 0
-      if (first_tried(self) > 0 .or. self%n_tried == most_sets) call end_cycle(self, status)
+      if (first_tried(self) > 0 .or. self%n_tried == most_sets) call end_cycle(self, system, status)
       is_done = status /= step_done
    end subroutine active_set_advance
 
@@ -333,9 +333,11 @@ contains
 
    !> The sets since the first coming of the present one are a cycle: end it by a cut; or, where
    !> gaps of the start are held, by closing candidates below those from now on, and if one comes
-   !> back then too by the union, from which nothing is let go any more.
-   pure subroutine end_cycle(self, status)
+   !> back then too by the union, from which nothing is let go any more. A guard beside a contact
+   !> that says nearly the same would pull in the union: there a cut comes first.
+   pure subroutine end_cycle(self, system, status)
       type(active_set_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
       integer, intent(inout) :: status
       integer :: first
 
@@ -351,6 +353,9 @@ contains
          self%has_cycled = .true.
          self%comes_and_goes = .false.
          self%n_tried = 0
+      else if (self%may_cut .and. any(self%comes_and_goes( &
+         system%first_constraint(system%n_pair + 1) + 1:))) then
+         status = step_cycling
       else
          self%only_adds = .true.
          self%n_tried = 0

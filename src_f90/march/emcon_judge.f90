@@ -1,9 +1,9 @@
 !> The judge: after each step, is a body inside another, whatever the constraints say?
 !>
-!> All pieces that contact pairs name are looked at both ways, at the end of the step and, where
-!> they move by much, on the straight way there. Of those that no pair brings together it is told
-!> where they come to overlap. While boxes are apart nothing is done. Source: docs/theory.md,
-!> section 4.11.
+!> All pieces of the mesh are looked at both ways, at the end of the step and, where they move by
+!> much, on the straight way there. Those that no pair brings together may overlap if they do at
+!> the start of a step of the deck, or if ties hold them together. While boxes are apart nothing is
+!> done. Source: docs/theory.md, section 4.11.
 module emcon_judge
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
    use emcon_interactions, only : contact_options_t
@@ -85,6 +85,7 @@ contains
       do p = 1, self%look%outline%n_piece
          call find_later(self, tree, p, n)
          do i = 1, n
+            if (self%look%outline%body(p) == self%look%outline%body(self%other(i))) cycle
             if (outline_meets(self%look%outline, p, self%other(i))) cycle
             overlap = overlap_t()
             call judge_pieces(self, p, self%other(i), x, u, rest, overlap)
@@ -110,10 +111,9 @@ contains
       do p = 1, self%look%outline%n_piece
          call find_later(self, tree, p, n)
          do i = 1, n
+            if (is_excused(self, p, self%other(i))) cycle
             if (outline_meets(self%look%outline, p, self%other(i))) then
                call judge_pieces(self, p, self%other(i), x, u0, du, overlap)
-            else if (is_excused(self, p, self%other(i))) then
-               cycle
             else
                call judge_pieces(self, p, self%other(i), x, u0, du, self%stray)
             end if
@@ -155,12 +155,16 @@ contains
       end do
    end subroutine find_later
 
-   !> May pieces `p` and `q` overlap, as they did at first, or is it one piece with itself?
+   !> May `p` and `q` overlap, without a pair: as at first, or as parts of one body?
    pure logical function is_excused(self, p, q)
       type(judge_t), intent(in) :: self
       integer, intent(in) :: p, q                !! p <= q
 
-      is_excused = p == q .or. any(self%excused%first == p .and. self%excused%second == q)
+      associate (body => self%look%outline%body)
+         is_excused = body(p) == body(q) .or. &
+            any(self%excused%first == p .and. self%excused%second == q)
+      end associate
+      if (is_excused) is_excused = .not. outline_meets(self%look%outline, p, q)
    end function is_excused
 
    !> Smallest distance of the boxes of two pieces that are looked at, by the axis where it is

@@ -9,6 +9,7 @@ module emcon_verdict
       energy_start, energy_warnings, energy_watch_t
    use emcon_far_nodes, only : far_element_find
    use emcon_force_scatter, only : force_scatter_t, scatter_follow
+   use emcon_guards, only : overlap_bar, touching_bar
    use emcon_kinds, only : wp
    use emcon_locking, only : locking_advice, locking_element
    use emcon_ledger, only : ledger_t
@@ -23,14 +24,13 @@ module emcon_verdict
    implicit none
    private
    public :: verdict_t, verdict_start, verdict_update, verdict_move, verdict_end, &
-      verdict_is_good, verdict_is_failure, verdict_law_violation, verdict_has_stray, touching
+      verdict_is_good, verdict_is_failure, verdict_law_violation
 
    !> Largest relative residual that is accepted where rounding ends Newton's method early: half of
    !> the digits are left.
    real(wp), parameter :: half_digits = sqrt(epsilon(1.0_wp))
-   !> So far, per edge, bodies may be in each other: corners of master surfaces are rounded over a
-   !> tenth of that, coordinates of decks by less. And so far that the run has failed.
-   real(wp), parameter :: touching = 1.0e-3_wp, far_behind = 0.1_wp
+   !> So far in each other, per edge, bodies make the run a failure.
+   real(wp), parameter :: far_behind = 0.1_wp
    !> What contact gives way by is told; so many times that is deeper, whichever edge counts.
    real(wp), parameter :: most_give = 2.0_wp
    !> The laws of contact and friction may be missed by this part of the largest force; forces that
@@ -41,13 +41,17 @@ module emcon_verdict
    real(wp), parameter :: told_stand_off = 0.1_wp, most_stand_off = 0.5_wp
    !> Rotation [rad] beyond which linear sections are wrong by a fifth.
    real(wp), parameter :: most_turn = 0.2_wp
-   character(len=*), parameter :: stray_words = ", which no contact pair brings together, overlap"
+   character(len=*), parameter :: unpaired = ": no contact pair brings the two together; name " // &
+      "them in a *CONTACT PAIR, or all by *CONTACT"
    !> Different warnings that are kept; others are counted only.
    integer, parameter :: most_warnings = 20
 
    !> Running figures, and how the run ended.
    type :: verdict_t
       type(energy_watch_t) :: energy
+      !> So far, per edge, bodies may be in each other: corners of master surfaces are rounded over a
+      !> tenth of that, coordinates of decks by less.
+      real(wp) :: bar = touching_bar
       real(wp) :: deepest = 0.0_wp               !! penetration per edge
       real(wp) :: deepest_time = 0.0_wp          !! [T]
       real(wp) :: of_edges = 0.0_wp              !! of edges that stand for curves, per edge
@@ -83,6 +87,7 @@ contains
       type(march_t), intent(in) :: march
 
       call energy_start(self%energy, march%ledger)
+      if (size(march%system%contact) > march%system%n_pair) self%bar = overlap_bar
       self%place = ""
       self%message = ""
       call small_range_init(self%small, terms_solid(march%system%term))
@@ -189,30 +194,24 @@ contains
          to_text(found%percent, 2) // " %; " // found%advice)
    end subroutine follow_bending
 
-   !> Bodies in each other: the deepest overlap. Of those that no pair brings together a warning
-   !> tells, for the first time of two of them.
+   !> Bodies in each other: the deepest overlap, of those that no pair brings together as well.
    subroutine follow_overlaps(self, scene, march, increment)
       type(verdict_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(march_t), intent(in) :: march
       type(increment_t), intent(in) :: increment
-      character(len=:), allocatable :: text, place
 
-      associate (body => march%system%space%body, overlap => increment%overlap, &
-            stray => increment%stray, time => march%state%time)
-         self%of_edges = max(self%of_edges, overlap%of_edges)
-         if (overlap%depth > self%deepest) then
-            self%deepest = overlap%depth
-            self%deepest_time = time
-            call overlap_text(overlap, scene%node_label, body, self%place)
+      self%of_edges = max(self%of_edges, increment%overlap%of_edges)
+      associate (overlap => increment%overlap, stray => increment%stray)
+         if (max(overlap%depth, stray%depth) <= self%deepest) return
+         self%deepest = max(overlap%depth, stray%depth)
+         self%deepest_time = march%state%time
+         if (overlap%depth >= stray%depth) then
+            call overlap_text(overlap, scene%node_label, march%system%space%body, self%place)
+         else
+            call overlap_text(stray, scene%node_label, march%system%space%body, self%place)
+            self%place = self%place // unpaired
          end if
-         if (.not. stray%depth > touching) return
-         text = "bodies " // to_text(min(body(stray%node), body(stray%edge(1)))) // " and " // &
-            to_text(max(body(stray%node), body(stray%edge(1)))) // stray_words
-         if (has_warning(self, text)) return
-         call overlap_text(stray, scene%node_label, body, place)
-         call add_warning(self, text // " at time " // to_text(time, 9) // ", " // place // &
-            ": name them in a *CONTACT PAIR, or all by *CONTACT")
       end associate
    end subroutine follow_overlaps
 
@@ -340,7 +339,7 @@ contains
    pure real(wp) function most_overlap(self)
       type(verdict_t), intent(in) :: self
 
-      most_overlap = touching + most_give*self%give
+      most_overlap = self%bar + most_give*self%give
       if (self%give <= far_behind) most_overlap = min(most_overlap, far_behind)
    end function most_overlap
 
@@ -367,17 +366,5 @@ contains
       missed = 0.0_wp
       if (self%largest_push > 0.0_wp) missed = self%law_missed/self%largest_push
    end function verdict_law_violation
-
-   !> Was there an overlap of bodies that no pair brings together?
-   pure logical function verdict_has_stray(self)
-      type(verdict_t), intent(in) :: self
-      integer :: i
-
-      verdict_has_stray = .false.
-      do i = 1, self%warnings%n
-         verdict_has_stray = verdict_has_stray .or. &
-            index(self%warnings%item(i)%text, stray_words) > 0
-      end do
-   end function verdict_has_stray
 
 end module emcon_verdict

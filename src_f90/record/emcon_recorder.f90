@@ -255,7 +255,8 @@ contains
             real(ledger%momentum, dp), &
             real(ledger%angular, dp), &
             real(increment%n_active, dp), real(increment%n_newton, dp), &
-            real(increment%n_cut, dp), real(increment%overlap%depth, dp), &
+            real(increment%n_cut, dp), &
+            real(max(increment%overlap%depth, increment%stray%depth), dp), &
             real(increment%stand_off%largest, dp), cpu, pair_values(stepper)], error)
          if (allocated(error)) return
          self%n_row = self%n_row + 1

@@ -11,7 +11,7 @@ module emcon_verdict_lines
    use emcon_stand_off, only : stand_off_mean
    use emcon_step_control, only : control_sizes, n_why, why_text
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
-   use emcon_verdict, only : touching, verdict_has_stray, verdict_law_violation, verdict_t
+   use emcon_verdict, only : verdict_law_violation, verdict_t
    implicit none
    private
    public :: verdict_balance_lines, verdict_line, guard_advice
@@ -62,8 +62,7 @@ contains
             line = line // "contact gives way by up to " // to_text(self%give, 3) // &
                " of an edge and no more penetrates, "
          else if (size(self%largest_force) > 0) then
-            line = line // "nothing penetrates" // trim(merge(" where contact pairs are", &
-               repeat(" ", 24), verdict_has_stray(self))) // ", "
+            line = line // "nothing penetrates, "
          end if
       end if
       line = line // "all residuals are within the tolerance"
@@ -171,7 +170,7 @@ contains
          call note_add(lines, "overlap checked: " // to_text(outline%n_piece) // " bodies, " // &
             to_text(size(outline%edge, 2)) // " edges; deepest penetration " // &
             to_text(self%deepest, 3) // " of an element")
-         if (self%of_edges > touching) call note_add(lines, "edges of curved surfaces " // &
+         if (self%of_edges > self%bar) call note_add(lines, "edges of curved surfaces " // &
             "overlap by up to " // to_text(self%of_edges, 3) // &
             " of their length, the curves that they are chords of do not")
       end associate

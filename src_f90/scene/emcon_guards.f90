@@ -2,7 +2,7 @@
 !>
 !> A pair holds the nodes of its slave, or means of gaps; a corner of the master may go in between
 !> two of them. For each direction in which no pair holds the nodes themselves a guard does, from a
-!> small depth on.
+!> small depth on: a corner at once, a node of a smooth side where means of gaps have failed.
 !> Source: docs/theory.md, section 4.11.
 module emcon_guards
    use emcon_interactions, only : contact_pair_t, formulation_nts
@@ -11,11 +11,14 @@ module emcon_guards
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    implicit none
    private
-   public :: guards_find, guard_slack
+   public :: guards_find, guard_slack, corner_slack, overlap_bar, touching_bar
 
-   !> So far a node may go in, by the length of the edge: polygons of coarse curved surfaces, and
+   !> So far, by the edge, bodies may be in each other: where nodes are held themselves, and where
+   !> gaps are closed in the mean, or on one side, with guards for the rest.
+   real(wp), parameter :: touching_bar = 1.0e-3_wp, overlap_bar = 2.0e-2_wp
+   !> So far a node may go in: a corner, and any other one. Polygons of coarse curved surfaces, and
    !> gaps that are closed in the mean, stay above it.
-   real(wp), parameter :: guard_slack = 0.05_wp
+   real(wp), parameter :: corner_slack = 0.8_wp*touching_bar, guard_slack = 0.05_wp
 
 contains
 

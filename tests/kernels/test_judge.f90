@@ -39,7 +39,8 @@ contains
          test_case_t("chords of one circle, and a circle pushed in", test_circles), &
          test_case_t("a dent is no arc", test_dent), &
          test_case_t("an edge of a profile counts as what is in it", test_profile), &
-         test_case_t("bodies without a pair are not looked at", test_no_pair)]
+         test_case_t("bodies that no pair brings together", test_no_pair), &
+         test_case_t("a block in its twin, no node of either inside", test_in_line)]
    end subroutine collect_judge
 
    !> Block 1 on [0, 4] x [0, 1] of 4 x 1 elements, top the master; block 2 of `n` elements on
@@ -411,12 +412,30 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(overlap_t) :: overlap
+      type(judge_t) :: judge
 
       call make_scene(scene, [1.3_wp, 0.5_wp], [1.0_wp, 1.0_wp], [1, 1], .false.)
       deallocate(scene%pair)
       allocate(scene%pair(0))
       call judged(scene, overlap)
       call check_equal(error, overlap%node, 0, "no pair")
+      call judge_init(judge, scene)
+      call judge_step(judge, scene%x, scene%u0, 0.0_wp*scene%u0, overlap)
+      call check_near(error, judge%stray%depth, 0.5_wp, 4.0_wp*eps, 1.0_wp, "stray")
    end subroutine test_no_pair
+
+   !> Square 2 has the sides of block 1 and stands in it to a quarter: nothing crosses.
+   subroutine test_in_line(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+
+      call make_scene(scene, [0.0_wp, 0.75_wp], [4.0_wp, 1.0_wp], [1, 1], .false.)
+      call judged(scene, overlap)
+      call check_near(error, overlap%depth, 0.25_wp, 4.0_wp*eps, 1.0_wp, "in line")
+      call make_scene(scene, [0.0_wp, 1.0_wp], [4.0_wp, 1.0_wp], [1, 1], .false.)
+      call judged(scene, overlap)
+      call check_equal(error, overlap%node, 0, "on top")
+   end subroutine test_in_line
 
 end module test_judge

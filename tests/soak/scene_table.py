@@ -45,7 +45,9 @@ def judge_seed(seed, folder, patience=PATIENCE):
         return result | {"verdict": "stopped", "why": "time limit", "seconds": patience}
     result["seconds"] = round(time.monotonic() - began, 2)
     said = done.stdout + done.stderr
-    if done.returncode not in (0, 3) or CRASH.search(said):
+    if CRASH.search(said):
+        return result | {"verdict": "stopped", "why": "crash"}
+    if done.returncode not in (0, 3):
         return result | {"verdict": "stopped", "why": f"exit code {done.returncode}: {said[-300:]}"}
     run = Run(folder / "scene", done.stderr)
     verdict = run.verdict
