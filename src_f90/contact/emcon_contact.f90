@@ -3,7 +3,7 @@
 !> A formulation chooses, once per step, what each constraint is made of (its stencil), and gives
 !> its value, discrete gradient and derivatives. Which constraints act is not its business.
 module emcon_contact
-   use emcon_constraint, only : condition_t, constraint_t
+   use emcon_constraint, only : condition_normal, condition_t, constraint_t
    use emcon_interactions, only : contact_damping_t, contact_options_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
@@ -34,12 +34,17 @@ module emcon_contact
       real(wp) :: gap1 = 0.0_wp
       real(wp) :: size = 0.0_wp
       real(wp) :: closed = 0.0_wp                     !! the gap at which it acts, < 0: a guard [L]
+      !> So much of friction goes to another node by the last choice of stencils than by the one
+      !> before, 0 to 1
+      real(wp) :: slip_shift = 0.0_wp
    end type gap_state_t
 
    type, abstract, extends(constraint_t) :: contact_t
       real(wp) :: rounding = 0.0_wp                   !! of corners, as a fraction of a master edge
       logical :: may_sharpen = .false.                !! of polygons: convex corners are rounded
       logical :: is_sharp = .false.                   !! but not in this step
+      logical :: pushes_at_end = .false.              !! forces act at the end of this step, else
+                                                      !! all over it
       logical :: meets_statics = .false.              !! a step of the deck is static
       logical :: may_leave = .false.                  !! constraints lose their surface, in a step
       logical :: gives_way = .false.                  !! it stores what it takes: a penalty
@@ -232,11 +237,15 @@ contains
 
       if (motion%pose%is_gradient .and. .not. motion%pose%place > 0.0_wp) then
          call from_start(self, wanted, motion, target, item)
+         call find_normals(item)
          return
       end if
       if (.not. pose_is_equilibrium(motion%pose) .or. any(item%rubs)) call self%evaluate(wanted, &
          motion%x, motion%u0, motion%du, target, item)
-      if (.not. (pose_is_equilibrium(motion%pose) .or. motion%pose%pushes_at_end)) return
+      if (.not. (pose_is_equilibrium(motion%pose) .or. motion%pose%pushes_at_end)) then
+         call find_normals(item)
+         return
+      end if
       gap0 = item%gap0
       dgap = item%dgap
       if (any(item%rubs)) over = item
@@ -249,10 +258,21 @@ contains
          item(k)%slip = over(k)%slip
          item(k)%t1 = over(k)%t1
       end do
+      call find_normals(item)
       if (pose_is_equilibrium(motion%pose)) return
       item%gap0 = gap0
       item%dgap = dgap
    end subroutine linearise
+
+   !> The normal forces of integrated gaps that rub.
+   pure subroutine find_normals(item)
+      type(condition_t), intent(inout) :: item(:)
+      integer :: k
+
+      do k = 1, size(item)
+         if (item(k)%rubs .and. item(k)%is_mean) item(k)%normal = condition_normal(item(k))
+      end do
+   end subroutine find_normals
 
    !> The gradients at the start in place of discrete ones: forces along them have no moment there,
    !> docs/theory.md, section 14. Stencils that are others there keep the discrete ones.

@@ -188,19 +188,22 @@ contains
       end do
    end function rise_moments
 
-   !> The points of quadrature of its gap, where they are as the step begins, or if it covers
-   !> nothing there as it is expected to end, with the weights that they have in the gap.
+   !> The points of quadrature of its gap with the weights that they have in it where forces act: at
+   !> the end of the step as that is expected, or in the middle.
    pure subroutine mortar_choose_slip(self, i, x, u0, du, list)
       class(mortar_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       type(slip_list_t), intent(inout) :: list
-      integer :: k, at_end, e
+      integer :: k, e, pass
+      real(wp) :: at
 
-      do at_end = 0, 1
+      do pass = 1, 2
+         at = 0.0_wp                             ! where nothing is covered there: at the start
+         if (pass == 1) at = merge(1.0_wp, 0.5_wp, self%pushes_at_end)
          do k = 1, 2
             e = self%node_edge(k, i)
-            if (e > 0) list%point = [list%point, edge_slips(self, e, 3 - k, x, u0, du, at_end)]
+            if (e > 0) list%point = [list%point, edge_slips(self, e, 3 - k, x, u0, du, at)]
          end do
          if (size(list%point) > 0) return
       end do
@@ -214,35 +217,27 @@ contains
    end subroutine mortar_choose_slip
 
    !> What slave edge `e` gives to the slip of its node `side`, 1 or 2: docs/theory.md, eq. (14j).
-   pure function edge_slips(self, e, side, x, u0, du, at_end) result(point)
+   pure function edge_slips(self, e, side, x, u0, du, at) result(point)
       type(mortar_t), intent(in) :: self
       integer, intent(in) :: e, side
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
-      integer, intent(in) :: at_end              !! 0: as the step begins, 1: as it ends
+      real(wp), intent(in) :: at                 !! 0: as the step begins, 1: as it ends; between
       type(slip_point_t), allocatable :: point(:)
       type(slip_point_t) :: list(size(self%point)*(self%start(e + 1) - self%start(e)))
-      type(frame_t) :: frame
-      real(wp) :: xi(size(list)), local(size(x, 1), n_place), dlocal(size(x, 1), n_place)
-      real(wp) :: low, high, part, theta
+      real(wp) :: xi(size(list)), bound(0:1), part, theta
       integer :: k, i, n
 
       n = 0
       do k = self%start(e), self%start(e + 1) - 1
-         associate (pair => self%pair(k))
-            call stencil_gather(pair, x, u0, du, local, dlocal)
-            call frame_init(frame, pair, local + at_end*dlocal)
-            low = 0.0_wp
-            high = 1.0_wp
-            if (self%options%integration /= integration_elements) call frame_cover(frame, low, high)
-            do i = 1, size(self%point)
-               part = (high - low)*self%weight(i)
-               if (self%options%integration == integration_elements) part = share(self, i, e, k)
-               if (.not. part > 0.0_wp) cycle
-               n = n + 1
-               xi(n) = low + (high - low)*self%point(i)
-               list(n) = slip_point(pair%node(:place_master(1) + 1), xi(n), part)
-            end do
-         end associate
+         bound = segment_of(self, k, x, u0, du, at)
+         do i = 1, size(self%point)
+            part = (bound(1) - bound(0))*self%weight(i)
+            if (self%options%integration == integration_elements) part = share(self, i, e, k)
+            if (.not. part > 0.0_wp) cycle
+            n = n + 1
+            xi(n) = bound(0) + (bound(1) - bound(0))*self%point(i)
+            list(n) = slip_point(self%pair(k)%node(:place_master(1) + 1), xi(n), part)
+         end do
       end do
       theta = 0.0_wp
       if (self%is_dual) theta = sum(list(:n)%weight)**2
@@ -253,6 +248,33 @@ contains
       end do
       point = list(:n)
    end function edge_slips
+
+   !> Where the segment of pair `k` lies on its slave edge, between its ends at the start and at the
+   !> end of the step; all of the edge for Gauss points of whole edges.
+   pure function segment_of(self, k, x, u0, du, at) result(bound)
+      class(mortar_t), intent(in) :: self
+      integer, intent(in) :: k
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+      real(wp), intent(in) :: at                 !! as in `edge_slips`
+      real(wp) :: bound(0:1)                     !! 0 to 1; the same: it covers nothing
+      type(frame_t) :: frame
+      real(wp), dimension(size(x, 1), n_place) :: local, dlocal
+      real(wp), dimension(0:1) :: first, last
+      integer :: j
+
+      bound = [0.0_wp, 1.0_wp]
+      if (self%options%integration == integration_elements) return
+      call stencil_gather(self%pair(k), x, u0, du, local, dlocal)
+      first = 0.0_wp
+      last = 0.0_wp
+      do j = 0, 1
+         if (.not. abs(at - real(1 - j, wp)) > 0.0_wp) cycle      ! of no weight
+         call frame_init(frame, self%pair(k), local + j*dlocal)
+         call frame_cover(frame, first(j), last(j))
+      end do
+      last = max(first, last)
+      bound = [(1.0_wp - at)*first(0) + at*first(1), (1.0_wp - at)*last(0) + at*last(1)]
+   end function segment_of
 
    !> The master edges that slave edge `e` faces within the step, appended to the `n` pairs so far.
    pure subroutine choose_pairs(self, e, x, u0, du, n)

@@ -21,6 +21,9 @@ module emcon_segment
    private
    public :: segment_t, segment_init
 
+   !> What is left of weights that cancel.
+   real(wp), parameter :: noise = 16.0_wp*epsilon(1.0_wp)
+
    type, extends(weighted_t) :: segment_t
       type(nts_t) :: nts                              !! gaps of the nodes
       integer, allocatable :: end_node(:, :)          !! (2, n_edge) nodes as numbers in `nts`
@@ -91,44 +94,48 @@ contains
       call self%has_looked(self%nts%near%clearance)
    end subroutine segment_begin_step
 
-   !> The slip of its own node where that is over the surface, else of the other ends of its edges
-   !> which are.
+   !> The mean of slips of its own node and of the other ends of its edges, as their gaps are in its
+   !> own; where none is over the surface, of what is near.
    pure subroutine segment_choose_slip(self, i, x, u0, du, list)
       class(segment_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       type(slip_list_t), intent(inout) :: list
-      integer, dimension(size(self%node_edge, 1)) :: own, other
-      integer :: k
+      integer :: node(3), side, j, k, n          ! its own one, and those beside it
+      real(wp) :: part(size(node)), of_edge(size(self%end_node, 1))
 
-      own = 0
-      other = 0
-      do k = 1, 2
-         if (self%node_edge(k, i) == 0) cycle
-         own(k) = self%end_node(3 - k, self%node_edge(k, i))
-         other(k) = self%end_node(k, self%node_edge(k, i))
+      node = 0
+      part = 0.0_wp
+      do side = 1, size(self%node_edge, 1)
+         associate (e => self%node_edge(3 - side, i))
+            if (e == 0) cycle
+            node([1, 1 + side]) = self%end_node([side, 3 - side], e)
+            of_edge = self%slave%length(e)*gap_parts(weights( &
+               [(self%nts%stands_over(self%end_node(j, e)), j = 1, 2)]), side, self%is_dual)
+            part([1, 1 + side]) = part([1, 1 + side]) + of_edge([side, 3 - side])
+         end associate
       end do
-      call take(self%nts, [maxval(own)], .true., list)
-      if (size(list%point) == 0) call take(self%nts, other, .true., list)
-      if (size(list%point) == 0) call take(self%nts, [maxval(own), other], .false., list)
+      if (.not. any(part > 0.0_wp)) part = 1.0_wp
+      do k = 1, size(node)
+         if (node(k) == 0 .or. part(k) <= noise*maxval(part)) cycle
+         n = size(list%point)
+         call self%nts%slips_by(node(k), list)
+         list%point(n + 1:)%weight = part(k)*list%point(n + 1:)%weight
+      end do
    end subroutine segment_choose_slip
 
-   !> Nodes that are over the surface, or near it at least.
-   pure subroutine take(nts, node, is_over, list)
-      type(nts_t), intent(in) :: nts
-      integer, intent(in) :: node(:)             !! numbers in `nts`; 0: none
-      logical, intent(in) :: is_over             !! else all that are near
-      type(slip_list_t), intent(inout) :: list
-      integer :: k
+   !> The weights of an edge's nodal gaps in the gap of its node `side`, as `form_share` has them.
+   pure function gap_parts(w, side, is_dual) result(part)
+      real(wp), intent(in) :: w(:, :)            !! (n_moment, 2) of `weights`
+      integer, intent(in) :: side                !! 1, 2
+      logical, intent(in) :: is_dual             !! multiplier basis
+      real(wp) :: part(size(w, 2)), skew(size(w, 2))
 
-      do k = 1, size(node)
-         if (node(k) == 0) cycle
-         if (is_over) then
-            if (.not. nts%stands_over(node(k))) cycle
-         end if
-         call nts%slips_by(node(k), list)
-      end do
-   end subroutine take
+      skew = w(moment_gap, :) - 2.0_wp*w(moment_gap_xi, :)
+      part = w(moment_gap_xi, :)
+      if (side == 1) part = part + skew
+      if (is_dual) part = part + merge(1.0_wp, -1.0_wp, side == 1)*sum(w(moment_cover, :))**2*skew
+   end function gap_parts
 
    !> The weights of an edge's nodal gaps in the moments, in units of its length: docs/theory.md,
    !> eq. (15i).

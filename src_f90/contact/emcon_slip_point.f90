@@ -13,7 +13,7 @@ module emcon_slip_point
    use emcon_nts_slip_first, only : nts_slip_first => nts_slip
    implicit none
    private
-   public :: slip_point_t, slip_list_t, slip_point, slip_over, slip_add
+   public :: slip_point_t, slip_list_t, slip_point, slip_over, slip_add, slip_share
 
    type :: slip_point_t
       integer :: node(4) = 0                     !! of the scene: slave edge, master edge
@@ -40,6 +40,19 @@ contains
 
       slip_point = slip_point_t(node, [1.0_wp - xi, xi, 1.0_wp, 1.0_wp], weight)
    end function slip_point
+
+   !> The part of friction at some points that acts on a slave node.
+   pure real(wp) function slip_share(point, node) result(part)
+      type(slip_point_t), intent(in) :: point(:) !! weights with the sum 1
+      integer, intent(in) :: node                !! of the scene
+      integer :: k
+
+      part = 0.0_wp
+      do k = 1, size(point)
+         part = part + point(k)%weight*sum(point(k)%share, point(k)%node == node .and. &
+            place == slave)
+      end do
+   end function slip_share
 
    !> Weight times slip.
    pure real(wp) function slip_over(self, x, u0, du) result(slip)

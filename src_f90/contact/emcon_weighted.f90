@@ -14,7 +14,7 @@ module emcon_weighted
    use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_slip_point, only : slip_add, slip_list_t, slip_over, slip_point_t
+   use emcon_slip_point, only : slip_add, slip_list_t, slip_over, slip_point_t, slip_share
    implicit none
    private
    public :: weighted_t, weighted_init, weighted_slips, weighted_sagittas
@@ -38,6 +38,7 @@ module emcon_weighted
       logical, allocatable :: is_formed(:)            !! (n_edge)
       logical :: leaves_second = .false.              !! of `form`: no second derivatives
       type(slip_list_t), allocatable :: slide(:)      !! (n_constraint) if it counts: of the step
+      real(wp), allocatable :: own_slip(:)            !! (n_constraint) part of it at the own node
       type(wide_t) :: work(3)
    contains
       procedure :: measure => weighted_measure
@@ -114,7 +115,8 @@ contains
       allocate(self%state(n), self%form(self%slave%n_edge), self%slide(n))
       allocate(self%is_formed(self%slave%n_edge), source=.false.)
       call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)
-      allocate(self%whole(n), self%scale(n), self%cover(n), self%sagitta(n), source=0.0_wp)
+      allocate(self%whole(n), self%scale(n), self%cover(n), self%sagitta(n), self%own_slip(n), &
+         source=0.0_wp)
       do i = 1, n
          do k = 1, 2
             associate (e => self%node_edge(k, i))
@@ -135,6 +137,7 @@ contains
       class(weighted_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       type(slip_point_t), parameter :: nothing(0) = slip_point_t()
+      real(wp) :: own
       integer :: i
 
       if (.not. (self%friction > 0.0_wp .or. self%damping%tangent > 0.0_wp)) return
@@ -144,6 +147,9 @@ contains
          associate (weight => self%slide(i)%point%weight)
             if (size(weight) > 0) weight = weight/sum(weight)
          end associate
+         own = slip_share(self%slide(i)%point, self%node(i))
+         self%state(i)%slip_shift = abs(own - self%own_slip(i))
+         self%own_slip(i) = own
       end do
    end subroutine weighted_slips
 
@@ -262,6 +268,7 @@ contains
             self%is_dual, target(n) + self%offset + self%sagitta(i), self%scale(i)), &
             self%work, item(n))
          item(n)%size = self%state(i)%size
+         item(n)%is_mean = .true.
          if (item(n)%rubs) call add_slip(self%slide(i)%point, x, u0, du, item(n))
       end do
    end subroutine weighted_evaluate

@@ -11,6 +11,7 @@ module emcon_active_set
    use emcon_kinds, only : wp
    use emcon_motion, only : at_rest, motion_t
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
+   use emcon_pose, only : pose_is_equilibrium
    use emcon_softness, only : softness_owes, softness_select, softness_state_t
    use emcon_state, only : state_t
    use emcon_system, only : system_t
@@ -155,7 +156,10 @@ contains
          self%friction%tau0 = state%drag
       end if
       do pair = 1, size(system%contact)
-         system%contact(pair)%contact%is_sharp = .false.
+         associate (contact => system%contact(pair)%contact)
+            contact%is_sharp = .false.
+            contact%pushes_at_end = pose_is_equilibrium(motion%pose) .or. motion%pose%pushes_at_end
+         end associate
       end do
       call active_set_restart(self, system, motion)
       call phase_leave(system%phases, left)

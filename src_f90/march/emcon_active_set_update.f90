@@ -6,7 +6,7 @@ module emcon_active_set_update
    use emcon_constraints, only : constraint_place, constraints_gives_back
    use emcon_contact, only : contact_t, deepest_arrival, gap_state_t
    use emcon_dashpots, only : dashpots_idle, dashpots_look
-   use emcon_friction, only : friction_close, friction_holds, friction_turn
+   use emcon_friction, only : friction_close, friction_holds, friction_turn, most_lagged, most_shift
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_system, only : system_t
@@ -56,6 +56,13 @@ contains
          self%friction%is_idle = .false.
       end if
       is_done = status /= step_done .or. .not. has_changed
+      if (is_done .and. status == step_done .and. self%friction%lags &
+         .and. self%friction%n_lagged < most_lagged) then
+         self%friction%n_lagged = self%friction%n_lagged + 1
+         self%n_tried = 0
+         is_done = .false.
+         return
+      end if
       if (self%holding%is_needed) call find_grips(self, system)
       if (is_done) return
       ! What is damped only grows within a step: the same contacts beside more of it are no cycle.
@@ -107,6 +114,7 @@ contains
       has_changed = .false.
       has_more = .false.
       self%is_stale = .false.
+      self%friction%lags = .false.
       k = count(self%is_active(:system%first_constraint(1)))
       call active_set_pass(self, system, motion)
       do pair = 1, size(system%contact)
@@ -127,6 +135,8 @@ contains
                   if (self%friction%is_on .and. .not. changes) then
                      call friction_turn(self%friction, system, self%set, k, turns)
                      has_changed = has_changed .or. turns
+                     if (self%friction%mu(id) > 0.0_wp) self%friction%lags = self%friction%lags &
+                        .or. contact%state(i)%slip_shift > most_shift
                   end if
                else
                   call look_at_open(self, contact, i, id, changes, status)

@@ -5,7 +5,7 @@
 !> within the step are its candidates: they hold their gaps as one complementarity, and never cease
 !> to be candidates within the step. Source: docs/theory.md, section 4.13.
 module emcon_friction
-   use emcon_constraint, only : condition_drag, condition_t
+   use emcon_constraint, only : condition_drag, condition_normal, condition_t
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_stick
    use emcon_contact, only : contact_t
    use emcon_csr, only : csr_find
@@ -21,6 +21,10 @@ module emcon_friction
       friction_keep, friction_turn, friction_close, friction_work, friction_missed, &
       friction_slides, friction_holds
 
+   !> So much of the friction of a contact may act on another node than its push, and a step is
+   !> solved again so often at most for more.
+   real(wp), parameter, public :: most_shift = 5.0e-3_wp
+   integer, parameter, public :: most_lagged = 2
    !> Forces that differ by less than this part of the largest push are one.
    real(wp), parameter :: tied = 5.0e4_wp*epsilon(1.0_wp)
 
@@ -36,8 +40,11 @@ module emcon_friction
       logical, allocatable :: is_needed(:)       !! (n_constraint) others hold its slip but nearly
       logical, allocatable :: has_turned(:)      !! (n_constraint) from one slide to the other
       logical, allocatable :: knows_limit(:)     !! (n_constraint) of mu: see emcon_friction_limit
+      logical, allocatable :: knows_corners(:)   !! (n_contact) as emcon_interlock_plane tells
       integer, allocatable :: tried(:, :)        !! (n_constraint, sets) ways of the sets tried
       integer :: n_asked = 0                     !! times that the referee has set all of it
+      logical :: lags = .false.                  !! it acts where slip was expected, not where it is
+      integer :: n_lagged = 0                    !! so often the step was solved again for that
    end type friction_t
 
 contains
@@ -58,6 +65,7 @@ contains
       allocate(self%way(n), self%way0(n), source=touch_sticks)
       allocate(self%is_idle(n), self%is_needed(n), self%has_turned(n), self%knows_limit(n), &
          source=.false.)
+      allocate(self%knows_corners(size(system%contact)), source=.false.)
       allocate(self%tried(n, merge(n_set, 0, self%is_on)), source=0)
       if (.not. self%is_on) return
       do i = 1, size(system%contact)
@@ -82,6 +90,7 @@ contains
       self%is_needed = .false.
       self%has_turned = .false.
       self%n_asked = 0
+      self%n_lagged = 0
       self%lead = 0.0_wp
       if (.not. pose_is_equilibrium(motion%pose)) call find_leads(self, system, motion, was_active)
    end subroutine friction_begin
@@ -207,9 +216,9 @@ contains
       turns = .false.
       if (.not. set%item(k)%rubs) return
       stiffness = stiffness_at(system, set%item(k))
-      tie = tied*maxval(abs(set%lam(set%n_held + 1:set%n)))
+      tie = tied*largest_push(set)
       associate (id => set%id(k), item => set%item(k), lam => set%lam)
-         at = touch_t(lam(k), condition_drag(item, lam(k)), 0.0_wp, item%slip, &
+         at = touch_t(item%normal*lam(k), condition_drag(item, lam(k)), 0.0_wp, item%slip, &
             self%lead(id), slip_rounding*item%size)
          ! Where slip is held the solution has no other, but for round-off.
          if (holds(self, id)) at%slip = slip_held(self, id)
@@ -272,22 +281,33 @@ contains
       type(constraint_set_t), intent(in) :: set  !! of the step, solved
       real(wp), intent(out) :: missed, largest   !! 0 without friction [M L/T^2]
       type(touch_t) :: at
+      real(wp) :: push
       integer :: k
 
       missed = 0.0_wp
       largest = 0.0_wp
       if (.not. self%is_on .or. set%n == set%n_held) return
-      largest = maxval(abs(set%lam(set%n_held + 1:set%n)))
+      largest = largest_push(set)
+      if (.not. largest > 0.0_wp) return
       do k = set%n_held + 1, set%n
          associate (item => set%item(k))
             if (.not. item%rubs) cycle
-            at = touch_t(set%lam(k), condition_drag(item, set%lam(k)), set%defect(k), item%slip, &
+            push = set%lam(k)
+            if (item%is_mean) push = condition_normal(item)*push
+            at = touch_t(push, condition_drag(item, set%lam(k)), set%defect(k), item%slip, &
                self%lead(set%id(k)), slip_rounding*item%size)
             missed = max(missed, friction_violation(at, self%mu(set%id(k)), &
                stiffness_at(system, item)))
          end associate
       end do
    end subroutine friction_missed
+
+   !> The largest normal force of contacts.
+   pure real(wp) function largest_push(set) result(largest)
+      type(constraint_set_t), intent(in) :: set  !! some contact acts
+
+      largest = maxval(abs(set%item(set%n_held + 1:set%n)%normal*set%lam(set%n_held + 1:set%n)))
+   end function largest_push
 
    !> The mean stiffness of the system at the slave node of a condition: of its unknowns, or those
    !> that it follows. Where it is held and has none, that at the next node of the condition.

@@ -106,7 +106,8 @@ contains
                   flexibility_row(numbering, item, item%t), along, error)
                if (allocated(error)) return
                row = flexibility_row(numbering, item, item%c)
-               associate (wnn => dot_product(row, normal), wnt => abs(dot_product(row, along)))
+               associate (wnn => dot_product(row, normal), &
+                     wnt => item%normal*abs(dot_product(row, along)))
                   if (wnn > 0.0_wp .and. wnt > depends*wnn) limit(k) = wnn/wnt
                end associate
             end associate

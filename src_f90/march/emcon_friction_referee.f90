@@ -79,7 +79,7 @@ contains
       allocate(problem%w(2*n, 2*n), source=0.0_wp)
       associate (item => self%set%item(first:), id => self%set%id(first:self%set%n), &
             numbering => system%space%numbering)
-         problem%mu = self%friction%mu(id)
+         problem%mu = self%friction%mu(id)*item(:n)%normal
          problem%lead = self%friction%lead(id)
          call pick_unknowns(numbering, system%response%residual, force)
          call flexibility_move(flexibility, -force, way, error)

@@ -69,7 +69,6 @@ contains
       allocate(self%state%lam, self%state%closure, source=self%lam)
       call motion_init(self%motion, scene%x)
       allocate(self%du, self%push, source=at_rest(scene%x))
-      allocate(self%slave_push(size(scene%x, 1), size(model%contact)), source=0.0_wp)
       call active_set_init(self%active, self%system)
    end subroutine layer_init
 

@@ -11,8 +11,8 @@ module emcon_layer_push
    use emcon_lapack, only : dense_solve
    use emcon_layer_type, only : layer_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
-   use emcon_pair_sums, only : slave_pushes
    use emcon_system, only : system_t, system_tangent_times
+   use emcon_velocity_jumps, only : jumps_add, jumps_begin
    implicit none
    private
    public :: layer_find_push
@@ -46,7 +46,10 @@ contains
          if (is_singular .or. allocated(error)) return
          field = 0.0_wp
          call add_to_dofs(system%space%numbering, y, 1.0_wp, field)
-         call find_slave_push(self, opened, mu, field)
+         call jumps_begin(self%jump)
+         call jumps_add(self%jump, opened, opened%lam)
+         call jumps_add(self%jump, set, mu, field)
+         self%jump%id = self%n_before + self%jump%id
          call add_tangent(self, field)
          do k = 1, set%n
             do i = 1, set%item(k)%n_node
@@ -118,35 +121,6 @@ contains
          mu = forces(:, 0) + matmul(forces(:, 1:), real(opening(:, 1), wp))
       end associate
    end subroutine respond_to
-
-   !> What the forces are on the slave sides: of contacts that have opened, of those that act, and
-   !> by how the directions of the latter turn where z moves by `way`.
-   pure subroutine find_slave_push(self, opened, mu, way)
-      type(layer_t), intent(inout) :: self
-      type(constraint_set_t), intent(in) :: opened
-      real(wp), intent(in) :: mu(:)              !! (n of the set) [M L/T^2]
-      real(wp), intent(in) :: way(:, :)          !! (n_dim, n_node) [L]
-      real(wp) :: part(size(way, 1), size(self%slave_push, 2))
-      integer :: k, i, j, contact, n_dim
-
-      n_dim = size(way, 1)
-      associate (set => self%active%set, first => self%system%first_constraint)
-         call slave_pushes(self%system, opened, opened%lam, self%slave_push)
-         call slave_pushes(self%system, set, mu, part)
-         self%slave_push = self%slave_push + part
-         do k = 1, set%n
-            contact = count(first < set%id(k))
-            associate (item => set%item(k), push => self%slave_push(:, contact))
-               do j = 1, item%n_node
-                  do i = 1, item%n_slave
-                     push = push + set%lam(k)*matmul(item%h(n_dim*(i - 1) + 1:n_dim*i, &
-                        n_dim*(j - 1) + 1:n_dim*j), way(:, item%node(j)))
-                  end do
-               end do
-            end associate
-         end do
-      end associate
-   end subroutine find_slave_push
 
    !> Subtract what the forces on all freedoms change by where z moves by `way`.
    subroutine add_tangent(self, way)

@@ -9,6 +9,7 @@ module emcon_layer_type
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_system, only : system_t
+   use emcon_velocity_jumps, only : velocity_jump_t
    implicit none
    private
    public :: layer_t
@@ -31,7 +32,7 @@ module emcon_layer_type
       real(wp) :: released = 0.0_wp              !! energy that z has given up [M L^2/T^2]
       real(wp) :: work = 0.0_wp                  !! of the loads on z [M L^2/T^2]
       real(wp), allocatable :: push(:, :)        !! (n_dim, n_node) forces to give energy back along
-      real(wp), allocatable :: slave_push(:, :)  !! (n_dim, n_contact) what they are on slave sides
+      type(velocity_jump_t), allocatable :: jump(:)  !! what they are of each contact
       logical, allocatable :: acts(:)            !! (contacts) at the end
       real(wp), allocatable :: lam(:)            !! (contacts) with these forces [M L/T^2]
    end type layer_t

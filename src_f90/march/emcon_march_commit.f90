@@ -10,13 +10,14 @@ module emcon_march_commit
    use emcon_friction_limit, only : friction_limit_tell
    use emcon_holding, only : holding_t
    use emcon_keeping, only : keeping_commit
+   use emcon_interlock_plane, only : interlock_tell
    use emcon_kinds, only : wp
    use emcon_march_guess, only : follow_links
    use emcon_march_past, only : march_past_keep
    use emcon_march_types, only : increment_t, march_t
    use emcon_numbering, only : gather_dependent
-   use emcon_pair_record, only : pair_record_measure
-   use emcon_pair_sums, only : pair_sums_add, pair_sums_begin, pair_sums_push, slave_pushes
+   use emcon_pair_record, only : pair_record_jump, pair_record_measure
+   use emcon_pair_sums, only : pair_sums_add, pair_sums_begin, pair_sums_jump
    use emcon_phases, only : phase_enter, phase_leave, phase_restitution
    use emcon_pose, only : pose_velocity
    use emcon_quasi_static, only : quasi_static_move
@@ -29,6 +30,7 @@ module emcon_march_commit
    use emcon_term_registry, only : terms_decay
    use emcon_text, only : note_add, notes_t, to_text
    use emcon_turn_record, only : turn_record_measure
+   use emcon_velocity_jumps, only : jumps_add, jumps_begin, jumps_join, jumps_scale
    use emcon_velocity_update, only : push_t, push_weights, velocity_update_apply, &
       velocity_update_push
    implicit none
@@ -80,6 +82,7 @@ contains
          call tell_gaps(self, h, increment)
          call friction_limit_tell(self, scene, increment, error)
          if (allocated(error)) return
+         call interlock_tell(self, scene, increment)
          increment%is_guarded = increment%is_guarded .or. &
             any(set%id > system%first_constraint(system%n_pair + 1))
          associate (reached => self%newton%convergence)
@@ -110,10 +113,12 @@ contains
          if (.not. self%active%softness%is_at_ends) then
             lag = merge(0.5_wp, 0.0_wp, self%scheme%row%masses_resist .and. &
                .not. self%motion%pose%pushes_at_end)
-            call pair_record_measure(state%pairs, system, self%active%set, scene%x, state%u, &
-               self%motion%du, lag)
+            ! Forces act where nodes without mass were before their balance.
+            call pair_record_measure(state%pairs, system, self%active%set, scene%x, state%u &
+               + (self%motion%du - self%ending%du), self%motion%du, lag)
             call pair_sums_add(state%sums, system, self%active%set, self%motion, h, &
                self%scheme%row%masses_resist)
+            call record_jumps(self, scene, h)
             return
          end if
          call pair_sums_add(state%sums, system, explicit%soft(explicit%i_start), self%motion, &
@@ -125,8 +130,20 @@ contains
                0.0_wp)
             self%ledger%contact_energy = softness_stored(self%active%softness, soft)
          end associate
+         call record_jumps(self, scene, h)
       end associate
    end subroutine record_pairs
+
+   !> Add the impulses by which velocities jump at the end of the step.
+   subroutine record_jumps(self, scene, h)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: h                  !! > 0 [T]
+
+      if (size(self%state%sums%sum) == 0) return
+      call pair_sums_jump(self%state%sums, self%system, self%jump)
+      call pair_record_jump(self%state%pairs, self%system, self%jump, scene%x + self%state%u, h)
+   end subroutine record_jumps
 
    !> What contacts stand off and give way by, how often they were pushed again, how they rub.
    pure subroutine tell_gaps(self, h, increment)
@@ -189,6 +206,7 @@ contains
       integer :: left
 
       call phase_enter(self%system%phases, phase_restitution, left)
+      call jumps_begin(self%jump)
       if (self%scheme%row%masses_resist .and. scene%step(self%state%i_step)%initiation &
          == initiation_velocity_update) call restore_energy(self, notes, error)
       if (self%scheme%row%masses_resist .and. self%active%set%n > self%active%set%n_held &
@@ -263,7 +281,8 @@ contains
          if (allocated(error)) return
          if (has_root) then
             self%ledger%contact_work = self%ledger%contact_work + lost
-            call pair_sums_push(self%state%sums, self%velocity_update%part*layer%slave_push)
+            call jumps_scale(layer%jump, self%velocity_update%part)
+            call jumps_join(self%jump, layer%jump)
          else
             call note_add(notes, "the energy " // to_text(lost + layer%released) // &
                " that contacts took as they opened or closed is not restored: there is no root")
@@ -276,7 +295,7 @@ contains
       type(march_t), intent(inout) :: self
       type(notes_t), intent(inout) :: notes      !! for the log
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: restored, push(size(self%v1, 1), size(self%system%contact))
+      real(wp) :: restored
       logical :: has_root
 
       call velocity_update_apply(self%velocity_update, self%system, self%active%set, self%v1, &
@@ -285,8 +304,8 @@ contains
       self%ledger%contact_work = self%ledger%contact_work + restored
       if (restored > 0.0_wp) then
          call note_add(notes, "velocity update restores an energy of " // to_text(restored))
-         call slave_pushes(self%system, self%active%set, push_weights(self%active%set), push)
-         call pair_sums_push(self%state%sums, self%velocity_update%part*push)
+         call jumps_add(self%jump, self%active%set, &
+            self%velocity_update%part*push_weights(self%active%set))
       end if
       if (.not. has_root) call note_add(notes, &
          "velocity update: no root, the energy lost in this step is not restored")

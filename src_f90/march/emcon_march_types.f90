@@ -16,6 +16,7 @@ module emcon_march_types
    use emcon_state, only : state_t
    use emcon_system, only : system_t
    use emcon_text, only : notes_t
+   use emcon_velocity_jumps, only : velocity_jump_t
    use emcon_velocity_update, only : velocity_update_t
    implicit none
    private
@@ -110,6 +111,7 @@ module emcon_march_types
       type(newton_t) :: newton
       type(active_set_t) :: active
       type(velocity_update_t) :: velocity_update
+      type(velocity_jump_t), allocatable :: jump(:)  !! at the end of the step
       type(layer_t) :: layer                     !! of massless contact surfaces
       logical, allocatable :: may_shed(:)        !! (n_node) massless at first
       logical, allocatable :: is_bare(:)         !! (n_node) of sections without inertia

@@ -8,9 +8,10 @@ module emcon_pair_record
    use emcon_kinds, only : wp
    use emcon_moment_plane, only : moment_of
    use emcon_system, only : system_t
+   use emcon_velocity_jumps, only : velocity_jump_t
    implicit none
    private
-   public :: pair_total_t, pair_record_t, pair_record_init, pair_record_measure
+   public :: pair_total_t, pair_record_t, pair_record_init, pair_record_measure, pair_record_jump
 
    !> Sums over one pair. The forces on its sides, and their moments, are opposite to round-off.
    type :: pair_total_t
@@ -26,6 +27,11 @@ module emcon_pair_record
       real(wp), allocatable :: force(:, :)
       !> (n_constraint) of each multiplier [L^2]; 0: nothing acts in its pair
       real(wp), allocatable :: area(:)
+      !> (n_constraint) the same of friction, where it acts [L^2]
+      real(wp), allocatable :: shear_area(:)
+      ! Of jumps of the velocities, not allocated where there were none: their impulses by the step,
+      real(wp), allocatable :: jump(:, :)        !! (n_dim, n_node) on all nodes [M L/T^2]
+      real(wp), allocatable :: jump_lam(:)       !! (n_constraint) as multipliers [M L/T^2]
    end type pair_record_t
 
    !> Places in a list; none if the last is before the first.
@@ -42,7 +48,7 @@ contains
 
       allocate(self%total(system%n_pair))
       allocate(self%force(size(system%space%is_alive, 1), system%n_constraint), source=0.0_wp)
-      allocate(self%area(system%n_constraint), source=0.0_wp)
+      allocate(self%area(system%n_constraint), self%shear_area(system%n_constraint), source=0.0_wp)
    end subroutine pair_record_init
 
    !> Take over the constraints that acted in the step to `u`, and what was damped. Their forces act
@@ -83,9 +89,72 @@ contains
             else
                self%area(before + 1:n) = 0.0_wp
             end if
+            self%shear_area(before + 1:n) = self%area(before + 1:n)
+            self%shear_area(set%id(first:last)) = set%item(first:last)%normal &
+               *self%area(set%id(first:last))
          end associate
       end do
    end subroutine pair_record_measure
+
+   !> Add the impulses of jumps of the velocities at the end of the step, as means over it.
+   pure subroutine pair_record_jump(self, system, jump, place, h)
+      type(pair_record_t), intent(inout) :: self !! of this step
+      type(system_t), intent(in) :: system
+      type(velocity_jump_t), intent(in) :: jump(:)   !! (any) of this step
+      real(wp), intent(in) :: place(:, :)        !! (n_dim, n_node) of nodes at the end [L]
+      real(wp), intent(in) :: h                  !! > 0 [T]
+      integer :: k, i, contact, own
+
+      if (allocated(self%jump)) deallocate(self%jump, self%jump_lam)
+      if (size(jump) == 0) return
+      allocate(self%jump, source=0.0_wp*place)
+      allocate(self%jump_lam, source=0.0_wp*self%area)
+      do k = 1, size(jump)
+         associate (node => jump(k)%node, id => jump(k)%id)
+            self%jump_lam(id) = self%jump_lam(id) + jump(k)%lam/h
+            contact = count(system%first_constraint < id)
+            call add_total(self%total(abs(system%contact(contact)%of_pair)), jump(k), place, h, &
+               system%contact(contact)%of_pair < 0)
+            do i = 1, size(node)
+               self%jump(:, node(i)) = self%jump(:, node(i)) + jump(k)%impulse(:, i)/h
+               if (i > jump(k)%n_slave) cycle
+               associate (of => system%contact(contact)%contact)
+                  own = findloc(of%node, node(i), 1)
+                  if (own == 0) own = findloc(of%twin, node(i), 1)
+               end associate
+               if (own == 0) cycle
+               own = own + system%first_constraint(contact)
+               self%force(:, own) = self%force(:, own) + jump(k)%impulse(:, i)/h
+            end do
+         end associate
+      end do
+   end subroutine pair_record_jump
+
+   !> Add forces and moments of a jump on both sides of its pair.
+   pure subroutine add_total(total, jump, place, h, is_exchanged)
+      type(pair_total_t), intent(inout) :: total
+      type(velocity_jump_t), intent(in) :: jump
+      real(wp), intent(in) :: place(:, :)        !! (n_dim, n_node) [L]
+      real(wp), intent(in) :: h                  !! > 0 [T]
+      logical, intent(in) :: is_exchanged        !! its slave side is the pair's master side
+      real(wp) :: force(size(place, 1))
+      integer :: i
+
+      if (is_exchanged) call exchange_sides(total)
+      total%slave(3) = total%slave(3) + jump%slave_moment/h
+      total%master(3) = total%master(3) + jump%master_moment/h
+      do i = 1, size(jump%node)
+         force = jump%impulse(:, i)/h
+         associate (both => [force, moment_of(place(:, jump%node(i)), force)])
+            if (i <= jump%n_slave) then
+               total%slave = total%slave + both
+            else
+               total%master = total%master + both
+            end if
+         end associate
+      end do
+      if (is_exchanged) call exchange_sides(total)
+   end subroutine add_total
 
    pure subroutine exchange_sides(total)
       type(pair_total_t), intent(inout) :: total

@@ -10,10 +10,11 @@ module emcon_pair_sums
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_system, only : system_t
+   use emcon_velocity_jumps, only : velocity_jump_t
    implicit none
    private
    public :: pair_sum_t, pair_sums_t, pair_sums_init, pair_sums_begin, pair_sums_add, &
-      pair_sums_push, pair_force, pair_center, slave_pushes
+      pair_sums_jump, pair_force, pair_center
 
    type :: pair_sum_t
       real(wp) :: impulse(3) = 0.0_wp            !! on the first surface, in dynamic steps [M L/T]
@@ -161,21 +162,24 @@ contains
       end do
    end subroutine add_forces
 
-   !> Add what jumps of the velocities push at the end of a step.
-   pure subroutine pair_sums_push(self, push)
+   !> Add the impulses of jumps of the velocities at the end of a step.
+   pure subroutine pair_sums_jump(self, system, jump)
       type(pair_sums_t), intent(inout) :: self
-      real(wp), intent(in) :: push(:, :)         !! (n_dim, n_contact) on slave sides [M L/T]
-      real(wp) :: signed(size(push, 1))
-      integer :: k
+      type(system_t), intent(in) :: system
+      type(velocity_jump_t), intent(in) :: jump(:)   !! (any) of this step
+      real(wp) :: signed(size(system%space%is_alive, 1))
+      integer :: k, contact
 
-      do k = 1, size(push, 2)
-         associate (sum => self%sum(abs(self%of_pair(k))), n => size(push, 1))
-            signed = merge(push(:, k), -push(:, k), self%of_pair(k) > 0)
-            sum%push(:n) = sum%push(:n) + signed
-            sum%impulse(:n) = sum%impulse(:n) + signed
+      do k = 1, size(jump)
+         contact = count(system%first_constraint < jump(k)%id)
+         associate (sum_of => self%sum(abs(self%of_pair(contact))), n => size(signed))
+            signed = sum(jump(k)%impulse(:, :jump(k)%n_slave), 2)
+            if (self%of_pair(contact) < 0) signed = -signed
+            sum_of%push(:n) = sum_of%push(:n) + signed
+            sum_of%impulse(:n) = sum_of%impulse(:n) + signed
          end associate
       end do
-   end subroutine pair_sums_push
+   end subroutine pair_sums_jump
 
    !> The mean force over the last increment, of a static step that at its end [M L/T^2]; 0 before
    !> the first.
@@ -196,25 +200,5 @@ contains
       center = none
       if (sum%weight > 0.0_wp) center = sum%moment/sum%weight
    end function pair_center
-
-   !> Resultants on the slave sides of all contacts of the forces `lam` along gradients at the end.
-   pure subroutine slave_pushes(system, set, lam, push)
-      type(system_t), intent(in) :: system
-      type(constraint_set_t), intent(in) :: set
-      real(wp), intent(in) :: lam(:)             !! (n of the set) [M L/T^2]
-      real(wp), intent(out) :: push(:, :)        !! (n_dim, n_contact) [M L/T^2]
-      integer :: k, contact
-
-      push = 0.0_wp
-      contact = 1
-      do k = set%n_held + 1, set%n
-         do while (set%id(k) > system%first_constraint(contact + 1))
-            contact = contact + 1
-         end do
-         associate (item => set%item(k))
-            push(:, contact) = push(:, contact) + lam(k)*sum(item%c(:, :item%n_slave), 2)
-         end associate
-      end do
-   end subroutine slave_pushes
 
 end module emcon_pair_sums

@@ -8,8 +8,8 @@ module emcon_restitution
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t
-   use emcon_pair_sums, only : pair_sums_push, slave_pushes
    use emcon_text, only : note_add, notes_t
+   use emcon_velocity_jumps, only : jumps_add
    use emcon_velocity_update, only : rate_jump_t, velocity_update_change
    implicit none
    private
@@ -23,7 +23,7 @@ contains
       type(notes_t), intent(inout) :: notes      !! for the log
       type(error_t), allocatable, intent(out) :: error
       type(rate_jump_t) :: jump
-      real(wp) :: lam(self%active%set%n), push(size(self%v1, 1), size(self%system%contact))
+      real(wp) :: lam(self%active%set%n)
 
       if (self%active%set%n == self%active%set%n_held .or. .not. is_asked(self)) return
       call find_impacts(self, jump)
@@ -41,8 +41,7 @@ contains
          ledger%restitution = ledger%restitution + jump%lost
          lam = 0.0_wp
          lam(jump%row) = jump%impulse
-         call slave_pushes(self%system, set, lam, push)
-         call pair_sums_push(self%state%sums, push)
+         call jumps_add(self%jump, set, lam)
       end associate
    end subroutine restitution_take
 

@@ -287,6 +287,10 @@ contains
             allocate(values(2, n))
             values(1, :) = 0.0_dp
             where (state%pairs%area > 0.0_wp) values(1, :) = real(state%lam/state%pairs%area, dp)
+            if (allocated(state%pairs%jump_lam)) then
+               where (state%pairs%area > 0.0_wp) values(1, :) = values(1, :) &
+                  + real(state%pairs%jump_lam/state%pairs%area, dp)
+            end if
             values(2, :) = merge(1.0_dp, 0.0_dp, state%is_active)
          case ("CSHEAR", "CSLIP")
             values = rubbing(stepper, variable)
@@ -313,7 +317,8 @@ contains
             values(n, :) = real(state%slip_path, dp)
             return
          end if
-         where (state%pairs%area > 0.0_wp) values(1, :) = real(state%drag/state%pairs%area, dp)
+         where (state%pairs%shear_area > 0.0_wp) values(1, :) = real(state%drag &
+            /state%pairs%shear_area, dp)
          where (state%is_active .and. mu > 0.0_wp) values(n, :) = merge(1.0_dp, 2.0_dp, &
             state%sliding == 0)
       end associate
@@ -331,6 +336,9 @@ contains
 
       if (variable == "CF") then
          values = real(stepper%march%state%contact, dp)
+         associate (pairs => stepper%march%state%pairs)
+            if (allocated(pairs%jump)) values = values + real(pairs%jump, dp)
+         end associate
          return
       end if
       at_slave = contact_quantity(stepper, variable)

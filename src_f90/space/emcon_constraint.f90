@@ -9,7 +9,7 @@ module emcon_constraint
    implicit none
    private
    public :: condition_t, condition_force, condition_push, condition_rate, condition_slip_rate, &
-      condition_drag, constraint_t, constraint_box_t
+      condition_drag, condition_normal, condition_normal_slope, constraint_t, constraint_box_t
 
    !> One condition over a motion, on its own nodes: f = (Phi - t W)/s, docs/theory.md, eq. (15).
    type :: condition_t
@@ -31,6 +31,9 @@ module emcon_constraint
       real(wp) :: lead = 0.0_wp                       !! a, from which the law counts slip [L]
       real(wp) :: tilt = 0.0_wp                       !! mu sigma where it slides, 0 where it sticks
       real(wp) :: hold = 0.0_wp                       !! tau where it sticks [M L/T^2]
+      !> Of integrated gaps, whose normal force is not the multiplier: see `condition_normal`
+      logical :: is_mean = .false.
+      real(wp) :: normal = 1.0_wp
       real(wp), allocatable :: t(:, :)                !! (n_dim, >= n_node) T, by discrete gradient
       real(wp), allocatable :: t1(:, :)               !! (n_dim, >= n_node) gradient at the end
       !> (i, j): derivative of t(i) by end coordinate j, coordinates node by node
@@ -99,12 +102,44 @@ contains
       if (self%rubs) force = force - condition_drag(self, lam)*self%t(:, i)
    end function condition_force
 
+   !> The normal force by a multiplier of 1, where friction of 1 acts along the surface with 1:
+   !> resultants on the slave side. docs/theory.md, eq. (14r).
+   pure real(wp) function condition_normal(self) result(normal)
+      type(condition_t), intent(in) :: self           !! it rubs
+      real(wp) :: along
+
+      along = norm2(sum(self%t(:, :self%n_slave), 2))
+      normal = 0.0_wp
+      if (along > 0.0_wp) normal = norm2(sum(self%g(:, :self%n_slave), 2))/along
+   end function condition_normal
+
+   !> Its derivative by the end coordinates, node by node.
+   pure function condition_normal_slope(self) result(slope)
+      type(condition_t), intent(in) :: self           !! it rubs, with second derivatives
+      real(wp) :: slope(size(self%g, 1)*self%n_node)  !! [1/L]
+      real(wp), dimension(size(self%g, 1)) :: push, along
+      integer :: i, a, row
+
+      slope = 0.0_wp
+      push = sum(self%g(:, :self%n_slave), 2)
+      along = sum(self%t(:, :self%n_slave), 2)
+      if (.not. min(norm2(push), norm2(along)) > 0.0_wp) return
+      push = push/norm2(push)/norm2(along)
+      along = condition_normal(self)*along/dot_product(along, along)
+      do i = 1, self%n_slave
+         do a = 1, size(push)
+            row = size(push)*(i - 1) + a
+            slope = slope + push(a)*self%h(row, :size(slope)) - along(a)*self%ht(row, :size(slope))
+         end do
+      end do
+   end function condition_normal_slope
+
    !> The force of friction tau against slip.
    pure real(wp) function condition_drag(self, lam) result(tau)
       type(condition_t), intent(in) :: self
       real(wp), intent(in) :: lam                     !! the multiplier [M L/T^2]
 
-      tau = self%tilt*lam + self%hold
+      tau = self%tilt*self%normal*lam + self%hold
    end function condition_drag
 
    !> The directions in which a unit of the multiplier pushes: where the condition slides, tilted
@@ -114,7 +149,7 @@ contains
       real(wp) :: push(size(self%g, 1), self%n_node)
 
       push = self%g(:, :self%n_node)
-      if (self%rubs) push = push - self%tilt*self%t(:, :self%n_node)
+      if (self%rubs) push = push - self%tilt*self%normal*self%t(:, :self%n_node)
    end function condition_push
 
    !> By how much the condition's value at the end changes with the field `way`, to first order.

@@ -379,6 +379,12 @@ contains
 
       call restart_exchange(restart, "pair_force", pairs%force)
       call restart_exchange(restart, "pair_area", pairs%area)
+      if (restart_offers(restart, "pair_shear_area", any(abs(pairs%shear_area - pairs%area) &
+         > 0.0_wp))) then
+         call restart_exchange(restart, "pair_shear_area", pairs%shear_area)
+      else
+         pairs%shear_area = pairs%area
+      end if
       call restart_exchange(restart, "pair_total", none)     ! also where there are no pairs
       do k = 1, size(pairs%total)
          call restart_exchange(restart, "pair_total", pairs%total(k)%slave)
@@ -386,6 +392,12 @@ contains
          call restart_exchange(restart, "pair_total", pairs%total(k)%length)
       end do
       call restart_exchange(restart, "pair_active", pairs%total%n_active)
+      if (restart%is_reading .and. allocated(pairs%jump)) deallocate(pairs%jump, pairs%jump_lam)
+      if (.not. restart_offers(restart, "pair_jump", allocated(pairs%jump))) return
+      if (restart%is_reading) allocate(pairs%jump_lam(size(pairs%area)), &
+         pairs%jump(size(pairs%force, 1), restart_size(restart, "pair_jump")/size(pairs%force, 1)))
+      call restart_exchange(restart, "pair_jump", pairs%jump)
+      call restart_exchange(restart, "pair_jump_lam", pairs%jump_lam)
    end subroutine exchange_pairs
 
    !> Where the file has none they begin at 0.

@@ -5,8 +5,8 @@
 !> a sum of displacements; it stands here only where it is not eliminated in the numbering. Sign:
 !> docs/theory.md, eq. (1).
 module emcon_constraints
-   use emcon_constraint, only : condition_drag, condition_force, condition_push, condition_t, &
-      constraint_t
+   use emcon_constraint, only : condition_drag, condition_force, condition_normal_slope, &
+      condition_push, condition_t, constraint_t
    use emcon_csr, only : csr_find, csr_t
    use emcon_damped, only : damped_add_forces, damped_evaluate, damped_rows, damped_stiffness, &
       damped_t
@@ -491,6 +491,9 @@ contains
             ! Friction pushes against slip.
             if (item%rubs) call subtract_sum(item, -condition_drag(item, self%lam(k)), &
                item%ht(:n, :n), numbering, merged)
+            if (item%rubs .and. item%is_mean .and. abs(item%tilt) > 0.0_wp) call subtract_sum( &
+               item, -item%tilt*self%lam(k), spread(reshape(item%t(:, :item%n_node), [n]), 2, n) &
+               *spread(condition_normal_slope(item), 1, n), numbering, merged)
             if (all(abs(item%h(:n, :n)) <= 0.0_wp)) cycle
             call subtract_sum(item, self%lam(k), item%h(:n, :n), numbering, merged)
          end associate

@@ -2,7 +2,7 @@
 !> pairs.
 module test_mortar
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_constraint, only : condition_t
+   use emcon_constraint, only : condition_normal, condition_normal_slope, condition_t
    use emcon_edge_form, only : form_share
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, integration_elements, &
@@ -41,6 +41,8 @@ contains
          test_case_t("values and identity", test_identity), &
          test_case_t("momenta", test_momenta), &
          test_case_t("gradient and second derivatives", test_derivatives), &
+         test_case_t("normal force by the multiplier", test_normal), &
+         test_case_t("and its derivatives", test_normal_slope), &
          test_case_t("notch: nodes on both sides of a pair", test_notch), &
          test_case_t("the nearer of two layers", test_layers), &
          test_case_t("not the back of a thin body", test_thin), &
@@ -490,6 +492,92 @@ contains
          end do
       end do
    end subroutine compare
+
+   ! ---- friction -------------------------------------------------------------------------------
+
+   !> On flat surfaces that rest in contact a multiplier of 1 pushes by what is covered over the
+   !> scale of the constraint, also where that is a part, and friction of 1 acts with 1.
+   subroutine test_normal(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(mortar_t) :: mortar
+      type(condition_t) :: item(3)
+      real(wp), allocatable :: still(:, :)
+      real(wp) :: area(0:1)
+      integer :: i, j, k, n_part
+
+      n_part = 0
+      do i = 1, n_combination
+         do k = 1, 3
+            call make(0.0_wp, shift(k), 0.0_wp, i, scene, mortar, error)
+            if (allocated(error)) return
+            still = 0.0_wp*scene%x
+            mortar%friction = 0.5_wp
+            call mortar%begin_step(scene%x, still, still)
+            call mortar%measure(scene%x, still, still)
+            item%rubs = .true.
+            call mortar%evaluate([1, 2, 3], scene%x, still, still, [0.0_wp, 0.0_wp, 0.0_wp], item)
+            do j = 1, 3
+               area = area_of(mortar, j)
+               if (area(1) < mortar%scale(j)) cycle
+               mortar%scale(j) = 0.25_wp
+               call mortar%evaluate([j], scene%x, still, still, [0.0_wp], item(j:j))
+               if (area(1) < 0.9_wp*mortar%whole(j)) n_part = n_part + 1
+               call check_near(error, condition_normal(item(j)), 4.0_wp*area(1), tol, 1.0_wp, &
+                  "normal force" // text_of(i, k))
+               call check_near(error, abs(sum(item(j)%t(1, :item(j)%n_slave))), 1.0_wp, tol, &
+                  1.0_wp, "friction" // text_of(i, k))
+            end do
+         end do
+         if (allocated(error)) return
+      end do
+      call check_true(error, n_part >= n_combination, "some are covered in part: " &
+         // to_text(n_part))
+   end subroutine test_normal
+
+   !> Central differences, with the steps and bounds of `compare`; none where a gradient jumps.
+   subroutine test_normal_slope(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: shortest = 0.25_wp, step = 4.0_wp*shortest*eps**(1.0_wp/3.0_wp)
+      real(wp), parameter :: none(3) = 0.0_wp
+      type(scene_t) :: scene
+      type(mortar_t) :: mortar
+      type(condition_t), dimension(3) :: item, up, down
+      real(wp), allocatable :: u(:, :), du(:, :), way(:, :), slope(:)
+      integer :: i, j, k, n, column
+
+      item%rubs = .true.
+      up%rubs = .true.
+      down%rubs = .true.
+      do i = 1, n_combination
+         do k = 1, 3
+            call draw(i, k, 0.1_wp, scene, mortar, u, du, error)
+            if (allocated(error)) return
+            mortar%friction = 0.5_wp
+            call mortar%begin_step(scene%x, u, du)
+            call mortar%measure(scene%x, u, du)
+            call mortar%evaluate([1, 2, 3], scene%x, u, du, none, item)
+            do n = 0, size(u) - 1
+               way = 0.0_wp*u
+               way(1 + mod(n, 2), 1 + n/2) = step
+               call mortar%evaluate([1, 2, 3], scene%x, u, du + way, none, up)
+               call mortar%evaluate([1, 2, 3], scene%x, u, du - way, none, down)
+               do j = 1, 3
+                  associate (m => item(j)%n_node)
+                     column = 2*findloc(item(j)%node(:m), 1 + n/2, 1) - 1 + mod(n, 2)
+                     if (column < 1) cycle
+                     if (maxval(abs(up(j)%g(:, :m) - down(j)%g(:, :m))) > 1.0e3_wp*step) cycle
+                     slope = condition_normal_slope(item(j))
+                     call check_near(error, slope(column), (condition_normal(up(j)) &
+                        - condition_normal(down(j)))/(2.0_wp*step), 25.0_wp*(step/shortest)**2, &
+                        1.0_wp + maxval(abs(item(j)%h(:2*m, :2*m))), "slope" // text_of(i, k))
+                  end associate
+               end do
+            end do
+         end do
+         if (allocated(error)) return
+      end do
+   end subroutine test_normal_slope
 
    ! ---- choice of pairs ------------------------------------------------------------------------
 

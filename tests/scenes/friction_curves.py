@@ -84,3 +84,42 @@ def bush_torques(run, mu=0.3):
         moment = fields["reaction_moment"][k].ravel()
         seen.append(abs(moment[np.abs(moment).argmax()])/(mu*push))
     return np.array(seen)
+
+
+def belt_on_drum(edges, mu, smoothing="NONE"):
+    """A belt of so many elements on half a drum of as many edges, which it does not meet at its
+    nodes: drawn over it by one end against a pull at the other."""
+    length = math.pi*50/edges
+
+    def circle(r, angle):
+        return r*math.cos(angle), r*math.sin(angle)
+
+    belt = [[(-50.0, -k*length), (-51.0, -k*length)] for k in (2, 1)]
+    for k in range(edges + 1):
+        angle = math.pi*(1 - k/edges)
+        belt.append([circle(50, angle), circle(51, angle)])
+    belt += [[(50.0, -k*length), (51.0, -k*length)] for k in (1, 2)]
+    drum = [[circle(r, math.radians(210) - (k - 0.3)*math.pi/edges) for r in (45, 50)]
+            for k in range(4*edges//3 + 1)]
+    nodes = [f"{first + 2*i + k}, {x!r}, {y!r}" for first, rows in ((1, belt), (1001, drum))
+             for i, row in enumerate(rows) for k, (x, y) in enumerate(row)]
+    n, m = len(belt) - 1, len(drum) - 1
+    over = [f"{i + 1}, {2*i + 1}, {2*i + 3}, {2*i + 4}, {2*i + 2}" for i in range(n)]
+    under = [f"{1001 + i}, {1001 + 2*i}, {1003 + 2*i}, {1004 + 2*i}, {1002 + 2*i}"
+             for i in range(m)]
+    smooth = f", 1.\n*SURFACE SMOOTHING, TYPE={smoothing}\n"
+    press, draw = (f"*STEP, NLGEOM\n*STATIC\n{h!r}{smooth}" for h in (0.25, 0.1))
+    return Deck("\n".join([
+        "*NODE", *nodes, "*ELEMENT, TYPE=CPE4I, ELSET=BELT", *over,
+        "*ELEMENT, TYPE=CPE4, ELSET=DRUM", *under, "*NSET, NSET=A\n1, 2",
+        f"*NSET, NSET=B\n{2*n + 1}, {2*n + 2}",
+        f"*NSET, NSET=D, GENERATE\n1001, {1002 + 2*m}, 1",
+        "*SURFACE, NAME=INNER", *(f"{i + 1}, S1" for i in range(1, n - 1)),
+        "*SURFACE, NAME=OUTER", *(f"{1001 + i}, S3" for i in range(m)),
+        "*MATERIAL, NAME=M\n*ELASTIC\n2000, 0.\n*SOLID SECTION, ELSET=BELT, MATERIAL=M",
+        "*SOLID SECTION, ELSET=DRUM, MATERIAL=M",
+        f"*SURFACE INTERACTION, NAME=I\n*FRICTION\n{mu!r}",
+        "*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE\nINNER, OUTER",
+        "*BOUNDARY\nD, 1, 2\nA, 1\nB, 1", press + "*CLOAD\nA, 2, -5.",
+        "*BOUNDARY\nB, 2, 2, -0.5\n*END STEP", draw + "*BOUNDARY",
+        f"B, 2, 2, {-6 - 1.5*length!r}", "*NODE PRINT, NSET=B, TOTALS=ONLY\nRF\n*END STEP"]))

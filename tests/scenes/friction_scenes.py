@@ -351,3 +351,39 @@ def partial_slip(run, place, mu=0.3):
         rows.append((-history["pair1_force_x"][k]/(mu*history["pair1_force_y"][k]), held/half,
                      np.diff(bears).max()/half))
     return np.array(rows)
+
+
+def dragged(mu, *, leaves=False, tied=False, statics=True, increments=12, sides=ONE, cells=(6, 2),
+            floor=13):
+    """A block whose top is pressed down and moved along a floor of elements, whose end at 0 it comes
+    onto, or leaves: with both in proportion, so that all slides at once. With `tied` it is two
+    pieces."""
+    scene = Scene(1/increments, 1.0)
+    scene.block("BLOCK", (-1.5, 0), (1 if tied else 2, 1), cells, stiffness=1e4, density=1e-4)
+    if tied:
+        scene.block("SECOND", (-0.5, 0), (1, 1), (cells[0] + 1, cells[1]), stiffness=1e4,
+                    density=1e-4)
+    scene.block("FLOOR", (-6 if leaves else 0, -1), (6, 1), (floor, 1), stiffness=1e4, density=1e-4)
+    scene.hold("FLOOR", lambda x, y: y < -0.99)
+    for name in ("BLOCK", "SECOND")[:1 + tied]:
+        scene.hold(name, lambda x, y: y > 0.99, "1, 1", 1.0)
+        scene.hold(name, lambda x, y: y > 0.99, "2, 2", -5e-4)
+        scene.side(f"UNDER_{name}", name, lambda x, y: y < 0.01)
+    scene.side("TOP", "FLOOR", lambda x, y: y > -0.01)
+    scene.pairs = [("UNDER_BLOCK", "TOP")]
+    if tied:
+        scene.side("LEFT", "BLOCK", lambda x, y: x > -0.51)
+        scene.side("RIGHT", "SECOND", lambda x, y: x < -0.49)
+        scene.cards += ["*TIE, NAME=SEAM", "LEFT, RIGHT"]
+    deck = rubbing(scene.deck(sides), mu)
+    if tied:
+        under = [deck.data("*SURFACE", f"NAME=UNDER_{name}") for name in ("BLOCK", "SECOND")]
+        under[0] += under[1]
+    if statics:
+        deck.replace("*DYNAMIC, DIRECT", "*STATIC, DIRECT")
+    else:
+        for name in ("BLOCK", "SECOND", "FLOOR"):
+            if f"*MATERIAL, NAME={name}\n" in deck.text():
+                deck.replace(f"*MATERIAL, NAME={name}\n",
+                             f"*MATERIAL, NAME={name}\n*DAMPING, BETA=1e-2\n")
+    return deck

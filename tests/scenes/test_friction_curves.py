@@ -1,10 +1,13 @@
 """`*FRICTION` on curves: the capstan's law of a bead on a track, the torque of a hub in a sleeve."""
 
+import math
+
+import h5py
 import numpy as np
 import pytest
-from friction_curves import BUSHES, bead, bead_error, bush, bush_torques
+from friction_curves import BUSHES, bead, bead_error, belt_on_drum, bush, bush_torques
 from friction_scenes import NODES, balance
-from scene_tools import run_deck
+from scene_tools import run_deck, run_one_sided
 
 
 @pytest.mark.parametrize("pad", [0.05, 0.3])
@@ -42,3 +45,17 @@ def test_a_hub_turned_in_a_sleeve(smoothing, more, fit, tmp_path):
         assert error[-1] < (np.pi/edges)**2*2
     if len(error) > 1:
         assert np.log2(error[0]/error[1]) > 3
+
+
+@pytest.mark.parametrize("smoothing", ["NONE", "HERMITE"])
+def test_corners_that_catch_are_told(smoothing, tmp_path):
+    """Edges that turn by 7.5 degrees have a push of up to 0.066 along the curve: 22 % of a friction
+    of 0.3. Smoothed ones have none, and the pulls differ by exp(mu pi)."""
+    run = run_one_sided(belt_on_drum(24, 0.3, smoothing), tmp_path)
+    told = [text for text in run.verdict["warnings"] if "catch" in text]
+    assert len(told) == (smoothing == "NONE")
+    assert all("7.5 degrees" in text and "22 %" in text and "HERMITE" in text for text in told)
+    if smoothing == "HERMITE":
+        with h5py.File(run.file(".h5")) as file:
+            pull = -file["sets/B/TOTAL_RF"][-1].reshape(-1)[1]
+        assert pull/10 == pytest.approx(math.exp(0.3*math.pi), rel=0.02)

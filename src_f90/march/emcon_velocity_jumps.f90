@@ -1,0 +1,115 @@
+!> Impulses of contacts by which velocities jump at the end of a step.
+!>
+!> They act in no time: what tells contact forces has them as means over the step.
+module emcon_velocity_jumps
+   use emcon_constraint, only : condition_t
+   use emcon_constraints, only : constraint_set_t
+   use emcon_kinds, only : wp
+   use emcon_moment_plane, only : moment_of
+   implicit none
+   private
+   public :: velocity_jump_t, jumps_begin, jumps_add, jumps_join, jumps_scale
+
+   !> The impulse of one contact constraint.
+   type :: velocity_jump_t
+      integer :: id = 0                          !! number of the constraint over all
+      integer :: n_slave = 0                     !! nodes 1..n_slave are on the slave side
+      integer, allocatable :: node(:)            !! (nodes) of the scene
+      real(wp), allocatable :: impulse(:, :)     !! (n_dim, nodes) [M L/T]
+      real(wp) :: lam = 0.0_wp                   !! along the gradient of the gap [M L/T]
+      !> Moments on either side beside those of the impulses where the nodes end up, as forces that
+      !> stay go with nodes that move [M L^2/T]
+      real(wp) :: slave_moment = 0.0_wp, master_moment = 0.0_wp
+   end type velocity_jump_t
+
+contains
+
+   !> There are none so far.
+   pure subroutine jumps_begin(jump)
+      type(velocity_jump_t), allocatable, intent(inout) :: jump(:)   !! (any)
+
+      if (allocated(jump)) then
+         if (size(jump) == 0) return
+         deallocate(jump)
+      end if
+      allocate(jump(0))
+   end subroutine jumps_begin
+
+   !> Append impulses `lam` along the gradients at the end of the step. With `way` also what the
+   !> multipliers of the set push where their directions turn by that motion.
+   pure subroutine jumps_add(jump, set, lam, way)
+      type(velocity_jump_t), allocatable, intent(inout) :: jump(:)   !! begun
+      type(constraint_set_t), intent(in) :: set  !! evaluated; with `way` second derivatives too
+      real(wp), intent(in) :: lam(:)             !! (n of the set) [M L/T]
+      real(wp), intent(in), optional :: way(:, :)    !! (n_dim, n_node) [L]
+      type(velocity_jump_t) :: more(set%n - set%n_held)
+      integer :: k
+
+      do k = 1, size(more)
+         associate (j => set%n_held + k)
+            more(k) = jump_of(set%item(j), set%id(j), lam(j))
+            if (present(way)) call turn(set%item(j), set%lam(j), way, more(k))
+         end associate
+      end do
+      call jumps_join(jump, more)
+   end subroutine jumps_add
+
+   !> Append others.
+   pure subroutine jumps_join(jump, more)
+      type(velocity_jump_t), allocatable, intent(inout) :: jump(:)   !! begun
+      type(velocity_jump_t), intent(in) :: more(:)   !! (any)
+      type(velocity_jump_t), allocatable :: longer(:)
+      integer :: n
+
+      n = size(jump)
+      allocate(longer(n + size(more)))
+      longer(:n) = jump
+      longer(n + 1:) = more
+      call move_alloc(longer, jump)
+   end subroutine jumps_join
+
+   pure type(velocity_jump_t) function jump_of(item, id, lam) result(jump)
+      type(condition_t), intent(in) :: item
+      integer, intent(in) :: id                  !! number over all constraints
+      real(wp), intent(in) :: lam                !! [M L/T]
+
+      jump = velocity_jump_t(id, item%n_slave, item%node(:item%n_node), &
+         lam*item%c(:, :item%n_node), lam)
+   end function jump_of
+
+   !> Add what `lam` pushes where the nodes of a condition move by `way` and its directions turn.
+   pure subroutine turn(item, lam, way, jump)
+      type(condition_t), intent(in) :: item
+      real(wp), intent(in) :: lam                !! [M L/T^2]
+      real(wp), intent(in) :: way(:, :)          !! (n_dim, n_node) [L]
+      type(velocity_jump_t), intent(inout) :: jump
+      real(wp) :: moment
+      integer :: i, j, n_dim
+
+      n_dim = size(way, 1)
+      do j = 1, item%n_node
+         do i = 1, item%n_node
+            jump%impulse(:, i) = jump%impulse(:, i) + lam*matmul(item%h(n_dim*(i - 1) + 1:n_dim*i, &
+               n_dim*(j - 1) + 1:n_dim*j), way(:, item%node(j)))
+         end do
+         moment = moment_of(way(:, item%node(j)), lam*item%c(:, j))
+         if (j <= item%n_slave) then
+            jump%slave_moment = jump%slave_moment + moment
+         else
+            jump%master_moment = jump%master_moment + moment
+         end if
+      end do
+   end subroutine turn
+
+   !> Take a part of all.
+   elemental subroutine jumps_scale(jump, part)
+      type(velocity_jump_t), intent(inout) :: jump
+      real(wp), intent(in) :: part               !! of it that is taken
+
+      jump%impulse = part*jump%impulse
+      jump%lam = part*jump%lam
+      jump%slave_moment = part*jump%slave_moment
+      jump%master_moment = part*jump%master_moment
+   end subroutine jumps_scale
+
+end module emcon_velocity_jumps

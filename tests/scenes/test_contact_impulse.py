@@ -1,0 +1,44 @@
+"""Contact forces times the increment are the change of momentum, jumps of velocities included."""
+
+import h5py
+import numpy as np
+import pytest
+from plain_scenes import BOTH, ONE, Scene
+from scene_tools import EPSILON, run_deck
+
+WAYS = [("PERSISTENT", 1.0), ("PERSISTENT", 0.5), ("VELOCITY UPDATE", 1.0), ("MASSLESS", 1.0)]
+
+
+def two_blocks(sides, restitution):
+    """One free block meets another with an edge that is not parallel to it."""
+    scene = Scene(0.005, 0.2)
+    scene.block("UPPER", (0.1, 0.02), (1, 1), (3, 3), turn=0.02, velocity=(0.2, -1.0))
+    scene.block("LOWER", (-0.5, -1), (2, 1), (4, 2))
+    scene.pairs = [("UPPER", "LOWER")]
+    deck = scene.deck(sides)
+    deck.replace("*SURFACE INTERACTION, NAME=SMOOTH",
+                 f"*SURFACE INTERACTION, NAME=SMOOTH, RESTITUTION={restitution!r}")
+    return deck, 16
+
+
+@pytest.mark.parametrize(("sides", "formulation"), [(BOTH, "NODE TO SURFACE"), (ONE, "MORTAR")])
+@pytest.mark.parametrize(("initiation", "restitution"), WAYS)
+def test_forces_are_the_change_of_momentum(initiation, restitution, sides, formulation, tmp_path):
+    """The mean force over an increment, of fields as of sums of the pair, times its size is what the
+    body gains, its moment what it turns by: to the round-off of momenta that are summed over nodes."""
+    deck, n = two_blocks(sides, restitution)
+    run = run_deck(deck, tmp_path, initiation=initiation, formulation=formulation)
+    h = run.history["h"][1:]
+    with h5py.File(run.file(".h5")) as file:
+        momentum = file["sets/BODIES/MOMENTUM"][:, 0]
+        pairs = file["sets/PAIRS"]
+        total = pairs["CF"][-len(h):, 0]
+        if sides == BOTH:
+            total = total + pairs["CF_MASTER"][-len(h):, 1]
+    gained, size = np.diff(momentum, axis=0), np.abs(momentum).max()
+    assert np.abs(gained).sum() > 0.5*size   # they have met
+    field = run.fields()["contact_force"][1:, :n].sum(axis=1)[:, :2]
+    assert np.abs(field*h[:, None] - gained[:, :2]).max() < 1000*EPSILON*size
+    assert np.abs(total*h[:, None] - gained).max() < 1000*EPSILON*size
+    force = np.stack([run.history[f"pair1_force_{axis}"][1:] for axis in "xy"], axis=1)
+    assert np.abs(force*h[:, None] - gained[:, :2]).max() < 1000*EPSILON*size

@@ -1,0 +1,39 @@
+"""Forces of friction that act: mu times the normal ones, in sum and node by node."""
+
+import numpy as np
+import pytest
+from friction_scenes import dragged
+from plain_scenes import BOTH, ONE
+from scene_tools import run_one_sided
+
+MU = 0.2
+MESHED = [{"formulation": "NODE TO SURFACE"}, {"formulation": "SEGMENT"}, {"formulation": "MORTAR"},
+          {"formulation": "SEGMENT", "multiplier": "STANDARD"},
+          {"formulation": "MORTAR", "multiplier": "STANDARD"},
+          {"formulation": "MORTAR", "integration": "ELEMENTS"}]
+
+
+def ratios(run, floor, since=0.0):
+    """Of all increments from a time on: friction by push of the pair, and of each node of the block
+    with a push of more than a twentieth of the largest. The floor has the last `floor` nodes."""
+    late = run.history["time"] > since + 1e-9
+    whole = run.history["pair1_force_x"][late]/run.history["pair1_force_y"][late]
+    force = run.fields()["contact_force"][late, :-floor]
+    pushed = np.abs(force[..., 1]) > 0.05*np.abs(force[..., 1]).max()
+    return np.abs(whole), np.abs(force[..., 0][pushed]/force[..., 1][pushed])
+
+
+def rubs(run, floor=28, since=0.0, node=0.01):
+    """Surfaces lean by what they are pressed in over a part of their length: by some 1e-3."""
+    whole, nodes = ratios(run, floor, since)
+    assert len(whole) > 4
+    assert np.abs(whole/MU - 1).max() < 0.01
+    assert np.abs(nodes/MU - 1).max() < node
+    assert run.verdict["law_violation"] < 1e-9
+    assert not any("catch" in text for text in run.verdict["warnings"])
+
+
+@pytest.mark.parametrize("leaves", [False, True])
+@pytest.mark.parametrize("more", MESHED)
+def test_a_block_comes_onto_a_floor_or_leaves_it(more, leaves, tmp_path):
+    rubs(run_one_sided(dragged(MU, leaves=leaves), tmp_path, **more))
