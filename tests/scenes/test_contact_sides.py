@@ -41,11 +41,16 @@ def test_nothing_is_in_another(tmp_path, name, sides):
 
 
 def test_bodies_of_one_surface_may_overlap_at_first(tmp_path):
-    """A press fit of unlike meshes, whose edges cross: all exterior is one surface, of both."""
+    """A press fit of unlike meshes, whose edges cross: all exterior is one surface, of both. At the
+    end circles touch, so that nodes are behind chords of the hole by their sagitta at most."""
     path = made("press_fit", tmp_path, "--hub", "8x4", "--sleeve", "11x5")
     done = FileOutcome(FileScene(path), tmp_path / "run", ALL)
     assert done.code == 0 and done.run.history["active"].max() > 0
-    assert done.overlap.by_edge <= rounding(done.fields)
+    assert done.overlap.depth <= 1.01*2.0*(1.0 - math.cos(math.pi/4/11))
+    fields = done.fields
+    bore = np.abs(np.linalg.norm(fields.x, axis=1) - 1.0) < 1e-6
+    moved = (fields["displacement"][-1]*fields.x).sum(axis=1)[bore].mean()
+    assert moved == pytest.approx(-3.125e-4, rel=0.02)          # Lame, by the heading of the deck
 
 
 def journal(sides):
