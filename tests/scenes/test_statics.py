@@ -336,8 +336,8 @@ def test_press_fit_of_smoothed_arcs(tmp_path):
 
 def test_overlap_of_arcs_is_told(tmp_path):
     """A pair of one node of the rim holds nothing: chords of one circle are no overlap, those of
-    circles that differ by three sagittas are."""
-    for interference, verdict in ((0.0, "good"), (0.03, "bad")):
+    circles that differ by two sagittas are."""
+    for interference, verdict in ((0.0, "good"), (0.02, "bad")):
         text = press_fit((8, 11), FORMULATIONS[0], interference)
         text = text.replace("*CONTACT INTERFERENCE, SHRINK\n", "")
         text = text.replace("*MATERIAL", "*SURFACE, NAME=RIM, TYPE=NODE\n10006\n*MATERIAL", 1)
@@ -345,6 +345,31 @@ def test_overlap_of_arcs_is_told(tmp_path):
         folder.mkdir()
         run = solve(folder, text.replace("\nF1, F0\n", "\nRIM, F0\n"))
         assert run.verdict["verdict"] == verdict
+
+
+@pytest.mark.parametrize("formulation", [FORMULATIONS[0], FORMULATIONS[4]], ids=" ".join)
+def test_sleeve_on_a_drum(tmp_path, formulation):
+    """A sleeve, radii 2 and 3, pressed onto an arc of radius 2, edges of one degree. Chords of the
+    hole have to overlap the arc; that is no penetration. Lame, with the hole held, but for what a
+    mean gap of chords is off by: a part of their sagitta."""
+    text = press_fit((2, 16), formulation, 0.0).replace("*CONTACT INTERFERENCE, SHRINK\n", "")
+    text = text[text.index("*NODE\n10001") :]                       # without the hub
+    at = [f"{2 * math.sin(a)!r}, {2 * math.cos(a)!r}" for a in (-0.2, 0.5 * math.pi + 0.2)]
+    drum = ["*NODE, NSET=REF", "9999, 0., 0.", "*SURFACE, TYPE=SEGMENTS, NAME=DRUM"]
+    drum += [f"START, {at[0]}", f"CIRCL, {at[1]}, 0., 0."]
+    drum += ["*RIGID BODY, ANALYTICAL SURFACE=DRUM, REF NODE=9999", "*SURFACE, NAME=RIM"]
+    drum += [f"{10001 + 8 * i + 7}, S3" for i in range(16)]
+    text = text.replace("*MATERIAL", "\n".join([*drum, "*MATERIAL"]), 1)
+    text = text.replace("*SOLID SECTION, ELSET=R0, MATERIAL=M\n", "").replace("F1, F0", "F1, DRUM")
+    text = text.replace("E01, 1\nE02, 2\n", "REF, ENCASTRE\n")
+    run = solve(tmp_path, text.replace("*NODE FILE", "*DSLOAD\nRIM, P, 20.\n*NODE FILE"))
+    shear, first = E / 2 / (1 + NU), E * NU / (1 + NU) / (1 - 2 * NU)
+    exact = -20.0 * (3 - 4 / 3) / (2 * (first + shear) + 2 * shear * 4 / 9)
+    fields = run.fields()
+    rim = np.abs(np.linalg.norm(fields.x, axis=1) - 3.0) < 1e-6
+    moved = (fields["displacement"][-1] * fields.x).sum(axis=1)[rim].mean() / 3.0
+    assert moved == pytest.approx(exact, abs=2 * (1 - math.cos(math.pi / 64)))
+    assert run.verdict["verdict"] == "good"
 
 
 def test_amplitude_of_the_overclosure(tmp_path):
