@@ -36,8 +36,8 @@ contains
                   " of surface " // scene%surface(pair%slave)%name // " is " // &
                   to_text(-contact%state(i)%gap1, 3) // " behind surface " // &
                   scene%surface(pair%master)%name // &
-                  ": *BOUNDARY moves it and all of that surface into each other, and no contact " // &
-                  "can prevent it; free one of them, or take the node off the surface"
+                  ": *BOUNDARY moves it and all of that surface into each other, and no " // &
+                  "contact can prevent it; free one of them, or take the node off the surface"
                return
             end do
          end associate

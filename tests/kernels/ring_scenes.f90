@@ -13,7 +13,8 @@ module ring_scenes
 contains
 
    !> A hub, radii 1 to 2 + `more`, in a sleeve, radii 2 to 3, of `n` elements around: nodes meet
-   !> nodes, or their numbers differ, and edges of the sleeve are not as long as each other. The hub is the slave, or the master.
+   !> nodes, or their numbers differ, and edges of the sleeve are not as long as each other. The hub
+   !> is the slave, or the master.
    subroutine make_rings(scene, n, more, is_reversed)
       type(scene_t), intent(out) :: scene
       integer, intent(in) :: n(2)                !! of the hub, of the sleeve
