@@ -6,12 +6,12 @@ module emcon_contact
    use emcon_constraint, only : condition_normal, condition_t, constraint_t
    use emcon_interactions, only : contact_damping_t, contact_options_t
    use emcon_kinds, only : wp
+   use emcon_midside_plane, only : midside_distribute, midside_points, midside_stretch, midside_t
    use emcon_motion, only : motion_t
    use emcon_pose, only : pose_is_equilibrium
    implicit none
    private
-   public :: contact_t, contact_box_t, condition_resize, condition_resize_slip, &
-      condition_include, gap_state_t
+   public :: contact_t, contact_box_t, gap_state_t
    public :: deepest_arrival
 
    !> Corners of master surfaces are rounded over these fractions of an edge: with and without a
@@ -73,6 +73,7 @@ module emcon_contact
       !> in the step, in the mean: counted off the gap. 0 unless `follow_arcs` says so [L]
       real(wp), allocatable :: sagitta(:)
       type(gap_state_t), allocatable :: state(:)      !! (n_constraint) as last measured
+      type(midside_t) :: midside                      !! whose contact points are not the nodes
    contains
       procedure :: suit_steps
       procedure :: follow_arcs
@@ -81,13 +82,21 @@ module emcon_contact
       procedure :: own_area
       procedure :: share
       procedure :: mean_gap
-      procedure :: covers
-      procedure :: slip
+      ! To be called, with the displacements of nodes:
+      procedure, non_overridable :: begin_step
+      procedure, non_overridable :: measure
+      procedure, non_overridable :: evaluate
+      procedure, non_overridable :: covers
+      procedure, non_overridable :: slip
+      procedure, non_overridable :: area
+      ! To be given, by the displacements of contact points:
       procedure(configure_interface), deferred :: configure
-      procedure(begin_interface), deferred :: begin_step
-      procedure(measure_interface), deferred :: measure
-      procedure(evaluate_interface), deferred :: evaluate
-      procedure(area_interface), deferred :: area
+      procedure(begin_interface), deferred :: begin_points
+      procedure(begin_interface), deferred :: measure_points
+      procedure(evaluate_interface), deferred :: evaluate_points
+      procedure(area_interface), deferred :: area_points
+      procedure :: covers_points
+      procedure :: slip_points
    end type contact_t
 
    !> For arrays of formulations of different types.
@@ -106,22 +115,14 @@ module emcon_contact
          type(contact_options_t), intent(in) :: options
       end subroutine configure_interface
 
-      !> Choose the stencils for a step from `u0` with the expected motion `du`.
+      !> As `begin_step` and `measure`.
       pure subroutine begin_interface(self, x, u0, du)
          import :: contact_t, wp
          class(contact_t), intent(inout) :: self
          real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node)
       end subroutine begin_interface
 
-      !> Fill `state`: all gaps at both ends of the step, cheaply.
-      pure subroutine measure_interface(self, x, u0, du)
-         import :: contact_t, wp
-         class(contact_t), intent(inout) :: self
-         real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
-      end subroutine measure_interface
-
-      !> The constraints `wanted` with their derivatives, as `constraint_t` has it; `target` are the
-      !> mean gaps to hold.
+      !> As `evaluate`.
       pure subroutine evaluate_interface(self, wanted, x, u0, du, target, item)
          import :: condition_t, contact_t, wp
          class(contact_t), intent(inout) :: self
@@ -131,8 +132,7 @@ module emcon_contact
          type(condition_t), intent(inout) :: item(:) !! (n)
       end subroutine evaluate_interface
 
-      !> Area over which each multiplier of the last step acts, which ended at x + u: pressure is
-      !> multiplier over area. And the length of slave surface that belongs to it at the end.
+      !> As `area`.
       pure subroutine area_interface(self, x, u, area, length)
          import :: contact_t, wp
          class(contact_t), intent(in) :: self
@@ -182,7 +182,7 @@ contains
       real(wp) :: length(size(area)), u(size(x, 1), size(x, 2))
 
       u = 0.0_wp
-      call self%area(x, u, area, length)
+      call self%area_points(x, u, area, length)
    end subroutine own_area
 
    !> What the values of constraint `i` are to be multiplied by to be the same function in all
@@ -203,24 +203,115 @@ contains
       mean_gap = gap
    end function mean_gap
 
+   !> Choose the stencils for a step from `u0` with the expected motion `du`.
+   pure subroutine begin_step(self, x, u0, du)
+      class(contact_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+
+      if (self%midside%n == 0) then
+         call self%begin_points(x, u0, du)
+      else
+         call self%begin_points(x, midside_points(self%midside, u0), &
+            midside_points(self%midside, du))
+         self%clearance = self%clearance/midside_stretch(self%midside)
+      end if
+   end subroutine begin_step
+
+   !> Fill `state`: all gaps at both ends of the step, cheaply.
+   pure subroutine measure(self, x, u0, du)
+      class(contact_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+
+      if (self%midside%n == 0) then
+         call self%measure_points(x, u0, du)
+      else
+         call self%measure_points(x, midside_points(self%midside, u0), &
+            midside_points(self%midside, du))
+      end if
+   end subroutine measure
+
+   !> The constraints `wanted` with their derivatives, as `constraint_t` has it; `target` are the
+   !> mean gaps to hold.
+   pure subroutine evaluate(self, wanted, x, u0, du, target, item)
+      class(contact_t), intent(inout) :: self
+      integer, intent(in) :: wanted(:)           !! (n) numbers of constraints, ascending
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+      real(wp), intent(in) :: target(:)          !! (n) [L]
+      type(condition_t), intent(inout) :: item(:)   !! (n)
+      integer :: k
+
+      if (self%midside%n == 0) then
+         call self%evaluate_points(wanted, x, u0, du, target, item)
+      else
+         call self%evaluate_points(wanted, x, midside_points(self%midside, u0), &
+            midside_points(self%midside, du), target, item)
+         do k = 1, size(item)
+            call midside_distribute(self%midside, item(k))
+         end do
+      end if
+   end subroutine evaluate
+
    !> Does the stencil of constraint `i` still hold at the end of the motion that was last measured?
    pure logical function covers(self, i, x, u0, du)
       class(contact_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
 
-      covers = self%state(i)%is_covered
+      if (self%midside%n == 0) then
+         covers = self%covers_points(i, x, u0, du)
+      else
+         covers = self%covers_points(i, x, midside_points(self%midside, u0), &
+            midside_points(self%midside, du))
+      end if
    end function covers
 
-   !> How far the node of constraint `i` slides along the surface over the step, or would by a
-   !> field `du` that is small: docs/theory.md, eq. (14e).
+   !> The same by contact points.
+   pure logical function covers_points(self, i, x, u0, du) result(covers)
+      class(contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+
+      covers = self%state(i)%is_covered
+   end function covers_points
+
+   !> How far the contact point of constraint `i` slides along the surface over the step, or would
+   !> by a field `du` that is small: docs/theory.md, eq. (14e).
    pure real(wp) function slip(self, i, x, u0, du)
       class(contact_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
 
-      slip = 0.0_wp
+      if (self%midside%n == 0) then
+         slip = self%slip_points(i, x, u0, du)
+      else
+         slip = self%slip_points(i, x, midside_points(self%midside, u0), &
+            midside_points(self%midside, du))
+      end if
    end function slip
+
+   !> The same by contact points.
+   pure real(wp) function slip_points(self, i, x, u0, du) result(slip)
+      class(contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+
+      slip = 0.0_wp
+   end function slip_points
+
+   !> Area over which each multiplier of the last step acts, which ended at x + u: pressure is
+   !> multiplier over area. And the length of slave surface that belongs to it at the end.
+   pure subroutine area(self, x, u, of_multiplier, length)
+      class(contact_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+      real(wp), intent(out) :: of_multiplier(:)  !! (n_constraint) [L^2]
+      real(wp), intent(out) :: length(:)         !! (n_constraint) [L]
+
+      if (self%midside%n == 0) then
+         call self%area_points(x, u, of_multiplier, length)
+      else
+         call self%area_points(x, midside_points(self%midside, u), of_multiplier, length)
+      end if
+   end subroutine area
 
    !> As `constraint_t` has it: second derivatives are by the end of the step. Conditions hold at
    !> that end, and work over the whole step, wherever in it a scheme evaluates forces, or push
@@ -296,64 +387,5 @@ contains
          item(k)%h = 0.0_wp
       end do
    end subroutine from_start
-
-   !> Make room for `n` nodes and count them.
-   pure subroutine condition_resize(self, n)
-      type(condition_t), intent(inout) :: self
-      integer, intent(in) :: n                   !! > 0
-
-      self%n_node = n
-      if (allocated(self%node)) then
-         if (size(self%node) >= n) return
-         deallocate(self%node, self%g, self%c, self%h)
-      end if
-      allocate(self%node(n), source=0)
-      allocate(self%g(2, n), self%c(2, n), self%h(2*n, 2*n), source=0.0_wp)
-   end subroutine condition_resize
-
-   !> Let a condition depend on the nodes `node` too, so far by nothing.
-   pure subroutine condition_include(self, node)
-      type(condition_t), intent(inout) :: self   !! with its values and derivatives
-      integer, intent(in) :: node(:)             !! of the scene; not of the slave side if new
-      type(condition_t) :: old
-      integer :: i, n, list(self%n_node + size(node)), n_dim
-
-      n = self%n_node
-      list(:n) = self%node(:n)
-      do i = 1, size(node)
-         if (any(list(:n) == node(i))) cycle
-         n = n + 1
-         list(n) = node(i)
-      end do
-      if (n == self%n_node) return
-      old = self
-      n_dim = size(self%g, 1)
-      call condition_resize(self, n)
-      self%node(:n) = list(:n)
-      self%g = 0.0_wp
-      self%c = 0.0_wp
-      self%h = 0.0_wp
-      associate (m => old%n_node)
-         self%g(:, :m) = old%g(:, :m)
-         self%c(:, :m) = old%c(:, :m)
-         if (self%leaves_second) return
-         self%h(:n_dim*m, :n_dim*m) = old%h(:n_dim*m, :n_dim*m)
-      end associate
-   end subroutine condition_include
-
-   !> Make room for the derivatives of slip, and set them to 0.
-   pure subroutine condition_resize_slip(self)
-      type(condition_t), intent(inout) :: self   !! resized
-
-      if (allocated(self%t)) then
-         if (size(self%t, 2) /= size(self%g, 2)) deallocate(self%t, self%t1, self%ht)
-      end if
-      if (.not. allocated(self%t)) allocate(self%t, self%t1, mold=self%g)
-      if (.not. allocated(self%ht)) allocate(self%ht, mold=self%h)
-      self%slip = 0.0_wp
-      self%t = 0.0_wp
-      self%t1 = 0.0_wp
-      self%ht = 0.0_wp
-   end subroutine condition_resize_slip
 
 end module emcon_contact

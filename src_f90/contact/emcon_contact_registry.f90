@@ -3,6 +3,7 @@ module emcon_contact_registry
    use emcon_contact, only : contact_t
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_segment
+   use emcon_midside_plane, only : midside_init
    use emcon_mortar, only : mortar_init, mortar_t
    use emcon_nts, only : nts_init, nts_t
    use emcon_scene, only : scene_t
@@ -37,6 +38,7 @@ contains
          call nts_init(nts, scene, pair, error)
          call move_alloc(nts, contact)
       end select
+      call midside_init(contact%midside, scene, scene%surface([pair%slave, pair%master]))
    end subroutine new_contact
 
 end module emcon_contact_registry

@@ -2,8 +2,8 @@
 !>
 !> Source: docs/theory.md, eqs. (15) and (15b).
 module emcon_edge_form
+   use emcon_condition_nodes, only : condition_resize
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : condition_resize
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_dgrad_wide, only : wide_add, wide_add_product, wide_clear, wide_t
    use emcon_kinds, only : wp

@@ -52,7 +52,7 @@ module emcon_mortar
    contains
       procedure :: configure => mortar_configure
       procedure :: follow_arcs => mortar_follow_arcs
-      procedure :: begin_step => mortar_begin_step
+      procedure :: begin_points => mortar_begin_step
       procedure :: choose_slip => mortar_choose_slip
       procedure :: measure_edges => mortar_measure_edges
       procedure :: form_edge => mortar_form_edge

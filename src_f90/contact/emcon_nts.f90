@@ -48,14 +48,14 @@ module emcon_nts
       logical, allocatable :: is_lost(:)              !! (n_constraint) no unique closest point when
                                                       !! last evaluated, since the last measurement
    contains
-      procedure :: begin_step => nts_begin_step
+      procedure :: begin_points => nts_begin_step
       procedure :: configure => nts_configure
       procedure :: follow_arcs => nts_follow_arcs
-      procedure :: measure => nts_measure
-      procedure :: evaluate => nts_evaluate
-      procedure :: covers => nts_covers
-      procedure :: area => nts_area
-      procedure :: slip => nts_slip
+      procedure :: measure_points => nts_measure
+      procedure :: evaluate_points => nts_evaluate
+      procedure :: covers_points => nts_covers
+      procedure :: area_points => nts_area
+      procedure :: slip_points => nts_slip
       procedure :: stands_over
       procedure :: slips_by
    end type nts_t

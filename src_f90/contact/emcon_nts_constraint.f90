@@ -3,8 +3,8 @@
 !>
 !> Source: docs/theory.md, sections 4.2 and 4.3.
 module emcon_nts_constraint
+   use emcon_condition_nodes, only : condition_resize, condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : condition_resize, condition_resize_slip
    use emcon_dgrad8, only : dg8_t => dg_t
    use emcon_dgrad8_first, only : dg8_first_t => dg_t
    use emcon_dgrad13, only : dg13_t => dg_t

@@ -31,8 +31,8 @@ module emcon_segment
    contains
       procedure :: configure => segment_configure
       procedure :: follow_arcs => segment_follow_arcs
-      procedure :: begin_step => segment_begin_step
-      procedure :: covers => segment_covers
+      procedure :: begin_points => segment_begin_step
+      procedure :: covers_points => segment_covers
       procedure :: choose_slip => segment_choose_slip
       procedure :: measure_edges => segment_measure_edges
       procedure :: form_edge => segment_form_edge
@@ -88,7 +88,7 @@ contains
       self%nts%reach = self%reach
       self%nts%rounding = self%rounding
       self%nts%is_sharp = self%is_sharp
-      call self%nts%begin_step(x, u0, du)
+      call self%nts%begin_points(x, u0, du)
       call weighted_slips(self, x, u0, du)
       self%reach = self%nts%reach
       call self%has_looked(self%nts%near%clearance)
@@ -176,7 +176,7 @@ contains
          associate (e => self%node_edge(k, i))
             if (e == 0) cycle
             do j = 1, size(self%end_node, 1)
-               if (covers) covers = self%nts%covers(self%end_node(j, e), x, u0, du)
+               if (covers) covers = self%nts%covers_points(self%end_node(j, e), x, u0, du)
             end do
          end associate
       end do
@@ -188,7 +188,7 @@ contains
       real(wp) :: w(n_moment, 2), a(2), b(2), length(0:1)
       integer :: e, k
 
-      call self%nts%measure(x, u0, du)
+      call self%nts%measure_points(x, u0, du)
       do e = 1, self%slave%n_edge
          associate (value => self%form(e)%value, node => self%slave%edge(:, e), &
                i => self%end_node(:, e))
@@ -224,8 +224,8 @@ contains
       do k = 1, 2
          self%nodal(k)%n_node = 0
          self%nodal(k)%leaves_second = self%leaves_second
-         if (is_there(k)) call self%nts%evaluate([self%end_node(k, e)], x, u0, du, [0.0_wp], &
-            self%nodal(k:k))
+         if (is_there(k)) call self%nts%evaluate_points([self%end_node(k, e)], x, u0, du, &
+            [0.0_wp], self%nodal(k:k))
       end do
       call begin_form(self, e)
       associate (form => self%form(e), length => self%work(1), gap => self%work(2))

@@ -90,7 +90,7 @@ contains
       logical, intent(out) :: is_last            !! it is round-off
       type(condition_t) :: item(1)
 
-      call self%nts%evaluate([i], scene%x, scene%u0, self%still, [0.0_wp], item)
+      call self%nts%evaluate_points([i], scene%x, scene%u0, self%still, [0.0_wp], item)
       associate (normal => item(1)%c(:, 1))
          way = item(1)%gap1*normal/dot_product(normal, normal)
       end associate

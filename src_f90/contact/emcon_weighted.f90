@@ -5,8 +5,9 @@
 !> edge. Source: docs/theory.md, eq. (15).
 module emcon_weighted
    use emcon_chain, only : chain_init, chain_t, chain_thickness
+   use emcon_condition_nodes, only : condition_include, condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : condition_include, condition_resize_slip, contact_t, deepest_arrival
+   use emcon_contact, only : contact_t, deepest_arrival
    use emcon_dgrad_wide, only : wide_t
    use emcon_edge_form, only : edge_form_t, form_constraint, form_share, weighted_gap_t
    use emcon_errors, only : error_t
@@ -41,13 +42,13 @@ module emcon_weighted
       real(wp), allocatable :: own_slip(:)            !! (n_constraint) part of it at the own node
       type(wide_t) :: work(3)
    contains
-      procedure :: measure => weighted_measure
-      procedure :: evaluate => weighted_evaluate
-      procedure :: area => weighted_area
+      procedure :: measure_points => weighted_measure
+      procedure :: evaluate_points => weighted_evaluate
+      procedure :: area_points => weighted_area
       procedure :: own_area => weighted_own_area
       procedure :: share => weighted_share
       procedure :: mean_gap => weighted_mean_gap
-      procedure :: slip => weighted_slip
+      procedure :: slip_points => weighted_slip
       procedure(slip_interface), deferred :: choose_slip
       procedure(measure_interface), deferred :: measure_edges
       procedure(form_interface), deferred :: form_edge

@@ -9,6 +9,8 @@ module emcon_judge
    use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
    use emcon_look_plane, only : look_init, look_longest, look_one_way, look_place, look_t, overlap_t
+   use emcon_mesh, only : surface_t
+   use emcon_midside_plane, only : midside_init, midside_points, midside_stretch, midside_t
    use emcon_outline_curves_plane, only : outline_curves_init
    use emcon_outline_plane, only : outline_meets
    use emcon_scene, only : scene_t
@@ -31,6 +33,7 @@ module emcon_judge
 
    type :: judge_t
       type(look_t) :: look
+      type(midside_t) :: midside                 !! of outlines, by contact points
       ! Where each piece is in a step:
       real(wp), allocatable :: low(:, :), high(:, :)     !! (n_dim, n_piece) box over the step [L]
       real(wp), allocatable :: least(:, :), most(:, :)   !! (n_dim, n_piece) motions of nodes [L]
@@ -50,8 +53,11 @@ contains
    subroutine judge_init(self, scene)
       type(judge_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
+      type(surface_t) :: outline
 
       call look_init(self%look, scene)
+      outline%edge = self%look%outline%edge
+      call midside_init(self%midside, scene, [outline])
       associate (n => self%look%outline%n_piece)
          allocate(self%low(scene%n_dim, n), self%high(scene%n_dim, n), &
             self%least(scene%n_dim, n), self%most(scene%n_dim, n))
@@ -71,6 +77,18 @@ contains
 
    !> What overlaps at `u`, and no pair brings together, is meant to.
    subroutine judge_excuse(self, x, u)
+      type(judge_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+
+      if (self%midside%n == 0) then
+         call excuse_points(self, x, u)
+      else
+         call excuse_points(self, x, midside_points(self%midside, u))
+      end if
+   end subroutine judge_excuse
+
+   !> The same, by the displacements of contact points.
+   subroutine excuse_points(self, x, u)
       type(judge_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
       type(overlap_t) :: overlap
@@ -93,10 +111,25 @@ contains
          end do
       end do
       self%excused = meant
-   end subroutine judge_excuse
+   end subroutine excuse_points
 
    !> The deepest overlap in the step from `u0` by `du`.
    subroutine judge_step(self, x, u0, du, overlap)
+      type(judge_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)      !! (n_dim, n_node) [L]
+      type(overlap_t), intent(out) :: overlap
+
+      if (self%midside%n == 0) then
+         call judge_points(self, x, u0, du, overlap)
+      else
+         call judge_points(self, x, midside_points(self%midside, u0), &
+            midside_points(self%midside, du), overlap)
+         self%clearance = self%clearance/midside_stretch(self%midside)
+      end if
+   end subroutine judge_step
+
+   !> The same, by the displacements of contact points.
+   subroutine judge_points(self, x, u0, du, overlap)
       type(judge_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)      !! (n_dim, n_node) [L]
       type(overlap_t), intent(out) :: overlap
@@ -122,7 +155,7 @@ contains
       end do
       self%clearance = 0.0_wp
       if (is_apart) self%clearance = half_way*least_distance(self)
-   end subroutine judge_step
+   end subroutine judge_points
 
    !> Measure all pieces over the step, and put their boxes into a tree.
    pure subroutine place(self, x, u0, du, tree)

@@ -59,6 +59,7 @@ program main
    use test_loads, only : collect_loads
    use test_march, only : collect_march
    use test_march_contact, only : collect_march_contact
+   use test_midside, only : collect_midside
    use test_mortar, only : collect_mortar
    use test_mortar_pair, only : collect_mortar_pair
    use test_name_index, only : collect_name_index
@@ -172,6 +173,7 @@ program main
    call run("node_potential", collect_node_potential)
    call run("guards", collect_guards)
    call run("hermite_gap", collect_hermite_gap)
+   call run("midside", collect_midside)
    call run("mortar_pair", collect_mortar_pair)
    call run("mortar", collect_mortar)
    call run("damped", collect_damped)

@@ -2,7 +2,7 @@
 module random_constraints
    use emcon_constraints, only : constraint_set_t, constraints_add_curvature, &
       constraints_merge_pattern, constraints_rows, constraints_select
-   use emcon_contact, only : condition_resize
+   use emcon_condition_nodes, only : condition_resize
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_t

@@ -3,7 +3,7 @@ module test_friction
    use, intrinsic :: iso_fortran_env, only : output_unit
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_constraint, only : condition_drag, condition_force, condition_t
-   use emcon_contact, only : condition_include, condition_resize, condition_resize_slip
+   use emcon_condition_nodes, only : condition_include, condition_resize, condition_resize_slip
    use emcon_errors, only : error_t
    use emcon_friction_law, only : friction_trial, friction_violation, touch_free, touch_open, &
       touch_rests, touch_sticks, touch_t

@@ -1,7 +1,7 @@
 !> Redundant constraints, and the choice of the unknowns to eliminate.
 module test_independent_rows
    use check, only : check_equal, check_true, test_case_t
-   use emcon_contact, only : condition_resize
+   use emcon_condition_nodes, only : condition_resize
    use emcon_errors, only : error_t
    use emcon_independent_rows, only : independent_rows_find, independent_rows_t
    use emcon_kinds, only : dp, wp

@@ -1,0 +1,70 @@
+!> Room for the nodes of a condition and its derivatives.
+module emcon_condition_nodes
+   use emcon_constraint, only : condition_t
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: condition_resize, condition_resize_slip, condition_include
+
+contains
+
+   !> Make room for `n` nodes and count them.
+   pure subroutine condition_resize(self, n)
+      type(condition_t), intent(inout) :: self
+      integer, intent(in) :: n                   !! > 0
+
+      self%n_node = n
+      if (allocated(self%node)) then
+         if (size(self%node) >= n) return
+         deallocate(self%node, self%g, self%c, self%h)
+      end if
+      allocate(self%node(n), source=0)
+      allocate(self%g(2, n), self%c(2, n), self%h(2*n, 2*n), source=0.0_wp)
+   end subroutine condition_resize
+
+   !> Let a condition depend on the nodes `node` too, so far by nothing.
+   pure subroutine condition_include(self, node)
+      type(condition_t), intent(inout) :: self   !! with its values and derivatives
+      integer, intent(in) :: node(:)             !! of the scene; not of the slave side if new
+      type(condition_t) :: old
+      integer :: i, n, list(self%n_node + size(node)), n_dim
+
+      n = self%n_node
+      list(:n) = self%node(:n)
+      do i = 1, size(node)
+         if (any(list(:n) == node(i))) cycle
+         n = n + 1
+         list(n) = node(i)
+      end do
+      if (n == self%n_node) return
+      old = self
+      n_dim = size(self%g, 1)
+      call condition_resize(self, n)
+      self%node(:n) = list(:n)
+      self%g = 0.0_wp
+      self%c = 0.0_wp
+      self%h = 0.0_wp
+      associate (m => old%n_node)
+         self%g(:, :m) = old%g(:, :m)
+         self%c(:, :m) = old%c(:, :m)
+         if (self%leaves_second) return
+         self%h(:n_dim*m, :n_dim*m) = old%h(:n_dim*m, :n_dim*m)
+      end associate
+   end subroutine condition_include
+
+   !> Make room for the derivatives of slip, and set them to 0.
+   pure subroutine condition_resize_slip(self)
+      type(condition_t), intent(inout) :: self   !! resized
+
+      if (allocated(self%t)) then
+         if (size(self%t, 2) /= size(self%g, 2)) deallocate(self%t, self%t1, self%ht)
+      end if
+      if (.not. allocated(self%t)) allocate(self%t, self%t1, mold=self%g)
+      if (.not. allocated(self%ht)) allocate(self%ht, mold=self%h)
+      self%slip = 0.0_wp
+      self%t = 0.0_wp
+      self%t1 = 0.0_wp
+      self%ht = 0.0_wp
+   end subroutine condition_resize_slip
+
+end module emcon_condition_nodes
