@@ -7,6 +7,7 @@ module emcon_ties
    use emcon_couplings, only : tie_rows_t, tie_t
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
+   use emcon_midside_plane, only : midside_distribute_rows, midside_init, midside_places, midside_t
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted
    use emcon_surface_edges, only : faces_of_edges, surface_edges
@@ -25,33 +26,48 @@ module emcon_ties
 contains
 
    !> Find the constraint rows of all ties and move their slave nodes so that D x_s = M x_m; the
-   !> notes tell how far. What they cover is no exterior any more.
+   !> notes tell how far. What they cover is no exterior any more. Rows are found between contact
+   !> points, which midside nodes have, and distributed to nodes at the end.
    subroutine ties_prepare(scene, notes, error)
       type(scene_t), intent(inout) :: scene
       type(notes_t), intent(inout) :: notes
       type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: points
+      type(midside_t) :: midside
       integer, allocatable :: n_tie(:)
       logical, allocatable :: is_held(:, :)
       type(tie_rows_t) :: rows
       integer :: t
 
       if (size(scene%tie) == 0) return
+      call midside_init(midside, scene, scene%surface([scene%tie%slave, scene%tie%master]))
+      points = scene
+      call midside_places(midside, points%x)
       do t = 1, size(scene%tie)
-         call tie_measure(scene, scene%tie(t), rows, error)
+         call tie_measure(points, scene%tie(t), rows, error)
          if (allocated(error)) return
-         scene%tie(t)%rows = rows
+         points%tie(t)%rows = rows
       end do
-      call check_repeated(scene, error)
+      call check_repeated(points, error)
       if (allocated(error)) return
-      call uncover_exterior(scene)
-      call count_ties(scene, n_tie)
+      call uncover_exterior(points)
+      call count_ties(points, n_tie)
       call find_held(scene, is_held)
       do t = 1, size(scene%tie)
-         call tie_ends_merge(scene%tie(t)%rows, n_tie, is_held)
+         call tie_ends_merge(points%tie(t)%rows, n_tie, is_held)
       end do
-      call balance(scene, error)
-      if (.not. allocated(error)) call ties_move_nodes(scene, notes, error)
-      if (.not. allocated(error)) call note_unbalanced(scene, notes, error)
+      call balance(points, error)
+      if (allocated(error)) return
+      scene%surface = points%surface
+      scene%tie = points%tie
+      do t = 1, merge(size(scene%tie), 0, midside%n > 0)
+         call midside_distribute_rows(midside, scene%tie(t)%rows)
+      end do
+      call ties_move_nodes(scene, notes, error)
+      if (allocated(error)) return
+      points%x = scene%x
+      call midside_places(midside, points%x)
+      call note_unbalanced(points, notes, error)
    end subroutine ties_prepare
 
    !> Take the faces that ties cover out of all exterior.
