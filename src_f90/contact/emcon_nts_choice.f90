@@ -5,6 +5,7 @@
 module emcon_nts_choice
    use emcon_chain, only : chain_init, chain_shortest, chain_t, chain_thickness
    use emcon_contact, only : contact_t
+   use emcon_corner_tops_plane, only : corner_tops
    use emcon_errors, only : error_t
    use emcon_facing, only : facing_allows
    use emcon_interactions, only : contact_pair_t, smoothing_hermite, smoothing_none
@@ -246,6 +247,8 @@ contains
 
       call polygon_stencil(stencil, self%master, self%node(i), edge, &
          self%rounding*[1.0_wp, merge(0.0_wp, 1.0_wp, self%is_sharp)], x, u0)
+      if (.not. (self%is_sharp .or. self%meets_statics)) call corner_tops(self%slave, &
+         self%chain_node(i), self%master, edge, x, u0, stencil)
       stencil%goes_around = self%offset > 0.0_wp
       associate (n => stencil%n, before => stencil%before, after => stencil%after)
          if (after > 0) then

@@ -30,7 +30,7 @@ contains
    pure subroutine nts_gap_value(x, before, after, rounding, gap, xi, goes_around)
       real(wp), intent(in) :: x(:, :)            !! (2, 3 to 5)
       integer, intent(in) :: before, after       !! as in `nts_gap`
-      real(wp), intent(in) :: rounding(2, 2)  !! as in `nts_gap`
+      real(wp), intent(in) :: rounding(3, 2)     !! as in `nts_gap`
       real(wp), intent(out) :: gap               !! [L]
       real(wp), intent(out) :: xi                !! on the line of the edge, 0 to 1 within it
       logical, intent(in), optional :: goes_around   !! as in `nts_gap`
@@ -91,13 +91,24 @@ contains
 
    !> kappa min(tau, 0), rounded as in `bent_part` of emcon_nts_gap.inc.
    pure real(wp) function bent_value(tau, rounding, kappa)
-      real(wp), intent(in) :: tau, rounding(2), kappa
+      real(wp), intent(in) :: tau, rounding(3), kappa
       real(wp) :: convex
 
       convex = rounded_negative(kappa, flat)
-      bent_value = convex*above_negative(tau, rounding(2)) &
+      bent_value = convex*over_top_value(tau, rounding(2), rounding(3)) &
          + (kappa - convex)*rounded_negative(tau, rounding(1))
    end function bent_value
+
+   !> min(tau, 0), rounded as in `over_top` of emcon_nts_gap.inc.
+   pure real(wp) function over_top_value(tau, narrow, wide) result(part)
+      real(wp), intent(in) :: tau, narrow, wide
+
+      if (wide > narrow) then
+         part = 2.0_wp*above_negative(tau, wide) - above_negative(tau, 0.5_wp*wide)
+      else
+         part = above_negative(tau, narrow)
+      end if
+   end function over_top_value
 
    pure real(wp) function cross(a, b)
       real(wp), intent(in) :: a(2), b(2)

@@ -29,8 +29,8 @@ module emcon_nts_stencil
       integer :: node(5) = 0
       integer :: before = 0, after = 0           !! local numbers of the neighbours' nodes; 0: none
       logical :: goes_around = .false.           !! convex corners, as a circle does
-      real(wp) :: rounding(2, 2) = 0.0_wp        !! (concave and convex; before and after) half
-                                                 !! widths of the rounded corners [L]
+      real(wp) :: rounding(3, 2) = 0.0_wp        !! (concave, convex, and facing a corner; before
+                                                 !! and after) half widths of the corners [L]
    end type polygon_stencil_t
 
    !> A smoothed surface near a slave node; chosen for a step. Slave node and edge come first.
@@ -57,7 +57,7 @@ contains
       self%node(1) = slave
       self%node(2:3) = master%edge(:, edge)
       self%n = 3
-      self%rounding = spread(rounding, 2, 2)*spread(chain_shorter(master, edge), 1, 2)
+      self%rounding(:2, :) = spread(rounding, 2, 2)*spread(chain_shorter(master, edge), 1, 2)
       e = master%previous(edge)
       if (e > 0) then
          if (is_blunt(x, u0, master%edge(1, e), self%node(2), self%node(3))) then

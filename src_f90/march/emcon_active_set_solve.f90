@@ -12,7 +12,8 @@ module emcon_active_set_solve
    use emcon_active_set, only : active_set_drop, active_set_let_go, active_set_put_off, &
       active_set_restart, active_set_select, active_set_t, step_cycling, step_done, step_loose, &
       step_not_held
-   use emcon_active_set_update, only : active_set_advance, active_set_leave, most_early
+   use emcon_active_set_update, only : active_set_advance, active_set_leave, active_set_narrow, &
+      most_early
    use emcon_errors, only : error_t
    use emcon_friction, only : friction_holds, friction_idle, friction_keep
    use emcon_friction_referee, only : friction_referee
@@ -64,7 +65,8 @@ contains
          call keep_multipliers(self)
          call friction_keep(self%friction, self%set)
          if (status == newton_redundant) then
-            call leave_out(self, newton%correction%redundant, newton%correction%is_near)
+            call leave_out(self, system, scene, newton%correction%redundant, &
+               newton%correction%is_near)
             cycle
          end if
          if (status == newton_diverged) then
@@ -118,16 +120,20 @@ contains
    end subroutine keep_multipliers
 
    !> Leave out constraints that follow from others, or of what sticks its slip.
-   subroutine leave_out(self, redundant, is_near)
+   subroutine leave_out(self, system, scene, redundant, is_near)
       type(active_set_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(scene_t), intent(in) :: scene
       integer, intent(in) :: redundant(:)        !! (any) rows of the set, from 1
       logical, intent(in) :: is_near(:)          !! (as many) they nearly do
-      logical :: is_gap(size(redundant))
+      logical :: is_gap(size(redundant)), is_done
 
       is_gap = redundant <= self%set%n
       call friction_idle(self%friction, self%set, pack(redundant, .not. is_gap))
       self%n_tried = self%n_tried - 1
       if (.not. any(is_gap)) return
+      call active_set_narrow(self, system, scene, pack(redundant, is_gap), is_done)
+      if (is_done) return
       call active_set_put_off(self, pack(redundant, is_gap .and. is_near))
       call active_set_drop(self, pack(redundant, is_gap .and. .not. is_near))
    end subroutine leave_out

@@ -9,10 +9,11 @@ module emcon_active_set_update
    use emcon_friction, only : friction_close, friction_holds, friction_turn, most_lagged, most_shift
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
+   use emcon_scene, only : scene_t
    use emcon_system, only : system_t
    implicit none
    private
-   public :: active_set_advance, active_set_leave
+   public :: active_set_advance, active_set_leave, active_set_narrow
 
    !> Penetration and tension below these multiples of epsilon are round-off.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
@@ -95,6 +96,51 @@ contains
       self%friction%way = way
       self%n_early = most_early
    end subroutine active_set_leave
+
+   !> Of contacts that have closed between the same two rigid bodies some follow from others, at the
+   !> places `redundant` of the set: a large step takes in more than can act. Their order, which
+   !> knows no symmetry, does not tell which do: the deepest stay, and the set goes on from these one
+   !> by one. `has_narrowed`: some were not as deep.
+   subroutine active_set_narrow(self, system, scene, redundant, has_narrowed)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: redundant(:)        !! (any) places in the set, from 1
+      logical, intent(out) :: has_narrowed       !! less is active
+      real(wp) :: depth(self%set%n)              ! of contacts that have closed, by the edge
+      integer, dimension(self%set%n) :: low, high   ! bodies; 0: not rigid, or it acted before
+      integer :: body(size(scene%node_label)), i, k, pair
+      logical :: is_like(self%set%n)
+
+      has_narrowed = .false.
+      depth = 0.0_wp
+      if (.not. self%has_rigid .or. self%one_by_one) return
+      body = 0
+      do i = 1, size(scene%rigid)
+         body(scene%rigid(i)%node) = i
+      end do
+      low = 0
+      high = 0
+      do k = self%set%n_held + 1, self%set%n
+         if (self%was_active(self%set%id(k))) cycle
+         call constraint_place(system, self%set%id(k), pair, i)
+         depth(k) = depth_of(self, system%contact(pair)%contact%state(i), self%set%id(k))
+         associate (item => self%set%item(k))
+            low(k) = minval(body(item%node(:item%n_node)))
+            high(k) = maxval(body(item%node(:item%n_node)))
+         end associate
+      end do
+      do i = 1, size(redundant)
+         if (low(redundant(i)) == 0) cycle
+         is_like = low == low(redundant(i)) .and. high == high(redundant(i))
+         is_like = is_like .and. depth > minval(depth, is_like) + touch_tol
+         has_narrowed = has_narrowed .or. any(is_like)
+         self%is_active(pack(self%set%id, is_like)) = .false.
+      end do
+      if (.not. has_narrowed) return
+      self%one_by_one = .true.
+      self%n_tried = 0
+   end subroutine active_set_narrow
 
    !> The next set, from the gaps and multipliers of the converged one. Of the conditions gap >= 0,
    !> lam >= 0, lam gap = 0 the set fulfils the last: what acts is let go where lam < 0, what does
@@ -185,7 +231,7 @@ contains
       if (pulls) then
          amount = self%set%lam(k)
       else
-         amount = (gap%gap1 - self%left(1)*self%overclosure(id) - gap%closed)/gap%size
+         amount = depth_of(self, gap, id)
       end if
       if (choice%id > 0) then
          if (choice%pulls .and. .not. pulls) return
@@ -193,6 +239,15 @@ contains
       end if
       choice = choice_t(id, pulls, amount)
    end subroutine weigh
+
+   !> How far contact `id` is open at the end of the step, by the edge: < 0 if it closes.
+   pure real(wp) function depth_of(self, gap, id) result(depth)
+      type(active_set_t), intent(in) :: self
+      type(gap_state_t), intent(in) :: gap
+      integer, intent(in) :: id
+
+      depth = (gap%gap1 - self%left(1)*self%overclosure(id) - gap%closed)/gap%size
+   end function depth_of
 
    !> Can the step stand on constraint `k` of the set, the `i`-th of `contact`, which acts? If its
    !> stencil has moved on, the step is solved again with that for the motion that came out.

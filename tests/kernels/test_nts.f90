@@ -38,7 +38,8 @@ contains
          test_case_t("a strip in contact with itself", test_self), &
          test_case_t("corners that meet are held by the faces that bear", test_corners), &
          test_case_t("faces stay chosen where gaps are evaluated at the end", test_faces_stay), &
-         test_case_t("sharp corners are the polygon, round ones stand out", test_sharp)]
+         test_case_t("sharp corners are the polygon, round ones stand out", test_sharp), &
+         test_case_t("wide tops where corners face each other", test_wide_tops)]
    end subroutine collect_nts
 
    !> A gap of 1/4 that closes by 3/8 in the middle of the step.
@@ -179,6 +180,63 @@ contains
       call check_true(error, gap(2) < gap(1) - min(tol, 0.01_wp*width) .and. &
          gap(2) > gap(1) - 0.08_wp*width, "round: smaller by " // to_text(gap(1) - gap(2)))
    end subroutine test_sharp
+
+   !> Two squares corner on corner: the top is round over a quarter of an edge, by the part of the
+   !> normals that both corners have. Turned by 45 degrees half of them are left, by 90 one; the
+   !> corner of a block that lies flat on another one has one normal only.
+   subroutine test_wide_tops(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: angle(4) = acos(-1.0_wp)*[0.0_wp, 0.25_wp, -0.25_wp, 0.5_wp]
+      real(wp), parameter :: share(4) = [1.0_wp, 0.5_wp, 0.5_wp, 0.0_wp]
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(nts_t) :: nts
+      real(wp), allocatable :: u(:, :)
+      integer :: k
+
+      call scene_begin(scene)
+      call add_block(scene, "CPE4", [1, 1], [0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp], lower)
+      call add_block(scene, "CPE4", [1, 1], [1.0_wp, 1.0_wp], [1.0_wp, 1.0_wp], upper)
+      call add_surface(scene, "LOWER", lower, [bottom, right, top, left])
+      call add_surface(scene, "UPPER", upper, [bottom, right, top, left])
+      call nts_init(nts, scene, contact_pair_t(slave=2, master=1), error)
+      if (allocated(error)) return
+      call nts%configure(scene%x, contact_options_t())
+      call nts%suit_steps(.false.)
+      allocate(u, source=0.0_wp*scene%x)
+      do k = 1, size(angle)
+         associate (arm => scene%x(:, 5:) - 1.0_wp, c => cos(angle(k)), s => sin(angle(k)))
+            u(1, 5:) = (c - 1.0_wp)*arm(1, :) - s*arm(2, :)
+            u(2, 5:) = s*arm(1, :) + (c - 1.0_wp)*arm(2, :)
+         end associate
+         call check_near(error, top_width(), 0.25_wp*share(k), tol, 1.0_wp, &
+            "turned: " // to_text(k))
+      end do
+      ! Moved to the left by an edge, it lies on the top of the lower one with its side.
+      u = 0.0_wp
+      u(1, 5:) = -1.0_wp
+      call check_near(error, top_width(), 0.0_wp, tol, 1.0_wp, "flat on the other")
+      u = 0.0_wp
+      call nts%suit_steps(.true.)
+      call check_near(error, top_width(), 0.0_wp, tol, 1.0_wp, "in statics")
+
+   contains
+
+      !> For the first corner of the upper block at the corner of the lower one where it stands.
+      real(wp) function top_width()
+         integer :: node, side
+
+         node = block_node(upper, 0, 0)
+         nts%were_sharp = .not. nts%is_sharp     ! stencils are to be chosen anew
+         call nts%begin_step(scene%x, u, 0.0_wp*u)
+         associate (stencil => nts%polygon(1, findloc(nts%node, node, 1)))
+            side = merge(1, 2, norm2(scene%x(:, stencil%node(2)) - scene%x(:, node) - u(:, node)) &
+               < 0.5_wp)
+            top_width = stencil%rounding(3, side)
+         end associate
+      end function top_width
+
+   end subroutine test_wide_tops
 
    !> Over the side of the lower block no constraint may act; at its corner one may.
    subroutine test_past_end(error)

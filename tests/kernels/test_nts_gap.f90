@@ -18,10 +18,10 @@ module test_nts_gap
    real(wp), parameter :: eps = epsilon(1.0_wp)
    !> Some 50 roundings of quantities of size 1.
    real(wp), parameter :: tol = 64.0_wp*eps
-   !> Sharp corners, and corners rounded over these lengths: concave and convex, before the edge and
-   !> after it.
-   real(wp), parameter :: sharp(2, 2) = 0.0_wp, round(2, 2) = reshape([0.05_wp, 0.06_wp, &
-      0.04_wp, 0.03_wp], [2, 2])
+   !> Sharp corners, and corners rounded over these lengths: concave, convex and facing a corner,
+   !> before the edge and after it.
+   real(wp), parameter :: sharp(3, 2) = 0.0_wp, round(3, 2) = reshape([0.05_wp, 0.06_wp, 0.0_wp, &
+      0.04_wp, 0.03_wp, 0.07_wp], [3, 2])
    !> Slave node, edge, node before it, node after it; the body is below the edge.
    real(wp), parameter :: flat(2, 5) = reshape([0.3_wp, 0.4_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
       2.1_wp, 0.0_wp, -0.9_wp, 0.0_wp], [2, 5])
@@ -37,6 +37,7 @@ contains
          test_case_t("continuous across the bisector", test_continuity), &
          test_case_t("rounded corners", test_rounded), &
          test_case_t("rounded corners are those of either edge", test_either_edge), &
+         test_case_t("the top of a corner has no side", test_top), &
          test_case_t("identity and values", test_identity), &
          test_case_t("tiny steps", test_tiny), &
          test_case_t("momenta", test_momenta), &
@@ -47,7 +48,7 @@ contains
 
    !> The gap over a step with its derivatives by all five nodes.
    pure type(nodal_t) function nts_gap(x0, dx, before, after, rounding, goes_around)
-      real(wp), intent(in) :: x0(:, :), dx(:, :), rounding(2, 2)
+      real(wp), intent(in) :: x0(:, :), dx(:, :), rounding(3, 2)
       integer, intent(in) :: before, after
       logical, intent(in), optional :: goes_around
       type(dg_t) :: a
@@ -192,6 +193,42 @@ contains
       call check_true(error, n_within > 50 .and. n_within < 150, "on both sides")
    end subroutine test_either_edge
 
+   !> Over a corner that faces a corner: gradients at mirrored places are mirror images. In the
+   !> middle the normal is that between the edges, and t of the half width beside it the slope of what the
+   !> corner adds is at least 1/2 - 15 t^3. Nowhere does that slope change faster than by 3 t.
+   subroutine test_top(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: width = 0.25_wp, up = 0.05_wp, still(2, 4) = 0.0_wp
+      real(wp), parameter :: step = 0.0075_wp    ! of t
+      real(wp), parameter :: half(3) = [0.13_wp, 0.5_wp, 0.785_wp]
+      type(nodal_t) :: one, other, before
+      real(wp) :: x(2, 4), place, rounding(3, 2)
+      integer :: i, k
+
+      rounding = 0.01_wp*width
+      rounding(3, :) = width
+      do k = 1, size(half)
+         associate (c => cos(half(k)), s => sin(half(k)))
+            x(:, 2:) = reshape([c, -s, 0.0_wp, 0.0_wp, -c, -s], [2, 3])
+            do i = 0, 200
+               place = 0.5_wp*width/c*step*real(i, wp)
+               x(:, 1) = [place, up]
+               one = nts_gap(x, still, 0, 4, rounding)
+               x(:, 1) = [-place, up]
+               other = nts_gap(x, still, 0, 4, rounding)
+               call check_near(error, other%g(:2), [-one%g(1), one%g(2)], tol, 1.0_wp, "mirrored")
+               if (i == 0) call check_near(error, one%g(:2), [0.0_wp, c], tol, &
+                  1.0_wp, "middle")
+               call check_true(error, abs(one%g(1)) <= 30.0_wp*s*(2.0_wp*c*place/width)**3 + tol, &
+                  "flat in the middle: " // to_text(one%g(1)))
+               if (i > 0) call check_true(error, abs(one%g(1) - before%g(1)) <= 6.0_wp*s*step &
+                  + tol, "no jump: " // to_text(place))
+               before = one
+            end do
+         end associate
+      end do
+   end subroutine test_top
+
    !> Chains of three edges and their motion of up to a third of an edge, slave node across both
    !> corners. Edges are in random places of the array.
    subroutine draw(x0, dx)
@@ -207,7 +244,7 @@ contains
 
    subroutine test_identity(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: x0(2, 5), dx(2, 5), g(2, 5), gap(2), xi(2), width(2, 2)
+      real(wp) :: x0(2, 5), dx(2, 5), g(2, 5), gap(2), xi(2), width(3, 2)
       type(nodal_t) :: a
       integer :: i, n_crossed
 
@@ -307,7 +344,7 @@ contains
    !> difference to compare with.
    subroutine test_derivatives(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: x0(2, 5), dx(2, 5), way(2, 5), step, bound, gap(2), xi, width(2, 2)
+      real(wp) :: x0(2, 5), dx(2, 5), way(2, 5), step, bound, gap(2), xi, width(3, 2)
       type(nodal_t) :: a, up, down
       integer :: i, k, n, j
 
