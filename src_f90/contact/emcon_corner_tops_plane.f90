@@ -1,7 +1,7 @@
 !> Round tops of the corners of a polygon that face a corner of the slave surface.
 !>
 !> Two vertices that meet have many normals in common, and round-off must not choose one: where they
-!> face each other the top of the corner is wide. Source: docs/theory.md, section 4.2, eq. (14e).
+!> face each other the top of the corner is wide. Source: docs/theory.md, section 4.2, eq. (14s).
 module emcon_corner_tops_plane
    use emcon_chain, only : chain_shorter, chain_t
    use emcon_kinds, only : wp
