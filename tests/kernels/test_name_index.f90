@@ -1,6 +1,7 @@
 !> Names in a hash table: all are found, and nothing else.
 module test_name_index
-   use check, only : check_equal, error_t, test_case_t
+   use check, only : check_equal, test_case_t
+   use emcon_errors, only : error_t
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_text, only : to_text
    implicit none
