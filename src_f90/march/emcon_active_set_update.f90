@@ -99,8 +99,8 @@ contains
 
    !> Of contacts that have closed between the same two rigid bodies some follow from others, at the
    !> places `redundant` of the set: a large step takes in more than can act. Their order, which
-   !> knows no symmetry, does not tell which do: the deepest stay, and the set goes on from these one
-   !> by one. `has_narrowed`: some were not as deep.
+   !> knows no symmetry, does not tell which do: the deepest stay, and the set goes on from these,
+   !> one by one. `has_narrowed`: some were not as deep.
    subroutine active_set_narrow(self, system, scene, redundant, has_narrowed)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(in) :: system

@@ -194,8 +194,8 @@ contains
    end subroutine test_either_edge
 
    !> Over a corner that faces a corner: gradients at mirrored places are mirror images. In the
-   !> middle the normal is that between the edges, and t of the half width beside it the slope of what the
-   !> corner adds is at least 1/2 - 15 t^3. Nowhere does that slope change faster than by 3 t.
+   !> middle the normal is that between the edges, and t of the half width beside it the slope of
+   !> what the corner adds is at least 1/2 - 15 t^3. Nowhere does it change faster than by 3 t.
    subroutine test_top(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: width = 0.25_wp, up = 0.05_wp, still(2, 4) = 0.0_wp
