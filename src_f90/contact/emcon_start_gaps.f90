@@ -9,6 +9,7 @@ module emcon_start_gaps
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, contact_pair_t
    use emcon_kinds, only : wp
+   use emcon_midside_plane, only : midside_init, midside_points, midside_t
    use emcon_nts, only : nts_init, nts_nearest, nts_t
    use emcon_scene, only : scene_t
    implicit none
@@ -27,6 +28,7 @@ module emcon_start_gaps
       type(gap_state_t), allocatable :: state(:) !! (n) as last measured
       type(nts_t), private :: nts
       real(wp), allocatable, private :: still(:, :)  !! (2, n_node) no displacement [L]
+      real(wp), allocatable, private :: u(:, :)  !! (2, n_node) initial, of contact points [L]
    end type start_gaps_t
 
 contains
@@ -39,6 +41,7 @@ contains
       type(contact_pair_t), intent(in) :: pair
       type(error_t), allocatable, intent(out) :: error
       type(contact_options_t), intent(in), optional :: options
+      type(midside_t) :: midside
 
       call nts_init(self%nts, scene, pair, error)
       if (allocated(error)) return
@@ -54,6 +57,9 @@ contains
       self%chain_node = self%nts%chain_node
       self%edge = self%nts%edge
       self%state = self%nts%state
+      call midside_init(midside, scene, scene%surface([pair%slave, pair%master]))
+      self%u = scene%u0
+      if (midside%n > 0) self%u = midside_points(midside, scene%u0)
    end subroutine start_gaps_init
 
    !> Gap of node `i` over the nearest master edge, searched among all edges; `edge(i)` tells which.
@@ -64,7 +70,7 @@ contains
       real(wp), intent(out) :: gap               !! [L]
       logical, intent(out) :: is_over            !! not past an end of the surface
 
-      call nts_nearest(self%nts, i, scene%x, scene%u0, self%still, gap, is_over)
+      call nts_nearest(self%nts, i, scene%x, self%u, self%still, gap, is_over)
       self%edge(i) = self%nts%edge(i)
    end subroutine start_gaps_nearest
 
@@ -74,8 +80,8 @@ contains
       type(scene_t), intent(in) :: scene
 
       self%nts%reach = 0.0_wp
-      call self%nts%begin_step(scene%x, scene%u0, self%still)
-      call self%nts%measure(scene%x, scene%u0, self%still)
+      call self%nts%begin_points(scene%x, self%u, self%still)
+      call self%nts%measure_points(scene%x, self%u, self%still)
       self%edge = self%nts%edge
       self%state = self%nts%state
    end subroutine start_gaps_measure
@@ -90,7 +96,7 @@ contains
       logical, intent(out) :: is_last            !! it is round-off
       type(condition_t) :: item(1)
 
-      call self%nts%evaluate_points([i], scene%x, scene%u0, self%still, [0.0_wp], item)
+      call self%nts%evaluate_points([i], scene%x, self%u, self%still, [0.0_wp], item)
       associate (normal => item(1)%c(:, 1))
          way = item(1)%gap1*normal/dot_product(normal, normal)
       end associate
