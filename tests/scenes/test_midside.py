@@ -2,9 +2,13 @@
 
 import numpy as np
 import pytest
-from scene_tools import run_deck
+from scene_tools import Deck, run_deck
 from side_scenes import (
+    block,
+    bodies,
     collision,
+    grid,
+    pair,
     patch,
     pressed,
     pressed_errors,
@@ -93,3 +97,26 @@ def test_collision(tmp_path, kinds, options, treatment, friction):
     np.testing.assert_allclose(energy, energy[0], rtol=1e-13)
     if friction:
         assert history["total"][-1] < 0.99*history["total"][0]
+
+
+def test_displaced_at_the_start(tmp_path):
+    """The middle of a side of CPE8 is displaced by d, its contact point by 4/3 d: there a node
+    of the other body touches it, before the first step and in it, but for the corner that is round
+    over 1e-6 of an edge: 3/16 of that by the half turn of 0.02 (docs/theory.md, 4.2)."""
+    low = grid("CPE8", (1, 1), block(0, -1, 4, 0))
+    high = grid("CPE4", (2, 1), block(0, 0, 4, 1))
+    first = len(low.x)
+    deck = Deck(bodies(LOW=low, HIGH=high) + pair("HIGH_bottom", "LOW_top", "TYPE=NODE TO SURFACE")
+                + f"""*INITIAL CONDITIONS, TYPE=DISPLACEMENT
+{low.label[1, 2]}, 2, -0.03
+{first + high.label[1, 0]}, 2, -0.04
+*STEP, NLGEOM
+*DYNAMIC, DIRECT
+1e-6, 1e-6
+*CONTACT FILE
+CDISP
+*END STEP
+""")
+    gap = run_deck(deck, tmp_path).fields()["contact_gap"][0]
+    touching = [low.label[1, 2] - 1, first + high.label[1, 0] - 1]
+    np.testing.assert_allclose(gap[touching], 0, rtol=0, atol=1.01*3/16*2e-6*0.02)
