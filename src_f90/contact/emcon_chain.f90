@@ -14,7 +14,7 @@ module emcon_chain
    implicit none
    private
    public :: chain_t, chain_init, chain_number, chain_shorter, chain_shortest, chain_thickness, &
-      chain_tributary, chain_distance, chain_is_joint, chain_touches, chain_corners, chain_turn, &
+      chain_tributary, chain_distance, chain_is_joint, chain_touches, chain_corners, &
       chain_crossing, surface_edges
 
    type :: chain_t
@@ -271,24 +271,6 @@ contains
          is_corner(i) = turn > angle + turn_tol
       end do
    end subroutine chain_corners
-
-   !> The turn of the chain at its node `k` in the reference configuration, > 0 where the body is
-   !> convex; a half turn at an end.
-   pure real(wp) function chain_turn(self, x, k) result(turn)
-      type(chain_t), intent(in) :: self
-      real(wp), intent(in) :: x(:, :)            !! (2, n_node of the scene)
-      integer, intent(in) :: k                   !! index into `node`
-      real(wp) :: a(2), b(2)
-
-      turn = pi
-      if (any(self%node_edge(:, k) == 0)) return
-      associate (before => self%edge(:, self%node_edge(1, k)), &
-            here => self%edge(:, self%node_edge(2, k)))
-         a = x(:, before(2)) - x(:, before(1))
-         b = x(:, here(2)) - x(:, here(1))
-      end associate
-      turn = atan2(cross(a, b), dot_product(a, b))
-   end function chain_turn
 
    !> The first two edges, not neighbours, in which the chain crosses itself at x + u; 0, 0 if it
    !> does nowhere. Where it only touches itself or runs alongside, it does not cross.

@@ -20,7 +20,8 @@ module emcon_look_plane
    !> On the way, overlap below the smaller of these, by the edge and by the thickness of the
    !> element behind it, is the straight way past a corner.
    real(wp), parameter :: passing = 0.1_wp, passing_thin = 0.2_wp
-   !> By the edge: less than this behind it, the middle of an edge that crosses nothing lies along it.
+   !> Less than this behind an edge, by its length, the middle of one that crosses nothing lies along
+   !> it.
    real(wp), parameter :: aligned = sqrt(epsilon(1.0_wp))
    !> Crossings of one edge that are told apart.
    integer, parameter :: most_crossings = 8
@@ -249,8 +250,8 @@ contains
 
    end subroutine try_edge
 
-   !> An edge that crosses nothing lies in the other piece all the same where its ends stand exactly on
-   !> the sides of that.
+   !> An edge that crosses nothing lies in the other piece all the same where its ends stand exactly
+   !> on the sides of that.
    pure subroutine try_middle(self, x, e, other, reach, overlap)
       type(look_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)

@@ -8,7 +8,7 @@ module emcon_nts
    use emcon_constraint, only : condition_t
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
-   use emcon_guard_slack, only : guard_slack_depth, guard_slack_init, guard_slack_t
+   use emcon_guard_slack_plane, only : guard_slack_depth, guard_slack_init, guard_slack_t
    use emcon_hermite_gap_value, only : hermite_gap_value, hermite_slip_value
    use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite, &
       smoothing_none

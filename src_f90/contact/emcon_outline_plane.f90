@@ -130,7 +130,9 @@ contains
          if (any(self%pair == s)) call pieces_of(scene, scene%surface(s), piece, self%on(s)%piece)
       end do
       number = unique_sorted(pack(piece, piece > 0))
-      if (scene%n_dim /= 2 .or. (size(scene%pair) == 0 .and. size(number) < 2)) number = [integer ::]
+      if (scene%n_dim /= 2 .or. (size(scene%pair) == 0 .and. size(number) < 2)) then
+         number = [integer ::]
+      end if
       self%n_piece = size(number)
       do s = 1, size(scene%surface)
          associate (on => self%on(s)%piece)

@@ -49,8 +49,8 @@ module emcon_verdict
    !> Running figures, and how the run ended.
    type :: verdict_t
       type(energy_watch_t) :: energy
-      !> So far, per edge, bodies may be in each other: corners of master surfaces are rounded over a
-      !> tenth of that, coordinates of decks by less.
+      !> So far, per edge, bodies may be in each other: corners of master surfaces are rounded over
+      !> a tenth of that, coordinates of decks by less.
       real(wp) :: bar = touching_bar
       real(wp) :: deepest = 0.0_wp               !! penetration per edge
       real(wp) :: deepest_time = 0.0_wp          !! [T]

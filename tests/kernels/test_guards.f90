@@ -3,7 +3,7 @@ module test_guards
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_chain, only : chain_init, chain_t
    use emcon_errors, only : error_t
-   use emcon_guard_slack, only : guard_slack_depth, guard_slack_init, guard_slack_t
+   use emcon_guard_slack_plane, only : guard_slack_depth, guard_slack_init, guard_slack_t
    use emcon_guards, only : corner_slack, guard_slack, guards_find
    use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts
    use emcon_kinds, only : wp

@@ -1,11 +1,11 @@
 !> How far a guard lets the nodes of a surface into another one.
 !>
-!> A corner is held nearly at once: means of gaps, and nodes beside it, do not see it. Nodes of smooth
-!> sides are left to these, down to the bar of the verdict. Where polygons of one curve lie in each
-!> other their edges dip into the arcs by what the curve is away from its chords: that is no overlap.
+!> A corner is held nearly at once: means of gaps, and nodes beside it, do not see it. Nodes of
+!> smooth sides are left to these. Where polygons of one curve lie in each other their edges dip into
+!> the arcs by what the curve is away from its chords: that is no overlap.
 !> Source: docs/theory.md, section 4.11.
-module emcon_guard_slack
-   use emcon_chain, only : chain_t, chain_turn
+module emcon_guard_slack_plane
+   use emcon_chain, only : chain_t
    use emcon_guards, only : corner_slack
    use emcon_kinds, only : wp
    implicit none
@@ -37,7 +37,7 @@ contains
       allocate(self%slack(size(slave%node)), source=slack)
       allocate(self%own(size(slave%node)), self%hollow(master%n_edge), source=0.0_wp)
       do k = 1, size(slave%node)
-         turn = chain_turn(slave, x, k)
+         turn = turn_at(slave, x, k)
          if (turn > corner_turn) then
             self%slack(k) = corner_slack
          else
@@ -46,7 +46,7 @@ contains
       end do
       do e = 1, master%n_edge
          do k = 1, 2
-            turn = -chain_turn(master, x, master%end_node(k, e))
+            turn = -turn_at(master, x, master%end_node(k, e))
             if (turn < corner_turn) self%hollow(e) = max(self%hollow(e), sagitta*turn)
          end do
       end do
@@ -64,4 +64,22 @@ contains
       if (self%hollow(e) > 0.0_wp) depth = depth + self%own(k)*own_length + self%hollow(e)*length
    end function guard_slack_depth
 
-end module emcon_guard_slack
+   !> The turn of a chain at its node `k` in the reference configuration [rad], > 0 where the body is
+   !> convex; a half turn at an end.
+   pure real(wp) function turn_at(chain, x, k)
+      type(chain_t), intent(in) :: chain
+      real(wp), intent(in) :: x(:, :)            !! (2, n_node of the scene) [L]
+      integer, intent(in) :: k                   !! index into the nodes of `chain`
+      real(wp) :: a(2), b(2)
+
+      turn_at = acos(-1.0_wp)
+      if (any(chain%node_edge(:, k) == 0)) return
+      associate (before => chain%edge(:, chain%node_edge(1, k)), &
+            here => chain%edge(:, chain%node_edge(2, k)))
+         a = x(:, before(2)) - x(:, before(1))
+         b = x(:, here(2)) - x(:, here(1))
+      end associate
+      turn_at = atan2(a(1)*b(2) - a(2)*b(1), dot_product(a, b))
+   end function turn_at
+
+end module emcon_guard_slack_plane
