@@ -1,8 +1,8 @@
 !> How far a guard lets the nodes of a surface into another one.
 !>
 !> A corner is held nearly at once: means of gaps, and nodes beside it, do not see it. Nodes of
-!> smooth sides are left to these. Where polygons of one curve lie in each other their edges dip into
-!> the arcs by what the curve is away from its chords: that is no overlap.
+!> smooth sides are left to these. Where polygons of one curve lie in each other their edges dip
+!> into the arcs by what the curve is away from its chords: that is no overlap.
 !> Source: docs/theory.md, section 4.11.
 module emcon_guard_slack_plane
    use emcon_chain, only : chain_t
@@ -64,8 +64,8 @@ contains
       if (self%hollow(e) > 0.0_wp) depth = depth + self%own(k)*own_length + self%hollow(e)*length
    end function guard_slack_depth
 
-   !> The turn of a chain at its node `k` in the reference configuration [rad], > 0 where the body is
-   !> convex; a half turn at an end.
+   !> The turn of a chain at its node `k` in the reference configuration [rad], > 0 where the body
+   !> is convex; a half turn at an end.
    pure real(wp) function turn_at(chain, x, k)
       type(chain_t), intent(in) :: chain
       real(wp), intent(in) :: x(:, :)            !! (2, n_node of the scene) [L]

@@ -20,8 +20,8 @@ module emcon_look_plane
    !> On the way, overlap below the smaller of these, by the edge and by the thickness of the
    !> element behind it, is the straight way past a corner.
    real(wp), parameter :: passing = 0.1_wp, passing_thin = 0.2_wp
-   !> Less than this behind an edge, by its length, the middle of one that crosses nothing lies along
-   !> it.
+   !> Less than this behind an edge, by its length, the middle of one that crosses nothing lies
+   !> along it.
    real(wp), parameter :: aligned = sqrt(epsilon(1.0_wp))
    !> Crossings of one edge that are told apart.
    integer, parameter :: most_crossings = 8

@@ -88,12 +88,26 @@ def test_bodies_without_a_pair_that_go_through_each_other_are_told(tmp_path, gap
     scene.block("LEFT", (-0.5, 0.0), (0.5, 0.5), (2, 2), velocity=(1.0, 0.0))
     scene.block("RIGHT", (gap, 0.0), (0.5, 0.5), (2, 2))
     scene.pairs = [("LEFT", "FLOOR"), ("RIGHT", "FLOOR"), *[("LEFT", "RIGHT")]*is_paired]
-    run = run_deck(scene.deck(AUTO), tmp_path, formulation=NODES)
+    run = run_deck(scene.deck(AUTO), tmp_path, code=3*warns, formulation=NODES)
     assert (max(overlap.frames(run.fields())).by_edge > 0.1) is not is_paired
-    told = [text for text in run.verdict["warnings"] if "no contact pair brings together" in text]
-    assert [text.startswith("bodies 2 and 3, which") for text in told] == [True]*warns
-    assert run.verdict["verdict"] == "good" and run.verdict["penetration"] < 1e-12
-    assert ("nothing penetrates where contact pairs are" in run.log) is warns
+    told = [text for text in run.verdict["reasons"] if "no contact pair brings the two" in text]
+    assert len(told) == warns and run.verdict["verdict"] == ("bad" if warns else "good")
+    assert (run.verdict["penetration"] > 0.1) is warns
+    assert ("nothing penetrates" in run.log) is not warns
+
+
+@pytest.mark.parametrize("cells", [(1, 1), (2, 3)])
+def test_bodies_of_a_deck_without_contact_are_looked_at(tmp_path, cells):
+    """A square falls into one of the same width: of single elements no node or edge crosses."""
+    scene = Scene(0.05, 0.5)
+    scene.block("LOWER", (0.0, 0.0), (1.0, 1.0), cells)
+    scene.block("UPPER", (0.0, 1.1), (1.0, 1.0), cells, velocity=(0.0, -1.0))
+    deck = scene.deck(AUTO)
+    for card in ("*SURFACE INTERACTION", "*CONTACT PAIR", "*CONTACT FILE", "*CONTACT PRINT"):
+        deck.remove(card)
+    run = run_deck(deck, tmp_path, code=3)
+    assert run.verdict["penetration"] >= 0.39 and run.history["penetration"][-1] >= 0.39
+    assert "name them in a *CONTACT PAIR" in run.verdict["reasons"][0]
 
 
 def test_decks_made_anew():
