@@ -93,7 +93,8 @@ contains
       integer(c_int), pointer :: errno
       integer(c_intptr_t) :: n
       integer(c_size_t) :: first
-      integer(c_int), parameter :: standard_output = 1, errno_pipe = 32, errno_closed = 9   ! of Linux
+      integer(c_int), parameter :: standard_output = 1
+      integer(c_int), parameter :: errno_pipe = 32, errno_closed = 9   ! of Linux
 
       if (has_failed) return
       line = printable(text) // new_line("a")
@@ -107,8 +108,8 @@ contains
       if (.not. has_failed) return
       call c_f_pointer(c_errno(), errno)
       if (errno == errno_pipe .or. errno == errno_closed) return
-      write(error_unit, "(a)", iostat=ignored) "emcon: cannot write to standard output: is the " // &
-         "disk full?"
+      write(error_unit, "(a)", iostat=ignored) "emcon: cannot write to standard output: is " // &
+         "the disk full?"
       is_lost = .true.
    end subroutine print_line
 

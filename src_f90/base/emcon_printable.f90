@@ -6,8 +6,8 @@ module emcon_printable
 
 contains
 
-   !> `text` with a question mark in place of each byte of control characters: those of ASCII but the
-   !> end of a line, and those that Unicode has from 128 to 159.
+   !> `text` with a question mark in place of each byte of control characters: those of ASCII but
+   !> the end of a line, and those that Unicode has from 128 to 159.
    pure function printable(text) result(shown)
       character(len=*), intent(in) :: text
       character(len=len(text)) :: shown

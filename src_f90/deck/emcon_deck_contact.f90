@@ -368,7 +368,8 @@ contains
          of_card%rebound = reader%rebound(i)
          of_card%damping = reader%damping(i)
       end if
-      if (.not. (i > 0 .or. name == "" .or. reader%doubt_names)) call card_error(reader, card, "unknown surface interaction " &
+      if (.not. (i > 0 .or. name == "" .or. reader%doubt_names)) call card_error( &
+         reader, card, "unknown surface interaction " &
          // quoted(name) // suggestion(name, reader%interaction))
       if (.not. of_card%offset > 0.0_wp) return
       if (any(pair%slave == pair%master .and. pair%slave > 0)) call card_error(reader, card, &

@@ -61,8 +61,8 @@ contains
       other_dimension = n_plane + n_space - n_dim
    end function other_dimension
 
-   !> Dimensions of the first element whose type tells; the plane if none does. Where nodes have a z,
-   !> solids count before elements of the plane: these are then their faces, as generators write.
+   !> Dimensions of the first element whose type tells; the plane if none does. Where nodes have a
+   !> z, solids count before elements of the plane: these are then their faces, as generators write.
    integer function find_dimension(reader) result(n_dim)
       type(reader_t), intent(in) :: reader
       integer :: i, first, own
