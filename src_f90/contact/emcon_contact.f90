@@ -55,7 +55,7 @@ module emcon_contact
       real(wp) :: friction = 0.0_wp                   !! mu >= 0 of Coulomb's law
       real(wp) :: rebound = 0.0_wp                    !! along the surface, of what sticks, 0 to 1
       type(contact_damping_t) :: damping              !! of what is near, too
-      real(wp) :: reach = 0.0_wp                      !! up to where it is near; 0: a step begins [L]
+      real(wp) :: reach = 0.0_wp                      !! so far it is near; 0: a step begins [L]
       !> No state changes before a node has moved farther from where the last step began [L].
       real(wp) :: clearance = 0.0_wp
       integer :: n_look = 0                           !! steps begun so far

@@ -14,7 +14,7 @@ module emcon_near_list
    !> close by the largest motion in the step.
    real(wp), parameter :: near_per_edge = 0.5_wp, near_per_motion = 2.0_wp
    !> A list reaches so far, so that it serves for several steps.
-   real(wp), parameter :: list_per_edge = 1.0_wp, list_per_motion = 8.0_wp
+   real(wp), parameter :: list_per_edge = 1.0_wp, list_per_motion = 8.0_wp, list_beyond = 2.0_wp
    !> Of a reach that round-off does not touch.
    real(wp), parameter :: surely = 0.99_wp
 
@@ -25,11 +25,11 @@ module emcon_near_list
       real(wp), allocatable :: u(:, :)           !! (2, size of `node`) when the list was made
       type(candidates_t) :: candidates
       integer :: n_list = 0                      !! lists made so far
-      real(wp) :: reach = 0.0_wp                 !! of the list when it was made; 0: there is none [L]
+      real(wp) :: reach = 0.0_wp                 !! of the list as it was made; 0: none [L]
       real(wp) :: nearest = 0.0_wp               !! of it: distance along the axes, or `reach` [L]
       real(wp) :: depth = 0.0_wp                 !! beyond the fractions above [L]
       real(wp) :: edge_size = 0.0_wp             !! width plus height in the mean, at first [L]
-      !> As long as no node has moved farther since the last update, nothing touches [L].
+      !> As long as no node has moved farther since the last update, nothing is near [L].
       real(wp) :: clearance = 0.0_wp
    end type near_list_t
 
@@ -75,12 +75,12 @@ contains
          max(near_per_edge*self%edge_size, near_per_motion*step_motion) + self%depth)
       if (.not. 2.0_wp*way + (within - self%depth) < surely*(self%reach - self%depth)) then
          call search(self, x, u0, self%depth + max(list_per_edge*self%edge_size, &
-            list_per_motion*step_motion, 2.0_wp*(within - self%depth)))
+            list_per_motion*step_motion, list_beyond*(within - self%depth)))
          way = 0.0_wp
       end if
       self%clearance = 0.0_wp
-      if (self%nearest - self%depth > near_per_edge*self%edge_size) self%clearance = max(0.0_wp, &
-         0.5_wp*surely*(self%nearest - self%depth) - way)
+      if (self%nearest - 2.0_wp*way > within) self%clearance = max(0.0_wp, 0.5_wp*(surely* &
+         (self%nearest - self%depth) - near_per_edge*self%edge_size) - way)
    end subroutine near_list_update
 
    !> Is edge `e` near item `i` at x + u: on each axis within `within`? Only edges of its list can
@@ -95,16 +95,19 @@ contains
       integer :: k
 
       is_near = .true.
-      do k = 1, size(x, 1)
-         at = x(k, self%item(1, i)) + u(k, self%item(1, i))
-         a = x(k, self%edge(1, e)) + u(k, self%edge(1, e))
-         b = x(k, self%edge(2, e)) + u(k, self%edge(2, e))
-         is_near = is_near .and. max(min(a, b) - at, at - max(a, b)) <= within
-      end do
+      associate (node => self%item(1, i), first => self%edge(1, e), &
+            last => self%edge(size(self%edge, 1), e))
+         do k = 1, size(x, 1)
+            at = x(k, node) + u(k, node)
+            a = x(k, first) + u(k, first)
+            b = x(k, last) + u(k, last)
+            is_near = is_near .and. max(min(a, b) - at, at - max(a, b)) <= within
+         end do
+      end associate
    end function near_list_within
 
-   !> List what lies within `reach`. Surfaces far apart get a reach as large as their distance and an
-   !> empty list: then nothing is done until one has moved half of that.
+   !> List what lies within `reach`. Surfaces far apart get a reach as large as their distance and
+   !> an empty list: then nothing is done until one has moved half of that.
    pure subroutine search(self, x, u0, reach)
       type(near_list_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)

@@ -113,7 +113,7 @@ contains
    subroutine march_watch(self, is_interrupted, watcher)
       type(march_t), intent(inout) :: self
       procedure(interrupt_interface) :: is_interrupted   !! has the user asked to stop?
-      class(watcher_t), target, optional, intent(inout) :: watcher   !! is told of parts of increments
+      class(watcher_t), target, optional, intent(inout) :: watcher   !! is told of parts
 
       nullify(self%watcher)
       if (present(watcher)) self%watcher => watcher

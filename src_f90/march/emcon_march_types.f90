@@ -34,9 +34,9 @@ module emcon_march_types
       subroutine tell_interface(self, increment, time, n_part, h_least)
          import :: watcher_t, wp
          class(watcher_t), intent(inout) :: self
-         integer, intent(in) :: increment
+         integer, intent(in) :: increment            !! from 1
          real(wp), intent(in) :: time                !! [T]
-         integer, intent(in) :: n_part
+         integer, intent(in) :: n_part               !! tried so far
          real(wp), intent(in) :: h_least             !! [T]
       end subroutine tell_interface
    end interface

@@ -43,7 +43,8 @@ FORMULATIONS = (
 def ask(stepper, chance, folder):
     """One of the questions that a stepper answers."""
     name = chance.choice(("contact", "pressures", "gaps", "pairs", "friction", "verdict", "ledger",
-                          "energies", "momenta", "report", "body_momenta", "mass", "u", "lam"))  # fmt: skip
+                          "energies", "momenta", "report", "body_momenta", "mass", "u",
+                          "lam"))  # fmt: skip
     getattr(stepper, name)() if callable(getattr(type(stepper), name)) else getattr(stepper, name)
     return stepper
 
@@ -51,7 +52,7 @@ def ask(stepper, chance, folder):
 def evaluate(stepper, chance, folder):
     """The residual and the tangent of a step that is not made."""
     h = 10.0**chance.uniform(-3, 0)*stepper_size(stepper)
-    with contextlib.suppress(AnalysisError):
+    with contextlib.suppress(AnalysisError, emcon.InputError):   # friction is not evaluated
         stepper.evaluate(stepper.guess(h), h).residual()
     return stepper
 
@@ -128,7 +129,7 @@ def run(model, plan, folder=None, seed=0):
         if stepper.is_done and is_own:
             break
         told.append(advance(stepper, factor*size, is_own))
-        if isinstance(told[-1], str):
+        if is_own and isinstance(told[-1], str):
             break
         size = size or told[-1].h
         ways.append([])
@@ -137,16 +138,22 @@ def run(model, plan, folder=None, seed=0):
     return told, end, ways
 
 
-def differ(model, seed, folder, most_before=MOST_BEFORE, steps=STEPS):
-    """Where the twins part, in words; "" if they do not."""
+def differ(model, seed, folder, before=None, steps=STEPS, largest=1.0):
+    """Where the twins part, in words; "" if they do not.
+
+    `before` increments of the deck at first, then `steps` up to `largest` times their size.
+    """
     chance = random.Random(seed)
-    plan = [(True, 0.0)]*(1 + chance.randint(0, most_before))
-    plan += [(False, 10.0**chance.uniform(-3, 0)) for _ in range(steps)]
+    plan = [(True, 0.0)]*(before or 1 + chance.randint(0, MOST_BEFORE))
+    # Small steps after large ones: what a large one left behind would show there.
+    plan += [(False, largest*10.0**chance.choice((chance.uniform(-0.5, 0), chance.uniform(-3, -1))))
+             for _ in range(steps)]
     told, end, _ = run(model, plan)
     twin, twin_end, ways = run(model, plan, folder, seed)
     for k, (mine, its) in enumerate(zip(told, twin, strict=False)):
         if repr(mine) != repr(its):
-            return f"increment {k + 1} of {len(plan)}, after {ways[:k + 1][-4:]}:\n  {mine}\n  {its}"
+            return (f"increment {k + 1} of {len(plan)}, after {ways[:k + 1][-4:]}:\n"
+                    f"  {mine}\n  {its}")
     if len(told) != len(twin):
         return f"{len(told)} increments, the twin {len(twin)}"
     for name, mine, its in zip(("u", "v", "lam", "active"), end, twin_end, strict=True):
@@ -165,7 +172,8 @@ def variants():
         for extra in FORMULATIONS:
             if any(f"<{name}>" not in names for name in extra):
                 continue
-            yield f"{path.stem} {' '.join(f'{k}={v}' for k, v in extra.items())}".strip(), path, extra
+            words = [path.stem, *(f"{name}={value}" for name, value in extra.items())]
+            yield " ".join(words), path, extra
 
 
 def fuzz_twins(chance, folder):
