@@ -101,26 +101,33 @@ contains
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       type(slip_list_t), intent(inout) :: list
-      integer :: node(3), side, j, k, n          ! its own one, and those beside it
-      real(wp) :: part(size(node)), of_edge(size(self%end_node, 1))
+      !> Of both edges, with two own nodes at a joint
+      integer, dimension(size(self%end_node, 1), size(self%node_edge, 1)) :: node
+      real(wp), dimension(size(node, 1), size(node, 2)) :: part
+      integer :: side, j, k, n
 
       node = 0
       part = 0.0_wp
       do side = 1, size(self%node_edge, 1)
          associate (e => self%node_edge(3 - side, i))
             if (e == 0) cycle
-            node([1, 1 + side]) = self%end_node([side, 3 - side], e)
-            of_edge = self%slave%length(e)*gap_parts(weights( &
+            node(:, side) = self%end_node(:, e)
+            part(:, side) = self%slave%length(e)*gap_parts(weights( &
                [(self%nts%stands_over(self%end_node(j, e)), j = 1, 2)]), side, self%is_dual)
-            part([1, 1 + side]) = part([1, 1 + side]) + of_edge([side, 3 - side])
          end associate
       end do
+      if (node(1, 1) == node(size(node, 1), 2)) then
+         part(1, 1) = part(1, 1) + part(size(node, 1), 2)
+         node(size(node, 1), 2) = 0
+      end if
       if (.not. any(part > 0.0_wp)) part = 1.0_wp
-      do k = 1, size(node)
-         if (node(k) == 0 .or. part(k) <= noise*maxval(part)) cycle
-         n = size(list%point)
-         call self%nts%slips_by(node(k), list)
-         list%point(n + 1:)%weight = part(k)*list%point(n + 1:)%weight
+      do side = 1, size(node, 2)
+         do k = 1, size(node, 1)
+            if (node(k, side) == 0 .or. part(k, side) <= noise*maxval(part)) cycle
+            n = size(list%point)
+            call self%nts%slips_by(node(k, side), list)
+            list%point(n + 1:)%weight = part(k, side)*list%point(n + 1:)%weight
+         end do
       end do
    end subroutine segment_choose_slip
 

@@ -113,9 +113,14 @@ contains
          if (.not. self%active%softness%is_at_ends) then
             lag = merge(0.5_wp, 0.0_wp, self%scheme%row%masses_resist .and. &
                .not. self%motion%pose%pushes_at_end)
-            ! Forces act where nodes without mass were before their balance.
-            call pair_record_measure(state%pairs, system, self%active%set, scene%x, state%u &
-               + (self%motion%du - self%ending%du), self%motion%du, lag)
+            if (self%layer%is_settled) then
+               ! Forces act where nodes without mass were before their balance.
+               call pair_record_measure(state%pairs, system, self%active%set, scene%x, state%u &
+                  + (self%motion%du - self%ending%du), self%motion%du, lag)
+            else
+               call pair_record_measure(state%pairs, system, self%active%set, scene%x, state%u, &
+                  self%motion%du, lag)
+            end if
             call pair_sums_add(state%sums, system, self%active%set, self%motion, h, &
                self%scheme%row%masses_resist)
             call record_jumps(self, scene, h)
@@ -140,7 +145,7 @@ contains
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: h                  !! > 0 [T]
 
-      if (size(self%state%sums%sum) == 0) return
+      if (size(self%jump) == 0 .and. .not. allocated(self%state%pairs%jump)) return
       call pair_sums_jump(self%state%sums, self%system, self%jump)
       call pair_record_jump(self%state%pairs, self%system, self%jump, scene%x + self%state%u, h)
    end subroutine record_jumps

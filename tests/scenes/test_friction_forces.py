@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 from friction_scenes import dragged
-from plain_scenes import BOTH, ONE
+from plain_scenes import BOTH
 from scene_tools import run_one_sided
 
 MU = 0.2
@@ -37,3 +37,23 @@ def rubs(run, floor=28, since=0.0, node=0.01):
 @pytest.mark.parametrize("more", MESHED)
 def test_a_block_comes_onto_a_floor_or_leaves_it(more, leaves, tmp_path):
     rubs(run_one_sided(dragged(MU, leaves=leaves), tmp_path, **more))
+
+
+@pytest.mark.parametrize("leaves", [False, True])
+@pytest.mark.parametrize("more", [MESHED[k] for k in (1, 2, 3)])
+def test_a_block_of_two_pieces_or_with_inertia(more, leaves, tmp_path):
+    """Over the joint of a tie, and damped in a dynamic step, once the start has died away."""
+    rubs(run_one_sided(dragged(MU, leaves=leaves, tied=True), tmp_path/"tied", **more))
+    moving = dragged(MU, leaves=leaves, statics=False, increments=24)
+    rubs(run_one_sided(moving, tmp_path/"moving", **more), since=0.4, node=0.02)
+
+
+@pytest.mark.parametrize("cells", [(3, 1), (11, 2)])
+def test_other_meshes(cells, tmp_path):
+    rubs(run_one_sided(dragged(MU, cells=cells, floor=9), tmp_path), floor=20)
+
+
+def test_nodes_of_both_sides(tmp_path):
+    """The sum alone: nodes are pushed as slaves and as masters."""
+    run = run_one_sided(dragged(MU, sides=BOTH), tmp_path, **MESHED[0])
+    assert np.abs(ratios(run, 28)[0]/MU - 1).max() < 0.01
