@@ -197,21 +197,6 @@ A, GRAV, {gravity}, 0., -1.
     assert ("BAD" in run.errors) == (word == "bad")
 
 
-@pytest.mark.parametrize(
-    "pairs", [["FOOT1, HEAD0"], ["L, HEAD0", "R, HEAD0"], ["HEAD0, L", "HEAD0, R"]], ids=len
-)
-def test_nodes_on_nodes_from_both_sides(tmp_path, pairs):
-    """Each place is held once, also where two surfaces share one."""
-    halves = [f"*SURFACE, NAME={name}\n" + "".join(f"{k}, S1\n" for k in range(first, first + 4))
-              for name, first in (("L", 101), ("R", 105))]
-    surfaces = "".join(halves)
-    text = tower([0.0], load=-40.0, n=8).replace("*MATERIAL", surfaces + "*MATERIAL", 1)
-    text = text.replace("\nFOOT1, HEAD0\n", "\n" + "\n".join(pairs) + "\n")
-    run = solve(tmp_path, text)
-    assert run.verdict["verdict"] == "good"
-    assert run.history["active"][-1] == 9
-
-
 # ---- slave nodes that the deck moves -------------------------------------------------------------
 
 
