@@ -343,23 +343,13 @@ contains
             status = step_too_far
          else if (self%was_active(id) .or. .not. gap%gap0 - allowed(0) &
             < -contact%deepest_start*gap%size) then
-            closes = .not. gap%gap1 - allowed(1) >= -closing_noise(self, contact, id)*gap%size
+            closes = .not. gap%gap1 - allowed(1) >= -merge(0.0_wp, gap_noise, contact%gives_way) &
+               *gap%size
             if (self%holds_gap .and. self%is_candidate(id) .and. (self%has_cycled &
                .or. contact%friction > 0.0_wp)) closes = gap%gap1 - gap%gap0 < -gap_noise*gap%size
          end if
       end associate
    end subroutine look_at_open
-
-   !> So far, per edge, a gap that closes is round-off. Of what waits since less than a hundredth of
-   !> it is left beside others, that of their gaps comes out as much larger.
-   pure real(wp) function closing_noise(self, contact, id)
-      type(active_set_t), intent(in) :: self
-      class(contact_t), intent(in) :: contact
-      integer, intent(in) :: id                  !! of a constraint of it
-
-      closing_noise = merge(100.0_wp*gap_noise, gap_noise, self%is_put_off(id))
-      if (contact%gives_way) closing_noise = 0.0_wp
-   end function closing_noise
 
    !> With nothing to hold at its start, a contact begins with the next step, or in a smaller one;
    !> in the smallest it begins at once, if it is deep.
