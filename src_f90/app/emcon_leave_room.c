@@ -1,8 +1,9 @@
 /* Before libraries are set up: is there address space for what OpenBLAS takes as it starts?
  *
  * An OpenBLAS with OpenMP takes a work space for each thread before `main`, another one when it is
- * called, and tries for ever where a limit (`ulimit -v`) leaves too little. Functions of .preinit_array run before that: with too
- * little for all threads the program starts anew with one, with too little for one it ends. */
+ * called, and tries for ever where a limit (`ulimit -v`) leaves too little. Functions of
+ * .preinit_array run before that: with too little for all threads the program starts anew with one,
+ * with too little for one it ends. */
 #define _GNU_SOURCE
 #include <stdio.h>
 #include <string.h>

@@ -356,7 +356,8 @@ contains
          call card_error(reader, card, "unknown element set " // quoted(set_name) // hint)
          reader%doubt_names = .true.
       end if
-      if (i > 0 .and. name_index_find(reader%line_sets, set_name) > 0) call card_error(reader, card, &
+      if (i > 0 .and. name_index_find(reader%line_sets, set_name) > 0) call card_error( &
+         reader, card, &
          "element set " // quoted(set_name) // " holds lines too, which have no stiffness; give " &
          // "the section a set without them")
    end subroutine read_section

@@ -1,5 +1,5 @@
-!> What a run will cost, by its first increments: a quarter of a second of them, or three, but no more
-!> than a second of work.
+!> What a run will cost, by its first increments: a quarter of a second of them, or three, but no
+!> more than a second of work.
 module emcon_probe
    use, intrinsic :: iso_c_binding, only : c_int
    use emcon_bent_bodies, only : bent_body_find, bent_body_t

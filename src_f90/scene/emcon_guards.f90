@@ -28,7 +28,7 @@ contains
       type(surface_t), intent(in) :: surface(:)
       type(contact_pair_t), allocatable, intent(out) :: guard(:)     !! in the order of `pair`
       type(contact_pair_t), allocatable :: all(:)
-      type(name_index_t) :: known                  !! which side's nodes are held or guarded, by pair
+      type(name_index_t) :: known                !! which sides' nodes are held or guarded, by pair
       integer :: i, n
 
       do i = 1, size(pair)
