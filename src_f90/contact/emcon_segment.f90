@@ -101,35 +101,50 @@ contains
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       type(slip_list_t), intent(inout) :: list
-      !> Of both edges, with two own nodes at a joint
-      integer, dimension(size(self%end_node, 1), size(self%node_edge, 1)) :: node
-      real(wp), dimension(size(node, 1), size(node, 2)) :: part
-      integer :: side, j, k, n
+      !> Of both edges: its own node, two at a joint, and the other one, with their parts
+      integer, dimension(size(self%node_edge, 1)) :: own, other
+      real(wp), dimension(size(own)) :: own_part, other_part, part
+      integer :: side, j
 
-      node = 0
-      part = 0.0_wp
-      do side = 1, size(self%node_edge, 1)
+      own = 0
+      other = 0
+      own_part = 0.0_wp
+      other_part = 0.0_wp
+      do side = 1, size(own)
          associate (e => self%node_edge(3 - side, i))
             if (e == 0) cycle
-            node(:, side) = self%end_node(:, e)
-            part(:, side) = self%slave%length(e)*gap_parts(weights( &
-               [(self%nts%stands_over(self%end_node(j, e)), j = 1, 2)]), side, self%is_dual)
+            own(side) = self%end_node(side, e)
+            other(side) = self%end_node(3 - side, e)
+            part = self%slave%length(e)*gap_parts(weights([(self%nts%stands_over( &
+               self%end_node(j, e)), j = 1, size(part))]), side, self%is_dual)
+            own_part(side) = part(side)
+            other_part(side) = part(3 - side)
          end associate
       end do
-      if (node(1, 1) == node(size(node, 1), 2)) then
-         part(1, 1) = part(1, 1) + part(size(node, 1), 2)
-         node(size(node, 1), 2) = 0
+      if (own(1) == own(size(own))) then
+         own_part(1) = sum(own_part)
+         own(size(own)) = 0
       end if
-      if (.not. any(part > 0.0_wp)) part = 1.0_wp
-      do side = 1, size(node, 2)
-         do k = 1, size(node, 1)
-            if (node(k, side) == 0 .or. part(k, side) <= noise*maxval(part)) cycle
-            n = size(list%point)
-            call self%nts%slips_by(node(k, side), list)
-            list%point(n + 1:)%weight = part(k, side)*list%point(n + 1:)%weight
-         end do
-      end do
+      call take(self%nts, [own, other], [own_part, other_part], list)
    end subroutine segment_choose_slip
+
+   !> The slips of nodes by their parts; if there are none of all that are near.
+   pure subroutine take(nts, node, part, list)
+      type(nts_t), intent(in) :: nts
+      integer, intent(in) :: node(:)             !! numbers in `nts`; 0: none
+      real(wp), intent(in) :: part(:)            !! (as many) >= 0 but for noise
+      type(slip_list_t), intent(inout) :: list
+      integer :: k, n
+      logical :: is_any
+
+      is_any = any(part > 0.0_wp)
+      do k = 1, size(node)
+         if (node(k) == 0 .or. (is_any .and. part(k) <= noise*maxval(part))) cycle
+         n = size(list%point)
+         call nts%slips_by(node(k), list)
+         if (is_any) list%point(n + 1:)%weight = part(k)*list%point(n + 1:)%weight
+      end do
+   end subroutine take
 
    !> The weights of an edge's nodal gaps in the gap of its node `side`, as `form_share` has them.
    pure function gap_parts(w, side, is_dual) result(part)
