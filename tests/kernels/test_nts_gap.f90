@@ -349,7 +349,7 @@ contains
       integer :: i, k, n, j
 
       step = eps**(1.0_wp/3.0_wp)
-      bound = 4.0_wp*(step/minval(round))**2
+      bound = 4.0_wp*(step/minval(round, round > 0.0_wp))**2
       do i = 1, 40
          call draw(x0, dx)
          width = merge(round, sharp, mod(i, 2) == 0)
