@@ -544,8 +544,9 @@ contains
       type(mortar_t) :: mortar
       type(condition_t), dimension(3) :: item, up, down
       real(wp), allocatable :: u(:, :), du(:, :), way(:, :), slope(:)
-      integer :: i, j, k, n, column
+      integer :: i, j, k, n, column, n_checked
 
+      n_checked = 0
       item%rubs = .true.
       up%rubs = .true.
       down%rubs = .true.
@@ -567,6 +568,7 @@ contains
                      column = 2*findloc(item(j)%node(:m), 1 + n/2, 1) - 1 + mod(n, 2)
                      if (column < 1) cycle
                      if (maxval(abs(up(j)%g(:, :m) - down(j)%g(:, :m))) > 1.0e3_wp*step) cycle
+                     n_checked = n_checked + 1
                      slope = condition_normal_slope(item(j))
                      call check_near(error, slope(column), (condition_normal(up(j)) &
                         - condition_normal(down(j)))/(2.0_wp*step), 25.0_wp*(step/shortest)**2, &
@@ -577,6 +579,8 @@ contains
          end do
          if (allocated(error)) return
       end do
+      call check_true(error, n_checked > 3*3*10*n_combination, "most columns are compared: " &
+         // to_text(n_checked))
    end subroutine test_normal_slope
 
    ! ---- choice of pairs ------------------------------------------------------------------------
