@@ -3,7 +3,7 @@
 module test_march_contact
    use check, only : check_near, check_true, test_case_t
    use emcon_constraints, only : constraint_set_t, constraints_select
-   use emcon_contact, only : condition_resize
+   use emcon_condition_nodes, only : condition_resize
    use emcon_correction, only : correction_t
    use emcon_errors, only : error_t
    use emcon_flexibility, only : flexibility_free, flexibility_make, flexibility_row, flexibility_t
