@@ -171,7 +171,7 @@ contains
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
 
-      call gaps_forget(system)
+      if (size(system%contact) > 0) call gaps_forget(system)
       call begin_contact(self, system, motion)
       call friction_begin(self%friction, system, motion, self%was_active)
       call holding_forget(self%holding)

@@ -534,7 +534,7 @@ contains
       below = radius*[sin(0.5_wp/radius), -cos(0.5_wp/radius)]
       u(:, 12) = middle + 0.05_wp*below - scene%x(:, 12)
       nts%reach = 0.0_wp
-      zero(2, 12) = 1.0_wp                       ! so far the search has to reach
+      zero(2, 12) = 4.0_wp                       ! so far what is near has to reach
       call nts%begin_step(scene%x, u, zero)
       call polygon%begin_step(scene%x, u, zero)
       zero = 0.0_wp
