@@ -605,7 +605,7 @@ contains
       do k = 1, size(u, 2)
          u(:, k) = bent(scene%x(:, k)) - scene%x(:, k)
       end do
-      du(1, :) = 0.4_wp                          ! the search reaches from leg to leg
+      du(1, :) = 1.6_wp                          ! the search reaches from leg to leg
       call nts%begin_step(scene%x, u, du)
       associate (near => nts%near%candidates)
          call check_true(error, size(near%edge) > 0, "candidates")
