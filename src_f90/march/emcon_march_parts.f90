@@ -15,7 +15,6 @@ module emcon_march_parts
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_softness, only : most_augmentations
-   use emcon_steps, only : initiation_admissible
    use emcon_system, only : system_may_hold, system_t
    use emcon_term_registry, only : terms_solid
    use emcon_text, only : joined, note_add, notes_append, notes_t, string_t, to_text
@@ -117,7 +116,7 @@ contains
       type(increment_t), intent(in) :: increment
       type(parts_t), intent(in) :: parts
       type(error_t), allocatable, intent(out) :: error
-      character(len=:), allocatable :: nodes, advice
+      character(len=:), allocatable :: nodes
       type(part_t) :: last
 
       last%start%total_time = self%state%time + increment%done
@@ -126,13 +125,10 @@ contains
          call nodes_text(self, scene, parts%changes, nodes)
          nodes = "; in them contact begins and ends at slave nodes " // nodes
       end if
-      advice = "; give smaller increments from here on"
-      if (scene%step(self%state%i_step)%initiation == initiation_admissible) advice = advice // &
-         ", or *CONTACT INITIATION, TYPE=PERSISTENT, which holds what opens and closes in turn"
       call march_stop(self, scene, last, "an increment of h = " // to_text(increment%h) // &
          " was tried in " // to_text(parts%n) // " parts, the smallest of h = " // &
          to_text(parts%h_least) // ", and " // to_text(100.0_wp*increment%done/increment%h, 3) // &
-         " % of it are done" // nodes // advice, error)
+         " % of it are done" // nodes // "; give smaller increments from here on", error)
    end subroutine stop_crawl
 
    !> One step. Where it fails because nodes without mass find no balance these take their mass back
