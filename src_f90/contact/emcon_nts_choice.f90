@@ -247,8 +247,9 @@ contains
 
       call polygon_stencil(stencil, self%master, self%node(i), edge, &
          self%rounding*[1.0_wp, merge(0.0_wp, 1.0_wp, self%is_sharp)], x, u0)
-      if (.not. (self%is_sharp .or. self%meets_statics)) call corner_tops(self%slave, &
-         self%chain_node(i), self%master, edge, x, u0, stencil)
+      ! Guards watch the mesh.
+      if (.not. (self%is_sharp .or. self%meets_statics .or. self%slack > 0.0_wp)) &
+         call corner_tops(self%slave, self%chain_node(i), self%master, edge, x, u0, stencil)
       stencil%goes_around = self%offset > 0.0_wp
       associate (n => stencil%n, before => stencil%before, after => stencil%after)
          if (after > 0) then
