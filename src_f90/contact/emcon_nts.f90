@@ -8,7 +8,7 @@ module emcon_nts
    use emcon_constraint, only : condition_t
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
-   use emcon_guard_slack_plane, only : guard_slack_depth, guard_slack_init, guard_slack_t
+   use emcon_guard_slack_plane, only : guard_slack_find
    use emcon_hermite_gap_value, only : hermite_gap_value, hermite_slip_value
    use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite, &
       smoothing_none
@@ -38,7 +38,7 @@ module emcon_nts
    end type start_t
 
    type, extends(nts_choice_t) :: nts_t
-      type(guard_slack_t), allocatable :: guard       !! only of a guard
+      real(wp), allocatable :: own_slack(:)           !! (n_node of the slave) only of a guard
       type(stance_t) :: stance                        !! of the nodes as stencils were chosen:
       real(wp) :: chosen_reach = 0.0_wp               !! among edges up to there [L],
       logical :: were_sharp = .false.                 !! with which corners,
@@ -77,10 +77,8 @@ contains
       allocate(self%sagitta(self%n_constraint), source=0.0_wp)
       self%deepest_start = touch_tol
       self%slack = pair%slack
-      if (pair%slack > 0.0_wp) then
-         allocate(self%guard)
-         call guard_slack_init(self%guard, self%slave, self%master, scene%x, pair%slack)
-      end if
+      if (pair%slack > 0.0_wp) call guard_slack_find(self%slave, scene%x, pair%slack, &
+         self%own_slack)
       self%restitution = pair%restitution
       if (.not. pair%slack > 0.0_wp) then
          self%friction = pair%friction
@@ -227,8 +225,8 @@ contains
             stencil%rounding, state%gap0, start%xi, stencil%goes_around)
          state%gap0 = state%gap0 - self%offset - self%sagitta(i)
          state%size = stencil_length(x, stencil%node)
-         if (allocated(self%guard)) state%closed = -guard_slack_depth(self%guard, &
-            self%chain_node(i), self%edge(i), self%own_size(i), state%size)
+         if (allocated(self%own_slack)) state%closed = -self%own_slack(self%chain_node(i)) &
+            *min(state%size, self%own_size(i))
          state%is_near = .true.
       end associate
    end function polygon_start
