@@ -39,8 +39,7 @@ def test_runs(deck, tmp_path):
     assert found["verdict"] == "good" and found["penetration"] <= ONE_SIDED
     # Shorter than the deck's own and coarser: forces may act across more of a gap.
     assert all("act across gaps" in warning for warning in found["warnings"])
-    assert run.errors == "".join(f"emcon: warning: {warning}
-" for warning in found["warnings"])
+    assert run.errors == "".join(f"emcon: warning: {warning}\n" for warning in found["warnings"])
     if found["penetration"] > 1e-3:
         assert "** Overlap: " in deck.read_text(), "the heading does not say so"
     for suffix in (".csv", ".h5", ".log", ".vtkhdf"):
