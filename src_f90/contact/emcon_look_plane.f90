@@ -260,12 +260,35 @@ contains
       real(wp), intent(in) :: reach              !! [L]
       type(overlap_t), intent(inout) :: overlap
       type(overlap_t) :: found
+      integer :: side
 
+      do side = 1, 2
+         if (.not. stands_on(self, x, self%outline%edge(side, e), other)) return
+      end do
       found = overlap
       found%depth = max(aligned, overlap%depth)
       call try_place(self, x, e, 0.5_wp, other, found, reach)
       if (found%depth > max(aligned, overlap%depth)) overlap = found
    end subroutine try_middle
+
+   !> Is a node on one of these edges, to round-off?
+   pure logical function stands_on(self, x, node, other) result(stands)
+      type(look_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :)
+      integer, intent(in) :: node
+      integer, intent(in) :: other(:)
+      type(nearest_t) :: nearest
+      integer :: k
+
+      do k = 1, size(other)
+         associate (b => self%outline%edge(:, other(k)))
+            call nearest_update(nearest, other(k), between(x, self%u, b(1), node), &
+               between(x, self%u, b(1), b(2)))
+         end associate
+      end do
+      stands = nearest%edge > 0
+      if (stands) stands = nearest%square <= (aligned*length_of(nearest%along))**2
+   end function stands_on
 
    !> The edges `crossed`, and those along the outline on either side of them within `reach` of edge
    !> `e`: `self%around`.

@@ -49,23 +49,18 @@ contains
       type(scene_t), intent(in) :: scene
       integer, allocatable :: connected(:, :), piece(:), number(:), edge(:, :), order(:)
       real(wp), allocatable :: thickness(:)
-      logical, allocatable :: is_tied(:), is_meant(:)
+      logical, allocatable :: is_meant(:)
       integer :: n_body, p
 
       call connect(scene, connected)
       call bodies_find(connected, size(scene%x, 2), piece, n_body)
-      call find_meetings(self, scene, piece, number)
+      call find_free_edges(scene, edge, thickness)
+      call find_meetings(self, scene, piece, edge, number)
       call find_bodies(self, scene, connected(:, size(scene%element_node, 2) + 1:), piece, number)
       allocate(self%start(self%n_piece + 1), source=1)
-      if (self%n_piece > 0) then
-         call find_edges(scene, edge, thickness)
-      else
-         allocate(edge(2, 0), thickness(0))
-      end if
       ! From here on the piece of a node is its place among those that meet; 0: none of them.
       piece = [(find_sorted(number, piece(p)), p = 1, size(piece))]
-      call tied_edges_find(scene, edge, is_tied)
-      is_meant = .not. is_tied .and. piece(edge(1, :)) > 0
+      is_meant = piece(edge(1, :)) > 0
       edge = edge(:, pack([(p, p = 1, size(edge, 2))], is_meant))
       thickness = pack(thickness, is_meant)
       order = sort_order(piece(edge(1, :)))
@@ -113,11 +108,13 @@ contains
       end do
    end subroutine connect
 
-   !> The pieces, unless there is a single one and no pair, and which surfaces meet.
-   subroutine find_meetings(self, scene, piece, number)
+   !> The pieces that have an outline, unless there is a single one and no pair, and which surfaces
+   !> meet.
+   subroutine find_meetings(self, scene, piece, edge, number)
       type(outline_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: piece(:)            !! (n_node)
+      integer, intent(in) :: edge(:, :)          !! (2, n_edge) of the outlines
       integer, allocatable, intent(out) :: number(:)   !! (n_piece) as in `piece`, ascending
       integer :: s, i
 
@@ -129,10 +126,8 @@ contains
          allocate(self%on(s)%piece(0))
          if (any(self%pair == s)) call pieces_of(scene, scene%surface(s), piece, self%on(s)%piece)
       end do
-      number = unique_sorted(pack(piece, piece > 0))
-      if (scene%n_dim /= 2 .or. (size(scene%pair) == 0 .and. size(number) < 2)) then
-         number = [integer ::]
-      end if
+      number = unique_sorted(piece(edge(1, :)))
+      if (size(scene%pair) == 0 .and. size(number) < 2) number = [integer ::]
       self%n_piece = size(number)
       do s = 1, size(scene%surface)
          associate (on => self%on(s)%piece)
@@ -192,6 +187,24 @@ contains
          found = unique_sorted(piece(edge(1, :)))
       end if
    end subroutine pieces_of
+
+   !> The edges that one element alone has, but those that a tie covers; in space there are none.
+   subroutine find_free_edges(scene, edge, thickness)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: edge(:, :)  !! (2, n)
+      real(wp), allocatable, intent(out) :: thickness(:)   !! (n) of the elements behind [L]
+      logical, allocatable :: is_tied(:)
+      integer :: k
+
+      if (scene%n_dim /= 2) then
+         allocate(edge(2, 0), thickness(0))
+         return
+      end if
+      call find_edges(scene, edge, thickness)
+      call tied_edges_find(scene, edge, is_tied)
+      edge = edge(:, pack([(k, k = 1, size(is_tied))], .not. is_tied))
+      thickness = pack(thickness, .not. is_tied)
+   end subroutine find_free_edges
 
    !> Faces that one element alone has, and edges of surfaces that no element has.
    subroutine find_edges(scene, edge, thickness)
