@@ -1,6 +1,7 @@
 """README.md and docs/*.md tell the truth: figures, links, folders, make targets, options."""
 
 import functools
+import pathlib
 import re
 import shlex
 import subprocess
@@ -88,8 +89,8 @@ def test_files_and_folders(page):
 
 @EACH_PAGE
 def test_make_targets(page):
-    targets = re.findall(r"^([a-z]\w*):", (ROOT / "Makefile").read_text(), re.MULTILINE)
-    variables = "MODE PRECISION LICENSE V PREFIX FC CC FFLAGS CFLAGS SECONDS VECTOR".split()
+    targets = re.findall(r"^([a-z][\w-]*):", (ROOT / "Makefile").read_text(), re.MULTILINE)
+    variables = "MODE PRECISION LICENSE V PREFIX FC CC FFLAGS CFLAGS SECONDS VECTOR COUNT ORDER SEEDS".split()
     for words in commands(page):
         for word in words[1:] if words[0] == "make" else []:
             name, equals, _ = word.partition("=")
@@ -111,6 +112,14 @@ def program_of(words):
 
 @functools.cache
 def options_of(program):
+    """What `--help` lists; of a script what it and the modules beside it add to their parsers."""
+    script = pathlib.Path(program[-1])
+    if script.suffix == ".py":
+        text = script.read_text()
+        beside = [script.with_name(f"{name}.py") for name in re.findall(r"^(?:from|import) (\w+)",
+                                                                      text, re.MULTILINE)]
+        text += "".join(path.read_text() for path in beside if path.exists())
+        return {"--help", *re.findall(r"\"(--[a-z][\w-]*)\"", text)}
     told = subprocess.run([*program, "--help"], capture_output=True, text=True, check=True).stdout
     return set(re.findall(r"--[a-z][\w-]*", told))
 
