@@ -119,7 +119,7 @@ def options_of(program):
         beside = [script.with_name(f"{name}.py") for name in re.findall(r"^(?:from|import) (\w+)",
                                                                       text, re.MULTILINE)]
         text += "".join(path.read_text() for path in beside if path.exists())
-        return {"--help", *re.findall(r"\"(--[a-z][\w-]*)\"", text)}
+        return {"--help", *(f"--{name}" for name in re.findall(r'"(?:--)?([a-z][\w-]*)"', text))}
     told = subprocess.run([*program, "--help"], capture_output=True, text=True, check=True).stdout
     return set(re.findall(r"--[a-z][\w-]*", told))
 
