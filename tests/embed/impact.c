@@ -1,6 +1,6 @@
 /* The ring impact, driven from C: the run of the program, increment by increment.
  *
- * usage: impact DECK [NAME=VALUE] */
+ * usage: impact DECK [NAME=VALUE]...   a run for each of them */
 #include <emcon.h>
 #include <stdio.h>
 #include <stdlib.h>
@@ -27,7 +27,7 @@ static void require(int status, emcon_model *model)
    exit(status);
 }
 
-int main(int argc, char **argv)
+static int impact(const char *deck, const char *parameters)
 {
    emcon_model *model;
    emcon_sizes sizes;
@@ -37,8 +37,7 @@ int main(int argc, char **argv)
    const char *json = NULL;
    int n = 0, status, is_good;
 
-   if (argc < 2) return 2;
-   status = emcon_open(argv[1], argc > 2 ? argv[2] : NULL, 0, &model);
+   status = emcon_open(deck, parameters, 0, &model);
    require(status, model);
    require(emcon_get_sizes(model, &sizes), model);
    require(emcon_advance(model, &increment), model);
@@ -58,4 +57,14 @@ int main(int argc, char **argv)
    emcon_close(model);
    emcon_close(NULL);
    return 0;
+}
+
+int main(int argc, char **argv)
+{
+   int k, status;
+
+   if (argc < 2) return 2;
+   status = impact(argv[1], argc > 2 ? argv[2] : NULL);
+   for (k = 3; k < argc && status == 0; k++) status = impact(argv[1], argv[k]);
+   return status;
 }

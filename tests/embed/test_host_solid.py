@@ -88,7 +88,7 @@ def test_energy_is_kept(
     assert c[:, 3].max() > 0.05*total and c[:, 4].max() > 0.2*total
 
 
-@pytest.mark.parametrize("language", COMPILERS)
+@pytest.mark.parametrize("language", ["c", "fortran"])    # C++ compiles the source of C
 def test_hosts_lose_no_memory(
     hosts: dict[str, Path], installed: dict[str, str], language: str
 ) -> None:

@@ -151,8 +151,9 @@ int main(void)
     assert run(tmp_path/"example", env=installed) == ""
 
 
+@pytest.mark.parametrize("bars", ["cc"], indirect=True)
 def test_memory_of_a_host_in_c(bars: Path, installed: dict[str, str]) -> None:
-    """The impact is over after 100 steps."""
+    """The impact is over after 100 steps. What C++ makes of the same source calls the same."""
     check_memory(installed, bars, "100")
 
 
