@@ -47,6 +47,7 @@ module emcon_contact
                                                       !! all over it
       logical :: meets_statics = .false.              !! a step of the deck is static
       logical :: may_leave = .false.                  !! constraints lose their surface, in a step
+      logical :: is_soft = .false.                    !! in this step: a penalty, or augmented
       logical :: gives_way = .false.                  !! it stores what it takes: a penalty
       logical :: both_sides = .false.                 !! this and others hold nodes of both surfaces
       real(wp) :: slack = 0.0_wp                      !! > 0: a guard, closed at -slack by the edge

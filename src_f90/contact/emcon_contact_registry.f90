@@ -38,7 +38,7 @@ contains
          call nts_init(nts, scene, pair, error)
          call move_alloc(nts, contact)
       end select
-      call midside_init(contact%midside, scene, scene%surface([pair%slave, pair%master]))
+      call midside_init(contact%midside, scene, [pair%slave, pair%master])
    end subroutine new_contact
 
 end module emcon_contact_registry

@@ -1,7 +1,7 @@
 !> How far a guard lets the nodes of a surface into another one.
 !>
 !> A corner is held nearly at once: means of gaps, and nodes beside it, do not see it. Nodes of
-!> smooth sides are left to these.
+!> smooth sides are left to these. Where contact gives way corners go in as all other nodes do.
 !> Source: docs/theory.md, section 4.11.
 module emcon_guard_slack_plane
    use emcon_chain, only : chain_t

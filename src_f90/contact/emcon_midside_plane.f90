@@ -37,29 +37,42 @@ module emcon_midside_plane
 contains
 
    !> The sides of the elements of surfaces, at the present reference positions.
-   pure subroutine midside_init(self, scene, surface)
+   pure subroutine midside_init(self, scene, which, outline)
       type(midside_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
-      type(surface_t), intent(in) :: surface(:)  !! (any) of `scene`, or of its nodes
+      integer, intent(in) :: which(:)            !! (any) surfaces of `scene`
+      type(surface_t), intent(in), optional :: outline   !! one more, of nodes of `scene`
       type(side_t), allocatable :: list(:)       ! by the places of their midside nodes in `node`
-      integer, allocatable :: node(:), edge(:, :)
+      integer, allocatable :: node(:)
       integer :: i
 
       allocate(node(0))
-      do i = 1, size(surface)
-         call surface_edges(scene, surface(i), edge)
-         node = [node, reshape(edge, [size(edge)])]
-         if (surface(i)%is_nodal) node = [node, surface(i)%node]
+      do i = 1, size(which)
+         call take_nodes(scene, scene%surface(which(i)), node)
       end do
+      if (present(outline)) call take_nodes(scene, outline, node)
       node = unique_sorted(node)
       allocate(list(size(node)))
-      do i = 1, size(surface)
-         call take_sides(scene, surface(i), node, list)
+      do i = 1, size(which)
+         call take_sides(scene, scene%surface(which(i)), node, list)
       end do
+      if (present(outline)) call take_sides(scene, outline, node, list)
       self%side = list(pack([(i, i = 1, size(list))], list%middle > 0))
       self%n = size(self%side)
       self%node = unique_sorted([node, self%side%end(1), self%side%end(2)])
    end subroutine midside_init
+
+   !> Append the nodes of a surface.
+   pure subroutine take_nodes(scene, surface, node)
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      integer, allocatable, intent(inout) :: node(:)
+      integer, allocatable :: edge(:, :)
+
+      call surface_edges(scene, surface, edge)
+      node = [node, reshape(edge, [size(edge)])]
+      if (surface%is_nodal) node = [node, surface%node]
+   end subroutine take_nodes
 
    !> Take over the sides of `surface`, if it is none of faces those of all elements, whose midside
    !> nodes are among `node`.

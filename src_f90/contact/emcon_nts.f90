@@ -80,10 +80,8 @@ contains
       if (pair%slack > 0.0_wp) call guard_slack_find(self%slave, scene%x, pair%slack, &
          self%own_slack)
       self%restitution = pair%restitution
-      if (.not. pair%slack > 0.0_wp) then
-         self%friction = pair%friction
-         self%damping = pair%damping
-      end if
+      self%friction = pair%friction
+      if (.not. pair%slack > 0.0_wp) self%damping = pair%damping
       self%rebound = pair%rebound
    end subroutine nts_init
 
@@ -225,8 +223,8 @@ contains
             stencil%rounding, state%gap0, start%xi, stencil%goes_around)
          state%gap0 = state%gap0 - self%offset - self%sagitta(i)
          state%size = stencil_length(x, stencil%node)
-         if (allocated(self%own_slack)) state%closed = -self%own_slack(self%chain_node(i)) &
-            *min(state%size, self%own_size(i))
+         if (allocated(self%own_slack)) state%closed = -min(state%size, self%own_size(i)) &
+            *merge(self%slack, self%own_slack(self%chain_node(i)), self%is_soft)
          state%is_near = .true.
       end associate
    end function polygon_start

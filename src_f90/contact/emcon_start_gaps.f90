@@ -57,7 +57,7 @@ contains
       self%chain_node = self%nts%chain_node
       self%edge = self%nts%edge
       self%state = self%nts%state
-      call midside_init(midside, scene, scene%surface([pair%slave, pair%master]))
+      call midside_init(midside, scene, [pair%slave, pair%master])
       self%u = scene%u0
       if (midside%n > 0) self%u = midside_points(midside, scene%u0)
    end subroutine start_gaps_init

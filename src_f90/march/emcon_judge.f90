@@ -57,7 +57,7 @@ contains
 
       call look_init(self%look, scene)
       outline%edge = self%look%outline%edge
-      call midside_init(self%midside, scene, [outline])
+      call midside_init(self%midside, scene, [integer ::], outline)
       associate (n => self%look%outline%n_piece)
          allocate(self%low(scene%n_dim, n), self%high(scene%n_dim, n), &
             self%least(scene%n_dim, n), self%most(scene%n_dim, n))

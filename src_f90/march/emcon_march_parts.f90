@@ -25,7 +25,7 @@ module emcon_march_parts
    !> Halvings of an increment after which nodes without mass take it back.
    integer, parameter :: return_level = 3
    !> Parts of an increment that are tried at most.
-   integer, parameter :: most_parts = 500
+   integer, parameter :: most_parts = 4000
    !> Nodes named in a message.
    integer, parameter :: most_named = 10
 

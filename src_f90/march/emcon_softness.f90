@@ -50,6 +50,7 @@ contains
          size(system%contact) > 0
       self%is_at_ends = self%is_on .and. step%scheme%is_explicit
       do k = 1, size(system%contact)
+         system%contact(k)%contact%is_soft = self%is_on
          system%contact(k)%contact%gives_way = .false.
       end do
       if (.not. self%is_on) return

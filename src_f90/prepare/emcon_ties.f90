@@ -40,7 +40,7 @@ contains
       integer :: t
 
       if (size(scene%tie) == 0) return
-      call midside_init(midside, scene, scene%surface([scene%tie%slave, scene%tie%master]))
+      call midside_init(midside, scene, [scene%tie%slave, scene%tie%master])
       points = scene
       call midside_places(midside, points%x)
       do t = 1, size(scene%tie)

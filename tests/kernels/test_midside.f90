@@ -131,7 +131,7 @@ contains
          scene%x(:, side) = reshape([0.0_wp, 0.0_wp, 2.0_wp, 0.0_wp, 1.0_wp, 0.0_wp], [2, 3])
          d = 0.2_wp*k
          scene%x(1, side(3)) = 1.0_wp + d
-         call midside_init(midside, scene, scene%surface(2:2))
+         call midside_init(midside, scene, [2])
          call check_equal(error, midside%n, 1, "sides")
          if (allocated(error)) return
          call condition_resize(item, 3)
@@ -161,9 +161,10 @@ contains
       type(scene_t) :: scene
       type(midside_t) :: midside
       real(wp), allocatable :: u(:, :), point(:, :)
+      integer :: s
 
       call make_curved_rows(scene)
-      call midside_init(midside, scene, scene%surface)
+      call midside_init(midside, scene, [(s, s = 1, size(scene%surface))])
       call check_equal(error, midside%n, 3, "sides")
       u = matmul(turn, scene%x) - scene%x + spread(way, 2, size(scene%x, 2))
       point = midside_points(midside, u)
@@ -182,10 +183,10 @@ contains
       integer :: i, k
 
       call make_rows(scene)
-      call midside_init(midside, scene, scene%surface)
+      call midside_init(midside, scene, [(k, k = 1, size(scene%surface))])
       call check_near(error, midside_stretch(midside), 5.0_wp/3.0_wp, tol, 1.0_wp, "straight")
       call make_curved_rows(scene)
-      call midside_init(midside, scene, scene%surface)
+      call midside_init(midside, scene, [(k, k = 1, size(scene%surface))])
       allocate(u, mold=scene%x)
       most = 0.0_wp
       do i = 1, 2000
@@ -210,20 +211,20 @@ contains
       integer :: k, top(5)
 
       call make_rows(scene)
-      call midside_init(midside(1), scene, scene%surface(1:1))
+      call midside_init(midside(1), scene, [1])
       top = [scene%element_node([3, 7, 4], 2), scene%element_node([7, 4], 1)]
       edges%edge = reshape([top(1:2), top(2:3), top(3:4), top(4:5)], [2, 4])
       nodes%is_nodal = .true.
       allocate(nodes%element(0), nodes%face(0))
       nodes%node = top
-      call midside_init(midside(2), scene, [edges])
-      call midside_init(midside(3), scene, [nodes])
+      call midside_init(midside(2), scene, [integer ::], edges)
+      call midside_init(midside(3), scene, [integer ::], nodes)
       do k = 1, 3
          call check_equal(error, midside(k)%n, 2, "sides of surface " // to_text(k))
          call check_equal(error, midside(k)%side%middle, midside(1)%side%middle, "their middles")
          call check_equal(error, midside(k)%node, midside(1)%node, "nodes")
       end do
-      call midside_init(midside(1), scene, scene%surface(1:0))
+      call midside_init(midside(1), scene, [integer ::])
       call check_equal(error, midside(1)%n, 0, "no surface")
    end subroutine test_surfaces
 
@@ -345,7 +346,7 @@ contains
       integer :: k, s
 
       call make_curved_rows(scene)
-      call midside_init(midside, scene, scene%surface)
+      call midside_init(midside, scene, [(k, k = 1, size(scene%surface))])
       associate (own => scene%element_node([1, 2, 5], 3), other => scene%element_node([3, 4, 7], 1))
          points%slave = own([1, 3])
          points%start = [0, 3, 6]

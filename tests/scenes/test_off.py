@@ -216,13 +216,14 @@ def bullet(speed, distance, looks=False):
 
 
 def test_nothing_of_a_far_pair_is_called(tmp_path):
-    """The judge and guards included: the increments after the first do not know of it."""
+    """The judge and guards included: the increments after the first do not know of it, but for that
+    a step begins."""
     deck = bullet(0.5, 50.0)
     deck.set_parameter("t_end", "{end}")
     calls, _ = per_increment(deck.text(), tmp_path)
     contact = [name for name in FOLDER if FOLDER[name] == "contact"]
     assert called(calls, *contact) == []
-    assert not called(calls, "emcon_gaps", "emcon_judge")
+    assert called(calls, "emcon_gaps", "emcon_judge") == ["__emcon_gaps_MOD_gaps_forget"]
 
 
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
