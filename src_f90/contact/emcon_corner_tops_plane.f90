@@ -1,7 +1,9 @@
 !> Round tops of the corners of a polygon that face a corner of the slave surface.
 !>
-!> Two vertices that meet have many normals in common, and round-off must not choose one: where they
-!> face each other the top of the corner is wide. Source: docs/theory.md, section 4.2, eq. (14s).
+!> Two vertices of round bodies that meet have many normals in common, and round-off must not
+!> choose one: where they face each other the top of the corner is wide, by less than an edge dips
+!> into its arc. Corners that are no vertices of a curve stay as they are, since bodies pass close
+!> by them. Source: docs/theory.md, section 4.2, eq. (14s).
 module emcon_corner_tops_plane
    use emcon_chain, only : chain_shorter, chain_t
    use emcon_kinds, only : wp
@@ -15,6 +17,8 @@ module emcon_corner_tops_plane
    !> What turns by less in the reference configuration is flat [radians]: coordinates in a deck are
    !> rounded.
    real(wp), parameter :: flat = 1.0e-5_wp
+   !> What turns by more is a corner, and no vertex of a curve [radians].
+   real(wp), parameter :: corner_turn = acos(0.5_wp)
 
 contains
 
@@ -52,7 +56,8 @@ contains
          master(:, side) = along(x, corner(side:side + 1))
          slave(:, side) = along(x, chain%edge(:, chain%node_edge(side, k)))
       end do
-      if (min(angle(master(:, 1), master(:, 2)), angle(slave(:, 1), slave(:, 2))) <= flat) return
+      turn = [angle(master(:, 1), master(:, 2)), angle(slave(:, 1), slave(:, 2))]
+      if (minval(turn) <= flat .or. maxval(turn) > corner_turn) return
       do side = 1, 2
          master(:, side) = master(:, side) + along(u, corner(side:side + 1))
          slave(:, side) = -(slave(:, side) + along(u, chain%edge(:, chain%node_edge(side, k))))

@@ -9,7 +9,7 @@ module emcon_verdict
       energy_start, energy_warnings, energy_watch_t
    use emcon_far_nodes, only : far_element_find
    use emcon_force_scatter, only : force_scatter_t, scatter_follow
-   use emcon_guards, only : overlap_bar, touching_bar
+   use emcon_guards, only : overlap_bar, overlap_told, touching_bar
    use emcon_kinds, only : wp
    use emcon_locking, only : locking_advice, locking_element
    use emcon_ledger, only : ledger_t
@@ -296,6 +296,10 @@ contains
             call note_add(found, text)
          end if
       end associate
+      if (self%deepest > overlap_told .and. self%deepest <= most_overlap(self)) call note_add( &
+         found, "bodies overlap by " // to_text(self%deepest, 3) // " of an edge at time " // &
+         to_text(self%deepest_time, 9) // ", as guards allow: SIDES=BOTH of NODE TO SURFACE " // &
+         "holds all nodes, smaller edges let less in")
       do i = 1, found%n
          call add_warning(self, found%item(i)%text)
       end do

@@ -11,14 +11,16 @@ module emcon_guards
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    implicit none
    private
-   public :: guards_find, guard_slack, corner_slack, overlap_bar, touching_bar
+   public :: guards_find, guard_slack, corner_slack, overlap_bar, overlap_told, touching_bar
 
-   !> So far, by the edge, bodies may be in each other: where nodes are held themselves, and where
-   !> gaps are closed in the mean, or on one side, with guards for the rest.
-   real(wp), parameter :: touching_bar = 1.0e-3_wp, overlap_bar = 2.0e-2_wp
+   !> So far, by the edge, bodies may be in each other where nodes are held themselves.
+   real(wp), parameter :: touching_bar = 1.0e-3_wp
    !> So far a node may go in: a corner, and any other one. Polygons of coarse curved surfaces, and
    !> gaps that are closed in the mean, stay above it.
    real(wp), parameter :: corner_slack = 0.8_wp*touching_bar, guard_slack = 0.05_wp
+   !> So far bodies may be in each other where gaps are closed in the mean, or on one side, with
+   !> guards for the rest; more than half of what guards let in is told.
+   real(wp), parameter :: overlap_bar = 1.1_wp*guard_slack, overlap_told = 0.5_wp*guard_slack
 
 contains
 

@@ -181,12 +181,17 @@ contains
          gap(2) > gap(1) - 0.08_wp*width, "round: smaller by " // to_text(gap(1) - gap(2)))
    end subroutine test_sharp
 
-   !> Two squares corner on corner: the top is round over a quarter of an edge, by the part of the
-   !> normals that both corners have. Turned by 45 degrees half of them are left, by 90 one; the
-   !> corner of a block that lies flat on another one has one normal only.
+   !> Two rhombs corner on corner, blunt as vertices of a curve: the top is round over a quarter of an edge, by the part of the
+   !> normals that both corners have. Turned by half of their turn half of them are left, by all one;
+   !> the corner of a block that lies flat on another one has one normal only.
    subroutine test_wide_tops(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: angle(4) = acos(-1.0_wp)*[0.0_wp, 0.25_wp, -0.25_wp, 0.5_wp]
+      real(wp), parameter :: pi = acos(-1.0_wp)
+      real(wp), parameter :: angle(4) = pi*[0.0_wp, 0.25_wp, -0.25_wp, 0.5_wp]/3.0_wp
+      !> Squares pressed flat along a diagonal: their corners there turn by 30 degrees.
+      real(wp), parameter :: part = tan(pi/12.0_wp), edge = sqrt(0.5_wp*(1.0_wp + part**2))
+      real(wp), parameter :: flatten(2, 2) = 0.5_wp*reshape([1.0_wp + part, part - 1.0_wp, &
+         part - 1.0_wp, 1.0_wp + part], [2, 2])
       real(wp), parameter :: share(4) = [1.0_wp, 0.5_wp, 0.5_wp, 0.0_wp]
       type(scene_t) :: scene
       type(block_t) :: lower, upper
@@ -199,28 +204,37 @@ contains
       call add_block(scene, "CPE4", [1, 1], [1.0_wp, 1.0_wp], [1.0_wp, 1.0_wp], upper)
       call add_surface(scene, "LOWER", lower, [bottom, right, top, left])
       call add_surface(scene, "UPPER", upper, [bottom, right, top, left])
-      call nts_init(nts, scene, contact_pair_t(slave=2, master=1), error)
-      if (allocated(error)) return
-      call nts%configure(scene%x, contact_options_t())
-      call nts%suit_steps(.false.)
       allocate(u, source=0.0_wp*scene%x)
+      call begin()
+      if (allocated(error)) return
+      call check_near(error, top_width(), 0.0_wp, tol, 1.0_wp, "corners of squares")
+      scene%x = 1.0_wp + matmul(flatten, scene%x - 1.0_wp)
+      call begin()
+      if (allocated(error)) return
       do k = 1, size(angle)
          associate (arm => scene%x(:, 5:) - 1.0_wp, c => cos(angle(k)), s => sin(angle(k)))
             u(1, 5:) = (c - 1.0_wp)*arm(1, :) - s*arm(2, :)
             u(2, 5:) = s*arm(1, :) + (c - 1.0_wp)*arm(2, :)
          end associate
-         call check_near(error, top_width(), 0.25_wp*share(k), tol, 1.0_wp, &
+         call check_near(error, top_width(), 0.25_wp*share(k)*edge, tol, 1.0_wp, &
             "turned: " // to_text(k))
       end do
       ! Moved to the left by an edge, it lies on the top of the lower one with its side.
       u = 0.0_wp
-      u(1, 5:) = -1.0_wp
+      u(:, 5:) = spread(-flatten(:, 1), 2, 4)
       call check_near(error, top_width(), 0.0_wp, tol, 1.0_wp, "flat on the other")
       u = 0.0_wp
       call nts%suit_steps(.true.)
       call check_near(error, top_width(), 0.0_wp, tol, 1.0_wp, "in statics")
 
    contains
+
+      subroutine begin()
+         call nts_init(nts, scene, contact_pair_t(slave=2, master=1), error)
+         if (allocated(error)) return
+         call nts%configure(scene%x, contact_options_t())
+         call nts%suit_steps(.false.)
+      end subroutine begin
 
       !> For the first corner of the upper block at the corner of the lower one where it stands.
       real(wp) function top_width()

@@ -345,7 +345,8 @@ def test_no_flight_through_a_body(tmp_path, swap, choice):
     run = run_one_sided(scene.dynamic(0.5, 1.0), tmp_path, **CHOICES[choice])
     assert_sound(scene, run, deepest=1.0)
     assert momentum_of(run, 0)[-1, 1] < 0
-    assert (momentum_of(run, 1)[1:, 1] > 0).all()  # thrown back by the first increment, cut or not
+    # Thrown back or stopped by the first increment, cut or not; it came with a momentum of -10.
+    assert (momentum_of(run, 1)[1:, 1] > -1).all()
 
 
 # ---- several pairs ------------------------------------------------------------------------------

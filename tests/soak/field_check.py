@@ -22,7 +22,7 @@ from plain_scenes import ALL
 
 #: So far, by the edge, bodies may be in each other: where the nodes of both sides are held, and where
 #: means of gaps leave something open between the nodes.
-TOUCHING, OF_MEANS = 1e-3, 2e-2
+TOUCHING, OF_MEANS = 1e-3, 5.5e-2
 #: Of sums of forces and momenta, by their largest parts; Newton's method stops at 1e-10.
 BALANCE = 1e-7
 ENERGY = 1e-9

@@ -72,8 +72,8 @@ def rebound_text(run):
     return f", rebounds at {rebound(run):.3f} of its speed"
 
 
-def coil_by(formulation):
-    return lambda: SCENES["coil"]().deck(ONE), {"method": "PENALTY", "formulation": formulation}
+def crossing_by(formulation):
+    return lambda: SCENES["crossing"]().deck(ONE), {"method": "PENALTY", "formulation": formulation}
 
 
 def none(change, names):
@@ -81,7 +81,7 @@ def none(change, names):
 
 
 SHORT_BAR = {"t_end": 3.0, "frame": 3.0}
-COIL, COIL_SEGMENT = coil_by("SEGMENT")
+CROSSING, CROSSING_MORTAR = crossing_by("MORTAR")
 CAUSES = [
     Cause("`INITIATION=ADMISSIBLE`: nodes that arrive are stopped", "`bouncing_bar.inp`",
           read("bouncing_bar"), lambda c, _: c["contact_work"] < -1e-3
@@ -115,11 +115,11 @@ CAUSES = [
           lambda c, _: abs(c["total"]) > 1e-4 and c["contact_work"] == 0, {"h": 0.2}),
     Cause("the same by `ENERGY MOMENTUM`", "`spinning_ring.inp`", ring_by("ENERGY MOMENTUM"),
           lambda c, _: none(c, COLUMNS), {"h": 0.2}),
-    Cause("`PENALTY` of `SEGMENT`: an edge passes the end of its surface while in it",
-          "a coil that unwinds", COIL, lambda c, run: c["contact_work"] < -1e-5
-          and run.verdict["verdict"] == "bad", COIL_SEGMENT),
-    Cause("`PENALTY` of `NODE TO SURFACE` there", "a coil that unwinds", COIL,
-          lambda c, _: none(c, ("total", "contact_work")), coil_by("NODE TO SURFACE")[1]),
+    Cause("`PENALTY` of `MORTAR`: an edge passes the end of its surface while in it",
+          "squares whose corners cross", CROSSING, lambda c, run: abs(c["contact_work"]) > 1e-5
+          and run.verdict["verdict"] == "bad", CROSSING_MORTAR),
+    Cause("`PENALTY` of `NODE TO SURFACE` there", "squares whose corners cross", CROSSING,
+          lambda c, _: none(c, ("total", "contact_work")), crossing_by("NODE TO SURFACE")[1]),
     Cause("`PENALTY` with `SCHEME=TRAPEZOIDAL`", "`bouncing_bar.inp`", read("bouncing_bar"),
           lambda c, run: abs(c["contact_work"]) > 1e-6,
           {**SHORT_BAR, "scheme": "TRAPEZOIDAL", "method": "PENALTY"}),
