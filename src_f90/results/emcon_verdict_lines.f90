@@ -2,6 +2,7 @@
 module emcon_verdict_lines
    use emcon_energy_watch, only : closing_text, energy_bar, energy_rounding
    use emcon_force_scatter, only : scatter_is_comb, scatter_of
+   use emcon_guards, only : overlap_told
    use emcon_interactions, only : contact_pair_t, formulation_nts
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
@@ -61,6 +62,8 @@ contains
          if (self%give > 0.0_wp) then
             line = line // "contact gives way by up to " // to_text(self%give, 3) // &
                " of an edge and no more penetrates, "
+         else if (self%deepest > overlap_told) then
+            line = line // "nothing penetrates by more than guards allow, "
          else if (size(self%largest_force) > 0) then
             line = line // "nothing penetrates, "
          end if
