@@ -1,6 +1,6 @@
 !> What a run tells of itself: the lines of the log.
 module emcon_run_log
-   use emcon_guards, only : guard_slack
+   use emcon_guards, only : corner_slack, guard_slack
    use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_segment, &
       normal_nodal, smoothing_none
    use emcon_kinds, only : wp
@@ -83,7 +83,8 @@ contains
                scene%surface(scene%pair(k)%master)%name // ", " // how)
          end do
          if (system%n_pair < size(system%contact)) call note_add(notes, "contact: guards hold " // &
-            "nodes that the pairs do not, deeper than " // to_text(guard_slack) // " of an edge")
+            "nodes that the pairs do not: corners that are deeper than " // to_text(corner_slack) &
+            // " of an edge, other nodes than " // to_text(guard_slack))
          do k = 1, size(scene%step)
             call add_step(notes, scene, k)
          end do
