@@ -59,8 +59,10 @@ contains
       if (allocated(self%t)) then
          if (size(self%t, 2) /= size(self%g, 2)) deallocate(self%t, self%t1, self%ht)
       end if
-      if (.not. allocated(self%t)) allocate(self%t, self%t1, mold=self%g)
-      if (.not. allocated(self%ht)) allocate(self%ht, mold=self%h)
+      associate (n_dim => size(self%g, 1), n => size(self%g, 2), m => size(self%h, 1))
+         if (.not. allocated(self%t)) allocate(self%t(n_dim, n, n_dim - 1), &
+            self%t1(n_dim, n, n_dim - 1), self%ht(m, m, n_dim - 1))
+      end associate
       self%slip = 0.0_wp
       self%t = 0.0_wp
       self%t1 = 0.0_wp

@@ -246,9 +246,10 @@ contains
       first = both(item%g, item%c)
       if (.not. item%leaves_second) second = item%h(:size(first, 1), :size(first, 1))
       if (item%rubs) then
-         slip = item%slip
-         slip_first = both(item%t, item%t1)
-         if (.not. item%leaves_second) slip_second = item%ht(:size(first, 1), :size(first, 1))
+         slip = item%slip(1)
+         slip_first = both(item%t(:, :, 1), item%t1(:, :, 1))
+         if (.not. item%leaves_second) slip_second = item%ht(:size(first, 1), &
+            :size(first, 1), 1)
       end if
       call condition_resize(item, to)
       item%node(:to) = list
@@ -256,9 +257,9 @@ contains
       if (.not. item%leaves_second) call take_second(second, item%h)
       if (.not. item%rubs) return
       call condition_resize_slip(item)
-      item%slip = slip
-      call take(slip_first, item%t, item%t1)
-      if (.not. item%leaves_second) call take_second(slip_second, item%ht)
+      item%slip(1) = slip
+      call take(slip_first, item%t(:, :, 1), item%t1(:, :, 1))
+      if (.not. item%leaves_second) call take_second(slip_second, item%ht(:, :, 1))
 
    contains
 

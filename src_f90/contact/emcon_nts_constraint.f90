@@ -152,14 +152,15 @@ contains
       call condition_resize_slip(item)
       if (item%leaves_second) then
          call hermite_slip_first(smooth%curve, local, dlocal, smooth%place(1), first)
-         item%slip = first%df
+         item%slip(1) = first%df
          call take_directions(first%g, first%c, item)
       else
          call hermite_slip(smooth%curve, local, dlocal, smooth%place(1), slip)
-         item%slip = slip%df
+         item%slip(1) = slip%df
          call take_directions(slip%g, slip%c, item)
-         item%ht(:size(local), :size(local)) = 0.0_wp
-         call nodes_add_second(1.0_wp, size(local, 1), slip%h, in_order(:size(local, 2)), item%ht)
+         item%ht(:size(local), :size(local), 1) = 0.0_wp
+         call nodes_add_second(1.0_wp, size(local, 1), slip%h, in_order(:size(local, 2)), &
+            item%ht(:, :, 1))
       end if
    end subroutine take_slip
 
@@ -168,8 +169,8 @@ contains
       real(wp), intent(in) :: g(:), c(:)         !! by the nodes but the first
       type(condition_t), intent(inout) :: item
 
-      call take_first(g, item%t(:, :item%n_node))
-      call take_first(c, item%t1(:, :item%n_node))
+      call take_first(g, item%t(:, :item%n_node, 1))
+      call take_first(c, item%t1(:, :item%n_node, 1))
    end subroutine take_directions
 
    !> A gap and its first derivatives as those of a constraint.

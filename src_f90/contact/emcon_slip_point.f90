@@ -90,12 +90,12 @@ contains
       end do
       if (item%leaves_second) then
          only_first = nts_slip_first(local, dlocal)
-         item%slip = item%slip + self%weight*only_first%df
+         item%slip(1) = item%slip(1) + self%weight*only_first%df
          call add_first(self, to, only_first%g, only_first%c, item)
          return
       end if
       slip = nts_slip(local, dlocal)
-      item%slip = item%slip + self%weight*slip%df
+      item%slip(1) = item%slip(1) + self%weight*slip%df
       call add_first(self, to, slip%g, slip%c, item)
       h = 0.0_wp
       call nodes_add_second(1.0_wp, size(x, 1), slip%h, [slave, first, last], h)
@@ -124,8 +124,8 @@ contains
       do k = 1, size(to)
          part = self%weight*self%share(k)
          if (.not. self%share(k) > 0.0_wp) cycle
-         item%t(:, to(k)) = item%t(:, to(k)) + part*by_g(:, place(k))
-         item%t1(:, to(k)) = item%t1(:, to(k)) + part*by_c(:, place(k))
+         item%t(:, to(k), 1) = item%t(:, to(k), 1) + part*by_g(:, place(k))
+         item%t1(:, to(k), 1) = item%t1(:, to(k), 1) + part*by_c(:, place(k))
       end do
    end subroutine add_first
 
@@ -143,7 +143,7 @@ contains
          column = n_dim*(to(j) - 1) + b
          do a = 1, n_dim
             row = n_dim*(to(k) - 1) + a
-            item%ht(row, column) = item%ht(row, column) &
+            item%ht(row, column, 1) = item%ht(row, column, 1) &
                + part*h(n_dim*(place(k) - 1) + a, n_dim*(place(j) - 1) + b)
          end do
       end do

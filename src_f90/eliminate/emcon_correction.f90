@@ -44,7 +44,7 @@ module emcon_correction
       type(csr_t) :: merged                      !! N with constraints
       integer, allocatable :: slot(:)            !! entries of the system's matrix in `merged`
       integer, allocatable :: row_start(:), column(:)   !! constraint rows that the layout is for
-      integer, allocatable :: damped_start(:), damped_column(:)   !! and of what is damped
+      integer, allocatable :: law_start(:), law_column(:)   !! and those of laws alone
       type(null_space_t) :: null_space
       type(kept_factor_t) :: kept                !! over increments
       type(saddle_point_t) :: saddle_point
@@ -104,7 +104,7 @@ contains
       self%knows_multipliers = .true.
       if (set%n == 0) then
          self%fell_back = .false.
-         if (set%damped%n == 0) return
+         if (set%n_condition == 0) return
          if (.not. has_pattern(self, set)) call take_pattern(self, set)
          return
       end if
@@ -162,27 +162,26 @@ contains
    pure logical function has_pattern(self, set)
       type(correction_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
-      integer :: n
 
-      n = set%force_rows%row_start(set%n_row + 1)
       has_pattern = allocated(self%row_start)
-      if (has_pattern) has_pattern = size(self%row_start) == set%n_row + 1 &
-         .and. size(self%column) == n
-      if (has_pattern) has_pattern = all(self%row_start == set%force_rows%row_start)
-      if (has_pattern) has_pattern = all(self%column == set%force_rows%column(:n))
-      if (has_pattern) has_pattern = is_same(self%damped_start, set%damped%row_start)
-      if (has_pattern) has_pattern = is_same(self%damped_column, set%damped%column)
+      if (has_pattern) has_pattern = is_pattern(self%row_start, self%column, set%n_row, &
+         set%force_rows)
+      if (has_pattern) has_pattern = is_pattern(self%law_start, self%law_column, &
+         set%n_condition - set%n, set%law_rows)
    end function has_pattern
 
-   !> The two lists are one, or none is there.
-   pure logical function is_same(a, b)
-      integer, allocatable, intent(in) :: a(:), b(:)
+   !> Is this the pattern of the `n` rows?
+   pure logical function is_pattern(start, column, n, rows)
+      integer, intent(in) :: start(:), column(:)
+      integer, intent(in) :: n
+      type(csr_t), intent(in) :: rows            !! with values if `n` is above 0
 
-      is_same = allocated(a) .eqv. allocated(b)
-      if (.not. (is_same .and. allocated(a))) return
-      is_same = size(a) == size(b)
-      if (is_same) is_same = all(a == b)
-   end function is_same
+      is_pattern = size(start) == n + 1
+      if (.not. is_pattern .or. n == 0) return
+      is_pattern = size(column) == rows%row_start(n + 1)
+      if (is_pattern) is_pattern = all(start == rows%row_start(:n + 1))
+      if (is_pattern) is_pattern = all(column == rows%column(:size(column)))
+   end function is_pattern
 
    !> Entries of N with the constraints, at most: those of a constraint meet in pairs.
    pure integer function n_merged(system, set)
@@ -193,9 +192,9 @@ contains
          n_merged = size(system%matrix%column) &
             + sum((start(2:set%n_row + 1) - start(:set%n_row))**2)
       end associate
-      if (set%damped%n == 0) return
-      associate (start => set%damped%row_start)
-         n_merged = n_merged + sum((start(2:) - start(:set%damped%n))**2)
+      if (set%n_condition == set%n) return
+      associate (start => set%law_rows%row_start)
+         n_merged = n_merged + sum((start(2:) - start(:size(start) - 1))**2)
       end associate
    end function n_merged
 
@@ -206,10 +205,12 @@ contains
 
       self%row_start = set%force_rows%row_start
       self%column = set%force_rows%column(:set%force_rows%row_start(set%n_row + 1))
-      if (allocated(self%damped_start)) deallocate(self%damped_start, self%damped_column)
-      if (set%damped%n > 0) then
-         self%damped_start = set%damped%row_start
-         self%damped_column = set%damped%column
+      if (set%n_condition > set%n) then
+         self%law_start = set%law_rows%row_start
+         self%law_column = set%law_rows%column(:self%law_start(size(self%law_start)))
+      else
+         self%law_start = [0]
+         self%law_column = [integer ::]
       end if
       self%is_merged = .false.
       self%has_saddle_point = .false.
@@ -226,7 +227,7 @@ contains
 
       self%n_factorisation = self%n_factorisation + 1
       if (.not. allocated(self%solver)) call make_solvers(self)
-      if (set%n == 0 .and. set%damped%n == 0) then
+      if (set%n_condition == 0) then
          call factorise_free(self, system, system%matrix, system%is_symmetric, is_singular, error)
          return
       end if
@@ -255,7 +256,7 @@ contains
       call saddle_point_factorise(self%saddle_point, set, self%merged, is_singular, error)
    end subroutine correction_factorise
 
-   !> The tangent of the system with what constraints and damping add to it.
+   !> The tangent of the system with what constraints and laws of contact add to it.
    subroutine merge_all(self, system, set)
       type(correction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
@@ -278,7 +279,7 @@ contains
    subroutine factorise_free(self, system, matrix, is_symmetric, is_singular, error)
       type(correction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
-      type(csr_t), intent(in) :: matrix          !! of the system, or with what is damped
+      type(csr_t), intent(in) :: matrix          !! of the system, or with laws of contact
       logical, intent(in) :: is_symmetric
       logical, intent(out) :: is_singular
       type(error_t), allocatable, intent(out) :: error

@@ -44,17 +44,16 @@ contains
       real(hp) :: largest(n_kind, set%n_row)
       integer :: own(size(numbering%unknown, 1), set%n_row), k
 
-      do k = 1, set%n
-         associate (item => set%item(k), n => set%item(k)%n_node)
+      do k = 1, set%n_row
+         associate (item => set%item(set%condition(k)), n => set%item(set%condition(k))%n_node, &
+               s => set%slip(k))
             own(:, k) = numbering%unknown(:, item%node(1))
-            largest(:, k) = real([maxval(abs(item%g(:, :n))), maxval(abs(item%c(:, :n)))], hp)
-         end associate
-      end do
-      do k = set%n + 1, set%n_row
-         associate (item => set%item(set%stuck(k - set%n)), n => set%item(set%stuck(k &
-               - set%n))%n_node)
-            own(:, k) = numbering%unknown(:, item%node(1))
-            largest(:, k) = real([maxval(abs(item%t(:, :n))), maxval(abs(item%t1(:, :n)))], hp)
+            if (s == 0) then
+               largest(:, k) = real([maxval(abs(item%g(:, :n))), maxval(abs(item%c(:, :n)))], hp)
+            else
+               largest(:, k) = real([maxval(abs(item%t(:, :n, s))), &
+                  maxval(abs(item%t1(:, :n, s)))], hp)
+            end if
          end associate
       end do
       call eliminate(self, set, set%gap_rows, own, largest)
@@ -124,7 +123,7 @@ contains
       integer, intent(inout) :: order(:)         !! (n_row)
       logical :: is_gap(size(order)), is_firm(size(order))
 
-      is_gap = order <= set%n
+      is_gap = set%slip(order) == 0
       is_firm = set%is_firm(order)
       order = [pack(order, is_gap .and. is_firm), pack(order, is_gap .and. .not. is_firm), &
          pack(order, .not. is_gap .and. is_firm), pack(order, .not. (is_gap .or. is_firm))]

@@ -9,7 +9,7 @@
 !> Every decision here depends on the present gradients and the pattern only, so that a run does
 !> not remember how it came to where it is.
 module emcon_null_space
-   use emcon_constraint, only : condition_push
+   use emcon_constraint, only : condition_row_force
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_multiply, csr_multiply_transposed, csr_t
    use emcon_dependent_block, only : dependent_block_factorise, dependent_block_init, &
@@ -306,19 +306,14 @@ contains
       rest = residual(self%present%dependent)
       magnitude = abs(rest)
       do k = 1, set%n_row
-         if (k > set%n) then
-            associate (item => set%item(set%stuck(k - set%n)))
-               call subtract(item%node(:item%n_node), -item%t, lam(k))
-            end associate
-         else if (set%item(k)%rubs) then
-            associate (item => set%item(k))
-               call subtract(item%node(:item%n_node), condition_push(item), lam(k))
-            end associate
-         else
-            associate (item => set%item(k))
+         associate (item => set%item(set%condition(k)))
+            if (item%rubs) then
+               call subtract(item%node(:item%n_node), condition_row_force(item, set%slip(k)), &
+                  lam(k))
+            else
                call subtract(item%node(:item%n_node), item%g, lam(k))
-            end associate
-         end if
+            end if
+         end associate
       end do
       relative = 0.0_wp
       do k = 1, set%n_row

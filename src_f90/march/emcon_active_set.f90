@@ -278,10 +278,17 @@ contains
       integer :: k, pair, i
 
       call remember(self)
-      if (self%set%n == 0 .and. .not. (any(self%is_active) .or. self%dashpots%is_on)) return
-      call constraints_select(self%set, pack([(k, k = 1, size(self%is_active))], self%is_active))
+      if (self%set%n_condition == 0 .and. .not. (any(self%is_active) .or. self%dashpots%is_on)) &
+         return
       if (.not. knows_gaps()) call measure_all(self, system, motion)
-      if (self%dashpots%is_on) call select_damped(self, system)
+      if (self%dashpots%is_on) then
+         call look_for_damped(self, system)
+         call constraints_select(self%set, places_of(self%is_active), &
+            places_of(self%dashpots%is_near))
+         call dashpots_select(self%dashpots, system, self%is_active, self%set)
+      else
+         call constraints_select(self%set, places_of(self%is_active))
+      end if
       do k = 1, self%set%n
          self%set%lam(k) = self%lam(self%set%id(k))
          call constraint_place(system, self%set%id(k), pair, i)
@@ -301,7 +308,7 @@ contains
             if (self%set%is_kept(k)) self%set%target(k) = gap%gap0
          end associate
       end do
-      self%set%n_held = count(self%set%id <= system%first_constraint(1))
+      self%set%n_held = count(self%set%id(:self%set%n) <= system%first_constraint(1))
       call friction_select(self%friction, self%set, self%n_tried)
       call softness_select(self%softness, system, self%set, self%masses_resist .and. &
          .not. motion%pose%pushes_at_end)
@@ -315,8 +322,17 @@ contains
 
    end subroutine active_set_select
 
-   !> What is damped beside the set, by the gaps as they were measured.
-   subroutine select_damped(self, system)
+   !> Where a list is true.
+   pure function places_of(is_meant) result(place)
+      logical, intent(in) :: is_meant(:)
+      integer, allocatable :: place(:)
+      integer :: k
+
+      place = pack([(k, k = 1, size(is_meant))], is_meant)
+   end function places_of
+
+   !> What is near enough to be damped, by the gaps as they were measured.
+   subroutine look_for_damped(self, system)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       logical :: grows
@@ -328,8 +344,7 @@ contains
          if (.not. is_empty(self, system, k)) call dashpots_look(self%dashpots, system, k, &
             self%is_active, grows)
       end do
-      call dashpots_select(self%dashpots, system, self%is_active, self%set)
-   end subroutine select_damped
+   end subroutine look_for_damped
 
    !> Measure the gaps of all contacts that something is near.
    subroutine measure_all(self, system, motion)

@@ -135,7 +135,7 @@ contains
          is_like = low == low(redundant(i)) .and. high == high(redundant(i))
          is_like = is_like .and. depth > minval(depth, is_like) + touch_tol
          has_narrowed = has_narrowed .or. any(is_like)
-         self%is_active(pack(self%set%id, is_like)) = .false.
+         self%is_active(pack(self%set%id(:self%set%n), is_like)) = .false.
       end do
       if (.not. has_narrowed) return
       self%one_by_one = .true.

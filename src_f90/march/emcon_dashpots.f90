@@ -1,9 +1,9 @@
 !> Which contacts are damped in a step: those that act and those whose surfaces are near, by the law
 !> of their pairs. Source: docs/theory.md, eqs. (14n) to (14q).
 module emcon_dashpots
-   use emcon_constraints, only : constraint_set_t
+   use emcon_constraints, only : constraint_set_t, constraints_dissipated
    use emcon_contact, only : contact_t
-   use emcon_damped, only : damped_select, damped_t, damped_work, dashpot_t
+   use emcon_dashpot_law, only : dashpot_t
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_steps, only : step_t
@@ -27,15 +27,13 @@ contains
 
    !> Set up for `step`, whose contacts are laid out. Surfaces made of nodes have no areas: the
    !> coefficient is a force by velocity there. Where nodes of both sides are held each has half.
-   pure subroutine dashpots_begin_step(self, set, system, scene, step)
+   pure subroutine dashpots_begin_step(self, system, scene, step)
       type(dashpots_t), intent(out) :: self
-      type(constraint_set_t), intent(inout) :: set   !! beside which there is nothing left
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       type(step_t), intent(in) :: step
       integer :: k
 
-      set%damped = damped_t()
       do k = 1, size(system%contact)
          self%is_on = self%is_on .or. system%contact(k)%contact%damping%coefficient > 0.0_wp
       end do
@@ -112,33 +110,30 @@ contains
          contact%state(i)%gap0 <= touch_tol*contact%state(i)%size
    end function touches
 
-   !> Let what is near be damped beside `set`. What contact holds exactly is closed, whatever gap
-   !> that leaves.
+   !> Let the laws of the conditions of `set` behind its own, which are near, be those of damping.
+   !> What contact holds exactly is closed, whatever gap that leaves.
    pure subroutine dashpots_select(self, system, is_active, set)
       type(dashpots_t), intent(in) :: self
       type(system_t), intent(in) :: system
       logical, intent(in) :: is_active(:)        !! (n_constraint)
       type(constraint_set_t), intent(inout) :: set
-      type(dashpot_t), allocatable :: dashpot(:)
-      integer, allocatable :: id(:)
       integer :: j, k
 
-      id = pack([(j, j = 1, size(self%is_near))], self%is_near)
-      allocate(dashpot(size(id)))
       k = 1
-      do j = 1, size(id)
-         do while (id(j) > system%first_constraint(k + 1))
-            k = k + 1
-         end do
-         associate (contact => system%contact(k)%contact, i => id(j) - system%first_constraint(k))
-            dashpot(j)%law = contact%damping
-            dashpot(j)%area = contact%share(i)*self%area(id(j))
-            dashpot(j)%gap = contact%state(i)%gap0
-            dashpot(j)%is_closed = (is_active(id(j)) .and. .not. contact%gives_way) .or. &
-               touches(contact, i)
+      do j = set%n + 1, set%n_condition
+         associate (id => set%id(j), item => set%item(j))
+            do while (id > system%first_constraint(k + 1))
+               k = k + 1
+            end do
+            associate (contact => system%contact(k)%contact, i => id - system%first_constraint(k))
+               set%target(j) = contact%state(i)%gap0
+               item%rubs = contact%damping%tangent > 0.0_wp
+               allocate(set%law(j)%law, source=dashpot_t(contact%damping, &
+                  contact%share(i)*self%area(id), set%target(j), (is_active(id) .and. .not. &
+                  contact%gives_way) .or. touches(contact, i)))
+            end associate
          end associate
       end do
-      call damped_select(set%damped, id, dashpot)
    end subroutine dashpots_select
 
    !> What damping has taken in the step that `set` has solved, >= 0.
@@ -147,8 +142,8 @@ contains
       integer :: k
 
       work = 0.0_wp
-      do k = 1, set%damped%n
-         work = work + damped_work(set%damped, k)
+      do k = set%n + 1, set%n_condition
+         work = work + constraints_dissipated(set, k)
       end do
    end function dashpots_work
 

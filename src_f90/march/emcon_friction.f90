@@ -5,7 +5,7 @@
 !> within the step are its candidates: they hold their gaps as one complementarity, and never cease
 !> to be candidates within the step. Source: docs/theory.md, section 4.13.
 module emcon_friction
-   use emcon_constraint, only : condition_drag, condition_normal, condition_t
+   use emcon_constraint, only : condition_drag, condition_normal, condition_t, most_slips
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_stick
    use emcon_contact, only : contact_t
    use emcon_csr, only : csr_find
@@ -142,13 +142,14 @@ contains
          associate (item => set%item(k), id => set%id(k))
             item%rubs = self%mu(id) > 0.0_wp
             if (.not. item%rubs) cycle
-            item%lead = slip_held(self, id)
-            item%tilt = self%mu(id)*friction_slides(self, id)
+            item%slip_target(1) = slip_held(self, id)
+            item%response%mu_sigma(1) = self%mu(id)*friction_slides(self, id)
             sticks(k) = holds(self, id)
          end associate
       end do
       call constraints_stick(set, pack([(k, k = 1, set%n)], sticks), &
-         pack(self%tau(set%id), sticks), pack(self%is_needed(set%id), sticks))
+         reshape(pack(self%tau(set%id(:set%n)), sticks), [1, count(sticks)]), &
+         pack(self%is_needed(set%id(:set%n)), sticks))
    end subroutine friction_select
 
    !> The direction in which contact `id` slides by the law: 0 where it does not.
@@ -185,13 +186,13 @@ contains
       if (self%way(id) == touch_rests) slip_held = 0.0_wp
    end function slip_held
 
-   !> What sticks by the rows `row` of the set, past its conditions, does so by what holds others.
+   !> What sticks by the rows `row` of slips does so by what holds others.
    pure subroutine friction_idle(self, set, row)
       type(friction_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
-      integer, intent(in) :: row(:)              !! (any) from set%n + 1
+      integer, intent(in) :: row(:)              !! (any) of the set
 
-      if (size(row) > 0) self%is_idle(set%id(set%stuck(row - set%n))) = .true.
+      if (size(row) > 0) self%is_idle(set%id(set%condition(row))) = .true.
    end subroutine friction_idle
 
    !> Friction of what sticks, to start from with the next set.
@@ -199,7 +200,7 @@ contains
       type(friction_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
 
-      if (set%n_row > set%n) self%tau(set%id(set%stuck)) = set%lam(set%n + 1:)
+      if (set%n_row > set%n) self%tau(set%id(set%condition(set%n + 1:))) = set%lam(set%n + 1:)
    end subroutine friction_keep
 
    !> The way of contact `k` of the set, which acts and goes on to do so, from what solves the step.
@@ -218,7 +219,7 @@ contains
       stiffness = stiffness_at(system, set%item(k))
       tie = tied*largest_push(set)
       associate (id => set%id(k), item => set%item(k), lam => set%lam)
-         at = touch_t(item%normal*lam(k), condition_drag(item, lam(k)), 0.0_wp, item%slip, &
+         at = touch_t(item%normal*lam(k), drag_of(item, lam(k)), 0.0_wp, item%slip(1), &
             self%lead(id), slip_rounding*item%size)
          ! Where slip is held the solution has no other, but for round-off.
          if (holds(self, id)) at%slip = slip_held(self, id)
@@ -271,8 +272,19 @@ contains
       integer, intent(in) :: k                   !! from 1
 
       work = 0.0_wp
-      if (set%item(k)%rubs) work = condition_drag(set%item(k), set%lam(k))*set%item(k)%slip
+      if (set%item(k)%rubs) work = dot_product(condition_drag(set%item(k), set%lam(k)), &
+         set%item(k)%slip)
    end function friction_work
+
+   !> The friction of a condition in the plane, against its slip.
+   pure real(wp) function drag_of(item, lam) result(tau)
+      type(condition_t), intent(in) :: item
+      real(wp), intent(in) :: lam                !! of its gap [M L/T^2]
+      real(wp) :: drag(most_slips)
+
+      drag = condition_drag(item, lam)
+      tau = drag(1)
+   end function drag_of
 
    !> How far the laws of contact and friction are missed at worst, and the largest push.
    pure subroutine friction_missed(self, system, set, missed, largest)
@@ -294,7 +306,7 @@ contains
             if (.not. item%rubs) cycle
             push = set%lam(k)
             if (item%is_mean) push = condition_normal(item)*push
-            at = touch_t(push, condition_drag(item, set%lam(k)), set%defect(k), item%slip, &
+            at = touch_t(push, drag_of(item, set%lam(k)), set%defect(k), item%slip(1), &
                self%lead(set%id(k)), slip_rounding*item%size)
             missed = max(missed, friction_violation(at, self%mu(set%id(k)), &
                stiffness_at(system, item)))

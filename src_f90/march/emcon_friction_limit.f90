@@ -4,6 +4,7 @@
 !> lam (Wnn - mu sigma Wnt), with the flexibility W of the step without contacts: from
 !> mu = Wnn/|Wnt| on it is closed by being pushed open. Source: docs/theory.md, eq. (14l).
 module emcon_friction_limit
+   use emcon_constraint, only : most_slips
    use emcon_constraints, only : constraint_place, constraint_set_t
    use emcon_errors, only : error_t
    use emcon_flexibility, only : flexibility_free, flexibility_make, flexibility_move, &
@@ -93,7 +94,8 @@ contains
       real(wp), intent(out) :: limit(:)          !! (n) huge: none
       type(error_t), allocatable, intent(out) :: error
       real(wp), dimension(system%space%numbering%n_unknown) :: normal, along, row
-      integer :: k
+      real(wp) :: wnt(most_slips)
+      integer :: k, s
 
       limit = huge(limit)
       if (flexibility%is_singular) return
@@ -102,13 +104,17 @@ contains
             associate (item => set%item(list(k)))
                call flexibility_move(flexibility, flexibility_row(numbering, item, item%g), &
                   normal, error)
-               if (.not. allocated(error)) call flexibility_move(flexibility, &
-                  flexibility_row(numbering, item, item%t), along, error)
                if (allocated(error)) return
                row = flexibility_row(numbering, item, item%c)
-               associate (wnn => dot_product(row, normal), &
-                     wnt => item%normal*abs(dot_product(row, along)))
-                  if (wnn > 0.0_wp .and. wnt > depends*wnn) limit(k) = wnn/wnt
+               wnt = 0.0_wp
+               do s = 1, size(item%t, 3)
+                  call flexibility_move(flexibility, flexibility_row(numbering, item, &
+                     item%t(:, :, s)), along, error)
+                  if (allocated(error)) return
+                  wnt(s) = item%normal*dot_product(row, along)
+               end do
+               associate (wnn => dot_product(row, normal), most => norm2(wnt))
+                  if (wnn > 0.0_wp .and. most > depends*wnn) limit(k) = wnn/most
                end associate
             end associate
          end do

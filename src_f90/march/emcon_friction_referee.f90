@@ -86,7 +86,7 @@ contains
          if (allocated(error)) return
          problem%gap = self%set%defect(first:self%set%n) + gap_rates(numbering, item(:n), way)
          problem%slip = slip_rates(numbering, item(:n), way)
-         where (item(:n)%rubs) problem%slip = problem%slip + item(:n)%slip
+         where (item(:n)%rubs) problem%slip = problem%slip + item(:n)%slip(1)
          do i = 1, n
             call flexibility_move(flexibility, flexibility_row(numbering, item(i), item(i)%g), &
                way, error)
@@ -96,8 +96,8 @@ contains
             ! Without friction there is no slip to solve for: any one by itself.
             problem%w(n + i, n + i) = problem%w(i, i)
             if (.not. item(i)%rubs) cycle
-            call flexibility_move(flexibility, flexibility_row(numbering, item(i), -item(i)%t), &
-               way, error)
+            call flexibility_move(flexibility, flexibility_row(numbering, item(i), &
+               -item(i)%t(:, :, 1)), way, error)
             if (allocated(error)) return
             problem%w(:n, n + i) = gap_rates(numbering, item(:n), way)
             problem%w(n + 1:, n + i) = -slip_rates(numbering, item(:n), way)
@@ -128,8 +128,8 @@ contains
 
       rate = 0.0_wp
       do i = 1, size(item)
-         if (item(i)%rubs) rate(i) = dot_product(flexibility_row(numbering, item(i), item(i)%t1), &
-            way)
+         if (item(i)%rubs) rate(i) = dot_product(flexibility_row(numbering, item(i), &
+            item(i)%t1(:, :, 1)), way)
       end do
    end function slip_rates
 

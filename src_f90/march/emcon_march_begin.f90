@@ -192,7 +192,7 @@ contains
          call configure_contact(self, scene)
          call softness_begin_step(self%active%softness, self%system, scene, step, error)
          if (allocated(error)) return
-         call dashpots_begin_step(self%active%dashpots, self%active%set, self%system, &
+         call dashpots_begin_step(self%active%dashpots, self%system, &
             scene, step)
          call begin_overclosure(self, scene, step)
          call begin_massless(self, scene, step, error)

@@ -1,6 +1,6 @@
 !> What follows from a solved step: velocities, works, forces, and what the user is told.
 module emcon_march_commit
-   use emcon_constraint, only : condition_drag
+   use emcon_constraint, only : condition_drag, most_slips
    use emcon_constraints, only : constraints_force
    use emcon_correction, only : correction_reason
    use emcon_dashpots, only : dashpots_work
@@ -84,7 +84,7 @@ contains
          if (allocated(error)) return
          call interlock_tell(self, scene, increment)
          increment%is_guarded = increment%is_guarded .or. &
-            any(set%id > system%first_constraint(system%n_pair + 1))
+            any(set%id(:set%n) > system%first_constraint(system%n_pair + 1))
          associate (reached => self%newton%convergence)
             increment%residual = reached%history(:reached%n_history)
             if (reached%last > reached%tolerance .and. .not. self%newton%is_idle) then
@@ -227,6 +227,7 @@ contains
    !> of what has no mass.
    subroutine keep_constraints(self)
       type(march_t), intent(inout) :: self
+      real(wp) :: drag(most_slips)
       integer :: k
 
       associate (state => self%state, set => self%active%set, layer => self%layer, &
@@ -250,9 +251,10 @@ contains
                set%soft(k)%now < 0.0_wp
             if (.not. set%item(k)%rubs) cycle
             state%sliding(set%id(k)) = friction_slides(self%active%friction, set%id(k))
-            state%drag(set%id(k)) = condition_drag(set%item(k), set%lam(k))
-            state%slip(set%id(k)) = state%slip(set%id(k)) + set%item(k)%slip
-            state%slip_path(set%id(k)) = state%slip_path(set%id(k)) + abs(set%item(k)%slip)
+            drag = condition_drag(set%item(k), set%lam(k))
+            state%drag(set%id(k)) = drag(1)
+            state%slip(set%id(k)) = state%slip(set%id(k)) + set%item(k)%slip(1)
+            state%slip_path(set%id(k)) = state%slip_path(set%id(k)) + norm2(set%item(k)%slip)
          end do
          if (.not. layer%is_settled) return
          state%is_active(layer%n_before + 1:) = layer%acts

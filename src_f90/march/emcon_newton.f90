@@ -3,15 +3,14 @@
 !> Forces are measured against the sum of their contributions before these cancel, docs/theory.md,
 !> eq. (25), so that no unit and no absolute size enters.
 module emcon_newton
-   use emcon_constraint, only : condition_rate, condition_slip_rate
+   use emcon_constraint, only : condition_rate
    use emcon_constraints, only : constraint_set_t, constraints_add_forces, constraints_evaluate, &
-      constraints_force, constraints_push, constraints_rows, constraints_take_hold
+      constraints_force, constraints_rows, constraints_take_hold
    use emcon_convergence, only : convergence_begin, convergence_init, convergence_judge, &
       convergence_nears_end, convergence_t, most_rounding, next_done, next_give_up, next_tangent, &
       round_off
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
       correction_solve, correction_t, correction_ticks
-   use emcon_damped, only : damped_add_forces
    use emcon_early_look, only : early_enough, early_look
    use emcon_errors, only : err_interrupt, error_t, raise
    use emcon_keeping, only : keeping_begin, keeping_break_off, keeping_correct, keeping_give_up, &
@@ -426,12 +425,9 @@ contains
       call system_tangent_times(system, motion, self%driven, self%contact)
       call pick_unknowns(system%space%numbering, self%contact, self%scale)
       self%residual = self%residual + self%scale
-      do k = 1, set%n
-         set%defect(k) = set%defect(k) + condition_rate(set%item(k), self%driven)
-      end do
-      do k = set%n + 1, set%n_row
-         set%defect(k) = set%defect(k) - condition_slip_rate(set%item(set%stuck(k - set%n)), &
-            self%driven)
+      do k = 1, set%n_row
+         set%defect(k) = set%defect(k) + condition_rate(set%item(set%condition(k)), self%driven, &
+            set%slip(k))
       end do
       call factorise(self, system, set, status, error)
       if (allocated(error) .or. status /= newton_converged) return
@@ -467,7 +463,7 @@ contains
       end do
       status = newton_converged
       call phase_enter(system%phases, phase_gaps, left)
-      if (constraints_push(set)) then
+      if (set%n_condition > 0) then
          leaves_second = .not. with_tangent
          if (self%convergence%is_kept) leaves_second = .not. (keeping_looks(self%keeping) .and. &
             kept_factor_has_room(self%correction%kept, set%n, size(system%matrix%column)))
@@ -500,18 +496,15 @@ contains
       else
          call constraints_force(set, 1, self%contact)
       end if
-      if (constraints_push(set)) then
+      if (set%n_condition > 0) then
          call vector_sum(size(self%left), system%response%residual, -1.0_wp, self%contact, &
             self%left)
          call pick_unknowns(system%space%numbering, self%left, self%residual)
       end if
       norm = relative_size(self%residual, self%forces)
       defect = 0.0_wp
-      do k = 1, set%n
-         defect = max(defect, abs(set%defect(k))/set%item(k)%size)
-      end do
-      do k = set%n + 1, set%n_row
-         defect = max(defect, abs(set%defect(k))/set%item(set%stuck(k - set%n))%size)
+      do k = 1, set%n_row
+         defect = max(defect, abs(set%defect(k))/set%item(set%condition(k))%size)
       end do
       is_rounding = relative_size(self%residual, self%rounding) <= round_off &
          .and. defect <= round_off
@@ -521,18 +514,18 @@ contains
       if (.not. self%is_idle) is_rounding = is_rounding .and. norm <= most_rounding
    end subroutine measure
 
-   !> The residual without the forces of constraints, which what is damped has a part in.
+   !> The residual without the forces of constraints, which conditions of laws alone have a part in.
    subroutine pick_residual(self, system, set)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
 
-      if (set%damped%n == 0) then
+      if (set%n_condition == set%n) then
          call pick_unknowns(system%space%numbering, system%response%residual, self%residual)
          return
       end if
       call vector_zero(size(self%contact), self%contact)
-      call damped_add_forces(set%damped, self%contact)
+      call constraints_add_forces(set, set%n + 1, set%n_condition, self%contact)
       call vector_sum(size(self%left), system%response%residual, -1.0_wp, self%contact, self%left)
       call pick_unknowns(system%space%numbering, self%left, self%residual)
    end subroutine pick_residual
@@ -549,7 +542,7 @@ contains
       lam = set%lam
       set%lam = set%soft%lack
       call vector_zero(size(self%left), self%left)
-      call constraints_add_forces(set, 1, self%left)
+      call constraints_add_forces(set, 1, set%n, self%left)
       set%lam = lam
       call pick_unknowns(system%space%numbering, self%left, self%scale)
       norm = max(norm, relative_size(self%scale, self%forces))

@@ -3,8 +3,8 @@
 !> Forces and moments belong to the configuration that the step's gradients are those of; areas and
 !> lengths to the multipliers of the step. Signs: docs/theory.md, eq. (1).
 module emcon_pair_record
-   use emcon_constraint, only : condition_force, condition_t
-   use emcon_constraints, only : constraint_set_t
+   use emcon_constraint, only : condition_force
+   use emcon_constraints, only : constraint_set_t, constraints_lam
    use emcon_kinds, only : wp
    use emcon_moment_plane, only : moment_of
    use emcon_system, only : system_t
@@ -51,47 +51,45 @@ contains
       allocate(self%area(system%n_constraint), self%shear_area(system%n_constraint), source=0.0_wp)
    end subroutine pair_record_init
 
-   !> Take over the constraints that acted in the step to `u`, and what was damped. Their forces act
-   !> at u - lag du: half a step back for discrete gradients, at the end (0) in statics.
+   !> Take over the constraints that acted in the step to `u`, and laws. Their forces act at
+   !> u - lag du: half a step back for discrete gradients, at the end (0) in statics.
    subroutine pair_record_measure(self, system, set, x, u, du, lag)
       type(pair_record_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)   !! (n_dim, n_node)
       real(wp), intent(in) :: lag                !! 0 or 1/2
-      integer :: k, first, last, from, to
+      type(range_t) :: own, by_law
+      integer :: k
 
       self%total = pair_total_t()
-      last = set%n_held
-      to = 0
+      own%last = set%n_held
+      by_law%last = set%n
       do k = 1, size(system%contact)
-         first = last + 1
-         last = count(set%id <= system%first_constraint(k + 1))
-         from = to + 1
-         if (set%damped%n > 0) to = count(set%damped%id <= system%first_constraint(k + 1))
+         own = range_t(own%last + 1, count(set%id(:set%n) <= system%first_constraint(k + 1)))
+         by_law = range_t(by_law%last + 1, set%n + count(set%id(set%n + 1:) &
+            <= system%first_constraint(k + 1)))
          associate (total => self%total(abs(system%contact(k)%of_pair)), &
-               damped => set%damped, before => system%first_constraint(k), &
-               n => system%first_constraint(k + 1))
-            total%n_active = total%n_active + max(0, last - first + 1)
+               before => system%first_constraint(k), n => system%first_constraint(k + 1))
+            total%n_active = total%n_active + max(0, own%last - own%first + 1)
             if (system%contact(k)%of_pair < 0) call exchange_sides(total)
-            call add_up(total, set%item(first:last), set%lam(first:last), x, u, du, lag)
-            if (to >= from) call add_up(total, damped%item(from:to), damped%dashpot(from:to)%push, &
-               x, u, du, lag)
+            call add_up(total, set, own, x, u, du, lag)
+            call add_up(total, set, by_law, x, u, du, lag)
             if (system%contact(k)%of_pair < 0) call exchange_sides(total)
-            if (last >= first .or. to >= from) then
-               call measure_nodes(self, system, k, set, range_t(first, last), &
-                  range_t(from, to))
+            if (own%last >= own%first .or. by_law%last >= by_law%first) then
+               call measure_nodes(self, system, k, set, own, by_law)
             else
                self%force(:, before + 1:n) = 0.0_wp
             end if
-            if (last >= first) then
-               call measure_areas(self, system, k, set%id(first:last), x, u)
-            else
-               self%area(before + 1:n) = 0.0_wp
-            end if
-            self%shear_area(before + 1:n) = self%area(before + 1:n)
-            self%shear_area(set%id(first:last)) = set%item(first:last)%normal &
-               *self%area(set%id(first:last))
+            associate (acting => set%id(own%first:own%last))
+               if (size(acting) > 0) then
+                  call measure_areas(self, system, k, acting, x, u)
+               else
+                  self%area(before + 1:n) = 0.0_wp
+               end if
+               self%shear_area(before + 1:n) = self%area(before + 1:n)
+               self%shear_area(acting) = set%item(own%first:own%last)%normal*self%area(acting)
+            end associate
          end associate
       end do
    end subroutine pair_record_measure
@@ -165,23 +163,24 @@ contains
       total%master = slave
    end subroutine exchange_sides
 
-   !> Add forces and moments on both sides of a pair.
-   pure subroutine add_up(total, item, lam, x, u, du, lag)
+   !> Add forces and moments of a range of conditions on both sides of a pair.
+   pure subroutine add_up(total, set, range, x, u, du, lag)
       type(pair_total_t), intent(inout) :: total
-      type(condition_t), intent(in) :: item(:)
-      real(wp), intent(in) :: lam(:), lag
+      type(constraint_set_t), intent(in) :: set
+      type(range_t), intent(in) :: range
       real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)
+      real(wp), intent(in) :: lag
       real(wp) :: place(size(x, 1)), force(size(x, 1)), both(size(total%slave))
       integer :: k, i
 
-      do k = 1, size(item)
-         do i = 1, item(k)%n_node
-            associate (node => item(k)%node(i))
+      do k = range%first, range%last
+         do i = 1, set%item(k)%n_node
+            associate (node => set%item(k)%node(i))
                place = x(:, node) + (u(:, node) - lag*du(:, node))
             end associate
-            force = condition_force(item(k), lam(k), i)
+            force = condition_force(set%item(k), constraints_lam(set, k), i)
             both = [force, moment_of(place, force)]
-            if (i <= item(k)%n_slave) then
+            if (i <= set%item(k)%n_slave) then
                total%slave = total%slave + both
             else
                total%master = total%master + both
@@ -191,13 +190,13 @@ contains
    end subroutine add_up
 
    !> Forces of contact `k` on its slave nodes.
-   subroutine measure_nodes(self, system, k, set, own, damped)
+   subroutine measure_nodes(self, system, k, set, own, by_law)
       type(pair_record_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       integer, intent(in) :: k
       type(constraint_set_t), intent(in) :: set
       type(range_t), intent(in) :: own           !! of it, in the set
-      type(range_t), intent(in) :: damped        !! and of what is damped
+      type(range_t), intent(in) :: by_law        !! and of laws alone
       real(wp) :: force(size(self%force, 1), size(system%space%body))
       integer :: j, i, first
 
@@ -209,10 +208,10 @@ contains
             if (twin(i) > 0) force(:, twin(i)) = 0.0_wp
          end do
          do j = own%first, own%last
-            call add_forces(set%item(j), set%lam(j))
+            call add_forces(j)
          end do
-         do j = damped%first, damped%last
-            call add_forces(set%damped%item(j), set%damped%dashpot(j)%push)
+         do j = by_law%first, by_law%last
+            call add_forces(j)
          end do
          do i = 1, size(node)
             self%force(:, first + i) = force(:, node(i))
@@ -225,14 +224,16 @@ contains
 
    contains
 
-      subroutine add_forces(item, lam)
-         type(condition_t), intent(in) :: item
-         real(wp), intent(in) :: lam             !! its multiplier, or push [M L/T^2]
+      !> Those of one condition.
+      subroutine add_forces(place)
+         integer, intent(in) :: place            !! in the set
          integer :: m
 
-         do m = 1, item%n_slave
-            force(:, item%node(m)) = force(:, item%node(m)) + condition_force(item, lam, m)
-         end do
+         associate (item => set%item(place), lam => constraints_lam(set, place))
+            do m = 1, item%n_slave
+               force(:, item%node(m)) = force(:, item%node(m)) + condition_force(item, lam, m)
+            end do
+         end associate
       end subroutine add_forces
 
    end subroutine measure_nodes

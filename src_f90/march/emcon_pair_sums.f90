@@ -4,8 +4,7 @@
 !> surface that the deck names first.
 module emcon_pair_sums
    use emcon_constraint, only : condition_drag, condition_force, condition_t
-   use emcon_constraints, only : constraint_set_t
-   use emcon_damped, only : damped_t, damped_work
+   use emcon_constraints, only : constraint_set_t, constraints_dissipated, constraints_lam
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
@@ -81,7 +80,7 @@ contains
       sum%moment = 0.0_wp
    end subroutine pair_sums_begin
 
-   !> Add the constraints that acted over `motion`, of the size `h`, and what was damped.
+   !> Add the constraints that acted over `motion`, of the size `h`, and laws.
    pure subroutine pair_sums_add(self, system, set, motion, h, masses_resist)
       type(pair_sums_t), intent(inout) :: self
       type(system_t), intent(in) :: system
@@ -89,58 +88,39 @@ contains
       type(motion_t), intent(in) :: motion
       real(wp), intent(in) :: h                  !! > 0 [T]
       logical, intent(in) :: masses_resist       !! forces are means over the motion, else its end
-      integer :: k, contact, p
+      integer :: k, contact
 
       if (size(self%sum) == 0) return
       if (.not. masses_resist) call pair_sums_begin(self%sum)
       self%sum%span = self%sum%span + h
       self%sum%is_pressed = .false.
       contact = 1
-      do k = set%n_held + 1, set%n
+      do k = set%n_held + 1, set%n_condition
+         if (k == set%n + 1) contact = 1
          do while (set%id(k) > system%first_constraint(contact + 1))
             contact = contact + 1
          end do
-         p = abs(self%of_pair(contact))
-         associate (item => set%item(k))
-            call add_forces(self%sum(p), item, set%lam(k), motion, h, side_t( &
+         associate (item => set%item(k), sum => self%sum(abs(self%of_pair(contact))))
+            call add_forces(sum, item, constraints_lam(set, k), motion, h, side_t( &
                self%of_pair(contact) > 0, masses_resist))
-            if (item%rubs) self%sum(p)%friction = self%sum(p)%friction &
-               + condition_drag(item, set%lam(k))*item%slip
+            if (k > set%n) then
+               sum%damping = sum%damping + constraints_dissipated(set, k)
+               cycle
+            end if
+            if (item%rubs) sum%friction = sum%friction &
+               + dot_product(condition_drag(item, set%lam(k)), item%slip)
+            sum%is_pressed = sum%is_pressed .or. abs(set%lam(k)) > 0.0_wp
          end associate
-         self%sum(p)%is_pressed = self%sum(p)%is_pressed .or. abs(set%lam(k)) > 0.0_wp
       end do
-      call add_damped(self, system, set%damped, motion, h)
       if (.not. masses_resist) return
       where (self%sum%is_pressed) self%sum%duration = self%sum%duration + h
    end subroutine pair_sums_add
-
-   !> The same of what is damped, in a dynamic step.
-   pure subroutine add_damped(self, system, damped, motion, h)
-      type(pair_sums_t), intent(inout) :: self
-      type(system_t), intent(in) :: system
-      type(damped_t), intent(in) :: damped
-      type(motion_t), intent(in) :: motion
-      real(wp), intent(in) :: h
-      integer :: k, contact
-
-      contact = 1
-      do k = 1, damped%n
-         do while (damped%id(k) > system%first_constraint(contact + 1))
-            contact = contact + 1
-         end do
-         associate (sum => self%sum(abs(self%of_pair(contact))))
-            call add_forces(sum, damped%item(k), damped%dashpot(k)%push, motion, h, side_t( &
-               self%of_pair(contact) > 0, .true.))
-            sum%damping = sum%damping + damped_work(damped, k)
-         end associate
-      end do
-   end subroutine add_damped
 
    !> Add the forces of a condition on the nodes of its slave side, by the size `h` of the step.
    pure subroutine add_forces(sum, item, lam, motion, h, side)
       type(pair_sum_t), intent(inout) :: sum
       type(condition_t), intent(in) :: item
-      real(wp), intent(in) :: lam                !! its multiplier, or push [M L/T^2]
+      real(wp), intent(in) :: lam                !! of the row of its gap [M L/T^2]
       type(motion_t), intent(in) :: motion
       real(wp), intent(in) :: h                  !! > 0 [T]
       type(side_t), intent(in) :: side

@@ -65,18 +65,21 @@ contains
       type(mechanism_rows_t), intent(inout) :: rows
       type(condition_t), intent(in) :: item(:)
       logical, intent(in) :: grips(:)            !! (size(item)) these rub
-      integer :: k, n, m, n_dim
+      integer :: k, n, m, s, n_dim
 
       if (size(item) == 0) return
       n_dim = size(item(1)%c, 1)
       rows%noise = contact_noise
       n = rows%start(rows%n + 1)
-      m = n_dim*(sum(item%n_node) + sum(item%n_node, mask=grips))
+      m = n_dim*(sum(item%n_node) + (n_dim - 1)*sum(item%n_node, mask=grips))
       rows%dof = [rows%dof, spread(0, 1, m)]
       rows%weight = [rows%weight, spread(0.0_wp, 1, m)]
       do k = 1, size(item)
          call append(item(k), item(k)%c)
-         if (grips(k)) call append(item(k), item(k)%t1)
+         if (.not. grips(k)) cycle
+         do s = 1, n_dim - 1
+            call append(item(k), item(k)%t1(:, :, s))
+         end do
       end do
 
    contains

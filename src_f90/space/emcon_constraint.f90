@@ -8,8 +8,24 @@ module emcon_constraint
    use emcon_numbering, only : numbering_t
    implicit none
    private
-   public :: condition_t, condition_force, condition_push, condition_rate, condition_slip_rate, &
-      condition_drag, condition_normal, condition_normal_slope, constraint_t, constraint_box_t
+   public :: condition_t, contact_response_t, condition_force, condition_row_force, &
+      condition_row_gradient, condition_rate, condition_drag, condition_stiffness, &
+      condition_normal, condition_normal_slope, constraint_t, constraint_box_t
+
+   !> A condition has so many slips at most: one less than there are dimensions.
+   integer, parameter, public :: most_slips = 2
+
+   !> What laws of contact make of a condition: multipliers that are no unknowns, and how those fall
+   !> with gap (0) and slips. Entries past the slips of a condition are 0.
+   type :: contact_response_t
+      real(wp) :: lam = 0.0_wp                        !! of the gap, beside its row's [M L/T^2]
+      !> Against slips: by these laws, or of the rows that stick [M L/T^2]
+      real(wp) :: tau(most_slips) = 0.0_wp
+      !> Against slips by the normal force: mu sigma where it slides, 0 where it sticks
+      real(wp) :: mu_sigma(most_slips) = 0.0_wp
+      !> (row, by): -d lam or d tau, by the gap or slip at the end [M/T^2]
+      real(wp) :: stiffness(0:most_slips, 0:most_slips) = 0.0_wp
+   end type contact_response_t
 
    !> One condition over a motion, on its own nodes: f = (Phi - t W)/s, docs/theory.md, eq. (15).
    type :: condition_t
@@ -25,19 +41,17 @@ module emcon_constraint
       !> (i, j): derivative of g(i) by end coordinate j, coordinates node by node
       real(wp), allocatable :: h(:, :)
       logical :: leaves_second = .false.              !! nobody asks for `h`
-      ! Of friction, docs/theory.md, eqs. (14e) to (14h):
+      ! Of slip, docs/theory.md, eqs. (14e) to (14h):
       logical :: rubs = .false.                       !! the rest is known
-      real(wp) :: slip = 0.0_wp                       !! s over the step [L]
-      real(wp) :: lead = 0.0_wp                       !! a, from which the law counts slip [L]
-      real(wp) :: tilt = 0.0_wp                       !! mu sigma where it slides, 0 where it sticks
-      real(wp) :: hold = 0.0_wp                       !! tau where it sticks [M L/T^2]
+      real(wp) :: slip(most_slips) = 0.0_wp           !! s over the step [L]
+      real(wp) :: slip_target(most_slips) = 0.0_wp    !! a, at which it sticks [L]
+      type(contact_response_t) :: response            !! of the laws of contact
       !> Of integrated gaps, whose normal force is not the multiplier: see `condition_normal`
       logical :: is_mean = .false.
       real(wp) :: normal = 1.0_wp
-      real(wp), allocatable :: t(:, :)                !! (n_dim, >= n_node) T, by discrete gradient
-      real(wp), allocatable :: t1(:, :)               !! (n_dim, >= n_node) gradient at the end
-      !> (i, j): derivative of t(i) by end coordinate j, coordinates node by node
-      real(wp), allocatable :: ht(:, :)
+      real(wp), allocatable :: t(:, :, :)             !! (n_dim, >= n_node, n_slip) T, as `g`
+      real(wp), allocatable :: t1(:, :, :)            !! (n_dim, >= n_node, n_slip) as `c`
+      real(wp), allocatable :: ht(:, :, :)            !! (i, j, n_slip) as `h`
    end type condition_t
 
    type, abstract :: constraint_t
@@ -90,16 +104,21 @@ contains
       is_idle = .false.
    end subroutine find_idle
 
-   !> The force of the multiplier `lam` on node `i` of the condition: along the discrete gradient,
-   !> and of friction along that of slip.
+   !> The force of the multiplier `lam`, and of what laws give beside it, on node `i` of the
+   !> condition: along the discrete gradient, and of friction along those of slips.
    pure function condition_force(self, lam, i) result(force)
       type(condition_t), intent(in) :: self
-      real(wp), intent(in) :: lam                     !! [M L/T^2]
+      real(wp), intent(in) :: lam                     !! of the row of its gap; 0: none [M L/T^2]
       integer, intent(in) :: i                        !! 1..n_node
-      real(wp) :: force(size(self%g, 1))              !! (n_dim) [M L/T^2]
+      real(wp) :: force(size(self%g, 1)), tau(most_slips)
+      integer :: s
 
-      force = lam*self%g(:, i)
-      if (self%rubs) force = force - condition_drag(self, lam)*self%t(:, i)
+      force = (lam + self%response%lam)*self%g(:, i)
+      if (.not. self%rubs) return
+      tau = condition_drag(self, lam)
+      do s = 1, size(self%t, 3)
+         force = force - tau(s)*self%t(:, i, s)
+      end do
    end function condition_force
 
    !> The normal force by a multiplier of 1, where friction of 1 acts along the surface with 1:
@@ -108,7 +127,7 @@ contains
       type(condition_t), intent(in) :: self           !! it rubs
       real(wp) :: along
 
-      along = norm2(sum(self%t(:, :self%n_slave), 2))
+      along = norm2(sum(self%t(:, :self%n_slave, :), 2))/sqrt(real(size(self%t, 3), wp))
       normal = 0.0_wp
       if (along > 0.0_wp) normal = norm2(sum(self%g(:, :self%n_slave), 2))/along
    end function condition_normal
@@ -117,63 +136,130 @@ contains
    pure function condition_normal_slope(self) result(slope)
       type(condition_t), intent(in) :: self           !! it rubs, with second derivatives
       real(wp) :: slope(size(self%g, 1)*self%n_node)  !! [1/L]
-      real(wp), dimension(size(self%g, 1)) :: push, along
-      integer :: i, a, row
+      real(wp) :: push(size(self%g, 1)), along(size(self%g, 1), size(self%t, 3))
+      integer :: i, a, row, s
 
       slope = 0.0_wp
       push = sum(self%g(:, :self%n_slave), 2)
-      along = sum(self%t(:, :self%n_slave), 2)
+      along = sum(self%t(:, :self%n_slave, :), 2)
       if (.not. min(norm2(push), norm2(along)) > 0.0_wp) return
-      push = push/norm2(push)/norm2(along)
-      along = condition_normal(self)*along/dot_product(along, along)
+      push = push/norm2(push)/(norm2(along)/sqrt(real(size(along, 2), wp)))
+      along = condition_normal(self)*along/sum(along**2)
       do i = 1, self%n_slave
          do a = 1, size(push)
             row = size(push)*(i - 1) + a
-            slope = slope + push(a)*self%h(row, :size(slope)) - along(a)*self%ht(row, :size(slope))
+            slope = slope + push(a)*self%h(row, :size(slope))
+            do s = 1, size(along, 2)
+               slope = slope - along(a, s)*self%ht(row, :size(slope), s)
+            end do
          end do
       end do
    end function condition_normal_slope
 
-   !> The force of friction tau against slip.
-   pure real(wp) function condition_drag(self, lam) result(tau)
+   !> The forces of friction tau against slips.
+   pure function condition_drag(self, lam) result(tau)
       type(condition_t), intent(in) :: self
-      real(wp), intent(in) :: lam                     !! the multiplier [M L/T^2]
+      real(wp), intent(in) :: lam                     !! of the row of its gap; 0: none [M L/T^2]
+      real(wp) :: tau(most_slips)                     !! 0 past the last slip [M L/T^2]
 
-      tau = self%tilt*self%normal*lam + self%hold
+      tau = self%response%mu_sigma*self%normal*lam + self%response%tau
    end function condition_drag
 
-   !> The directions in which a unit of the multiplier pushes: where the condition slides, tilted
-   !> against slip.
-   pure function condition_push(self) result(push)
-      type(condition_t), intent(in) :: self
+   !> The directions in which a unit of the multiplier of a row pushes: where the condition slides
+   !> that of its gap is tilted against slip.
+   pure function condition_row_force(self, slip) result(push)
+      type(condition_t), intent(in) :: self           !! it rubs, or `slip` is 0
+      integer, intent(in) :: slip                     !! 0: the row of the gap
       real(wp) :: push(size(self%g, 1), self%n_node)
+      integer :: s
 
+      if (slip > 0) then
+         push = -self%t(:, :self%n_node, slip)
+         return
+      end if
       push = self%g(:, :self%n_node)
-      if (self%rubs) push = push - self%tilt*self%normal*self%t(:, :self%n_node)
-   end function condition_push
+      if (.not. self%rubs) return
+      do s = 1, size(self%t, 3)
+         push = push - self%response%mu_sigma(s)*self%normal*self%t(:, :self%n_node, s)
+      end do
+   end function condition_row_force
 
-   !> By how much the condition's value at the end changes with the field `way`, to first order.
-   pure real(wp) function condition_rate(self, way) result(rate)
-      type(condition_t), intent(in) :: self
+   !> The gradient of the value of a row at the end.
+   pure function condition_row_gradient(self, slip) result(gradient)
+      type(condition_t), intent(in) :: self           !! it rubs, or `slip` is 0
+      integer, intent(in) :: slip                     !! 0: the row of the gap
+      real(wp) :: gradient(size(self%g, 1), self%n_node)
+
+      if (slip > 0) then
+         gradient = -self%t1(:, :self%n_node, slip)
+      else
+         gradient = self%c(:, :self%n_node)
+      end if
+   end function condition_row_gradient
+
+   !> By how much the value of a row changes at the end with the field `way`, to first order.
+   pure real(wp) function condition_rate(self, way, slip) result(rate)
+      type(condition_t), intent(in) :: self           !! it rubs if `slip` is above 0
       real(wp), intent(in) :: way(:, :)               !! (n_dim, n_node of the scene)
-      integer :: i
+      integer, intent(in), optional :: slip           !! of the row; 0, as by default: its gap
+      integer :: i, s
 
+      s = 0
+      if (present(slip)) s = slip
       rate = 0.0_wp
       do i = 1, self%n_node
-         rate = rate + dot_product(self%c(:, i), way(:, self%node(i)))
+         if (s == 0) then
+            rate = rate + dot_product(self%c(:, i), way(:, self%node(i)))
+         else
+            rate = rate - dot_product(self%t1(:, i, s), way(:, self%node(i)))
+         end if
       end do
    end function condition_rate
 
-   !> The same of its slip.
-   pure real(wp) function condition_slip_rate(self, way) result(rate)
-      type(condition_t), intent(in) :: self      !! it rubs
-      real(wp), intent(in) :: way(:, :)          !! (n_dim, n_node of the scene)
-      integer :: i
+   !> What the forces of a condition fall by with the end coordinates of its nodes, node by node,
+   !> while the multipliers of its rows stay.
+   pure function condition_stiffness(self, lam) result(stiffness)
+      type(condition_t), intent(in) :: self           !! with second derivatives
+      real(wp), intent(in) :: lam                     !! of the row of its gap; 0: none [M L/T^2]
+      real(wp), dimension(size(self%g, 1)*self%n_node, size(self%g, 1)*self%n_node) :: stiffness
+      real(wp) :: along(size(stiffness, 1), 0:most_slips), tau(most_slips)
+      integer :: s, m, n_slip
 
-      rate = 0.0_wp
-      do i = 1, self%n_node
-         rate = rate + dot_product(self%t1(:, i), way(:, self%node(i)))
+      m = size(stiffness, 1)
+      n_slip = 0
+      if (self%rubs) n_slip = size(self%t, 3)
+      stiffness = -(lam + self%response%lam)*self%h(:m, :m)
+      along(:, 0) = reshape(self%g(:, :self%n_node), [m])
+      tau = condition_drag(self, lam)
+      do s = 1, n_slip
+         along(:, s) = reshape(self%t(:, :self%n_node, s), [m])
+         stiffness = stiffness + tau(s)*self%ht(:m, :m, s)
+         if (.not. (self%is_mean .and. abs(self%response%mu_sigma(s)) > 0.0_wp)) cycle
+         stiffness = stiffness + self%response%mu_sigma(s)*lam*spread(along(:, s), 2, m) &
+            *spread(condition_normal_slope(self), 1, m)
       end do
-   end function condition_slip_rate
+      if (all(abs(self%response%stiffness) <= 0.0_wp)) return
+      call add_response(0, reshape(self%c(:, :self%n_node), [m]))
+      do s = 1, n_slip
+         call add_response(s, reshape(self%t1(:, :self%n_node, s), [m]))
+      end do
+
+   contains
+
+      !> Add what the laws answer to the gap or a slip with.
+      pure subroutine add_response(by, gradient)
+         integer, intent(in) :: by                    !! 0: the gap
+         real(wp), intent(in) :: gradient(:)          !! (m) of it at the end
+         integer :: row, j
+
+         do row = 0, n_slip
+            do j = 1, m
+               stiffness(:, j) = stiffness(:, j) &
+                  + (self%response%stiffness(row, by)*gradient(j))*along(:, row)
+            end do
+         end do
+      end subroutine add_response
+
+   end function condition_stiffness
 
 end module emcon_constraint

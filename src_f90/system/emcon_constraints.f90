@@ -5,11 +5,10 @@
 !> a sum of displacements; it stands here only where it is not eliminated in the numbering. Sign:
 !> docs/theory.md, eq. (1).
 module emcon_constraints
-   use emcon_constraint, only : condition_drag, condition_force, condition_normal_slope, &
-      condition_push, condition_t, constraint_t
+   use emcon_constraint, only : condition_force, condition_row_force, condition_row_gradient, &
+      condition_stiffness, condition_t, constraint_t, contact_response_t
+   use emcon_contact_law, only : contact_law_box_t, contact_values_t
    use emcon_csr, only : csr_find, csr_t
-   use emcon_damped, only : damped_add_forces, damped_evaluate, damped_rows, damped_stiffness, &
-      damped_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_numbering, only : numbering_t
@@ -21,34 +20,39 @@ module emcon_constraints
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_rows
    public :: constraints_add_curvature, constraints_force, constraints_merge_pattern
    public :: constraints_stick, constraints_take_hold, constraints_gives_back
-   public :: constraints_push, constraints_add_forces
+   public :: constraints_add_forces, constraints_lam, constraints_dissipated
    public :: constraint_place, constraint_dof
 
-   !> Which constraints act, and the linearised set on the unknowns.
+   !> Which conditions act, and their linearised rows on the unknowns. The first `n` have a row of
+   !> their gap, of the same number; those of them that stick have rows of their slips too, after
+   !> these. The others are of laws alone, beside those or where only these act.
    type :: constraint_set_t
       integer :: n = 0
+      integer :: n_condition = 0
       integer :: n_linear = 0                    !! the first ones: linear, without curvature
       integer :: n_held = 0                      !! these and the next ones always act
-      integer, allocatable :: id(:)              !! (n) numbers over all pairs
-      type(condition_t), allocatable :: item(:) !! (n) values and derivatives
-      real(wp), allocatable :: target(:)         !! (n) mean gap to hold [L]
+      !> (n_condition) numbers over all pairs, ascending up to `n` and from there on
+      integer, allocatable :: id(:)
+      type(condition_t), allocatable :: item(:)  !! (n_condition) values and derivatives
+      real(wp), allocatable :: target(:)         !! (n_condition) mean gap to hold, or to count from
+      type(contact_law_box_t), allocatable :: law(:)   !! (n_condition) where not all are held
       logical, allocatable :: is_kept(:)         !! (n) target is gap(q0): hold the difference at 0
-      !> (n_row) it acts also where it says nearly what others say
-      logical, allocatable :: is_firm(:)
-      real(wp), allocatable :: lam(:)            !! (n_row) multipliers [M L/T^2]
-      real(wp), allocatable :: defect(:)         !! (n_row) f(q1), what is left to the target [L]
       !> (n) contacts that give way, whose multipliers follow from gaps; not there: none
       type(soft_t), allocatable :: soft(:)
       logical :: is_stored = .false.             !! by discrete gradients of what these store
       !> Their multipliers are on the way to what the gaps say, as unknowns of a solve
       logical :: is_under_way = .false.
-      type(damped_t) :: damped                   !! conditions that are damped, of these and others
-      !> Conditions that stick have a second row, behind all others: of slip, whose multiplier is
-      !> their friction. `n_row` rows, multipliers and defects.
+      real(wp) :: frequency = 0.0_wp             !! 1/h of the motion evaluated; statics: 0 [1/T]
       integer :: n_row = 0
-      integer, allocatable :: stuck(:)           !! (n_row - n) places in the set
+      integer, allocatable :: condition(:)       !! (n_row) that each row is of
+      integer, allocatable :: slip(:)            !! (n_row) and of which slip; 0: of the gap
+      !> (n_row) it acts also where it says nearly what others say
+      logical, allocatable :: is_firm(:)
+      real(wp), allocatable :: lam(:)            !! (n_row) multipliers [M L/T^2]
+      real(wp), allocatable :: defect(:)         !! (n_row) what is left to the target [L]
       type(csr_t) :: force_rows                  !! (n_row x n_unknown) directions of forces
       type(csr_t) :: gap_rows                    !! (n_row x n_unknown) gradients at the end
+      type(csr_t) :: law_rows                    !! of conditions without a row, directions
    end type constraint_set_t
 
    !> One row while it is made.
@@ -61,47 +65,65 @@ module emcon_constraints
 
 contains
 
-   !> Take the constraints `id` as the active ones; multipliers start at zero.
-   pure subroutine constraints_select(self, id)
+   !> Take the constraints `id` as the active ones; multipliers start at zero. Beside them, or where
+   !> they are not, the conditions `by_law`, whose laws the caller gives.
+   pure subroutine constraints_select(self, id, by_law)
       type(constraint_set_t), intent(inout) :: self
       integer, intent(in) :: id(:)               !! (n) ascending, from 1
+      integer, intent(in), optional :: by_law(:) !! (any) ascending, of contacts
+      integer :: k
 
       self%n = size(id)
+      self%n_condition = self%n
       self%n_row = self%n
       self%n_linear = 0
       self%n_held = 0
       self%id = id
-      if (allocated(self%soft)) deallocate(self%soft)
+      self%condition = [(k, k = 1, self%n)]
+      self%slip = 0*self%condition
       self%is_under_way = .false.
-      if (allocated(self%stuck)) deallocate(self%stuck)
+      if (allocated(self%soft)) deallocate(self%soft)
+      if (allocated(self%law)) deallocate(self%law)
       if (allocated(self%item)) deallocate(self%item, self%target, self%is_kept, &
          self%is_firm, self%lam, self%defect)
-      allocate(self%item(self%n), self%is_kept(self%n), self%is_firm(self%n))
-      allocate(self%target(self%n), self%lam(self%n), self%defect(self%n), source=0.0_wp)
+      if (present(by_law)) then
+         self%n_condition = self%n + size(by_law)
+         self%id = [id, by_law]
+         allocate(self%law(self%n_condition))
+      end if
+      allocate(self%item(self%n_condition), self%is_kept(self%n), self%is_firm(self%n))
+      allocate(self%target(self%n_condition), self%lam(self%n), self%defect(self%n), source=0.0_wp)
       self%is_kept = .false.
       self%is_firm = .true.
    end subroutine constraints_select
 
-   !> Let the conditions at the places `stuck` stick, with the friction `tau` to start from.
+   !> Let the conditions `stuck` stick, with the friction `tau` to start from: rows of their slips.
    pure subroutine constraints_stick(self, stuck, tau, is_firm)
       type(constraint_set_t), intent(inout) :: self      !! of `constraints_select`
-      integer, intent(in) :: stuck(:)            !! (any) ascending, from 1; these rub
-      real(wp), intent(in) :: tau(:)             !! (as many) [M L/T^2]
+      integer, intent(in) :: stuck(:)            !! (any) ascending, up to n; these rub
+      real(wp), intent(in) :: tau(:, :)          !! (slips, as many) [M L/T^2]
       logical, intent(in) :: is_firm(:)          !! (as many) also where others nearly do
+      integer :: k, s
 
-      self%stuck = stuck
-      self%n_row = self%n + size(stuck)
-      self%lam = [self%lam(:self%n), tau]
-      self%defect = [self%defect(:self%n), 0.0_wp*tau]
-      self%is_firm = [self%is_firm(:self%n), is_firm]
+      associate (n => self%n, n_slip => size(tau, 1))
+         self%n_row = n + size(tau)
+         self%condition = [self%condition(:n), [((stuck(k), s = 1, n_slip), k = 1, size(stuck))]]
+         self%slip = [self%slip(:n), [((s, s = 1, n_slip), k = 1, size(stuck))]]
+         self%lam = [self%lam(:n), tau]
+         self%defect = [self%defect(:n), 0.0_wp*tau]
+         self%is_firm = [self%is_firm(:n), [((is_firm(k), s = 1, n_slip), k = 1, size(stuck))]]
+      end associate
       call constraints_take_hold(self)
    end subroutine constraints_stick
 
-   !> The friction of what sticks is its multiplier.
+   !> The friction of what sticks is the multipliers of its slips.
    pure subroutine constraints_take_hold(self)
       type(constraint_set_t), intent(inout) :: self
+      integer :: k
 
-      if (self%n_row > self%n) self%item(self%stuck)%hold = self%lam(self%n + 1:)
+      do k = self%n + 1, self%n_row
+         self%item(self%condition(k))%response%tau(self%slip(k)) = self%lam(k)
+      end do
    end subroutine constraints_take_hold
 
    !> Has condition `k` stored energy in steps before, which it gives back in this one?
@@ -125,30 +147,46 @@ contains
       if (pair > 0) i = id - system%first_constraint(pair)
    end subroutine constraint_place
 
-   !> Is there anything that may push?
-   pure logical function constraints_push(self) result(push)
-      type(constraint_set_t), intent(in) :: self
-
-      push = self%n > 0 .or. self%damped%n > 0
-   end function constraints_push
-
-   !> Values and derivatives of all active constraints over a motion, and of what is damped.
+   !> Values and derivatives of all conditions over a motion, and what laws make of them.
    subroutine constraints_evaluate(self, system, motion, leaves_second)
       type(constraint_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       logical, intent(in), optional :: leaves_second       !! no second derivatives
-      integer :: k, last, before
-      logical :: leaves
+      integer :: k
 
-      leaves = .false.
-      if (present(leaves_second)) leaves = leaves_second
-      if (self%damped%n > 0) call damped_evaluate(self%damped, system, motion, leaves)
-      if (self%n == 0) return
-      self%n_linear = count(self%id <= system%space%linear%n)
-      self%n_held = count(self%id <= system%first_constraint(1))
-      self%item%leaves_second = leaves
-      last = 0
+      if (self%n_condition == 0) return
+      self%item%leaves_second = .false.
+      if (present(leaves_second)) self%item%leaves_second = leaves_second
+      self%n_linear = count(self%id(:self%n) <= system%space%linear%n)
+      self%n_held = count(self%id(:self%n) <= system%first_constraint(1))
+      self%frequency = motion%pose%mass_scale
+      call linearise_range(self, self%n + 1, self%n_condition, system, motion)
+      call linearise_range(self, 1, self%n, system, motion)
+      do k = 1, self%n
+         self%defect(k) = merge(self%item(k)%dgap, self%item(k)%gap1, self%is_kept(k))
+      end do
+      do k = self%n + 1, self%n_row
+         associate (item => self%item(self%condition(k)), s => self%slip(k))
+            self%defect(k) = item%slip_target(s) - item%slip(s)
+         end associate
+      end do
+      if (allocated(self%soft)) call give_way(self)
+      do k = self%n + 1, self%n_condition
+         self%item(k)%response = contact_response_t()
+         call self%law(k)%law%respond(values_of(self, k), self%item(k)%response)
+      end do
+   end subroutine constraints_evaluate
+
+   !> The conditions `from` to `to`, whose numbers ascend.
+   subroutine linearise_range(self, from, to, system, motion)
+      type(constraint_set_t), intent(inout) :: self
+      integer, intent(in) :: from, to            !! places in the set
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      integer :: k, last, before
+
+      last = from - 1
       before = 0
       do k = 1, size(system%held)
          call linearise(system%held(k)%constraint)
@@ -156,28 +194,42 @@ contains
       do k = 1, size(system%contact)
          call linearise(system%contact(k)%contact)
       end do
-      do k = 1, self%n
-         self%defect(k) = merge(self%item(k)%dgap, self%item(k)%gap1, self%is_kept(k))
-      end do
-      if (self%n_row > self%n) self%defect(self%n + 1:) = self%item(self%stuck)%lead &
-         - self%item(self%stuck)%slip
-      if (allocated(self%soft)) call give_way(self)
 
    contains
 
       !> The conditions of the next constraint.
       subroutine linearise(constraint)
          class(constraint_t), intent(inout) :: constraint
-         integer :: to
+         integer :: first
 
-         to = count(self%id <= before + constraint%n_constraint)
-         if (to > last) call constraint%linearise(self%id(last + 1:to) - before, motion, &
-            self%target(last + 1:to), self%item(last + 1:to))
+         first = last + 1
+         last = from - 1 + count(self%id(from:to) <= before + constraint%n_constraint)
+         if (last >= first) call constraint%linearise(self%id(first:last) - before, motion, &
+            self%target(first:last), self%item(first:last))
          before = before + constraint%n_constraint
-         last = to
       end subroutine linearise
 
-   end subroutine constraints_evaluate
+   end subroutine linearise_range
+
+   !> Where condition `k` has gone over the motion that was evaluated.
+   pure type(contact_values_t) function values_of(self, k) result(values)
+      type(constraint_set_t), intent(in) :: self
+      integer, intent(in) :: k                   !! 1..n_condition
+
+      associate (item => self%item(k))
+         values = contact_values_t(item%gap0, item%gap1, item%dgap, item%gap1, item%slip, &
+            self%frequency)
+         if (k <= self%n) values%left = self%defect(k)
+      end associate
+   end function values_of
+
+   !> What the law of condition `k` has taken over the motion that was evaluated.
+   pure real(wp) function constraints_dissipated(self, k) result(dissipated)
+      type(constraint_set_t), intent(in) :: self
+      integer, intent(in) :: k                   !! n + 1..n_condition
+
+      dissipated = self%law(k)%law%dissipated(values_of(self, k), self%item(k)%response)
+   end function constraints_dissipated
 
    !> The multipliers of contacts that give way, or what those under way lack; they have no defect.
    pure subroutine give_way(self)
@@ -202,53 +254,61 @@ contains
       end do
    end subroutine give_way
 
-   !> Gradients of the active constraints as rows over the unknowns: those by all freedoms, times T.
+   !> Gradients of the rows over the unknowns: those by all freedoms, times T.
    subroutine constraints_rows(self, numbering)
       type(constraint_set_t), intent(inout) :: self
       type(numbering_t), intent(in) :: numbering
+      integer :: k
+
+      call make_rows(self, numbering, self%condition, self%slip, self%force_rows, self%gap_rows)
+      if (self%n_condition > self%n) call make_rows(self, numbering, [(k, k = self%n + 1, &
+         self%n_condition)], [(0, k = self%n + 1, self%n_condition)], self%law_rows)
+   end subroutine constraints_rows
+
+   !> Rows of conditions: directions of forces and gradients at the end, of one pattern.
+   subroutine make_rows(self, numbering, condition, slip, force_rows, gap_rows)
+      type(constraint_set_t), intent(in) :: self
+      type(numbering_t), intent(in) :: numbering
+      integer, intent(in) :: condition(:)        !! (rows) places in the set
+      integer, intent(in) :: slip(:)             !! (rows) 0: of the gap
+      type(csr_t), intent(inout) :: force_rows   !! (rows x n_unknown)
+      type(csr_t), intent(inout), optional :: gap_rows   !! (rows x n_unknown)
       type(row_t) :: row
       integer, allocatable :: order(:)
-      integer :: room(self%n_row), k, n
+      integer :: room(size(condition)), k, n
 
-      do k = 1, self%n
-         room(k) = entries_of(self%item(k), numbering)
-      end do
-      do k = self%n + 1, self%n_row
-         room(k) = room(self%stuck(k - self%n))
+      do k = 1, size(room)
+         room(k) = entries_of(self%item(condition(k)), numbering)
       end do
       n = maxval([0, room])
       allocate(row%column(n), row%g(n), row%c(n), order(n))
-      call make_room(self%force_rows, self%n_row, numbering%n_unknown, sum(room))
-      call make_room(self%gap_rows, self%n_row, numbering%n_unknown, sum(room))
+      call make_room(force_rows, size(room), numbering%n_unknown, sum(room))
+      if (present(gap_rows)) call make_room(gap_rows, size(room), numbering%n_unknown, sum(room))
       n = 0
-      do k = 1, self%n_row
-         ! A linear constraint stands on single freedoms.
-         if (k > self%n) then
-            associate (item => self%item(self%stuck(k - self%n)))
-               call fill_row(row, item, -item%t, -item%t1, numbering, leaves_zeros=.true.)
-            end associate
-         else if (self%item(k)%rubs) then
-            associate (item => self%item(k))
-               call fill_row(row, item, condition_push(item), item%c, numbering, &
-                  leaves_zeros=.true.)
-            end associate
-         else
-            call fill_row(row, self%item(k), self%item(k)%g, self%item(k)%c, numbering, &
-               leaves_zeros=k > self%n_linear)
-         end if
+      do k = 1, size(room)
+         associate (item => self%item(condition(k)))
+            if (item%rubs) then
+               call fill_row(row, item, condition_row_force(item, slip(k)), &
+                  condition_row_gradient(item, slip(k)), numbering, leaves_zeros=.true.)
+            else
+               ! A linear constraint stands on single freedoms.
+               call fill_row(row, item, item%g, item%c, numbering, &
+                  leaves_zeros=condition(k) > self%n_linear)
+            end if
+         end associate
          associate (m => row%n)
             order(:m) = insertion_order(row%column(:m))
-            self%force_rows%column(n + 1:n + m) = row%column(order(:m))
-            self%force_rows%value(n + 1:n + m) = real(row%g(order(:m)), dp)
-            self%gap_rows%value(n + 1:n + m) = real(row%c(order(:m)), dp)
+            force_rows%column(n + 1:n + m) = row%column(order(:m))
+            force_rows%value(n + 1:n + m) = real(row%g(order(:m)), dp)
+            if (present(gap_rows)) gap_rows%value(n + 1:n + m) = real(row%c(order(:m)), dp)
             n = n + m
          end associate
-         self%force_rows%row_start(k + 1) = n
+         force_rows%row_start(k + 1) = n
       end do
-      self%gap_rows%row_start = self%force_rows%row_start
-      self%gap_rows%column = self%force_rows%column
-      call damped_rows(self%damped, numbering)
-   end subroutine constraints_rows
+      if (.not. present(gap_rows)) return
+      gap_rows%row_start = force_rows%row_start
+      gap_rows%column = force_rows%column
+   end subroutine make_rows
 
    !> So many unknowns a condition stands on, at most.
    pure integer function entries_of(item, numbering)
@@ -403,19 +463,24 @@ contains
 
    end subroutine constraints_merge_pattern
 
-   !> The unknowns of what is in the tangent: constraints with curvature, and what is damped.
+   !> The unknowns of what is in the tangent: constraints with curvature, and what laws give.
    pure subroutine curved_rows(self, row_start, column)
       type(constraint_set_t), intent(in) :: self
       integer, allocatable, intent(out) :: row_start(:)    !! (rows + 1)
       integer, allocatable, intent(out) :: column(:)       !! from 0
 
-      associate (start => self%force_rows%row_start(self%n_linear + 1:self%n_row + 1), &
-            damped => self%damped)
-         row_start = start - start(1)
-         column = self%force_rows%column(start(1) + 1:start(size(start)))
-         if (damped%n == 0) return
-         row_start = [row_start, size(column) + damped%row_start(2:)]
-         column = [column, damped%column]
+      allocate(row_start(1), source=0)
+      allocate(column(0))
+      associate (start => self%force_rows%row_start, before => self%n_linear + 1)
+         if (self%n > 0) then
+            row_start = start(before:) - start(before)
+            column = self%force_rows%column(start(before) + 1:start(size(start)))
+         end if
+      end associate
+      if (self%n_condition == self%n) return
+      associate (start => self%law_rows%row_start)
+         row_start = [row_start, size(column) + start(2:)]
+         column = [column, self%law_rows%column(:start(size(start)))]
       end associate
    end subroutine curved_rows
 
@@ -445,62 +510,65 @@ contains
       end do
    end subroutine list_rows
 
-   !> Forces lam_k g_k on all nodes of the constraints from the `first` one on, and those of what is
-   !> damped; with `magnitude` the sum of their sizes.
+   !> Forces on all nodes of the conditions from the `first` one on, and of laws; with `magnitude`
+   !> the sum of their sizes.
    pure subroutine constraints_force(self, first, force, magnitude)
       type(constraint_set_t), intent(in) :: self
       integer, intent(in) :: first               !! place in the set, from 1
-      real(wp), intent(out), contiguous :: force(:, :)                   !! (2, n_node)
-      real(wp), intent(inout), contiguous, optional :: magnitude(:, :)   !! (2, n_node), added to
+      real(wp), intent(out), contiguous :: force(:, :)                   !! (n_dim, n_node)
+      real(wp), intent(inout), contiguous, optional :: magnitude(:, :)   !! (n_dim, n_node)
 
       call vector_zero(size(force), force)
-      if (first <= self%n) call constraints_add_forces(self, first, force, magnitude)
-      if (self%damped%n > 0) call damped_add_forces(self%damped, force, magnitude)
+      call constraints_add_forces(self, first, self%n_condition, force, magnitude)
    end subroutine constraints_force
 
-   !> Add the forces lam_k g_k alone.
-   pure subroutine constraints_add_forces(self, first, force, magnitude)
+   !> Add the forces of the conditions `first` to `last`.
+   pure subroutine constraints_add_forces(self, first, last, force, magnitude)
       type(constraint_set_t), intent(in) :: self
-      integer, intent(in) :: first               !! place in the set, from 1
+      integer, intent(in) :: first, last         !! places in the set, from 1
       real(wp), intent(inout), contiguous :: force(:, :)                 !! (n_dim, n_node)
       real(wp), intent(inout), contiguous, optional :: magnitude(:, :)   !! (n_dim, n_node)
-      real(wp) :: part(size(force, 1))
+      real(wp) :: part(size(force, 1)), lam
       integer :: k, i, node
 
-      do k = first, self%n
+      do k = first, last
+         lam = constraints_lam(self, k)
          do i = 1, self%item(k)%n_node
             node = self%item(k)%node(i)
-            part = condition_force(self%item(k), self%lam(k), i)
+            part = condition_force(self%item(k), lam, i)
             force(:, node) = force(:, node) + part
             if (present(magnitude)) magnitude(:, node) = magnitude(:, node) + abs(part)
          end do
       end do
    end subroutine constraints_add_forces
 
-   !> Subtract the sum of lam_k d(discrete gradient of gap_k)/d q1 from the matrix `merged`, and the
-   !> derivatives of the forces of what is damped.
+   !> The multiplier of the row that condition `k` has of its gap; 0 if there is none.
+   pure real(wp) function constraints_lam(self, k) result(lam)
+      type(constraint_set_t), intent(in) :: self
+      integer, intent(in) :: k                   !! 1..n_condition
+
+      lam = 0.0_wp
+      if (k <= self%n) lam = self%lam(k)
+   end function constraints_lam
+
+   !> Subtract the derivatives of the forces of all conditions by q1 from the matrix `merged`, with
+   !> multipliers of rows as they are.
    subroutine constraints_add_curvature(self, numbering, merged)
       type(constraint_set_t), intent(in) :: self
       type(numbering_t), intent(in) :: numbering
       type(csr_t), intent(inout) :: merged
       integer :: k, n
 
-      do k = self%n_linear + 1, self%n
+      do k = self%n_linear + 1, self%n_condition
          associate (item => self%item(k))
             n = size(item%g, 1)*item%n_node
-            ! Friction pushes against slip.
-            if (item%rubs) call subtract_sum(item, -condition_drag(item, self%lam(k)), &
-               item%ht(:n, :n), numbering, merged)
-            if (item%rubs .and. item%is_mean .and. abs(item%tilt) > 0.0_wp) call subtract_sum( &
-               item, -item%tilt*self%lam(k), spread(reshape(item%t(:, :item%n_node), [n]), 2, n) &
-               *spread(condition_normal_slope(item), 1, n), numbering, merged)
-            if (all(abs(item%h(:n, :n)) <= 0.0_wp)) cycle
-            call subtract_sum(item, self%lam(k), item%h(:n, :n), numbering, merged)
+            if (item%rubs .or. k > self%n) then
+               call subtract_sum(item, -1.0_wp, condition_stiffness(item, &
+                  constraints_lam(self, k)), numbering, merged)
+            else if (any(abs(item%h(:n, :n)) > 0.0_wp)) then
+               call subtract_sum(item, self%lam(k), item%h(:n, :n), numbering, merged)
+            end if
          end associate
-      end do
-      do k = 1, self%damped%n
-         call subtract_sum(self%damped%item(k), -1.0_wp, damped_stiffness(self%damped, k), &
-            numbering, merged)
       end do
    end subroutine constraints_add_curvature
 

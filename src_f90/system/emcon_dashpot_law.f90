@@ -1,17 +1,64 @@
-!> Viscous damping between surfaces, at one place of contact. It knows no mechanics.
+!> Viscous damping between surfaces: a law of contact.
 !>
 !> The pressure is mu(g) times the rate at which the gap g changes, mu a given value up to a part of
 !> a clearance, from there on falling linearly to 0 at the clearance. Over a step it is the mean of
 !> mu over the way of the gap: the impulse is then a function of where the gap begins and ends, and
-!> the work is never positive. Source: docs/theory.md, eqs. (14n) to (14q).
+!> the work is never positive. Slip is pushed against by a part of that coefficient. Source:
+!> docs/theory.md, eqs. (14n) to (14q).
 module emcon_dashpot_law
+   use emcon_constraint, only : contact_response_t
+   use emcon_contact_law, only : contact_law_t, contact_values_t
    use emcon_interactions, only : contact_damping_t
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: dashpot_at, dashpot_mean, dashpot_mean_slope
+   public :: dashpot_t, dashpot_at, dashpot_mean, dashpot_mean_slope
+
+   !> The law at one condition.
+   type, extends(contact_law_t) :: dashpot_t
+      type(contact_damping_t) :: coefficients
+      real(wp) :: area = 0.0_wp                  !! A of its node [L^2]
+      real(wp) :: gap = 0.0_wp                   !! mean gap as the step begins [L]
+      logical :: is_closed = .false.             !! contact holds it: it slides by the whole mu
+   contains
+      procedure :: respond => dashpot_respond
+      procedure :: dissipated => dashpot_dissipated
+   end type dashpot_t
 
 contains
+
+   !> Push and drag of a condition, docs/theory.md, eqs. (14o) and (14p).
+   pure subroutine dashpot_respond(self, at, response)
+      class(dashpot_t), intent(inout) :: self
+      type(contact_values_t), intent(in) :: at
+      type(contact_response_t), intent(inout) :: response
+      real(wp) :: by_mu, mean
+      integer :: s
+
+      associate (law => self%coefficients, gap => self%gap, way => at%dgap)
+         by_mu = self%area*at%frequency
+         mean = dashpot_mean(law, gap, way)
+         response%lam = -by_mu*mean*way
+         response%stiffness(0, 0) = by_mu*dashpot_at(law, gap + way)
+         if (.not. law%tangent > 0.0_wp) return
+         if (self%is_closed) mean = law%coefficient
+         do s = 1, size(at%slip)
+            response%stiffness(s, s) = law%tangent*by_mu*mean
+            if (.not. self%is_closed) response%stiffness(s, 0) = law%tangent*by_mu &
+               *dashpot_mean_slope(law, gap, way)*at%slip(s)
+            response%tau(s) = response%stiffness(s, s)*at%slip(s)
+         end do
+      end associate
+   end subroutine dashpot_respond
+
+   !> What the forces take, >= 0.
+   pure real(wp) function dashpot_dissipated(self, at, response) result(dissipated)
+      class(dashpot_t), intent(in) :: self
+      type(contact_values_t), intent(in) :: at
+      type(contact_response_t), intent(in) :: response
+
+      dissipated = -response%lam*at%dgap + dot_product(response%tau, at%slip)
+   end function dashpot_dissipated
 
    !> mu at the gap `gap`.
    pure real(wp) function dashpot_at(law, gap) result(mu)

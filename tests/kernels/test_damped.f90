@@ -1,9 +1,10 @@
 !> Forces of what is damped: what they take, that no rigid motion sees them, and their derivatives.
 module test_damped
    use check, only : check_near, check_true, test_case_t
-   use emcon_constraints, only : constraint_dof
-   use emcon_damped, only : damped_add_forces, damped_evaluate, damped_select, damped_stiffness, &
-      damped_t, damped_work, dashpot_t
+   use emcon_constraint, only : condition_stiffness
+   use emcon_constraints, only : constraint_dof, constraint_set_t, constraints_dissipated, &
+      constraints_evaluate, constraints_force, constraints_select
+   use emcon_dashpot_law, only : dashpot_t
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_damping_t, formulation_mortar, formulation_nts, &
       formulation_segment
@@ -28,7 +29,7 @@ module test_damped
    type :: trial_t
       type(scene_t) :: scene
       type(system_t) :: system
-      type(damped_t) :: damped
+      type(constraint_set_t) :: set
       real(wp), allocatable :: u0(:, :), du(:, :)
    end type trial_t
 
@@ -51,8 +52,10 @@ contains
       real(wp), intent(in) :: size
       type(error_t), allocatable, intent(out) :: error
       type(block_t) :: lower, upper
+      integer, allocatable :: none(:)
       integer :: i
 
+      allocate(none(0))
       call make_two_blocks(self%scene, 0.125_wp, lower, upper)
       self%scene%pair%formulation = formulations(k)
       self%scene%pair%damping = law
@@ -66,8 +69,12 @@ contains
       associate (contact => self%system%contact(1)%contact)
          call contact%begin_step(self%scene%x, self%u0, self%du)
          call contact%measure(self%scene%x, self%u0, self%du)
-         call damped_select(self%damped, [(i, i = 1, contact%n_constraint)], &
-            [(dashpot_t(law, 0.5_wp, contact%state(i)%gap0), i = 1, contact%n_constraint)])
+         call constraints_select(self%set, none, [(i, i = 1, contact%n_constraint)])
+         self%set%item%rubs = .true.
+         do i = 1, contact%n_constraint
+            self%set%target(i) = contact%state(i)%gap0
+            allocate(self%set%law(i)%law, source=dashpot_t(law, 0.5_wp, contact%state(i)%gap0))
+         end do
       end associate
    end subroutine begin
 
@@ -77,10 +84,9 @@ contains
       real(wp), intent(in) :: du(:, :)
       real(wp), intent(out) :: force(:, :)
 
-      call damped_evaluate(self%damped, self%system, motion_of(pose_t(mass_scale=10.0_wp), &
-         self%scene%x, self%u0, du), .false.)
-      force = 0.0_wp
-      call damped_add_forces(self%damped, force)
+      call constraints_evaluate(self%set, self%system, motion_of(pose_t(mass_scale=10.0_wp), &
+         self%scene%x, self%u0, du))
+      call constraints_force(self%set, 1, force)
    end subroutine find_forces
 
    subroutine test_work(error)
@@ -96,9 +102,10 @@ contains
          force = trial%du
          call find_forces(trial, trial%du, force)
          work = 0.0_wp
-         do i = 1, trial%damped%n
-            call check_true(error, damped_work(trial%damped, i) > 0.0_wp, "it takes something")
-            work = work + damped_work(trial%damped, i)
+         do i = 1, trial%set%n_condition
+            call check_true(error, constraints_dissipated(trial%set, i) > 0.0_wp, &
+               "it takes something")
+            work = work + constraints_dissipated(trial%set, i)
          end do
          call check_near(error, -sum(force*trial%du), work, tol, 1.0_wp, "work")
       end do
@@ -138,7 +145,7 @@ contains
          plus = trial%du
          minus = trial%du
          call find_forces(trial, trial%du, plus)
-         call gather(trial%damped, size(plus), stiffness)
+         call gather(trial%set, size(plus), stiffness)
          worst = 0.0_wp
          do i = 1, size(plus, 2)
             do a = 1, 2
@@ -157,20 +164,20 @@ contains
    end subroutine test_tangent
 
    !> The stiffness of all conditions over the freedoms.
-   subroutine gather(damped, n_dof, stiffness)
-      type(damped_t), intent(in) :: damped
+   subroutine gather(set, n_dof, stiffness)
+      type(constraint_set_t), intent(in) :: set
       integer, intent(in) :: n_dof
       real(wp), allocatable, intent(out) :: stiffness(:, :)
       real(wp), allocatable :: part(:, :)
       integer :: i, j, k
 
       allocate(stiffness(n_dof, n_dof), source=0.0_wp)
-      do k = 1, damped%n
-         part = damped_stiffness(damped, k)
+      do k = 1, set%n_condition
+         part = condition_stiffness(set%item(k), 0.0_wp)
          do j = 1, size(part, 2)
             do i = 1, size(part, 1)
-               associate (to => stiffness(constraint_dof(damped%item(k), i), &
-                     constraint_dof(damped%item(k), j)))
+               associate (to => stiffness(constraint_dof(set%item(k), i), &
+                     constraint_dof(set%item(k), j)))
                   to = to + part(i, j)
                end associate
             end do

@@ -141,8 +141,8 @@ contains
          call shake(set%item(k)%g, 1.0_wp)
          call shake(set%item(k)%c, 0.1_wp)
          set%item(k)%c = set%item(k)%c + set%item(k)%g
-         allocate(set%item(k)%t, mold=set%item(k)%g)
-         call shake(set%item(k)%t, 1.0_wp)
+         allocate(set%item(k)%t(size(set%item(k)%g, 1), size(set%item(k)%g, 2), 1))
+         call shake(set%item(k)%t(:, :, 1), 1.0_wp)
       end do
       set%item(3)%t = 0.0_wp
       correction%choice = solver_default
@@ -156,7 +156,7 @@ contains
          allocate(force(size(matrix, 1), 2), way(size(matrix, 1), 2))
          do k = 1, 2
             force(:, 1) = real(flexibility_row(numbering, set%item(k), set%item(k)%g), dp)
-            force(:, 2) = real(flexibility_row(numbering, set%item(k), set%item(k)%t), dp)
+            force(:, 2) = real(flexibility_row(numbering, set%item(k), set%item(k)%t(:, :, 1)), dp)
             call dense_solve(matrix, force, way, is_singular)
             row = real(matmul(real(flexibility_row(numbering, set%item(k), set%item(k)%c), dp), &
                way), wp)

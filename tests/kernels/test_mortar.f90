@@ -525,7 +525,7 @@ contains
                if (area(1) < 0.9_wp*mortar%whole(j)) n_part = n_part + 1
                call check_near(error, condition_normal(item(j)), 4.0_wp*area(1), tol, 1.0_wp, &
                   "normal force" // text_of(i, k))
-               call check_near(error, abs(sum(item(j)%t(1, :item(j)%n_slave))), 1.0_wp, tol, &
+               call check_near(error, abs(sum(item(j)%t(1, :item(j)%n_slave, 1))), 1.0_wp, tol, &
                   1.0_wp, "friction" // text_of(i, k))
             end do
          end do
