@@ -166,7 +166,7 @@ contains
       end do
       self%n_forward = self%n_forward + set%n
       call fill_products(self)
-      if (allocated(set%soft)) then
+      if (set%gives_way) then
          self%product = self%l
          self%compliance = 0.0_dp*self%mu
          call soften(self, set, is_fit)
@@ -187,7 +187,7 @@ contains
       self%l = self%product
       do k = set%n_held + 1, set%n
          associate (diagonal => self%l(k, k))
-            stiffness = real(set%soft(k)%slope, dp)*self%blocks%scale*diagonal
+            stiffness = real(set%slope(k), dp)*self%blocks%scale*diagonal
             self%compliance(k) = diagonal*max(rounding, 1.0_dp/max(stiffness, rounding))
             diagonal = diagonal + self%compliance(k)
          end associate
@@ -302,7 +302,7 @@ contains
       most = merge(most_curved, most_curved_far, is_near)
       do k = set%n_linear + 1, set%n
          lam = real(set%lam(k), dp)
-         if (allocated(set%soft)) lam = lam + self%mu(k)
+         if (set%gives_way) lam = lam + self%mu(k)
          if (abs(lam)*self%bend(k) > most) kept_factor_serves = .false.
       end do
    end function kept_factor_serves
@@ -318,14 +318,14 @@ contains
       integer :: k, j
       logical :: is_fit
 
-      if (allocated(set%soft)) call soften(self, set, is_fit)
+      if (set%gives_way) call soften(self, set, is_fit)
       self%x = -real(residual, dp)
       call blocks_solve(self%blocks, .false., self%x, self%y, error)
       if (allocated(error)) return
       do k = 1, set%n
          self%mu(k) = -real(set%defect(k), dp)/self%blocks%scale
-         if (allocated(set%soft)) self%mu(k) = self%mu(k) &
-            + self%compliance(k)*real(set%soft(k)%lack, dp)
+         if (set%gives_way) self%mu(k) = self%mu(k) &
+            + self%compliance(k)*real(set%lack(k), dp)
          do j = self%start(k) + 1, self%start(k + 1)
             self%mu(k) = self%mu(k) - self%w(j)*self%y(self%index(j) + 1)
          end do

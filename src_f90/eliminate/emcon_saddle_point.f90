@@ -11,7 +11,6 @@ module emcon_saddle_point
    use emcon_csr, only : csr_find, csr_from_entries, csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
-   use emcon_soft_law, only : soft_t
    use emcon_solver_registry, only : factors_symmetric, solver_create, solver_default
    use emcon_sparse_solver, only : matrix_general, matrix_symmetric, sparse_solver_t
    implicit none
@@ -72,7 +71,7 @@ contains
       n = matrix%n_row
       n_matrix = size(matrix%column)
       n_rows = set%force_rows%row_start(set%n_row + 1)
-      n_soft = merge(set%n - set%n_held, 0, allocated(set%soft))
+      n_soft = merge(set%n - set%n_held, 0, set%gives_way)
       allocate(row(n_matrix + 2*n_rows + n_soft), column(n_matrix + 2*n_rows + n_soft))
       do i = 1, n
          row(matrix%row_start(i) + 1:matrix%row_start(i + 1)) = i
@@ -122,10 +121,10 @@ contains
          self%full%value(self%slot(n_matrix + k)) = -self%scale*set%force_rows%value(k)
          self%full%value(self%slot(n_matrix + n_rows + k)) = self%scale*set%gap_rows%value(k)
       end do
-      if (allocated(set%soft)) then
+      if (set%gives_way) then
          do k = set%n_held + 1, set%n
             self%full%value(self%slot(n_matrix + 2*n_rows + k - set%n_held)) = compliance(self, &
-               set%soft(k))
+               set%slope(k))
          end do
       end if
       self%is_symmetric = is_mirrored(self, set, matrix)
@@ -139,11 +138,11 @@ contains
    end subroutine saddle_point_factorise
 
    !> Of a contact that gives way, in units of the matrix.
-   pure real(dp) function compliance(self, soft)
+   pure real(dp) function compliance(self, slope)
       type(saddle_point_t), intent(in) :: self
-      type(soft_t), intent(in) :: soft
+      real(wp), intent(in) :: slope              !! >= 0 [M/T^2]
 
-      compliance = self%scale*(self%scale/max(real(soft%slope, dp), rounding*self%scale))
+      compliance = self%scale*(self%scale/max(real(slope, dp), rounding*self%scale))
    end function compliance
 
    !> Would the matrix be symmetric but for the sign of its lower rows, and is there a use for it?
@@ -195,10 +194,10 @@ contains
       n = size(residual)
       self%rhs(:n) = -residual
       self%rhs(n + 1:) = -real(self%scale, wp)*set%defect
-      if (allocated(set%soft)) then
+      if (set%gives_way) then
          do k = set%n_held + 1, set%n
-            self%rhs(n + k) = self%rhs(n + k) + real(compliance(self, set%soft(k)), wp) &
-               *(set%soft(k)%lack/real(self%scale, wp))
+            self%rhs(n + k) = self%rhs(n + k) + real(compliance(self, set%slope(k)), wp) &
+               *(set%lack(k)/real(self%scale, wp))
          end do
       end if
       if (self%is_symmetric) then

@@ -268,7 +268,7 @@ contains
          if (is_new .and. self%gap_tolerance > 0.0_wp &
             .and. gap%gap0 > self%gap_tolerance*gap%size) status = step_stands_off
          held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
-         if (allocated(self%set%soft)) held = held + contact%mean_gap(i, self%set%soft(k)%left)
+         if (self%set%gives_way) held = held + contact%mean_gap(i, self%set%left(k))
          self%is_stale = self%is_stale .or. &
             (.not. gap%is_leaving .and. abs(gap%gap1 - held) > touch_tol*gap%size)
       end associate

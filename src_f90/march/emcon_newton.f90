@@ -114,7 +114,7 @@ contains
       real(wp), allocatable :: lam(:)
       logical :: is_done
 
-      set%is_under_way = allocated(set%soft) .and. .not. pose_is_equilibrium(motion%pose)
+      set%is_under_way = set%gives_way .and. .not. pose_is_equilibrium(motion%pose)
       if (set%is_under_way) lam = set%lam
       is_done = .false.
       if (self%keeping%is_allowed .and. size(self%residual) > 0) call solve_by_kept_factor(self, &
@@ -193,7 +193,7 @@ contains
       end if
       call phase_enter(system%phases, phase_factorise, left)
       call keeping_make(self%keeping, self%correction, system, set, motion, is_fit, error)
-      if (is_fit .and. .not. allocated(set%soft)) is_fit = kept_factor_serves( &
+      if (is_fit .and. .not. set%gives_way) is_fit = kept_factor_serves( &
          self%correction%kept, set, self%convergence%knows_sizes)
       call phase_leave(system%phases, left)
    end subroutine make_factor
@@ -214,7 +214,7 @@ contains
       call phase_leave(system%phases, left)
       is_fit = .true.
       if (allocated(error)) return
-      if (allocated(set%soft)) is_fit = kept_factor_serves(self%correction%kept, set, &
+      if (set%gives_way) is_fit = kept_factor_serves(self%correction%kept, set, &
          self%convergence%knows_sizes)
       if (.not. is_fit) return
       system%phases%n_solve = system%phases%n_solve + 1
@@ -540,7 +540,7 @@ contains
       real(wp) :: lam(set%n)
 
       lam = set%lam
-      set%lam = set%soft%lack
+      set%lam = set%lack
       call vector_zero(size(self%left), self%left)
       call constraints_add_forces(set, 1, set%n, self%left)
       set%lam = lam

@@ -5,7 +5,7 @@ module emcon_softness
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t, where_text
-   use emcon_soft_law, only : soft_energy
+   use emcon_soft_law, only : augmented_t, penalty_t
    use emcon_steps, only : method_augmented_lagrange, method_penalty, step_t
    use emcon_system, only : system_t
    use emcon_term_registry, only : terms_mass_rows
@@ -134,18 +134,24 @@ contains
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(inout) :: set
       logical, intent(in) :: is_stored           !! pushes are discrete gradients of what is stored
+      type(penalty_t) :: law
       integer :: k, pair, i
 
-      if (.not. self%is_on .or. set%n == 0) return
-      if (.not. allocated(set%soft)) allocate(set%soft(set%n))
+      set%gives_way = self%is_on .and. set%n > 0
+      if (.not. set%gives_way) return
       set%is_stored = is_stored .and. .not. self%augments
       do k = 1, set%n
          call constraint_place(system, set%id(k), pair, i)
          if (pair == 0) cycle
-         set%soft(k)%share = system%contact(pair)%contact%share(i)
-         set%soft(k)%stiffness = self%stiffness(set%id(k))*set%soft(k)%share**2
-         if (.not. self%is_at_ends) set%soft(k)%before = self%closure(set%id(k))/set%soft(k)%share
-         if (self%augments) set%soft(k)%base = set%lam(k)
+         law%share = system%contact(pair)%contact%share(i)
+         law%stiffness = self%stiffness(set%id(k))*law%share**2
+         if (.not. self%is_at_ends) law%before = self%closure(set%id(k))/law%share
+         if (set%is_stored) then
+            allocate(set%law(k)%law, source=law)
+         else
+            allocate(set%law(k)%law, source=augmented_t(penalty_t=law, base=merge(set%lam(k), &
+               0.0_wp, self%augments)))
+         end if
       end do
    end subroutine softness_select
 
@@ -158,11 +164,14 @@ contains
       integer :: k
 
       is_done = .true.
-      if (.not. self%augments .or. .not. allocated(set%soft)) return
+      if (.not. (self%augments .and. set%gives_way)) return
       self%n_augmentation = self%n_augmentation + 1
       do k = set%n_held + 1, set%n
-         if (abs(set%soft(k)%left) > self%tolerance*set%item(k)%size) is_done = .false.
-         set%soft(k)%base = set%lam(k)
+         if (abs(set%left(k)) > self%tolerance*set%item(k)%size) is_done = .false.
+         select type (law => set%law(k)%law)
+         type is (augmented_t)
+            law%base = set%lam(k)
+         end select
       end do
    end subroutine softness_augment
 
@@ -185,23 +194,22 @@ contains
       integer :: k
 
       energy = 0.0_wp
-      if (self%augments .or. .not. allocated(set%soft)) return
+      if (self%augments .or. .not. set%gives_way) return
       do k = set%n_held + 1, set%n
-         energy = energy + soft_energy(set%soft(k), set%soft(k)%now)
+         energy = energy + set%law(k)%law%stored()
       end do
    end function softness_stored
 
-   !> What the contacts of `set` leave to the next step: how far they are closed, times the part of
-   !> their area that is covered, as that may be another one then.
+   !> What the contacts of `set` leave to the next step.
    pure subroutine softness_keep(self, set, closure)
       type(softness_state_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(inout) :: closure(:)      !! (n_constraint) those of others stand [L]
       integer :: k
 
-      if (self%augments .or. .not. allocated(set%soft)) return
+      if (self%augments .or. .not. set%gives_way) return
       do k = set%n_held + 1, set%n
-         closure(set%id(k)) = min(set%soft(k)%now, 0.0_wp)*set%soft(k)%share
+         closure(set%id(k)) = set%law(k)%law%closure()
       end do
    end subroutine softness_keep
 
@@ -224,12 +232,12 @@ contains
       integer :: k
 
       depth = 0.0_wp
-      if (.not. allocated(set%soft)) return
+      if (.not. set%gives_way) return
       do k = set%n_held + 1, set%n
          edge = set%item(k)%size
          if (self%edge(set%id(k)) > 0.0_wp .and. .not. self%augments) edge = min(edge, &
             self%edge(set%id(k)))
-         depth = max(depth, -set%soft(k)%left/edge)
+         depth = max(depth, -set%left(k)/edge)
       end do
    end function softness_depth
 

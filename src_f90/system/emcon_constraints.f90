@@ -12,7 +12,6 @@ module emcon_constraints
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_numbering, only : numbering_t
-   use emcon_soft_law, only : soft_augmented, soft_follow, soft_penalty, soft_t
    use emcon_system, only : system_t
    use emcon_vectors, only : vector_zero
    implicit none
@@ -35,10 +34,10 @@ module emcon_constraints
       integer, allocatable :: id(:)
       type(condition_t), allocatable :: item(:)  !! (n_condition) values and derivatives
       real(wp), allocatable :: target(:)         !! (n_condition) mean gap to hold, or to count from
-      type(contact_law_box_t), allocatable :: law(:)   !! (n_condition) where not all are held
+      type(contact_law_box_t), allocatable :: law(:)   !! (n_condition) none: its row holds it
       logical, allocatable :: is_kept(:)         !! (n) target is gap(q0): hold the difference at 0
-      !> (n) contacts that give way, whose multipliers follow from gaps; not there: none
-      type(soft_t), allocatable :: soft(:)
+      !> Contacts give way: laws give the multipliers of their rows
+      logical :: gives_way = .false.
       logical :: is_stored = .false.             !! by discrete gradients of what these store
       !> Their multipliers are on the way to what the gaps say, as unknowns of a solve
       logical :: is_under_way = .false.
@@ -50,6 +49,10 @@ module emcon_constraints
       logical, allocatable :: is_firm(:)
       real(wp), allocatable :: lam(:)            !! (n_row) multipliers [M L/T^2]
       real(wp), allocatable :: defect(:)         !! (n_row) what is left to the target [L]
+      ! Of the gaps of contacts that give way:
+      real(wp), allocatable :: left(:)           !! (n) of the gap to the target, at the end [L]
+      real(wp), allocatable :: slope(:)          !! (n) -d multiplier / d gap, >= 0 [M/T^2]
+      real(wp), allocatable :: lack(:)           !! (n) what one on its way lacks [M L/T^2]
       type(csr_t) :: force_rows                  !! (n_row x n_unknown) directions of forces
       type(csr_t) :: gap_rows                    !! (n_row x n_unknown) gradients at the end
       type(csr_t) :: law_rows                    !! of conditions without a row, directions
@@ -82,17 +85,17 @@ contains
       self%condition = [(k, k = 1, self%n)]
       self%slip = 0*self%condition
       self%is_under_way = .false.
-      if (allocated(self%soft)) deallocate(self%soft)
-      if (allocated(self%law)) deallocate(self%law)
-      if (allocated(self%item)) deallocate(self%item, self%target, self%is_kept, &
-         self%is_firm, self%lam, self%defect)
+      self%gives_way = .false.
+      if (allocated(self%item)) deallocate(self%item, self%law, self%target, self%is_kept, &
+         self%is_firm, self%lam, self%defect, self%left, self%slope, self%lack)
       if (present(by_law)) then
          self%n_condition = self%n + size(by_law)
          self%id = [id, by_law]
-         allocate(self%law(self%n_condition))
       end if
-      allocate(self%item(self%n_condition), self%is_kept(self%n), self%is_firm(self%n))
-      allocate(self%target(self%n_condition), self%lam(self%n), self%defect(self%n), source=0.0_wp)
+      allocate(self%item(self%n_condition), self%law(self%n_condition), self%is_kept(self%n), &
+         self%is_firm(self%n))
+      allocate(self%target(self%n_condition), self%lam(self%n), self%defect(self%n), &
+         self%left(self%n), self%slope(self%n), self%lack(self%n), source=0.0_wp)
       self%is_kept = .false.
       self%is_firm = .true.
    end subroutine constraints_select
@@ -131,8 +134,8 @@ contains
       type(constraint_set_t), intent(in) :: self
       integer, intent(in) :: k                   !! place in the set, from 1
 
-      gives_back = self%is_stored .and. allocated(self%soft)
-      if (gives_back) gives_back = self%soft(k)%before < 0.0_wp
+      gives_back = allocated(self%law(k)%law)
+      if (gives_back) gives_back = self%law(k)%law%gives_back()
    end function constraints_gives_back
 
    !> Pair and number within the pair of constraint `id`; pair 0: it is not one of contact.
@@ -171,10 +174,8 @@ contains
             self%defect(k) = item%slip_target(s) - item%slip(s)
          end associate
       end do
-      if (allocated(self%soft)) call give_way(self)
-      do k = self%n + 1, self%n_condition
-         self%item(k)%response = contact_response_t()
-         call self%law(k)%law%respond(values_of(self, k), self%item(k)%response)
+      do k = self%n_held + 1, self%n_condition
+         if (allocated(self%law(k)%law)) call respond(self, k)
       end do
    end subroutine constraints_evaluate
 
@@ -231,28 +232,24 @@ contains
       dissipated = self%law(k)%law%dissipated(values_of(self, k), self%item(k)%response)
    end function constraints_dissipated
 
-   !> The multipliers of contacts that give way, or what those under way lack; they have no defect.
-   pure subroutine give_way(self)
+   !> What the law of condition `k` gives. Where the condition has a row of its gap, that takes the
+   !> multiplier, or what one under way lacks of it, and has no defect.
+   pure subroutine respond(self, k)
       type(constraint_set_t), intent(inout) :: self
-      real(wp) :: lam, start
-      integer :: k
+      integer, intent(in) :: k                   !! n_held + 1..n_condition
+      type(contact_response_t) :: response
 
-      do k = self%n_held + 1, self%n
-         associate (soft => self%soft(k), item => self%item(k))
-            soft%left = self%defect(k)
-            if (self%is_stored) then
-               call soft_follow(soft, item%gap0, item%gap1, item%dgap, start)
-               call soft_penalty(soft, start, soft%now, lam)
-            else
-               soft%now = item%gap1
-               call soft_augmented(soft, lam)
-            end if
-            soft%lack = merge(lam - self%lam(k), 0.0_wp, self%is_under_way)
-            self%lam(k) = lam - soft%lack
-            self%defect(k) = 0.0_wp
-         end associate
-      end do
-   end subroutine give_way
+      call self%law(k)%law%respond(values_of(self, k), response)
+      if (k > self%n) then
+         self%item(k)%response = response
+         return
+      end if
+      self%left(k) = self%defect(k)
+      self%slope(k) = response%stiffness(0, 0)
+      self%lack(k) = merge(response%lam - self%lam(k), 0.0_wp, self%is_under_way)
+      self%lam(k) = response%lam - self%lack(k)
+      self%defect(k) = 0.0_wp
+   end subroutine respond
 
    !> Gradients of the rows over the unknowns: those by all freedoms, times T.
    subroutine constraints_rows(self, numbering)

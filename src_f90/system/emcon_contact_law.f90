@@ -25,6 +25,9 @@ module emcon_contact_law
       procedure(respond_interface), deferred :: respond
       procedure :: stored
       procedure :: dissipated
+      procedure :: stiffest
+      procedure :: closure
+      procedure :: gives_back
    end type contact_law_t
 
    !> For arrays of laws of different types; not allocated: the rows hold, nothing else.
@@ -62,5 +65,27 @@ contains
 
       dissipated = 0.0_wp
    end function dissipated
+
+   !> As stiff as the law becomes by the gap, 0 unless overridden [M/T^2].
+   pure real(wp) function stiffest(self)
+      class(contact_law_t), intent(in) :: self
+
+      stiffest = 0.0_wp
+   end function stiffest
+
+   !> What a step leaves to the next one where the law stores something: how far it is closed by the
+   !> whole area of the condition, <= 0, 0 unless overridden [L].
+   pure real(wp) function closure(self)
+      class(contact_law_t), intent(in) :: self   !! it has responded
+
+      closure = 0.0_wp
+   end function closure
+
+   !> Has the law stored in steps before what it gives back in this one? Not unless overridden.
+   pure logical function gives_back(self)
+      class(contact_law_t), intent(in) :: self
+
+      gives_back = .false.
+   end function gives_back
 
 end module emcon_contact_law

@@ -19,6 +19,7 @@ program main
    use test_cholmod, only : collect_cholmod
    use test_supernodal, only : collect_supernodal
 #endif
+   use test_condition_rows, only : collect_condition_rows
    use test_constraints, only : collect_constraints
    use test_correction, only : collect_correction
    use test_corotated, only : collect_corotated
@@ -188,6 +189,7 @@ program main
    call run("rigid_motion", collect_rigid_motion)
    call run("rigidity", collect_rigidity)
    call run("rigid_bodies", collect_rigid_bodies)
+   call run("condition_rows", collect_condition_rows)
    call run("constraints", collect_constraints)
    call run("independent_rows", collect_independent_rows)
    call run("null_space", collect_null_space)

@@ -1,10 +1,11 @@
-!> Contact that gives way: what a push takes is what is stored, and its slope is its derivative; the
-!> corrections that know the slope are those of the stiffened matrix.
+!> Contact that gives way: what a push takes is what is stored, and its slope is its derivative.
 module test_soft_law
    use check, only : check_near, check_true, test_case_t
+   use emcon_constraint, only : contact_response_t
+   use emcon_contact_law, only : contact_law_t, contact_values_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_soft_law, only : soft_augmented, soft_energy, soft_follow, soft_penalty, soft_t
+   use emcon_soft_law, only : augmented_t, penalty_t
    implicit none
    private
    public :: collect_soft_law
@@ -28,18 +29,29 @@ contains
          test_case_t("an augmented Lagrangian is linear", test_augmented)]
    end subroutine collect_soft_law
 
+   !> The answer to a gap that goes from `from` to `to`, which it is to be 0 at the end.
+   type(contact_response_t) function response_of(law, from, to) result(response)
+      class(contact_law_t), intent(inout) :: law
+      real(wp), intent(in) :: from, to
+
+      call law%respond(contact_values_t(gap0=from, gap1=to, dgap=to - from, left=to), response)
+   end function response_of
+
    subroutine test_work(error)
       type(error_t), allocatable, intent(out) :: error
-      type(soft_t) :: soft
-      real(wp) :: lam
+      type(penalty_t) :: law
+      type(contact_response_t) :: response
+      real(wp) :: before
       integer :: k
 
-      soft%stiffness = stiffness
+      law%stiffness = stiffness
       do k = 1, size(gaps, 2)
          associate (g => gaps(:, k))
-            call soft_penalty(soft, g(1), g(2), lam)
-            call check_near(error, lam*(g(2) - g(1)), soft_energy(soft, g(1)) &
-               - soft_energy(soft, g(2)), 8.0_wp*epsilon(1.0_wp), stiffness, "work")
+            law%now = g(1)
+            before = law%stored()
+            response = response_of(law, g(1), g(2))
+            call check_near(error, response%lam*(g(2) - g(1)), before - law%stored(), &
+               8.0_wp*epsilon(1.0_wp), stiffness, "work")
          end associate
       end do
    end subroutine test_work
@@ -51,27 +63,27 @@ contains
       real(wp), parameter :: moved(2, 6) = reshape([0.3_wp, -0.2_wp, -0.35_wp, -0.3_wp, 0.05_wp, &
          -0.1_wp, -0.4_wp, 0.2_wp, -0.1_wp, -0.15_wp, 0.5_wp, 0.4_wp], [2, 6])
       real(wp), parameter :: ends(6) = [-0.2_wp, -0.15_wp, -0.3_wp, 0.3_wp, -0.05_wp, -0.15_wp]
-      type(soft_t) :: soft
-      real(wp) :: lam, start, taken
+      type(penalty_t) :: law
+      type(contact_response_t) :: response
+      real(wp) :: taken, start
       integer :: k
 
-      soft%stiffness = stiffness
-      call soft_follow(soft, -0.5_wp, -0.25_wp, 0.25_wp, start)
-      call check_near(error, [start, soft%now], [-0.5_wp, -0.25_wp], epsilon(1.0_wp), 1.0_wp, &
-         "nothing is known of a step before")
+      law%stiffness = stiffness
+      response = response_of(law, -0.5_wp, -0.25_wp)
+      call check_near(error, [response%lam, law%now], [0.375_wp*stiffness, -0.25_wp], &
+         epsilon(1.0_wp), stiffness, "nothing is known of a step before")
       taken = 0.0_wp
-      soft%before = 0.0_wp
+      law%before = 0.0_wp
       do k = 1, size(ends)
          associate (g => moved(:, k))
-            call soft_follow(soft, g(1), g(2), g(2) - g(1), start)
-            call check_near(error, min(start, 0.0_wp), soft%before, epsilon(1.0_wp), 1.0_wp, &
-               "start")
-            call check_near(error, soft%now, ends(k), 4.0_wp*epsilon(1.0_wp), 1.0_wp, "end")
-            call soft_penalty(soft, start, soft%now, lam)
-            taken = taken - lam*(soft%now - start)
-            call check_near(error, soft_energy(soft, soft%now), taken, 16.0_wp*epsilon(1.0_wp), &
-               stiffness, "stored")
-            soft%before = min(soft%now, 0.0_wp)
+            call check_true(error, law%gives_back() .eqv. law%before < 0.0_wp, "it gives back")
+            response = response_of(law, g(1), g(2))
+            call check_near(error, law%now, ends(k), 4.0_wp*epsilon(1.0_wp), 1.0_wp, "end")
+            start = law%now - (g(2) - g(1))
+            taken = taken - response%lam*(law%now - start)
+            call check_near(error, law%stored(), taken, 16.0_wp*epsilon(1.0_wp), stiffness, &
+               "stored")
+            law%before = law%closure()
          end associate
       end do
    end subroutine test_follow
@@ -81,19 +93,18 @@ contains
    subroutine test_slope(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: d = epsilon(1.0_wp)**(1.0_wp/3.0_wp)
-      type(soft_t) :: soft
-      real(wp) :: lam(2), bound
+      type(penalty_t) :: law
+      type(contact_response_t) :: low, high, response
       integer :: k
 
-      soft%stiffness = stiffness
+      law%stiffness = stiffness
       do k = 1, 4
          associate (g => gaps(:, k))
-            call soft_penalty(soft, g(1), g(2) - d, lam(1))
-            call soft_penalty(soft, g(1), g(2) + d, lam(2))
-            call soft_penalty(soft, g(1), g(2), bound)
-            bound = 16.0_wp*d**2
-            call check_near(error, (lam(1) - lam(2))/(2.0_wp*d), soft%slope, bound, stiffness, &
-               "slope")
+            low = response_of(law, g(1), g(2) - d)
+            high = response_of(law, g(1), g(2) + d)
+            response = response_of(law, g(1), g(2))
+            call check_near(error, (low%lam - high%lam)/(2.0_wp*d), response%stiffness(0, 0), &
+               16.0_wp*d**2, stiffness, "slope")
          end associate
       end do
    end subroutine test_slope
@@ -102,33 +113,36 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: starts(3) = [-1.0_wp, 0.5_wp, 2.0_wp]
       real(wp), parameter :: near = 1.0e-6_wp
-      type(soft_t) :: soft, beside
-      real(wp) :: lam
+      type(penalty_t) :: law
+      type(contact_response_t) :: response, beside
       integer :: k
 
-      soft%stiffness = stiffness
-      beside%stiffness = stiffness
+      law%stiffness = stiffness
       do k = 1, size(gaps, 2)
-         call soft_penalty(soft, gaps(1, k), gaps(2, k), lam)
-         call check_true(error, lam >= 0.0_wp .and. soft%slope >= 0.0_wp, "pushes")
-         call check_true(error, soft%slope <= 0.5_wp*stiffness, "no stiffer than where closed")
+         response = response_of(law, gaps(1, k), gaps(2, k))
+         associate (slope => response%stiffness(0, 0))
+            call check_true(error, min(response%lam, slope) >= 0.0_wp, "pushes")
+            call check_true(error, slope <= 0.5_wp*law%stiffest(), "no stiffer than where closed")
+         end associate
       end do
       do k = 1, size(starts)
-         call soft_penalty(soft, starts(k), near, lam)
-         call soft_penalty(beside, starts(k), -near, lam)
-         call check_near(error, soft%slope, beside%slope, 8.0_wp*near, stiffness, "slopes")
+         response = response_of(law, starts(k), near)
+         beside = response_of(law, starts(k), -near)
+         call check_near(error, response%stiffness(0, 0), beside%stiffness(0, 0), 8.0_wp*near, &
+            stiffness, "slopes")
       end do
    end subroutine test_sign
 
    subroutine test_augmented(error)
       type(error_t), allocatable, intent(out) :: error
-      type(soft_t) :: soft
-      real(wp) :: lam
+      type(augmented_t) :: law
+      type(contact_response_t) :: response
 
-      soft = soft_t(stiffness, 2.0_wp, 0.0_wp, -0.5_wp)
-      call soft_augmented(soft, lam)
-      call check_near(error, lam, 3.5_wp, 4.0_wp*epsilon(1.0_wp), 1.0_wp, "push")
-      call check_near(error, soft%slope, stiffness, epsilon(1.0_wp), 1.0_wp, "slope")
+      law%stiffness = stiffness
+      law%base = 2.0_wp
+      response = response_of(law, 1.0_wp, -0.5_wp)
+      call check_near(error, response%lam, 3.5_wp, 4.0_wp*epsilon(1.0_wp), 1.0_wp, "push")
+      call check_near(error, response%stiffness(0, 0), stiffness, epsilon(1.0_wp), 1.0_wp, "slope")
    end subroutine test_augmented
 
 end module test_soft_law
