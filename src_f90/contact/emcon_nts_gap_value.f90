@@ -9,7 +9,7 @@
 !> Source: docs/theory.md, eqs. (12) to (14). Sign: gap > 0 is open.
 module emcon_nts_gap_value
    use emcon_kinds, only : wp
-   use emcon_rounded, only : above_negative, rounded_negative
+   use emcon_rounded, only : above_negative, rounded_negative, rounded_part
    implicit none
    private
    public :: nts_gap_value, has_arc
@@ -17,9 +17,10 @@ module emcon_nts_gap_value
 
    !> Local numbers of the nodes; the neighbours' further nodes follow as they are present.
    integer, parameter :: slave = 1, first = 2, last = 3
-   !> Where |tan(theta/2)| is smaller, a corner is in between convex and concave. Times the width of
-   !> a rounded corner that is round-off of the gap.
-   real(wp), parameter :: flat = 1.0e-9_wp
+   !> Where |tan(theta/2)| is smaller, a concave corner is rounded as a convex one in part: a flat
+   !> one leaves the gap exact, whichever way round-off or a load turns it. Of the gap that is less
+   !> than what counts as a penetration.
+   real(wp), parameter :: flat = 1.0e-3_wp
    !> Corners that turn by more than this (cosine) are not gone around: a right angle, with room for
    !> round-off.
    real(wp), parameter :: right_angle = -1.0e-6_wp
@@ -92,11 +93,11 @@ contains
    !> kappa min(tau, 0), rounded as in `bent_part` of emcon_nts_gap.inc.
    pure real(wp) function bent_value(tau, rounding, kappa)
       real(wp), intent(in) :: tau, rounding(3), kappa
-      real(wp) :: convex
+      real(wp) :: hollow
 
-      convex = rounded_negative(kappa, flat)
-      bent_value = convex*over_top_value(tau, rounding(2), rounding(3)) &
-         + (kappa - convex)*rounded_negative(tau, rounding(1))
+      hollow = rounded_part(kappa, flat)
+      bent_value = (kappa - hollow)*over_top_value(tau, rounding(2), rounding(3)) &
+         + hollow*rounded_negative(tau, rounding(1))
    end function bent_value
 
    !> min(tau, 0), rounded as in `over_top` of emcon_nts_gap.inc.

@@ -9,7 +9,7 @@ from plain_scenes import BOTH, ONE, SCENES, UNGUARDED, Scene, below
 from scene_tools import DECKS, attempt, run_deck
 from test_contact_output import data_sets, restart
 from test_explicit import EVERY, LINEAR, bar, block, critical_step, stiffness_and_mass
-from test_statics import E, FORCE, FORMULATIONS, NU, ROUNDED, displacement, tower
+from test_statics import E, FORCE, FORMULATIONS, NU, ACCURACY, displacement, tower
 
 METHOD = "*CONSTRAINT METHOD, TYPE=<method>"
 PENALTY, AUGMENTED = "PENALTY", "AUGMENTED LAGRANGE"
@@ -387,7 +387,7 @@ def test_a_uniform_pressure_gives_way_evenly(tmp_path, formulation, gap):
     run = run_deck(tmp_path/"deck.inp", tmp_path)
     shortening, give = 2*(1 - NU**2)*FORCE/E, FORCE/stiffness
     top = displacement(run, 1)[-1, :, 1]
-    assert np.allclose(top, -gap - shortening - give, rtol=0, atol=ROUNDED*shortening)
+    assert np.allclose(top, -gap - shortening - give, rtol=0, atol=ACCURACY*shortening)
     gaps = run.fields()["contact_gap"][-1]
     # Of the width, the contact surface keeps all but FORCE/E.
     assert np.allclose(gaps[~np.isnan(gaps)], -give, rtol=4*FORCE/E, atol=0)
