@@ -216,6 +216,24 @@ contains
       end if
    end function ends_of
 
+   !> Does a segment end where its bounds are rounded, or beside it?
+   pure logical function meets_bend(kind, stencil, x)
+      integer, intent(in) :: kind
+      type(pair_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: x(:, :)
+      type(frame_t) :: frame
+      integer :: k
+
+      meets_bend = .false.
+      if (kind > last_segment) return
+      call frame_init(frame, stencil, x)
+      do k = 1, 2
+         associate (xi => frame_project(frame, k))
+            meets_bend = meets_bend .or. min(abs(xi), abs(1.0_wp - xi)) < 2.0_wp*end_rounding
+         end associate
+      end do
+   end function meets_bend
+
    ! ---- cases ----------------------------------------------------------------------------------
 
    !> A pair with edges of ratio 1/`ratio` to `ratio`, slave and master bent, turned at random, and
@@ -539,13 +557,17 @@ contains
       integer :: i, j, k, kind, n_checked
       logical :: crosses
 
-      step = eps**(1.0_wp/3.0_wp)
-      bound = 4.0e2_wp*step**2
+      bound = 4.0e2_wp*eps**(2.0_wp/3.0_wp)
       do kind = 1, n_kind
          n_checked = 0
          do i = 1, 60
             call draw(kind, 2.0_wp, merge(1.0_wp, 1.0e-6_wp, mod(i, 3) > 0), stencil, x0, dx)
             call evaluate(kind, stencil, x0, dx, number)
+            ! Where bounds bend third derivatives grow by 1/width^2: what steps and round-off leave
+            ! grows alike, by width^(-2/3).
+            step = eps**(1.0_wp/3.0_wp)
+            if (meets_bend(kind, stencil, x0) .or. meets_bend(kind, stencil, x0 + dx)) &
+               step = step*end_rounding**(2.0_wp/3.0_wp)
             do j = 1, 2*n_place
                way = reshape([(merge(step, 0.0_wp, k == j), k = 1, 2*n_place)], [2, n_place])
                call evaluate(kind, stencil, x0, dx + way, up)

@@ -16,8 +16,9 @@ def test_two_discs(tmp_path, form, sides, n_edge, h):
     assert defect(run) < TOLERANCE
 
 
-@pytest.mark.parametrize("form", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
-def test_a_chain_of_ten(tmp_path, form):
+@pytest.mark.parametrize(("form", "h"), [("NODE TO SURFACE", 0.05), ("SEGMENT", 0.05),
+                                         ("MORTAR", 0.01)])
+def test_a_chain_of_ten(tmp_path, form, h):
     """Turned, so that coordinates are off by round-off; the last one leaves with all."""
-    run = run_deck(row(10, 24, 0.05, 1.3, turn=0.3), tmp_path, formulation=form)
+    run = run_deck(row(10, 24, h, 1.3, turn=0.3), tmp_path, formulation=form)
     assert defect(run, 0.3) < TOLERANCE
