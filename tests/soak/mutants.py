@@ -1,14 +1,18 @@
 """Do the tests notice a wrong line of the numerics? `make mutants COUNT=80`
 
     .venv/bin/python tests/soak/mutants.py [--count N] [--seed N] [--since COMMIT] [--folders ...]
+    .venv/bin/python tests/soak/mutants.py --try src_f90/march/emcon_judge.f90:120 'n = n - 1'
 
 Each mutant is the library with one small mistake in one line: a relation or a sign turned round, a
 factor halved, a condition left out, an assignment not made. Lines are drawn by chance from those of
 `contact`, `march`, `terms` and `solid` that have changed since the last version; with `--since=`
-and nothing behind it from all. The kernel tests are run, then the runs of tests/scenes file by file,
-until one fails. What compiles to the same object means nothing and is not counted. Mutants that
-nobody notices are printed with their line; the exit code is 1 where more than a twentieth are.
-Two mutants are tried at a time, in copies of the repository below build/mutants.
+and nothing behind it from all. `--try` puts a text of one's own into a line.
+
+The kernel suites that run this line (by the counters of MODE=coverage) come first, the quickest at
+their head; then the runs of tests/scenes file by file, until one fails. What compiles to the same
+object means nothing and is not counted. Mutants that nobody notices are printed with their line;
+the exit code is 1 where more than a twentieth are. Nothing but the changed file is compiled, beside
+build/release, which stays as it is.
 """
 
 import argparse
@@ -16,20 +20,26 @@ import concurrent.futures
 import dataclasses
 import os
 import pathlib
-import queue
 import random
 import re
+import resource
+import shlex
 import shutil
 import subprocess
 import sys
 import time
 
+from kernel_coverage import lines_of_suites
+
 ROOT = pathlib.Path(__file__).resolve().parents[2]
+RELEASE = pathlib.Path("build/release")
 FOLDERS = ["contact", "march", "terms", "solid"]
 GOAL = 0.95
-#: What a mutant may make endless [s].
-PATIENCE = 120
-#: What tests of runs may take before a mutant counts as not noticed [s].
+#: A mutant may never end: CPU time of a kernel suite, in times of what it takes and more [s].
+SLOWER, GRACE = 5, 2
+#: CPU time of one run of a scene [s], and memory of any program [bytes].
+PATIENCE, ROOM = 60, 4 << 30
+#: CPU time that tests of runs may take before a mutant counts as not noticed [s].
 LONGEST = 240
 
 #: Mistakes: what to look for in the code of a line, and what stands there instead.
@@ -61,6 +71,12 @@ class Mutant:
     before: str
     after: str
 
+    @staticmethod
+    def of(place, after):
+        """A text of one's own in a line, FILE:LINE."""
+        file, line = place.split(":")
+        return Mutant(file, int(line), (ROOT / file).read_text().splitlines()[int(line) - 1], after)
+
     def __str__(self):
         return f"{self.file}:{self.line}\n  - {self.before.strip()}\n  + {self.after.strip()}"
 
@@ -70,14 +86,14 @@ def code_of(line):
     return line.split("!")[0].rstrip() if "'" not in line and '"' not in line else ""
 
 
-def mistakes(line):
-    """All that a line can be made into."""
+def mistakes(line, is_behind=False):
+    """All that a line can be made into; `is_behind`: it goes on with the statement above it."""
     code = code_of(line)
     if IDLE.match(code):
         return []
     found = [code[:hit.start()] + put + code[hit.end():]
              for pattern, put in MISTAKES for hit in pattern.finditer(code)]
-    if STATEMENT.match(code) and "=>" not in code:
+    if STATEMENT.match(code) and "=>" not in code and not is_behind:
         found.append(re.match(" *", code)[0] + "continue")
     return found
 
@@ -115,75 +131,129 @@ def draw(folders, since, seed):
     """All mutants in an order of chance."""
     found = []
     for name, numbers in changed_lines(folders, since).items():
-        text = (ROOT / name).read_text().splitlines()
-        found += [Mutant(name, k, text[k - 1], after)
-                  for k in numbers for after in mistakes(text[k - 1])]
+        text = ["", *(ROOT / name).read_text().splitlines()]
+        found += [Mutant(name, k, text[k], after) for k in numbers
+                  for after in mistakes(text[k], is_behind=text[k - 1].endswith("&"))]
     random.Random(seed).shuffle(found)
     return found
 
 
-class Place:
-    """A copy of the repository with what is built, in which one mutant is tried at a time."""
+class Build:
+    """What make would call for build/release: how a file is compiled and the programs are linked."""
 
-    def __init__(self, number):
-        self.folder = ROOT / "build" / "mutants" / str(number)
+    def __init__(self, files):
+        new = [f"-W{name}" for name in files]
+        told = subprocess.run(["make", "--dry-run", "V=1", *new, "lib", "app", "kernels"], cwd=ROOT,
+                              capture_output=True, text=True, check=True).stdout
+        calls = [shlex.split(line) for line in told.replace("\\\n", " ").splitlines()
+                 if " -o " in line]
+        self.call = {call[call.index("-o") + 1]: call for call in calls}
+
+    def compile(self, name, text, folder):
+        """The object made of a file that reads `text` now; None where that is no Fortran."""
+        path = pathlib.Path(name)
+        source, made = folder / path.name, folder / (path.stem + ".o")
+        source.write_text(text)
+        call = [part for part in self.call[str(RELEASE / "obj" / made.name)]
+                if not part.startswith("-J")]
+        call[call.index("-c") + 1], call[call.index("-o") + 1] = str(source), str(made)
+        # Places of code in its line are no difference: -g0.
+        done = subprocess.run([*call, "-g0", f"-J{folder}", f"-I{RELEASE/'mod'}", f"-I{path.parent}"],
+                              cwd=ROOT, capture_output=True, check=False)
+        return made if done.returncode == 0 else None
+
+    def link(self, program, made, folder):
+        """A program or the library with `made` in the place of what it has."""
+        call = list(self.call[str(RELEASE / program)])
+        call[call.index("-o") + 1] = str(folder / program)
+        own = str(RELEASE / "obj" / made.name)
+        if own in call:
+            call[call.index(own)] = str(made)
+        else:
+            call.insert(call.index(str(RELEASE / "libemcon.a")), str(made))
+        subprocess.run([*call, "-Wl,--strip-debug"], cwd=ROOT, check=True)
+        return folder / program
+
+
+class Trial:
+    """Mutants tried one at a time, in a folder below build/mutants."""
+
+    def __init__(self, build, suites):
+        self.folder = ROOT / "build" / "mutants" / str(os.getpid())
         shutil.rmtree(self.folder, ignore_errors=True)
         self.folder.mkdir(parents=True)
-        for name in ("src_f90", "tests", "input_decks", "docs", ".ci", "pywrap", "Makefile",
-                     "pyproject.toml", "README.md"):
-            copy = shutil.copytree if (ROOT / name).is_dir() else shutil.copy2
-            copy(ROOT / name, self.folder / name)
-        (self.folder / ".venv").symlink_to(ROOT / ".venv")
-        shutil.copytree(ROOT / "build" / "release", self.folder / "build" / "release",
-                        ignore=shutil.ignore_patterns("py"), symlinks=True)
-        settings = (ROOT / "build" / "config.mk").read_text()
-        (self.folder / "build" / "config.mk").write_text(
-            settings.replace(f" {ROOT}\n", f" {self.folder}\n", 1))
-        shutil.copystat(ROOT / "build" / "config.mk", self.folder / "build" / "config.mk")
-        self.make()
-
-    def run(self, command, timeout, **options):
-        """Exit code; 1 where it takes too long."""
-        try:
-            return subprocess.run(command, cwd=self.folder, stdout=subprocess.DEVNULL,
-                                  stderr=subprocess.DEVNULL, timeout=timeout, **options).returncode
-        except subprocess.TimeoutExpired:
-            return 1
-
-    def make(self):
-        return self.run(["make", "--silent", "app", "kernels"], 600)
+        self.build = build
+        self.suites = suites
+        self.sound = {}
+        self.passes = {}
 
     def noticed_by(self, mutant):
         """Name of the test that notices; "" if none, None if it is no mutant."""
-        path = self.folder / mutant.file
-        sound = path.read_text()
-        made = self.folder / "build/release/obj" / (path.stem + ".o")
-        object_before = made.read_bytes()
-        lines = sound.splitlines(keepends=True)
+        text = (ROOT / mutant.file).read_text()
+        if mutant.file not in self.sound:
+            self.sound[mutant.file] = self.build.compile(mutant.file, text, self.folder).read_bytes()
+        lines = text.splitlines(keepends=True)
         lines[mutant.line - 1] = mutant.after + "\n"
-        path.write_text("".join(lines))
-        try:
-            if self.make() != 0 or made.read_bytes() == object_before:
-                return None
-            return self.first_failure()
-        finally:
-            path.write_text(sound)
-            self.make()
+        made = self.build.compile(mutant.file, "".join(lines), self.folder)
+        if made is None or made.read_bytes() == self.sound[mutant.file]:
+            return None
+        return self.failing_suite(mutant, made) or self.failing_run(made)
 
-    def first_failure(self):
-        program = self.folder / "build/release/kernels"
-        if self.run([program], PATIENCE) != 0:
-            return "kernels"
-        begin = time.monotonic()
-        for test in tests_of_runs():
-            rest = LONGEST - (time.monotonic() - begin)
-            if rest < 0:
-                break
-            done = self.run([sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider",
-                             f"tests/{test}"], max(rest, 1.0))
-            if done != 0:
-                return test
+    def failing_suite(self, mutant, made):
+        seen = [s for s in self.suites if mutant.line in s.lines.get(mutant.file, ())]
+        if not seen:
+            return ""
+        program = self.build.link("kernels", made, self.folder)
+        for suite in sorted(seen, key=lambda s: s.seconds):
+            limit = GRACE + SLOWER*suite.seconds
+            if call([program, suite.name], self.folder, limit, 20*limit)[0] != 0:
+                return suite.name
         return ""
+
+    def failing_run(self, made):
+        program = self.build.link("emcon", made, self.folder)
+        library = next(name for name in self.build.call if ".so." in name)
+        self.build.link(pathlib.Path(library).name, made, self.folder)
+        place = {"EMCON": str(program), "LD_LIBRARY_PATH": str(self.folder)}
+        rest = LONGEST
+        for test in tests_of_runs():
+            code, seconds = run_tests(test, place)
+            if code != 0 and self.passes_when_sound(test):
+                return test
+            rest -= seconds
+            if rest <= 0:
+                break
+        return ""
+
+    def passes_when_sound(self, test):
+        """A test that fails anyway, or for want of time, has noticed nothing."""
+        if test not in self.passes:
+            self.passes[test] = run_tests(test, {})[0] == 0
+        return self.passes[test]
+
+
+def run_tests(test, place):
+    """Exit code and CPU time of a file of tests; the program of `place` runs them."""
+    return call([sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider",
+                 f"tests/{test}"], ROOT, PATIENCE, 20*LONGEST, {"EMCON_PATIENCE": "20"} | place)
+
+
+def call(command, folder, seconds, wall, place=None):
+    """Exit code, not 0 where each of its programs takes more than `seconds`; CPU time [s]."""
+
+    def limit():
+        resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 2))
+        resource.setrlimit(resource.RLIMIT_AS, (ROOM, ROOM))
+
+    before = resource.getrusage(resource.RUSAGE_CHILDREN)
+    try:
+        code = subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL, timeout=wall,
+                              stderr=subprocess.DEVNULL, preexec_fn=limit,
+                              env=os.environ | (place or {}), check=False).returncode
+    except subprocess.TimeoutExpired:
+        code = 1
+    after = resource.getrusage(resource.RUSAGE_CHILDREN)
+    return code, after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
 
 
 def tests_of_runs():
@@ -196,32 +266,20 @@ def tests_of_runs():
 
 
 def main():
-    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
-    parser.add_argument("--count", type=int, default=80, help="mutants that are tried")
-    parser.add_argument("--seed", type=int, default=1)
-    parser.add_argument("--since", metavar="COMMIT", help="lines changed since then; empty: all")
-    parser.add_argument("--folders", nargs="+", default=FOLDERS)
-    parser.add_argument("--jobs", type=int, default=os.cpu_count())
-    options = parser.parse_args()
+    options = read_options()
     since = last_version() if options.since is None else options.since
-    waiting = draw(options.folders, since, options.seed)
-    print(f"{len(waiting)} mutants of lines "
-          + (f"changed since {since[:12]}" if since else "of " + " ".join(options.folders)))
-    places = queue.SimpleQueue()
-    for k in range(options.jobs):
-        places.put(Place(k))
-
-    def attempt(mutant):
-        place = places.get()
-        try:
-            return place.noticed_by(mutant)
-        finally:
-            places.put(place)
-
+    if options.put:
+        waiting = [Mutant.of(*options.put)]
+    else:
+        waiting = draw(options.folders, since, options.seed)
+        print(f"{len(waiting)} mutants of lines "
+              + (f"changed since {since[:12]}" if since else "of " + " ".join(options.folders)))
+    build = Build(sorted({mutant.file for mutant in waiting}))
+    suites = lines_of_suites(options.folders)
     noticed, missed = 0, []
-    with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
-        waiting = iter(waiting)
-        running = {}
+    with concurrent.futures.ProcessPoolExecutor(options.jobs, initializer=begin,
+                                                initargs=(build, suites)) as pool:
+        waiting, running = iter(waiting), {}
         while True:
             while len(running) < options.jobs and (
                     noticed + len(missed) + len(running) < options.count):
@@ -234,14 +292,37 @@ def main():
             for task in concurrent.futures.wait(
                     running, return_when=concurrent.futures.FIRST_COMPLETED).done:
                 mutant, by = running.pop(task), task.result()
-                if by:
-                    noticed += 1
-                elif by is not None:
-                    missed.append(mutant)
-                    print(mutant, flush=True)
+                if by is None:
+                    continue
+                noticed += by != ""
+                missed += [mutant] if by == "" else []
+                if options.all or by == "":
+                    print(mutant, f"\n  {by or 'NOT NOTICED'}", flush=True)
     total = noticed + len(missed)
     print(f"{noticed} of {total} mutants noticed ({noticed/max(total, 1):.0%})")
     return noticed < GOAL*total
+
+
+def read_options():
+    parser = argparse.ArgumentParser(description=__doc__.split("\n", maxsplit=1)[0])
+    parser.add_argument("--count", type=int, default=80, help="mutants that are tried")
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--since", metavar="COMMIT", help="lines changed since then; empty: all")
+    parser.add_argument("--folders", nargs="+", default=FOLDERS)
+    parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--all", action="store_true", help="print what is noticed too, and by what")
+    parser.add_argument("--try", dest="put", nargs=2, metavar=("FILE:LINE", "TEXT"))
+    return parser.parse_args()
+
+
+def begin(build, suites):
+    """Of each process that tries mutants."""
+    global trial
+    trial = Trial(build, suites)
+
+
+def attempt(mutant):
+    return trial.noticed_by(mutant)
 
 
 if __name__ == "__main__":
