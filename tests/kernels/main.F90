@@ -35,6 +35,7 @@ program main
    use test_element_kinds, only : collect_element_kinds
    use test_element_axial, only : collect_element_axial
    use test_element_space, only : collect_element_space
+   use test_explicit, only : collect_explicit
    use test_friction, only : collect_friction
    use test_gauss, only : collect_gauss
    use test_host_check, only : collect_host_check
@@ -206,6 +207,7 @@ program main
    call run("verdict", collect_verdict)
    call run("scheme", collect_scheme)
    call run("active_set", collect_active_set)
+   call run("explicit", collect_explicit)
    call run("march", collect_march)
    call run("march_contact", collect_march_contact)
    call run("ties", collect_ties)

@@ -1,0 +1,278 @@
+!> Explicit steps: the critical step beside dense matrices, what closed penalties stiffen, and steps
+!> of a block that penalties stop, whose pushes and momenta have closed forms.
+module test_explicit
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_condition_nodes, only : condition_resize
+   use emcon_constraints, only : constraint_set_t, constraints_select
+   use emcon_critical_step, only : critical_bound, critical_sharp
+   use emcon_errors, only : error_t
+   use emcon_explicit_soft, only : explicit_soft_widen
+   use emcon_kinds, only : dp, wp
+   use emcon_lapack, only : dense_eigen
+   use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
+      march_t
+   use emcon_numbering, only : add_to_dofs, pick_unknowns
+   use emcon_scene, only : scene_t
+   use emcon_scheme_registry, only : scheme_row
+   use emcon_steps, only : method_penalty
+   use emcon_system, only : system_t, system_tangent_times
+   use emcon_term_registry, only : terms_mass_values
+   use small_scenes, only : add_step, block_t, clamp, make_two_blocks, shake
+   use sparse_samples, only : dense_of
+   implicit none
+   private
+   public :: collect_explicit
+
+   real(wp), parameter :: eps = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+   real(wp), parameter :: h = 0.01_wp, gap_start = 0.0327_wp
+   !> Pressure by depth [M/(L T)^2].
+   real(wp), parameter :: stiffness = 500.0_wp
+   !> Nodes of the upper block's bottom and of the lower one's top, and the lengths that they have.
+   integer, parameter :: slave(3) = [11, 12, 13], master(5) = [6, 7, 8, 9, 10]
+   real(wp), parameter :: slave_length(3) = [0.5_wp, 1.0_wp, 0.5_wp]
+   real(wp), parameter :: master_length(5) = [0.5_wp, 1.0_wp, 1.0_wp, 1.0_wp, 0.5_wp]
+
+contains
+
+   subroutine collect_explicit(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("critical step, by dense matrices", test_critical), &
+         test_case_t("stiffness of closed pairs at nodes", test_limit), &
+         test_case_t("contacts that stiffen more than any before", test_widen), &
+         test_case_t("a block that penalties stop", test_drop)]
+   end subroutine collect_explicit
+
+   !> The upper block falls on the lower one, which is clamped or free; central differences.
+   subroutine begin(scene, is_clamped, march, error)
+      type(scene_t), intent(out) :: scene
+      logical, intent(in) :: is_clamped
+      type(march_t), intent(inout) :: march
+      type(error_t), allocatable, intent(out) :: error
+      type(block_t) :: lower, upper
+      integer :: i
+
+      call make_two_blocks(scene, gap_start, lower, upper)
+      call add_step(scene, .false., h, 40)
+      scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+      scene%step(1)%constraint_method = method_penalty
+      scene%step(1)%softness%stiffness = stiffness
+      if (is_clamped) call clamp(scene%step(1), [(i, i = 1, 10)])
+      scene%v0(2, 11:) = -1.0_wp
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+   end subroutine begin
+
+   !> 2/sqrt of the largest eigenvalue of M^-1 (K + S + sum of k c c^T); the bound is below it, and
+   !> is that of the fastest element and the stiffest node together.
+   subroutine test_critical(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(constraint_set_t) :: closed
+      real(wp) :: node_stiffness(16), limit, bound, sharp, alone
+      integer :: k, element, other
+      logical :: is_bounded
+
+      call begin(scene, .true., march, error)
+      if (allocated(error)) return
+      node_stiffness = 0.0_wp
+      call critical_bound(march%system, march%explicit%place, node_stiffness, alone, element, &
+         is_bounded)
+      node_stiffness([3, 12, 14]) = [1.0e6_wp, 300.0_wp, 150.0_wp]
+      call make_closed(closed)
+      do k = 1, 2
+         if (k == 1) then
+            call critical_sharp(march%system, march%explicit%place, node_stiffness, sharp, error)
+         else
+            call critical_sharp(march%system, march%explicit%place, node_stiffness, sharp, error, &
+               closed)
+         end if
+         if (.not. allocated(error)) call by_dense(march%system, k == 2, limit, error)
+         if (allocated(error)) return
+         call check_near(error, sharp, limit, 1.0e-6_wp, limit, "the critical step")
+         if (k == 1) call check_true(error, alone > sharp, "nodes stiffen")
+      end do
+      call critical_bound(march%system, march%explicit%place, node_stiffness, bound, other, &
+         is_bounded)
+      ! Of four elements of mass 1 around it in all: nodes 12 and 14 have 1/2 and 1/4.
+      call check_near(error, 4.0_wp/bound**2, 4.0_wp/alone**2 + 600.0_wp, sqrt(eps), &
+         4.0_wp/bound**2, "the bound")
+      call check_true(error, is_bounded .and. element == other .and. element >= 1, "the element")
+      call march_free(march)
+
+   contains
+
+      subroutine by_dense(system, has_closed, limit, error)
+         type(system_t), intent(inout) :: system
+         logical, intent(in) :: has_closed
+         real(wp), intent(out) :: limit
+         type(error_t), allocatable, intent(out) :: error
+         real(dp), allocatable :: value(:), root(:, :), square(:)
+         real(dp), dimension(system%space%numbering%n_unknown, &
+            system%space%numbering%n_unknown) :: matrix, mass
+         real(wp) :: way(2, 16), force(2, 16), q(system%space%numbering%n_unknown)
+         integer :: i, j, n
+
+         n = size(q)
+         do i = 1, n
+            q = 0.0_wp
+            q(i) = 1.0_wp
+            way = 0.0_wp
+            call add_to_dofs(system%space%numbering, q, 1.0_wp, way)
+            call system_tangent_times(system, march%explicit%place, way, force)
+            force = force + spread(node_stiffness, 1, 2)*way
+            if (has_closed) then
+               do j = 1, closed%n
+                  associate (item => closed%item(j))
+                     force(:, item%node(:3)) = force(:, item%node(:3)) + closed%soft(j)%stiffness &
+                        *sum(item%c(:, :3)*way(:, item%node(:3)))*item%c(:, :3)
+                  end associate
+               end do
+            end if
+            call pick_unknowns(system%space%numbering, force, q)
+            matrix(:, i) = real(q, dp)
+         end do
+         call terms_mass_values(system%term, value)
+         system%matrix%value = value
+         mass = dense_of(system%matrix)
+         call dense_eigen(mass, square, root, error)
+         if (allocated(error)) return
+         do i = 1, n
+            root(:, i) = root(:, i)/sqrt(square(i))
+         end do
+         deallocate(square)
+         matrix = matmul(transpose(root), matmul(matrix, root))
+         deallocate(root)
+         call dense_eigen(matrix, square, root, error)
+         if (.not. allocated(error)) limit = 2.0_wp/sqrt(real(square(n), wp))
+      end subroutine by_dense
+
+   end subroutine test_critical
+
+   !> Two conditions of random gradients over a node of the lower block, which is clamped, and two
+   !> free ones.
+   subroutine make_closed(closed)
+      type(constraint_set_t), intent(inout) :: closed
+      integer :: k
+
+      call constraints_select(closed, [1, 2])
+      allocate(closed%soft(2))
+      do k = 1, 2
+         call condition_resize(closed%item(k), 3)
+         closed%item(k)%n_node = 3
+         closed%item(k)%node(:3) = [7, 11, 11 + k]
+         call shake(closed%item(k)%c, 1.0_wp)
+         closed%item(k)%c = closed%item(k)%c + 2.0_wp
+         closed%soft(k)%stiffness = 100.0_wp*real(k, wp)
+      end do
+   end subroutine make_closed
+
+   !> Slave nodes by their own length, master nodes by theirs; twice both where both surfaces move.
+   subroutine test_limit(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: expected(16)
+      integer :: k
+
+      do k = 1, 2
+         expected = 0.0_wp
+         expected(slave) = stiffness*slave_length*real(k, wp)
+         expected(master) = stiffness*master_length*real(k, wp)
+         block
+            type(scene_t) :: scene
+            type(march_t) :: march
+
+            call begin(scene, k == 1, march, error)
+            if (allocated(error)) return
+            call check_near(error, march%explicit%stiffness, expected, 16.0_wp*eps, stiffness, &
+               "at nodes")
+            call march_free(march)
+         end block
+         if (allocated(error)) return
+      end do
+   end subroutine test_limit
+
+   !> A node is stiffened by k |c_i| times the sum of |c_j| over what moves. More than the most so
+   !> far is told once, as a tenth more is then allowed.
+   subroutine test_widen(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      real(wp) :: total(16), length(2)
+      logical :: has_grown
+      integer :: k
+
+      call begin(scene, .true., march, error)
+      if (allocated(error)) return
+      associate (soft => march%explicit%soft(march%explicit%i_start), met => march%explicit%met)
+         call explicit_soft_widen(march, has_grown)
+         call check_true(error, .not. has_grown, "none is closed")
+         call make_closed(soft)
+         total = 0.0_wp
+         do k = 1, 2
+            length = sqrt(sum(soft%item(k)%c(:, 2:3)**2, 1))
+            total(soft%item(k)%node(2:3)) = total(soft%item(k)%node(2:3)) &
+               + soft%soft(k)%stiffness*length*sum(length)
+         end do
+         met = total
+         call explicit_soft_widen(march, has_grown)
+         call check_true(error, .not. has_grown, "as much as before")
+         met(13) = 0.999_wp*total(13)
+         met(12) = 2.0_wp*total(12)
+         call explicit_soft_widen(march, has_grown)
+         call check_true(error, has_grown, "more than before")
+         total = 1.1_wp*total
+         total(12) = 2.0_wp/1.1_wp*total(12)
+         call check_near(error, met, total, 16.0_wp*eps, maxval(total), "the most")
+         met(13) = met(13)/1.11_wp
+         march%active%softness%is_at_ends = .false.
+         call explicit_soft_widen(march, has_grown)
+         call check_true(error, .not. has_grown, "not of other steps")
+      end associate
+      call march_free(march)
+   end subroutine test_widen
+
+   !> Slave nodes are pushed by stiffness times length times depth where a step ends; the momentum
+   !> changes by the mean of the pushes at both ends times h. What is stored comes back.
+   subroutine test_drop(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+      real(wp) :: before, momentum, push(3), scale, total, stored
+      integer :: k, n_closed
+
+      call begin(scene, .true., march, error)
+      if (allocated(error)) return
+      n_closed = 0
+      before = 0.0_wp
+      stored = 0.0_wp
+      total = march%ledger%total
+      scale = stiffness*gap_start
+      do k = 1, 40
+         momentum = march%ledger%momentum(2)
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         associate (state => march%state, ledger => march%ledger)
+            push = stiffness*slave_length*max(0.0_wp, -gap_start - state%u(2, slave))
+            call check_near(error, state%contact(2, slave), push, 64.0_wp*eps, scale, "pushes")
+            call check_near(error, ledger%momentum(2) - momentum, 0.5_wp*h*(before + sum(push)), &
+               64.0_wp*eps, abs(momentum) + 2.0_wp, "momentum")
+            stored = max(stored, ledger%contact_energy)
+            call check_near(error, ledger%contact_energy, 0.5_wp*sum(push**2 &
+               /(stiffness*slave_length)), 256.0_wp*eps, total, "stored")
+            call check_equal(error, increment%n_active, count(push > 0.0_wp), "closed contacts")
+            if (allocated(error)) return
+         end associate
+         before = sum(push)
+         if (before > 0.0_wp) n_closed = n_closed + 1
+      end do
+      call check_true(error, n_closed > 5 .and. .not. before > 0.0_wp, "it comes and goes")
+      call check_true(error, stored > 0.01_wp*total, "penalties store")
+      ! The step is a twentieth of the critical one: energy to its square, by what is stored.
+      call check_near(error, march%ledger%total, total, 0.02_wp, total, "energy")
+      call march_free(march)
+   end subroutine test_drop
+
+end module test_explicit
