@@ -38,6 +38,7 @@ program main
    use test_explicit, only : collect_explicit
    use test_friction, only : collect_friction
    use test_gauss, only : collect_gauss
+   use test_holding, only : collect_holding
    use test_host_check, only : collect_host_check
    use test_host_deck, only : collect_host_deck
    use test_host_force, only : collect_host_force
@@ -208,6 +209,7 @@ program main
    call run("scheme", collect_scheme)
    call run("active_set", collect_active_set)
    call run("explicit", collect_explicit)
+   call run("holding", collect_holding)
    call run("march", collect_march)
    call run("march_contact", collect_march_contact)
    call run("ties", collect_ties)
