@@ -35,6 +35,10 @@ program main
    use test_element_kinds, only : collect_element_kinds
    use test_element_axial, only : collect_element_axial
    use test_element_space, only : collect_element_space
+   use test_energy_watch, only : collect_energy_watch
+   use test_velocity_jumps, only : collect_velocity_jumps
+   use test_near_list, only : collect_near_list
+   use test_corner_tops, only : collect_corner_tops
    use test_explicit, only : collect_explicit
    use test_friction, only : collect_friction
    use test_gauss, only : collect_gauss
@@ -208,6 +212,10 @@ program main
    call run("verdict", collect_verdict)
    call run("scheme", collect_scheme)
    call run("active_set", collect_active_set)
+   call run("energy_watch", collect_energy_watch)
+   call run("velocity_jumps", collect_velocity_jumps)
+   call run("near_list", collect_near_list)
+   call run("corner_tops", collect_corner_tops)
    call run("explicit", collect_explicit)
    call run("holding", collect_holding)
    call run("march", collect_march)
