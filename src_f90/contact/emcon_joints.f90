@@ -11,6 +11,7 @@ module emcon_joints
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
+   use emcon_sort, only : find_sorted, unique_sorted
    implicit none
    private
    public :: chain_join
@@ -39,27 +40,22 @@ contains
       type(chain_t), intent(in) :: chain
       type(scene_t), intent(in) :: scene
       integer, allocatable, intent(out) :: joint(:, :)       !! (2, n)
-      integer, allocatable :: last(:), first(:)
-      logical, allocatable :: meets(:, :), is_slave(:)
-      integer :: i, j, k, n
+      integer :: partner(2, size(chain%node))    ! of an end, of a beginning; 0: none, -1: several
+      logical :: is_slave(size(chain%node))
+      integer :: i, k, n
 
-      associate (node_edge => chain%node_edge, all => [(k, k = 1, size(chain%node))])
-         last = pack(all, node_edge(1, :) > 0 .and. node_edge(2, :) == 0)
-         first = pack(all, node_edge(2, :) > 0 .and. node_edge(1, :) == 0)
-      end associate
-      allocate(meets(size(last), size(first)), source=.false.)
-      allocate(is_slave(size(chain%node)), source=.false.)
+      partner = 0
+      is_slave = .false.
       do k = 1, size(scene%tie)
-         call mark_tied(chain, scene, scene%tie(k), last, first, meets, is_slave)
+         call find_partners(chain, scene, scene%tie(k), partner, is_slave)
       end do
       n = 0
-      allocate(joint(2, size(last)))
-      do i = 1, size(last)
-         if (count(meets(i, :)) /= 1) cycle
-         j = findloc(meets(i, :), .true., 1)
-         if (count(meets(:, j)) /= 1) cycle
+      allocate(joint(2, count(partner(1, :) > 0)))
+      do i = 1, size(chain%node)
+         if (partner(1, i) <= 0) cycle
+         if (partner(2, partner(1, i)) <= 0) cycle
          n = n + 1
-         joint(:, n) = [min(last(i), first(j)), max(last(i), first(j))]
+         joint(:, n) = [min(i, partner(1, i)), max(i, partner(1, i))]
          if (is_slave(joint(1, n)) .and. .not. is_slave(joint(2, n))) then
             joint(:, n) = joint([2, 1], n)
          end if
@@ -67,55 +63,74 @@ contains
       joint = joint(:, :n)
    end subroutine find_joints
 
-   !> Which of the nodes `last`, where parts of `chain` end, does `tie` connect to which of `first`,
-   !> where parts begin? And which of them are on its slave side?
-   pure subroutine mark_tied(chain, scene, tie, last, first, meets, is_slave)
+   !> To which nodes, where parts of `chain` begin, does `tie` connect nodes where parts end? And
+   !> which of them are on its slave side?
+   pure subroutine find_partners(chain, scene, tie, partner, is_slave)
       type(chain_t), intent(in) :: chain
       type(scene_t), intent(in) :: scene
       type(tie_t), intent(in) :: tie
-      integer, intent(in) :: last(:), first(:)   !! indices into the nodes of the chain
-      logical, intent(inout) :: meets(:, :)      !! (size of last, size of first)
+      integer, intent(inout) :: partner(:, :)    !! (2, n_node) of an end, of a beginning
       logical, intent(inout) :: is_slave(:)      !! (n_node)
-      logical :: ends(2, size(last)), begins(2, size(first))     ! on its slave, its master side
+      integer, allocatable :: slave(:), master(:)
       integer :: i, j
 
-      ends(1, :) = is_on(scene, scene%surface(tie%slave), chain%node(last))
-      ends(2, :) = is_on(scene, scene%surface(tie%master), chain%node(last))
-      begins(1, :) = is_on(scene, scene%surface(tie%slave), chain%node(first))
-      begins(2, :) = is_on(scene, scene%surface(tie%master), chain%node(first))
-      is_slave(last) = is_slave(last) .or. ends(1, :)
-      is_slave(first) = is_slave(first) .or. begins(1, :)
-      do j = 1, size(first)
-         do i = 1, size(last)
-            if (.not. any(ends(:, i) .and. begins([2, 1], j))) cycle
-            meets(i, j) = meets(i, j) .or. is_near(chain, scene%x, tie%tolerance, last(i), first(j))
+      call open_nodes(chain, scene, scene%surface(tie%slave), slave)
+      is_slave(slave) = .true.
+      call open_nodes(chain, scene, scene%surface(tie%master), master)
+      do j = 1, size(master)
+         do i = 1, size(slave)
+            if (may_go_on(slave(i), master(j))) call note_partners(slave(i), master(j), partner)
+            if (may_go_on(master(j), slave(i))) call note_partners(master(j), slave(i), partner)
          end do
       end do
-   end subroutine mark_tied
 
-   !> Which of `node` are nodes of `surface`?
-   pure function is_on(scene, surface, node)
+   contains
+
+      !> Can a part that ends at node `last` go on at node `first`?
+      pure logical function may_go_on(last, first)
+         integer, intent(in) :: last, first
+
+         may_go_on = chain%node_edge(1, last) > 0 .and. chain%node_edge(2, first) > 0
+         if (may_go_on) may_go_on = is_near(chain, scene%x, tie%tolerance, last, first)
+      end function may_go_on
+
+   end subroutine find_partners
+
+   !> A part that ends at node `last` can go on at node `first`.
+   pure subroutine note_partners(last, first, partner)
+      integer, intent(in) :: last, first
+      integer, intent(inout) :: partner(:, :)    !! (2, n_node) as of `find_partners`
+
+      if (partner(1, last) == first .and. partner(2, first) == last) return
+      partner(1, last) = merge(first, -1, partner(1, last) == 0)
+      partner(2, first) = merge(last, -1, partner(2, first) == 0)
+   end subroutine note_partners
+
+   !> The nodes of `surface` at which parts of `chain` end or begin, as indices into its nodes.
+   pure subroutine open_nodes(chain, scene, surface, node)
+      type(chain_t), intent(in) :: chain
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
-      integer, intent(in) :: node(:)             !! of the scene
-      logical :: is_on(size(node))
+      integer, allocatable, intent(out) :: node(:)
       integer, allocatable :: edge(:, :)
-      integer :: i, k
+      integer :: i, k, n
 
-      is_on = .false.
       if (surface%is_nodal) then
-         do k = 1, size(node)
-            is_on(k) = any(surface%node == node(k))
-         end do
-         return
+         node = unique_sorted(surface%node)
+      else
+         call surface_edges(scene, surface, edge)
+         node = unique_sorted(reshape(edge, [size(edge)]))
       end if
-      call surface_edges(scene, surface, edge)
-      do i = 1, size(edge, 2)
-         do k = 1, size(node)
-            is_on(k) = is_on(k) .or. any(edge(:, i) == node(k))
-         end do
+      n = 0
+      do i = 1, size(node)
+         k = find_sorted(chain%node, node(i))
+         if (k == 0) cycle
+         if (count(chain%node_edge(:, k) > 0) /= 1) cycle
+         n = n + 1
+         node(n) = k
       end do
-   end function is_on
+      node = node(:n)
+   end subroutine open_nodes
 
    !> Is the end of a part at node `last` near the beginning of another at node `first`?
    pure logical function is_near(chain, x, tolerance, last, first)

@@ -5,10 +5,11 @@ module emcon_deck_check_surfaces
    use emcon_diagnostics, only : add_error, label_list
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
+   use emcon_sort, only : find_sorted, sort_order, unique_sorted
    use emcon_surface_edges, only : surface_edges
    implicit none
    private
-   public :: check_surfaces, mark_nodes, find_common_edges
+   public :: check_surfaces, mark_nodes, surface_nodes, find_common_edges
 
 contains
 
@@ -66,24 +67,25 @@ contains
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
       character(len=*), intent(in) :: title
-      integer, allocatable :: n_end(:, :)
-      logical, allocatable :: is_branch(:)
-      integer, allocatable :: edge(:, :)
-      integer :: i, k
+      integer, allocatable :: edge(:, :), ends(:), begins(:), branch(:)
 
-      allocate(n_end(2, size(scene%node_label)), source=0)
       call surface_edges(scene, surface, edge)
       if (any(edge == 0)) return
-      do i = 1, size(edge, 2)
-         do k = 1, 2
-            n_end(k, edge(k, i)) = n_end(k, edge(k, i)) + 1
-         end do
-      end do
-      is_branch = n_end(1, :) > 1 .or. n_end(2, :) > 1
-      if (any(is_branch)) call add_error(reader%log, surface%origin, title &
+      begins = edge(1, sort_order(edge(1, :)))
+      ends = edge(2, sort_order(edge(2, :)))
+      branch = unique_sorted([repeated(begins), repeated(ends)])
+      if (size(branch) > 0) call add_error(reader%log, surface%origin, title &
          // " is no chain of faces: more than two of them meet at node " &
-         // label_list(pack(scene%node_label, is_branch)))
+         // label_list(scene%node_label(branch)))
    end subroutine check_chain
+
+   !> What stands in the ascending `list` more than once.
+   pure function repeated(list)
+      integer, intent(in) :: list(:)
+      integer, allocatable :: repeated(:)
+
+      repeated = pack(list(2:), list(2:) == list(:size(list) - 1))
+   end function repeated
 
    !> Mark the nodes of a surface.
    pure subroutine mark_nodes(scene, surface, is_in)
@@ -100,27 +102,38 @@ contains
       end do
    end subroutine mark_nodes
 
+   !> The nodes of a surface, ascending.
+   pure subroutine surface_nodes(scene, surface, node)
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      integer, allocatable, intent(out) :: node(:)
+      integer, allocatable :: edge(:, :)
+
+      call surface_edges(scene, surface, edge)
+      node = unique_sorted([surface%node, pack(edge, spread(all(edge > 0, 1), 1, 2))])
+   end subroutine surface_nodes
+
    !> Which of the edges of `surface` belong to the surface `other` too, of edges or of nodes?
    pure subroutine find_common_edges(scene, surface, other, is_common)
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface, other
       logical, allocatable, intent(out) :: is_common(:)      !! (n_edge)
-      integer, allocatable :: edge(:, :), list(:, :), last(:)
-      logical, allocatable :: is_in(:)
-      integer :: i
+      integer, allocatable :: edge(:, :), list(:, :), first(:), node(:)
+      integer :: i, k
 
       call surface_edges(scene, surface, edge)
       call surface_edges(scene, other, list)
-      allocate(last(0:size(scene%node_label)), source=0)
-      do i = 1, size(list, 2)
-         last(list(1, i)) = list(2, i)
-      end do
-      allocate(is_in(size(scene%node_label)), source=.false.)
-      if (other%is_nodal) is_in(other%node) = .true.
-      allocate(is_common(size(edge, 2)))
+      list = list(:, sort_order(list(1, :)))
+      first = list(1, :)
+      allocate(node(0))
+      if (other%is_nodal) node = unique_sorted(other%node)
+      allocate(is_common(size(edge, 2)), source=.false.)
       do i = 1, size(is_common)
-         is_common(i) = all(edge(:, i) > 0)
-         if (is_common(i)) is_common(i) = last(edge(1, i)) == edge(2, i) .or. all(is_in(edge(:, i)))
+         if (any(edge(:, i) == 0)) cycle
+         k = find_sorted(first, edge(1, i))
+         if (k > 0) is_common(i) = list(2, k) == edge(2, i)
+         is_common(i) = is_common(i) .or. &
+            (find_sorted(node, edge(1, i)) > 0 .and. find_sorted(node, edge(2, i)) > 0)
       end do
    end subroutine find_common_edges
 

@@ -7,6 +7,7 @@ module emcon_deck_ties
       option_real, reader_t, refuse_option
    use emcon_deck_surfaces, only : get_surfaces
    use emcon_diagnostics, only : quoted
+   use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_scene, only : scene_t, where_text
    implicit none
    private
@@ -20,6 +21,7 @@ contains
       type(scene_t), intent(inout) :: scene
       type(tie_t), allocatable :: tie(:)
       type(tie_t) :: common
+      type(name_index_t) :: card_of, tie_of
       integer :: i, n, most
 
       most = 0
@@ -33,8 +35,8 @@ contains
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= "TIE") cycle
          call read_tie_options(reader, reader%card(i), common)
-         call check_name(reader, i, scene)
-         call read_tie_lines(reader, reader%card(i), scene, common, tie, n)
+         call check_name(reader, i, scene, card_of)
+         call read_tie_lines(reader, reader%card(i), scene, common, tie_of, tie, n)
       end do
       scene%tie = tie(:n)
    end subroutine read_ties
@@ -69,30 +71,32 @@ contains
    end subroutine read_tie_options
 
    !> The card `i` must not have the name of an earlier one.
-   subroutine check_name(reader, i, scene)
+   subroutine check_name(reader, i, scene, card_of)
       type(reader_t), intent(inout) :: reader
       integer, intent(in) :: i
       type(scene_t), intent(in) :: scene
+      type(name_index_t), intent(inout) :: card_of   !! the first card with a name
       character(len=:), allocatable :: name
       integer :: k
 
       name = option_name(reader%card(i), "NAME")
       if (name == "") return
-      do k = 1, i - 1
-         if (reader%card(k)%name /= "TIE") cycle
-         if (option_name(reader%card(k), "NAME") /= name) cycle
+      k = name_index_find(card_of, name)
+      if (k == 0) then
+         call name_index_put(card_of, name, i)
+      else
          call card_error(reader, reader%card(i), "tie " // name // " is defined twice; first at " &
             // where_text(scene, reader%card(k)%origin))
-         return
-      end do
+      end if
    end subroutine check_name
 
    !> Data lines: slave surface, master surface. Ties that are refused have no surfaces.
-   subroutine read_tie_lines(reader, card, scene, common, tie, n)
+   subroutine read_tie_lines(reader, card, scene, common, tie_of, tie, n)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(scene_t), intent(in) :: scene
       type(tie_t), intent(in) :: common
+      type(name_index_t), intent(inout) :: tie_of    !! ties by their surfaces, the lower one first
       type(tie_t), intent(inout) :: tie(:)
       integer, intent(inout) :: n
       type(data_t) :: data
@@ -107,7 +111,7 @@ contains
          call get_surfaces(reader, data, scene, tie(n)%slave, tie(n)%master)
          if (tie(n)%slave > 0 .and. tie(n)%master > 0) then
             call check_sides(reader, data, scene, tie(n))
-            if (data%ok) call check_repeated(reader, data, scene, tie(:n))
+            if (data%ok) call check_repeated(reader, data, scene, tie(:n), tie_of)
          end if
          if (data%ok) cycle
          tie(n)%slave = 0
@@ -140,22 +144,26 @@ contains
    end subroutine check_sides
 
    !> The last of `tie` must not be there already, in either order.
-   subroutine check_repeated(reader, data, scene, tie)
+   subroutine check_repeated(reader, data, scene, tie, tie_of)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
       type(scene_t), intent(in) :: scene
       type(tie_t), intent(in) :: tie(:)
-      integer :: i, n
+      type(name_index_t), intent(inout) :: tie_of
+      integer :: i
 
-      n = size(tie)
-      do i = 1, n - 1
-         if (.not. ((tie(i)%slave == tie(n)%slave .and. tie(i)%master == tie(n)%master) .or. &
-            (tie(i)%slave == tie(n)%master .and. tie(i)%master == tie(n)%slave))) cycle
-         call data_error(reader, data, "surfaces " // quoted(scene%surface(tie(n)%slave)%name) &
-            // " and " // quoted(scene%surface(tie(n)%master)%name) // " are tied twice; first " &
-            // "at " // where_text(scene, tie(i)%origin))
-         return
-      end do
+      associate (slave => tie(size(tie))%slave, master => tie(size(tie))%master)
+         associate (name => name_index_pair(min(slave, master), max(slave, master)))
+            i = name_index_find(tie_of, name)
+            if (i == 0) then
+               call name_index_put(tie_of, name, size(tie))
+            else
+               call data_error(reader, data, "surfaces " // quoted(scene%surface(slave)%name) &
+                  // " and " // quoted(scene%surface(master)%name) // " are tied twice; first " &
+                  // "at " // where_text(scene, tie(i)%origin))
+            end if
+         end associate
+      end associate
    end subroutine check_repeated
 
 end module emcon_deck_ties

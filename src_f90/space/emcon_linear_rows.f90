@@ -32,6 +32,7 @@ contains
    pure subroutine linear_rows_init(self, scene)
       type(linear_rows_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
+      real(wp) :: extent
       integer :: t, k, n, n_dim, most
 
       n_dim = size(scene%x, 1)
@@ -54,8 +55,10 @@ contains
       allocate(self%start(self%n + 1), self%dof(most), source=0)
       allocate(self%size(self%n), self%weight(most), source=0.0_wp)
       n = 0
+      extent = 0.0_wp
+      if (self%n > 0) extent = maxval(maxval(scene%x, 2) - minval(scene%x, 2))
       do k = 1, size(scene%rigid)
-         call add_rigid(self, scene, k, n)
+         call add_rigid(self, scene, k, extent, n)
       end do
       do t = 1, size(scene%tie)
          call add_tie(self, scene, t, n)
@@ -65,7 +68,7 @@ contains
          associate (equation => scene%equation(k))
             self%place(n) = k
             self%own(n) = n_dim*(equation%node(1) - 1) + equation%dof(1)
-            self%size(n) = maxval(maxval(scene%x, 2) - minval(scene%x, 2))
+            self%size(n) = extent
             call add_row(self, n, n_dim*(equation%node - 1) + equation%dof, &
                equation%coefficient/maxval(abs(equation%coefficient)))
          end associate
@@ -115,15 +118,15 @@ contains
 
    !> Append the rows of rigid body `b` behind row `n`: nodes follow its frame, and arms are what
    !> its frame moves by less its reference node.
-   pure subroutine add_rigid(self, scene, b, n)
+   pure subroutine add_rigid(self, scene, b, extent, n)
       type(linear_rows_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: b
+      real(wp), intent(in) :: extent             !! of the scene [L]
       integer, intent(inout) :: n
-      real(wp) :: weight(size(scene%x, 1) + 1), extent
+      real(wp) :: weight(size(scene%x, 1) + 1)
       integer :: i
 
-      extent = maxval(maxval(scene%x, 2) - minval(scene%x, 2))
       associate (body => scene%rigid(b), n_dim => size(scene%x, 1))
          do i = 1, size(body%node)
             if (any(body%frame == body%node(i))) cycle
