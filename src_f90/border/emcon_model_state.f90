@@ -6,7 +6,7 @@ module emcon_model_state
    use emcon_kinds, only : dp, wp
    use emcon_model, only : model_t
    use emcon_quantities, only : contact_quantity
-   use emcon_report_row, only : report_row_t, rows_json
+   use emcon_report_row, only : report_rows_t, rows_json
    use emcon_scene_report, only : scene_report
    use emcon_stepper, only : stepper_fraction, stepper_is_done
    use emcon_text, only : to_upper
@@ -94,7 +94,7 @@ contains
    subroutine model_report(model, json)
       type(model_t), intent(inout) :: model
       character(len=:), allocatable, intent(out) :: json
-      type(report_row_t), allocatable :: rows(:)
+      type(report_rows_t) :: rows
 
       call scene_report(model%stepper, rows)
       call rows_json(rows, json)

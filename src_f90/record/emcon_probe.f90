@@ -9,7 +9,7 @@ module emcon_probe
    use emcon_march, only : increment_t
    use emcon_march_grid, only : march_count_increments
    use emcon_recorder, only : recorder_close, recorder_open, recorder_t, recorder_write
-   use emcon_report_row, only : report_row_t, row_begin, row_put, rows_add
+   use emcon_report_row, only : report_row_t, report_rows_t, row_begin, row_put, rows_add
    use emcon_stepper, only : stepper_advance, stepper_is_done, stepper_t
    use emcon_text, only : to_text
    use emcon_timer, only : cpu_seconds
@@ -48,7 +48,7 @@ contains
    !> Let `stepper` make increments, and tell what all of them will take. It is of no use after.
    subroutine probe_cost(stepper, rows)
       type(stepper_t), intent(inout) :: stepper  !! before its first increment
-      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_rows_t), intent(inout) :: rows
       type(error_t), allocatable :: error
       type(recorder_t) :: recorder
       type(probe_t) :: probe
@@ -85,7 +85,7 @@ contains
    !> A body that the probe has bent, of elements that are too stiff for it.
    subroutine advise_bending(stepper, rows)
       type(stepper_t), intent(in) :: stepper
-      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_rows_t), intent(inout) :: rows
       type(bent_body_t) :: found
       type(report_row_t) :: row
 

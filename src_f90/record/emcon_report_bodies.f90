@@ -5,7 +5,7 @@ module emcon_report_bodies
    use emcon_law, only : law_response_plane, law_response_t
    use emcon_law_registry, only : law_given, law_rows
    use emcon_locking, only : locking_ratio
-   use emcon_report_row, only : report_row_t, row_begin, row_put, rows_add
+   use emcon_report_row, only : report_row_t, report_rows_t, row_begin, row_put, rows_add
    use emcon_rotation, only : n_turn
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
@@ -196,7 +196,7 @@ contains
    subroutine bodies_rows(scene, body, rows)
       type(scene_t), intent(in) :: scene
       type(body_t), intent(in) :: body(:)
-      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_rows_t), intent(inout) :: rows
       type(report_row_t) :: row
       character(len=:), allocatable :: kind, name
       integer :: i

@@ -2,16 +2,22 @@
 module emcon_report_row
    use emcon_json, only : json_number, json_text
    use emcon_kinds, only : wp
-   use emcon_text, only : to_text
+   use emcon_text, only : note_add, notes_t, to_text
    implicit none
    private
-   public :: report_row_t, row_begin, row_put, rows_add, rows_json
+   public :: report_row_t, report_rows_t, row_begin, row_put, rows_add, rows_json
 
    type :: report_row_t
       character(len=:), allocatable :: kind      !! under which JSON lists it
       character(len=:), allocatable :: text
       character(len=:), allocatable :: json      !! of an object, without the last brace
    end type report_row_t
+
+   !> Rows, with room for more.
+   type :: report_rows_t
+      integer :: n = 0
+      type(report_row_t), allocatable :: row(:)  !! the first n count
+   end type report_rows_t
 
    !> Append a figure or a word: `pattern` is its text, with # where the value stands; empty: it is
    !> in JSON alone.
@@ -67,42 +73,90 @@ contains
       if (i > 0) row%text = row%text // pattern(:i - 1) // value // pattern(i + 1:)
    end subroutine append
 
+   !> Append `row`, which is empty after.
    pure subroutine rows_add(rows, row)
-      type(report_row_t), allocatable, intent(inout) :: rows(:)
-      type(report_row_t), intent(in) :: row
+      type(report_rows_t), intent(inout) :: rows
+      type(report_row_t), intent(inout) :: row
       type(report_row_t), allocatable :: grown(:)
+      integer :: i
 
-      allocate(grown(size(rows) + 1))
-      grown(:size(rows)) = rows
-      grown(size(grown)) = row
-      call move_alloc(grown, rows)
+      if (.not. allocated(rows%row)) allocate(rows%row(16))
+      if (rows%n == size(rows%row)) then
+         allocate(grown(2*rows%n))
+         do i = 1, rows%n
+            call move_row(rows%row(i), grown(i))
+         end do
+         call move_alloc(grown, rows%row)
+      end if
+      rows%n = rows%n + 1
+      call move_row(row, rows%row(rows%n))
    end subroutine rows_add
+
+   pure subroutine move_row(from, to)
+      type(report_row_t), intent(inout) :: from, to
+
+      call move_alloc(from%kind, to%kind)
+      call move_alloc(from%text, to%text)
+      call move_alloc(from%json, to%json)
+   end subroutine move_row
 
    !> All rows as one JSON object: under each kind a list.
    pure subroutine rows_json(rows, line)
-      type(report_row_t), intent(in) :: rows(:)
+      type(report_rows_t), intent(in) :: rows
       character(len=:), allocatable, intent(out) :: line
-      character(len=:), allocatable :: member
-      logical :: is_done(size(rows))
-      integer :: i, j
+      type(notes_t) :: lists
+      logical :: is_done(rows%n)
+      integer :: i
 
       is_done = .false.
-      line = "{"
-      do i = 1, size(rows)
-         if (is_done(i)) cycle
-         if (i > 1) line = line // ", "
-         line = line // '"' // rows(i)%kind // '": ['
-         do j = i, size(rows)
-            if (rows(j)%kind /= rows(i)%kind) cycle
-            if (j > i) line = line // ", "
-            member = rows(j)%json
-            call json_text(member, "text", rows(j)%text)
-            line = line // member // "}"
-            is_done(j) = .true.
-         end do
-         line = line // "]"
+      do i = 1, rows%n
+         if (.not. is_done(i)) call list_kind(rows, i, is_done, lists)
       end do
+      line = "{"
+      call append_joined(line, lists)
       line = line // "}"
    end subroutine rows_json
+
+   !> Note the JSON of row `i` and of all behind it of its kind, `is_done` then, as one list.
+   pure subroutine list_kind(rows, i, is_done, lists)
+      type(report_rows_t), intent(in) :: rows
+      integer, intent(in) :: i
+      logical, intent(inout) :: is_done(:)
+      type(notes_t), intent(inout) :: lists
+      type(notes_t) :: members
+      character(len=:), allocatable :: text
+      integer :: j
+
+      do j = i, rows%n
+         if (rows%row(j)%kind /= rows%row(i)%kind) cycle
+         text = rows%row(j)%json
+         call json_text(text, "text", rows%row(j)%text)
+         call note_add(members, text // "}")
+         is_done(j) = .true.
+      end do
+      text = '"' // rows%row(i)%kind // '": ['
+      call append_joined(text, members)
+      call note_add(lists, text // "]")
+   end subroutine list_kind
+
+   !> Append `parts`, with commas between, in one go.
+   pure subroutine append_joined(text, parts)
+      character(len=:), allocatable, intent(inout) :: text
+      type(notes_t), intent(in) :: parts
+      character(len=:), allocatable :: joined
+      integer :: i, n
+
+      n = len(text) + sum([(len(parts%item(i)%text), i = 1, parts%n)]) + 2*max(0, parts%n - 1)
+      allocate(character(len=n) :: joined)
+      joined(:len(text)) = text
+      n = len(text)
+      do i = 1, parts%n
+         if (i > 1) joined(n + 1:n + 2) = ", "
+         if (i > 1) n = n + 2
+         joined(n + 1:n + len(parts%item(i)%text)) = parts%item(i)%text
+         n = n + len(parts%item(i)%text)
+      end do
+      call move_alloc(joined, text)
+   end subroutine append_joined
 
 end module emcon_report_row

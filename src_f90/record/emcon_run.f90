@@ -19,7 +19,7 @@ module emcon_run
    use emcon_phases, only : n_phase, phase_eliminate, phase_gaps, phase_judge, phase_search, &
       phases_seconds, phases_start
    use emcon_probe, only : probe_cost
-   use emcon_report_row, only : report_row_t, rows_json
+   use emcon_report_row, only : report_rows_t, rows_json
    use emcon_run_log, only : log_increment, log_start, model_lines
    use emcon_run_watch, only : run_watch_t
    use emcon_run_phases, only : part_march, part_output, part_read, run_parts_mark, run_parts_t, &
@@ -91,7 +91,7 @@ contains
       type(run_report_t), intent(out) :: report
       type(error_t), allocatable, intent(out) :: error
       type(run_t), allocatable :: run
-      type(report_row_t), allocatable :: rows(:)
+      type(report_rows_t) :: rows
       type(notes_t) :: lines
       character(len=:), allocatable :: json
       integer :: k
@@ -110,8 +110,8 @@ contains
          call rows_json(rows, json)
          call note_add(lines, json)
       else
-         do k = 1, size(rows)
-            call note_add(lines, rows(k)%text)
+         do k = 1, rows%n
+            call note_add(lines, rows%row(k)%text)
          end do
       end if
       report%closing = lines%item(:lines%n)

@@ -8,7 +8,7 @@ module emcon_run_log
    use emcon_log, only : log_line, log_lines, log_t
    use emcon_march, only : increment_t
    use emcon_options, only : option_text
-   use emcon_report_row, only : report_row_t
+   use emcon_report_row, only : report_rows_t
    use emcon_scene, only : scene_t
    use emcon_scene_report, only : scene_report
    use emcon_scheme_registry, only : scheme_given
@@ -31,7 +31,7 @@ contains
       type(stepper_t), intent(inout) :: stepper
       type(string_t), intent(in) :: diagnostic(:)    !! of the deck
       character(len=*), intent(in) :: path
-      type(report_row_t), allocatable :: rows(:)
+      type(report_rows_t) :: rows
       integer :: k
 
       call log_line(log, "EMCON " // version // ", " // trim(precision_names(this_precision)) &
@@ -40,8 +40,8 @@ contains
       call log_lines(log, "", notes_t(size(diagnostic), diagnostic))
       call log_lines(log, "", model_notes(stepper))
       call scene_report(stepper, rows)
-      do k = 1, size(rows)
-         call log_line(log, rows(k)%text)
+      do k = 1, rows%n
+         call log_line(log, rows%row(k)%text)
       end do
       call log_line(log, "")
       call log_line(log, " increment          time             h newton cuts active" // &

@@ -10,7 +10,7 @@ module emcon_scene_report
    use emcon_options, only : option_text
    use emcon_pose, only : pose_at_end
    use emcon_report_bodies, only : bodies_find, bodies_rows, body_t
-   use emcon_report_row, only : report_row_t, row_begin, row_put, rows_add
+   use emcon_report_row, only : report_row_t, report_rows_t, row_begin, row_put, rows_add
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_steps, only : initiation_massless, initiation_persistent, initiation_velocity_update
@@ -32,10 +32,9 @@ contains
    !> The report, before the first increment.
    subroutine scene_report(stepper, rows)
       type(stepper_t), intent(inout) :: stepper
-      type(report_row_t), allocatable, intent(out) :: rows(:)
+      type(report_rows_t), intent(out) :: rows
       type(body_t), allocatable :: body(:)
 
-      allocate(rows(0))
       call bodies_find(stepper, body)
       call bodies_rows(stepper%scene, body, rows)
       call add_pairs(stepper, rows)
@@ -51,7 +50,7 @@ contains
    !> A row for each pair, as the history counts them.
    subroutine add_pairs(stepper, rows)
       type(stepper_t), intent(inout) :: stepper
-      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_rows_t), intent(inout) :: rows
       type(gap_state_t), allocatable :: gap(:)
       type(report_row_t) :: row
       logical, allocatable :: is_of(:)
@@ -117,7 +116,7 @@ contains
    !> A row for each tie.
    subroutine add_ties(scene, rows)
       type(scene_t), intent(in) :: scene
-      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_rows_t), intent(inout) :: rows
       type(report_row_t) :: row
       integer :: k
 
@@ -134,7 +133,7 @@ contains
    !> What of the program the scene needs, and what is off, and why.
    subroutine add_choices(stepper, rows)
       type(stepper_t), intent(in) :: stepper
-      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_rows_t), intent(inout) :: rows
       logical :: is_dynamic
 
       associate (scene => stepper%scene, system => stepper%march%system, &
@@ -189,7 +188,7 @@ contains
    !> Unknowns before and after elimination, and entries of the matrix.
    subroutine add_sizes(stepper, rows)
       type(stepper_t), intent(in) :: stepper
-      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_rows_t), intent(inout) :: rows
       type(report_row_t) :: row
 
       associate (space => stepper%march%system%space, matrix => stepper%march%system%matrix)
@@ -207,7 +206,7 @@ contains
    subroutine add_increment(stepper, body, rows)
       type(stepper_t), intent(in) :: stepper
       type(body_t), intent(in) :: body(:)
-      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_rows_t), intent(inout) :: rows
       type(report_row_t) :: row
       real(wp) :: transit
       integer :: k
@@ -241,7 +240,7 @@ contains
    !> Bodies so stiff that they may be rigid.
    subroutine advise_rigid(body, rows)
       type(body_t), intent(in) :: body(:)
-      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_rows_t), intent(inout) :: rows
       type(report_row_t) :: row
       logical :: is_elastic(size(body))
       real(wp) :: softest
@@ -269,7 +268,7 @@ contains
    subroutine advise_locking(solid, body, rows)
       type(solid_t), intent(in) :: solid
       type(body_t), intent(in) :: body(:)
-      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_rows_t), intent(inout) :: rows
       type(report_row_t) :: row
       integer :: i
 
@@ -287,7 +286,7 @@ contains
    subroutine advise_massless(scene, body, rows)
       type(scene_t), intent(in) :: scene
       type(body_t), intent(in) :: body(:)
-      type(report_row_t), allocatable, intent(inout) :: rows(:)
+      type(report_rows_t), intent(inout) :: rows
       type(report_row_t) :: row
       real(wp) :: transit
       integer :: k
