@@ -138,7 +138,9 @@ class Run:
     @functools.cached_property
     def history(self):
         """NAME.csv as a structured array, one row per increment."""
-        return np.atleast_1d(np.genfromtxt(self.file(".csv"), delimiter=",", names=True))
+        with self.file(".csv").open() as file:
+            columns = [(name, float) for name in file.readline().strip().split(",")]
+            return np.loadtxt(file, columns, delimiter=",", ndmin=1)
 
     def digits(self, pairs=True):
         """The columns of NAME.csv as they are written, all but `cpu`, for comparison bit by bit;
@@ -168,12 +170,17 @@ class Run:
             group = file["sets"][place]
             return group[f"{variable}_time"][:], group[variable][:]
 
-    def fields(self):
+    @functools.cached_property
+    def _fields(self):
         return Fields(self.file(".vtkhdf"))
+
+    def fields(self):
+        """NAME.vtkhdf, read once."""
+        return self._fields
 
 
 class Fields:
-    """The field file, all of it: times, `x` (n_node, n_dim) and fields (n_frame, n, n_component)."""
+    """The field file: times, `x` (n_node, n_dim) and fields (n_frame, n, n_component)."""
 
     #: Cells of three dimensions.
     SPACE = (10, 12, 24, 25)
@@ -190,9 +197,15 @@ class Fields:
             self._data = {}
             for kind in ("PointData", "CellData"):
                 n = len(self.x) if kind == "PointData" else len(self.cells)
+                starts = steps[f"{kind}Offsets"]
                 for name, values in root[kind].items():
-                    start = steps[f"{kind}Offsets"][name][:n_frame]
-                    self._data[name] = np.array([values[k : k + n] for k in start])
+                    # Frames that follow one another are read at once.
+                    first = starts[name][:n_frame]
+                    rows = (first[:, None] + np.arange(n)).ravel()
+                    whole = values[:]
+                    if not np.array_equal(rows, np.arange(len(whole))):
+                        whole = whole[rows]
+                    self._data[name] = whole.reshape(n_frame, n, *whole.shape[1:])
 
     def names(self):
         return set(self._data)

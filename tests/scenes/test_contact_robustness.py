@@ -141,32 +141,28 @@ def depths(scene, run):
                             for k, face in block.side["A"]
                             for nodes, f in [(block.element[k], int(face[1]) - 1)]]) - 1
             for name, block in scene.block.items()}
-    found = np.zeros(len(fields.time))
-    for frame, u in enumerate(fields["displacement"]):
-        q = fields.x + u
-        for here in edge:
-            for there in edge:
-                if here != there:
-                    points = q[np.unique(edge[here])]
-                    longest = max(np.hypot(*np.diff(q[edge[k]], axis=1)[:, 0].T).max()
-                                  for k in (here, there))
-                    depth = depth_inside(points, q[edge[there]])/longest
-                    found[frame] = max(found[frame], depth)
+    q = fields.x + fields["displacement"]
+    longest = {name: np.linalg.norm(np.diff(q[:, pairs], axis=2)[:, :, 0], axis=2).max(axis=1)
+               for name, pairs in edge.items()}
+    found = np.zeros(len(q))
+    for here in edge:
+        for there in edge:
+            if here != there:
+                depth = depth_inside(q[:, np.unique(edge[here])], q[:, edge[there]])
+                found = np.maximum(found, depth/np.maximum(longest[here], longest[there]))
     return found
 
 
 def depth_inside(points, edge):
-    """Largest distance from the outline `edge` (n, 2, 2) of the points inside it."""
-    a, d = edge[:, 0], edge[:, 1] - edge[:, 0]
-    deepest = 0.0
-    for p in points:
-        b = p - a
-        crosses = (a[:, 1] > p[1]) != (edge[:, 1, 1] > p[1])
-        rise = np.where(crosses, d[:, 1], 1.0)
-        if (crosses & (b[:, 0] < b[:, 1]*d[:, 0]/rise)).sum() % 2 == 1:
-            share = np.clip((b*d).sum(axis=1)/(d*d).sum(axis=1), 0, 1)
-            deepest = max(deepest, np.hypot(*(b - share[:, None]*d).T).min())
-    return deepest
+    """Largest distance from outlines `edge` (m, n, 2, 2) of the `points` (m, k, 2) inside them: (m)."""
+    p, a, e = points[:, :, None], edge[:, None, :, 0], edge[:, None, :, 1]
+    b, d = p - a, e - a
+    crosses = (a[..., 1] > p[..., 1]) != (e[..., 1] > p[..., 1])
+    rise = np.where(crosses, d[..., 1], 1.0)
+    inside = (crosses & (b[..., 0] < b[..., 1]*d[..., 0]/rise)).sum(axis=2) % 2 == 1
+    share = np.clip((b*d).sum(axis=3)/(d*d).sum(axis=3), 0, 1)
+    away = np.linalg.norm(b - share[..., None]*d, axis=3).min(axis=2)
+    return np.where(inside, away, 0.0).max(axis=1)
 
 
 def assert_sound(scene, run, initiation="PERSISTENT", deepest=0.5):
