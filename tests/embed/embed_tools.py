@@ -42,13 +42,3 @@ def build(compiler: str, source: Path, program: Path, env: dict[str, str], *opti
     flags = run("pkg-config", "--cflags", "--libs", "emcon", env=env).split()
     run(compiler, *WARNINGS, *options, source, "-o", program, *flags, "-lm", env=env,
         cwd=program.parent)
-
-
-def check_memory(env: dict[str, str], *command: object) -> None:
-    """No invalid access, and no bytes lost."""
-    if SANITIZED:
-        run(*command, env=env)
-        return
-    need("valgrind")
-    run("valgrind", "--leak-check=full", "--errors-for-leak-kinds=definite", "--error-exitcode=9",
-        "--quiet", *command, env=env)

@@ -10,7 +10,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from embed_tools import API, HERE, ROOT, SANITIZED, build, check_memory, run
+from embed_tools import API, HERE, ROOT, SANITIZED, build, run
 
 sys.path.insert(0, str(ROOT/"pywrap"))
 
@@ -60,13 +60,6 @@ def test_threads_in_cpp(installed: dict[str, str], tmp_path: Path) -> None:
     program = tmp_path/"two_models"
     build("c++", HERE/"two_models.cpp", program, installed, "-std=c++11", "-pthread")
     assert "no such file" in run(program, RING, env=installed)
-
-
-def test_c_loses_no_memory(impact: Path, installed: dict[str, str]) -> None:
-    """Of models of all formulations, one after the other."""
-    check_memory(installed, impact, RING,
-                 *(f"h=0.1\nt_end=0.2\nformulation={formulation}"
-                   for formulation in ("NODE TO SURFACE", "MORTAR", "SEGMENT")))
 
 
 @pytest.mark.skipif(SANITIZED, reason="Python cannot load such a library")

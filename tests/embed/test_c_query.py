@@ -6,7 +6,7 @@ import re
 from pathlib import Path
 
 import pytest
-from embed_tools import API, HERE, ROOT, WARNINGS, build, check_memory, need, run
+from embed_tools import API, HERE, ROOT, WARNINGS, build, need, run
 
 DECKS = ROOT/"input_decks"
 HEADER = (API/"emcon.h").read_text(encoding="utf-8")
@@ -92,10 +92,6 @@ def test_null_space_is_orthogonal_to_gradients(
     assert max(of_p, of_df) <= 100*EPS*terms
 
 
-def test_query_loses_no_memory(query: Path, installed: dict[str, str]) -> None:
-    check_memory(installed, query, DECKS/"bouncing_bar.inp")
-
-
 def test_wrong_calls_are_told(bad_calls: Path, installed: dict[str, str], tmp_path: Path) -> None:
     text = run(bad_calls, DECKS/"bouncing_bar.inp", tmp_path, env=installed)
     calls = re.findall(r"^(emcon_\w+)\|(\d+)\|(.*(?:\n(?!emcon_).*)*)$", text, re.MULTILINE)
@@ -108,12 +104,6 @@ def test_wrong_calls_are_told(bad_calls: Path, installed: dict[str, str], tmp_pa
     for (name, code, message), pattern in zip(calls, expected):
         assert int(code) == CODES.get(pattern, 2), (name, message)
         assert re.search(pattern, message) if pattern else message == "", (name, message)
-
-
-def test_wrong_calls_lose_no_memory(
-    bad_calls: Path, installed: dict[str, str], tmp_path: Path
-) -> None:
-    check_memory(installed, bad_calls, DECKS/"bouncing_bar.inp", tmp_path)
 
 
 def structures() -> dict[str, list[str]]:

@@ -9,7 +9,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from embed_tools import HERE, ROOT, build, check_memory, run
+from embed_tools import HERE, ROOT, build, run
 
 EPS = 2.0**-52
 # Steps, and freedoms of the 39 nodes: each step adds roundings of a sum over them.
@@ -88,13 +88,6 @@ def test_energy_is_kept(
     assert c[:, 3].max() > 0.05*total and c[:, 4].max() > 0.2*total
 
 
-@pytest.mark.parametrize("language", ["c", "fortran"])    # C++ compiles the source of C
-def test_hosts_lose_no_memory(
-    hosts: dict[str, Path], installed: dict[str, str], language: str
-) -> None:
-    check_memory(installed, hosts[language], "MORTAR", "0.05")
-
-
 def test_hosts_are_told_what_is_wrong(hosts: dict[str, Path], installed: dict[str, str]) -> None:
     for program in hosts.values():
         with pytest.raises(AssertionError, match="error 2: .*solid:.*unknown.*FRICTIONAL"):
@@ -116,12 +109,6 @@ def test_what_cannot_be_given(bad: Path, installed: dict[str, str], tmp_path: Pa
     for (code, message), (wanted, pattern) in zip(calls, expected):
         assert int(code) == wanted, message
         assert re.search(pattern, message) if pattern else message == "", message
-
-
-def test_what_cannot_be_given_loses_no_memory(
-    bad: Path, installed: dict[str, str], tmp_path: Path
-) -> None:
-    check_memory(installed, bad, tmp_path/"given.h5")
 
 
 def examples(language: str) -> list[str]:

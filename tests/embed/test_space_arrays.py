@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from embed_tools import HERE, ROOT, build, check_memory
+from embed_tools import ROOT
 
 sys.path[:0] = [str(ROOT/"pywrap"), str(ROOT/"tests"/"scenes")]
 
@@ -39,13 +39,6 @@ def deck(folder: Path, text: str) -> Path:
     path = folder/"block.inp"
     path.write_text(text)
     return path
-
-
-def test_arrays_of_exact_size(installed: dict[str, str], tmp_path: Path) -> None:
-    """As in the plane, with three numbers per node."""
-    program = tmp_path/"exact_arrays"
-    build("cc", HERE/"exact_arrays.c", program, installed, "-std=c99")
-    check_memory(installed, program, deck(tmp_path, flight("C3D8")))
 
 
 @pytest.mark.parametrize("kind", KINDS)
