@@ -144,20 +144,48 @@ LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(MUMPS_LIBS) $(LAPACK_LIBS)
 # Of the compiler: threads.
 THREAD_LIBS := -lgomp
 
+# Flags of a release by the build tags of sources, `! build: lanes`: module_order.py reads them.
+
+# What holds whole models and computes nothing: optimising how those are freed takes half of the
+# time of the library.
+FFLAGS_OF_holder := -O0 -g1
+
+# Loops over points side by side: a law in numbers that the compiler takes apart, so that it sees the
+# whole of it at once. No sum over lanes, no fused product: with any VECTOR=... the bits are the same.
+FFLAGS_OF_lanes := -O3 -g1 -fopenmp-simd -fno-trapping-math \
+	-fno-semantic-interposition -Wno-unused-function -finline-limit=1000000 \
+	$(addprefix --param ,inline-unit-growth=100000 large-function-growth=1000000 \
+	large-stack-frame=1000000 max-completely-peel-times=32 max-completely-peeled-insns=2000 \
+	sra-max-propagations=1000 sra-max-scalarization-size-Ospeed=2000) $(VECTOR)
+
+# Loops over all unknowns in each correction, several at a time: the bits are the same here too.
+FFLAGS_OF_streams := -O3 -g1 -fopenmp-simd $(VECTOR)
+
+# Numbers with many derivatives, added and multiplied term by term: several terms at a time.
+# -Wno-zerotrip: those without second derivatives have loops over none.
+FFLAGS_OF_derivatives := -O3 -g1 -Wno-zerotrip $(VECTOR)
+# Loops over eight of them are vectors of the unit's length only if nobody unrolls them before.
+FFLAGS_OF_eight := $(FFLAGS_OF_derivatives) --param max-completely-peel-times=3
+
+TAGS := $(sort $(patsubst FFLAGS_OF_%,%,$(filter FFLAGS_OF_%,$(.VARIABLES))))
+
 # Kept beside the objects, and written only where they differ: what stands on them is made anew.
 # Read by cat: $(file <...) of GNU make 4.3 loses text when its buffer has to grow.
 ifdef COMPILER
 $(shell mkdir -p $(O) $(BUILD)/mod)
-FLAGS := $(strip $(COMPILER) $(FCOMPILE) $(VECTOR) $(CCOMPILE) $(LIBS))
-ifneq ($(shell cat $(BUILD)/flags.txt 2> /dev/null),$(FLAGS))
-$(file >$(BUILD)/flags.txt,$(FLAGS))
+define stored
+ifneq ($$(shell cat $(1) 2> /dev/null),$$(strip $$($(2))))
+$$(file >$(1),$$(strip $$($(2))))
 endif
-ifneq ($(shell cat $(BUILD)/sources.txt 2> /dev/null),$(strip $(SRC) $(INC)))
-$(file >$(BUILD)/sources.txt,$(strip $(SRC) $(INC)))
-endif
+endef
+FLAGS := $(COMPILER) $(FCOMPILE) $(VECTOR) $(CCOMPILE) $(LIBS)
+READ := $(SRC) $(INC)
+$(eval $(call stored,$(BUILD)/flags.txt,FLAGS))
+$(eval $(call stored,$(BUILD)/sources.txt,READ))
+$(foreach tag,$(TAGS),$(eval $(call stored,$(BUILD)/flags_$(tag).txt,FFLAGS_OF_$(tag))))
 
-$(BUILD)/order.mk: src_f90/module_order.py $(SRC) $(INC) $(BUILD)/sources.txt
-	@$(PYTHON) $< $(O) $(BUILD)/mod $(SRC) > $@.$$$$ && mv $@.$$$$ $@
+$(BUILD)/order.mk: src_f90/module_order.py $(SRC) $(INC) $(BUILD)/sources.txt Makefile
+	@$(PYTHON) $< $(O) $(BUILD)/mod '$(TAGS)' $(SRC) > $@.$$$$ && mv $@.$$$$ $@
 include $(BUILD)/order.mk
 -include $(wildcard $(O)/*.d)
 endif
@@ -205,36 +233,12 @@ $(BUILD)/emcon: $(APP_OBJ) $(BUILD)/libemcon.a
 	@echo "  LINK  $@"
 	$(Q)$(FC) $(LDFLAGS_$(MODE)) -o $@ $^ $(LIBS) $(THREAD_LIBS)
 
-# What holds whole models and computes nothing: optimising how those are freed takes half of the
-# time of the library. `private`: what is made on the way keeps its own flags.
-HOLDERS := $(addprefix emcon_,c c_by_hand model run stepper stepper_query)
-$(HOLDERS:%=$(O)/%.o): private FFLAGS_release := -O0 -g1
-
-# Loops that threads share: with what these need, nothing else is compiled.
-THREADED := $(notdir $(basename $(shell grep -l '!$$omp parallel' $(filter-out $(MADE),$(LIB_SRC)))))
-$(THREADED:%=$(O)/%.o): private FFLAGS_ALL += -fopenmp
-
-# Loops over points side by side: a law in numbers that the compiler takes apart, so that it sees the
-# whole of it at once. No sum over lanes, no fused product: with any VECTOR=... the bits are the same.
-LANES := $(addprefix emcon_law_,linear neo_hooke coupled_neo_hooke mooney_rivlin yeoh) emcon_element_pack_plane \
-	emcon_stiff_product_plane emcon_corotated_pack_plane
-$(LANES:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 -fopenmp-simd -fno-trapping-math \
-	-fno-semantic-interposition -Wno-unused-function -finline-limit=1000000 \
-	$(addprefix --param ,inline-unit-growth=100000 large-function-growth=1000000 \
-	large-stack-frame=1000000 max-completely-peel-times=32 max-completely-peeled-insns=2000 \
-	sra-max-propagations=1000 sra-max-scalarization-size-Ospeed=2000) $(VECTOR)
-
-# Loops over all unknowns in each correction, several at a time: the bits are the same here too.
-STREAMS := $(addprefix emcon_,inertia kept_factor lane_sums mixing motion newton numbering \
-	supernodal_factor supernodal_solve system term vectors)
-$(STREAMS:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 -fopenmp-simd $(VECTOR)
-
-# Numbers with many derivatives, added and multiplied term by term: several terms at a time.
-# -Wno-zerotrip: those without second derivatives have loops over none.
-TERMS := $(addprefix emcon_dgrad,8 11 13 15 8_first 11_first 13_first 15_first _wide)
-$(TERMS:%=$(O)/%.o): private FFLAGS_release := -O3 -g1 -Wno-zerotrip $(VECTOR)
-# Loops over eight of them are vectors of the unit's length only if nobody unrolls them before.
-$(O)/emcon_dgrad8.o $(O)/emcon_dgrad8_first.o: private FFLAGS_release += --param max-completely-peel-times=3
+$(TAGGED_threads:%=$(O)/%.o): private FFLAGS_ALL += -fopenmp
+define tagged
+$$(TAGGED_$(1):%=$(O)/%.o): $(BUILD)/flags_$(1).txt
+$$(TAGGED_$(1):%=$(O)/%.o): private FFLAGS_release := $$(FFLAGS_OF_$(1))
+endef
+$(foreach tag,$(TAGS),$(eval $(call tagged,$(tag))))
 
 # The kernel tests are compiled once, with all checks: those of `debug` are these with its library.
 KERNEL_OBJ := $(call objects,$(KERNEL_SRC))
@@ -425,7 +429,7 @@ install: app lib  ## program, library, headers, modules, man page, for CMake and
 	$(Q)install -m 755 $(BUILD)/$(SHARED) '$(TO)/lib'
 	$(Q)ln -sf $(SHARED) '$(TO)/lib/libemcon.so'
 	$(Q)install -m 644 $(BUILD)/libemcon.a '$(TO)/lib'
-	$(Q)install -m 644 $(patsubst %,$(BUILD)/mod/%.mod,$(basename $(notdir $(LIB_SRC)))) \
+	$(Q)install -m 644 $(patsubst %,$(BUILD)/mod/%.mod,$(filter $(MODULES),$(basename $(notdir $(LIB_SRC))))) \
 		$(BORDER)/emcon.h $(BORDER)/emcon.hpp '$(TO)/include/emcon'
 	$(Q)$(foreach file,$(filter %.pc,$(COMPANIONS)),$(call fill,$(file),'$(TO)/lib/pkgconfig') &&) :
 	$(Q)$(foreach file,$(filter %.cmake,$(COMPANIONS)),$(call fill,$(file),'$(TO)/lib/cmake/emcon') &&) :

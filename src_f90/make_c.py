@@ -428,7 +428,7 @@ def main() -> None:
          f"private :: {kinds}"],
         indent(types(header))))
     head, body = functions(header, procedures([Path(p) for p in sys.argv[3:]]))
-    put(folder/"emcon_c.f90", module(
+    put(folder/"emcon_c.f90", "! build: holder\n" + module(
         "emcon_c", "The C functions; what each of them does is said in emcon.h.",
         ["use, intrinsic :: iso_c_binding", "use emcon_c_border", "use emcon_c_types",
          "use emcon_csr, only : csr_t", "use emcon_errors, only : err_none, error_t",

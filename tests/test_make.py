@@ -5,6 +5,7 @@ import pathlib
 import re
 import shutil
 import subprocess
+import sys
 
 import pytest
 
@@ -70,12 +71,15 @@ class Tree:
         path.parent.mkdir(exist_ok=True)
         path.write_text(text)
 
-    def compiled(self, *goals):
-        """The command lines of compilations that make prints, and the files they compile."""
+    def run(self, *goals):
         environment = {k: v for k, v in os.environ.items() if k not in ("MAKEFLAGS", "MAKELEVEL")}
         # `timeout` of coreutils: it ends what make has started, too.
-        done = subprocess.run(["timeout", "120", "make", "V=1", *goals], cwd=self.folder,
+        return subprocess.run(["timeout", "120", "make", "V=1", *goals], cwd=self.folder,
                               env=environment, capture_output=True, text=True)  # fmt: skip
+
+    def compiled(self, *goals):
+        """The command lines of compilations that make prints, and the files they compile."""
+        done = self.run(*goals)
         assert done.returncode == 0, done.stdout + done.stderr
         lines = re.findall(r"^(.* -c (\S+\.[fF]90) .*)$", done.stdout, re.M)
         return [(pathlib.Path(file).stem, line) for line, file in lines]
@@ -138,6 +142,78 @@ def test_the_kernel_tests_are_compiled_once(tree):
     (tree.folder / "tests/kernels/main.F90").touch()
     assert " -fcheck=all," in tree.make("MODE=debug", "kernels")["main"]
     assert not tree.make("kernels")
+
+
+LAWS = """module emcon_laws
+   implicit none
+   private
+   public :: n_law
+   interface
+      !> How many there are.
+      pure module integer function n_law()
+      end function n_law
+   end interface
+end module emcon_laws
+"""
+KINDS = """submodule (emcon_laws) emcon_law_kinds
+   implicit none
+   integer, parameter :: code(*) = [1, 2]
+contains
+   module procedure n_law
+      n_law = size(code)
+   end procedure n_law
+end submodule emcon_law_kinds
+"""
+
+
+def test_what_stands_in_a_submodule_compiles_one_file(tree):
+    tree.write("laws/emcon_laws.f90", LAWS)
+    tree.write("laws/emcon_law_kinds.f90", KINDS)
+    tree.write("laws/emcon_law_more.f90", KINDS.replace("(emcon_laws)", "(emcon_laws:emcon_law_kinds)")
+               .replace("emcon_law_kinds", "emcon_law_more", 3).replace(":emcon_law_more", ":emcon_law_kinds")
+               .split("contains")[0] + "end submodule emcon_law_more\n")  # fmt: skip
+    tree.write("base/emcon_top.f90", user("top", "laws", "n_law").replace("n_law(i)", "n_law()"))
+    assert {"emcon_laws", "emcon_law_kinds", "emcon_law_more", "emcon_top"} <= set(tree.make("lib"))
+    assert not tree.make("lib")
+    tree.write("laws/emcon_laws.f90", LAWS + "! a last line\n")
+    assert set(tree.make("lib")) == {"emcon_laws"}
+    tree.write("laws/emcon_law_kinds.f90", KINDS.replace("[1, 2]", "[1, 2, 3]"))
+    assert set(tree.make("lib")) == {"emcon_law_kinds", "emcon_law_more"}
+    (tree.folder / "build/release/mod/emcon_laws.smod").unlink()
+    assert "emcon_laws" in tree.make("lib")
+
+
+def test_a_tag_of_a_source_chooses_its_flags(tree):
+    """And those of a tag that are new compile the files that have it."""
+    tree.write("base/emcon_beside.f90", "! build: streams\n" + user("beside", "low", "twice"))
+    shared = user("middle", "low", "twice").replace("   pure integer", "   integer")
+    shared = shared.replace("\n\n", "\n      !$omp parallel\n      !$omp end parallel\n")
+    tree.write("base/emcon_middle.f90", shared)
+    commands = tree.make("lib")
+    assert set(commands) == {"emcon_beside", "emcon_middle"}
+    assert " -O3 " in commands["emcon_beside"] and " -fopenmp-simd " in commands["emcon_beside"]
+    assert " -O2 " in commands["emcon_middle"] and " -fopenmp " in commands["emcon_middle"]
+    makefile = tree.folder / "Makefile"
+    makefile.write_text(makefile.read_text().replace("FFLAGS_OF_streams := -O3", "FFLAGS_OF_streams := -O1"))
+    assert set(tree.make("lib")) == {"emcon_beside"}
+    assert not tree.make("lib")
+
+
+@pytest.mark.parametrize("lines, says", [
+    ("! build: lanes\n! Build: stream\n", ":2: there is no build tag 'stream'; there are: lanes, streams"),
+    ("! build:\n", ":1: there is no build tag ''"),
+    ("! build: lanes streams\n", ":1: there is no build tag 'lanes streams'"),
+    ("! build: lanes\n! build: streams\n", ":2: the second build tag"),
+])  # fmt: skip
+def test_a_wrong_tag_is_refused(lines, says, tmp_path):
+    source = tmp_path / "emcon_low.f90"
+    script = [sys.executable, ROOT / "src_f90/module_order.py", "obj", "mod", "lanes streams", source]
+    source.write_text("! build: lanes\n" + LOW)
+    good = subprocess.run(script, capture_output=True, text=True, check=True)
+    assert "TAGGED_lanes := emcon_low\n" in good.stdout
+    source.write_text(lines + LOW)
+    bad = subprocess.run(script, capture_output=True, text=True)
+    assert bad.returncode == 1 and bad.stdout == "" and bad.stderr.startswith(f"{source}{says}")
 
 
 def test_a_dry_run_ends_and_makes_nothing(tmp_path):

@@ -1,3 +1,4 @@
+! build: streams
 !> Sums of products over vectors by eight partial sums side by side, and the size of a vector beside
 !> that of another one.
 !>

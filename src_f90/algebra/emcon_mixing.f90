@@ -1,3 +1,4 @@
+! build: streams
 !> Anderson's mixing of a fixed-point iteration x <- x + f(x): the next move is the one that makes
 !> the smallest f of those that the last moves have shown, to first order.
 !>

@@ -1,3 +1,4 @@
+! build: streams
 !> Cholesky factors in single precision, node by node of a tree of dense fronts.
 !>
 !> For corrections that are repeated until a residual vanishes: their last digits are of no use, and

@@ -1,3 +1,4 @@
+! build: streams
 !> Substitution with a factor of dense blocks: each half alone, and for sparse right-hand sides.
 !>
 !> Numbers of single precision are taken in double; sums run over eight lanes in a fixed order.

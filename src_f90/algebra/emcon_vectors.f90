@@ -1,3 +1,4 @@
+! build: streams
 !> Plain loops over fields of any rank, taken as the vectors that they are in memory.
 !>
 !> Written out for what runs in each correction: a compiler takes an array expression of rank two

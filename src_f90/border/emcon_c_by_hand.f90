@@ -1,3 +1,4 @@
+! build: holder
 !> The C functions that are no calls of one procedure with a status. What each does is said in
 !> emcon.h.
 module emcon_c_by_hand

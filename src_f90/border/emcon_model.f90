@@ -1,3 +1,4 @@
+! build: holder
 !> Models that other languages hold by their address.
 !>
 !> A model owns a stepper, the answers to what was asked last, and the text of the last failure;

@@ -1,3 +1,4 @@
+! build: derivatives
 !> Discrete-gradient arithmetic over 11 variables: six nodes in the plane, and the
 !> unknown of an implicit equation (`dg_root`).
 !>

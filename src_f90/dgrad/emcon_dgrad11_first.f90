@@ -1,3 +1,4 @@
+! build: derivatives
 !> The numbers of emcon_dgrad11 without second derivatives: values and gradients, bit by bit.
 !>
 !> Source: docs/theory.md, section 2.

@@ -1,3 +1,4 @@
+! build: derivatives
 !> Discrete-gradient arithmetic over 13 variables: seven nodes in the plane, and the
 !> unknown of an implicit equation (`dg_root`).
 !>

@@ -1,3 +1,4 @@
+! build: eight
 !> Discrete-gradient arithmetic over 8 variables: five nodes in the plane.
 !>
 !> Source: docs/theory.md, section 2.

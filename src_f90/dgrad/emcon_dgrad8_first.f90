@@ -1,3 +1,4 @@
+! build: eight
 !> The numbers of emcon_dgrad8 without second derivatives: values and gradients, bit by bit.
 !>
 !> Source: docs/theory.md, section 2.

@@ -1,3 +1,4 @@
+! build: derivatives
 !> Discrete-gradient numbers over any number of variables: sums of numbers over few variables.
 !>
 !> For functions that are put together from many parts, each over its own variables: only sums and

@@ -1,3 +1,4 @@
+! build: streams
 !> Corrections of a step by a factor that is kept over many steps.
 !>
 !> L L^T is the symmetric part of an earlier tangent without constraints. With G the gradients of

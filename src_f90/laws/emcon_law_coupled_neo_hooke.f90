@@ -1,3 +1,4 @@
+! build: lanes
 !> Coupled neo-Hookean law: W = mu/2 (tr C - 3) - mu ln J + lam/2 (ln J)^2.
 module emcon_law_coupled_neo_hooke
    use emcon_dgrad_near, only : dg_t

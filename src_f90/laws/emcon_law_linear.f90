@@ -1,3 +1,4 @@
+! build: lanes
 !> Linear elasticity: W = lam/2 (tr E)^2 + mu E:E. Under NLGEOM this is St. Venant-Kirchhoff.
 module emcon_law_linear
    use emcon_dgrad_near, only : dg_t

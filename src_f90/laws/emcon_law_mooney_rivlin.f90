@@ -1,3 +1,4 @@
+! build: lanes
 !> Mooney and Rivlin's law with Abaqus' constants:
 !> W = C10 (J^(-2/3) I1 - 3) + C01 (J^(-4/3) I2 - 3) + (J - 1)^2/D1.
 module emcon_law_mooney_rivlin

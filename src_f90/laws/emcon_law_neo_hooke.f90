@@ -1,3 +1,4 @@
+! build: lanes
 !> Neo-Hookean law with Abaqus' constants: W = C10 (J^(-2/3) I1 - 3) + (J - 1)^2/D1.
 module emcon_law_neo_hooke
    use emcon_dgrad_near, only : dg_t

@@ -1,3 +1,4 @@
+! build: lanes
 !> Yeoh's law with Abaqus' constants:
 !> W = sum over i = 1..3 of C_i0 (J^(-2/3) I1 - 3)^i + (J - 1)^(2 i)/D_i.
 module emcon_law_yeoh

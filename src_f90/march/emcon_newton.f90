@@ -1,3 +1,4 @@
+! build: streams
 !> Newton's method for one step with a given set of active constraints.
 !>
 !> Forces are measured against the sum of their contributions before these cancel, docs/theory.md,

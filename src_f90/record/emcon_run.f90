@@ -1,3 +1,4 @@
+! build: holder
 !> A batch run: deck in, files out, from the first increment or from a restart file.
 module emcon_run
    use emcon_blas, only : blas_single_thread

@@ -1,3 +1,4 @@
+! build: lanes
 !> Forces of corotated elements side by side: `emcon_corotated_plane` over lanes.
 !>
 !> All arrays run over lanes first, and nothing is summed over them. Source: docs/theory.md,

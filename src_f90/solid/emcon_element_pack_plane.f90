@@ -1,3 +1,4 @@
+! build: lanes
 !> Force, tangent and strain energy of elements in the plane side by side, over one step.
 !>
 !> The strain is bilinear in the positions, so with the algorithmic stress of the law the force is

@@ -1,3 +1,4 @@
+! build: lanes
 !> The product of emcon_stiff_product in the plane, written out: it is half of the time of linear
 !> sections.
 module emcon_stiff_product_plane

@@ -1,3 +1,4 @@
+! build: streams
 !> A motion over one step, and where in it forces are evaluated.
 !>
 !> A scheme decides where. Forces are discrete gradients over a span of the step, from `from` by

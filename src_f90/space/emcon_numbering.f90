@@ -1,3 +1,4 @@
+! build: streams
 !> Which degrees of freedom are unknowns, which are prescribed, and which follow from others.
 !>
 !> Every displacement is a sum over unknown and prescribed ones, u = T w with T constant: one term

@@ -1,3 +1,4 @@
+! build: streams
 !> What a term is: whatever has forces over a motion, with their sizes, an energy and a tangent.
 !>
 !> The residual of a step is s M (b du - w v0) + f_int - f_ext, docs/theory.md, eqs. (2) and (16).

@@ -1,3 +1,4 @@
+! build: holder
 !> The stepper: open a deck, step, query, save, go on. All state is in the object; any number of
 !> steppers live side by side.
 module emcon_stepper

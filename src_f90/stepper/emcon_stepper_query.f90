@@ -1,3 +1,4 @@
+! build: holder
 !> What the engine computes for a step, asked for from outside: residual, tangent, mass, momenta.
 !>
 !> A query has work space of its own, with its own system and contact search: asking changes neither

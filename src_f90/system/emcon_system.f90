@@ -1,3 +1,4 @@
+! build: streams
 !> The discrete system of one step: a list of terms, constraints, numbered unknowns, the matrix.
 !>
 !> It knows configurations and weights, not time stepping, and not which kinds of terms there are:

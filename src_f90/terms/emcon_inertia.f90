@@ -1,3 +1,4 @@
+! build: streams
 !> Inertia s M (b du - w v0), and what the past adds: the mass between nodes, the same in all
 !> directions, that of the elements and what is given.
 !>
