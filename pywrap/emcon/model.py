@@ -24,33 +24,26 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from . import _core
-from .cards import (Block, Cards, Dof, Number, Numbering, Where, array_of, caller, card, real,
-                    text_lines, whole)
-from .deck_text import element_table, number, table, write_text
+from .cards import Dof, Number, Where, array_of, card, real, text_lines, whole
+from .deck_text import element_table, table, write_text
 from .derivatives import check_law
 from .errors import InputError
-from .given import (GivenLaw, GivenPotential, GivenSolid, PointFunction, Solid, check_function,
-                    check_solid, node_shape)
-from .given_matrices import give_masses, given_mass
+from .given import PointFunction, Solid, check_function, check_solid
 from .options import LAWS, words
+from .source import Source, parameter_text
+from .stepper import Stepper
 from .steps import Step
 
 if TYPE_CHECKING:
-    from .handle import Handle
     from .mesh import Mesh
-    from .stepper import Stepper
 
-_LARGEST_TEXT = 2**31 - 1
 #: The interaction of pairs that name none.
 _FRICTIONLESS = "FRICTIONLESS CONTACT"
-
-
 #: Nodes of an element, by kind.
 KINDS = {word: int(re.sub("C(PE|PS|AX|3D)|[A-Z]", "", word)) for word in words("element")}
 
 
-class Model(Cards):
+class Model(Source):
     """A scene: mesh, sets, materials, contact, steps; made of a deck, a mesh, arrays or calls.
 
     Each method adds one card of docs/deck.md, which says what it means. Where an argument is a
@@ -65,36 +58,12 @@ class Model(Cards):
     """
 
     def __init__(self, heading: str = "") -> None:
-        super().__init__(Numbering("node", rows=True), Numbering("element", rows=True))
-        self._place = caller()
-        self._steps: list[Step] = []
-        self._overrides: dict[str, str] = {}
-        self._lenient = False
+        super().__init__()
         self._has_frictionless = False
-        # given from outside, by `_give`
-        self._laws: dict[str, PointFunction] = {}
-        self._potentials: list[tuple[PointFunction, str | NDArray[np.int64] | None]] = []
-        self._hosts: list[tuple[Solid, Any]] = []
         if heading:
             self.heading(heading)
 
     # --- making ----------------------------------------------------------------------------
-
-    @classmethod
-    def from_deck(cls, path: str | os.PathLike[str], *, lenient: bool = False,
-                  **parameters: object) -> Model:
-        """The model of the deck at `path`; parameters of the deck as keywords.
-
-        The deck is read when a `Stepper` is made. With `lenient` output that is not
-        supported is left out.
-        Further steps may be added by calls. Raises `InputError` for a parameter that is no number
-        and no line of text.
-        """
-        model = cls._labelled()
-        model._lenient = lenient
-        for name, value in parameters.items():
-            model._overrides[name] = _parameter(name, value)
-        return model.include(path)
 
     @classmethod
     def from_arrays(cls, nodes: ArrayLike,
@@ -141,16 +110,12 @@ class Model(Cards):
 
         Nodes and elements are named by the labels of the mesh. `parameters`: see `parameter`.
         """
-        model = cls._labelled(heading)
+        model = cls._labelled()
+        if heading:
+            model.heading(heading)
         if parameters:
             model.parameter(**parameters)
         model._add(mesh.text())
-        return model
-
-    @classmethod
-    def _labelled(cls, heading: str = "") -> Model:
-        model = cls(heading)
-        model._nodes.rows = model._elements.rows = False
         return model
 
     def __repr__(self) -> str:
@@ -174,18 +139,8 @@ class Model(Cards):
 
         Numbers, or text as it stands in a deck: `60./n`, `NULL SPACE`.
         """
-        self._add("*PARAMETER\n" + "".join(f"{name} = {_parameter(name, value)}\n"
+        self._add("*PARAMETER\n" + "".join(f"{name} = {parameter_text(name, value)}\n"
                                            for name, value in values.items()))
-        return self
-
-    def include(self, path: str | os.PathLike[str]) -> Model:
-        """`*INCLUDE`: the cards of a file, relative to the working directory."""
-        name = os.fsdecode(path)
-        if not name.strip() or any(ord(c) < 32 or ord(c) == 127 for c in name):
-            raise InputError(f"{name!r} is not the name of a deck")
-        # quotes keep blanks and commas at the ends
-        self._blocks.append(Block(f'*INCLUDE, INPUT="{name}"\n', *caller(),
-                                  f'*INCLUDE, INPUT="{os.path.abspath(name)}"\n'))
         return self
 
     # --- mesh ------------------------------------------------------------------------------
@@ -556,7 +511,7 @@ class Model(Cards):
         options: dict[str, object] = {
             "NLGEOM": "NO" if nlgeom is False else nlgeom, "INC": increments,
             "AMPLITUDE": amplitude}
-        step = Step(self, options, procedure,
+        step = Step((self._nodes, self._elements), options, procedure,
                     {"DIRECT": direct, "EXPLICIT": explicit, "SOLVER": solver},
                     (h, duration, h_min, h_max))
         self._steps.append(step)
@@ -581,57 +536,7 @@ class Model(Cards):
 
     def stepper(self) -> Stepper:
         """A new `Stepper` of this model. Raises `InputError`."""
-        from .stepper import Stepper
         return Stepper(self)
-
-    def build(self, handle: Handle) -> None:
-        """Read the model into a handle, and build it.
-
-        Raises `InputError`, and what given functions raise.
-        """
-        self.read(handle)
-        handle.call(_core.emcon_build)
-
-    def read(self, handle: Handle) -> None:
-        """`build` without the building, for a state that is loaded instead."""
-        blocks = self._all_blocks()
-        text = "".join(block.text for block in blocks).encode(errors="surrogateescape")
-        if len(text) > _LARGEST_TEXT:
-            raise InputError("the text of the model is larger than 2 GB; use include")
-        files = {file: i for i, file in enumerate(
-            dict.fromkeys([self._place[0], *(block.file for block in blocks)]), 1)}
-        places = np.array([(block.text.count("\n"), files[block.file], block.line, 0)
-                           for block in blocks] or [(0, 1, self._place[1], 0)], dtype=np.int32)
-        names = "\n".join(file.replace("\n", "?") for file in files)
-        overrides = "\n".join(f"{name}={value}" for name, value in self._overrides.items())
-        if b"\0" in text:
-            raise InputError("a card of the model holds a character 0, which no deck has")
-        handle.open(_core.emcon_read_passages, text, places, os.fsencode(names),
-                    overrides.encode(), int(self._lenient))
-        handle.given = self._give(handle.address)
-
-    def _give(self, handle: int) -> list[Any]:
-        """Hand over what is given from outside; returns what has to live with the model."""
-        given: list[Any] = [GivenLaw(material, law) for material, law in self._laws.items()]
-        given += [GivenPotential(f"potential {k}", function, nodes)
-                  for k, (function, nodes) in enumerate(self._potentials, 1)]
-        if self._hosts:
-            shape = node_shape(handle)
-            given += [GivenSolid(f"solid {k}", solid, *shape)
-                      for k, (solid, _) in enumerate(self._hosts, 1)]
-            give_masses(handle, [given_mass(mass, *shape) for _, mass in self._hosts
-                                 if mass is not None])
-        for item in given:
-            item.give(handle)
-        return given
-
-    def _all_blocks(self) -> list[Block]:
-        blocks = list(self._blocks)
-        for step in self._steps:
-            first = step._blocks[0]
-            blocks += [*step._blocks, Block("*END STEP\n", first.file, first.line)]
-        return blocks
-
 
 def _law_card(material: str, argument: str, n: int) -> tuple[str, dict[str, object]]:
     """The card of a law with `n` constants, and its parameters."""
@@ -643,15 +548,3 @@ def _law_card(material: str, argument: str, n: int) -> tuple[str, dict[str, obje
                          f"constants, not {n}")
     row = rows[n]
     return row.card, {"TYPE": "ISO"} if row.keyword == "ELASTIC" else {"N": row.order}
-
-
-def _parameter(name: str, value: object) -> str:
-    """The value of a parameter as text."""
-    text = (value.strip() if isinstance(value, str)
-            else str(int(value)) if isinstance(value, (int, np.integer)) else "")
-    if isinstance(value, (float, np.floating)):
-        text = number(float(value)) if np.isfinite(value) else ""
-    if not text or not text.isprintable() or not name.isidentifier() or not name.isascii():
-        raise InputError(f"parameter {name!r} = {value!r} cannot stand in a deck: a name is one "
-                         "word, a value a finite number or one line of text")
-    return text

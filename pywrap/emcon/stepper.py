@@ -23,8 +23,8 @@ from .errors import AnalysisError, InputError, MissingFile
 from .handle import Handle
 from .memory import structure, text
 from .meshes import Meshes
-from .model import Model
 from .queries import ConstraintReport, Evaluation, Queries, contact_arguments, of_all
+from .source import Source
 
 if TYPE_CHECKING:
     from .results import Results
@@ -98,7 +98,7 @@ class Snapshot:
 
 
 class Stepper(Queries, Conditions, Meshes):
-    """A model at some point of its analysis; `model` is one, or the path of a deck.
+    """A model at some point of its analysis; `model` is a `Model`, or the path of a deck.
 
     Parameters of the deck are given as keywords: ``Stepper("ring.inp", h=0.005)``. Arrays are
     copies, of shape (n_node, n_dim) where they belong to nodes; `n_dim` is 2 or, of decks of three
@@ -111,16 +111,16 @@ class Stepper(Queries, Conditions, Meshes):
     does not wait.
     """
 
-    def __init__(self, model: str | os.PathLike[str] | Model, *, lenient: bool = False,
+    def __init__(self, model: str | os.PathLike[str] | Source, *, lenient: bool = False,
                  **parameters: object) -> None:
-        if isinstance(model, Model):
+        if isinstance(model, Source):
             if lenient or parameters:
                 raise InputError("parameters are given to Model.from_deck, not to the Stepper of "
                                  "a Model")
             self._begin(model.build)
             return
         try:
-            self._begin(Model.from_deck(model, lenient=lenient, **parameters).build)
+            self._begin(Source.from_deck(model, lenient=lenient, **parameters).build)
         except InputError:
             if os.path.exists(model):
                 raise
@@ -142,7 +142,7 @@ class Stepper(Queries, Conditions, Meshes):
         self.n_dim = sizes["n_dim"]
 
     @classmethod
-    def from_restart(cls, path: str | os.PathLike[str], model: Model | None = None) -> Stepper:
+    def from_restart(cls, path: str | os.PathLike[str], model: Source | None = None) -> Stepper:
         """The stepper that a restart file holds, of `write_restart` or of a run of the program.
 
         It goes on to the same bits. `model` is needed where laws, potentials or a host's solid were

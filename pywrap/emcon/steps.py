@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal, TypeAlias
+from typing import Literal, TypeAlias
 
 from numpy.typing import ArrayLike
 
-from .cards import Cards, Dof, Number, Where, card, entry
+from .cards import Cards, Dof, Number, Numbering, Where, card, entry
 from .errors import InputError
 from .options import words
-
-if TYPE_CHECKING:
-    from .model import Model
 
 Op: TypeAlias = Literal["MOD", "NEW"]
 #: Requests, and the parameter that names their set.
@@ -27,9 +24,10 @@ class Step(Cards):
     Methods return the step.
     """
 
-    def __init__(self, model: Model, step: dict[str, object], procedure: str,
-                 options: dict[str, object], times: Sequence[Number | None]) -> None:
-        super().__init__(model._nodes, model._elements)
+    def __init__(self, numbering: tuple[Numbering, Numbering], step: dict[str, object],
+                 procedure: str, options: dict[str, object],
+                 times: Sequence[Number | None]) -> None:
+        super().__init__(*numbering)
         if procedure not in words("procedure"):
             raise InputError(f"procedures are {' and '.join(words('procedure'))}, not "
                              f"{procedure!r}")
