@@ -134,10 +134,36 @@ def planar_literals(path):
             yield number, code
 
 
+# ---- words of the plane -------------------------------------------------------------------------
+
+#: Rooms that know surfaces. In those above, a chain is the rule of derivatives.
+SURFACED = ("scene deck space solid contact terms system eliminate prepare march results stepper "
+            "record border app").split()  # fmt: skip
+WORD = re.compile(r"\b(?:[a-z]\w*_)?(?:chain|corner|edge|arc|outline)s?(?:_\w+)?\b", re.I)
+# Corners of elements are there in space, too; those of an amplitude are instants.
+ELSEWHERE = re.compile(
+    r"\b(?:n_corner|amplitude_corners|\w*grid_corner_t|march_next_corner|step%corner)\b", re.I
+)
+
+
+def planar_words(path):
+    """(line, statement) of lines that name a chain, a corner, an edge, an arc or an outline."""
+    if path.stem.endswith("_plane") or (path.stem.endswith("_space") and path.parent.name in SOLID):
+        return
+    for number, line in enumerate(path.read_text().splitlines(), 1):
+        code = STRING.sub('""', line).partition("!")[0].strip()
+        if WORD.search(ELSEWHERE.sub("n", code)):
+            yield number, code
+
+
 # ---- counts against the record ------------------------------------------------------------------
 
 
-KINDS = {"silent arguments": (silent_arguments, TOLD), "planar literals": (planar_literals, None)}
+KINDS = {
+    "silent arguments": (silent_arguments, TOLD),
+    "planar literals": (planar_literals, None),
+    "planar words": (planar_words, SURFACED),
+}
 
 
 def places(root, kind):
@@ -158,11 +184,13 @@ def counts(root):
 
 
 def risen(found, record):
-    """Counts above the record, as lines; a room that the record does not know may have none."""
+    """Counts above the record, as lines; a room that the record does not know may have none.
+
+    A kind that it does not know is a new one, whose counts `--update` writes down.
+    """
     for kind, rooms in found.items():
         for room, count in rooms.items():
-            most = record.get(kind, {}).get(room, 0)
-            if count > most:
+            if kind in record and count > (most := record[kind].get(room, 0)):
                 yield f"{kind} in {room}: {count}, not more than {most}"
 
 
@@ -178,8 +206,8 @@ def main():
         return
     found, record = counts(ROOT), json.loads(RECORD.read_text())
     for kind, rooms in found.items():
-        for room in sorted({*rooms, *record[kind]}):
-            most = record[kind].get(room, 0)
+        for room in sorted({*rooms, *record.get(kind, {})}):
+            most = record.get(kind, {}).get(room, "none")
             print(f"{kind:18} {room:10} {rooms.get(room, 0):5} of {most}")
     if faults := list(risen(found, record)):
         sys.exit("\n".join(faults))
