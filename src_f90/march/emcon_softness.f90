@@ -144,7 +144,10 @@ contains
          call constraint_place(system, set%id(k), pair, i)
          if (pair == 0) cycle
          law%share = system%contact(pair)%contact%share(i)
-         law%stiffness = self%stiffness(set%id(k))*law%share**2
+         law%stiffness = self%stiffness(set%id(k))
+         ! What is stored is a function of the integral of the gap. What is pushed back is a mean
+         ! gap, which gives way to a force as much where a part of the edges is covered.
+         if (.not. self%augments) law%stiffness = law%stiffness*law%share**2
          if (.not. self%is_at_ends) law%before = self%closure(set%id(k))/law%share
          if (set%is_stored) then
             allocate(set%law(k)%law, source=law)

@@ -410,6 +410,27 @@ def test_a_penalty_tends_to_the_exact_contact(tmp_path):
     assert max(held) < 1e-7
 
 
+def test_edges_that_are_covered_in_part_close_alike(tmp_path):
+    """A punch covers the edges at its sides in part: the stiffness is that of a force by a mean
+    gap, which is the same over a part of an edge. The forces are those of exact contact."""
+    found = {}
+    for method in ("NULL SPACE", AUGMENTED):
+        scene = Scene(0.5, 1.0)
+        scene.block("BLOCK", (-1.0, -1.0), (2.0, 1.0), (8, 4)).hold("BLOCK", below(-1.0))
+        scene.block("PUNCH", (-0.18, 0.0), (0.5, 0.4), (2, 2))
+        scene.hold("PUNCH", lambda _, y: y > 0.39, "1, 1")
+        scene.hold("PUNCH", lambda _, y: y > 0.39, "2, 2", -0.05)
+        scene.pairs = [("BLOCK", "PUNCH")]
+        deck = scene.deck(UNGUARDED)
+        deck.replace("*DYNAMIC, DIRECT", "*STATIC")
+        run = run_deck(deck, tmp_path/method, method=method, formulation="MORTAR")
+        found[method] = run.fields()["contact_force"][-1]
+        if method == AUGMENTED:
+            assert run.verdict["augmentations"] < 15
+    largest = np.abs(found["NULL SPACE"]).max()
+    assert np.allclose(found[AUGMENTED], found["NULL SPACE"], rtol=0, atol=1e-6*largest)
+
+
 # ---- bits ---------------------------------------------------------------------------------------
 
 
