@@ -232,7 +232,7 @@ contains
       associate (pair => model%stepper%march%state%pairs%total)
          allocate(total(7, size(pair)), n_active(size(pair)))
          do k = 1, size(pair)
-            total(:, k) = [pair(k)%slave, pair(k)%master, pair(k)%length]
+            total(:, k) = [pair(k)%slave(:3), pair(k)%master(:3), pair(k)%length]
             n_active(k) = pair(k)%n_active
          end do
       end associate

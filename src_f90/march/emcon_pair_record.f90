@@ -6,24 +6,29 @@ module emcon_pair_record
    use emcon_constraint, only : condition_force
    use emcon_constraints, only : constraint_set_t, constraints_lam
    use emcon_kinds, only : wp
-   use emcon_moment_plane, only : moment_of
+   use emcon_rotation, only : add_moments, n_turn
    use emcon_system, only : system_t
    use emcon_velocity_jumps, only : velocity_jump_t
    implicit none
    private
-   public :: pair_total_t, pair_record_t, pair_record_init, pair_record_measure, pair_record_jump
+   public :: pair_total_t, pair_record_t, pair_record_init, pair_record_measure, pair_record_jump, &
+      pair_components
+
+   !> Directions and rotations in space.
+   integer, parameter :: most_components = 6
 
    !> Sums over one pair. The forces on its sides, and their moments, are opposite to round-off.
    type :: pair_total_t
-      real(wp) :: slave(3) = 0.0_wp              !! fx, fy [M L/T^2], moment about the origin
-      real(wp) :: master(3) = 0.0_wp             !! the same on the master side
+      !> Force [M L/T^2] and moment about the origin: the first 3 in the plane, in space all
+      real(wp) :: slave(most_components) = 0.0_wp
+      real(wp) :: master(most_components) = 0.0_wp   !! the same on the master side
       real(wp) :: length = 0.0_wp                !! of the slave surface in contact [L]
       integer :: n_active = 0                    !! constraints that act
    end type pair_total_t
 
    type :: pair_record_t
       type(pair_total_t), allocatable :: total(:)   !! (n_pair)
-      !> (2, n_constraint) by its pair on the slave node, and on the other one at its place
+      !> (n_dim, n_constraint) by its pair on the slave node, and on the other one at its place
       real(wp), allocatable :: force(:, :)
       !> (n_constraint) of each multiplier [L^2]; 0: nothing acts in its pair
       real(wp), allocatable :: area(:)
@@ -40,6 +45,13 @@ module emcon_pair_record
    end type range_t
 
 contains
+
+   !> Components of force and moment: 3 in the plane, 6 in space.
+   pure integer function pair_components(self) result(n)
+      type(pair_record_t), intent(in) :: self
+
+      n = size(self%force, 1) + n_turn(size(self%force, 1))
+   end function pair_components
 
    !> A record for the pairs of `system` in which nothing has acted.
    pure subroutine pair_record_init(self, system)
@@ -136,27 +148,39 @@ contains
       real(wp), intent(in) :: h                  !! > 0 [T]
       logical, intent(in) :: is_exchanged        !! its slave side is the pair's master side
       real(wp) :: force(size(place, 1))
-      integer :: i
+      integer :: i, n, m
 
+      n = size(place, 1)
+      m = n + n_turn(n)
       if (is_exchanged) call exchange_sides(total)
-      total%slave(3) = total%slave(3) + jump%slave_moment/h
-      total%master(3) = total%master(3) + jump%master_moment/h
+      total%slave(n + 1:m) = total%slave(n + 1:m) + jump%slave_moment/h
+      total%master(n + 1:m) = total%master(n + 1:m) + jump%master_moment/h
       do i = 1, size(jump%node)
          force = jump%impulse(:, i)/h
-         associate (both => [force, moment_of(place(:, jump%node(i)), force)])
-            if (i <= jump%n_slave) then
-               total%slave = total%slave + both
-            else
-               total%master = total%master + both
-            end if
-         end associate
+         if (i <= jump%n_slave) then
+            call add_force(total%slave(:m), place(:, jump%node(i)), force)
+         else
+            call add_force(total%master(:m), place(:, jump%node(i)), force)
+         end if
       end do
       if (is_exchanged) call exchange_sides(total)
    end subroutine add_total
 
+   !> Add a force and its moment.
+   pure subroutine add_force(total, place, force)
+      real(wp), intent(inout) :: total(:)        !! (3 or 6)
+      real(wp), intent(in) :: place(:)           !! (n_dim) where it acts [L]
+      real(wp), intent(in) :: force(:)           !! (n_dim) [M L/T^2]
+      integer :: n
+
+      n = size(place)
+      total(:n) = total(:n) + force
+      call add_moments(place, force, total(n + 1:))
+   end subroutine add_force
+
    pure subroutine exchange_sides(total)
       type(pair_total_t), intent(inout) :: total
-      real(wp) :: slave(3)
+      real(wp) :: slave(most_components)
 
       slave = total%slave
       total%slave = total%master
@@ -170,20 +194,20 @@ contains
       type(range_t), intent(in) :: range
       real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)
       real(wp), intent(in) :: lag
-      real(wp) :: place(size(x, 1)), force(size(x, 1)), both(size(total%slave))
-      integer :: k, i
+      real(wp) :: place(size(x, 1)), force(size(x, 1))
+      integer :: k, i, n
 
+      n = size(x, 1) + n_turn(size(x, 1))
       do k = range%first, range%last
          do i = 1, set%item(k)%n_node
             associate (node => set%item(k)%node(i))
                place = x(:, node) + (u(:, node) - lag*du(:, node))
             end associate
             force = condition_force(set%item(k), constraints_lam(set, k), i)
-            both = [force, moment_of(place, force)]
             if (i <= set%item(k)%n_slave) then
-               total%slave = total%slave + both
+               call add_force(total%slave(:n), place, force)
             else
-               total%master = total%master + both
+               call add_force(total%master(:n), place, force)
             end if
          end do
       end do

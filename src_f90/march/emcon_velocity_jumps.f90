@@ -5,7 +5,7 @@ module emcon_velocity_jumps
    use emcon_constraint, only : condition_t
    use emcon_constraints, only : constraint_set_t
    use emcon_kinds, only : wp
-   use emcon_moment_plane, only : moment_of
+   use emcon_rotation, only : add_moments, n_turn
    implicit none
    private
    public :: velocity_jump_t, jumps_begin, jumps_add, jumps_join, jumps_scale
@@ -19,7 +19,7 @@ module emcon_velocity_jumps
       real(wp) :: lam = 0.0_wp                   !! along the gradient of the gap [M L/T]
       !> Moments on either side beside those of the impulses where the nodes end up, as forces that
       !> stay go with nodes that move [M L^2/T]
-      real(wp) :: slave_moment = 0.0_wp, master_moment = 0.0_wp
+      real(wp), allocatable :: slave_moment(:), master_moment(:)   !! (1 or 3)
    end type velocity_jump_t
 
 contains
@@ -73,8 +73,10 @@ contains
       integer, intent(in) :: id                  !! number over all constraints
       real(wp), intent(in) :: lam                !! [M L/T]
 
-      jump = velocity_jump_t(id, item%n_slave, item%node(:item%n_node), &
-         lam*item%c(:, :item%n_node), lam)
+      associate (none => spread(0.0_wp, 1, n_turn(size(item%c, 1))))
+         jump = velocity_jump_t(id, item%n_slave, item%node(:item%n_node), &
+            lam*item%c(:, :item%n_node), lam, none, none)
+      end associate
    end function jump_of
 
    !> Add what `lam` pushes where the nodes of a condition move by `way` and its directions turn.
@@ -83,7 +85,6 @@ contains
       real(wp), intent(in) :: lam                !! [M L/T^2]
       real(wp), intent(in) :: way(:, :)          !! (n_dim, n_node) [L]
       type(velocity_jump_t), intent(inout) :: jump
-      real(wp) :: moment
       integer :: i, j, n_dim
 
       n_dim = size(way, 1)
@@ -92,11 +93,10 @@ contains
             jump%impulse(:, i) = jump%impulse(:, i) + lam*matmul(item%h(n_dim*(i - 1) + 1:n_dim*i, &
                n_dim*(j - 1) + 1:n_dim*j), way(:, item%node(j)))
          end do
-         moment = moment_of(way(:, item%node(j)), lam*item%c(:, j))
          if (j <= item%n_slave) then
-            jump%slave_moment = jump%slave_moment + moment
+            call add_moments(way(:, item%node(j)), lam*item%c(:, j), jump%slave_moment)
          else
-            jump%master_moment = jump%master_moment + moment
+            call add_moments(way(:, item%node(j)), lam*item%c(:, j), jump%master_moment)
          end if
       end do
    end subroutine turn

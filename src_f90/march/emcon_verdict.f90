@@ -160,7 +160,7 @@ contains
          end if
          do i = 1, size(state%pairs%total)
             self%largest_force(i) = max(self%largest_force(i), &
-               norm2(state%pairs%total(i)%slave(:2)))
+               norm2(state%pairs%total(i)%slave(:size(state%u, 1))))
          end do
       end associate
       self%stand_off%largest = max(self%stand_off%largest, increment%stand_off%largest)

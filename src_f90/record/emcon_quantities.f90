@@ -28,6 +28,8 @@ module emcon_quantities
    !> Components of a vector, in a row: one for each direction; of a rotation: for each plane.
    !> Of a strain: of its tensor, shears twice.
    integer, parameter :: of_vector = 0, of_rotation = -1, of_strain = -2
+   !> Of a force and its moment.
+   integer, parameter :: of_wrench = -3
 
    !> A variable of decks at one kind of places.
    type :: row_t
@@ -58,8 +60,8 @@ module emcon_quantities
       row_t("CF", at_contacts, of_vector, "contact_force", is_sparse=.true.), &
       row_t("CSHEAR", at_contacts, 2, "contact_shear", "contact_status", .true.), &
       row_t("CSLIP", at_contacts, 2, "contact_slip", "slip_path", .true.), &
-      row_t("CF", at_pairs, 3), &
-      row_t("CF_MASTER", at_pairs, 3), &
+      row_t("CF", at_pairs, of_wrench), &
+      row_t("CF_MASTER", at_pairs, of_wrench), &
       row_t("CONTACT_LENGTH", at_pairs), &
       row_t("CNUM", at_pairs)]
 
@@ -97,7 +99,7 @@ contains
       n = rows(findloc(rows%variable == variable .and. rows%place == place, .true., 1))%n_component
       if (n == of_vector) n = n_dim
       if (n == of_rotation) n = n_turn(n_dim)
-      if (n == of_strain) n = n_dim + n_turn(n_dim)
+      if (n == of_strain .or. n == of_wrench) n = n_dim + n_turn(n_dim)
    end function quantity_components
 
    !> All variables that can stand in the field file.
@@ -375,7 +377,7 @@ contains
    end subroutine take_over
 
    !> Of each contact pair (second index): CF, CF_MASTER force and moment about the origin on the
-   !> slave and on the master side (3); CONTACT_LENGTH; CNUM active constraints (1).
+   !> slave and on the master side (3 or 6); CONTACT_LENGTH; CNUM active constraints (1).
    function pair_quantity(stepper, variable) result(values)
       type(stepper_t), intent(in) :: stepper
       character(len=*), intent(in) :: variable
@@ -387,9 +389,9 @@ contains
          do k = 1, size(total)
             select case (variable)
             case ("CF")
-               values(:, k) = real(total(k)%slave, dp)
+               values(:, k) = real(total(k)%slave(:size(values, 1)), dp)
             case ("CF_MASTER")
-               values(:, k) = real(total(k)%master, dp)
+               values(:, k) = real(total(k)%master(:size(values, 1)), dp)
             case ("CNUM")
                values(:, k) = real(total(k)%n_active, dp)
             case default

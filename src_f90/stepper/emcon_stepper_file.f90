@@ -12,7 +12,7 @@ module emcon_stepper_file
    use emcon_ledger, only : ledger_t
    use emcon_march, only : march_free, march_resume, march_t, march_watch
    use emcon_newton, only : interrupt_interface
-   use emcon_pair_record, only : pair_record_t
+   use emcon_pair_record, only : pair_components, pair_record_t
    use emcon_pair_sums, only : pair_sums_t
    use emcon_restart_data, only : restart_check, restart_exchange, restart_list, restart_offers, &
       restart_rewind, restart_size, restart_t
@@ -375,8 +375,9 @@ contains
       type(pair_record_t), intent(inout) :: pairs
       type(restart_t), intent(inout) :: restart
       real(wp) :: none(0)
-      integer :: k
+      integer :: k, n
 
+      n = pair_components(pairs)
       call restart_exchange(restart, "pair_force", pairs%force)
       call restart_exchange(restart, "pair_area", pairs%area)
       if (restart_offers(restart, "pair_shear_area", any(abs(pairs%shear_area - pairs%area) &
@@ -387,8 +388,8 @@ contains
       end if
       call restart_exchange(restart, "pair_total", none)     ! also where there are no pairs
       do k = 1, size(pairs%total)
-         call restart_exchange(restart, "pair_total", pairs%total(k)%slave)
-         call restart_exchange(restart, "pair_total", pairs%total(k)%master)
+         call restart_exchange(restart, "pair_total", pairs%total(k)%slave(:n))
+         call restart_exchange(restart, "pair_total", pairs%total(k)%master(:n))
          call restart_exchange(restart, "pair_total", pairs%total(k)%length)
       end do
       call restart_exchange(restart, "pair_active", pairs%total%n_active)
