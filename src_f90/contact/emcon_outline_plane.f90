@@ -14,7 +14,7 @@ module emcon_outline_plane
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
    use emcon_sort, only : find_sorted, sort_order, unique_sorted
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_nodes, only : surface_nodes
    use emcon_tied_edges, only : tied_edges_find, tied_ends_find
    implicit none
    private
@@ -178,14 +178,10 @@ contains
       type(surface_t), intent(in) :: surface
       integer, intent(in) :: piece(:)
       integer, allocatable, intent(out) :: found(:)    !! ascending
-      integer, allocatable :: edge(:, :)
+      integer, allocatable :: node(:)
 
-      if (surface%is_nodal) then
-         found = unique_sorted(piece(surface%node))
-      else
-         call surface_edges(scene, surface, edge)
-         found = unique_sorted(piece(edge(1, :)))
-      end if
+      call surface_nodes(scene, surface, node)
+      found = unique_sorted(piece(node))
    end subroutine pieces_of
 
    !> The edges that one element alone has, but those that a tie covers; in space there are none.

@@ -7,6 +7,7 @@ module emcon_deck_check_surfaces
    use emcon_scene, only : scene_t
    use emcon_sort, only : find_sorted, sort_order, unique_sorted
    use emcon_surface_edges, only : surface_edges
+   use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
    public :: check_surfaces, mark_nodes, surface_nodes, find_common_edges
@@ -92,14 +93,10 @@ contains
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
       logical, intent(inout) :: is_in(:)           !! (n_node)
-      integer, allocatable :: edge(:, :)
-      integer :: i
+      integer, allocatable :: node(:)
 
-      is_in(surface%node) = .true.
-      call surface_edges(scene, surface, edge)
-      do i = 1, size(edge, 2)
-         if (all(edge(:, i) > 0)) is_in(edge(:, i)) = .true.
-      end do
+      call surface_nodes(scene, surface, node)
+      is_in(node) = .true.
    end subroutine mark_nodes
 
    !> The nodes of a surface, ascending.

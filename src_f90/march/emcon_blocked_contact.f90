@@ -5,7 +5,7 @@ module emcon_blocked_contact
    use emcon_kinds, only : wp
    use emcon_numbering, only : numbering_t
    use emcon_scene, only : scene_t
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_nodes, only : surface_nodes
    use emcon_system, only : system_t
    use emcon_text, only : to_text
    implicit none
@@ -49,14 +49,13 @@ contains
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: number              !! of the surface
-      integer, allocatable :: edge(:, :)
+      integer, allocatable :: node(:)
       integer :: i
 
-      call surface_edges(scene, scene%surface(number), edge)
+      call surface_nodes(scene, scene%surface(number), node)
       surface_is_bound = .true.
-      do i = 1, size(edge, 2)
-         surface_is_bound = surface_is_bound .and. is_bound(system%space%numbering, edge(1, i)) &
-            .and. is_bound(system%space%numbering, edge(size(edge, 1), i))
+      do i = 1, size(node)
+         surface_is_bound = surface_is_bound .and. is_bound(system%space%numbering, node(i))
       end do
    end function surface_is_bound
 

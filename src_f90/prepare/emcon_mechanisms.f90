@@ -9,7 +9,7 @@ module emcon_mechanisms
    use emcon_mechanism_rows, only : mechanism_rows_t
    use emcon_rotation, only : cross_product, n_turn
    use emcon_scene, only : scene_t
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_nodes, only : surface_nodes
    use emcon_system, only : system_may_hold, system_t
    implicit none
    private
@@ -92,19 +92,12 @@ contains
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: pair
       logical, intent(inout) :: touches(:)
-      integer, allocatable :: edge(:, :), node(:)
+      integer, allocatable :: node(:)
       integer :: i, surface(2)
 
       surface = [scene%pair(pair)%slave, scene%pair(pair)%master]
-      do i = 1, 2
-         associate (s => scene%surface(surface(i)))
-            call surface_edges(scene, s, edge)
-            if (s%is_nodal) then
-               node = s%node
-            else
-               node = edge(1, :)
-            end if
-         end associate
+      do i = 1, size(surface)
+         call surface_nodes(scene, scene%surface(surface(i)), node)
          touches(pack(system%space%body(node), system%space%body(node) > 0)) = .true.
       end do
    end subroutine mark_contact_bodies

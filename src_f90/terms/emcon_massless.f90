@@ -13,7 +13,7 @@ module emcon_massless
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_steps, only : initiation_massless, initiation_persistent
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
    public :: massless_bare, massless_find, massless_shed, massless_return, massless_follow
@@ -110,14 +110,11 @@ contains
       integer, intent(in) :: k
       logical, intent(in) :: mark
       logical, intent(inout) :: is_massless(:)   !! (n_node)
-      integer, allocatable :: edge(:, :)
+      integer, allocatable :: node(:)
 
       if (k == 0) return
-      associate (surface => scene%surface(k))
-         call surface_edges(scene, surface, edge)
-         is_massless([edge]) = mark
-         if (surface%is_nodal) is_massless(surface%node) = mark
-      end associate
+      call surface_nodes(scene, scene%surface(k), node)
+      is_massless(node) = mark
    end subroutine mark_surface
 
    !> Leave the nodes of each element that would keep no mass theirs.
