@@ -50,6 +50,11 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: i
 
+      if (size(scene%x, 1) /= 2) then
+         call raise(error, err_input, "surface " // surface%name // ": chains of edges are of " // &
+            "the plane, and nodes have " // to_text(size(scene%x, 1)) // " coordinates")
+         return
+      end if
       call surface_edges(scene, surface, self%edge)
       self%n_edge = size(self%edge, 2)
       if (surface%is_nodal) then

@@ -46,6 +46,7 @@ module emcon_look_plane
    end type crossings_t
 
    type :: look_t
+      logical :: is_able = .true.                !! there are outlines: not in three dimensions
       type(outline_t) :: outline
       type(outline_curves_t) :: curves           !! that edges stand for
       real(wp), allocatable :: u(:, :)           !! (2, n_node) displacement at the look [L]
@@ -62,6 +63,7 @@ contains
       type(scene_t), intent(in) :: scene
       integer :: n
 
+      self%is_able = size(scene%x, 1) == 2
       call outline_init(self%outline, scene)
       n = size(self%outline%edge, 2)
       allocate(self%near(n), self%found(n), self%around(n))

@@ -45,7 +45,7 @@ contains
 
       allocate(self%number(size(outline%edge, 2)), source=0)
       allocate(self%piece(0))
-      do i = 1, size(scene%pair)
+      do i = 1, merge(size(scene%pair), 0, outline%n_piece > 0)
          associate (pair => scene%pair(i))
             chosen = options
             if (pair%has_options) chosen = pair%options

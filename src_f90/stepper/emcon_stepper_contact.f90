@@ -288,6 +288,8 @@ contains
 
       call query_sync(self, stepper, error)
       call query_place(self, stepper, u0, du, error)
+      call check_that(self%march%judge%look%is_able, "overlap in three dimensions is not in this " &
+         // "version", error)
       if (.not. allocated(error)) call judge_step(self%march%judge, stepper%scene%x, u0, du, &
          overlap)
    end subroutine query_overlap

@@ -3,8 +3,12 @@ module test_chain
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_chain, only : chain_corners, chain_crossing, chain_distance, chain_init, chain_t, &
       chain_tributary
+   use emcon_contact, only : contact_t
+   use emcon_contact_registry, only : new_contact
    use emcon_element_registry, only : find_element_row
    use emcon_errors, only : err_input, error_t
+   use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts, &
+      formulation_segment
    use emcon_kinds, only : dp, wp
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
@@ -32,6 +36,7 @@ contains
          test_case_t("two bodies in one surface", test_two_bodies), &
          test_case_t("surface of nodes", test_nodal), &
          test_case_t("branching surface", test_branch), &
+         test_case_t("nodes in space", test_in_space), &
          test_case_t("tributary lengths", test_tributary), &
          test_case_t("parts, places and distances", test_parts), &
          test_case_t("corners of a block", test_corners_right), &
@@ -43,6 +48,32 @@ contains
          test_case_t("touching with rounded coordinates", test_touching_rounded), &
          test_case_t("crossing of a long chain", test_crossing_long)]
    end subroutine collect_chain
+
+   !> A chain of nodes with three coordinates is refused, not written past its ends.
+   subroutine test_in_space(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: raised
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(chain_t) :: chain
+      class(contact_t), allocatable :: contact
+      integer, parameter :: formulation(*) = [formulation_nts, formulation_segment, &
+         formulation_mortar]
+      integer :: k
+
+      call make_block(scene, "CPE4", [3, 1], block)
+      call add_surface(scene, "TOP", block, [top])
+      call add_surface(scene, "BOTTOM", block, [bottom])
+      scene%x = reshape([scene%x, scene%x(:1, :)], [3, size(scene%x, 2)])
+      call chain_init(chain, scene, scene%surface(1), raised)
+      call check_error(error, raised, err_input, "surface TOP: chains of edges are of the plane", &
+         "chain")
+      do k = 1, size(formulation)
+         call new_contact(scene, contact_pair_t(slave=1, master=2, formulation=formulation(k)), &
+            contact, raised)
+         call check_error(error, raised, err_input, "3 coordinates", "formulation " // to_text(k))
+      end do
+   end subroutine test_in_space
 
    !> Edges run with the body to the left: from right to left on top, triangles as quadrilaterals.
    subroutine test_open(error)
