@@ -8,7 +8,7 @@ module emcon_march_past
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t
    use emcon_motion, only : at_rest, motion_of, motion_t
-   use emcon_pose, only : instant_t, pose_at_end, pose_t
+   use emcon_pose, only : instant_t, pose_at_end
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_system, only : system_loads
@@ -36,11 +36,9 @@ contains
       type(instant_t), intent(in) :: start       !! of the next step
       type(error_t), allocatable, intent(out) :: error
       type(motion_t) :: place
-      type(pose_t) :: pose
 
-      pose = self%scheme%pose(start, 1.0_wp)
       associate (state => self%state, row => self%scheme%row)
-         if (state%has_past .or. .not. (row%n_past > 0 .or. pose%start_weight > 0.0_wp)) return
+         if (state%has_past .or. .not. row%looks_back) return
          if (allocated(state%past)) deallocate(state%past, state%load)
          allocate(state%past(size(scene%x, 1), size(scene%x, 2), row%n_past), source=0.0_wp)
          allocate(state%load, mold=scene%x)

@@ -3,15 +3,18 @@ module emcon_host_scheme
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_pose, only : instant_t, pose_t
-   use emcon_scheme, only : scheme_t
+   use emcon_pose, only : instant_t, most_past, pose_t
+   use emcon_scheme, only : scheme_row_t, scheme_t
+   use emcon_scheme_registry, only : scheme_given_row
    use emcon_text, only : to_text
    implicit none
    private
-   public :: host_scheme_t, host_scheme_add, host_scheme_find, host_scheme_check
+   public :: host_scheme_t, host_scheme_add, host_scheme_find, host_scheme_check, host_scheme_row
 
    !> What is the inverse of another number is so but for this.
    real(wp), parameter :: rounding = 4.0_wp*epsilon(1.0_wp)
+   !> Sizes of the step before for which poses are looked at: there is none, and one as long.
+   real(wp), parameter :: before(*) = [0.0_wp, 1.0_wp]
 
    type :: host_scheme_t
       character(len=:), allocatable :: name      !! capital letters, without blanks
@@ -53,14 +56,61 @@ contains
       k = 0
    end function host_scheme_find
 
-   !> Are the weights and places of `scheme` ones, as seen for one step of size 1?
+   !> The row of `scheme`: what it keeps it says itself, what it does not go with follows from
+   !> where it evaluates forces.
+   pure type(scheme_row_t) function host_scheme_row(name, scheme) result(row)
+      character(len=*), intent(in) :: name       !! capital letters, without blanks
+      class(scheme_t), intent(in) :: scheme      !! that was checked
+      type(pose_t) :: pose
+      integer :: k
+
+      row = scheme_given_row
+      row%word = name
+      row%n_past = scheme%row%n_past
+      row%is_accelerated = scheme%row%is_accelerated
+      row%setting = scheme%row%setting
+      do k = 1, size(before)
+         pose = scheme%pose(instant_t(h_before=before(k)), 1.0_wp)
+         row%dissipates = row%dissipates .or. pose%dissipation > 0.0_wp
+         if (pose%pushes_at_end .or. pose%start_weight > 0.0_wp) then
+            row%takes_jumps = .false.
+            row%takes_damping = .false.
+         end if
+         if (pose%is_gradient .or. row%dissipates) row%takes_massless = .false.
+      end do
+      row%takes_massless = row%takes_massless .and. row%takes_damping
+   end function host_scheme_row
+
+   !> Are the weights and places of `scheme` ones, as seen for a first step of size 1 and one that
+   !> follows another of that size?
    subroutine host_scheme_check(name, scheme, error)
       character(len=*), intent(in) :: name       !! for the message
       class(scheme_t), intent(in) :: scheme
       type(error_t), allocatable, intent(out) :: error
-      type(pose_t) :: pose
+      integer :: k
 
-      pose = scheme%pose(instant_t(), 1.0_wp)
+      if (scheme%row%n_past < 0 .or. scheme%row%n_past > most_past) call raise(error, err_input, &
+         "the scheme " // name // ": row%n_past = " // to_text(scheme%row%n_past) // " must be " &
+         // "0 to " // to_text(most_past))
+      if (scheme%row%is_accelerated .and. scheme%row%n_past < 1 .and. .not. allocated(error)) call &
+         raise(error, err_input, "the scheme " // name // ": row%is_accelerated needs " // &
+         "row%n_past = 1 or more, to keep the acceleration")
+      if (scheme%row%is_explicit .and. .not. allocated(error)) call raise(error, err_input, &
+         "the scheme " // name // ": row%is_explicit is for schemes of EMCON alone")
+      do k = 1, size(before)
+         if (allocated(error)) return
+         call check_pose(name, scheme%pose(instant_t(h_before=before(k)), 1.0_wp), &
+            scheme%row%n_past, error)
+      end do
+   end subroutine host_scheme_check
+
+   !> Are these weights and places, of a step of size 1?
+   subroutine check_pose(name, pose, n_past, error)
+      character(len=*), intent(in) :: name       !! for the message
+      type(pose_t), intent(in) :: pose
+      integer, intent(in) :: n_past              !! fields that the scheme keeps
+      type(error_t), allocatable, intent(out) :: error
+
       if (.not. (pose%mass_scale > 0.0_wp .and. pose%mass_scale <= huge(1.0_wp))) then
          call refuse("mass_scale", pose%mass_scale, "must be positive")
       else if (.not. (pose%rate > 0.0_wp .and. pose%rate <= huge(1.0_wp))) then
@@ -73,7 +123,17 @@ contains
          call refuse("place", pose%place, "must be above 0 and at most 1")
       else if (.not. (pose%load_place >= 0.0_wp .and. pose%load_place <= 1.0_wp)) then
          call refuse("load_place", pose%load_place, "must be 0 to 1")
+      else if (.not. (pose%start_weight >= 0.0_wp .and. pose%start_weight <= huge(1.0_wp))) then
+         call refuse("start_weight", pose%start_weight, "must be 0 or more")
+      else if (.not. (pose%dissipation >= 0.0_wp .and. pose%dissipation <= 1.0_wp)) then
+         call refuse("dissipation", pose%dissipation, "must be 0 to 1")
+      else if (.not. (pose%recalled >= 0.0_wp .and. pose%recalled <= 1.0_wp)) then
+         call refuse("recalled", pose%recalled, "must be 0 to 1")
+      else if (pose%recalled > 0.0_wp .and. n_past < 1) then
+         call refuse("recalled", pose%recalled, "needs row%n_past = 1 or more")
       end if
+      if (.not. allocated(error)) call check_past("past_velocity", pose%past_velocity)
+      if (.not. allocated(error)) call check_past("past_change", pose%past_change)
 
    contains
 
@@ -85,6 +145,24 @@ contains
             to_text(value) // " " // fault // ", in a step of size 1")
       end subroutine refuse
 
-   end subroutine host_scheme_check
+      !> Weights of the past are numbers, and of what is kept.
+      subroutine check_past(what, weight)
+         character(len=*), intent(in) :: what
+         real(wp), intent(in) :: weight(most_past)
+         integer :: k
+
+         do k = 1, most_past
+            if (.not. ieee_is_finite(weight(k))) then
+               call refuse(what // "(" // to_text(k) // ")", weight(k), "is not finite")
+               return
+            else if (k > n_past .and. abs(weight(k)) > 0.0_wp) then
+               call refuse(what // "(" // to_text(k) // ")", weight(k), "needs row%n_past = " // &
+                  to_text(k) // " or more")
+               return
+            end if
+         end do
+      end subroutine check_past
+
+   end subroutine check_pose
 
 end module emcon_host_scheme

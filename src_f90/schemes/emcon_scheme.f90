@@ -26,6 +26,8 @@ module emcon_scheme
       logical :: takes_massless = .true.         !! nodes may be without mass
       logical :: dissipates = .false.            !! elements take energy
       logical :: takes_damping = .true.          !! materials may be damped
+      !> It asks for the forces at the start of a step, and for the size of the step before
+      logical :: looks_back = .false.
       logical :: is_accelerated = .false.        !! the past is the acceleration
       integer :: n_past = 0                      !! fields that are kept of the steps before
       type(setting_t) :: setting

@@ -32,20 +32,22 @@ module emcon_scheme_registry
          masses_resist=.true., takes_massless=.false.), &
       scheme_row_t(scheme_trapezoidal, "DYNAMIC", "TRAPEZOIDAL", "trapezoidal rule", &
          masses_resist=.true., takes_jumps=.false., takes_massless=.false., &
-         takes_damping=.false.), &
+         takes_damping=.false., looks_back=.true.), &
       scheme_row_t(scheme_generalized_alpha, "DYNAMIC", "GENERALIZED ALPHA", &
          "generalised-alpha method", masses_resist=.true., takes_jumps=.false., &
-         takes_massless=.false., takes_damping=.false., is_accelerated=.true., n_past=1, &
+         takes_massless=.false., takes_damping=.false., looks_back=.true., &
+         is_accelerated=.true., n_past=1, &
          setting=setting_t("ALPHA", -0.05_wp)), &
       scheme_row_t(scheme_bdf2, "DYNAMIC", "BDF2", "backward differences", &
          masses_resist=.true., takes_jumps=.false., takes_massless=.false., &
-         takes_damping=.false., n_past=2), &
+         takes_damping=.false., looks_back=.true., n_past=2), &
       scheme_row_t(scheme_central_difference, "DYNAMIC", "CENTRAL DIFFERENCE", &
          "central differences", masses_resist=.true., takes_damping=.false., &
          is_explicit=.true.), &
       scheme_row_t(scheme_energy_decaying, "DYNAMIC", "ENERGY DECAYING", &
          "energy-decaying scheme", masses_resist=.true., takes_massless=.false., &
-         dissipates=.true., n_past=1, setting=setting_t("DISSIPATION", 0.125_wp))]
+         dissipates=.true., looks_back=.true., n_past=1, &
+         setting=setting_t("DISSIPATION", 0.125_wp))]
 
    !> What the numbers of schemes may be.
    type :: setting_range_t
@@ -60,9 +62,9 @@ module emcon_scheme_registry
       setting_range_t(scheme_generalized_alpha, "SPECTRAL RADIUS", 0.0_wp, 1.0_wp, "0 to 1"), &
       setting_range_t(scheme_energy_decaying, "DISSIPATION", 0.0_wp, 1.0_wp, "0 to 1")]
 
-   !> Of schemes that a program gives.
+   !> Of schemes that a program gives, before it has: then they say themselves what they keep.
    type(scheme_row_t), parameter :: scheme_given_row = &
-      scheme_row_t(scheme_given, "DYNAMIC", masses_resist=.true.)
+      scheme_row_t(scheme_given, "DYNAMIC", masses_resist=.true., looks_back=.true.)
 
 contains
 

@@ -1,4 +1,4 @@
-"""A scheme of time integration from outside, a file against the installed library."""
+"""Schemes of time integration from outside, a file each against the installed library."""
 
 from __future__ import annotations
 
@@ -14,8 +14,11 @@ sys.path.insert(0, str(HERE.parent/"embed"))
 
 from embed_tools import WARNINGS, install, need, run  # noqa: E402
 
-SOURCES = ["theta_scheme.f90", "integrated.f90"]
+SOURCES = ["theta_scheme.f90", "own_schemes.f90", "integrated.f90"]
 EPS = np.finfo(float).eps
+#: Of what does not gain any more so many roundings are left at most: `kept_floor` of
+#: emcon_convergence.
+FLOOR = 64
 # One element on rollers, fixed on the left: one linear oscillator, k = E, m = rho/3, omega = 3.
 OSCILLATOR = """*NODE, NSET=ALL
 1, 0., 0.
@@ -129,11 +132,12 @@ def program(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, dict[str, s
 
 
 def history(program: tuple[Path, dict[str, str]], folder: Path, deck: str,
-            theta: float) -> np.ndarray:
-    """Time, displacement, velocity, energy, angular momentum: a row each."""
+            theta: float, *more: str) -> np.ndarray:
+    """Time, displacement, velocity, energy, angular momentum, work of contact, momenta: a row
+    each."""
     path = folder/"deck.inp"
     path.write_text(deck)
-    lines = run(program[0], path, "theta", theta, env=program[1]).splitlines()
+    lines = run(program[0], path, "theta", theta, *more, env=program[1]).splitlines()
     return np.array([[float(word) for word in line.split()] for line in lines]).T
 
 
@@ -143,7 +147,7 @@ def test_oscillator_follows_the_closed_form(program: tuple[Path, dict[str, str]]
     """v + i omega u is multiplied by R = (1 + (1 - theta) i omega h)/(1 - theta i omega h): |R|,
     the spectral radius, is 1 for the mid-point rule and below it for theta > 1/2."""
     h, n = 0.125, 80
-    _, u, v, energy, _ = history(program, tmp_path, OSCILLATOR.format(h=h, end=n*h), theta)
+    _, u, v, energy, *_ = history(program, tmp_path, OSCILLATOR.format(h=h, end=n*h), theta)
     x = OMEGA*h
     factor = ((1 + (1 - theta)*1j*x)/(1 - theta*1j*x))**np.arange(n + 1)
     # Each step rounds u, v and what they are computed from: some ten times.
@@ -166,7 +170,7 @@ def test_midpoint_rule_keeps_angular_momentum_but_not_energy(
         program: tuple[Path, dict[str, str]], tmp_path: Path) -> None:
     drift = []
     for h in (1/32, 1/64):
-        *_, energy, angular = history(program, tmp_path, SPINNING.format(h=h), 0.5)
+        _, _, _, energy, angular, *_ = history(program, tmp_path, SPINNING.format(h=h), 0.5)
         # Newton stops at round-off: of forces that turn the square some times in a unit of time.
         assert np.abs(angular - angular[0]).max() <= 1e3*EPS*abs(angular[0])
         drift.append(np.abs(energy - energy[0]).max()/energy[0])
@@ -179,13 +183,107 @@ def test_contact_works_over_the_whole_step(program: tuple[Path, dict[str, str]],
                                            theta: float) -> None:
     """Wherever forces are evaluated, contact makes and takes nothing: energy stays with the
     mid-point rule and a linear law, and falls with the backward Euler method."""
-    _, u, v, energy, _ = history(program, tmp_path, IMPACT, theta)
+    _, u, v, energy, *_ = history(program, tmp_path, IMPACT, theta)
     assert u.max() <= 0.1 and v[0] > 0 > v[-1]
     growth = np.diff(energy)/energy[0]
     if theta == 0.5:
         assert np.abs(growth).max() <= 64*EPS
     else:
         assert growth.max() <= 64*EPS and energy[-1] < 0.9*energy[0]
+
+
+# Two blocks that fly at each other, one of them pushed by a load that grows.
+COLLISION = """*NODE, NSET=ALL
+1, 0., 0.
+2, 1., 0.
+3, 1., 1.
+4, 0., 1.
+5, 1.04, 0.3
+6, 2.04, 0.3
+7, 2.04, 1.3
+8, 1.04, 1.3
+*ELEMENT, TYPE=CPE4, ELSET=LEFT
+1, 1, 2, 3, 4
+*ELEMENT, TYPE=CPE4, ELSET=RIGHT
+2, 5, 6, 7, 8
+*ELSET, ELSET=BOTH
+1, 2
+*MATERIAL, NAME=STUFF
+*HYPERELASTIC, COUPLED NEO HOOKE
+100., 0.3
+*DENSITY
+1.
+*SOLID SECTION, ELSET=BOTH, MATERIAL=STUFF
+*SURFACE, NAME=ONE
+LEFT, S2
+*SURFACE, NAME=OTHER
+RIGHT, S4
+*SURFACE INTERACTION, NAME=HARD
+*CONTACT PAIR, INTERACTION=HARD
+ONE, OTHER
+*AMPLITUDE, NAME=GROWS
+0., 0., 0.5, 1.
+*INITIAL CONDITIONS, TYPE=VELOCITY
+5, 1, -1.
+6, 1, -1.
+7, 1, -1.
+8, 1, -1.
+*STEP, NLGEOM
+*DYNAMIC, DIRECT
+0.01, {end}
+*TIME INTEGRATION, SCHEME={scheme}
+{load}*END STEP
+"""
+LOAD = "*CLOAD, AMPLITUDE=GROWS\n1, 2, 3.\n4, 2, 3.\n"
+KINDS = ["ENERGY MOMENTUM", "MIDPOINT", "TRAPEZOIDAL", "GENERALIZED ALPHA", "BDF2",
+         "ENERGY DECAYING"]
+
+
+@pytest.mark.parametrize("theta", [0.5, 0.75, 1.0])
+def test_contact_that_pushes_at_the_end(program: tuple[Path, dict[str, str]], tmp_path: Path,
+                                        theta: float) -> None:
+    """Its forces are those along the gradients there, and so is their work: the mid-point rule and
+    a linear law change energy by just that, others lose more. Momentum stays."""
+    linear = COLLISION.replace("*HYPERELASTIC, COUPLED NEO HOOKE", "*ELASTIC").replace(
+        ", NLGEOM", "")
+    deck = linear.format(scheme="THETA", load="", end=0.3)
+    table = history(program, tmp_path, deck, theta, "end")
+    energy, work, momentum = table[3], table[5], table[6:]
+    assert np.abs(np.diff(work)).max() > 1e-6*energy[0]
+    left = np.diff(energy - work)/energy[0]
+    assert left.max() <= FLOOR*EPS
+    if theta == 0.5:
+        assert left.min() >= -FLOOR*EPS
+    else:
+        assert energy[-1] < 0.99*energy[0]
+    assert np.abs(momentum.T - [-1., 0.]).max() <= FLOOR*EPS
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_copies_do_what_their_originals_do(program: tuple[Path, dict[str, str]], tmp_path: Path,
+                                           kind: str) -> None:
+    """Together they set all that a `pose_t` has: what one of them leaves out would be seen here."""
+    path = tmp_path/"deck.inp"
+    lines = []
+    for scheme, name in ((kind, ""), ("OWN", "own")):
+        path.write_text(COLLISION.format(scheme=scheme, load=LOAD, end=0.3))
+        lines.append(run(program[0], path, name, kind.replace(" ", ""),
+                         env=program[1]).splitlines())
+    assert lines[0] == lines[1]
+    assert len({line.split()[2] for line in lines[0]}) > 10      # it is stopped in contact
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_contact_leaves_momentum(program: tuple[Path, dict[str, str]], tmp_path: Path,
+                                 kind: str) -> None:
+    """Whatever a scheme says of contact, forces on both surfaces are opposite."""
+    path = tmp_path/"deck.inp"
+    path.write_text(COLLISION.format(scheme="OWN", load="", end=0.3))
+    lines = run(program[0], path, "own", kind.replace(" ", ""), env=program[1]).splitlines()
+    table = np.array([[float(word) for word in line.split()] for line in lines])
+    momentum = table[:, 6:]
+    assert np.abs(momentum - [-1., 0.]).max() <= FLOOR*EPS
+    assert table[-1, 2] > -0.9                      # the right block was stopped
 
 
 @pytest.mark.parametrize(("name", "theta", "words"), [

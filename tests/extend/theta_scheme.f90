@@ -11,6 +11,7 @@ module theta_scheme
 
    type, extends(scheme_t) :: theta_scheme_t
       real(wp) :: theta = 0.5_wp                 !! 0 < . <= 1
+      logical :: pushes_at_end = .false.         !! contact pushes along gradients there
    contains
       procedure :: pose
    end type theta_scheme_t
@@ -27,6 +28,7 @@ contains
       pose%place = self%theta
       pose%is_gradient = .true.
       pose%load_place = self%theta
+      pose%pushes_at_end = self%pushes_at_end
       pose%load_instant = instant_later(start, self%theta*h)
    end function pose
 

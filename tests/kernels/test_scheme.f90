@@ -1,12 +1,14 @@
 !> Time stepping schemes: conservation, second order, reversibility.
 module test_scheme
-   use check, only : check_near, check_true, test_case_t
-   use emcon_errors, only : error_t
+   use check, only : check_error, check_near, check_true, test_case_t
+   use emcon_errors, only : err_input, error_t
+   use emcon_host_scheme, only : host_scheme_check, host_scheme_row
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : body_momenta, ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
-   use emcon_pose, only : instant_t, pose_is_equilibrium, pose_t, pose_velocity, pose_way
+   use emcon_pose, only : instant_t, pose_is_equilibrium, pose_moving, pose_t, pose_velocity, &
+      pose_way
    use emcon_scene, only : scene_t
    use emcon_scheme, only : scheme_row_t, scheme_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
@@ -18,6 +20,13 @@ module test_scheme
    private
    public :: collect_scheme
 
+   !> A scheme that a program gives: the same pose in all steps.
+   type, extends(scheme_t) :: given_t
+      type(pose_t) :: own
+   contains
+      procedure :: pose => given_pose
+   end type given_t
+
    real(wp), parameter :: eps = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
 
 contains
@@ -28,6 +37,8 @@ contains
       tests = [ &
          test_case_t("evaluation and velocity", test_pose), &
          test_case_t("rows say what schemes do", test_rows), &
+         test_case_t("rows of given schemes follow from their poses", test_given_rows), &
+         test_case_t("given schemes that are none", test_given_faults), &
          test_case_t("free flight conserves over 1000 steps", test_free_flight), &
          test_case_t("second order", test_order), &
          test_case_t("reversible", test_reversible), &
@@ -54,6 +65,94 @@ contains
       call check_near(error, pose_velocity(pose, 3.0_wp, 2.0_wp), 0.0_wp, 0.0_wp, 1.0_wp, &
          "rest")
    end subroutine test_pose
+
+   pure function given_pose(self, start, h) result(pose)
+      class(given_t), intent(in) :: self
+      type(instant_t), intent(in) :: start
+      real(wp), intent(in) :: h
+      type(pose_t) :: pose
+
+      associate (unused => start, nor_this => h)
+      end associate
+      pose = self%own
+   end function given_pose
+
+   !> What a scheme does not go with follows from where it evaluates forces: for those of the table
+   !> it is what their rows say.
+   subroutine test_given_rows(error)
+      type(error_t), allocatable, intent(out) :: error
+      class(scheme_t), allocatable :: scheme
+      type(scheme_row_t) :: row, given
+      integer :: i
+
+      do i = 1, size(scheme_rows)
+         row = scheme_rows(i)
+         if (row%is_explicit .or. .not. row%masses_resist) cycle
+         call scheme_create(row, scheme)
+         given = host_scheme_row("X", scheme)
+         call check_true(error, (given%takes_jumps .eqv. row%takes_jumps) .and. &
+            (given%takes_massless .eqv. row%takes_massless) .and. &
+            (given%takes_damping .eqv. row%takes_damping), trim(row%word) // " goes with the same")
+         call check_true(error, (given%dissipates .eqv. row%dissipates) .and. given%n_past == &
+            row%n_past .and. given%masses_resist .and. given%looks_back, trim(row%word) // &
+            " is the same")
+         call host_scheme_check("X", scheme, error)
+         if (allocated(error)) return
+      end do
+   end subroutine test_given_rows
+
+   !> Weights and places that are none are refused by their names.
+   subroutine test_given_faults(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(given_t) :: given, bad
+
+      given%own = pose_moving(1.0_wp, lapse=0.5_wp, v_weight=2.0_wp)
+      call host_scheme_check("X", given, error)
+      if (allocated(error)) return
+      bad = given
+      bad%own%place = 0.0_wp
+      call expect("place")
+      bad%own%mass_scale = 0.0_wp
+      call expect("mass_scale")
+      bad%own%rate = -1.0_wp
+      call expect("rate")
+      bad%own%lapse = 1.0_wp
+      call expect("lapse")
+      bad%own%load_place = 1.5_wp
+      call expect("load_place")
+      bad%own%start_weight = -1.0_wp
+      call expect("start_weight")
+      bad%own%dissipation = 2.0_wp
+      call expect("dissipation")
+      bad%own%recalled = 2.0_wp
+      call expect("recalled")
+      bad%own%recalled = 0.5_wp
+      call expect("needs row%n_past")
+      bad%own%past_velocity(2) = 1.0_wp
+      bad%row%n_past = 1
+      call expect("past_velocity(2)")
+      bad%own%past_change(1) = 1.0_wp
+      call expect("past_change(1)")
+      bad%row%n_past = 3
+      call expect("row%n_past = 3")
+      bad%row%is_accelerated = .true.
+      call expect("row%is_accelerated")
+      bad%row%is_explicit = .true.
+      call expect("row%is_explicit")
+
+   contains
+
+      !> The bad one is refused; begin anew.
+      subroutine expect(word)
+         character(len=*), intent(in) :: word
+         type(error_t), allocatable :: raised
+
+         call host_scheme_check("X", bad, raised)
+         call check_error(error, raised, err_input, word, word)
+         bad = given
+      end subroutine expect
+
+   end subroutine test_given_faults
 
    !> Each row makes a scheme that is what the row says of it; ways and velocities are inverse.
    subroutine test_rows(error)

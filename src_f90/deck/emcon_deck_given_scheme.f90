@@ -1,0 +1,44 @@
+!> What the scheme that a program gives does not go with, in the deck that calls it.
+module emcon_deck_given_scheme
+   use emcon_deck_check_massless, only : check_massless_sections
+   use emcon_deck_contact_damping, only : check_contact_damping
+   use emcon_deck_damping, only : check_damping
+   use emcon_deck_dimension, only : check_dimension, n_plane
+   use emcon_deck_friction, only : check_friction
+   use emcon_deck_reader, only : reader_t
+   use emcon_deck_scheme, only : check_schemes
+   use emcon_diagnostics, only : diagnostics_texts
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_scene, only : scene_t
+   use emcon_text, only : string_t
+   implicit none
+   private
+   public :: check_given_scheme
+
+contains
+
+   !> Check the deck again, now that the rows of all its schemes are known: its first error.
+   subroutine check_given_scheme(scene, error)
+      type(scene_t), intent(in) :: scene         !! without errors but for the scheme
+      type(error_t), allocatable, intent(out) :: error
+      type(reader_t) :: reader
+      type(string_t), allocatable :: text(:)
+      integer :: i
+
+      reader%log%file_name = scene%file
+      call check_schemes(reader, scene%pair, scene%step)
+      call check_damping(reader, scene)
+      call check_friction(reader, scene%pair, scene%step, scene%surface%is_nodal)
+      call check_contact_damping(reader, scene%pair, scene%step)
+      call check_massless_sections(reader, scene)
+      if (scene%n_dim /= n_plane .or. scene%is_axial) call check_dimension(reader, scene)
+      if (reader%log%n_errors == 0) return
+      text = diagnostics_texts(reader%log)
+      do i = 1, size(text)
+         if (index(text(i)%text, ": error: ") == 0) cycle
+         call raise(error, err_input, text(i)%text)
+         return
+      end do
+   end subroutine check_given_scheme
+
+end module emcon_deck_given_scheme
