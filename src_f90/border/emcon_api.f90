@@ -18,8 +18,9 @@
 !>    that extends `shape_t`; by `stepper_give_scheme` a scheme of time integration,
 !>    a type that extends `scheme_t`; by `stepper_give_force` and `stepper_give_mass` the solid of
 !>    a host code, a type that extends `host_force_t`; by `stepper_give_constraint` conditions that
-!>    always hold, a type that extends `constraint_t`; by `stepper_give_solver` a direct solver, a
-!>    type that extends `sparse_solver_t`.
+!>    always hold, a type that extends `constraint_t`; by `stepper_give_contact` the contact of a
+!>    pair, a type that extends `host_contact_t`; by `stepper_give_solver` a direct solver, a type
+!>    that extends `sparse_solver_t`.
 !> 2. `stepper_advance` until `stepper_is_done`: the grid of the deck. Or `stepper_step` with sizes
 !>    of the program's own, and `stepper_next_step` for the next step of the deck.
 !> 3. Between steps read `stepper%march%state` (`state_t`) and `stepper%march%ledger` (`ledger_t`),
@@ -54,11 +55,13 @@ module emcon_api
    use emcon_deck_source, only : passage_t
    use emcon_errors, only : err_analysis, err_file, err_input, err_internal, err_interrupt, &
       err_none, error_t
+   use emcon_host_contact, only : host_contact_t
    use emcon_host_force, only : force_response_t, host_failed, host_force_t, host_ok, &
       host_outside
-   use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_nts, &
-      formulation_segment, integration_elements, integration_segments, multiplier_dual, &
-      multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
+      formulation_nts, formulation_segment, integration_elements, integration_segments, &
+      multiplier_dual, multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, &
+      smoothing_none
    use emcon_judge, only : overlap_t
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_t
@@ -70,6 +73,7 @@ module emcon_api
       contact_quantity, element_quantity, node_quantity, pair_quantity, quantity_components, &
       quantity_values, quantity_variables
    use emcon_restart, only : restart_read, restart_t, restart_write
+   use emcon_scene, only : scene_t
    use emcon_scheme, only : scheme_t
    use emcon_shape, only : shape_t
    use emcon_sparse_solver, only : matrix_definite, matrix_general, matrix_symmetric, &
@@ -87,9 +91,9 @@ module emcon_api
    use emcon_stepper_file, only : stepper_load, stepper_save
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
       stepper_set_state, stepper_snapshot, stepper_step
-   use emcon_stepper_given, only : stepper_give_constraint, stepper_give_element, &
-      stepper_give_force, stepper_give_law, stepper_give_mass, stepper_give_potential, &
-      stepper_give_scheme, stepper_give_solver
+   use emcon_stepper_given, only : stepper_give_constraint, stepper_give_contact, &
+      stepper_give_element, stepper_give_force, stepper_give_law, stepper_give_mass, &
+      stepper_give_potential, stepper_give_scheme, stepper_give_solver
    use emcon_stepper_host, only : stepper_add_pair, stepper_add_surface, stepper_add_tie, &
       stepper_hold, stepper_new, stepper_set_contact, stepper_tie_matrices
    use emcon_stepper_loads, only : stepper_add_loads, stepper_find_load, stepper_set_load

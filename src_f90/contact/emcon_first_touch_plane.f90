@@ -1,5 +1,6 @@
 !> When surfaces that move along a given way touch for the first time, however far apart they are.
 module emcon_first_touch_plane
+   use emcon_interactions, only : formulation_given
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
@@ -25,6 +26,7 @@ contains
 
       touch_time = huge(touch_time)
       do i = 1, size(scene%pair)
+         if (scene%pair(i)%formulation == formulation_given) cycle   ! it sees all gaps itself
          associate (pair => scene%pair(i))
             call surface_edges(scene, scene%surface(pair%slave), slave)
             call surface_edges(scene, scene%surface(pair%master), master)

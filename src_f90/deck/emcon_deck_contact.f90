@@ -9,8 +9,8 @@ module emcon_deck_contact
       option_name, reader_t, refuse_option
    use emcon_deck_surfaces, only : get_surfaces
    use emcon_diagnostics, only : add_error, quoted, suggestion
-   use emcon_interactions, only : contact_damping_t, contact_pair_t, formulation_mortar, &
-      formulation_nts, formulation_segment
+   use emcon_interactions, only : contact_damping_t, contact_pair_t, formulation_given, &
+      formulation_mortar, formulation_nts, formulation_segment
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_options, only : option_code, option_default, option_words
@@ -190,7 +190,7 @@ contains
       of_card%is_asked = has_option(card, "SIDES")
       select case (option_name(card, "SIDES"))
       case ("", "AUTO")
-         of_card%may_choose = .true.
+         of_card%may_choose = of_card%formulation /= formulation_given
       case ("ONE")
          continue
       case ("BOTH")
@@ -198,6 +198,9 @@ contains
          if (any(of_card%formulation == [formulation_segment, formulation_mortar])) then
             call refuse_option(reader, card, "SIDES", "AUTO, ONE", "SEGMENT and MORTAR hold what " &
                // "lies between the surfaces once; use TYPE=NODE TO SURFACE")
+         else if (of_card%formulation == formulation_given) then
+            call refuse_option(reader, card, "SIDES", "AUTO, ONE", "what TYPE=USER holds the " // &
+               "program says that gives it")
          end if
       case default
          call refuse_option(reader, card, "SIDES", known, "")
@@ -337,6 +340,7 @@ contains
       if (has_option(card, "ADJUST")) call read_adjust(reader, card, scene, of_card)
       call read_guard(reader, card, any(pair%both_sides), of_card)
       call read_pair_initiation(reader, card, of_card%initiation)
+      if (any(pair%formulation == formulation_given)) call suit_given(reader, card, of_card)
       do i = 1, size(pair)
          pair(i)%adjust_distance = of_card%adjust_distance
          pair(i)%adjust_set = of_card%adjust_set
@@ -349,6 +353,31 @@ contains
          pair(i)%initiation = of_card%initiation
       end do
    end subroutine read_pair_options
+
+   !> What contact of a program has, and what it does not know of.
+   subroutine suit_given(reader, card, of_card)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(contact_pair_t), intent(inout) :: of_card
+
+      if (has_option(card, "GUARD") .and. of_card%is_guarded) call refuse("GUARD=YES")
+      of_card%is_guarded = .false.
+      if (has_option(card, "ADJUST")) call refuse("ADJUST")
+      if (of_card%offset > 0.0_wp) call refuse("PAD THICKNESS of its surface interaction")
+      if (of_card%friction > 0.0_wp) call refuse("*FRICTION of its surface interaction")
+      if (of_card%damping%coefficient > 0.0_wp) call refuse( &
+         "*CONTACT DAMPING of its surface interaction")
+
+   contains
+
+      subroutine refuse(what)
+         character(len=*), intent(in) :: what
+
+         call card_error(reader, card, what // " is not for TYPE=USER, contact that a program " // &
+            "gives")
+      end subroutine refuse
+
+   end subroutine suit_given
 
    !> INTERACTION= of a card: the thickness of its pad, restitution, friction, damping.
    subroutine read_interaction(reader, card, pair, of_card)

@@ -132,6 +132,7 @@ contains
       do i = 1, size(is_kept)
          k = findloc(plane_cards%name == reader%card(i)%name .and. .not. &
             (plane_cards%is_of_space .and. n_dim == n_space), .true., 1)
+         if (is_given_pair(reader%card(i)) .and. n_dim == n_space) k = 0
          is_kept(i) = k == 0 .and. index(reader%card(i)%name, "CONTACTINCLUSIONS") == 0 &
             .and. index(reader%card(i)%name, "CONTACTPROPERTY") == 0
          if (k == 0) cycle
@@ -152,6 +153,13 @@ contains
       reader%doubt_names = .true.
       reader%doubt_rigid = .true.
    end subroutine refuse_plane_cards
+
+   !> A contact pair whose contact a program gives?
+   pure logical function is_given_pair(card)
+      type(card_t), intent(in) :: card
+
+      is_given_pair = card%name == "CONTACTPAIR" .and. option_name(card, "TYPE") == "USER"
+   end function is_given_pair
 
    !> Refuse what sections, materials and steps ask for and is of the plane.
    subroutine check_dimension(reader, scene)

@@ -3,10 +3,13 @@
 !> All formulations are judged by the gaps of nodes over edges.
 module emcon_initial_contact
    use emcon_chain, only : chain_corners, chain_crossing, chain_t
-   use emcon_contact, only : gap_state_t
+   use emcon_contact, only : contact_t, gap_state_t
+   use emcon_contact_registry, only : new_contact
    use emcon_errors, only : err_input, error_t, raise
    use emcon_guards, only : guard_slack
-   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_nts
+   use emcon_host, only : host_find_contact, host_t
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_given, &
+      formulation_nts
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t, where_text
@@ -40,10 +43,11 @@ contains
 
    !> Move the nodes that ADJUST= names onto their surface and check every pair; the notes tell
    !> what was done.
-   subroutine initial_contact_prepare(scene, notes, error)
+   subroutine initial_contact_prepare(scene, notes, error, given)
       type(scene_t), intent(inout) :: scene
       type(notes_t), intent(inout) :: notes
       type(error_t), allocatable, intent(out) :: error
+      type(host_t), intent(in), optional :: given    !! contact of pairs, among others
       type(contact_options_t) :: options
       type(start_gaps_t) :: contact
       logical :: is_checked(size(scene%surface))
@@ -60,6 +64,11 @@ contains
       is_checked = .false.
       do i = 1, size(scene%pair)
          associate (pair => scene%pair(i))
+            if (pair%formulation == formulation_given) then
+               if (.not. is_meant) call check_given(scene, i, options, noise, error, given)
+               if (allocated(error)) return
+               cycle
+            end if
             call start_gaps_init(contact, scene, pair, error, options)
             if (allocated(error)) return
             if (.not. contact%is_self) then
@@ -274,7 +283,7 @@ contains
       character(len=:), allocatable :: found
 
       call start_gaps_measure(contact, scene)
-      limit = noise
+      limit = merge(noise, huge(noise), contact%edge > 0)
       if (contact%is_self) then
          associate (chain => contact%slave, state => contact%state)
             do i = 1, contact%n
@@ -286,13 +295,47 @@ contains
             end do
          end associate
       end if
-      call find_behind(scene, contact, limit, n, found)
+      call find_behind(scene, contact%node, contact%state, limit, n, found)
       if (n == 0) return
       call raise(error, err_input, where_text(scene, pair%origin) // ": error: " // to_text(n) // &
          " slave nodes of surface " // scene%surface(pair%slave)%name // " penetrate surface " // &
          scene%surface(pair%master)%name // found // &
          "; move them, or let *CONTACT PAIR, ADJUST= do it")
    end subroutine check_penetration
+
+   !> Slave nodes behind the master surface, as the contact that a program gives for pair `i` sees
+   !> them.
+   subroutine check_given(scene, i, options, noise, error, given)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i
+      type(contact_options_t), intent(in) :: options
+      real(wp), intent(in) :: noise              !! of coordinates [L]
+      type(error_t), allocatable, intent(out) :: error
+      type(host_t), intent(in), optional :: given
+      class(contact_t), allocatable :: contact
+      real(wp) :: still(size(scene%x, 1), size(scene%x, 2))
+      integer :: k, n
+      character(len=:), allocatable :: found
+
+      k = 0
+      if (present(given)) k = host_find_contact(given, i)
+      if (k == 0) return                         ! `system_init` tells that it is missing
+      call new_contact(scene, scene%pair(i), contact, error, given%contact(k)%contact)
+      if (allocated(error)) return
+      call contact%suit_steps(any(.not. scene%step%scheme%masses_resist))
+      call contact%configure(scene%x, options)
+      still = 0.0_wp
+      call contact%begin_step(scene%x, scene%u0, still)
+      call contact%measure(scene%x, scene%u0, still)
+      call find_behind(scene, contact%node, contact%state, merge(noise, huge(noise), &
+         contact%state%is_near), n, found)
+      if (n == 0) return
+      associate (pair => scene%pair(i))
+         call raise(error, err_input, where_text(scene, pair%origin) // ": error: " // &
+            to_text(n) // " slave nodes of surface " // scene%surface(pair%slave)%name // &
+            " penetrate surface " // scene%surface(pair%master)%name // found // "; move them")
+      end associate
+   end subroutine check_given
 
    !> Master nodes behind the slave surface, as a corner between two slave nodes: an integrated gap
    !> sees it, but ADJUST= cannot mend it.
@@ -316,7 +359,7 @@ contains
       if (allocated(error)) return
       call start_gaps_measure(contact, scene)
       allocate(is_corner(contact%slave%n_edge))
-      allocate(limit(contact%n), source=noise)
+      limit = merge(noise, huge(noise), contact%edge > 0)
       call chain_corners(contact%slave, scene%x, options%smoothing_angle, is_corner)
       do k = 1, contact%n
          if (contact%edge(k) == 0) cycle
@@ -328,7 +371,7 @@ contains
                scene%x, scene%u0)) limit(k) = huge(limit)
          end associate
       end do
-      call find_behind(scene, contact, limit, n, found)
+      call find_behind(scene, contact%node, contact%state, limit, n, found)
       if (n == 0) return
       call raise(error, err_input, where_text(scene, pair%origin) // ": error: " // to_text(n) // &
          " master nodes of surface " // scene%surface(pair%master)%name // " penetrate surface " &
@@ -338,27 +381,25 @@ contains
 
    !> How many of the nodes measured are behind the surface by more than `limit`, and a text with
    !> their labels and depths.
-   subroutine find_behind(scene, contact, limit, n, text)
+   subroutine find_behind(scene, node, state, limit, n, text)
       type(scene_t), intent(in) :: scene
-      type(start_gaps_t), intent(in) :: contact
-      real(wp), intent(in) :: limit(:)           !! (n) [L]
+      integer, intent(in) :: node(:)
+      type(gap_state_t), intent(in) :: state(:)  !! of each
+      real(wp), intent(in) :: limit(:)           !! of each; huge: no surface is near [L]
       integer, intent(out) :: n
       character(len=:), allocatable, intent(out) :: text
-      type(string_t) :: found(contact%n)
-      type(gap_state_t) :: state
+      type(string_t) :: found(size(node))
       real(wp) :: deepest
       integer :: i
 
       n = 0
       deepest = 0.0_wp
-      do i = 1, contact%n
-         if (contact%edge(i) == 0) cycle
-         state = contact%state(i)
-         if (.not. state%is_over .or. state%gap0 >= -limit(i)) cycle
+      do i = 1, size(node)
+         if (.not. state(i)%is_over .or. state(i)%gap0 >= -limit(i)) cycle
          n = n + 1
-         deepest = max(deepest, -state%gap0)
-         found(n)%text = to_text(scene%node_label(contact%node(i))) // " (" // &
-            to_text(-state%gap0) // ")"
+         deepest = max(deepest, -state(i)%gap0)
+         found(n)%text = to_text(scene%node_label(node(i))) // " (" // &
+            to_text(-state(i)%gap0) // ")"
       end do
       text = ", by " // to_text(deepest) // " at most; node (depth): " // &
          joined(found(:n), ", ", most_named)

@@ -2,6 +2,7 @@
 !> log and what `emcon check` prints.
 module emcon_scene_report
    use emcon_contact, only : gap_state_t
+   use emcon_deck_dimension, only : n_plane
    use emcon_gaps, only : gaps_forget, gaps_search
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
@@ -90,14 +91,11 @@ contains
       type(contact_pair_t), intent(in) :: pair
       type(report_row_t), intent(inout) :: row
       character(len=:), allocatable :: how
-      integer, allocatable :: edge(:, :)
 
       call row_put(row, "slave", scene%surface(pair%slave)%name, ": #")
-      call surface_edges(scene, scene%surface(pair%slave), edge)
-      call row_put(row, "slave_edges", size(edge, 2), " (# edges)")
+      call count_pieces(pair%slave, "slave")
       call row_put(row, "master", scene%surface(pair%master)%name, " on #")
-      call surface_edges(scene, scene%surface(pair%master), edge)
-      call row_put(row, "master_edges", size(edge, 2), " (# edges)")
+      call count_pieces(pair%master, "master")
       call option_text("formulation", pair%formulation, how)
       call row_put(row, "formulation", how, ", #")
       how = "both"
@@ -111,6 +109,24 @@ contains
          call row_put(row, "damping_flat", damping%flat, "")
          call row_put(row, "tangent_fraction", damping%tangent, ", # of it against slip")
       end associate
+
+   contains
+
+      !> How many edges a surface has, in space how many faces.
+      subroutine count_pieces(number, side)
+         integer, intent(in) :: number           !! of the surface
+         character(len=*), intent(in) :: side
+         integer, allocatable :: edge(:, :)
+
+         associate (surface => scene%surface(number))
+            if (scene%n_dim == n_plane) then
+               call surface_edges(scene, surface, edge)
+               call row_put(row, side // "_edges", size(edge, 2), " (# edges)")
+            else
+               call row_put(row, side // "_faces", size(surface%face), " (# faces)")
+            end if
+         end associate
+      end subroutine count_pieces
    end subroutine describe_pair
 
    !> A row for each tie.

@@ -5,10 +5,10 @@
 module emcon_options
    use emcon_couplings, only : tie_t
    use emcon_element_registry, only : element_rows
-   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
-      formulation_nts, formulation_segment, integration_elements, integration_segments, &
-      multiplier_dual, multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, &
-      smoothing_none
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_given, &
+      formulation_mortar, formulation_nts, formulation_segment, integration_elements, &
+      integration_segments, multiplier_dual, multiplier_standard, normal_edge, normal_nodal, &
+      smoothing_hermite, smoothing_none
    use emcon_materials, only : kinematics_corotated, kinematics_linear, kinematics_nonlinear, &
       section_t
    use emcon_scheme_registry, only : scheme_energy_momentum, scheme_rows, scheme_static
@@ -40,6 +40,7 @@ module emcon_options
          "gaps of nodes integrated over slave edges", ""), &
       option_row_t("formulation", formulation_mortar, "MORTAR", "EMCON_MORTAR", "mortar", &
          ",LINMORTAR,PGLINMORTAR,SURFACETOSURFACE,"), &
+      option_row_t("formulation", formulation_given, "USER", "", "contact of the program", ""), &
       option_row_t("integration", integration_segments, "SEGMENTS", "EMCON_SEGMENTS", &
          "segments", ""), &
       option_row_t("integration", integration_elements, "ELEMENTS", "EMCON_ELEMENTS", &

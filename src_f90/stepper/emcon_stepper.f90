@@ -171,7 +171,7 @@ contains
       type(stepper_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error
 
-      call initial_contact_prepare(self%scene, self%notes, error)
+      call initial_contact_prepare(self%scene, self%notes, error, self%given)
       if (.not. allocated(error)) call ties_move_nodes(self%scene, self%notes, error)
    end subroutine prepare_contact
 

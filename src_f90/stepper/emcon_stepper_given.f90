@@ -1,5 +1,5 @@
 !> What a program gives to a model between reading its deck and building it: laws, elements,
-!> schemes, forces, mass, constraints, solvers.
+!> schemes, forces, mass, constraints, contact, solvers.
 !>
 !> Copies are kept, also for a restart file that is loaded afterwards. Nodes that stand in no
 !> element are part of the model where they are given something. Gravity acts on the mass of
@@ -11,12 +11,14 @@ module emcon_stepper_given
    use emcon_element_kind, only : find_element_kind
    use emcon_element_registry, only : find_element_row
    use emcon_errors, only : error_t
-   use emcon_host, only : host_add_constraint, host_add_force, host_add_law, &
-      host_add_solver, host_copy_solvers, host_find_solver
+   use emcon_host, only : host_add_constraint, host_add_contact, host_add_force, host_add_law, &
+      host_add_solver, host_copy_solvers, host_find_contact, host_find_solver
    use emcon_host_check, only : host_check_force, host_check_mass
+   use emcon_host_contact, only : host_contact_t
    use emcon_host_force, only : host_force_t
    use emcon_host_scheme, only : host_scheme_add, host_scheme_check, host_scheme_find, &
       host_scheme_row
+   use emcon_interactions, only : formulation_given
    use emcon_law, only : law_t
    use emcon_law_registry, only : law_given
    use emcon_node_potential, only : node_potential_init, node_potential_t
@@ -33,7 +35,8 @@ module emcon_stepper_given
    implicit none
    private
    public :: stepper_give_law, stepper_give_element, stepper_give_scheme, stepper_give_solver
-   public :: stepper_give_potential, stepper_give_force, stepper_give_mass, stepper_give_constraint
+   public :: stepper_give_potential, stepper_give_force, stepper_give_mass
+   public :: stepper_give_constraint, stepper_give_contact
 
    !> Give the law of a *USER MATERIAL: its strain energy at points, or a type that extends `law_t`.
    interface stepper_give_law
@@ -210,6 +213,31 @@ contains
       if (.not. allocated(error)) call host_add_constraint(self%given, constraint)
    end subroutine stepper_give_constraint
 
+   !> Give the formulation of contact of the *CONTACT PAIR, TYPE=USER of two surfaces.
+   subroutine stepper_give_contact(self, slave, master, contact, error)
+      type(stepper_t), intent(inout) :: self
+      character(len=*), intent(in) :: slave          !! surface; small or capital letters
+      character(len=*), intent(in) :: master         !! surface; small or capital letters
+      class(host_contact_t), intent(in) :: contact
+      type(error_t), allocatable, intent(out) :: error   !! nothing was given
+      integer :: k
+
+      call check_stage(self, error)
+      if (allocated(error)) return
+      associate (pair => self%scene%pair, surface => self%scene%surface)
+         do k = size(pair), 1, -1
+            if (pair(k)%formulation /= formulation_given) cycle
+            if (surface(pair(k)%slave)%name == plain(slave) .and. &
+               surface(pair(k)%master)%name == plain(master)) exit
+         end do
+      end associate
+      call check_that(k > 0, "there is no *CONTACT PAIR, TYPE=USER of slave surface " // &
+         plain(slave) // " and master surface " // plain(master) // " in the deck", error)
+      call check_that(host_find_contact(self%given, k) == 0, "the contact of surfaces " // &
+         plain(slave) // " and " // plain(master) // " is given already", error)
+      if (.not. allocated(error)) call host_add_contact(self%given, k, contact)
+   end subroutine stepper_give_contact
+
    !> Give a direct solver, which steps with SOLVER=`name` factorise their matrices by.
    subroutine stepper_give_solver(self, name, solver, error)
       type(stepper_t), intent(inout) :: self
@@ -240,7 +268,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
 
       call check_that(.not. allocated(self%march%scheme), "laws, elements, schemes, forces, " // &
-         "mass, constraints and solvers are given before the model is built", error)
+         "mass, constraints, contact and solvers are given before the model is built", error)
       call check_that(self%is_read, "there is no scene to give anything to: no deck was read, " &
          // "or reading it failed", error)
    end subroutine check_stage

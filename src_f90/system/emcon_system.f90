@@ -12,7 +12,7 @@ module emcon_system
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_frozen, only : frozen_give, frozen_t
-   use emcon_host, only : host_t
+   use emcon_host, only : host_find_contact, host_t
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
@@ -70,19 +70,20 @@ contains
       call space_init(self%space, scene, lists)
       if (scene%is_hosted) self%space%is_alive = .true.
       call constraints_create(scene, self%space%linear, self%held, given)
-      call init_contact(self, scene, error)
+      call init_contact(self, scene, error, given)
       if (allocated(error)) return
       call response_init(self%response, size(scene%x, 1), size(scene%x, 2), &
          size(scene%element_kind))
    end subroutine system_init
 
    !> The contact of pairs and guards, and the numbers of conditions: those of `held`, then theirs.
-   subroutine init_contact(self, scene, error)
+   subroutine init_contact(self, scene, error, given)
       type(system_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
+      type(host_t), intent(in), optional :: given
       type(contact_pair_t), allocatable :: pair(:)
-      integer :: i
+      integer :: i, k
 
       do i = 1, size(self%held)
          self%n_constraint = self%n_constraint + self%held(i)%constraint%n_constraint
@@ -100,7 +101,14 @@ contains
       if (allocated(scene%guard)) self%contact(self%n_pair + 1:)%of_pair = &
          merge(-1, 1, scene%guard%is_reverse)*scene%guard%of_pair
       do i = 1, size(pair)
-         call new_contact(scene, pair(i), self%contact(i)%contact, error)
+         k = 0
+         if (present(given)) k = host_find_contact(given, i)
+         if (k > 0) then
+            call new_contact(scene, pair(i), self%contact(i)%contact, error, &
+               given%contact(k)%contact)
+         else
+            call new_contact(scene, pair(i), self%contact(i)%contact, error)
+         end if
          if (allocated(error)) return
          self%n_constraint = self%n_constraint + self%contact(i)%contact%n_constraint
          self%first_constraint(i + 1) = self%n_constraint

@@ -2,6 +2,7 @@
 module emcon_host
    use emcon_constraint, only : constraint_box_t, constraint_t
    use emcon_csr, only : csr_t
+   use emcon_host_contact, only : host_contact_box_t, host_contact_t
    use emcon_host_force, only : host_force_box_t, host_force_t
    use emcon_host_law, only : host_law_t
    use emcon_law, only : law_t
@@ -9,17 +10,19 @@ module emcon_host
    use emcon_sparse_solver, only : solver_box_t, sparse_solver_t
    implicit none
    private
-   public :: host_t, host_add_constraint, host_add_force, host_add_law, host_add_solver, &
-      host_copy_solvers, host_count, host_count_conditions, host_find_solver
+   public :: host_t, host_add_constraint, host_add_contact, host_add_force, host_add_law, &
+      host_add_solver, host_copy_solvers, host_count, host_count_conditions, host_find_contact, &
+      host_find_solver
 
    !> Laws by the names of materials, forces between nodes, mass beside that of elements, solvers
-   !> by what decks call them, constraints that always hold.
+   !> by what decks call them, constraints that always hold, contact of pairs.
    type :: host_t
       type(host_law_t), allocatable :: law(:)
       type(host_force_box_t), allocatable :: force(:)
       type(csr_t) :: mass                        !! (n_node x n_node) [M]; without rows: none
       type(solver_box_t), allocatable :: solver(:)
       type(constraint_box_t), allocatable :: constraint(:)
+      type(host_contact_box_t), allocatable :: contact(:)
    end type host_t
 
    !> What `host_count` counts: forces and masses.
@@ -60,6 +63,35 @@ contains
       allocate(longer(n + 1)%constraint, source=constraint)
       call move_alloc(longer, self%constraint)
    end subroutine host_add_constraint
+
+   !> Append a copy of `contact`, the formulation of pair `pair`.
+   subroutine host_add_contact(self, pair, contact)
+      type(host_t), intent(inout) :: self
+      integer, intent(in) :: pair                !! of the scene
+      class(host_contact_t), intent(in) :: contact
+      type(host_contact_box_t), allocatable :: longer(:)
+      integer :: i, n
+
+      n = 0
+      if (allocated(self%contact)) n = size(self%contact)
+      allocate(longer(n + 1))
+      do i = 1, n
+         longer(i)%pair = self%contact(i)%pair
+         call move_alloc(self%contact(i)%contact, longer(i)%contact)
+      end do
+      longer(n + 1)%pair = pair
+      allocate(longer(n + 1)%contact, source=contact)
+      call move_alloc(longer, self%contact)
+   end subroutine host_add_contact
+
+   !> The place of the formulation of pair `pair`; 0: it was not given.
+   pure integer function host_find_contact(self, pair) result(k)
+      type(host_t), intent(in) :: self
+      integer, intent(in) :: pair                !! of the scene
+
+      k = 0
+      if (allocated(self%contact)) k = findloc(self%contact%pair, pair, 1)
+   end function host_find_contact
 
    !> Number of forces, and of masses.
    pure function host_count(self) result(n)
