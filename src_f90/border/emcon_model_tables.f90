@@ -89,7 +89,7 @@ contains
       type(dg_t) :: number
 
       number = nts_gap(x0, dx, merge(4, 0, has_before), merge(5, 0, has_after), &
-         spread([rounding, rounding, 0.0_wp], 2, 2))
+         spread([rounding, rounding], 2, 2))
       gap = [number%f0, number%f1, number%df]
       by_g = 0.0_wp
       by_c = 0.0_wp

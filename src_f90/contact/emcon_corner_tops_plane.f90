@@ -36,7 +36,7 @@ contains
          if (before > 0) width(1) = top_width(slave, k, [node(before), node(2), node(3)], x, u)
          if (after > 0) width(2) = top_width(slave, k, [node(2), node(3), node(after)], x, u)
       end associate
-      stencil%rounding(3, :) = width*chain_shorter(master, edge)
+      stencil%rounding(2, :) = max(stencil%rounding(2, :), width*chain_shorter(master, edge))
    end subroutine corner_tops
 
    !> Half width of the top of a convex master corner for node `k` of the chain, per edge: widest

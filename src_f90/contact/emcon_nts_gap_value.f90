@@ -31,7 +31,7 @@ contains
    pure subroutine nts_gap_value(x, before, after, rounding, gap, xi, goes_around)
       real(wp), intent(in) :: x(:, :)            !! (2, 3 to 5)
       integer, intent(in) :: before, after       !! as in `nts_gap`
-      real(wp), intent(in) :: rounding(3, 2)     !! as in `nts_gap`
+      real(wp), intent(in) :: rounding(2, 2)     !! as in `nts_gap`
       real(wp), intent(out) :: gap               !! [L]
       real(wp), intent(out) :: xi                !! on the line of the edge, 0 to 1 within it
       logical, intent(in), optional :: goes_around   !! as in `nts_gap`
@@ -92,23 +92,19 @@ contains
 
    !> kappa min(tau, 0), rounded as in `bent_part` of emcon_nts_gap.inc.
    pure real(wp) function bent_value(tau, rounding, kappa)
-      real(wp), intent(in) :: tau, rounding(3), kappa
+      real(wp), intent(in) :: tau, rounding(2), kappa
       real(wp) :: hollow
 
       hollow = rounded_part(kappa, flat)
-      bent_value = (kappa - hollow)*over_top_value(tau, rounding(2), rounding(3)) &
+      bent_value = (kappa - hollow)*over_top_value(tau, rounding(2)) &
          + hollow*rounded_negative(tau, rounding(1))
    end function bent_value
 
    !> min(tau, 0), rounded as in `over_top` of emcon_nts_gap.inc.
-   pure real(wp) function over_top_value(tau, narrow, wide) result(part)
-      real(wp), intent(in) :: tau, narrow, wide
+   pure real(wp) function over_top_value(tau, width)
+      real(wp), intent(in) :: tau, width
 
-      if (wide > narrow) then
-         part = 2.0_wp*above_negative(tau, wide) - above_negative(tau, 0.5_wp*wide)
-      else
-         part = above_negative(tau, narrow)
-      end if
+      over_top_value = 2.0_wp*above_negative(tau, width) - above_negative(tau, 0.5_wp*width)
    end function over_top_value
 
    pure real(wp) function cross(a, b)

@@ -9,7 +9,7 @@ module emcon_nts_stencil
    implicit none
    private
    public :: polygon_stencil_t, polygon_stencil, smooth_stencil_t, smooth_stencil, edge_of_sector
-   public :: polygon_slip, stencil_gather, stencil_length, edge_distance, is_outside
+   public :: part_of_sector, polygon_slip, stencil_gather, stencil_length, edge_distance, is_outside
    public :: most_nodes
 
    !> Nodes of a stencil at most: slave node and five edges.
@@ -29,8 +29,8 @@ module emcon_nts_stencil
       integer :: node(5) = 0
       integer :: before = 0, after = 0           !! local numbers of the neighbours' nodes; 0: none
       logical :: goes_around = .false.           !! convex corners, as a circle does
-      real(wp) :: rounding(3, 2) = 0.0_wp        !! (concave, convex, and facing a corner; before
-                                                 !! and after) half widths of the corners [L]
+      real(wp) :: rounding(2, 2) = 0.0_wp        !! (concave, convex; before and after) half widths
+                                                 !! of the corners [L]
    end type polygon_stencil_t
 
    !> A smoothed surface near a slave node; chosen for a step. Slave node and edge come first.
@@ -57,7 +57,7 @@ contains
       self%node(1) = slave
       self%node(2:3) = master%edge(:, edge)
       self%n = 3
-      self%rounding(:2, :) = spread(rounding, 2, 2)*spread(chain_shorter(master, edge), 1, 2)
+      self%rounding = spread(rounding, 2, 2)*spread(chain_shorter(master, edge), 1, 2)
       e = master%previous(edge)
       if (e > 0) then
          if (is_blunt(x, u0, master%edge(1, e), self%node(2), self%node(3))) then
@@ -211,6 +211,34 @@ contains
 
       polygon_slip = slip_point(self%node([slave, slave, first, last]), 0.0_wp, weight)
    end function polygon_slip
+
+   !> Where the slave node is between the bisectors at both ends of the edge, 0 at the first and 1
+   !> at the last: over a node of an arc that is the node, at any distance from it.
+   pure real(wp) function part_of_sector(x, before, after) result(part)
+      real(wp), intent(in) :: x(:, :)            !! (2, 3 to 5) of the stencil's nodes [L]
+      integer, intent(in) :: before, after       !! local numbers as in `polygon_stencil_t`
+      real(wp) :: along(2), from, to
+
+      along = way(first, last)
+      from = dot_product(way(first, slave), along)
+      to = dot_product(way(slave, last), along)
+      if (before > 0) from = 0.5_wp*(from + dot_product(way(first, slave), way(before, first)))
+      if (after > 0) to = 0.5_wp*(to + dot_product(way(slave, last), way(last, after)))
+      part = 0.5_wp
+      if (from + to > 0.0_wp) part = from/(from + to)
+
+   contains
+
+      !> The direction from node `p` to node `q`; to the slave node the whole way.
+      pure function way(p, q)
+         integer, intent(in) :: p, q
+         real(wp) :: way(2)
+
+         way = x(:, q) - x(:, p)
+         if (p /= slave .and. q /= slave) way = way/sqrt(dot_product(way, way))
+      end function way
+
+   end function part_of_sector
 
    !> Reference length of the stencil's edge: what gaps are measured against.
    pure real(wp) function stencil_length(x, node)
