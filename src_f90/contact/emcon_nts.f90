@@ -17,7 +17,8 @@ module emcon_nts
       choice_settle, choice_take_nearer, nts_choice_t
    use emcon_nts_constraint, only : polygon_constraint, smooth_constraint
    use emcon_nts_gap_value, only : nts_gap_value
-   use emcon_nts_stencil, only : most_nodes, polygon_slip, stencil_gather, stencil_length
+   use emcon_nts_stencil, only : most_nodes, part_of_sector, polygon_slip, stencil_gather, &
+      stencil_length
    use emcon_scene, only : scene_t
    use emcon_slip_point, only : slip_list_t, slip_over
    use emcon_stance, only : stance_holds, stance_t, stance_take
@@ -145,15 +146,13 @@ contains
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
       real(wp), dimension(size(x, 1), most_nodes) :: local, dlocal
-      real(wp) :: gap, xi
 
       sagitta = 0.0_wp
       if (self%edge(i) == 0) return
       associate (stencil => self%polygon(1, i), e => self%edge(i))
          call stencil_gather(x, u0, u0, stencil%n, stencil%node, local, dlocal)
-         call nts_gap_value(local(:, :stencil%n), stencil%before, stencil%after, &
-            stencil%rounding, gap, xi, stencil%goes_around)
-         sagitta = arc_rise(self%curvature(e), self%master%length(e), xi, 0.0_wp)
+         sagitta = arc_rise(self%curvature(e), self%master%length(e), &
+            part_of_sector(local(:, :stencil%n), stencil%before, stencil%after), 0.0_wp)
       end associate
    end function sagitta_under
 
