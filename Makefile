@@ -233,6 +233,7 @@ $(BUILD)/emcon: $(APP_OBJ) $(BUILD)/libemcon.a
 	@echo "  LINK  $@"
 	$(Q)$(FC) $(LDFLAGS_$(MODE)) -o $@ $^ $(LIBS) $(THREAD_LIBS)
 
+# `private`: what is made on the way keeps its own flags.
 $(TAGGED_threads:%=$(O)/%.o): private FFLAGS_ALL += -fopenmp
 define tagged
 $$(TAGGED_$(1):%=$(O)/%.o): $(BUILD)/flags_$(1).txt

@@ -6,6 +6,7 @@ functions take the root of a tree and return findings, so they are tried on bad 
 
 import ast
 import collections
+import functools
 import graphlib
 import importlib.util
 import json
@@ -28,13 +29,13 @@ TOP |= set("README.md LICENSE CHANGELOG.md CITATION.cff pyproject.toml".split())
 
 #: Where the kinds of each abstract type are made: nobody else knows one of them by name.
 REGISTRY = {
-    "sparse_solver_t": {"emcon_solver_registry"},
-    "law_t": {"emcon_law_registry"},
-    "shape_t": {"emcon_element_registry"},
-    "scheme_t": {"emcon_scheme_registry"},
-    "contact_t": {"emcon_contact_registry"},
-    "term_t": {"emcon_term_registry"},
-    "constraint_t": {"emcon_constraint_registry"},
+    "sparse_solver_t": {"emcon_solver_kinds"},
+    "law_t": {"emcon_law_kinds"},
+    "shape_t": {"emcon_element_kinds"},
+    "scheme_t": {"emcon_scheme_kinds"},
+    "contact_t": {"emcon_contact_kinds"},
+    "term_t": {"emcon_term_kinds"},
+    "constraint_t": {"emcon_constraint_kinds"},
     "host_force_t": {"emcon_stepper_given", "emcon_c_given"},
 }
 #: What is made of another kind of its room: gaps of nodes, interpolated or looked at.
@@ -66,8 +67,17 @@ def room(root, path):
     return path.relative_to(root / "src_f90").parts[0]
 
 
+def units(text):
+    """Names of the modules and submodules that a source defines."""
+    return module_order.defined(text) + list(module_order.submodules(text))
+
+
+@functools.cache
 def modules(root):
-    """Module name -> (file, room, used modules); an included file counts for the including one."""
+    """Module name -> (file, room, used modules); an included file counts for the including one.
+
+    A submodule is one that uses the module it extends.
+    """
     found = {}
     for path in sources(root):
         if path.suffix == ".inc":
@@ -76,7 +86,7 @@ def modules(root):
         used = set()
         for part in [path, *module_order.included(path)]:
             used |= module_order.used(part.read_text())
-        for name in module_order.defined(text) or [f"program {path.stem}"]:
+        for name in units(text) or [f"program {path.stem}"]:
             found[name] = (path, room(root, path), used)
     return found
 
@@ -88,7 +98,10 @@ def names(root):
             continue
         if room(root, path) not in ROOMS:
             yield f"{path.relative_to(root)}: not in a room of the house"
-        defined = module_order.defined(path.read_text())
+        defined = units(path.read_text())
+        for parent in module_order.submodules(path.read_text()).values():
+            if not list(path.parent.glob(f"{parent}.[fF]90")):
+                yield f"{path.relative_to(root)}: a submodule of {parent}, which stands elsewhere"
         is_program = not defined and room(root, path) == "app"
         if defined != [path.stem] and not is_program:
             yield f"{path.relative_to(root)}: defines {defined or 'no module'}, not {path.stem}"
@@ -146,6 +159,14 @@ def named_kinds(root):
                 yield f"{name} uses {other}, a kind of {' and '.join(sorted(concrete[other]))}"
 
 
+def compiled_with(root, name):
+    """The files that are compiled where a module or submodule has a new interface, at the most."""
+    found, new = modules(root), {name}
+    while more := {user for user, (_, _, used) in found.items() if used & new} - new:
+        new |= more
+    return new
+
+
 def statements(root, pattern, rooms_free):
     """Lines that match, comments and strings aside, outside the rooms that may do so."""
     for path in sources(root):
@@ -165,7 +186,10 @@ def long_lines(root):
 
 
 def procedures(path):
-    """(first line, name, lines, arguments) of each procedure; interfaces of others aside."""
+    """(first line, name, lines, arguments) of each procedure; interfaces of others aside.
+
+    Of one whose body stands in a submodule, the interface has the arguments, the body the lines.
+    """
     opened, inside = False, []
     for number, code, _ in house_counts.statements(path):
         low = code.lower()
@@ -173,9 +197,13 @@ def procedures(path):
             opened = True
         elif re.match(r"end\s*interface\b", low):
             opened = False
-        elif not opened and re.match(r"end\s*(subroutine|function)\b", low):
+        elif opened and re.match(r"(pure\s+)?module\s", low) and (head := house_counts.HEAD.match(low)):
+            yield number, head[1], 1, len(re.findall(r"\w+", head[2] or ""))
+        elif not opened and re.match(r"end\s*(subroutine|function|procedure)\b", low):
             start, name, count = inside.pop()
             yield start, name, number - start + 1, count
+        elif not opened and (head := re.match(r"module\s+procedure\s+(\w+)", low)):
+            inside.append((number, head[1], 0))
         elif not opened and (head := house_counts.HEAD.match(low)):
             inside.append((number, head[1], len(re.findall(r"\w+", head[2] or ""))))
 
@@ -223,6 +251,32 @@ def hidden(root):
                     yield f"{path.relative_to(root)}: defines {name} {times} times"
 
 
+def imports(path, package):
+    """Modules of the package that one of them imports, those for types alone included."""
+    above = path.relative_to(package).parent
+    for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
+        if not isinstance(node, ast.ImportFrom) or not node.level:
+            continue
+        base = package.joinpath(*above.parts[: len(above.parts) - node.level + 1])
+        base = base.joinpath(*(node.module or "").split("."))
+        for file in [base, *(base / alias.name for alias in node.names)]:
+            if file.with_suffix(".py").is_file():
+                yield ".".join(file.relative_to(package).parts)
+        if (base / "__init__.py").is_file() and node.module:
+            yield ".".join([*base.relative_to(package).parts, "__init__"])
+
+
+def python_cycles(root):
+    """The first cycle among the modules of the Python package, if any."""
+    package = root / "pywrap/emcon"
+    used = {".".join(path.relative_to(package).with_suffix("").parts): set(imports(path, package))
+            for path in package.rglob("*.py")}  # fmt: skip
+    try:
+        graphlib.TopologicalSorter(used).prepare()
+    except graphlib.CycleError as error:
+        yield " -> ".join(error.args[1])
+
+
 def theory_numbers(root):
     """Equations and sections that sources cite and docs/theory.md does not have."""
     theory = (root / "docs/theory.md").read_text()
@@ -244,6 +298,7 @@ CHECKS = {
     "names": names,
     "arrows up": arrows_up,
     "cycles": cycles,
+    "python cycles": python_cycles,
     "kinds": named_kinds,
     "stop": lambda root: statements(root, STOP, {"app"}),
     "print": lambda root: statements(root, PRINT, {"app", "results"}),
@@ -259,9 +314,17 @@ def test_house(check):
     assert list(CHECKS[check](ROOT)) == []
 
 
+@pytest.mark.parametrize("table", sorted(
+    {name for names in REGISTRY.values() for name in names if name.endswith("_kinds")}))  # fmt: skip
+def test_a_new_kind_compiles_its_file_and_its_table(table):
+    """A law, an element, a scheme, a solver, a term, ...: nobody else is to be compiled anew."""
+    assert compiled_with(ROOT, table) == {table}
+
+
 def test_counts_only_fall():
-    """Dummy arguments that say nothing, literals of the plane: `house_counts.py --list`."""
+    """Dummy arguments that say nothing, literals and words of the plane: `house_counts.py --list`."""
     record = json.loads(house_counts.RECORD.read_text())
+    assert set(record) == set(house_counts.KINDS)
     assert list(house_counts.risen(house_counts.counts(ROOT), record)) == []
 
 
@@ -292,7 +355,13 @@ GOOD = {
     "app/emcon.f90": "program emcon\n   use emcon_stepper\n   print *, 1\n   stop 1\nend program\n",
     "laws/emcon_law_y.f90": "module emcon_law_y\n   type, extends(law_t) :: law_y_t\n"
     "   end type\nend module\n",
-    "laws/emcon_law_registry.f90": "module emcon_law_registry\n   use emcon_law_y\nend module\n",
+    "laws/emcon_law_registry.f90": "module emcon_law_registry\nend module\n",
+    "laws/emcon_law_kinds.f90": "submodule (emcon_law_registry) emcon_law_kinds\n"
+    "   use emcon_law_y\ncontains\n   module procedure f\n   end procedure\nend submodule\n",
+    "../pywrap/emcon/model.py": "from .mesh.read import f\nfrom .mesh import g\nfrom . import b\n",
+    "../pywrap/emcon/mesh/read.py": "import os\nfrom .. import b\n",
+    "../pywrap/emcon/mesh/__init__.py": "from .read import f\n",
+    "../pywrap/emcon/b.py": "",
     "order.py": "def f():\n    pass\n\n\nclass A:\n    def f(self):\n        pass\n",
 }
 BAD = {
@@ -307,8 +376,18 @@ BAD = {
     "names, two": {
         "base/emcon_a.f90": "module emcon_a\nend module\nmodule emcon_b\nend module\n"
     },
+    "names, submodule": {
+        "laws/emcon_law_kinds.f90": "submodule (emcon_law_registry) emcon_kinds_of_laws\nend submodule\n"
+    },
+    "names, submodule elsewhere": {
+        "march/emcon_a.f90": "submodule (emcon_law_registry) emcon_a\nend submodule\n"
+    },
     "names, room": {"misc/emcon_a.f90": "module emcon_a\nend module emcon_a\n"},
     "arrows up": {"scene/emcon_a.f90": "module emcon_a\n  use emcon_stepper\nend module emcon_a\n"},
+    "arrows up, submodule": {
+        "laws/emcon_law_kinds.f90": "submodule (emcon_law_registry) emcon_law_kinds\n"
+        "   use emcon_stepper\nend submodule\n",
+    },
     "arrows up, include": {
         "scene/emcon_a.f90": 'module emcon_a\n   include "a.inc"\nend module emcon_a\n',
         "scene/a.inc": "   USE emcon_stepper, ONLY : x\n",
@@ -317,15 +396,25 @@ BAD = {
         "laws/emcon_law.f90": "module emcon_law\nend module emcon_law\n",
         "app/emcon.f90": "program emcon\n   use emcon_law\nend program\n",
     },
+    "cycles, submodule": {
+        "base/emcon_a.f90": "module emcon_a\n  use emcon_b\nend module emcon_a\n",
+        "base/emcon_b.f90": "submodule (emcon_a) emcon_b\nend submodule emcon_b\n",
+    },
     "cycles": {
         "base/emcon_a.f90": "module emcon_a\n   use emcon_b\nend module emcon_a\n",
         "base/emcon_b.f90": "module emcon_b\n   use emcon_a\nend module emcon_b\n",
     },
+    "python cycles": {"../pywrap/emcon/mesh/read.py": "def f():\n    from ..model import g\n"},
+    "python cycles, package": {"../pywrap/emcon/b.py": "if True:\n    from .mesh import g\n",
+                               "../pywrap/emcon/mesh/__init__.py": "from .. import b\n"},
     "long lines": {"base/emcon_a.f90": f"module emcon_a ! {'a'*100}\nend module emcon_a\n"},
     "kinds": {
         "laws/emcon_law_x.f90": "module emcon_law_x\n   type, extends(law_t) :: law_x_t\n"
         "   end type\nend module\n",
         "march/emcon_a.f90": "module emcon_a\n   use emcon_law_x, only : law_x_t\nend module\n",
+    },
+    "kinds, in a registry": {
+        "laws/emcon_law_registry.f90": "module emcon_law_registry\n   use emcon_law_y\nend module\n",
     },
     "kinds, by a parent": {
         "contact/emcon_b.f90": "module emcon_b\n   type, abstract, extends(contact_t) :: b_t\n"
@@ -337,6 +426,14 @@ BAD = {
     "long procedures": {
         "base/emcon_a.f90": "module emcon_a\ncontains\n   subroutine f\n" + "x = 1\n"*59
         + "   end subroutine f\nend module\n"
+    },
+    "long procedures, body": {
+        "laws/emcon_law_kinds.f90": "submodule (emcon_law_registry) emcon_law_kinds\ncontains\n"
+        "   module procedure f\n" + "x = 1\n"*59 + "   end procedure f\nend submodule\n"
+    },
+    "long procedures, interface": {
+        "base/emcon_a.f90": "module emcon_a\ninterface\n   pure module subroutine f(a, b, c, d, &\n"
+        "         e, f, g, h)\n   end subroutine f\nend interface\nend module\n"
     },
     "long procedures, arguments": {
         "base/emcon_a.f90": "module emcon_a\ncontains\n   pure subroutine f(a, b, c, d, &\n"
@@ -388,7 +485,10 @@ contains
       integer, intent(in) :: &
          n                          !! > 0
       type(error_t), intent(out) :: error(:)
-      real(wp) :: work(3)
+      real(wp) :: work(3)              ! at a corner
+      type(chain_t) :: c
+      call tell("an edge", n_corner, ledger, search)
+      n = c%node_edges(1)
       work(1) = y(2*(n - 1) + 1)**2 + sum(x, 2)
    end subroutine f
    pure integer function g(self, i)
@@ -408,10 +508,12 @@ def test_what_is_counted(tmp_path):
     def found(kind, room):
         return [f[2] for f in house_counts.places(tmp_path, kind) if f[0] == room]
 
-    silent = [(12, "f", "x"), (12, "f", "y"), (16, "f", "error"), (22, "g", "i")]
+    silent = [(12, "f", "x"), (12, "f", "y"), (16, "f", "error"), (25, "g", "i")]
     assert found("silent arguments", "solid") == silent
-    assert [number for number, _ in found("planar literals", "solid")] == [12, 18]
+    assert [number for number, _ in found("planar literals", "solid")] == [12, 21]
     assert found("planar literals", "contact") == []
+    assert [number for number, _ in found("planar words", "solid")] == [18, 20]
+    assert found("planar words", "contact") == []
     counts = house_counts.counts(tmp_path)
     assert list(house_counts.risen(counts, counts)) == []
     counts["planar literals"]["solid"] -= 1

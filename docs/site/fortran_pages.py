@@ -10,7 +10,7 @@ from source_text import escape
 SOURCES = Path(__file__).resolve().parents[2]/"src_f90"
 FACADE = SOURCES/"border"/"emcon_api.f90"
 
-PROCEDURE = r"^ *(?:(?:pure|elemental|impure|recursive) )*(?:subroutine|function) {}\b"
+PROCEDURE = r"^ *(?:(?:pure|elemental|impure|recursive|module) )*(?:subroutine|function) {}\b"
 
 
 def files() -> dict[str, Path]:

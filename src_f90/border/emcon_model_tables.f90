@@ -6,7 +6,7 @@ module emcon_model_tables
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t, law_t
-   use emcon_law_registry, only : law_create, law_rows, n_constant
+   use emcon_law_registry, only : law_create, law_row, law_row_t, n_constant, n_law_row
    use emcon_nts_gap, only : nts_gap
    use emcon_options, only : n_option_row, option_default, option_row, option_row_t
    implicit none
@@ -25,7 +25,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(option_row_t) :: row
 
-      if (i < 1 .or. i > n_option_row) then
+      if (i < 1 .or. i > n_option_row()) then
          call raise(error, err_input, "there is no such option")
          return
       end if
@@ -41,20 +41,20 @@ contains
       integer, intent(out) :: code
       character(len=:), allocatable, intent(out) :: text
       type(error_t), allocatable, intent(out) :: error
+      type(law_row_t) :: row
       integer :: k
 
-      if (i < 1 .or. i > size(law_rows)) then
+      if (i < 1 .or. i > n_law_row()) then
          call raise(error, err_input, "there is no such law")
          return
       end if
-      associate (row => law_rows(i))
-         code = row%code
-         text = trim(row%name) // line_end // trim(row%keyword) // line_end // trim(row%variant) &
-            // line_end
-         do k = 1, n_constant(row)
-            text = text // " " // trim(row%constant(k))
-         end do
-      end associate
+      row = law_row(i)
+      code = row%code
+      text = trim(row%name) // line_end // trim(row%keyword) // line_end // trim(row%variant) &
+         // line_end
+      do k = 1, n_constant(row)
+         text = text // " " // trim(row%constant(k))
+      end do
    end subroutine model_law
 
    subroutine model_law_response(law, constant, strain, dstrain, energy, stress, tangent, error)

@@ -12,7 +12,8 @@ module emcon_deck_materials
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_t
-   use emcon_law_registry, only : find_law_row, law_create, law_given, law_rows, n_constant
+   use emcon_law_registry, only : find_law_row, law_create, law_given, law_row, &
+      law_row_t, n_constant, n_law_row
    use emcon_materials, only : kinematics_nonlinear, material_t, section_t
    use emcon_name_index, only : name_index_find, name_index_put
    use emcon_scene, only : scene_t, where_text
@@ -108,24 +109,24 @@ contains
       real(wp), allocatable :: value(:)
       type(error_t), allocatable :: error
       class(law_t), allocatable :: law
+      type(law_row_t) :: row
       integer :: i_row
       logical :: ok
 
       call choose_law(reader, card, material%law, i_row)
       if (card%name == "ELASTIC") call check_isotropic(reader, card)
       if (i_row == 0) return
-      associate (row => law_rows(i_row))
-         allocate(value(n_constant(row)))
-         call read_constants(reader, card, row%constant(:size(value)), value, ok)
-         if (.not. ok) return
-         call law_create(row%code, value, law, error)
-         if (allocated(error)) then
-            call card_error(reader, card, error%message)
-         else
-            call replace_incompressible(reader, card, law, row%constant(:size(value)), value)
-         end if
-         material%constant = value
-      end associate
+      row = law_row(i_row)
+      allocate(value(n_constant(row)))
+      call read_constants(reader, card, row%constant(:size(value)), value, ok)
+      if (.not. ok) return
+      call law_create(row%code, value, law, error)
+      if (allocated(error)) then
+         call card_error(reader, card, error%message)
+      else
+         call replace_incompressible(reader, card, law, row%constant(:size(value)), value)
+      end if
+      material%constant = value
    end subroutine read_law
 
    !> Code and row of the law; row 0: refused. A law is there, even if it is wrong: that none is
@@ -134,33 +135,37 @@ contains
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       integer, intent(out) :: code, i_row
-      character(len=:), allocatable :: variants, chosen
+      character(len=:), allocatable :: variants
+      type(law_row_t) :: row, chosen
       integer :: i, order, most
       logical :: ok
 
       i_row = 0
-      chosen = ""
+      chosen = law_row(1)
+      most = 1
       variants = ""
-      do i = size(law_rows), 1, -1
-         associate (row => law_rows(i))
-            if (row%keyword /= card%name .or. row%order > 1) cycle
-            ok = row%variant == ""
-            if (.not. ok) ok = has_option(card, trim(row%variant))
-            if (ok .and. i_row > 0) call card_error(reader, card, "more than one law is chosen")
-            if (ok) i_row = i
-            variants = " " // trim(row%variant) // variants
-         end associate
+      do i = n_law_row(), 1, -1
+         row = law_row(i)
+         if (row%keyword /= card%name .or. row%order > 1) cycle
+         ok = row%variant == ""
+         if (.not. ok) ok = has_option(card, trim(row%variant))
+         if (ok .and. i_row > 0) call card_error(reader, card, "more than one law is chosen")
+         if (ok) i_row = i
+         if (ok) chosen = row
+         variants = " " // trim(row%variant) // variants
       end do
-      code = law_rows(max(i_row, 1))%code
+      code = chosen%code
       if (i_row == 0) then
          if (size(card%option) == 0) call card_error(reader, card, "needs one of" // variants)
          return
       end if
-      chosen = trim(law_rows(i_row)%variant)
-      most = maxval(law_rows%order, law_rows%code == code)
+      do i = 1, n_law_row()
+         row = law_row(i)
+         if (row%code == code) most = max(most, row%order)
+      end do
       order = merge(0, 1, has_option(card, "N"))
-      call option_count(reader, card, "N", 1, order, max(most, 1))
-      i_row = find_law_row(card%name, chosen, order)
+      call option_count(reader, card, "N", 1, order, most)
+      i_row = find_law_row(card%name, trim(chosen%variant), order)
    end subroutine choose_law
 
    !> A law that a program gives: its constants, in any number of lines.

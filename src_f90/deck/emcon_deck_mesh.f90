@@ -8,8 +8,8 @@ module emcon_deck_mesh
    use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, need_name, &
       option_name, reader_t
    use emcon_diagnostics, only : add_error, label_list, quoted
-   use emcon_element_kind, only : element_kind_t, find_element_kind
-   use emcon_element_registry, only : element_rows
+   use emcon_element_kind, only : element_kind_t, element_row_t, find_element_kind
+   use emcon_element_registry, only : element_row, n_element_row
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t, where_text
@@ -318,11 +318,13 @@ contains
       type(element_kind_t), intent(in) :: kinds(:)
       character(len=*), intent(in) :: type_name
       character(len=:), allocatable :: list
+      type(element_row_t) :: row
       integer :: i
 
       list = ""
-      do i = 1, size(element_rows)
-         list = list // " " // trim(element_rows(i)%name)
+      do i = 1, n_element_row()
+         row = element_row(i)
+         list = list // " " // trim(row%name)
       end do
       do i = 1, size(kinds)
          if (is_user_type(kinds(i)%name)) list = list // " " // trim(kinds(i)%name)

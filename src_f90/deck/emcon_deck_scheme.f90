@@ -5,7 +5,8 @@ module emcon_deck_scheme
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_scheme, only : scheme_row_t, setting_t
-   use emcon_scheme_registry, only : scheme_given_row, scheme_row, setting_ranges
+   use emcon_scheme_registry, only : n_setting_range, scheme_given_row, scheme_row, &
+      setting_range, setting_range_t
    use emcon_steps, only : initiation_massless, initiation_velocity_update, step_t
    use emcon_text, only : read_real, squeezed, to_text
    implicit none
@@ -34,31 +35,31 @@ contains
       type(card_t), intent(in) :: card
       type(scheme_row_t), intent(inout) :: row
       character(len=:), allocatable :: text, given
+      type(setting_range_t) :: range
       real(wp) :: value
       logical :: ok
       integer :: i
 
       given = ""
-      do i = 1, size(setting_ranges)
-         associate (range => setting_ranges(i))
-            if (.not. has_option(card, squeezed(range%word)) .or. range%word == given) cycle
-            text = trim(range%word) // "=" // option_name(card, squeezed(range%word))
-            if (range%code /= row%code) then
-               call card_error(reader, card, text // " is not of SCHEME=" // &
-                  option_name(card, "SCHEME"))
-               cycle
-            end if
-            if (given /= "") call card_error(reader, card, "either " // given // " or " // &
-               trim(range%word) // " is to be given")
-            given = trim(range%word)
-            call read_real(option_name(card, squeezed(range%word)), value, ok)
-            if (ok) ok = value >= range%least .and. value <= range%most
-            if (ok) then
-               row%setting = setting_t(range%word, value)
-            else
-               call card_error(reader, card, text // " is not a number from " // trim(range%range))
-            end if
-         end associate
+      do i = 1, n_setting_range()
+         range = setting_range(i)
+         if (.not. has_option(card, squeezed(range%word)) .or. range%word == given) cycle
+         text = trim(range%word) // "=" // option_name(card, squeezed(range%word))
+         if (range%code /= row%code) then
+            call card_error(reader, card, text // " is not of SCHEME=" // &
+               option_name(card, "SCHEME"))
+            cycle
+         end if
+         if (given /= "") call card_error(reader, card, "either " // given // " or " // &
+            trim(range%word) // " is to be given")
+         given = trim(range%word)
+         call read_real(option_name(card, squeezed(range%word)), value, ok)
+         if (ok) ok = value >= range%least .and. value <= range%most
+         if (ok) then
+            row%setting = setting_t(range%word, value)
+         else
+            call card_error(reader, card, text // " is not a number from " // trim(range%range))
+         end if
       end do
    end subroutine read_setting
 

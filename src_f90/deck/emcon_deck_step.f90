@@ -33,7 +33,8 @@ module emcon_deck_step
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_row
-   use emcon_solver_registry, only : is_foreign_solver, solver_given, solver_names, solvers
+   use emcon_solver_registry, only : find_solver_row, is_foreign_solver, solver_given, &
+      solver_names, solver_row, solver_row_t
    use emcon_steps, only : step_t
    use emcon_text, only : to_text
    implicit none
@@ -264,10 +265,12 @@ contains
       type(card_t), intent(in) :: card
       type(step_t), intent(inout) :: step
       character(len=:), allocatable :: known
+      type(solver_row_t) :: row
       integer :: i
 
       if (.not. has_option(card, "SOLVER")) return
-      i = findloc(solvers%word, option_name(card, "SOLVER"), 1)
+      i = find_solver_row(option_name(card, "SOLVER"))
+      if (i > 0) row = solver_row(i)
       if (i == 0 .and. is_foreign_solver(option_name(card, "SOLVER"))) then
          call solver_names(known)
          call card_warning(reader, card, "SOLVER=" // option_name(card, "SOLVER") // &
@@ -276,11 +279,11 @@ contains
          step%solver = solver_given
          step%solver_name = option_name(card, "SOLVER")
          step%solver_origin = card%origin
-      else if (.not. solvers(i)%is_built) then
+      else if (.not. row%is_built) then
          call card_error(reader, card, "SOLVER=" // option_name(card, "SOLVER") // &
             ": this program was built without it; leave SOLVER out")
       else
-         step%solver = solvers(i)%code
+         step%solver = row%code
       end if
    end subroutine read_solver
 

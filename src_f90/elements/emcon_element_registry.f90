@@ -1,87 +1,34 @@
-!> The registry of elements: the only module that knows their kinds. A new kind is one file, one row
-!> of `plane_rows`, `axial_rows` or `space_rows` and one case of `element_kinds_create`.
+!> The registry of elements: what others see of it. Which kinds there are is known to
+!> `emcon_element_kinds` alone.
 module emcon_element_registry
-   use emcon_element_kind, only : element_kind_t, element_row_t, face_room, find_element_kind
+   use emcon_element_kind, only : element_kind_t, element_row_t
    use emcon_shape, only : shape_t
-   use emcon_shape_hexahedron_space, only : shape_hexahedron_t
-   use emcon_shape_quadratic_tetrahedron_space, only : shape_quadratic_tetrahedron_t
-   use emcon_shape_quadratic_triangle_plane, only : shape_quadratic_triangle_t
-   use emcon_shape_quadrilateral_plane, only : shape_quadrilateral_t
-   use emcon_shape_serendipity_plane, only : shape_serendipity_t
-   use emcon_shape_serendipity_space, only : shape_serendipity_space_t
-   use emcon_shape_tetrahedron_space, only : shape_tetrahedron_t
-   use emcon_shape_triangle_plane, only : shape_triangle_t
    implicit none
    private
-   public :: element_rows, plane_rows, axial_rows, space_rows
-   public :: element_kinds_create, find_element_row, &
-      face_shape_create
+   public :: element_row, n_element_row, element_kinds_create, find_element_row, face_shape_create
 
-   type(element_row_t), parameter :: plane_rows(*) = [ &
-      element_row_t("CPE3", 2, 3, 3, 3, 2, reshape([1, 2, 2, 3, 3, 1], face_room, pad=[0]), 5, 3), &
-      element_row_t("CPE4", 2, 4, 4, 4, 2, &
-         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4), &
-      element_row_t("CPE4H", 2, 4, 4, 4, 2, &
-         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, .true.), &
-      element_row_t("CPE4I", 2, 4, 4, 4, 2, &
-         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, has_modes=.true.), &
-      element_row_t("CPE6", 2, 6, 3, 3, 3, &
-         reshape([1, 2, 4, 2, 3, 5, 3, 1, 6], face_room, pad=[0]), 22, 6), &
-      element_row_t("CPE8", 2, 8, 4, 4, 3, &
-         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8), &
-      element_row_t("CPE8R", 2, 8, 4, 4, 3, &
-         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8), &
-      element_row_t("CPS3", 2, 3, 3, 3, 2, reshape([1, 2, 2, 3, 3, 1], face_room, pad=[0]), 5, 3, &
-         is_thin=.true.), &
-      element_row_t("CPS4", 2, 4, 4, 4, 2, &
-         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, is_thin=.true.), &
-      element_row_t("CPS4I", 2, 4, 4, 4, 2, &
-         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, is_thin=.true., &
-         has_modes=.true.), &
-      element_row_t("CPS6", 2, 6, 3, 3, 3, &
-         reshape([1, 2, 4, 2, 3, 5, 3, 1, 6], face_room, pad=[0]), 22, 6, is_thin=.true.), &
-      element_row_t("CPS8", 2, 8, 4, 4, 3, &
-         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8, &
-         is_thin=.true.), &
-      element_row_t("CPS8R", 2, 8, 4, 4, 3, &
-         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8, &
-         is_thin=.true.)]
+   interface
+      pure module integer function n_element_row()
+      end function n_element_row
 
-   !> Solids of revolution: their sections.
-   type(element_row_t), parameter :: axial_rows(*) = [ &
-      element_row_t("CAX3", 2, 3, 3, 3, 2, reshape([1, 2, 2, 3, 3, 1], face_room, pad=[0]), 5, 3, &
-         is_axial=.true.), &
-      element_row_t("CAX4", 2, 4, 4, 4, 2, &
-         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, is_axial=.true.), &
-      element_row_t("CAX6", 2, 6, 3, 3, 3, &
-         reshape([1, 2, 4, 2, 3, 5, 3, 1, 6], face_room, pad=[0]), 22, 6, is_axial=.true.), &
-      element_row_t("CAX8", 2, 8, 4, 4, 3, &
-         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8, &
-         is_axial=.true.), &
-      element_row_t("CAX8R", 2, 8, 4, 4, 3, &
-         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8, &
-         is_axial=.true.)]
+      !> Those of the plane, of solids of revolution, of space, in this order.
+      pure module function element_row(i) result(row)
+         integer, intent(in) :: i                !! 1..n_element_row()
+         type(element_row_t) :: row
+      end function element_row
 
-   !> Faces of hexahedra, seen from inside counter-clockwise: corners alone, and with the middles.
-   integer, parameter :: hexahedron_faces(face_room(1)) = reshape([1, 2, 3, 4, 5, 8, 7, 6, &
-      1, 5, 6, 2, 2, 6, 7, 3, 3, 7, 8, 4, 4, 8, 5, 1], face_room, pad=[0])
-   integer, parameter :: round_faces(face_room(1)) = [ &
-      1, 2, 3, 4, 9, 10, 11, 12, 5, 8, 7, 6, 16, 15, 14, 13, 1, 5, 6, 2, 17, 13, 18, 9, &
-      2, 6, 7, 3, 18, 14, 19, 10, 3, 7, 8, 4, 19, 15, 20, 11, 4, 8, 5, 1, 20, 16, 17, 12]
+      pure module subroutine allocate_shape(name, shape)
+         character(len=*), intent(in) :: name    !! of a row
+         class(shape_t), allocatable, intent(inout) :: shape   !! none so far
+      end subroutine allocate_shape
 
-   type(element_row_t), parameter :: space_rows(*) = [ &
-      element_row_t("C3D4", 3, 4, 4, 4, 3, &
-         reshape([1, 2, 3, 1, 4, 2, 2, 4, 3, 3, 4, 1], face_room, pad=[0]), 10, 4), &
-      element_row_t("C3D8", 3, 8, 8, 6, 4, hexahedron_faces, 12, 8), &
-      element_row_t("C3D8H", 3, 8, 8, 6, 4, hexahedron_faces, 12, 8, .true.), &
-      element_row_t("C3D8I", 3, 8, 8, 6, 4, hexahedron_faces, 12, 8, has_modes=.true.), &
-      element_row_t("C3D10", 3, 10, 4, 4, 6, &
-         reshape([1, 2, 3, 5, 6, 7, 1, 4, 2, 8, 9, 5, 2, 4, 3, 9, 10, 6, 3, 4, 1, 10, 8, 7], &
-            face_room, pad=[0]), 24, 10), &
-      element_row_t("C3D20", 3, 20, 8, 6, 8, round_faces, 25, 20), &
-      element_row_t("C3D20R", 3, 20, 8, 6, 8, round_faces, 25, 20)]
-
-   type(element_row_t), parameter :: element_rows(*) = [plane_rows, axial_rows, space_rows]
+      !> The shape of faces of so many nodes, corners in their order and then those between them;
+      !> none if there is no such face.
+      module subroutine face_shape_create(n_node, shape)
+         integer, intent(in) :: n_node
+         class(shape_t), allocatable, intent(out) :: shape
+      end subroutine face_shape_create
+   end interface
 
 contains
 
@@ -89,62 +36,34 @@ contains
    pure subroutine element_kinds_create(n_dim, kind)
       integer, intent(in) :: n_dim               !! 2 or 3
       type(element_kind_t), allocatable, intent(out) :: kind(:)
-      integer :: first, k
+      type(element_row_t) :: row
+      integer :: i, k
 
-      first = findloc(element_rows%n_dim, n_dim, 1) - 1
-      allocate(kind(count(element_rows%n_dim == n_dim)))
-      do k = 1, size(kind)
-         kind(k)%element_row_t = element_rows(first + k)
-         select case (kind(k)%name)
-         case ("CPE3", "CPS3")
-            allocate(shape_triangle_t :: kind(k)%shape)
-         case ("CAX3")
-            allocate(kind(k)%shape, source=shape_triangle_t(is_fine=.true.))
-         case ("CPE4", "CPE4H", "CPE4I", "CPS4", "CPS4I", "CAX4")
-            allocate(shape_quadrilateral_t :: kind(k)%shape)
-         case ("CPE6", "CPS6", "CAX6")
-            allocate(shape_quadratic_triangle_t :: kind(k)%shape)
-         case ("CPE8", "CPS8", "CAX8")
-            allocate(kind(k)%shape, source=shape_serendipity_t(n_side=3))
-         case ("CPE8R", "CPS8R", "CAX8R")
-            allocate(kind(k)%shape, source=shape_serendipity_t(n_side=2))
-         case ("C3D4")
-            allocate(shape_tetrahedron_t :: kind(k)%shape)
-         case ("C3D8", "C3D8H", "C3D8I")
-            allocate(shape_hexahedron_t :: kind(k)%shape)
-         case ("C3D10")
-            allocate(shape_quadratic_tetrahedron_t :: kind(k)%shape)
-         case ("C3D20")
-            allocate(kind(k)%shape, source=shape_serendipity_space_t(n_side=3))
-         case ("C3D20R")
-            allocate(kind(k)%shape, source=shape_serendipity_space_t(n_side=2))
-         end select
+      k = 0
+      do i = 1, n_element_row()
+         row = element_row(i)
+         if (row%n_dim == n_dim) k = k + 1
+      end do
+      allocate(kind(k))
+      k = 0
+      do i = 1, n_element_row()
+         row = element_row(i)
+         if (row%n_dim /= n_dim) cycle
+         k = k + 1
+         kind(k)%element_row_t = row
+         call allocate_shape(row%name, kind(k)%shape)
       end do
    end subroutine element_kinds_create
 
-   !> The shape of faces of so many nodes, corners in their order and then those between them; none
-   !> if there is no such face.
-   subroutine face_shape_create(n_node, shape)
-      integer, intent(in) :: n_node
-      class(shape_t), allocatable, intent(out) :: shape
-
-      select case (n_node)
-      case (3)
-         allocate(shape_triangle_t :: shape)
-      case (4)
-         allocate(shape_quadrilateral_t :: shape)
-      case (6)
-         allocate(shape_quadratic_triangle_t :: shape)
-      case (8)
-         allocate(shape, source=shape_serendipity_t(n_side=3))
-      end select
-   end subroutine face_shape_create
-
-   !> Index of the row of `element_rows` called `name` (upper case), 0 if there is none.
-   pure integer function find_element_row(name)
+   !> Number of the row called `name` (upper case), 0 if there is none.
+   pure integer function find_element_row(name) result(i)
       character(len=*), intent(in) :: name
+      type(element_row_t) :: row
 
-      find_element_row = find_element_kind(element_rows, name)
+      do i = n_element_row(), 1, -1
+         row = element_row(i)
+         if (row%name == name) return
+      end do
    end function find_element_row
 
 end module emcon_element_registry

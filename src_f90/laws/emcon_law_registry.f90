@@ -1,28 +1,18 @@
-!> The registry of constitutive laws: the only module that knows their kinds. A new law is one file,
-!> one row of `law_rows` and one case of `law_create`.
+!> The registry of constitutive laws: what others see of it. Which kinds there are is known to
+!> `emcon_law_kinds` alone.
 module emcon_law_registry
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_law, only : law_response_plane, law_response_t, law_t
-   use emcon_law_coupled_neo_hooke, only : law_coupled_neo_hooke_t
-   use emcon_law_linear, only : law_linear_t
-   use emcon_law_mooney_rivlin, only : law_mooney_rivlin_t
-   use emcon_law_neo_hooke, only : law_neo_hooke_t
-   use emcon_law_ogden, only : law_ogden_t
-   use emcon_law_thin_plane, only : thin_law
-   use emcon_law_yeoh, only : law_yeoh_t
+   use emcon_law, only : law_t
    use emcon_text, only : to_text, to_upper
    implicit none
    private
-   public :: law_row_t, law_rows, law_titles, law_variants, find_law_row, n_constant, law_create, &
-      law_linearise, law_make_thin
-   public :: law_linear, law_neo_hooke, law_coupled_neo_hooke, law_given, law_mooney_rivlin, &
-      law_yeoh, law_ogden
+   public :: law_row_t, law_row, n_law_row, law_titles, law_variants, find_law_row, n_constant
+   public :: law_create, law_linearise, law_make_thin, law_linear, law_given
 
-   !> Codes. `law_linear` is linear elasticity, under NLGEOM St. Venant-Kirchhoff; `law_given` is
+   !> Codes of laws that others ask for: linear elasticity, under NLGEOM St. Venant-Kirchhoff; those
    !> given by a program.
-   integer, parameter :: law_linear = 1, law_neo_hooke = 2, law_coupled_neo_hooke = 3, &
-      law_given = 4, law_mooney_rivlin = 5, law_yeoh = 6, law_ogden = 7
+   integer, parameter :: law_linear = 1, law_given = 4
 
    integer, parameter :: max_constant = 9
 
@@ -36,23 +26,34 @@ module emcon_law_registry
       character(len=6) :: constant(max_constant) !! names; empty behind the last
    end type law_row_t
 
-   type(law_row_t), parameter :: law_rows(*) = [ &
-      law_row_t("linear", "ELASTIC", "", 0, law_linear, [character(len=6) :: "E", "nu", &
-         "", "", "", "", "", "", ""]), &
-      law_row_t("neo hooke", "HYPERELASTIC", "NEOHOOKE", 0, law_neo_hooke, [character(len=6) :: &
-         "C10", "D1", "", "", "", "", "", "", ""]), &
-      law_row_t("coupled neo hooke", "HYPERELASTIC", "COUPLEDNEOHOOKE", 0, &
-         law_coupled_neo_hooke, [character(len=6) :: "E", "nu", "", "", "", "", "", "", ""]), &
-      law_row_t("mooney-rivlin", "HYPERELASTIC", "MOONEY-RIVLIN", 0, law_mooney_rivlin, &
-         [character(len=6) :: "C10", "C01", "D1", "", "", "", "", "", ""]), &
-      law_row_t("yeoh", "HYPERELASTIC", "YEOH", 0, law_yeoh, [character(len=6) :: &
-         "C10", "C20", "C30", "D1", "D2", "D3", "", "", ""]), &
-      law_row_t("ogden 1", "HYPERELASTIC", "OGDEN", 1, law_ogden, [character(len=6) :: &
-         "mu1", "alpha1", "D1", "", "", "", "", "", ""]), &
-      law_row_t("ogden 2", "HYPERELASTIC", "OGDEN", 2, law_ogden, [character(len=6) :: &
-         "mu1", "alpha1", "mu2", "alpha2", "D1", "D2", "", "", ""]), &
-      law_row_t("ogden 3", "HYPERELASTIC", "OGDEN", 3, law_ogden, [character(len=6) :: &
-         "mu1", "alpha1", "mu2", "alpha2", "mu3", "alpha3", "D1", "D2", "D3"])]
+   interface
+      !> Number of rows: one a law, and one an order of those that have several.
+      pure module integer function n_law_row()
+      end function n_law_row
+
+      pure module function law_row(i) result(row)
+         integer, intent(in) :: i                !! 1..n_law_row()
+         type(law_row_t) :: row
+      end function law_row
+
+      !> A law without constants.
+      module subroutine allocate_law(code, law)
+         integer, intent(in) :: code             !! of a row
+         class(law_t), allocatable, intent(out) :: law   !! not allocated: there is none
+      end subroutine allocate_law
+
+      !> Linear elasticity with the stiffness that `law` has at rest.
+      module subroutine law_linearise(law, linear)
+         class(law_t), intent(in) :: law
+         class(law_t), allocatable, intent(out) :: linear
+      end subroutine law_linearise
+
+      !> The law of a thin sheet, in plane stress.
+      module subroutine law_make_thin(law, thin)
+         class(law_t), intent(in) :: law
+         class(law_t), allocatable, intent(out) :: thin   !! not allocated: of plane strain alone
+      end subroutine law_make_thin
+   end interface
 
 contains
 
@@ -67,13 +68,14 @@ contains
    pure subroutine law_variants(keyword, list)
       character(len=*), intent(in) :: keyword    !! without asterisk, upper case
       character(len=:), allocatable, intent(out) :: list   !! empty: none
+      type(law_row_t) :: row
       integer :: i
 
       list = ""
-      do i = 1, size(law_rows)
-         if (law_rows(i)%keyword /= keyword .or. law_rows(i)%variant == "") cycle
-         if (law_rows(i)%order > 1) cycle
-         list = list // "," // trim(law_rows(i)%variant)
+      do i = 1, n_law_row()
+         row = law_row(i)
+         if (row%keyword /= keyword .or. row%variant == "" .or. row%order > 1) cycle
+         list = list // "," // trim(row%variant)
       end do
    end subroutine law_variants
 
@@ -81,14 +83,15 @@ contains
    pure subroutine law_titles(keyword, list)
       character(len=*), intent(in) :: keyword    !! without asterisk, upper case
       character(len=:), allocatable, intent(out) :: list   !! empty: none
+      type(law_row_t) :: row
       integer :: i
 
       list = ""
-      do i = 1, size(law_rows)
-         if (law_rows(i)%keyword /= keyword .or. law_rows(i)%variant == "") cycle
-         if (law_rows(i)%order > 1) cycle
+      do i = 1, n_law_row()
+         row = law_row(i)
+         if (row%keyword /= keyword .or. row%variant == "" .or. row%order > 1) cycle
          if (list /= "") list = list // ", "
-         list = list // to_upper(law_rows(i)%name(:verify(law_rows(i)%name, " 123456789", .true.)))
+         list = list // to_upper(row%name(:verify(row%name, " 123456789", .true.)))
       end do
    end subroutine law_titles
 
@@ -96,95 +99,40 @@ contains
    pure integer function find_law_row(keyword, variant, order) result(i)
       character(len=*), intent(in) :: keyword, variant   !! upper case, `variant` without blanks
       integer, intent(in) :: order               !! not looked at for a law that has none
+      type(law_row_t) :: row
 
-      do i = size(law_rows), 1, -1
-         if (law_rows(i)%keyword /= keyword .or. law_rows(i)%variant /= variant) cycle
-         if (law_rows(i)%order == 0 .or. law_rows(i)%order == order) return
+      do i = n_law_row(), 1, -1
+         row = law_row(i)
+         if (row%keyword /= keyword .or. row%variant /= variant) cycle
+         if (row%order == 0 .or. row%order == order) return
       end do
    end function find_law_row
 
    !> A law with its constants; err_input with what is wrong with one.
    subroutine law_create(code, constant, law, error)
-      integer, intent(in) :: code                !! one of `law_`, but not `law_given`
+      integer, intent(in) :: code                !! of a row
       real(wp), intent(in) :: constant(:)        !! as the row says
       class(law_t), allocatable, intent(out) :: law
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: fault
+      type(law_row_t) :: row
+      integer :: i
 
-      select case (code)
-      case (law_linear)
-         allocate(law_linear_t :: law)
-      case (law_neo_hooke)
-         allocate(law_neo_hooke_t :: law)
-      case (law_coupled_neo_hooke)
-         allocate(law_coupled_neo_hooke_t :: law)
-      case (law_mooney_rivlin)
-         allocate(law_mooney_rivlin_t :: law)
-      case (law_yeoh)
-         allocate(law_yeoh_t :: law)
-      case (law_ogden)
-         allocate(law_ogden_t :: law)
-      case default
+      call allocate_law(code, law)
+      if (.not. allocated(law)) then
          call raise(error, err_input, "there is no law with the code " // to_text(code))
          return
-      end select
-      if (.not. any(law_rows%code == code .and. count_constants() == size(constant))) then
+      end if
+      do i = 1, n_law_row()
+         row = law_row(i)
+         if (row%code == code .and. n_constant(row) == size(constant)) exit
+      end do
+      if (i > n_law_row()) then
          call raise(error, err_input, "a law got too many or too few constants")
          return
       end if
       call law%take(constant, fault)
       if (fault /= "") call raise(error, err_input, fault)
    end subroutine law_create
-
-   !> Linear elasticity with the stiffness that `law` has at rest.
-   subroutine law_linearise(law, linear)
-      class(law_t), intent(in) :: law
-      class(law_t), allocatable, intent(out) :: linear
-      real(wp), parameter :: rest(3) = 0.0_wp
-      type(law_response_t) :: response
-      type(law_linear_t) :: plain
-
-      select type (law)
-      type is (law_linear_t)
-         plain = law
-      class default
-         call law_response_plane(law, rest, rest, response)
-         plain%mu = law%shear                    ! the tangent is by the end of a step of no size
-         plain%lam = 2.0_wp*(response%tangent(1, 1) - plain%mu)
-         plain%density = law%density
-         plain%shear = plain%mu
-         plain%has_volume = .false.
-      end select
-      allocate(linear, source=plain)
-   end subroutine law_linearise
-
-   !> The law of a thin sheet, in plane stress.
-   subroutine law_make_thin(law, thin)
-      class(law_t), intent(in) :: law
-      class(law_t), allocatable, intent(out) :: thin   !! not allocated: of plane strain alone
-
-      type(law_linear_t) :: plain
-
-      select type (law)
-      type is (law_linear_t)
-         plain = law
-         call plain%make_thin()
-         allocate(thin, source=plain)
-      type is (law_ogden_t)                      ! its stretches are those of E33 = 0
-         return
-      class default
-         call thin_law(law, thin)
-      end select
-   end subroutine law_make_thin
-
-   !> Number of constants of each row.
-   pure function count_constants() result(n)
-      integer :: n(size(law_rows))
-      integer :: i
-
-      do i = 1, size(law_rows)
-         n(i) = n_constant(law_rows(i))
-      end do
-   end function count_constants
 
 end module emcon_law_registry

@@ -3,7 +3,7 @@ module emcon_report_bodies
    use emcon_csr, only : csr_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t
-   use emcon_law_registry, only : law_given, law_rows
+   use emcon_law_registry, only : law_given, law_row, law_row_t, n_law_row
    use emcon_locking, only : locking_ratio
    use emcon_report_row, only : report_row_t, report_rows_t, row_begin, row_put, rows_add
    use emcon_rotation, only : n_turn
@@ -276,12 +276,15 @@ contains
    subroutine name_law(body, name)
       type(body_t), intent(in) :: body
       character(len=:), allocatable, intent(out) :: name
+      type(law_row_t) :: row
       integer :: i
 
       name = "several laws"
       if (body%law == 0) name = "no law"
-      i = findloc(law_rows%code == body%law, .true., 1)
-      if (i > 0) name = trim(law_rows(i)%name)
+      do i = n_law_row(), 1, -1
+         row = law_row(i)
+         if (row%code == body%law) name = trim(row%name)
+      end do
       if (body%law == law_given) name = "given law"
    end subroutine name_law
 

@@ -14,7 +14,7 @@ module emcon_materials
    type :: material_t
       character(len=:), allocatable :: name
       type(origin_t) :: origin
-      integer :: law = 0                             !! of a row of `law_rows`; 0: none was given
+      integer :: law = 0                             !! code of a row of laws; 0: none was given
       real(wp), allocatable :: constant(:)           !! as the row of the law names them | any
       real(wp) :: density = 0.0_wp                   !! [M/L^3]
       type(origin_t) :: damping_origin

@@ -4,15 +4,18 @@
 !> Laws have more to say, in rows of their own: `emcon_law_registry`.
 module emcon_options
    use emcon_couplings, only : tie_t
-   use emcon_element_registry, only : element_rows
+   use emcon_element_kind, only : element_row_t
+   use emcon_element_registry, only : element_row, n_element_row
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_given, &
       formulation_mortar, formulation_nts, formulation_segment, integration_elements, &
       integration_segments, multiplier_dual, multiplier_standard, normal_edge, normal_nodal, &
       smoothing_hermite, smoothing_none
    use emcon_materials, only : kinematics_corotated, kinematics_linear, kinematics_nonlinear, &
       section_t
-   use emcon_scheme_registry, only : scheme_energy_momentum, scheme_rows, scheme_static
-   use emcon_solver_registry, only : solvers
+   use emcon_scheme, only : scheme_row_t
+   use emcon_scheme_registry, only : n_scheme_row, scheme_energy_momentum, scheme_row, &
+      scheme_static
+   use emcon_solver_registry, only : n_solver_row, solver_row, solver_row_t
    use emcon_steps, only : events_nodes, events_pairs, initiation_admissible, &
       initiation_massless, initiation_persistent, initiation_velocity_update, &
       method_augmented_lagrange, method_null_space, method_penalty, method_saddle_point, &
@@ -77,29 +80,38 @@ module emcon_options
       option_row_t("procedure", scheme_static, "STATIC", "", "", ""), &
       option_row_t("procedure", scheme_energy_momentum, "DYNAMIC", "", "", "")]
 
-   !> The schemes that *TIME INTEGRATION chooses from: statics, the first, is none.
-   integer, parameter :: n_scheme = size(scheme_rows) - 1
-   integer, parameter :: n_option_row = size(own) + size(solvers) + n_scheme + size(element_rows)
-
 contains
+
+   pure integer function n_option_row()
+      n_option_row = size(own) + n_solver_row() + n_choice() + n_element_row()
+   end function n_option_row
+
+   !> The schemes that *TIME INTEGRATION chooses from: statics, the first, is none.
+   pure integer function n_choice()
+      n_choice = n_scheme_row() - 1
+   end function n_choice
 
    !> One of the rows of all options; those of an option follow each other.
    pure type(option_row_t) function option_row(i) result(row)
-      integer, intent(in) :: i                   !! 1..n_option_row
+      integer, intent(in) :: i                   !! 1..n_option_row()
+      type(element_row_t) :: element
+      type(scheme_row_t) :: scheme
+      type(solver_row_t) :: solver
       integer :: k
 
       k = i - size(own)
       if (k <= 0) then
          row = own(i)
-      else if (k <= size(solvers)) then
-         row = option_row_t("solver", solvers(k)%code, solvers(k)%word, "", solvers(k)%text, "")
-      else if (k <= size(solvers) + n_scheme) then
-         associate (scheme => scheme_rows(k - size(solvers) + 1))
-            row = option_row_t("scheme", scheme%code, scheme%word, "", scheme%text, "")
-         end associate
+      else if (k <= n_solver_row()) then
+         solver = solver_row(k)
+         row = option_row_t("solver", solver%code, solver%word, "", solver%text, "")
+      else if (k <= n_solver_row() + n_choice()) then
+         scheme = scheme_row(k - n_solver_row() + 1)
+         row = option_row_t("scheme", scheme%code, scheme%word, "", scheme%text, "")
       else
-         k = k - size(solvers) - n_scheme
-         row = option_row_t("element", k, element_rows(k)%name, "", "", "")
+         k = k - n_solver_row() - n_choice()
+         element = element_row(k)
+         row = option_row_t("element", k, element%name, "", "", "")
       end if
    end function option_row
 
@@ -112,7 +124,7 @@ contains
 
       code = 0
       if (word == "") return
-      do i = 1, n_option_row
+      do i = 1, n_option_row()
          row = option_row(i)
          if (row%kind /= kind) cycle
          if (without_blanks(row%word) == word .or. index(row%also, "," // word // ",") > 0) then
@@ -170,7 +182,7 @@ contains
       integer :: i
 
       list = ""
-      do i = 1, n_option_row
+      do i = 1, n_option_row()
          row = option_row(i)
          if (row%kind /= kind) cycle
          if (list /= "") list = list // ", "
@@ -187,7 +199,7 @@ contains
       integer :: i
 
       text = ""
-      do i = 1, n_option_row
+      do i = 1, n_option_row()
          row = option_row(i)
          if (row%kind == kind .and. row%code == code) text = trim(row%text)
       end do

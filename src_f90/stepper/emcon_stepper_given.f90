@@ -27,7 +27,7 @@ module emcon_stepper_given
    use emcon_scheme, only : scheme_row_t, scheme_t
    use emcon_scheme_registry, only : scheme_given, scheme_row
    use emcon_shape, only : shape_fault, shape_t
-   use emcon_solver_registry, only : is_foreign_solver, solver_names, solvers
+   use emcon_solver_registry, only : find_solver_row, is_foreign_solver, solver_names
    use emcon_sparse_solver, only : solver_box_t, sparse_solver_t
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_that
@@ -252,7 +252,7 @@ contains
       call host_copy_solvers(self%given, present)
       call solver_names(known)
       word = plain(name)
-      call check_that(all(solvers%word /= word), "a solver cannot be given as " // word // &
+      call check_that(find_solver_row(word) == 0, "a solver cannot be given as " // word // &
          ": EMCON has its own " // known, error)
       call check_that(.not. is_foreign_solver(word) .and. index(word, " ") == 0, "a solver " // &
          "cannot be given as " // word // ": the name has to be one without blanks that no " // &

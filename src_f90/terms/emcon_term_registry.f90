@@ -1,256 +1,80 @@
-!> The terms of a model: which kinds there are, and what some of them are asked for by name.
+!> The registry of the terms of a model: what others see of it, and what some of them are asked for
+!> by name. Which kinds there are is known to `emcon_term_kinds` alone.
 module emcon_term_registry
-   use emcon_corotated_term, only : corotated_term_init, corotated_term_t
    use emcon_csr, only : csr_t
-   use emcon_decay_plane, only : decay_term_init, decay_term_t
    use emcon_errors, only : error_t
    use emcon_host, only : host_t
-   use emcon_host_check, only : host_check_mass
-   use emcon_host_term, only : host_term_init, host_term_t
-   use emcon_inertia, only : inertia_add, inertia_init, inertia_t, inertia_times
    use emcon_kinds, only : dp, wp
-   use emcon_linear_term, only : linear_term_init, linear_term_t
-   use emcon_loads, only : loads_init, loads_t
-   use emcon_materials, only : kinematics_corotated, kinematics_linear
-   use emcon_massless, only : massless_bare, massless_find, massless_return, massless_shed
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
-   use emcon_solid_term, only : solid_term_init, solid_term_t
    use emcon_term, only : term_box_t
    implicit none
    private
    public :: terms_create, terms_solid, terms_mass, terms_mass_rows, terms_mass_times, &
       terms_mass_values, terms_massless, terms_return_mass, terms_decay
 
-   !> Where the terms that every model has stand; what is given comes after them.
-   integer, parameter :: of_inertia = 1, of_solid = 2, of_loads = 3, n_own = 3
+   interface
+      !> The terms of `scene`, and of what it is given.
+      module subroutine terms_create(scene, term, error, given)
+         type(scene_t), intent(in) :: scene
+         type(term_box_t), allocatable, intent(out) :: term(:)   !! (n_term)
+         type(error_t), allocatable, intent(out) :: error
+         type(host_t), intent(in), optional :: given
+      end subroutine terms_create
 
-contains
+      !> The elements, for what is derived from them.
+      module function terms_solid(term) result(solid)
+         type(term_box_t), intent(in), target :: term(:)   !! of `terms_create`
+         type(solid_t), pointer :: solid
+      end function terms_solid
 
-   !> The terms of `scene`, and of what it is given.
-   subroutine terms_create(scene, term, error, given)
-      type(scene_t), intent(in) :: scene
-      type(term_box_t), allocatable, intent(out) :: term(:)   !! (n_term)
-      type(error_t), allocatable, intent(out) :: error
-      type(host_t), intent(in), optional :: given
-      integer :: n, i, first
-      logical :: has_linear, turns               ! there are linear elements, corotated ones
-      logical :: decays                          ! elements take energy
+      !> The mass between nodes, the same in all directions.
+      pure module subroutine terms_mass(term, mass)
+         type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
+         type(csr_t), intent(out) :: mass           !! (n_node x n_node) [M]
+      end subroutine terms_mass
 
-      n = 0
-      if (present(given)) then
-         if (allocated(given%force)) n = size(given%force)
-      end if
-      has_linear = any(scene%section(scene%element_section)%kinematics == kinematics_linear)
-      turns = any(scene%section(scene%element_section)%kinematics == kinematics_corotated)
-      decays = any(scene%step%scheme%dissipates) .or. any(scene%material%alpha > 0.0_wp .or. &
-         scene%material%beta > 0.0_wp)
-      first = n_own + count([has_linear, turns, decays])
-      allocate(term(first + n))
-      allocate(inertia_t :: term(of_inertia)%term)
-      allocate(solid_term_t :: term(of_solid)%term)
-      allocate(loads_t :: term(of_loads)%term)
-      if (has_linear) allocate(linear_term_t :: term(n_own + 1)%term)
-      if (turns) allocate(corotated_term_t :: term(n_own + count([has_linear, turns]))%term)
-      if (decays) allocate(decay_term_t :: term(first)%term)
-      call create_own(scene, term, error, given)
-      do i = 1, n
-         if (allocated(error)) return
-         allocate(host_term_t :: term(first + i)%term)
-         select type (part => term(first + i)%term)
-         type is (host_term_t)
-            call host_term_init(part, given%force(i)%force, scene, error)
-         end select
-      end do
-   end subroutine terms_create
+      !> Mass at each node: the sums of rows.
+      pure module subroutine terms_mass_rows(term, mass)
+         type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
+         real(wp), intent(out) :: mass(:)           !! (n_node) [M]
+      end subroutine terms_mass_rows
 
-   !> The elements, and the terms that stand on them.
-   subroutine create_own(scene, term, error, given)
-      type(scene_t), intent(in) :: scene
-      type(term_box_t), intent(inout), target :: term(:)
-      type(error_t), allocatable, intent(out) :: error
-      type(host_t), intent(in), optional :: given
-      type(csr_t) :: extra
-      type(solid_t), pointer :: solid
-      integer :: i
-      logical, dimension(size(scene%x, 2)) :: is_bare, is_massless, is_given
+      !> M field, in all directions.
+      pure module subroutine terms_mass_times(term, field, product)
+         type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
+         real(wp), intent(in), contiguous :: field(:, :)      !! (n_dim, n_node)
+         real(wp), intent(out), contiguous :: product(:, :)   !! (n_dim, n_node)
+      end subroutine terms_mass_times
 
-      select type (part => term(of_solid)%term)
-      type is (solid_term_t)
-         if (present(given)) then
-            call solid_term_init(part, scene, error, given%law)
-            extra = given%mass
-         else
-            call solid_term_init(part, scene, error)
-         end if
-      end select
-      if (.not. allocated(error) .and. extra%n_row > 0) call host_check_mass(extra, scene, error)
-      if (allocated(error)) return
-      solid => terms_solid(term)
-      call mark_given(size(scene%x, 1), extra, is_given, given)
-      call massless_bare(scene, solid, is_given, is_bare)
-      call massless_find(scene, solid, is_given, is_bare, is_massless)
-      if (any(is_massless)) call massless_shed(solid, is_massless)
-      select type (part => term(of_inertia)%term)
-      type is (inertia_t)
-         call inertia_init(part, solid, size(scene%x, 1), extra, error)
-         part%is_massless = is_massless
-         part%is_bare = is_bare
-      end select
-      select type (part => term(of_loads)%term)
-      type is (loads_t)
-         call loads_init(part, scene, solid)
-      end select
-      do i = n_own + 1, size(term)
-         if (.not. allocated(term(i)%term) .or. allocated(error)) exit
-         select type (part => term(i)%term)
-         type is (linear_term_t)
-            call linear_term_init(part, solid, size(scene%x, 1), error)
-         type is (corotated_term_t)
-            call corotated_term_init(part, solid, size(scene%x, 1))
-         type is (decay_term_t)
-            call decay_term_init(part, solid, scene)
-         end select
-      end do
-   end subroutine create_own
+      !> The mass between unknowns of the step, in the pattern of the matrix.
+      pure module subroutine terms_mass_values(term, value)
+         type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
+         real(dp), allocatable, intent(out) :: value(:)   !! (entries of the matrix) [M]
+      end subroutine terms_mass_values
 
-   !> The nodes that mass or forces are given for.
-   pure subroutine mark_given(n_dim, mass, is_given, given)
-      integer, intent(in) :: n_dim
-      type(csr_t), intent(in) :: mass            !! (n_node x n_node); without rows: none
-      logical, intent(out) :: is_given(:)        !! (n_node)
-      type(host_t), intent(in), optional :: given
-      integer :: i, k
+      !> The nodes that contact finds without mass: those that have given theirs to their
+      !> neighbours, and of sections without inertia.
+      pure module subroutine terms_massless(term, is_massless, is_bare)
+         type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
+         logical, intent(out) :: is_massless(:)     !! (n_node)
+         logical, intent(out) :: is_bare(:)      !! (n_node) of such sections, whatever contact does
+      end subroutine terms_massless
 
-      is_given = .false.
-      do i = 1, mass%n_row
-         is_given(i) = mass%row_start(i + 1) > mass%row_start(i)
-      end do
-      if (.not. present(given)) return
-      if (.not. allocated(given%force)) return
-      do k = 1, size(given%force)
-         associate (pattern => given%force(k)%force%pattern)
-            do i = 1, pattern%n_row
-               if (pattern%row_start(i + 1) > pattern%row_start(i)) is_given((i - 1)/n_dim + 1) = &
-                  .true.
-            end do
-         end associate
-      end do
-   end subroutine mark_given
+      !> Let the nodes `has_mass`, which had given theirs away, have mass again, and the others not.
+      !> The step of the deck has to begin anew.
+      module subroutine terms_return_mass(term, may_shed, has_mass, error)
+         type(term_box_t), intent(inout), target :: term(:)   !! of `terms_create`
+         logical, intent(in) :: may_shed(:)         !! (n_node) those of `terms_massless` at first
+         logical, intent(in) :: has_mass(:)         !! (n_node) of these
+         type(error_t), allocatable, intent(out) :: error
+      end subroutine terms_return_mass
 
-   !> The elements, for what is derived from them.
-   function terms_solid(term) result(solid)
-      type(term_box_t), intent(in), target :: term(:)   !! of `terms_create`
-      type(solid_t), pointer :: solid
-
-      nullify(solid)
-      select type (part => term(of_solid)%term)
-      type is (solid_term_t)
-         solid => part%solid
-      end select
-   end function terms_solid
-
-   !> The mass between nodes, the same in all directions.
-   pure subroutine terms_mass(term, mass)
-      type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
-      type(csr_t), intent(out) :: mass           !! (n_node x n_node) [M]
-
-      select type (part => term(of_inertia)%term)
-      type is (inertia_t)
-         mass = part%mass
-      end select
-   end subroutine terms_mass
-
-   !> Mass at each node: the sums of rows.
-   pure subroutine terms_mass_rows(term, mass)
-      type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
-      real(wp), intent(out) :: mass(:)           !! (n_node) [M]
-      type(csr_t) :: between
-      integer :: i
-
-      call terms_mass(term, between)
-      mass = 0.0_wp
-      do i = 1, between%n_row
-         mass(i) = real(sum(between%value(between%row_start(i) + 1:between%row_start(i + 1))), wp)
-      end do
-   end subroutine terms_mass_rows
-
-   !> The nodes that contact finds without mass: those that have given theirs to their neighbours,
-   !> and of sections without inertia.
-   pure subroutine terms_massless(term, is_massless, is_bare)
-      type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
-      logical, intent(out) :: is_massless(:)     !! (n_node)
-      logical, intent(out) :: is_bare(:)         !! (n_node) of such sections, whatever contact does
-
-      is_massless = .false.
-      is_bare = .false.
-      select type (part => term(of_inertia)%term)
-      type is (inertia_t)
-         is_massless = part%is_massless
-         is_bare = part%is_bare
-      end select
-   end subroutine terms_massless
-
-   !> Let the nodes `has_mass`, which had given theirs away, have mass again, and the others not.
-   !> The step of the deck has to begin anew.
-   subroutine terms_return_mass(term, may_shed, has_mass, error)
-      type(term_box_t), intent(inout), target :: term(:)   !! of `terms_create`
-      logical, intent(in) :: may_shed(:)         !! (n_node) those of `terms_massless` at first
-      logical, intent(in) :: has_mass(:)         !! (n_node) of these
-      type(error_t), allocatable, intent(out) :: error
-      type(solid_t), pointer :: solid
-      type(csr_t) :: relative
-
-      solid => terms_solid(term)
-      call massless_return(solid, may_shed, has_mass, relative, error)
-      if (allocated(error)) return
-      select type (part => term(of_inertia)%term)
-      type is (inertia_t)
-         part%is_massless = may_shed .and. .not. has_mass
-         call inertia_add(part, solid, relative, error)
-      end select
-   end subroutine terms_return_mass
-
-   !> The mass between unknowns of the step, in the pattern of the matrix.
-   pure subroutine terms_mass_values(term, value)
-      type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
-      real(dp), allocatable, intent(out) :: value(:)   !! (entries of the matrix) [M]
-
-      select type (part => term(of_inertia)%term)
-      type is (inertia_t)
-         value = part%value
-      end select
-   end subroutine terms_mass_values
-
-   !> What the damping of the scheme has taken in the last motion, and that of materials.
-   pure subroutine terms_decay(term, work, damping)
-      type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
-      real(wp), intent(out) :: work, damping     !! [M L^2/T^2]
-      integer :: k
-
-      work = 0.0_wp
-      damping = 0.0_wp
-      do k = n_own + 1, size(term)
-         select type (part => term(k)%term)
-         type is (decay_term_t)
-            work = part%work
-            damping = part%damping
-         end select
-      end do
-   end subroutine terms_decay
-
-   !> M field, in all directions.
-   pure subroutine terms_mass_times(term, field, product)
-      type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
-      real(wp), intent(in), contiguous :: field(:, :)      !! (n_dim, n_node)
-      real(wp), intent(out), contiguous :: product(:, :)   !! (n_dim, n_node)
-
-      select type (part => term(of_inertia)%term)
-      type is (inertia_t)
-         call inertia_times(part, field, product)
-      class default
-         product = 0.0_wp
-      end select
-   end subroutine terms_mass_times
+      !> What the damping of the scheme has taken in the last motion, and that of materials.
+      pure module subroutine terms_decay(term, work, damping)
+         type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
+         real(wp), intent(out) :: work, damping     !! [M L^2/T^2]
+      end subroutine terms_decay
+   end interface
 
 end module emcon_term_registry

@@ -9,7 +9,7 @@ program bench_element
    use emcon_element_registry, only : element_kinds_create, find_element_row
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, int64, wp
-   use emcon_law_registry, only : law_rows, n_constant
+   use emcon_law_registry, only : law_row, law_row_t, n_constant, n_law_row
    use emcon_motion, only : motion_t, motion_init, motion_place
    use emcon_scene, only : scene_t
    use emcon_solid_term, only : solid_term_init, solid_term_t
@@ -28,7 +28,7 @@ program bench_element
    write(output_unit, "(/, a)") "Elements, microseconds each"
    write(output_unit, "(a6, 1x, a18, 2a18)") "kind", "law", "forces", "and tangent"
    do i_kind = 1, size(kind_name)
-      do i_law = 1, size(law_rows)
+      do i_law = 1, n_law_row()
          call bench(kind_name(i_kind), i_law)
       end do
    end do
@@ -44,6 +44,7 @@ contains
       type(response_t) :: response
       type(space_t) :: space
       type(csr_t) :: matrix
+      type(law_row_t) :: row
       type(error_t), allocatable :: error
       real(dp), allocatable :: value(:)
       real(dp) :: side(1), seconds(2)
@@ -74,7 +75,8 @@ contains
          call time_of(term, motion, response, seconds(1))
          call time_of(term, motion, response, seconds(2), value, side)
       end do
-      write(output_unit, "(a6, 1x, a18, 2f18.3)") kind, law_rows(i_law)%name, &
+      row = law_row(i_law)
+      write(output_unit, "(a6, 1x, a18, 2f18.3)") kind, row%name, &
          1.0e6_dp*seconds/real(size(scene%element_kind), dp)
    end subroutine bench
 
@@ -99,6 +101,7 @@ contains
       character(len=*), intent(in) :: kind
       integer, intent(in) :: i_law
       type(scene_t), intent(out) :: scene
+      type(law_row_t) :: row
       integer :: i, j, e, corner(4), n
 
       call element_kinds_create(2, scene%kind)
@@ -127,10 +130,11 @@ contains
       end do
       scene%material(1)%name = "M"
       scene%material(1)%density = 1.0_wp
-      scene%material(1)%law = law_rows(i_law)%code
-      allocate(scene%material(1)%constant(n_constant(law_rows(i_law))))
+      row = law_row(i_law)
+      scene%material(1)%law = row%code
+      allocate(scene%material(1)%constant(n_constant(row)))
       do i = 1, size(scene%material(1)%constant)
-         j = findloc(names, law_rows(i_law)%constant(i), 1)
+         j = findloc(names, row%constant(i), 1)
          scene%material(1)%constant(i) = 2.0_wp
          if (j > 0) scene%material(1)%constant(i) = values(j)
       end do

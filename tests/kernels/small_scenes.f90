@@ -3,12 +3,12 @@ module small_scenes
    use emcon_element_registry, only : element_kinds_create, find_element_row
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
-   use emcon_law_registry, only : law_coupled_neo_hooke
    use emcon_mesh, only : surface_t
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_row
    use emcon_steps, only : load_t, prescribed_t, step_t
+   use kind_rows, only : law_code
    use random_draws, only : draw_random
    implicit none
    private
@@ -45,7 +45,7 @@ contains
       allocate(scene%tie(0), scene%equation(0), scene%rigid(0))
       allocate(scene%u0(2, 0), scene%v0(2, 0))
       scene%material(1)%name = "RUBBER"
-      scene%material(1)%law = law_coupled_neo_hooke
+      scene%material(1)%law = law_code("coupled neo hooke")
       scene%material(1)%constant = [young, poisson]
       scene%material(1)%density = 1.0_wp
       scene%section(1)%set = "ALL"

@@ -8,11 +8,12 @@ module test_element
    use emcon_host_law, only : host_response_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t
-   use emcon_law_registry, only : law_coupled_neo_hooke, law_linear, law_neo_hooke
+   use emcon_law_registry, only : law_linear
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_t
    use emcon_solid_respond, only : solid_element_respond
    use emcon_text, only : to_text
+   use kind_rows, only : law_code
    use random_draws, only : draw_random
    use small_scenes, only : block_t, make_block, shake, young
    implicit none
@@ -56,22 +57,22 @@ contains
       integer, intent(in) :: i
       type(sample_t), intent(out) :: sample
       type(error_t), allocatable, intent(out) :: error
-      integer, parameter :: law(3) = [law_linear, law_neo_hooke, law_coupled_neo_hooke]
       type(scene_t) :: scene
       type(block_t) :: block
-      integer :: i_law
+      integer :: i_law, law(3)
       real(wp) :: move(2, 4)
 
       sample%nlgeom = mod(i, 2) == 0
       sample%n = 3 + mod((i - 1)/2, 2)
       i_law = 1 + (i - 1)/4
+      law = [law_linear, law_code("neo hooke"), law_code("coupled neo hooke")]
       sample%what = "CPE" // to_text(sample%n) // ", law " // to_text(i_law) // ", nlgeom " &
          // to_text(merge(1, 0, sample%nlgeom))
       call make_block(scene, "CPE" // to_text(sample%n), [1, 1], block)
       call shake(move, 0.2_wp)
       scene%x = scene%x + move
       scene%material(1)%law = law(i_law)
-      if (law(i_law) == law_neo_hooke) scene%material(1)%constant = [0.2_wp*young, 1.0_wp/young]
+      if (i_law == 2) scene%material(1)%constant = [0.2_wp*young, 1.0_wp/young]
       sample%x(:, :sample%n) = scene%x(:, scene%element_node(:sample%n, 1))
       call solid_init(sample%solid, scene, error)
    end subroutine make_sample

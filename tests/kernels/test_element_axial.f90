@@ -2,18 +2,18 @@
 module test_element_axial
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_element_axial_plane, only : axial_element_respond
-   use emcon_element_registry, only : axial_rows, plane_rows
+   use emcon_element_kind, only : element_row_t
+   use emcon_element_registry, only : element_row
    use emcon_element_space, only : space_motion_t, space_part_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
-   use emcon_law_registry, only : law_coupled_neo_hooke, law_linear, law_mooney_rivlin, &
-      law_neo_hooke, law_ogden, law_yeoh
    use emcon_law_space, only : law_response_space, space_response_t
    use emcon_pressure_ring_plane, only : press_ring, press_ring_stiffness
    use emcon_scene, only : scene_t
    use emcon_shape, only : m => max_plane_nodes
    use emcon_solid, only : solid_init, solid_t
    use emcon_text, only : to_text
+   use kind_rows, only : law_code, n_plane_row, n_axial_row
    use small_scenes, only : scene_begin, shake, young
    implicit none
    private
@@ -57,28 +57,28 @@ contains
       type(sample_t), intent(out) :: sample
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
+      type(element_row_t) :: row
       real(wp), allocatable :: place(:, :)
       real(wp) :: move(2, m)
       integer :: i, n
 
       call scene_begin(scene)
-      associate (row => axial_rows(kind))
-         n = row%n_node
-         sample%n_corner = row%n_corner
-         call scene%kind(size(plane_rows) + kind)%shape%places(place)
-         if (sample%n_corner == 4) place = 0.5_wp*place
-         call shake(move, 0.2_wp)
-         place(1, :) = place(1, :) + 1.5_wp
-         place(:, :row%n_corner) = place(:, :row%n_corner) + move(:, :row%n_corner)
-         call shake(move, 0.25_wp*bend)
-         do i = row%n_corner + 1, n
-            associate (a => i - row%n_corner)
-               place(:, i) = 0.5_wp*(place(:, a) + place(:, 1 + mod(a, row%n_corner))) + move(:, i)
-            end associate
-         end do
-         sample%what = trim(row%name) // ", law " // to_text(law) // ", nlgeom " &
-            // to_text(merge(1, 0, nlgeom))
-      end associate
+      row = element_row(n_plane_row() + kind)
+      n = row%n_node
+      sample%n_corner = row%n_corner
+      call scene%kind(n_plane_row() + kind)%shape%places(place)
+      if (sample%n_corner == 4) place = 0.5_wp*place
+      call shake(move, 0.2_wp)
+      place(1, :) = place(1, :) + 1.5_wp
+      place(:, :row%n_corner) = place(:, :row%n_corner) + move(:, :row%n_corner)
+      call shake(move, 0.25_wp*bend)
+      do i = row%n_corner + 1, n
+         associate (a => i - row%n_corner)
+            place(:, i) = 0.5_wp*(place(:, a) + place(:, 1 + mod(a, row%n_corner))) + move(:, i)
+         end associate
+      end do
+      sample%what = trim(row%name) // ", law " // to_text(law) // ", nlgeom " &
+         // to_text(merge(1, 0, nlgeom))
       deallocate(scene%element_node, scene%node_label, scene%node_origin, scene%x, scene%u0, &
          scene%v0, scene%element_origin)
       allocate(scene%element_node(n, 1), scene%node_label(n), scene%node_origin(n), &
@@ -87,7 +87,7 @@ contains
       scene%element_node(:, 1) = [(i, i = 1, n)]
       scene%node_label = scene%element_node(:, 1)
       scene%element_label = [1]
-      scene%element_kind = [size(plane_rows) + kind]
+      scene%element_kind = [n_plane_row() + kind]
       scene%element_section = [1]
       scene%x = place
       scene%u0 = 0.0_wp*place
@@ -102,11 +102,11 @@ contains
    subroutine set_law(law, scene)
       integer, intent(in) :: law                 !! 1..n_law
       type(scene_t), intent(inout) :: scene
-      integer, parameter :: codes(n_law) = [law_linear, law_coupled_neo_hooke, law_neo_hooke, &
-         law_mooney_rivlin, law_yeoh, law_ogden]
+      character(len=18), parameter :: names(n_law) = [character(len=18) :: "linear", &
+         "coupled neo hooke", "neo hooke", "mooney-rivlin", "yeoh", "ogden 2"]
       real(wp), parameter :: c = 0.2_wp*young, d = 1.0_wp/young
 
-      scene%material(1)%law = codes(law)
+      scene%material(1)%law = law_code(names(law))
       select case (law)
       case (3)
          scene%material(1)%constant = [c, d]
@@ -155,9 +155,9 @@ contains
       integer :: i, k
 
       zero = 0.0_wp
-      do i = 0, 2*n_law*size(axial_rows) - 1
-         call make_sample(1 + mod(i/n_law, size(axial_rows)), 1 + mod(i, n_law), &
-            i >= n_law*size(axial_rows), 0.2_wp, sample, error)
+      do i = 0, 2*n_law*n_axial_row() - 1
+         call make_sample(1 + mod(i/n_law, n_axial_row()), 1 + mod(i, n_law), &
+            i >= n_law*n_axial_row(), 0.2_wp, sample, error)
          if (allocated(error)) return
          do k = 1, 4
             call draw(sample, u0, du)
@@ -185,7 +185,7 @@ contains
       integer :: a, i, j
 
       h = 0.25_wp*eps**0.3_wp
-      do i = 0, n_law*size(axial_rows) - 1
+      do i = 0, n_law*n_axial_row() - 1
          call make_sample(1 + i/n_law, 1 + mod(i, n_law), mod(i, 3) > 0, 0.2_wp, sample, error)
          if (allocated(error)) return
          call draw(sample, u0, du)
@@ -220,9 +220,9 @@ contains
       integer :: i
 
       zero = 0.0_wp
-      do i = 0, 2*n_law*size(axial_rows) - 1
-         call make_sample(1 + mod(i/n_law, size(axial_rows)), 1 + mod(i, n_law), &
-            i >= n_law*size(axial_rows), 0.0_wp, sample, error)
+      do i = 0, 2*n_law*n_axial_row() - 1
+         call make_sample(1 + mod(i/n_law, n_axial_row()), 1 + mod(i, n_law), &
+            i >= n_law*n_axial_row(), 0.0_wp, sample, error)
          if (allocated(error)) return
          u0(1, :) = a*sample%x(1, :)
          u0(2, :) = b*sample%x(2, :) + c*sample%x(1, :)
@@ -273,7 +273,7 @@ contains
       real(wp) :: u0(2, m), du(2, m)
       integer :: k
 
-      do k = 1, size(axial_rows)
+      do k = 1, n_axial_row()
          call make_sample(k, 1 + mod(k, n_law), .true., 0.2_wp, sample, error)
          if (allocated(error)) return
          u0 = 0.0_wp
@@ -296,7 +296,7 @@ contains
       integer :: k
 
       zero = 0.0_wp
-      do k = 1, size(axial_rows)
+      do k = 1, n_axial_row()
          call make_sample(k, 1 + mod(k, n_law), .true., 0.2_wp, sample, error)
          if (allocated(error)) return
          call respond(sample, zero, zero, .true., step)
@@ -329,7 +329,7 @@ contains
       type(sample_t) :: sample
       integer :: k
 
-      do k = 1, size(axial_rows)
+      do k = 1, n_axial_row()
          call make_sample(k, 1, .true., 0.0_wp, sample, error)
          if (allocated(error)) return
          associate (mass => sample%solid%mass(:sample%n, :sample%n, 1), &
@@ -355,7 +355,7 @@ contains
       real(dp) :: value(6*6), side(0)
       integer :: edge(3), slot(6, 6), a, i, j, k, n
 
-      do k = 3, size(axial_rows)
+      do k = 3, n_axial_row()
          call make_sample(k, 1, .true., 0.0_wp, sample, error)
          if (allocated(error)) return
          u = 0.0_wp

@@ -2,18 +2,18 @@
 module test_element_kinds
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_element_plane, only : element_motion_t, element_response_t
-   use emcon_element_registry, only : element_rows => plane_rows, find_element_row
+   use emcon_element_kind, only : element_row_t
+   use emcon_element_registry, only : element_row
    use emcon_errors, only : error_t
    use emcon_host_law, only : host_response_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t
-   use emcon_law_registry, only : law_coupled_neo_hooke, law_linear, law_mooney_rivlin, &
-      law_neo_hooke, law_ogden, law_yeoh
    use emcon_scene, only : scene_t
    use emcon_shape, only : max_plane_nodes
    use emcon_solid, only : solid_init, solid_t
    use emcon_solid_respond, only : solid_element_respond
    use emcon_text, only : to_text
+   use kind_rows, only : law_code, n_plane_row
    use small_scenes, only : scene_begin, shake, young
    implicit none
    private
@@ -59,26 +59,26 @@ contains
       type(sample_t), intent(out) :: sample
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
+      type(element_row_t) :: row
       real(wp), allocatable :: place(:, :)
       real(wp) :: move(2, m)
       integer :: i, n
 
       call scene_begin(scene)
-      n = element_rows(kind)%n_node
+      row = element_row(kind)
+      n = row%n_node
       call scene%kind(kind)%shape%places(place)
       if (n == 4 .or. n == 8) place = 0.5_wp*place
       call shake(move, 0.2_wp)
-      associate (row => element_rows(kind))
-         place(:, :row%n_corner) = place(:, :row%n_corner) + move(:, :row%n_corner)
-         call shake(move, 0.25_wp*bend)
-         do i = row%n_corner + 1, n
-            associate (a => i - row%n_corner)
-               place(:, i) = 0.5_wp*(place(:, a) + place(:, 1 + mod(a, row%n_corner))) + move(:, i)
-            end associate
-         end do
-         sample%what = trim(row%name) // ", law " // to_text(law) // ", nlgeom " &
-            // to_text(merge(1, 0, nlgeom))
-      end associate
+      place(:, :row%n_corner) = place(:, :row%n_corner) + move(:, :row%n_corner)
+      call shake(move, 0.25_wp*bend)
+      do i = row%n_corner + 1, n
+         associate (a => i - row%n_corner)
+            place(:, i) = 0.5_wp*(place(:, a) + place(:, 1 + mod(a, row%n_corner))) + move(:, i)
+         end associate
+      end do
+      sample%what = trim(row%name) // ", law " // to_text(law) // ", nlgeom " &
+         // to_text(merge(1, 0, nlgeom))
       deallocate(scene%element_node, scene%node_label, scene%node_origin, scene%x, scene%u0, &
          scene%v0, scene%element_origin)
       allocate(scene%element_node(n, 1), scene%node_label(n), scene%node_origin(n), &
@@ -92,7 +92,7 @@ contains
       scene%u0 = 0.0_wp*place
       scene%v0 = 0.0_wp*place
       ! Ogden's law is not known in plane stress: another one in its place.
-      call set_law(merge(n_law - 1, law, element_rows(kind)%is_thin .and. law == n_law), scene)
+      call set_law(merge(n_law - 1, law, row%is_thin .and. law == n_law), scene)
       sample%kind = kind
       sample%n = n
       sample%nlgeom = nlgeom
@@ -103,11 +103,11 @@ contains
    subroutine set_law(law, scene)
       integer, intent(in) :: law                 !! 1..n_law
       type(scene_t), intent(inout) :: scene
-      integer, parameter :: codes(n_law) = [law_linear, law_coupled_neo_hooke, law_neo_hooke, &
-         law_mooney_rivlin, law_yeoh, law_ogden]
+      character(len=18), parameter :: names(n_law) = [character(len=18) :: "linear", &
+         "coupled neo hooke", "neo hooke", "mooney-rivlin", "yeoh", "ogden 2"]
       real(wp), parameter :: c = 0.2_wp*young, d = 1.0_wp/young
 
-      scene%material(1)%law = codes(law)
+      scene%material(1)%law = law_code(names(law))
       select case (law)
       case (3)
          scene%material(1)%constant = [c, d]
@@ -170,9 +170,9 @@ contains
       integer :: i, k, law
 
       zero = 0.0_wp
-      do i = 1, 2*n_law*size(element_rows)
+      do i = 1, 2*n_law*n_plane_row()
          law = 1 + mod(i, n_law)
-         call make_sample(1 + mod(i/n_law, size(element_rows)), law, i > n_law*size(element_rows), &
+         call make_sample(1 + mod(i/n_law, n_plane_row()), law, i > n_law*n_plane_row(), &
             0.2_wp, sample, error)
          if (allocated(error)) return
          do k = 1, 5
@@ -205,7 +205,7 @@ contains
       integer :: i, a, n, node
 
       h = eps**0.3_wp
-      do i = 1, n_law*size(element_rows)
+      do i = 1, n_law*n_plane_row()
          call make_sample(1 + (i - 1)/n_law, 1 + mod(i, n_law), mod(i/2, 2) == 0, 0.2_wp, sample, &
             error)
          if (allocated(error)) return
@@ -239,7 +239,7 @@ contains
       real(wp) :: u0(2, m), du(2, m)
       integer :: i
 
-      do i = 1, n_law*size(element_rows)
+      do i = 1, n_law*n_plane_row()
          call make_sample(1 + (i - 1)/n_law, 1 + mod(i, n_law), .true., 0.2_wp, sample, error)
          if (allocated(error)) return
          call draw(sample, u0, du)
@@ -263,9 +263,9 @@ contains
       integer :: a, b, i
 
       zero = 0.0_wp
-      do i = 1, 2*n_law*size(element_rows)
-         call make_sample(1 + mod(i/n_law, size(element_rows)), 1 + mod(i, n_law), &
-            i > n_law*size(element_rows), 0.2_wp, sample, error)
+      do i = 1, 2*n_law*n_plane_row()
+         call make_sample(1 + mod(i/n_law, n_plane_row()), 1 + mod(i, n_law), &
+            i > n_law*n_plane_row(), 0.2_wp, sample, error)
          if (allocated(error)) return
          u0 = matmul(grad, sample%x)
          f = grad
@@ -304,7 +304,7 @@ contains
       real(wp) :: u0(2, m), du(2, m)
       integer :: i, k
 
-      do i = 1, n_law*size(element_rows)
+      do i = 1, n_law*n_plane_row()
          call make_sample(1 + (i - 1)/n_law, 1 + mod(i, n_law), .true., 0.2_wp, sample, error)
          if (allocated(error)) return
          u0 = 0.0_wp
@@ -327,17 +327,19 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(sample_t) :: sample
       type(element_response_t) :: step
+      type(element_row_t) :: row
       real(wp) :: zero(2, m)
       integer :: k, law
 
       zero = 0.0_wp
-      do k = 1, size(element_rows)
+      do k = 1, n_plane_row()
+         row = element_row(k)
          do law = 1, n_law
             call make_sample(k, law, .true., 0.2_wp, sample, error)
             if (allocated(error)) return
             call respond(sample, zero, zero, .true., step)
             call check_equal(error, rank_of(step%tangent(:2*sample%n, :2*sample%n)), &
-               2*sample%n - merge(4, 3, index(element_rows(k)%name, "8R") > 0), sample%what)
+               2*sample%n - merge(4, 3, index(row%name, "8R") > 0), sample%what)
          end do
       end do
    end subroutine test_rank
@@ -363,16 +365,18 @@ contains
    subroutine test_mass(error)
       type(error_t), allocatable, intent(out) :: error
       type(sample_t) :: sample
+      type(element_row_t) :: row
       real(wp) :: area, first(2), second, cross
       integer :: i, j, k, n
 
-      do k = 1, size(element_rows)
+      do k = 1, n_plane_row()
          call make_sample(k, 1, .true., 0.0_wp, sample, error)
          if (allocated(error)) return
          area = 0.0_wp
          first = 0.0_wp
          second = 0.0_wp
-         n = element_rows(k)%n_corner
+         row = element_row(k)
+         n = row%n_corner
          do i = 1, n
             j = 1 + mod(i, n)
             associate (a => sample%x(:, i), b => sample%x(:, j))
@@ -403,13 +407,15 @@ contains
       type(sample_t) :: sample
       type(element_response_t) :: step
       type(scene_t) :: scene
+      type(element_row_t) :: row
       real(wp) :: u(2, m), zero(2, m)
       real(wp), parameter :: nu = 0.4999_wp, small = 1.0e-3_wp
       integer :: k
 
       zero = 0.0_wp
-      do k = 1, size(element_rows)
-         if (.not. element_rows(k)%has_mean_volume) cycle
+      do k = 1, n_plane_row()
+         row = element_row(k)
+         if (.not. row%has_mean_volume) cycle
          call scene_begin(scene)
          call make_sample(k, 1, .true., 0.0_wp, sample, error)
          call scene%kind(k)%shape%places(scene%x)

@@ -8,8 +8,7 @@ module test_element_space
    use emcon_incompatible_space, only : incompatible_space_respond
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t, law_t
-   use emcon_law_registry, only : law_coupled_neo_hooke, law_create, law_linear, &
-      law_mooney_rivlin, law_neo_hooke, law_ogden, law_yeoh
+   use emcon_law_registry, only : law_create, law_linear
    use emcon_law_space, only : law_response_space, space_response_t
    use emcon_mean_volume_space, only : mean_volume_space_respond
    use emcon_shape, only : m => max_element_nodes, shape_fault, shape_t, shape_table_t, &
@@ -19,6 +18,7 @@ module test_element_space
    use emcon_shape_serendipity_space, only : shape_serendipity_space_t
    use emcon_shape_tetrahedron_space, only : shape_tetrahedron_t
    use emcon_text, only : to_text
+   use kind_rows, only : law_code
    use small_scenes, only : shake, young
    implicit none
    private
@@ -68,8 +68,8 @@ contains
       real(wp), intent(in) :: bend
       type(sample_t), intent(out) :: sample
       type(error_t), allocatable, intent(out) :: error
-      integer, parameter :: codes(n_law) = [law_linear, law_coupled_neo_hooke, law_neo_hooke, &
-         law_mooney_rivlin, law_yeoh, law_ogden]
+      character(len=18), parameter :: names(n_law) = [character(len=18) :: "linear", &
+         "coupled neo hooke", "neo hooke", "mooney-rivlin", "yeoh", "ogden 2"]
       integer, parameter :: side(2, 6) = reshape([1, 2, 2, 3, 3, 1, 1, 4, 2, 4, 3, 4], [2, 6])
       real(wp), parameter :: c = 0.2_wp*young, d = 1.0_wp/young
       real(wp), allocatable :: constant(:), place(:, :)
@@ -109,7 +109,7 @@ contains
       case default
          constant = [young, 0.3_wp]
       end select
-      call law_create(codes(law), constant, sample%law, error)
+      call law_create(law_code(names(law)), constant, sample%law, error)
       if (trim(name(kind)) == "C3D8H") call sample%law%divide(sample%rest)
       call place_element(sample)
       call check_true(error, all(sample%element%weight > 0.0_wp), sample%what // ": volume")

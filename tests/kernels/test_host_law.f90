@@ -7,7 +7,7 @@ module test_host_law
    use emcon_errors, only : err_analysis, err_input, error_t
    use emcon_kinds, only : dp, wp
    use emcon_law, only : lame_constants
-   use emcon_law_registry, only : law_coupled_neo_hooke, law_given, law_linear
+   use emcon_law_registry, only : law_given, law_linear
    use emcon_march, only : increment_t
    use emcon_motion, only : motion_of, motion_t
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
@@ -24,6 +24,7 @@ module test_host_law
    use emcon_stepper_query, only : query_evaluate, query_free, query_t
    use emcon_stress, only : nodal_stress
    use emcon_text, only : string_t, to_text
+   use kind_rows, only : law_code
    use small_scenes, only : add_block, add_step, block_t, clamp, make_block, make_two_blocks, &
       poisson, prescribe, shake, young
    implicit none
@@ -45,6 +46,10 @@ module test_host_law
 
 contains
 
+   pure integer function coupled_neo_hooke() result(code)
+      code = law_code("coupled neo hooke")
+   end function coupled_neo_hooke
+
    subroutine collect_host_law(tests)
       type(test_case_t), allocatable, intent(out) :: tests(:)
 
@@ -62,7 +67,7 @@ contains
          test_case_t("restart file of a deck with a given law", test_restart)]
    end subroutine collect_host_law
 
-   !> With y = det C - 1 and phi(y) = y - ln(1 + y), as in emcon_law_coupled_neo_hooke.
+   !> With y = det C - 1 and phi(y) = y - ln(1 + y), as in emcon_coupled_neo_hooke().
    subroutine elastic_evaluate(self, z, wants_hessian, value, gradient, hessian, status)
       class(elastic_t), intent(in) :: self
       real(wp), intent(in), contiguous :: z(:, :)
@@ -91,7 +96,7 @@ contains
          w_y = (self%lam + 2.0_wp*self%mu)*e1
          w_yy = self%lam + 2.0_wp*self%mu
          value(i) = 0.5_wp*w_y*e1 - 2.0_wp*self%mu*e2
-         if (self%law == law_coupled_neo_hooke) then
+         if (self%law == coupled_neo_hooke()) then
             y = 2.0_wp*e1 + 4.0_wp*e2
             if (.not. y > -1.0_wp) status = point_outside
             if (status /= point_ok) return
@@ -105,7 +110,7 @@ contains
          if (.not. wants_hessian) cycle
          do j = 1, 3
             hessian(:, j, i) = w_yy*dy(j)*dy - 2.0_wp*self%mu*dde2(:, j)
-            if (self%law == law_coupled_neo_hooke) hessian(:, j, i) = hessian(:, j, i) &
+            if (self%law == coupled_neo_hooke()) hessian(:, j, i) = hessian(:, j, i) &
                + 4.0_wp*w_y*dde2(:, j)
          end do
       end do
@@ -185,8 +190,8 @@ contains
 
       call compare_forces("CPE3", law_linear, error)
       if (.not. allocated(error)) call compare_forces("CPE4", law_linear, error)
-      if (.not. allocated(error)) call compare_forces("CPE3", law_coupled_neo_hooke, error)
-      if (.not. allocated(error)) call compare_forces("CPE4", law_coupled_neo_hooke, error)
+      if (.not. allocated(error)) call compare_forces("CPE3", coupled_neo_hooke(), error)
+      if (.not. allocated(error)) call compare_forces("CPE4", coupled_neo_hooke(), error)
    end subroutine test_forces
 
    subroutine compare_forces(name, law, error)
@@ -234,7 +239,7 @@ contains
       call make_block(scene, "CPE4", [2, 2], block)
       call add_step(scene, .true., 1.0_wp, 1)
       call clamp(scene%step(1), [1, 2])
-      call open_with(given, scene, law_coupled_neo_hooke, .true., error)
+      call open_with(given, scene, coupled_neo_hooke(), .true., error)
       if (allocated(error)) return
       call shake(u0, 0.1_wp)
       call shake(du, 0.2_wp)
@@ -332,7 +337,7 @@ contains
       scene%v0(1, :) = -2.0_wp*scene%x(2, :)
       scene%v0(2, :) = 2.0_wp*(scene%x(1, :) - 1.0_wp)
       call add_step(scene, .false., 0.4_wp/real(n, wp), n)
-      call open_both(given, own, scene, law_coupled_neo_hooke, error)
+      call open_both(given, own, scene, coupled_neo_hooke(), error)
       if (allocated(error)) return
       total = given%march%ledger%total
       do k = 1, n
@@ -368,7 +373,7 @@ contains
          call prescribe(scene%step(1), k, 1, 0.4_wp)
          call prescribe(scene%step(1), k, 2, 0.1_wp)
       end do
-      call open_both(given, own, scene, law_coupled_neo_hooke, error)
+      call open_both(given, own, scene, coupled_neo_hooke(), error)
       do k = 1, 2
          if (.not. allocated(error)) call stepper_advance(given, increment, error)
          if (.not. allocated(error)) call stepper_advance(own, increment, error)

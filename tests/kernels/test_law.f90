@@ -4,9 +4,10 @@ module test_law
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t
-   use emcon_law_registry, only : find_law_row, law_coupled_neo_hooke, law_create, law_given, &
-      law_linear, law_mooney_rivlin, law_neo_hooke, law_ogden, law_rows, law_yeoh, n_constant
+   use emcon_law_registry, only : find_law_row, law_create, law_given, law_row, law_row_t, &
+      n_constant, n_law => n_law_row
    use emcon_text, only : to_text
+   use kind_rows, only : law_code, name => law_name
    use random_draws, only : draw_random
    use referee, only : increment_doubt, increment_of, qp, slope_doubt, slopes_of
    implicit none
@@ -16,8 +17,6 @@ module test_law
    real(wp), parameter :: eps = epsilon(1.0_wp)
    !> 40 roundings; E:E = e1^2 - 2 e2 and its like lose a factor of at most 2.
    real(wp), parameter :: tol = 40.0_wp*eps
-   integer, parameter :: n_law = size(law_rows)
-   character(len=18), parameter :: name(n_law) = law_rows%name
    !> Constants of all laws; with `d1` they agree at small strains.
    real(wp), parameter :: lam = 2.5_wp, mu = 1.5_wp, c10 = 0.5_wp*mu, d1 = 2.0_wp/(lam + mu/1.5_wp)
    real(wp), parameter :: young = mu*(3.0_wp*lam + 2.0_wp*mu)/(lam + mu), &
@@ -54,34 +53,36 @@ contains
 
    !> Place in `constants` of the first one of a law; behind the last law: one more than there are.
    pure integer function first(which)
-      integer, intent(in) :: which                   !! row, 1..n_law + 1
+      integer, intent(in) :: which                   !! row, 1..n_law() + 1
       integer :: i
 
       first = 1
       do i = 1, which - 1
-         first = first + n_constant(law_rows(i))
+         first = first + n_constant(law_row(i))
       end do
    end function first
 
    subroutine make_laws(box, unit)
-      type(law_box_t), intent(out) :: box(n_law)
+      type(law_box_t), intent(out) :: box(n_law())
       real(wp), intent(in), optional :: unit         !! of stress
       real(wp), allocatable :: constant(:)
       type(error_t), allocatable :: raised
+      type(law_row_t) :: row
       integer :: i, k
 
-      do i = 1, n_law
+      do i = 1, n_law()
+         row = law_row(i)
          constant = constants(first(i):first(i + 1) - 1)
          do k = 1, size(constant)
             if (.not. present(unit)) cycle
-            select case (law_rows(i)%constant(k)(1:1))
+            select case (row%constant(k)(1:1))
             case ("E", "C", "m")
                constant(k) = constant(k)*unit
             case ("D")
                constant(k) = constant(k)/unit
             end select
          end do
-         call law_create(law_rows(i)%code, constant, box(i)%law, raised)
+         call law_create(row%code, constant, box(i)%law, raised)
       end do
    end subroutine make_laws
 
@@ -100,6 +101,7 @@ contains
       real(qp), intent(in) :: x(3)                   !! E11, E22, 2 E12
       real(qp), intent(in) :: c33                    !! 1 + 2 E33
       real(qp) :: w, trace, j, i1, i2, det
+      type(law_row_t) :: row
       integer :: i
 
       trace = x(1) + x(2) + 0.5_qp*(c33 - 1.0_qp)
@@ -107,22 +109,23 @@ contains
       j = sqrt(det*c33)
       i1 = (2.0_qp*trace + 3.0_qp)/j**(2.0_qp/3.0_qp)                ! of C, without J
       i2 = (det + c33*(2.0_qp*trace + 3.0_qp - c33))/j**(4.0_qp/3.0_qp)
-      select case (law_rows(which)%code)
-      case (law_linear)
+      row = law_row(which)
+      select case (row%name)
+      case ("linear")
          w = 0.5_qp*real(lam, qp)*trace**2 + real(mu, qp)*(x(1)**2 + x(2)**2 + 0.5_qp*x(3)**2 &
             + 0.25_qp*(c33 - 1.0_qp)**2)
-      case (law_neo_hooke)
+      case ("neo hooke")
          w = real(c10, qp)*(i1 - 3.0_qp) + volume_part(j, 1)
-      case (law_coupled_neo_hooke)
+      case ("coupled neo hooke")
          w = real(mu, qp)*trace - real(mu, qp)*log(j) + 0.5_qp*real(lam, qp)*log(j)**2
-      case (law_mooney_rivlin)
+      case ("mooney-rivlin")
          w = real(c10 - c01, qp)*(i1 - 3.0_qp) + real(c01, qp)*(i2 - 3.0_qp) + volume_part(j, 1)
-      case (law_yeoh)
+      case ("yeoh")
          w = real(c10, qp)*(i1 - 3.0_qp) + real(c20, qp)*(i1 - 3.0_qp)**2 &
             + real(c30, qp)*(i1 - 3.0_qp)**3 + volume_part(j, 3)
-      case (law_ogden)
-         w = volume_part(j, merge(3, 1, law_rows(which)%order == 3))
-         do i = 1, law_rows(which)%order
+      case ("ogden 1", "ogden 2", "ogden 3")
+         w = volume_part(j, merge(3, 1, row%order == 3))
+         do i = 1, row%order
             associate (m => real(constants(first(which) + 2*i - 2), qp), &
                   a => real(constants(first(which) + 2*i - 1), qp))
                w = w + 2.0_qp*m/a**2*(sum(stretches(x, c33, j)**a) - 3.0_qp)
@@ -203,14 +206,14 @@ contains
 
    subroutine test_energy(error)
       type(error_t), allocatable, intent(out) :: error
-      type(law_box_t) :: box(n_law)
+      type(law_box_t) :: box(n_law())
       type(law_response_t) :: response
       real(wp) :: strain(3), zero(3), expected
       integer :: i, k, digits_small
 
       call make_laws(box)
       zero = 0.0_wp
-      do i = 1, n_law
+      do i = 1, n_law()
          do k = 0, 240
             digits_small = mod(k, 13)
             call draw(10.0_wp**(-digits_small), 0.0_wp, strain, zero)
@@ -238,13 +241,13 @@ contains
    !> S_alg.dE = W1 - W0 relative to its terms, for increments of 1 to the smallest.
    subroutine test_identity(error)
       type(error_t), allocatable, intent(out) :: error
-      type(law_box_t) :: box(n_law)
+      type(law_box_t) :: box(n_law())
       type(law_response_t) :: response
       real(wp) :: strain(3), dstrain(3)
       integer :: i, k
 
       call make_laws(box)
-      do i = 1, n_law
+      do i = 1, n_law()
          do k = 0, -minexponent(1.0_wp) - 12, 3
             call draw(0.8_wp, 0.5_wp, strain, dstrain)
             dstrain = scale(dstrain, -k)
@@ -259,13 +262,13 @@ contains
 
    subroutine test_stress(error)
       type(error_t), allocatable, intent(out) :: error
-      type(law_box_t) :: box(n_law)
+      type(law_box_t) :: box(n_law())
       type(law_response_t) :: response
       real(wp) :: strain(3), zero(3)
       integer :: i, k
 
       call make_laws(box)
-      do i = 1, n_law
+      do i = 1, n_law()
          do k = 1, 50
             call draw(0.8_wp, 0.0_wp, strain, zero)
             call law_response_plane(box(i)%law, strain, zero, response)
@@ -278,14 +281,14 @@ contains
    !> Error of a central difference of step eps^(1/3): a multiple of eps^(2/3).
    subroutine test_tangent(error)
       type(error_t), allocatable, intent(out) :: error
-      type(law_box_t) :: box(n_law)
+      type(law_box_t) :: box(n_law())
       type(law_response_t) :: response, up, down
       real(wp) :: strain(3), dstrain(3), way(3), step
       integer :: i, j, k
 
       step = eps**(1.0_wp/3.0_wp)
       call make_laws(box)
-      do i = 1, n_law
+      do i = 1, n_law()
          do k = 0, 48, 4
             call draw(0.8_wp, 0.5_wp, strain, dstrain)
             dstrain = scale(dstrain, -k)
@@ -306,14 +309,14 @@ contains
    !> S = D (E0 + E1)/2 up to terms of the order of the strain, for all laws.
    subroutine test_small_strain(error)
       type(error_t), allocatable, intent(out) :: error
-      type(law_box_t) :: box(n_law)
+      type(law_box_t) :: box(n_law())
       type(law_response_t) :: response
       real(wp) :: strain(3), dstrain(3), d(3, 3), s
       integer :: i, k
 
       call make_laws(box)
       d = reshape([lam + 2*mu, lam, 0.0_wp, lam, lam + 2*mu, 0.0_wp, 0.0_wp, 0.0_wp, mu], [3, 3])
-      do i = 1, n_law
+      do i = 1, n_law()
          do k = 2, 10, 4
             s = 10.0_wp**(-k)
             call draw(s, s, strain, dstrain)
@@ -329,7 +332,7 @@ contains
    !> S33 = 2 dW/dC33 at C33 = 1, by differences in quadruple precision.
    subroutine test_stress_33(error)
       type(error_t), allocatable, intent(out) :: error
-      type(law_box_t) :: box(n_law)
+      type(law_box_t) :: box(n_law())
       type(law_response_t) :: response
       real(wp) :: strain(3), zero(3)
       real(qp) :: x(3), expected
@@ -340,7 +343,7 @@ contains
       do k = 1, 50
          call draw(0.8_wp, 0.0_wp, strain, zero)
          x = real(strain, qp)
-         do i = 1, n_law
+         do i = 1, n_law()
             call law_response_plane(box(i)%law, strain, zero, response)
             expected = (printed(i, x, 1.0_qp + h) - printed(i, x, 1.0_qp - h))/h
             call check_near(error, response%stress_33, real(expected, wp), &
@@ -353,14 +356,14 @@ contains
    subroutine test_scaling(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: unit = 2.0_wp**40
-      type(law_box_t) :: box(n_law), scaled(n_law)
+      type(law_box_t) :: box(n_law()), scaled(n_law())
       type(law_response_t) :: one, other
       real(wp) :: strain(3), dstrain(3)
       integer :: i, k
 
       call make_laws(box)
       call make_laws(scaled, unit)
-      do i = 1, n_law
+      do i = 1, n_law()
          do k = 1, 50
             call draw(0.8_wp, 0.5_wp, strain, dstrain)
             call law_response_plane(box(i)%law, strain, dstrain, one)
@@ -378,20 +381,19 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: raised
       type(law_box_t) :: created
+      type(law_row_t) :: row
       integer :: i, n
 
-      do i = 1, n_law
-         n = n_constant(law_rows(i))
+      do i = 1, n_law()
+         row = law_row(i)
+         n = n_constant(row)
          if (first(i) + n /= first(i + 1)) error stop "test_law: constants do not fit the rows"
-         call law_create(law_rows(i)%code, constants(first(i):first(i + 1) - 1), created%law, &
-            raised)
+         call law_create(row%code, constants(first(i):first(i + 1) - 1), created%law, raised)
          call check_near(error, created%law%shear, mu, tol, mu, name(i))
-         call law_create(law_rows(i)%code, spread(1.0_wp, 1, n + 1), created%law, raised)
+         call law_create(row%code, spread(1.0_wp, 1, n + 1), created%law, raised)
          call check_error(error, raised, err_input, "too many or too few", name(i))
-         associate (row => law_rows(i))
-            call check_near(error, real(find_law_row(row%keyword, row%variant, max(row%order, 1)), &
-               wp), real(i, wp), 0.0_wp, 1.0_wp, name(i))
-         end associate
+         call check_near(error, real(find_law_row(row%keyword, row%variant, max(row%order, 1)), &
+            wp), real(i, wp), 0.0_wp, 1.0_wp, name(i))
       end do
       call check_near(error, real(find_law_row("HYPERELASTIC", "OGDEN", 4), wp), 0.0_wp, 0.0_wp, &
          1.0_wp, "no such order")
@@ -402,7 +404,7 @@ contains
    !> With alpha = 2, and with 2 and -2, energy and stress are those of laws in I1 and I2.
    subroutine test_ogden_special(error)
       type(error_t), allocatable, intent(out) :: error
-      type(law_box_t) :: box(n_law)
+      type(law_box_t) :: box(n_law())
       type(law_response_t) :: one, other
       real(wp) :: strain(3), dstrain(3)
       integer :: i, k
@@ -430,14 +432,14 @@ contains
    !> identity and the tangent hold as elsewhere.
    subroutine test_equal_stretches(error)
       type(error_t), allocatable, intent(out) :: error
-      type(law_box_t) :: box(n_law)
+      type(law_box_t) :: box(n_law())
       type(law_response_t) :: response, up, down
       real(wp) :: strain(3), dstrain(3), way(3), step, off
       integer :: i, j, k
 
       call make_laws(box)
       step = eps**(1.0_wp/3.0_wp)
-      do i = 1, n_law
+      do i = 1, n_law()
          do k = 0, 60, 3
             off = 0.3_wp*2.0_wp**(-k)
             do j = 1, 6
@@ -468,8 +470,9 @@ contains
    !> (both 3 + g^2) 2 (W1 + W2) g. Uniform stretch of the plane by l: S11 = S22 from J = l^2.
    subroutine test_closed_form(error)
       type(error_t), allocatable, intent(out) :: error
-      type(law_box_t) :: box(n_law)
+      type(law_box_t) :: box(n_law())
       type(law_response_t) :: response
+      type(law_row_t) :: row
       real(wp) :: g, l, expected, s(2, 2), sigma
       integer :: i, k
 
@@ -477,14 +480,15 @@ contains
       do k = 1, 20
          g = 0.1_wp*k
          l = 0.5_wp*(g + sqrt(g*g + 4.0_wp))
-         do i = 1, n_law
-            select case (law_rows(i)%code)
-            case (law_neo_hooke, law_mooney_rivlin)
+         do i = 1, n_law()
+            row = law_row(i)
+            select case (row%name)
+            case ("neo hooke", "mooney-rivlin")
                expected = 2.0_wp*c10*g
-            case (law_yeoh)
+            case ("yeoh")
                expected = 2.0_wp*g*(c10 + 2.0_wp*c20*g**2 + 3.0_wp*c30*g**4)
-            case (law_ogden)
-               expected = ogden_shear(l, constants(first(i):first(i) + 2*law_rows(i)%order - 1))
+            case ("ogden 1", "ogden 2", "ogden 3")
+               expected = ogden_shear(l, constants(first(i):first(i) + 2*row%order - 1))
             case default
                cycle
             end select
@@ -509,11 +513,13 @@ contains
    subroutine test_refusals(error)
       type(error_t), allocatable, intent(out) :: error
 
-      call refuse(law_neo_hooke, [-1.0_wp, 1.0_wp], "C10 = -1 must be positive")
-      call refuse(law_mooney_rivlin, [1.0_wp, -2.0_wp, 1.0_wp], "C10 + C01 = -1 must be positive")
-      call refuse(law_yeoh, [1.0_wp, 0.0_wp, 0.0_wp, -1.0_wp, 0.0_wp, 0.0_wp], "D1 = -1 must not")
-      call refuse(law_ogden, [1.0_wp, 0.0_wp, 1.0_wp], "alpha = 0 must not be 0")
-      call refuse(law_ogden, [1.0_wp, 2.0_wp, -1.0_wp, 1.0_wp, 1.0_wp, 0.0_wp], "sum of all mu = 0")
+      call refuse(law_code("neo hooke"), [-1.0_wp, 1.0_wp], "C10 = -1 must be positive")
+      call refuse(law_code("mooney-rivlin"), [1.0_wp, -2.0_wp, 1.0_wp], &
+         "C10 + C01 = -1 must be positive")
+      call refuse(law_code("yeoh"), [1.0_wp, 0.0_wp, 0.0_wp, -1.0_wp, 0.0_wp, 0.0_wp], &
+         "D1 = -1 must not")
+      call refuse(law_code("ogden 1"), [1.0_wp, 0.0_wp, 1.0_wp], "alpha = 0 must not be 0")
+      call refuse(law_code("ogden 1"), [1.0_wp, 2.0_wp, -1.0_wp, 1.0_wp, 1.0_wp, 0.0_wp], "sum of all mu = 0")
 
    contains
 

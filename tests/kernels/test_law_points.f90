@@ -4,8 +4,9 @@ module test_law_points
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_law, only : law_points_t, law_response_plane, law_response_t, law_t, n_lane
-   use emcon_law_registry, only : law_create, law_rows, n_constant
+   use emcon_law_registry, only : law_create, law_row, law_row_t, n_constant, n_law_row
    use emcon_text, only : to_text
+   use kind_rows, only : law_name
    use small_scenes, only : shake
    implicit none
    private
@@ -32,13 +33,15 @@ contains
       integer, intent(in) :: i                   !! row
       class(law_t), allocatable, intent(out) :: law
       type(error_t), allocatable :: raised
-      real(wp) :: constant(n_constant(law_rows(i)))
+      real(wp) :: constant(n_constant(law_row(i)))
+      type(law_row_t) :: row
 
+      row = law_row(i)
       constant = 1.0_wp
-      where (law_rows(i)%constant(:size(constant)) == "nu") constant = 0.3_wp
-      where (law_rows(i)%constant(:size(constant)) == "C20") constant = -0.1_wp
-      where (law_rows(i)%constant(:size(constant)) == "alpha2") constant = -2.5_wp
-      call law_create(law_rows(i)%code, constant, law, raised)
+      where (row%constant(:size(constant)) == "nu") constant = 0.3_wp
+      where (row%constant(:size(constant)) == "C20") constant = -0.1_wp
+      where (row%constant(:size(constant)) == "alpha2") constant = -2.5_wp
+      call law_create(row%code, constant, law, raised)
    end subroutine make_law
 
    !> Strains of the size `extent`, increments from that size down.
@@ -64,7 +67,7 @@ contains
       real(wp) :: extent
       integer :: i, k, l
 
-      do i = 1, size(law_rows)
+      do i = 1, n_law_row()
          call make_law(i, law)
          do k = 1, 40
             extent = 0.15_wp
@@ -76,11 +79,11 @@ contains
                call law_response_plane(law, points%strain(l, :), points%dstrain(l, :), one)
                if (points%strain(l, 1) > 2.0_wp) extent = 30.0_wp
                call check_near(error, points%energy(l), one%energy, energy_tol, extent**2, &
-                  law_rows(i)%name // ": energy in lane " // to_text(l))
+                  law_name(i) // ": energy in lane " // to_text(l))
                call check_near(error, points%stress(l, :), one%stress, tol, 4.0_wp*extent, &
-                  law_rows(i)%name // ": stress")
+                  law_name(i) // ": stress")
                call check_near(error, points%tangent(l, :, :), one%tangent, tol, &
-                  4.0_wp*maxval(abs(one%tangent)), law_rows(i)%name // ": tangent")
+                  4.0_wp*maxval(abs(one%tangent)), law_name(i) // ": tangent")
             end do
          end do
       end do
@@ -95,7 +98,7 @@ contains
       real(wp) :: extent
       integer :: i, k, l
 
-      do i = 1, size(law_rows)
+      do i = 1, n_law_row()
          call make_law(i, law)
          do k = 1, 20
             extent = 0.15_wp
@@ -108,9 +111,9 @@ contains
                call law_response_plane(law, points%strain(l, :), points%dstrain(l, :), one)
                if (points%strain(l, 1) > 2.0_wp) extent = 30.0_wp
                call check_near(error, points%stress(l, :), one%stress, tol, 4.0_wp*extent, &
-                  law_rows(i)%name // ": stress in lane " // to_text(l))
+                  law_name(i) // ": stress in lane " // to_text(l))
                call check_near(error, points%stress_33(l), one%stress_33, tol, 4.0_wp*extent, &
-                  law_rows(i)%name // ": normal stress in lane " // to_text(l))
+                  law_name(i) // ": normal stress in lane " // to_text(l))
             end do
          end do
       end do
@@ -123,7 +126,7 @@ contains
       type(law_points_t) :: points, others
       integer :: i, k, l, m
 
-      do i = 1, size(law_rows)
+      do i = 1, n_law_row()
          call make_law(i, law)
          do k = 1, 5
             call draw(0.12_wp, points)
@@ -137,9 +140,9 @@ contains
                call law%respond(others, mod(l, 2) == 0)
                call check_true(error, same(others%energy(m), points%energy(l)) &
                   .and. all(same(others%stress(m, :), points%stress(l, :))), &
-                  law_rows(i)%name // ": bits in lane " // to_text(m))
+                  law_name(i) // ": bits in lane " // to_text(m))
                if (mod(l, 2) == 0) call check_true(error, all(same(others%tangent(m, :, :), &
-                  points%tangent(l, :, :))), law_rows(i)%name // ": bits of the tangent")
+                  points%tangent(l, :, :))), law_name(i) // ": bits of the tangent")
             end do
          end do
       end do

@@ -4,9 +4,10 @@ module test_law_space
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_t
-   use emcon_law_registry, only : law_create, law_mooney_rivlin, law_neo_hooke, law_ogden
+   use emcon_law_registry, only : law_create
    use emcon_law_space, only : law_response_space, n_strain, space_response_t
    use emcon_text, only : to_text
+   use kind_rows, only : law_code
    use random_draws, only : draw_random
    use referee, only : qp
    implicit none
@@ -41,8 +42,8 @@ contains
       class(law_t), allocatable, intent(out) :: law
       type(error_t), allocatable, intent(out) :: error
 
-      call law_create(law_ogden, [m(1), alpha(1), m(2), alpha(2), m(3), alpha(3), d1, d2, d3], &
-         law, error)
+      call law_create(law_code("ogden 3"), [m(1), alpha(1), m(2), alpha(2), m(3), alpha(3), d1, &
+         d2, d3], law, error)
    end subroutine make_ogden
 
    !> E11, E22, E33, 2 E12, 2 E23, 2 E13 of the principal values `x` along turned axes.
@@ -94,12 +95,12 @@ contains
 
       do i = 1, 2
          if (i == 1) then
-            call law_create(law_ogden, [2.0_wp*c10, 2.0_wp, d1], one, error)
-            call law_create(law_neo_hooke, [c10, d1], other, error)
+            call law_create(law_code("ogden 1"), [2.0_wp*c10, 2.0_wp, d1], one, error)
+            call law_create(law_code("neo hooke"), [c10, d1], other, error)
          else
-            call law_create(law_ogden, [2.0_wp*c10, 2.0_wp, 2.0_wp*c01, -2.0_wp, d1, 0.0_wp], one, &
-               error)
-            call law_create(law_mooney_rivlin, [c10, c01, d1], other, error)
+            call law_create(law_code("ogden 2"), [2.0_wp*c10, 2.0_wp, 2.0_wp*c01, -2.0_wp, d1, &
+               0.0_wp], one, error)
+            call law_create(law_code("mooney-rivlin"), [c10, c01, d1], other, error)
          end if
          do k = 1, 100
             call draw_axes(r)

@@ -12,7 +12,8 @@ module test_scheme
    use emcon_scene, only : scene_t
    use emcon_scheme, only : scheme_row_t, scheme_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
-   use emcon_scheme_registry, only : scheme_create, scheme_energy_momentum, scheme_row, scheme_rows
+   use emcon_scheme_registry, only : scheme_create, scheme_energy_momentum, scheme_row, &
+      n_scheme_row
    use emcon_scheme_static, only : scheme_static_t
    use emcon_text, only : squeezed, to_text
    use small_scenes, only : add_step, block_t, make_block
@@ -158,13 +159,14 @@ contains
    subroutine test_rows(error)
       type(error_t), allocatable, intent(out) :: error
       class(scheme_t), allocatable :: scheme
-      type(scheme_row_t) :: row
+      type(scheme_row_t) :: row, listed
       type(pose_t) :: pose
       integer :: i
 
-      do i = 1, size(scheme_rows)
-         row = scheme_row(scheme_rows(i)%card, squeezed(scheme_rows(i)%word))
-         call check_true(error, row%code == scheme_rows(i)%code, "a card and a word make a row")
+      do i = 1, n_scheme_row()
+         listed = scheme_row(i)
+         row = scheme_row(listed%card, squeezed(listed%word))
+         call check_true(error, row%code == listed%code, "a card and a word make a row")
          call scheme_create(row, scheme)
          pose = scheme%pose(instant_t(), 0.5_wp)
          call check_true(error, scheme%row%code == row%code, "the row is kept")

@@ -6,7 +6,8 @@ module test_solvers
    use emcon_errors, only : err_internal, error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
-   use emcon_solver_registry, only : solver_create, solver_default, solver_mumps, solvers
+   use emcon_solver_registry, only : solver_create, solver_default, solver_mumps, &
+      solver_row, solver_row_t, n_solver_row
    use emcon_sparse_solver, only : matrix_definite, matrix_general, matrix_symmetric, &
       solver_renew, sparse_solver_t
    use sparse_samples, only : dense_of, quad_mesh_matrix
@@ -108,23 +109,25 @@ contains
       type(csr_t) :: a
       real(wp) :: b(60), x(60)
       real(dp) :: expected(60, 1)
+      type(solver_row_t) :: row
       logical :: is_singular
       integer :: i, k, pass
 
       call quad_mesh_matrix(5, 4, 0.0_dp, a, error)
       if (allocated(error)) return
       call random_number(b)
-      do i = 1, size(solvers)
-         if (.not. solvers(i)%is_built) cycle
+      do i = 1, n_solver_row()
+         row = solver_row(i)
+         if (.not. row%is_built) cycle
          do k = 1, size(kinds)
-            call solver_create(solvers(i)%code, kinds(k), solver)
+            call solver_create(row%code, kinds(k), solver)
             do pass = 1, 2
                a%value = 3.0_dp*a%value
                call solve(solver, a, b, x, error)
                if (allocated(error)) return
                call dense_solve(dense_of(a), reshape(real(b, dp), [60, 1]), expected, is_singular)
                call check_near(error, x, real(expected(:, 1), wp), tol, maxval(abs(x)), &
-                  trim(solvers(i)%word))
+                  trim(row%word))
                if (allocated(error)) return
             end do
             call check_equal(error, solver%n_analysis, 1, "analyses")

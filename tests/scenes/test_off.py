@@ -79,7 +79,7 @@ def counted(path):
 
 def module(function):
     """The module of a Fortran procedure, or nothing."""
-    found = re.match(r"__(emcon_\w+?)_MOD_", function)
+    found = re.match(r"__(?:emcon_\w+\.)?(emcon_\w+?)_MOD_", function)
     return found[1] if found else ""
 
 

@@ -58,7 +58,7 @@ MISTAKES = [
 STATEMENT = re.compile(r"^ *(?! |do )(?:[\w%(),: +\-]+ = [^&]*|call \w[^&]*)$")
 #: Lines without numerics: declarations, interfaces, use.
 IDLE = re.compile(r"^ *(?:use|type|integer|real|logical|character|class|private|public|implicit|end|"
-                  r"contains|module|pure|subroutine|function|procedure|associate|else$|allocate|"
+                  r"contains|module|submodule|pure|subroutine|function|procedure|associate|else$|allocate|"
                   r"deallocate|import|interface|!|#|$)")
 
 

@@ -1,23 +1,15 @@
-!> The direct solvers, by what decks call them: the only module that knows their kinds.
-!>
-!> EMCON_PERMISSIVE: built without SuiteSparse, whose solvers are under the GPL.
+!> The registry of direct solvers, by what decks call them: what others see of it. Which kinds there
+!> are is known to `emcon_solver_kinds` alone.
 module emcon_solver_registry
-#ifndef EMCON_PERMISSIVE
-   use emcon_cholmod, only : cholmod_t
-   use emcon_umfpack, only : umfpack_t
-#endif
-   use emcon_mumps, only : mumps_t
-   use emcon_sparse_solver, only : matrix_definite, sparse_solver_t
+   use emcon_sparse_solver, only : sparse_solver_t
    implicit none
    private
-   public :: solver_row_t, solvers, solver_names, solver_create, is_foreign_solver
-   public :: factors_symmetric
-   public :: solver_default, solver_umfpack, solver_mumps, solver_given
+   public :: solver_row_t, solver_row, n_solver_row, find_solver_row, solver_names, solver_create
+   public :: is_foreign_solver, factors_symmetric, solver_default, solver_mumps, solver_given
 
    !> The default: CHOLMOD for definite matrices, UMFPACK for others; MUMPS where these are not.
    !> Codes above `solver_given` are those that a program gives, in their order.
-   integer, parameter :: solver_default = 0, solver_umfpack = 1, solver_mumps = 2, &
-      solver_given = 100
+   integer, parameter :: solver_default = 0, solver_mumps = 2, solver_given = 100
 
    !> A choice: what decks call it, and whether this build has it.
    type :: solver_row_t
@@ -27,36 +19,59 @@ module emcon_solver_registry
       character(len=40) :: text                  !! in the log
    end type solver_row_t
 
-#ifdef EMCON_PERMISSIVE
-   logical, parameter :: has_suitesparse = .false.
-   character(len=*), parameter :: default_text = "MUMPS"
-#else
-   logical, parameter :: has_suitesparse = .true.
-   character(len=*), parameter :: default_text = "CHOLMOD, UMFPACK"
-#endif
-   type(solver_row_t), parameter :: solvers(3) = [ &
-      solver_row_t("DEFAULT", solver_default, .true., default_text), &
-      solver_row_t("UMFPACK", solver_umfpack, has_suitesparse, "UMFPACK"), &
-      solver_row_t("MUMPS", solver_mumps, .true., "MUMPS")]
-
    !> What decks of other programs ask for, without blanks.
    character(len=*), parameter :: foreign_solvers = ",DIRECT,ITERATIVE,ITERATIVECHOLESKY," // &
       "ITERATIVESCALING,MATRIXSTORAGE,PARDISO,PASTIX,SGI,SPOOLES,TAUCS,"
 
+   interface
+      pure module integer function n_solver_row()
+      end function n_solver_row
+
+      pure module function solver_row(i) result(row)
+         integer, intent(in) :: i                !! 1..n_solver_row()
+         type(solver_row_t) :: row
+      end function solver_row
+
+      !> A solver that knows neither its choice nor its kind of matrix.
+      module subroutine allocate_solver(choice, symmetry, solver)
+         integer, intent(in) :: choice           !! one of `solver_` that is built
+         integer, intent(in) :: symmetry         !! one of `matrix_`
+         class(sparse_solver_t), allocatable, intent(out) :: solver
+      end subroutine allocate_solver
+
+      !> Are symmetric matrices that are not definite factorised as such, negative pivots counted?
+      pure module logical function factors_symmetric(choice)
+         integer, intent(in) :: choice           !! one of `solver_` that is built, or above
+      end function factors_symmetric
+   end interface
+
 contains
+
+   !> Number of the row that decks call `word`; 0: there is none.
+   pure integer function find_solver_row(word) result(i)
+      character(len=*), intent(in) :: word       !! upper case, without blanks
+      type(solver_row_t) :: row
+
+      do i = n_solver_row(), 1, -1
+         row = solver_row(i)
+         if (row%word == word) return
+      end do
+   end function find_solver_row
 
    !> "A, B and C": the solvers that have a name of their own.
    pure subroutine solver_names(list)
       character(len=:), allocatable, intent(out) :: list
+      type(solver_row_t) :: row
       integer :: i, n
 
       list = ""
-      n = size(solvers)
+      n = n_solver_row()
       do i = 1, n
-         if (solvers(i)%code == solver_default) cycle
+         row = solver_row(i)
+         if (row%code == solver_default) cycle
          if (list /= "" .and. i < n) list = list // ", "
          if (list /= "" .and. i == n) list = list // " and "
-         list = list // trim(solvers(i)%word)
+         list = list // trim(row%word)
       end do
    end subroutine solver_names
 
@@ -85,35 +100,10 @@ contains
       if (present(given)) then
          allocate(solver, source=given)
       else
-         call create_own(choice, symmetry, solver)
+         call allocate_solver(choice, symmetry, solver)
       end if
       solver%choice = choice
       solver%symmetry = symmetry
    end subroutine solver_create
-
-   !> Are symmetric matrices that are not definite factorised as such, negative pivots counted?
-   pure logical function factors_symmetric(choice)
-      integer, intent(in) :: choice              !! one of `solver_` that is built, or above
-
-      factors_symmetric = choice == solver_mumps .or. (choice == solver_default &
-         .and. .not. has_suitesparse)
-   end function factors_symmetric
-
-   subroutine create_own(choice, symmetry, solver)
-      integer, intent(in) :: choice, symmetry
-      class(sparse_solver_t), allocatable, intent(inout) :: solver
-
-#ifdef EMCON_PERMISSIVE
-      allocate(mumps_t :: solver)
-#else
-      if (choice == solver_mumps) then
-         allocate(mumps_t :: solver)
-      else if (choice == solver_default .and. symmetry == matrix_definite) then
-         allocate(cholmod_t :: solver)
-      else
-         allocate(umfpack_t :: solver)
-      end if
-#endif
-   end subroutine create_own
 
 end module emcon_solver_registry

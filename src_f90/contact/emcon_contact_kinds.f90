@@ -1,0 +1,64 @@
+!> The contact formulations: one case each.
+submodule (emcon_contact_registry) emcon_contact_kinds
+   use emcon_errors, only : err_input, raise
+   use emcon_host_contact, only : host_contact_set_up
+   use emcon_interactions, only : formulation_given, formulation_mortar, formulation_segment
+   use emcon_midside_plane, only : midside_init
+   use emcon_mortar, only : mortar_init, mortar_t
+   use emcon_nts, only : nts_init, nts_t
+   use emcon_scene, only : where_text
+   use emcon_segment, only : segment_init, segment_t
+   implicit none
+
+contains
+
+   module procedure new_contact
+      type(mortar_t), allocatable :: mortar
+      type(nts_t), allocatable :: nts
+      type(segment_t), allocatable :: segment
+
+      select case (pair%formulation)
+      case (formulation_given)
+         call new_given(scene, pair, contact, error, user)
+         return
+      case (formulation_mortar)
+         allocate(mortar)
+         call mortar_init(mortar, scene, pair, error)
+         call move_alloc(mortar, contact)
+      case (formulation_segment)
+         allocate(segment)
+         call segment_init(segment, scene, pair, error)
+         call move_alloc(segment, contact)
+      case default
+         allocate(nts)
+         call nts_init(nts, scene, pair, error)
+         call move_alloc(nts, contact)
+      end select
+      if (allocated(error)) return
+      call midside_init(contact%midside, scene, [pair%slave, pair%master])
+   end procedure new_contact
+
+   !> The contact that a program gives for a pair.
+   subroutine new_given(scene, pair, contact, error, user)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      class(contact_t), allocatable, intent(out) :: contact
+      type(error_t), allocatable, intent(out) :: error
+      class(host_contact_t), intent(in), optional :: user
+      class(host_contact_t), allocatable :: own
+      character(len=:), allocatable :: fault
+
+      if (.not. present(user)) then
+         fault = "no program has given this contact, see docs/embedding.md"
+      else
+         allocate(own, source=user)
+         call host_contact_set_up(own, scene, pair, error)
+         if (allocated(error)) fault = error%message
+         call move_alloc(own, contact)
+      end if
+      if (allocated(fault)) call raise(error, err_input, where_text(scene, pair%origin) // &
+         ": error: *CONTACT PAIR, TYPE=USER of surfaces " // scene%surface(pair%slave)%name // &
+         " and " // scene%surface(pair%master)%name // ": " // fault)
+   end subroutine new_given
+
+end submodule emcon_contact_kinds
