@@ -10,7 +10,7 @@ module emcon_deck_check_surfaces
    use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
-   public :: check_surfaces, mark_nodes, surface_nodes, find_common_edges
+   public :: check_surfaces, mark_nodes, find_common_edges
 
 contains
 
@@ -98,17 +98,6 @@ contains
       call surface_nodes(scene, surface, node)
       is_in(node) = .true.
    end subroutine mark_nodes
-
-   !> The nodes of a surface, ascending.
-   pure subroutine surface_nodes(scene, surface, node)
-      type(scene_t), intent(in) :: scene
-      type(surface_t), intent(in) :: surface
-      integer, allocatable, intent(out) :: node(:)
-      integer, allocatable :: edge(:, :)
-
-      call surface_edges(scene, surface, edge)
-      node = unique_sorted([surface%node, pack(edge, spread(all(edge > 0, 1), 1, 2))])
-   end subroutine surface_nodes
 
    !> Which of the edges of `surface` belong to the surface `other` too, of edges or of nodes?
    pure subroutine find_common_edges(scene, surface, other, is_common)

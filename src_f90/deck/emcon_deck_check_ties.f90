@@ -1,13 +1,14 @@
 !> The ties, as far as they can be judged by their meshes alone.
 module emcon_deck_check_ties
    use emcon_couplings, only : tie_t
-   use emcon_deck_check_surfaces, only : find_common_edges, surface_nodes
+   use emcon_deck_check_surfaces, only : find_common_edges
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, label_list
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted, unique_sorted
    use emcon_surface_edges, only : surface_edges
+   use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
    public :: check_ties
