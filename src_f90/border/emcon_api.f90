@@ -69,9 +69,9 @@ module emcon_api
    use emcon_motion, only : motion_t
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
    use emcon_pose, only : instant_later, instant_t, pose_moving, pose_t
-   use emcon_quantities, only : at_contacts, at_elements, at_nodes, at_pairs, contact_field, &
-      contact_quantity, element_quantity, node_quantity, pair_quantity, quantity_components, &
-      quantity_values, quantity_variables
+   use emcon_quantities, only : contact_field, contact_quantity, element_quantity, &
+      node_quantity, pair_quantity, quantity_components, quantity_values, quantity_variables
+   use emcon_quantity_registry, only : at_contacts, at_elements, at_nodes, at_pairs
    use emcon_restart, only : restart_read, restart_t, restart_write
    use emcon_scene, only : scene_t
    use emcon_scheme, only : scheme_t

@@ -34,7 +34,13 @@ contains
          return
       end if
       call nearest_word(upper, known, near)
-      if (len(near) == 0) near = "U, V, RF, S, E, ENER, CDIS, CSTR, CF, CSHEAR or CSLIP"
+      if (len(near) == 0) then
+         do k = 1, size(known)
+            if (k > 1 .and. k < size(known)) near = near // ", "
+            if (k == size(known)) near = near // " or "
+            near = near // known(k)%text
+         end do
+      end if
       call raise(error, err_input, "there is no variable '" // name // "'; did you mean " // &
          near // "?")
    end subroutine model_field

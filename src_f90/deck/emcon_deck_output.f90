@@ -10,6 +10,7 @@ module emcon_deck_output
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_mesh, only : named_set_t
    use emcon_name_index, only : name_index_find, name_index_t
+   use emcon_quantity_registry, only : at_contacts, at_elements, at_nodes, quantities_of_card
    use emcon_requests, only : output_contact_file, output_contact_print, output_element_file, &
       output_element_print, output_energy_print, output_node_file, output_node_print, output_t
    use emcon_scene, only : scene_t
@@ -24,27 +25,25 @@ module emcon_deck_output
       integer, allocatable :: step(:)              !! the step that gave each
    end type requests_t
 
-   !> One keyword with what it can write. `longer` gives other names of the same variables.
+   !> One keyword, and the quantities that it can write; place 0: the energies of the model.
    type :: output_row_t
       character(len=12) :: keyword
       integer :: kind
-      character(len=32) :: variables
-      character(len=32) :: longer
+      integer :: place = 0                         !! one of the `at_` codes
+      logical :: to_field_file = .false.
    end type output_row_t
 
-   character(len=*), parameter :: of_node = "U V RF UR VR RM", &
-      longer_node = "U V RF UR3 VR3 RM3", of_element = "S E ENER ELSE ELKE EVOL", &
-      of_contact = "CDIS CSTR CF CSHEAR CSLIP", longer_contact = "CDISP CSTRESS CFORCE", &
-      of_energy = "ALLKE ALLSE ALLWK ETOTAL"
-
    type(output_row_t), parameter :: output_rows(*) = [ &
-      output_row_t("NODEFILE", output_node_file, of_node, longer_node), &
-      output_row_t("NODEPRINT", output_node_print, of_node, longer_node), &
-      output_row_t("ELFILE", output_element_file, of_element, ""), &
-      output_row_t("ELPRINT", output_element_print, of_element, ""), &
-      output_row_t("CONTACTFILE", output_contact_file, of_contact, longer_contact), &
-      output_row_t("CONTACTPRINT", output_contact_print, of_contact // " CNUM", longer_contact), &
-      output_row_t("ENERGYPRINT", output_energy_print, of_energy, "")]
+      output_row_t("NODEFILE", output_node_file, at_nodes, .true.), &
+      output_row_t("NODEPRINT", output_node_print, at_nodes), &
+      output_row_t("ELFILE", output_element_file, at_elements, .true.), &
+      output_row_t("ELPRINT", output_element_print, at_elements), &
+      output_row_t("CONTACTFILE", output_contact_file, at_contacts, .true.), &
+      output_row_t("CONTACTPRINT", output_contact_print, at_contacts), &
+      output_row_t("ENERGYPRINT", output_energy_print)]
+
+   character(len=*), parameter :: energies(4) = [character(len=6) :: "ALLKE", "ALLSE", "ALLWK", &
+      "ETOTAL"]
 
 contains
 
@@ -128,12 +127,11 @@ contains
       type(output_t), intent(inout) :: new
       type(data_t) :: data
       type(string_t), allocatable :: list(:), longer(:)
-      character(len=:), allocatable :: name
+      character(len=:), allocatable :: name, known
       logical, allocatable :: is_wanted(:)
       integer :: i, k, n_before
 
-      call split_words(row%variables, list)
-      call split_words(row%longer, longer)
+      call list_variables(row, list, longer, known)
       allocate(is_wanted(size(list)), source=.false.)
       n_before = reader%log%n_errors + reader%log%n_warnings
       call data_open(data, card)
@@ -142,25 +140,23 @@ contains
             if (data%to(k) < data%from(k)) cycle
             call get_name(reader, data, k, "variable", name)
             do i = 1, size(list)
-               if (list(i)%text == name) exit
-               if (i > size(longer)) cycle
-               if (longer(i)%text == name) exit
+               if (list(i)%text == name .or. longer(i)%text == name) exit
             end do
             if (i <= size(list)) then
                is_wanted(i) = .true.
             else if (reader%is_lenient) then
                call data_warning(reader, data, "output variable " // quoted(name) &
-                  // " is not supported, left out; supported: " // trim(row%variables))
+                  // " is not supported, left out; supported: " // known)
             else
                call data_error(reader, data, "output variable " // quoted(name) &
-                  // " is not supported; supported: " // trim(row%variables))
+                  // " is not supported; supported: " // known)
             end if
          end do
       end do
       if (row%kind == output_energy_print .and. .not. any(is_wanted)) is_wanted = .true.
       if (.not. any(is_wanted) .and. reader%log%n_errors + reader%log%n_warnings == n_before) then
          call card_warning(reader, card, "no variable is named, nothing will be written; known: " &
-            // trim(row%variables))
+            // known)
       end if
       allocate(new%variable(count(is_wanted)))
       k = 0
@@ -171,23 +167,27 @@ contains
       end do
    end subroutine read_variables
 
-   !> The words of `text`, which blanks part.
-   pure subroutine split_words(text, list)
-      character(len=*), intent(in) :: text
-      type(string_t), allocatable, intent(out) :: list(:)
-      integer :: first, last, n
+   !> What a card may ask for, other names of the same, and all of them in one text.
+   pure subroutine list_variables(row, list, longer, known)
+      type(output_row_t), intent(in) :: row
+      type(string_t), allocatable, intent(out) :: list(:), longer(:)
+      character(len=:), allocatable, intent(out) :: known
+      integer :: i
 
-      allocate(list(len_trim(text)))
-      n = 0
-      first = 1
-      do while (first <= len_trim(text))
-         last = index(text(first:) // " ", " ") + first - 2
-         n = n + 1
-         list(n)%text = text(first:last)
-         first = last + 2
+      if (row%place > 0) then
+         call quantities_of_card(row%place, row%to_field_file, list, longer)
+      else
+         allocate(list(size(energies)))
+         do i = 1, size(list)
+            list(i)%text = trim(energies(i))
+         end do
+         longer = list
+      end if
+      known = list(1)%text
+      do i = 2, size(list)
+         known = known // " " // list(i)%text
       end do
-      list = list(:n)
-   end subroutine split_words
+   end subroutine list_variables
 
    subroutine read_set(reader, card, scene, new)
       type(reader_t), intent(inout) :: reader

@@ -5,8 +5,9 @@ module emcon_print_series
    use emcon_history, only : history_set_append, history_set_define, history_set_put, history_t
    use emcon_kinds, only : dp, wp
    use emcon_mesh, only : named_set_t
-   use emcon_quantities, only : at_contacts, at_elements, at_nodes, at_pairs, pair_variables, &
-      quantity_components, quantity_values
+   use emcon_quantities, only : quantity_components, quantity_values
+   use emcon_quantity_registry, only : at_contacts, at_elements, at_nodes, at_pairs, &
+      n_quantity_row, quantity_row, quantity_row_t
    use emcon_requests, only : output_contact_print, output_element_print, output_node_print, &
       output_t
    use emcon_stepper, only : stepper_t
@@ -59,6 +60,7 @@ contains
       type(series_t), intent(inout) :: new
       type(error_t), allocatable, intent(inout) :: error
       logical :: has_totals, has_sums, has_counts
+      type(quantity_row_t) :: row
       integer :: k
 
       associate (output => stepper%scene%step(new%step)%output(new%request))
@@ -76,8 +78,10 @@ contains
          has_counts = has_sums .or. has(output, "CNUM")
          new%place = at_pairs
          new%is_total = .false.
-         do k = 1, size(pair_variables)
-            new%variable = pair_variables(k)
+         do k = 1, n_quantity_row()
+            row = quantity_row(k)
+            if (row%place /= at_pairs) cycle
+            new%variable = row%variable
             if (.not. merge(has_counts, has_sums, new%variable == "CNUM")) cycle
             call define(self, history, stepper, output, new, error)
          end do

@@ -1,4 +1,5 @@
-!> The output quantities by their deck names, as arrays.
+!> The output quantities by their deck names, as arrays. Which there are is said in
+!> `emcon_quantity_rows`; of what there is not, values are of no size.
 module emcon_quantities
    use, intrinsic :: ieee_arithmetic, only : ieee_is_nan, ieee_quiet_nan, ieee_value
    use emcon_contact, only : gap_state_t
@@ -6,6 +7,9 @@ module emcon_quantities
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : at_rest, motion_of
    use emcon_pose, only : pose_at_end
+   use emcon_quantity_registry, only : at_contacts, at_elements, at_nodes, at_pairs, &
+      n_quantity_row, of_rotation, of_strain, of_vector, of_wrench, quantity_row, &
+      quantity_row_of, quantity_row_t
    use emcon_rigid_bodies, only : rigid_body_t
    use emcon_rotation, only : n_turn
    use emcon_solid, only : solid_t
@@ -20,54 +24,6 @@ module emcon_quantities
    public :: quantity_values, quantity_components, quantity_fields, quantity_of_field
    public :: quantity_variables
    public :: node_quantity, element_quantity, contact_quantity, contact_field, pair_quantity
-   public :: at_nodes, at_elements, at_contacts, at_pairs, pair_variables
-
-   !> Where the values of a quantity are.
-   integer, parameter :: at_nodes = 1, at_elements = 2, at_contacts = 3, at_pairs = 4
-
-   !> Components of a vector, in a row: one for each direction; of a rotation: for each plane.
-   !> Of a strain: of its tensor, shears twice.
-   integer, parameter :: of_vector = 0, of_rotation = -1, of_strain = -2
-   !> Of a force and its moment.
-   integer, parameter :: of_wrench = -3
-
-   !> A variable of decks at one kind of places.
-   type :: row_t
-      character(len=14) :: variable
-      integer :: place                           !! one of the `at_` codes
-      integer :: n_component = 1
-      character(len=16) :: field = ""            !! in the field file
-      character(len=16) :: last = ""             !! name of a field for the last component
-      logical :: is_sparse = .false.             !! the same at most places
-   end type row_t
-
-   type(row_t), parameter :: rows(22) = [ &
-      row_t("U", at_nodes, of_vector, "displacement"), &
-      row_t("V", at_nodes, of_vector, "velocity"), &
-      row_t("RF", at_nodes, of_vector, "reaction_force", is_sparse=.true.), &
-      row_t("UR", at_nodes, of_rotation, "rotation", is_sparse=.true.), &
-      row_t("VR", at_nodes, of_rotation, "spin", is_sparse=.true.), &
-      row_t("RM", at_nodes, of_rotation, "reaction_moment", is_sparse=.true.), &
-      row_t("S", at_nodes, 7, "cauchy_stress", "von_mises"), &
-      row_t("S", at_elements, 6), &
-      row_t("E", at_elements, of_strain, "strain"), &
-      row_t("ENER", at_elements, 1, "strain_energy"), &
-      row_t("ELSE", at_elements, 1, "strain_energy"), &
-      row_t("ELKE", at_elements, 1, "kinetic_energy"), &
-      row_t("EVOL", at_elements, 1, "volume"), &
-      row_t("CDIS", at_contacts, 1, "contact_gap", is_sparse=.true.), &
-      row_t("CSTR", at_contacts, 2, "contact_pressure", "contact_active", .true.), &
-      row_t("CF", at_contacts, of_vector, "contact_force", is_sparse=.true.), &
-      row_t("CSHEAR", at_contacts, 2, "contact_shear", "contact_status", .true.), &
-      row_t("CSLIP", at_contacts, 2, "contact_slip", "slip_path", .true.), &
-      row_t("CF", at_pairs, of_wrench), &
-      row_t("CF_MASTER", at_pairs, of_wrench), &
-      row_t("CONTACT_LENGTH", at_pairs), &
-      row_t("CNUM", at_pairs)]
-
-   !> What *CONTACT PRINT, TOTALS= with CF writes of each pair.
-   character(len=*), parameter :: pair_variables(4) = [character(len=14) :: "CF", "CF_MASTER", &
-      "CONTACT_LENGTH", "CNUM"]
 
 contains
 
@@ -85,35 +41,48 @@ contains
          values = element_quantity(stepper, variable)
       case (at_contacts)
          values = contact_quantity(stepper, variable)
-      case default
+      case (at_pairs)
          values = pair_quantity(stepper, variable)
+      case default
+         allocate(values(0, 0))
       end select
    end function quantity_values
 
-   !> Their components.
+   !> Their components; 0: there is no such quantity.
    pure integer function quantity_components(variable, place, n_dim) result(n)
       character(len=*), intent(in) :: variable
       integer, intent(in) :: place               !! one of the `at_` codes
       integer, intent(in) :: n_dim
+      type(quantity_row_t) :: row
 
-      n = rows(findloc(rows%variable == variable .and. rows%place == place, .true., 1))%n_component
-      if (n == of_vector) n = n_dim
-      if (n == of_rotation) n = n_turn(n_dim)
-      if (n == of_strain .or. n == of_wrench) n = n_dim + n_turn(n_dim)
+      row = quantity_row_of(variable, place)
+      n = row%n_component
+      if (row%place == 0) then
+         n = 0
+      else if (n == of_vector) then
+         n = n_dim
+      else if (n == of_rotation) then
+         n = n_turn(n_dim)
+      else if (n == of_strain .or. n == of_wrench) then
+         n = n_dim + n_turn(n_dim)
+      end if
    end function quantity_components
 
    !> All variables that can stand in the field file.
    pure function quantity_variables() result(names)
       type(string_t), allocatable :: names(:)
+      type(quantity_row_t) :: row
       integer :: k, n
 
-      allocate(names(count(rows%field /= "")))
+      allocate(names(n_quantity_row()))
       n = 0
-      do k = 1, size(rows)
-         if (rows(k)%field == "") cycle
+      do k = 1, n_quantity_row()
+         row = quantity_row(k)
+         if (row%field == "") cycle
          n = n + 1
-         names(n)%text = trim(rows(k)%variable)
+         names(n)%text = trim(row%variable)
       end do
+      names = names(:n)
    end function quantity_variables
 
    !> The fields of the field file that a variable stands for.
@@ -121,7 +90,7 @@ contains
       character(len=*), intent(in) :: variable
       integer, intent(in) :: n_dim
       type(field_t), allocatable :: fields(:)
-      type(row_t) :: row
+      type(quantity_row_t) :: row
       integer :: n
 
       row = field_row(variable)
@@ -139,7 +108,7 @@ contains
       type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: variable
       real(dp), allocatable :: values(:, :)
-      type(row_t) :: row
+      type(quantity_row_t) :: row
 
       row = field_row(variable)
       if (row%place == at_contacts) then
@@ -149,10 +118,16 @@ contains
       end if
    end function quantity_of_field
 
-   pure type(row_t) function field_row(variable) result(row)
+   !> The row of a variable of the field file; place 0: there is none.
+   pure type(quantity_row_t) function field_row(variable) result(row)
       character(len=*), intent(in) :: variable
+      integer :: k
 
-      row = rows(findloc(rows%variable == variable .and. rows%field /= "", .true., 1))
+      do k = 1, n_quantity_row()
+         row = quantity_row(k)
+         if (row%variable == variable .and. row%field /= "") return
+      end do
+      row = quantity_row_t()
    end function field_row
 
    !> U, V, RF: (n_dim, n_node); UR, VR, RM (1, n_node); S: Cauchy stress and von Mises stress (7,
@@ -180,13 +155,15 @@ contains
             do i = 1, size(stepper%scene%rigid)
                values(1, stepper%scene%rigid(i)%reference) = turning(stepper, variable, i)
             end do
-         case default
+         case ("S")
             allocate(stress(6, size(state%u, 2)), values(7, size(state%u, 2)))
             call nodal_stress(solid, state%u, is_large(stepper), stress)
             values(:6, :) = real(stress, dp)
             do i = 1, size(values, 2)
                values(7, i) = real(von_mises(stress(:, i)), dp)
             end do
+         case default
+            allocate(values(0, 0))
          end select
       end associate
    end function node_quantity
@@ -194,7 +171,7 @@ contains
    !> The angle, the spin, or the moment of the support of rigid body `b`.
    real(dp) function turning(stepper, variable, b)
       type(stepper_t), intent(in) :: stepper
-      character(len=*), intent(in) :: variable
+      character(len=*), intent(in) :: variable   !! UR, VR or RM
       integer, intent(in) :: b
 
       associate (state => stepper%march%state, scene => stepper%scene)
@@ -203,7 +180,7 @@ contains
             turning = real(state%turns%angle(b), dp)
          case ("VR")
             turning = real(turn_record_spin(scene%rigid(b), scene%x, state%u, state%v), dp)
-         case default
+         case ("RM")
             turning = real(state%turns%moment(b), dp)
          end select
       end associate
@@ -245,7 +222,7 @@ contains
             allocate(energy(n))
             call element_energies(solid, state%v, energy)
             values = reshape(real(energy, dp), [1, n])
-         case default
+         case ("S", "E", "EVOL")
             allocate(stress(6, n), volume(n), &
                strain(quantity_components("E", at_elements, stepper%scene%n_dim), n))
             call element_means(solid, state%u, is_large(stepper), stress, strain, volume)
@@ -256,6 +233,8 @@ contains
             else
                values = reshape(real(volume, dp), [1, n])
             end if
+         case default
+            allocate(values(0, 0))
          end select
       end associate
    end function element_quantity
@@ -296,8 +275,10 @@ contains
             values(2, :) = merge(1.0_dp, 0.0_dp, state%is_active)
          case ("CSHEAR", "CSLIP")
             values = rubbing(stepper, variable)
-         case default
+         case ("CF")
             values = real(state%pairs%force, dp)
+         case default
+            allocate(values(0, 0))
          end select
       end associate
    end function contact_quantity
@@ -334,6 +315,7 @@ contains
       type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: variable
       real(dp), allocatable :: values(:, :), at_slave(:, :)
+      type(quantity_row_t) :: row
       integer :: pair, i, id
 
       if (variable == "CF") then
@@ -343,6 +325,7 @@ contains
          end associate
          return
       end if
+      row = quantity_row_of(variable, at_contacts)
       at_slave = contact_quantity(stepper, variable)
       allocate(values(size(at_slave, 1), size(stepper%scene%x, 2)), source=0.0_dp)
       if (variable == "CDIS") values = ieee_value(1.0_dp, ieee_quiet_nan)
@@ -352,8 +335,8 @@ contains
                id = system%first_constraint(pair) + i
                associate (node => system%contact(pair)%contact%node(i), &
                      twin => system%contact(pair)%contact%twin(i))
-                  call take_over(variable, at_slave(:, id), values(:, node))
-                  if (twin > 0) call take_over(variable, at_slave(:, id), values(:, twin))
+                  call take_over(row%last /= "", at_slave(:, id), values(:, node))
+                  if (twin > 0) call take_over(row%last /= "", at_slave(:, id), values(:, twin))
                end associate
             end do
          end do
@@ -361,12 +344,12 @@ contains
    end function contact_field
 
    !> Add to the value of a node that of a constraint there.
-   pure subroutine take_over(variable, more, value)
-      character(len=*), intent(in) :: variable
+   pure subroutine take_over(has_last, more, value)
+      logical, intent(in) :: has_last            !! first values add up, the largest last counts
       real(dp), intent(in) :: more(:)
       real(dp), intent(inout) :: value(:)
 
-      if (variable == "CSTR" .or. variable == "CSHEAR" .or. variable == "CSLIP") then
+      if (has_last) then
          value(1) = value(1) + more(1)
          value(2) = max(value(2), more(2))
       else if (ieee_is_nan(value(1))) then
@@ -384,9 +367,10 @@ contains
       real(dp), allocatable :: values(:, :)
       integer :: k
 
-      associate (total => stepper%march%state%pairs%total)
-         allocate(values(quantity_components(variable, at_pairs, stepper%scene%n_dim), size(total)))
-         do k = 1, size(total)
+      associate (total => stepper%march%state%pairs%total, &
+            n => quantity_components(variable, at_pairs, stepper%scene%n_dim))
+         allocate(values(n, merge(size(total), 0, n > 0)))
+         do k = 1, size(values, 2)
             select case (variable)
             case ("CF")
                values(:, k) = real(total(k)%slave(:size(values, 1)), dp)
@@ -394,7 +378,7 @@ contains
                values(:, k) = real(total(k)%master(:size(values, 1)), dp)
             case ("CNUM")
                values(:, k) = real(total(k)%n_active, dp)
-            case default
+            case ("CONTACT_LENGTH")
                values(:, k) = real(total(k)%length, dp)
             end select
          end do

@@ -17,7 +17,7 @@ STANDS_FOR = ["emcon_stepper*", "emcon_quantities", "emcon_version"]
 INNER_MODULES = {"emcon_stepper_check"}
 INNER_NAMES = {"stepper_read_source", "stepper_check_solids", "query_sync", "query_place",
                "query_forget", "report_evaluate", "report_check_list", "quantity_fields",
-               "quantity_of_field", "pair_variables", "loads_exchange"}
+               "quantity_of_field", "loads_exchange"}
 
 
 def statements(path: Path) -> list[str]:

@@ -107,6 +107,7 @@ program main
 #ifndef EMCON_PERMISSIVE
    use test_umfpack, only : collect_umfpack
 #endif
+   use test_quantities, only : collect_quantities
    use test_verdict, only : collect_verdict
    use test_velocity_update, only : collect_velocity_update
    implicit none
@@ -209,6 +210,7 @@ program main
    call run("name_index", collect_name_index)
    call run("newton", collect_newton)
    call run("velocity_update", collect_velocity_update)
+   call run("quantities", collect_quantities)
    call run("verdict", collect_verdict)
    call run("scheme", collect_scheme)
    call run("active_set", collect_active_set)

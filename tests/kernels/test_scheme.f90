@@ -86,8 +86,8 @@ contains
       type(scheme_row_t) :: row, given
       integer :: i
 
-      do i = 1, size(scheme_rows)
-         row = scheme_rows(i)
+      do i = 1, n_scheme_row()
+         row = scheme_row(i)
          if (row%is_explicit .or. .not. row%masses_resist) cycle
          call scheme_create(row, scheme)
          given = host_scheme_row("X", scheme)
