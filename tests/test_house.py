@@ -315,7 +315,8 @@ def test_house(check):
 
 
 @pytest.mark.parametrize("table", sorted(
-    {name for names in REGISTRY.values() for name in names if name.endswith("_kinds")}))  # fmt: skip
+    {name for names in REGISTRY.values() for name in names if name.endswith("_kinds")}
+    | {"emcon_quantity_rows"}))  # fmt: skip
 def test_a_new_kind_compiles_its_file_and_its_table(table):
     """A law, an element, a scheme, a solver, a term, ...: nobody else is to be compiled anew."""
     assert compiled_with(ROOT, table) == {table}
@@ -326,6 +327,20 @@ def test_counts_only_fall():
     record = json.loads(house_counts.RECORD.read_text())
     assert set(record) == set(house_counts.KINDS)
     assert list(house_counts.risen(house_counts.counts(ROOT), record)) == []
+
+
+def test_tables_of_develop_name_what_there_is():
+    """The modules of the glossary, the suites and files that stand beside each folder."""
+    text = (ROOT / "docs/develop.md").read_text()
+    glossary = text.split("\n## Glossary\n")[1].split("\n## ")[0]
+    told = set(re.findall(r"`(emcon_\w+)`", glossary))
+    assert told and told <= set(modules(ROOT))
+    table = text.split("\n## Which tests for which room\n")[1].split("\n## ")[0]
+    rows = re.findall(r"^\| `(\w+)` \|(.*)\|(.*)\|$", table, re.M)
+    assert {row[0] for row in rows} == set(ROOMS)
+    assert all((ROOT / f"tests/kernels/test_{name}.f90").is_file()
+               for row in rows for name in re.findall(r"`(\w+)`", row[1]))  # fmt: skip
+    assert all((ROOT / name).exists() for row in rows for name in re.findall(r"`(.+?)`", row[2]))
 
 
 def test_one_version():
