@@ -66,6 +66,7 @@ program main
    use test_loads, only : collect_loads
    use test_march, only : collect_march
    use test_march_contact, only : collect_march_contact
+   use test_march_kinds, only : collect_march_kinds
    use test_midside, only : collect_midside
    use test_mortar, only : collect_mortar
    use test_mortar_pair, only : collect_mortar_pair
@@ -222,6 +223,7 @@ program main
    call run("holding", collect_holding)
    call run("march", collect_march)
    call run("march_contact", collect_march_contact)
+   call run("march_kinds", collect_march_kinds)
    call run("ties", collect_ties)
    call run("links", collect_links)
    call run("tied_contact", collect_tied_contact)
