@@ -189,8 +189,9 @@ contains
       type(scene_t) :: scene
       type(block_t) :: lower, upper
       class(contact_t), allocatable :: contact, chords
+      type(contact_options_t) :: options
       real(wp) :: largest
-      integer :: k, side
+      integer :: k, side, formulation
 
       do k = 1, 6
          do side = 1, 2
@@ -202,6 +203,15 @@ contains
             call check_near(error, largest, 0.0_wp, 0.0_wp, 1.0_wp, "change")
             call check_near(error, contact%state%gap0, chords%state%gap0, 0.0_wp, 1.0_wp, "gaps")
          end do
+         call make_rings(scene, unlike, 0.0_wp, .false.)
+         call make(scene, k, .true., contact, error)
+         if (.not. allocated(error)) call make(scene, k, .false., chords, error)
+         if (allocated(error)) return
+         call choose(k, formulation, options)
+         call contact%follow_arcs(scene%x, options, .false.)
+         call contact%begin_step(scene%x, scene%u0, 0.0_wp*scene%u0)
+         call contact%measure(scene%x, scene%u0, 0.0_wp*scene%u0)
+         call check_near(error, contact%state%gap0, chords%state%gap0, 0.0_wp, 1.0_wp, "once more")
       end do
    end subroutine test_as_they_are
 

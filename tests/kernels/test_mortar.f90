@@ -10,7 +10,10 @@ module test_mortar
       smoothing_hermite, smoothing_none
    use emcon_kinds, only : wp
    use emcon_mortar, only : mortar_init, mortar_t
+   use emcon_mortar_choice, only : pair_comes_near
    use emcon_mortar_frame, only : moment_cover, moment_gap
+   use emcon_motion, only : motion_init, motion_place, motion_t
+   use emcon_pose, only : pose_at_end, pose_moving
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
    use small_scenes, only : add_block, add_surface, bend_scene, block_node, block_t, bottom, left, &
@@ -47,7 +50,9 @@ contains
          test_case_t("the nearer of two layers", test_layers), &
          test_case_t("not the back of a thin body", test_thin), &
          test_case_t("surfaces that look the same way", test_same_way), &
-         test_case_t("nothing within reach", test_apart)]
+         test_case_t("nothing within reach", test_apart), &
+         test_case_t("edges whose boxes come near on the way", test_near), &
+         test_case_t("slip is kept from step to step", test_slip_share)]
    end subroutine collect_mortar
 
    ! ---- scenes ---------------------------------------------------------------------------------
@@ -496,7 +501,8 @@ contains
    ! ---- friction -------------------------------------------------------------------------------
 
    !> On flat surfaces that rest in contact a multiplier of 1 pushes by what is covered over the
-   !> scale of the constraint, also where that is a part, and friction of 1 acts with 1.
+   !> scale of the constraint, also where that is a part, and friction of 1 acts with 1; wherever a
+   !> scheme evaluates forces.
    subroutine test_normal(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -527,12 +533,40 @@ contains
                   "normal force" // text_of(i, k))
                call check_near(error, abs(sum(item(j)%t(1, :item(j)%n_slave, 1))), 1.0_wp, tol, &
                   1.0_wp, "friction" // text_of(i, k))
+               call by_schemes(mortar, j, 4.0_wp*area(1))
             end do
          end do
          if (allocated(error)) return
       end do
       call check_true(error, n_part >= n_combination, "some are covered in part: " &
          // to_text(n_part))
+
+   contains
+
+      !> At rest, over a step, at its end or start: the normal force that a condition knows.
+      subroutine by_schemes(mortar, j, expected)
+         type(mortar_t), intent(inout) :: mortar
+         integer, intent(in) :: j
+         real(wp), intent(in) :: expected
+         type(motion_t) :: motion
+         type(condition_t) :: one(1)
+         integer :: scheme
+
+         call motion_init(motion, scene%x)
+         do scheme = 1, 4
+            motion%pose = pose_at_end
+            if (scheme > 1) motion%pose = pose_moving(1.0_wp, 0.5_wp, 1.0_wp)
+            motion%pose%pushes_at_end = scheme == 3
+            if (scheme == 4) motion%pose%is_gradient = .true.
+            if (scheme == 4) motion%pose%place = 0.0_wp
+            call motion_place(motion)
+            one%rubs = .true.
+            one%normal = 0.0_wp
+            call mortar%linearise([j], motion, [0.0_wp], one)
+            call check_near(error, one(1)%normal, expected, tol, 1.0_wp, "scheme " // to_text(scheme))
+         end do
+      end subroutine by_schemes
+
    end subroutine test_normal
 
    !> Central differences, with the steps and bounds of `compare`; none where a gradient jumps.
@@ -777,5 +811,75 @@ contains
       call mortar%area(scene%x, scene%u0, area, length)
       call check_true(error, minval(area) > 0.0_wp, "areas")
    end subroutine test_apart
+
+   !> There is a time at which all four distances of boxes are below `depth`, where these go
+   !> straight from the start to the end: looked for at all times at which one of them passes it.
+   subroutine test_near(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: depth = 0.1_wp
+      real(wp) :: x0(2, 4), dx(2, 4), d(4, 0:1), time(6)
+      logical :: is_near
+      integer :: k, i, n
+
+      n = 0
+      do k = 1, 400
+         call shake(x0, 0.3_wp)
+         x0(:, 3:) = x0(:, 3:) + 0.7_wp
+         call shake(dx, 1.0_wp)
+         if (mod(k, 3) == 0) dx(:, :2) = dx(:, :2) + 0.7_wp
+         d(:, 0) = distances(x0) - depth
+         d(:, 1) = distances(x0 + dx) - depth
+         time = [d(:, 0)/(d(:, 0) - d(:, 1)), 0.0_wp, 1.0_wp]
+         is_near = .false.
+         do i = 1, 6
+            if (time(i) < 0.0_wp .or. time(i) > 1.0_wp) cycle
+            is_near = is_near .or. all(d(:, 0) + time(i)*(d(:, 1) - d(:, 0)) <= tol)
+         end do
+         call check_true(error, pair_comes_near(depth, x0, dx) .eqv. is_near, "draw " // to_text(k))
+         if (is_near) n = n + 1
+      end do
+      call check_true(error, n > 50 .and. n < 350, "both kinds: " // to_text(n))
+
+   contains
+
+      pure function distances(x) result(d)
+         real(wp), intent(in) :: x(2, 4)
+         real(wp) :: d(4)
+         integer :: a
+
+         do a = 1, 2
+            d(2*a - 1:2*a) = [minval(x(a, 3:)) - maxval(x(a, :2)), minval(x(a, :2)) &
+               - maxval(x(a, 3:))]
+         end do
+      end function distances
+
+   end subroutine test_near
+
+   !> The part of slip that is by the node itself: a step that is the same again changes nothing,
+   !> one to another place does.
+   subroutine test_slip_share(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(mortar_t) :: mortar
+      real(wp), allocatable :: u(:, :), still(:, :)
+      real(wp) :: first(3)
+      integer :: i
+
+      do i = 1, n_combination
+         call make(0.0_wp, 0.0_wp, 0.0_wp, i, scene, mortar, error)
+         if (allocated(error)) return
+         mortar%friction = 0.5_wp
+         still = 0.0_wp*scene%x
+         call mortar%begin_step(scene%x, still, still)
+         first = mortar%state%slip_shift
+         call check_true(error, all(first > 0.1_wp), "all that is known is new")
+         u = still
+         u(1, 11:) = 0.25_wp
+         call mortar%begin_step(scene%x, u, still)
+         call check_near(error, mortar%state%slip_shift, 0.0_wp*first, tol, 1.0_wp, &
+            "flat and covered all along")
+         if (allocated(error)) return
+      end do
+   end subroutine test_slip_share
 
 end module test_mortar

@@ -237,6 +237,10 @@ contains
       call check_true(error, .not. verdict_is_good(verdict), "not good")
       call verdict_line(verdict, line)
       call check_equal(error, line, "verdict: NOT COMPLETED", "line")
+      call check_equal(error, verdict%message, "the analysis stops", "why")
+      call check_true(error, .not. verdict%is_complete, "not complete")
+      call verdict_end(verdict)
+      call check_equal(error, verdict%message, "", "nothing is left of it")
    end subroutine test_failed
 
    !> Pairs with integrated gaps take no SIDES=BOTH; those that hold both sides have guards only
