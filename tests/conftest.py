@@ -9,7 +9,13 @@ import re
 import signal
 
 import pytest
-import scene_tools
+
+# Threads of BLAS that wait for work keep processors busy: an OpenBLAS with OpenMP looks at the first
+# of these alone, others at the second. Tests of threads set them anew. Before numpy is loaded.
+os.environ.setdefault("OMP_NUM_THREADS", "1")
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
+import scene_tools  # noqa: E402
 
 # What a script runs in the background is told to ignore Ctrl-C; what is tested here is not.
 if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:

@@ -5,6 +5,7 @@
 program main
    use, intrinsic :: iso_fortran_env, only : output_unit
    use check, only : test_case_t
+   use emcon_blas, only : blas_single_thread
    use emcon_errors, only : error_t
    use test_active_set, only : collect_active_set
    use test_arcs, only : collect_arcs
@@ -123,7 +124,10 @@ program main
 
    character(len=64) :: only_suite, only_test       !! blank: all
    integer :: n_passed, n_failed
+   logical :: is_done
 
+   ! As programs do: threads of BLAS would spend most of the time on waiting for each other.
+   call blas_single_thread(is_done)
    n_passed = 0
    n_failed = 0
    call get_command_argument(1, only_suite)
