@@ -217,7 +217,7 @@ contains
    pure real(wp) function part_of_sector(x, before, after) result(part)
       real(wp), intent(in) :: x(:, :)            !! (2, 3 to 5) of the stencil's nodes [L]
       integer, intent(in) :: before, after       !! local numbers as in `polygon_stencil_t`
-      real(wp) :: along(2), from, to
+      real(wp) :: along(size(x, 1)), from, to
 
       along = way(first, last)
       from = dot_product(way(first, slave), along)
@@ -232,7 +232,7 @@ contains
       !> The direction from node `p` to node `q`; to the slave node the whole way.
       pure function way(p, q)
          integer, intent(in) :: p, q
-         real(wp) :: way(2)
+         real(wp) :: way(size(x, 1))
 
          way = x(:, q) - x(:, p)
          if (p /= slave .and. q /= slave) way = way/sqrt(dot_product(way, way))

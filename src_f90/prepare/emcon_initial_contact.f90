@@ -92,6 +92,8 @@ contains
             if (is_meant .and. .not. allocated(error)) cycle
             if (allocated(error)) return
             call check_penetration(scene, pair, contact, noise, error)
+            if (allocated(error) .and. may_exchange(scene, pair)) call exchange(scene, pair, &
+               options, noise, notes, error)
             if (allocated(error) .and. pair%is_reverse .and. pair%may_choose) then
                deallocate(error)                     ! `check_corners` has let the nodes pass
                call become_guard(scene, pair, notes)
@@ -116,6 +118,42 @@ contains
          scene%surface(pair%slave)%name // " dips into edges of " // &
          scene%surface(pair%master)%name // " at the start: its nodes are guarded, not held")
    end subroutine become_guard
+
+   !> Does the deck leave it open which side of a pair is the slave?
+   pure logical function may_exchange(scene, pair)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+
+      may_exchange = pair%may_choose .and. .not. (pair%both_sides .or. pair%slave == pair%master &
+         .or. pair%adjust_distance >= 0.0_wp .or. pair%adjust_set > 0)
+      may_exchange = may_exchange .and. .not. any(scene%pair%slave == pair%master .and. &
+         scene%pair%master == pair%slave)
+   end function may_exchange
+
+   !> The finer of two polygons of curves that fit each other may begin with nodes behind edges of
+   !> the other one, and that with none behind its own: then that is the slave.
+   subroutine exchange(scene, pair, options, noise, notes, error)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(inout) :: pair
+      type(contact_options_t), intent(in) :: options
+      real(wp), intent(in) :: noise              !! of coordinates [L]
+      type(notes_t), intent(inout) :: notes
+      type(error_t), allocatable, intent(inout) :: error     !! out: none, or the same
+      type(contact_pair_t) :: other
+      type(start_gaps_t) :: contact
+      type(error_t), allocatable :: fault
+
+      other = reversed(pair)
+      other%is_exchanged = .not. pair%is_exchanged
+      call start_gaps_init(contact, scene, other, fault, options)
+      if (.not. allocated(fault)) call check_penetration(scene, other, contact, noise, fault)
+      if (allocated(fault)) return
+      deallocate(error)
+      pair = other
+      call note_add(notes, where_text(scene, pair%origin) // ": surface " // &
+         scene%surface(pair%slave)%name // " is the slave: nodes of " // &
+         scene%surface(pair%master)%name // " begin behind its edges")
+   end subroutine exchange
 
    !> A surface that crosses itself has no outside. Each surface is looked at once.
    subroutine check_crossing(scene, number, chain, is_checked, error)

@@ -78,7 +78,7 @@ contains
             call formulation_text(scene%pair(k)%formulation, scene%step(1)%contact, how)
             call note_add(notes, "contact: " // scene%surface(scene%pair(k)%slave)%name // &
                " (slave, " // to_text(system%contact(k)%contact%n_constraint) // " nodes" // &
-               trim(merge(", the rounder one", "                 ", &
+               trim(merge(", named second", "              ", &
                scene%pair(k)%is_exchanged)) // ") on " // &
                scene%surface(scene%pair(k)%master)%name // ", " // how)
          end do

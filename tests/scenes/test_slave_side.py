@@ -28,7 +28,7 @@ def test_the_rounder_surface_becomes_the_slave(tmp_path, choice):
     disc = run(tmp_path / "disc", choice, "DISC", contact=ONE)
     assert free.digits(pairs=False) == disc.digits(pairs=False)
     assert (free.history["pair1_force_y"] == -disc.history["pair1_force_y"]).all()
-    assert "DISC (slave, 32 nodes, the rounder one) on TOP" in free.log
+    assert "DISC (slave, 32 nodes, named second) on TOP" in free.log
     assert "DISC (slave, 32 nodes) on TOP" in disc.log
 
 

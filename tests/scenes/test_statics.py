@@ -333,6 +333,26 @@ def test_overclosure_that_is_meant_is_no_penetration(tmp_path, formulation):
     assert run.history["penetration"].max() < 1e-3
 
 
+@pytest.mark.parametrize("formulation", FORMULATIONS[2::2], ids=" ".join)
+def test_coarse_ring_around_a_fine_one(tmp_path, formulation):
+    """The fine one's nodes begin behind chords of the coarse one, whose arcs are 0.02 off: in either
+    order of the pair the coarse one is the slave, as `SIDES=ONE` has it."""
+    text = press_fit((12, 4), formulation, -0.02).replace("*CONTACT INTERFERENCE, SHRINK\n", "")
+    bore = "*SURFACE, NAME=BORE\n" + "".join(f"{1 + 6*i}, S1\n" for i in range(12))
+    text = text.replace("*MATERIAL", bore + "*MATERIAL", 1)
+    text = text.replace("*NODE FILE", "*DSLOAD\nBORE, P, 60.\n*NODE FILE")
+    moved = []
+    for sides, order in ((", SIDES=ONE", "F1, F0"), ("", "F1, F0"), ("", "F0, F1")):
+        folder = tmp_path / str(len(moved))
+        folder.mkdir()
+        named = text.replace("F1, F0", order).replace(f"={formulation[0]}", f"={formulation[0]}{sides}")
+        run = solve(folder, named)
+        assert ("F1 is the slave" in run.log) == (sides == "")
+        moved.append(run.fields()["displacement"][-1])
+    assert np.abs(moved[0]).max() > 0.02
+    assert (moved[1] == moved[0]).all() and (moved[2] == moved[0]).all()
+
+
 @pytest.mark.parametrize("cells", [(8, 11), (11, 8)], ids=str)
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=" ".join)
 def test_press_fit_of_unlike_meshes(tmp_path, formulation, cells):
