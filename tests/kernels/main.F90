@@ -52,6 +52,7 @@ program main
    use test_guards, only : collect_guards
    use test_hermite_gap, only : collect_hermite_gap
    use test_independent_rows, only : collect_independent_rows
+   use test_host_contact, only : collect_host_contact
    use test_initial_contact, only : collect_initial_contact
    use test_interface, only : collect_interface
    use test_joints, only : collect_joints
@@ -150,6 +151,7 @@ program main
    call run("cholmod", collect_cholmod)
    call run("supernodal", collect_supernodal)
 #endif
+   call run("host_contact", collect_host_contact)
    call run("initial_contact", collect_initial_contact)
    call run("lapack", collect_lapack)
    call run("friction", collect_friction)
