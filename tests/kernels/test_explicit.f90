@@ -14,6 +14,7 @@ module test_explicit
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_row
+   use emcon_soft_law, only : penalty_t
    use emcon_steps, only : method_penalty
    use emcon_system, only : system_t, system_tangent_times
    use emcon_term_registry, only : terms_mass_values
@@ -126,8 +127,9 @@ contains
             if (has_closed) then
                do j = 1, closed%n
                   associate (item => closed%item(j))
-                     force(:, item%node(:3)) = force(:, item%node(:3)) + closed%soft(j)%stiffness &
-                        *sum(item%c(:, :3)*way(:, item%node(:3)))*item%c(:, :3)
+                     force(:, item%node(:3)) = force(:, item%node(:3)) &
+                        + closed%law(j)%law%stiffest()*sum(item%c(:, :3)*way(:, item%node(:3))) &
+                        *item%c(:, :3)
                   end associate
                end do
             end if
@@ -158,14 +160,13 @@ contains
       integer :: k
 
       call constraints_select(closed, [1, 2])
-      allocate(closed%soft(2))
       do k = 1, 2
          call condition_resize(closed%item(k), 3)
          closed%item(k)%n_node = 3
          closed%item(k)%node(:3) = [7, 11, 11 + k]
          call shake(closed%item(k)%c, 1.0_wp)
          closed%item(k)%c = closed%item(k)%c + 2.0_wp
-         closed%soft(k)%stiffness = 100.0_wp*real(k, wp)
+         allocate(closed%law(k)%law, source=penalty_t(stiffness=100.0_wp*real(k, wp)))
       end do
    end subroutine make_closed
 
