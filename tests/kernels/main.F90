@@ -40,6 +40,7 @@ program main
    use test_velocity_jumps, only : collect_velocity_jumps
    use test_near_list, only : collect_near_list
    use test_corner_tops, only : collect_corner_tops
+   use test_blocked_contact, only : collect_blocked_contact
    use test_explicit, only : collect_explicit
    use test_friction, only : collect_friction
    use test_gauss, only : collect_gauss
@@ -225,6 +226,7 @@ program main
    call run("velocity_jumps", collect_velocity_jumps)
    call run("near_list", collect_near_list)
    call run("corner_tops", collect_corner_tops)
+   call run("blocked_contact", collect_blocked_contact)
    call run("explicit", collect_explicit)
    call run("holding", collect_holding)
    call run("march", collect_march)

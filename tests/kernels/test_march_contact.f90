@@ -42,6 +42,7 @@ contains
          test_case_t("restitution takes what the ledger says", test_restitution), &
          test_case_t("surfaces without mass keep energy and momenta", test_massless), &
          test_case_t("penalties store what they take", test_penalty), &
+         test_case_t("dashpots between surfaces take energy, not momentum", test_dashpots), &
          test_case_t("a body that contact alone holds", test_held)]
    end subroutine collect_march_contact
 
@@ -282,6 +283,57 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_penalty
+
+   !> Before anything has moved a dashpot pushes by coefficient, length of its node and velocity. In
+   !> a drop on a free block energy and what was taken stay as a sum, and so do the momenta.
+   subroutine test_dashpots(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: coefficient = 2.0_wp, short = 1.0e-5_wp
+      type(scene_t) :: scene
+      type(ledger_t) :: start
+      type(increment_t) :: increment
+      real(wp) :: taken
+      integer :: formulation, k, n
+
+      do k = 1, 4
+         formulation = merge(formulation_nts, formulation_mortar, mod(k, 2) == 0)
+         call make_drop(scene, formulation, 0.3_wp)
+         scene%pair(1)%damping%coefficient = coefficient
+         scene%pair(1)%damping%clearance = 2.0_wp*gap_start
+         scene%pair(1)%damping%flat = 1.0_wp
+         if (k > 2) scene%step(1)%h = short
+         deallocate(scene%step(1)%prescribed)
+         allocate(scene%step(1)%prescribed(0))
+         block
+            type(march_t) :: march
+
+            call begin(scene, march, error)
+            if (allocated(error)) return
+            start = march%ledger
+            do n = 1, merge(n_step, 1, k <= 2)
+               taken = march%ledger%contact_damping
+               call march_increment(march, scene, increment, error)
+               if (allocated(error)) return
+               associate (ledger => march%ledger)
+                  call check_near(error, ledger%total + ledger%contact_damping, start%total, tol, &
+                     start%total, "energy and what is taken, formulation " // to_text(formulation))
+                  call check_near(error, [ledger%momentum, ledger%angular], [start%momentum, &
+                     start%angular], tol, norm2(start%momentum), "momenta")
+                  call check_true(error, ledger%contact_damping >= taken - tol*start%total, "taken")
+               end associate
+               if (allocated(error)) return
+            end do
+            if (k <= 2) then
+               call check_true(error, march%ledger%contact_damping > 0.1_wp*start%total, "much")
+            else
+               call check_near(error, sum(march%state%contact(:, 11:), 2), [0.0_wp, &
+                  2.0_wp*coefficient], 1.0e3_wp*short, coefficient, "the push over a length of 2")
+            end if
+            call march_free(march)
+         end block
+         if (allocated(error)) return
+      end do
+   end subroutine test_dashpots
 
    !> Statics: a load presses the upper block, which nothing else holds upright, through its gap.
    subroutine test_held(error)

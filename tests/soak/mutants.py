@@ -98,6 +98,16 @@ def mistakes(line, is_behind=False):
     return found
 
 
+def statement(lines, number):
+    """Numbers of the lines of the statement that goes through a line, of which counters know one."""
+    first = last = number
+    while first > 1 and lines[first - 2].endswith("&"):
+        first -= 1
+    while lines[last - 1].endswith("&"):
+        last += 1
+    return range(first, last + 1)
+
+
 def changed_lines(folders, since):
     """File -> numbers of its lines that are not those of `since`, all of them if that is empty."""
     lines = {}
@@ -200,7 +210,9 @@ class Trial:
         return self.failing_suite(mutant, made) or self.failing_run(made)
 
     def failing_suite(self, mutant, made):
-        seen = [s for s in self.suites if mutant.line in s.lines.get(mutant.file, ())]
+        lines = statement((ROOT / mutant.file).read_text().splitlines(), mutant.line)
+        seen = [s for s in self.suites
+                if any(line in s.lines.get(mutant.file, ()) for line in lines)]
         if not seen:
             return ""
         program = self.build.link("kernels", made, self.folder)

@@ -2,7 +2,7 @@
 
 import pytest
 from kernel_coverage import ranges
-from mutants import MISTAKES, code_of, last_version, mistakes
+from mutants import MISTAKES, code_of, last_version, mistakes, statement
 
 
 @pytest.mark.parametrize(
@@ -33,6 +33,12 @@ def test_every_mistake_changes_the_line():
 
 def test_comments_hold_no_mistakes():
     assert code_of("   a = b   ! c < d") == "   a = b"
+
+
+def test_a_line_of_a_longer_statement():
+    assert [list(statement(["a = 1", "b = c &", "   + d &", "   - e", "f = 2"], k))
+            for k in (1, 3, 4, 5)] == [[1], [2, 3, 4], [2, 3, 4], [5]]
+    assert "      continue" not in mistakes("      b = 3", is_behind=True)
 
 
 def test_the_last_version_is_a_commit():
