@@ -47,9 +47,9 @@ module emcon_mortar_frame
    end type frame_t
 
    !> The ends of segments are held within the slave edge by bounds with corners rounded over this
-   !> fraction of it: so wide that what quadrature leaves of a force where nodes face each other does
-   !> not magnify round-off, and the integrals over the strip that changes hands differ by its square
-   !> only.
+   !> fraction of it: so wide that what quadrature leaves of a force where nodes face each other
+   !> does not magnify round-off, and the integrals over the strip that changes hands differ by its
+   !> square only.
    real(wp), parameter :: end_rounding = 1.0e-2_wp
    integer, parameter :: most_iterations = 50
 

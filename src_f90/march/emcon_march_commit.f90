@@ -15,6 +15,7 @@ module emcon_march_commit
    use emcon_march_guess, only : follow_links
    use emcon_march_past, only : march_past_keep
    use emcon_march_types, only : increment_t, march_t
+   use emcon_nodal_pull, only : nodal_pull_add
    use emcon_numbering, only : gather_dependent
    use emcon_pair_record, only : pair_record_jump, pair_record_measure
    use emcon_pair_sums, only : pair_sums_add, pair_sums_begin, pair_sums_jump
@@ -158,6 +159,7 @@ contains
       real(wp) :: missed, largest
 
       call stand_off_add(increment%stand_off, self%system, self%active%set, h)
+      call nodal_pull_add(increment%nodal_pull, self%active%set, size(self%state%u, 2))
       increment%give = max(increment%give, softness_depth(self%active%softness, &
          self%active%set))
       if (self%active%softness%is_at_ends) increment%give = max(increment%give, &

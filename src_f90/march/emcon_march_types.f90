@@ -9,6 +9,7 @@ module emcon_march_types
    use emcon_ledger, only : ledger_t
    use emcon_motion, only : motion_t
    use emcon_newton, only : interrupt_interface, newton_t
+   use emcon_nodal_pull, only : nodal_pull_t
    use emcon_pose, only : instant_t
    use emcon_scheme, only : scheme_t
    use emcon_sparse_solver, only : solver_box_t
@@ -63,6 +64,7 @@ module emcon_march_types
       type(overlap_t) :: overlap                 !! the deepest of bodies, by the judge
       type(overlap_t) :: stray                   !! of bodies that no pair brings together
       type(stand_off_t) :: stand_off             !! air across which contact forces act
+      type(nodal_pull_t) :: nodal_pull           !! where contact forces pull at single nodes
       real(wp), allocatable :: residual(:)       !! relative, of the last Newton solve
       !> Largest relative residual above Newton's tolerance that was accepted; 0: there is none.
       real(wp) :: unconverged = 0.0_wp

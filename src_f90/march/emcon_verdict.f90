@@ -15,6 +15,7 @@ module emcon_verdict
    use emcon_ledger, only : ledger_t
    use emcon_look_plane, only : overlap_text
    use emcon_march, only : increment_t, march_is_done, march_t
+   use emcon_nodal_pull, only : nodal_pull_join, nodal_pull_t
    use emcon_scene, only : scene_t
    use emcon_small_range, only : small_limit, small_range_init, small_range_t, small_range_widen
    use emcon_solid, only : solid_t
@@ -59,6 +60,7 @@ module emcon_verdict
       real(wp) :: unconverged = 0.0_wp           !! largest residual accepted above the tolerance
       real(wp) :: unconverged_time = 0.0_wp      !! [T]
       type(stand_off_t) :: stand_off
+      type(nodal_pull_t) :: nodal_pull
       type(small_range_t) :: small               !! what linear sections have met
       real(wp) :: law_missed = 0.0_wp            !! of contact and friction, at most [M L/T^2]
       real(wp) :: largest_push = 0.0_wp          !! of contacts where there is friction [M L/T^2]
@@ -166,6 +168,7 @@ contains
       self%stand_off%largest = max(self%stand_off%largest, increment%stand_off%largest)
       self%stand_off%impulse = self%stand_off%impulse + increment%stand_off%impulse
       self%stand_off%impulse_gap = self%stand_off%impulse_gap + increment%stand_off%impulse_gap
+      call nodal_pull_join(self%nodal_pull, increment%nodal_pull)
       do i = 1, increment%warnings%n
          call add_warning(self, increment%warnings%item(i)%text)
       end do

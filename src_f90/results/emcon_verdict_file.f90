@@ -7,6 +7,7 @@ module emcon_verdict_file
    use emcon_json, only : json_number, json_text, json_texts
    use emcon_kinds, only : wp
    use emcon_march, only : march_t
+   use emcon_nodal_pull, only : nodal_pull_share
    use emcon_restart_data, only : restart_exchange, restart_list, restart_offers, restart_t
    use emcon_stand_off, only : stand_off_mean
    use emcon_step_control, only : control_sizes, n_why, step_control_t, why_text
@@ -105,10 +106,7 @@ contains
          verdict_law_violation(self))
       if (self%most_augmentations > 0) call json_number(line, "augmentations", &
          real(self%most_augmentations, wp))
-      call json_number(line, "stand_off", self%stand_off%largest)
-      call json_number(line, "mean_stand_off", stand_off_mean(self%stand_off))
-      if (size(self%scatter) > 0) call json_number(line, "force_scatter", &
-         maxval(scatter_of(self%scatter)))
+      call add_forces(self, line)
       call json_number(line, "unconverged", self%unconverged)
       if (size(self%small%section) > 0) then
          call json_number(line, "linear_rotation", maxval(self%small%rotation))
@@ -117,6 +115,19 @@ contains
       call add_sizes(march%state%control, line)
       line = line // "}"
    end subroutine compose
+
+   !> Where contact forces act, and how even they are.
+   subroutine add_forces(self, line)
+      type(verdict_t), intent(in) :: self
+      character(len=:), allocatable, intent(inout) :: line
+
+      call json_number(line, "stand_off", self%stand_off%largest)
+      call json_number(line, "mean_stand_off", stand_off_mean(self%stand_off))
+      if (size(self%scatter) > 0) call json_number(line, "force_scatter", &
+         maxval(scatter_of(self%scatter)))
+      if (self%nodal_pull%force > 0.0_wp) call json_number(line, "nodal_pull", &
+         nodal_pull_share(self%nodal_pull))
+   end subroutine add_forces
 
    !> Of a run whose increments choose their sizes: how many of which, and why some are smaller.
    subroutine add_sizes(control, line)
@@ -167,6 +178,10 @@ contains
       if (restart_offers(restart, "law_missed", self%largest_push > 0.0_wp)) then
          call restart_exchange(restart, "law_missed", self%law_missed)
          call restart_exchange(restart, "law_missed", self%largest_push)
+      end if
+      if (restart_offers(restart, "nodal_pull", self%nodal_pull%force > 0.0_wp)) then
+         call restart_exchange(restart, "nodal_pull", self%nodal_pull%pull)
+         call restart_exchange(restart, "nodal_pull", self%nodal_pull%force)
       end if
       call exchange_scatter(self%scatter, restart)
       call exchange_texts(self, restart)

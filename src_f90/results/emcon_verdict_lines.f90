@@ -3,10 +3,11 @@ module emcon_verdict_lines
    use emcon_energy_watch, only : closing_text, energy_bar, energy_rounding
    use emcon_force_scatter, only : scatter_is_comb, scatter_of
    use emcon_guards, only : overlap_told
-   use emcon_interactions, only : contact_pair_t, formulation_nts
+   use emcon_interactions, only : contact_pair_t, formulation_nts, multiplier_dual
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : march_t
+   use emcon_nodal_pull, only : nodal_pull_text
    use emcon_scene, only : scene_t
    use emcon_small_range, only : small_limit, small_range_t
    use emcon_stand_off, only : stand_off_mean
@@ -235,6 +236,10 @@ contains
          call note_add(lines, text // ": " // to_text(march%state%pairs%total(k)%n_active) // &
             " active at end, largest force " // to_text(self%largest_force(k), 9))
       end do
+      if (any(scene%step%contact%multiplier == multiplier_dual)) then
+         call nodal_pull_text(self%nodal_pull, text)
+         if (len(text) > 0) call note_add(lines, text)
+      end if
       do p = 1, size(self%scatter)
          if (.not. scatter_is_comb(self%scatter(p)) .or. march%active%softness%is_on) cycle
          k = abs(march%system%contact(findloc(abs(march%state%sums%of_pair), p, 1))%of_pair)

@@ -1,12 +1,15 @@
 !> The verdict from running figures.
 module test_verdict
    use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_constraint, only : condition_t
+   use emcon_constraints, only : constraint_set_t
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_segment
    use emcon_energy_watch, only : energy_rounding
    use emcon_far_nodes, only : far_element_find
    use emcon_force_scatter, only : force_scatter_t, scatter_follow, scatter_is_comb, scatter_of
    use emcon_kinds, only : wp
+   use emcon_nodal_pull, only : nodal_pull_add, nodal_pull_share, nodal_pull_t, nodal_pull_text
    use emcon_pair_sums, only : pair_sum_t
    use emcon_verdict, only : verdict_end, verdict_is_failure, verdict_is_good, &
       verdict_t
@@ -31,6 +34,7 @@ contains
          test_case_t("what impacts take is told, of explicit steps bad", test_taken), &
          test_case_t("elements far from the origin keep few digits", test_far), &
          test_case_t("scatter of a comb, of a smooth force, of one push", test_scatter), &
+         test_case_t("pulls at single nodes are measured and told", test_pulls), &
          test_case_t("a run that failed is not good", test_failed), &
          test_case_t("what pairs can do to need no guards", test_advice)]
    end subroutine collect_verdict
@@ -266,5 +270,54 @@ contains
       call guard_advice([one, segment, both], advice)
       call check_equal(error, advice, mesh, "both sides")
    end subroutine test_advice
+
+   !> A slave node pushed by 3, against masters of weights -1/6, 5/6 and 1/3: a pull of 1/2. What a
+   !> second condition pushes that node with is taken off, what is no mean does not count.
+   subroutine test_pulls(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: first(4) = [-1.0_wp, -1.0_wp/6.0_wp, 5.0_wp/6.0_wp, 1.0_wp/3.0_wp], &
+         second(4) = [-1.0_wp, 0.1_wp, 0.8_wp, 0.1_wp], normal(2) = [0.6_wp, -0.8_wp]
+      type(constraint_set_t) :: set
+      type(nodal_pull_t) :: found
+      character(len=:), allocatable :: text
+
+      set%n = 2
+      allocate(set%item(2))
+      set%lam = [3.0_wp, 2.0_wp]
+      call fill(set%item(1), [1, 2, 3, 4], first, .true.)
+      call fill(set%item(2), [5, 2, 3, 4], second, .false.)
+      call nodal_pull_add(found, set, 5)
+      call check_near(error, found%pull, 0.5_wp, 8.0_wp*epsilon(1.0_wp), 1.0_wp, "one")
+      call check_near(error, found%force, 3.0_wp, 8.0_wp*epsilon(1.0_wp), 1.0_wp, "force")
+      call nodal_pull_text(found, text)
+      call check_true(error, index(text, "up to 17 %") > 0, "told: " // text)
+      set%item(2)%is_mean = .true.
+      found = nodal_pull_t()
+      call nodal_pull_add(found, set, 5)
+      call check_near(error, found%pull, 0.3_wp, 8.0_wp*epsilon(1.0_wp), 1.0_wp, "two")
+      call check_near(error, nodal_pull_share(found), 0.3_wp/4.1_wp, 8.0_wp*epsilon(1.0_wp), &
+         1.0_wp, "share")
+      set%n_held = 1
+      found = nodal_pull_t()
+      call nodal_pull_add(found, set, 5)
+      call nodal_pull_text(found, text)
+      call check_true(error, .not. found%pull > 0.0_wp .and. text == "", "pushes alone")
+
+   contains
+
+      subroutine fill(item, node, weight, is_mean)
+         type(condition_t), intent(inout) :: item
+         integer, intent(in) :: node(:)
+         real(wp), intent(in) :: weight(:)
+         logical, intent(in) :: is_mean
+
+         item%n_node = size(node)
+         item%n_slave = 1
+         item%node = node
+         item%g = spread(normal, 2, size(node))*spread(weight, 1, 2)
+         item%is_mean = is_mean
+      end subroutine fill
+
+   end subroutine test_pulls
 
 end module test_verdict

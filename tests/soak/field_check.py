@@ -11,7 +11,7 @@ the program says about itself is read. The checks:
  - momenta: linear and angular momentum stay, where nothing is held and nothing pulls;
  - energy: it stays without friction, and never grows with it;
  - push and Coulomb's law: each force on a node lies between the normals that surfaces have there,
-   widened by the angle of friction.
+   widened by the angle of friction; means of gaps add what `Check.look_at_directions` derives.
 """
 
 import collections
@@ -29,9 +29,10 @@ ENERGY = 1e-9
 #: Of directions of forces [rad], beside what edges turn in an increment.
 ANGLE = 5e-3
 #: Forces that are judged, by the largest: where a node slides along an edge, the two ends share its
-#: force along the edge and across it otherwise, and the functions of dual multipliers change their
-#: sign, so that a small one has any direction.
+#: force along the edge and across it otherwise, so that a small one has any direction.
 JUDGED = 0.05
+#: Edges meet in means of gaps whose normals are opposite by this cosine.
+FACING = 0.25
 
 POINT = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])/np.sqrt(3.0)
 CORNER = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
@@ -116,6 +117,7 @@ class Check:
     def __init__(self, case, fields):
         self.scene, self.fields = case.scene, fields
         self.has_means = case.kind["formulation"] in ("SEGMENT", "MORTAR")
+        self.is_dual = self.has_means and case.parameters.get("multiplier") != "STANDARD"
         labels = [n for part in self.scene.part.values() for n in part.node]
         labels += [label for label, _ in self.scene.reference.values()]
         self.number = {label: k for k, label in enumerate(sorted(labels))}
@@ -128,6 +130,8 @@ class Check:
         n_frame, n_node = self.u.shape[:2]
         self.contact = fields["contact_force"] if "contact_force" in fields.names() \
             else np.zeros((n_frame, n_node, 2))
+        self.pressure = fields["contact_pressure"] if "contact_pressure" in fields.names() \
+            else np.zeros((n_frame, n_node))
         self.mass = self.solid.nodal_mass(n_node)
         self.of_body = []
         for name, part in self.scene.part.items():
@@ -235,7 +239,14 @@ class Check:
     # ---- directions of forces
 
     def look_at_directions(self, meets_itself):
-        """Each contact force pushes, within the cones of friction of the surfaces around."""
+        """Each contact force pushes, within the cones of friction of the surfaces around.
+
+        Means of gaps over an edge make two more forces, no larger than `of_means` at a node. The
+        length of the edge is one of the motion: along itself it is pulled by its pressure times what
+        the gap is off its mean, which is half of the edge times the tangent of the angle between the
+        surfaces at most. And the pressure of dual multipliers, which is linear on an edge, from 2p-q
+        to 2q-p with p and q at its nodes, pulls where that is negative.
+        """
         if not np.abs(self.contact).max() > 0:
             return
         phi = np.arctan(self.scene.friction)
@@ -252,10 +263,37 @@ class Check:
                 normal = np.concatenate([self.normals_at(frame, i, body_of_node, meets_itself)
                                          for frame in (k - 1, k)])
                 off = outside_arc(way, normal) - phi
-                if off > ANGLE:
-                    self.tell("push", off, f"the force on node {i} (from 0) at time "
-                              f"{self.fields.time[k]:.6g} is {np.degrees(off):.3g} degrees out of "
-                              f"the cone, {size[i]/largest:.2e} of the largest")
+                if off <= ANGLE:
+                    continue
+                if self.has_means and size[i]*np.sin(min(off, np.pi/2)) <= self.of_means(k, i):
+                    continue
+                self.tell("push", off, f"the force on node {i} (from 0) at time "
+                          f"{self.fields.time[k]:.6g} is {np.degrees(off):.3g} degrees out of "
+                          f"the cone, {size[i]/largest:.2e} of the largest")
+
+    def of_means(self, k, i):
+        """How far out of the cone means of gaps may push node `i` in the step to frame `k`: by the
+        length of its own edges, and by negative pressures over the edges that its own ones may face,
+        across a gap no longer than they are."""
+        edge, found = self.bodies.edge, 0.0
+        p = np.sort(self.pressure[k][edge], axis=1)              # (edge, node) ascending
+        x = self.solid.x + self.u[k]
+        a, b = x[edge[:, 0]], x[edge[:, 1]]
+        length, normal = np.linalg.norm(b - a, axis=1), (b - a)[:, ::-1]*[1.0, -1.0]
+        own = (edge == i).any(1)
+        near = overlap.to_edges(x[i][None], a, b)[0] < length + length[own].max()
+        if self.is_dual:
+            below = np.maximum(p[:, 1] - 2*p[:, 0], 0.0)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                found = np.where(below > 0, length*below**2/(6*(p[:, 1] - p[:, 0])), 0.0)[near].sum()
+        other = near & (self.bodies.body_of_edge != self.bodies.body_of_edge[own][0])
+        for e in np.nonzero(own)[0]:
+            facing = -(normal[other] @ normal[e])/(length[other]*length[e])
+            facing = facing[facing > FACING]
+            if len(facing):
+                found += 0.5*np.sqrt(1 - min(facing.min(), 1.0)**2)/facing.min() \
+                    * 0.5*length[e]*p[e].sum()
+        return found
 
     def normals_at(self, k, i, body_of_node, meets_itself):
         """Directions along which node `i` may be pushed in frame `k` [rad]."""

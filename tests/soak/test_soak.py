@@ -70,3 +70,13 @@ def test_the_judge_of_fields_sees_what_is_wrong(tmp_path):
         fields._data[name][-1, :8] += 0.01
         assert broken <= set(faults(case, fields, cut)), name
         fields._data[name] = whole
+
+
+def test_the_judge_of_fields_sees_a_pull(tmp_path):
+    """Dual multipliers pull at nodes by what follows from pressures beside them, and by no more."""
+    judge_seed(55, tmp_path)
+    case, fields = draw_case(55), Run(tmp_path / "scene").fields()
+    cut = [False]*len(fields.time)
+    assert faults(case, fields, cut) == {}
+    fields._data["contact_pressure"] = 0.3*fields["contact_pressure"]
+    assert set(faults(case, fields, cut)) == {"push"}
