@@ -57,7 +57,8 @@ module emcon_contact
       real(wp) :: rebound = 0.0_wp                    !! along the surface, of what sticks, 0 to 1
       type(contact_damping_t) :: damping              !! of what is near, too
       real(wp) :: reach = 0.0_wp                      !! so far it is near; 0: a step begins [L]
-      !> No state changes before a node has moved farther from where the last step began [L].
+      !> Where nothing was near in the last step: how far apart the surfaces were as it began, by
+      !> the largest motion of nodes; else 0 [L].
       real(wp) :: clearance = 0.0_wp
       integer :: n_look = 0                           !! steps begun so far
       !> So far, per edge, a gap may be closed at the start of a step in which it begins to act;

@@ -29,7 +29,7 @@ module emcon_near_list
       real(wp) :: nearest = 0.0_wp               !! of it: distance along the axes, or `reach` [L]
       real(wp) :: depth = 0.0_wp                 !! beyond the fractions above [L]
       real(wp) :: edge_size = 0.0_wp             !! width plus height in the mean, at first [L]
-      !> As long as no node has moved farther since the last update, nothing is near [L].
+      !> How far apart the surfaces are where nothing is near, beyond `depth`; else 0 [L].
       real(wp) :: clearance = 0.0_wp
    end type near_list_t
 
@@ -58,7 +58,7 @@ contains
       type(near_list_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp), intent(inout) :: within          !! 0 as a step begins [L]
-      real(wp) :: step_motion, way
+      real(wp) :: step_motion, way, nearest
       integer :: i
 
       step_motion = 0.0_wp
@@ -78,10 +78,36 @@ contains
             list_per_motion*step_motion, list_beyond*(within - self%depth)))
          way = 0.0_wp
       end if
+      nearest = self%nearest - 2.0_wp*way
+      if (nearest <= within .and. way > 0.0_wp) call find_nearest(self, x, u0, &
+         self%reach - 2.0_wp*way, within, nearest)
       self%clearance = 0.0_wp
-      if (self%nearest - 2.0_wp*way > within) self%clearance = max(0.0_wp, 0.5_wp*(surely* &
-         (self%nearest - self%depth) - near_per_edge*self%edge_size) - way)
+      if (nearest > within) self%clearance = surely*(nearest - self%depth)
    end subroutine near_list_update
+
+   !> The least distance along the axes of what is listed at x + u, or `most`; of what is not above
+   !> `least` no more than that it is so.
+   pure subroutine find_nearest(self, x, u, most, least, nearest)
+      type(near_list_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in) :: most, least        !! [L]
+      real(wp), intent(out) :: nearest           !! [L]
+      real(wp), allocatable :: item(:, :, :), edge(:, :, :)
+      integer :: i, k
+
+      call boxes(x, u, self%item, item)
+      call boxes(x, u, self%edge, edge)
+      nearest = most
+      associate (list => self%candidates)
+         do i = 1, size(list%start) - 1
+            do k = list%start(i), list%start(i + 1) - 1
+               nearest = min(nearest, box_distance(item(:, i, 1), item(:, i, 2), &
+                  edge(:, list%edge(k), 1), edge(:, list%edge(k), 2)))
+               if (nearest <= least) return
+            end do
+         end do
+      end associate
+   end subroutine find_nearest
 
    !> Is edge `e` near item `i` at x + u: on each axis within `within`? Only edges of its list can
    !> be.
@@ -114,7 +140,6 @@ contains
       real(wp), intent(in) :: reach              !! [L]
       real(wp), allocatable :: item(:, :, :), edge(:, :, :)
       real(wp) :: apart
-      integer :: i, k
 
       self%u = u0(:, self%node)
       self%n_list = 1 + mod(self%n_list, huge(self%n_list) - 1)
@@ -125,15 +150,7 @@ contains
       self%reach = max(reach, surely*apart)
       call search_candidates(item(:, :, 1), item(:, :, 2), edge(:, :, 1), edge(:, :, 2), &
          self%reach, self%candidates)
-      self%nearest = self%reach
-      associate (list => self%candidates)
-         do i = 1, size(list%start) - 1
-            do k = list%start(i), list%start(i + 1) - 1
-               self%nearest = min(self%nearest, box_distance(item(:, i, 1), item(:, i, 2), &
-                  edge(:, list%edge(k), 1), edge(:, list%edge(k), 2)))
-            end do
-         end do
-      end associate
+      call find_nearest(self, x, u0, self%reach, -1.0_wp, self%nearest)
    end subroutine search
 
    !> Low and high corners (2, n, 2) of the boxes around the nodes of each item.

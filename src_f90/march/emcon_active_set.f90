@@ -38,7 +38,9 @@ module emcon_active_set
 
    !> Until when a contact whose surfaces are far apart need not be looked at.
    type :: outlook_t
-      real(wp) :: until = 0.0_wp                 !! by `travel%total` [L]
+      real(wp) :: at = 0.0_wp                    !! `travel%total` as the step looked at began [L]
+      real(wp) :: apart = 0.0_wp                 !! how far the surfaces were from each other [L]
+      real(wp) :: reach = 0.0_wp                 !! and how near something would have counted [L]
       integer :: n_look = 0                      !! of the contact; another one: look again
       logical :: passes = .false.                !! nothing comes near: see `active_set_pass`
    end type outlook_t
@@ -203,7 +205,7 @@ contains
       call pair_search(system, pair, motion)
       if (present(du)) call pair_measure(system, pair, motion%x, motion%u0, du)
       associate (contact => system%contact(pair)%contact)
-         self%outlook(pair) = outlook_t(self%travel%total + contact%clearance, &
+         self%outlook(pair) = outlook_t(self%travel%total, contact%clearance, contact%reach, &
             contact%n_look)
       end associate
    end subroutine active_set_look
@@ -213,14 +215,16 @@ contains
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(motion_t), intent(in) :: motion
-      real(wp) :: total
+      real(wp) :: closed
       integer :: pair
 
       if (size(self%outlook) == 0) return
-      total = self%travel%total + largest_motion(motion%du)
+      closed = 2.0_wp*largest_motion(motion%du)
       do pair = 1, size(self%outlook)
-         self%outlook(pair)%passes = is_empty(self, system, pair) .and. &
-            total < self%outlook(pair)%until
+         associate (outlook => self%outlook(pair))
+            outlook%passes = is_empty(self, system, pair) .and. 2.0_wp*(self%travel%total &
+               - outlook%at) + max(closed, outlook%reach) < outlook%apart
+         end associate
       end do
    end subroutine active_set_pass
 

@@ -309,7 +309,8 @@ contains
    end subroutine test_past_end
 
    !> A slave square tumbles over a master square: at each step the edge is the nearest of all
-   !> wherever the node could touch in this step.
+   !> wherever the node could touch in this step. Where nothing is near it is known how far apart
+   !> they are at least, and not else.
    subroutine test_walk(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -317,9 +318,9 @@ contains
       type(contact_pair_t) :: pair
       type(nts_t) :: nts, all
       real(wp), allocatable :: u(:, :), du(:, :)
-      real(wp) :: gap, speed(2, 1), path(2)
+      real(wp) :: gap, speed(2, 1), path(2), apart
       logical :: is_over
-      integer :: i, step, n_near
+      integer :: i, step, n_near, n_apart
 
       call scene_begin(scene)
       call add_block(scene, "CPE4", [8, 8], [0.0_wp, 0.0_wp], [8.0_wp, 8.0_wp], lower)
@@ -333,6 +334,7 @@ contains
       call nts_init(all, scene, pair, error)
       allocate(u, du, source=0.0_wp*scene%x)
       n_near = 0
+      n_apart = 0
       do step = 1, 400
          call shake(du, 0.02_wp)
          call shake(speed, 0.3_wp)
@@ -350,12 +352,34 @@ contains
                distance(all%node(i), all%master%edge(:, all%edge(i))), tol, 1.0_wp, &
                "distance of the nearest edge in step " // to_text(step))
          end do
+         apart = axis_distance(scene%x + u)
+         if (nts%clearance > 0.0_wp) n_apart = n_apart + 1
+         call check_true(error, apart >= nts%clearance, "apart at least so far")
+         call check_true(error, (nts%clearance > 0.0_wp) .eqv. apart > nts%reach, &
+            "what is not near is known to be apart, step " // to_text(step))
          if (allocated(error)) return
          u = u + du
       end do
+      call check_true(error, n_apart > 20, "often apart: " // to_text(n_apart))
       call check_true(error, n_near > 1000, "many nodes come near: " // to_text(n_near))
 
    contains
+
+      !> The least distance along the axes of a slave node from the box around a master edge.
+      pure real(wp) function axis_distance(at) result(least)
+         real(wp), intent(in) :: at(:, :)        !! (2, n_node) [L]
+         integer :: k, e
+
+         least = huge(1.0_wp)
+         do k = 1, size(nts%node)
+            do e = 1, nts%master%n_edge
+               associate (a => at(:, nts%master%edge(1, e)), b => at(:, nts%master%edge(2, e)))
+                  least = min(least, max(0.0_wp, maxval(max(min(a, b) - at(:, nts%node(k)), &
+                     at(:, nts%node(k)) - max(a, b)))))
+               end associate
+            end do
+         end do
+      end function axis_distance
 
       pure real(wp) function distance(node, edge)
          integer, intent(in) :: node, edge(2)
