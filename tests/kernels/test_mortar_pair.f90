@@ -447,7 +447,7 @@ contains
          n_opened = 0
          n_closed = 0
          n_passed = 0
-         do i = 1, 400
+         do i = 1, 150
             call draw(kind, 10.0_wp, 1.0_wp, stencil, x0, dx)
             call evaluate(kind, stencil, x0, dx, number)
             value0 = values_of(kind, stencil, x0)
@@ -470,7 +470,7 @@ contains
             if (allocated(error)) return
          end do
          if (kind > last_segment) cycle
-         call check_true(error, min(n_opened, n_closed, n_passed) > 20, "steps that open, close, " &
+         call check_true(error, min(n_opened, n_closed, n_passed) > 7, "steps that open, close, " &
             // "pass: " // to_text(n_opened) // " " // to_text(n_closed) // " " &
             // to_text(n_passed))
       end do
@@ -727,7 +727,7 @@ contains
 
       do kind = 9, 10
          stencil = stencil_of(kind)
-         do i = 1, 200
+         do i = 1, 200, 3
             bend = 0.02_wp*real(mod(i, 41) - 20, wp)
             x = over([0.4_wp, -0.3_wp], [-0.6_wp, -0.3_wp])
             x(2, [7, 8]) = x(2, [7, 8]) + bend
