@@ -10,10 +10,11 @@ import signal
 
 import pytest
 
-# Threads of BLAS that wait for work keep processors busy: an OpenBLAS with OpenMP looks at the first
-# of these alone, others at the second. Tests of threads set them anew. Before numpy is loaded.
+# Threads that wait for work keep processors busy. An OpenBLAS with OpenMP looks at the first of these
+# alone, others at the second; threads of our own wait as the third says. Tests of threads set them anew. Before numpy is loaded.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("OMP_WAIT_POLICY", "passive")
 
 import scene_tools  # noqa: E402
 

@@ -94,7 +94,8 @@ FORMULATIONS = [(ONE, "NODE TO SURFACE"), (BOTH, "NODE TO SURFACE"), (ONE, "SEGM
 def test_a_rigid_block_rests_and_slides_slowly(cells, sides, formulation, tmp_path):
     """Of nodes that hold the same body any may act. In small increments a first guess, which flies,
     meets gaps and forces nearly; slips of a body at rest are round-off. No increment is cut."""
-    for v0, h in itertools.product((0.0, 0.01, 0.1, 0.3), (0.005, 0.0025, 0.001)):
+    for v0, h in ((0.0, 0.005), (0.0, 0.001), (0.01, 0.0025), (0.1, 0.005), (0.1, 0.001),
+                  (0.3, 0.0025)):
         deck = block_on_floor(h, 60*h, 0.3, v0=v0, rigid=True, cells=cells, sides=sides)
         run = run_deck(deck, tmp_path/f"{v0} {h}", formulation=formulation)
         assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] <= 1e-9

@@ -23,8 +23,8 @@ def ring(law, folder, h, t_end):
 
 @pytest.mark.parametrize("law", LAWS)
 def test_energy_and_momenta_stay(tmp_path, law):
-    """40 increments, 12 a turn."""
-    history = ring(law, tmp_path, 0.5, 20).history
+    """16 increments, 12 a turn."""
+    history = ring(law, tmp_path, 0.5, 8).history
     for name in ("px", "py", "lz", "total"):
         drift = np.abs(history[name] - history[name][0]).max()
         assert drift <= 1e-12*abs(history[name][0]), name

@@ -28,9 +28,10 @@ FORMULATIONS = ["NODE TO SURFACE", "SEGMENT", "MORTAR"]
 @pytest.mark.parametrize("n", [2, 4])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_crossing_squares_do_not_miss(tmp_path, formulation, n):
-    """Bodies that cross each other's way meet, at every step and delay: 25 variants a mesh."""
+    """Bodies that cross each other's way meet, at every step and delay: 25 variants, of the finer
+    mesh every second one."""
     missed = {}
-    for name, scene in plain_scenes.crossings(n).items():
+    for name, scene in list(plain_scenes.crossings(n).items())[::n//2]:
         done = Outcome(scene, tmp_path / name, formulation=formulation)
         if not done.has_ended or done.way.by_edge > MISSED:
             missed[name] = f"exit code {done.code}, {done.way}"
