@@ -75,22 +75,24 @@ contains
       call outline_curves_init(self%look%curves, self%look%outline, scene, options)
    end subroutine judge_smooth
 
-   !> What overlaps at `u`, and no pair brings together, is meant to.
-   subroutine judge_excuse(self, x, u)
+   !> What overlaps at `u`, and no pair brings together, is left as it is from then on.
+   subroutine judge_excuse(self, x, u, overlap)
       type(judge_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+      type(overlap_t), intent(out) :: overlap    !! the deepest of these
 
       if (self%midside%n == 0) then
-         call excuse_points(self, x, u)
+         call excuse_points(self, x, u, overlap)
       else
-         call excuse_points(self, x, midside_points(self%midside, u))
+         call excuse_points(self, x, midside_points(self%midside, u), overlap)
       end if
    end subroutine judge_excuse
 
    !> The same, by the displacements of contact points.
-   subroutine excuse_points(self, x, u)
+   subroutine excuse_points(self, x, u, deepest)
       type(judge_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+      type(overlap_t), intent(out) :: deepest
       type(overlap_t) :: overlap
       type(meeting_t), allocatable :: meant(:)
       real(wp) :: rest(size(u, 1), size(u, 2))
@@ -108,6 +110,7 @@ contains
             overlap = overlap_t()
             call judge_pieces(self, p, self%other(i), x, u, rest, overlap)
             if (overlap%depth > 0.0_wp) meant = [meant, meeting_t(p, self%other(i))]
+            if (overlap%depth > deepest%depth) deepest = overlap
          end do
       end do
       self%excused = meant

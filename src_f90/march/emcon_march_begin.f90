@@ -6,6 +6,7 @@ module emcon_march_begin
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_explicit, only : explicit_prepare
    use emcon_factor_base, only : factor_base_t
+   use emcon_guards, only : touching_bar
    use emcon_holding, only : holding_begin, holding_t
    use emcon_dashpots, only : dashpots_begin_step
    use emcon_host, only : host_find_solver
@@ -15,6 +16,7 @@ module emcon_march_begin
    use emcon_kinds, only : dp, wp
    use emcon_layer, only : layer_begin_step, layer_mark
    use emcon_ledger, only : ledger_measure, ledger_t
+   use emcon_look_plane, only : overlap_text
    use emcon_march_accuracy, only : accuracy_begin
    use emcon_march_grid, only : march_count_grid, march_grid_time, march_part_time
    use emcon_march_past, only : march_past_forget
@@ -45,6 +47,8 @@ module emcon_march_begin
    private
    public :: march_begin_step, march_resume, march_renumber
 
+   !> So a warning of bodies begins that overlap from then on, since no pair brings them together.
+   character(len=*), parameter, public :: overlap_at_start = "bodies overlap as a step begins"
    !> Fields in a deck are rounded by less than this part of their largest value.
    real(wp), parameter :: deck_rounding = 1.0e-6_wp
 
@@ -249,11 +253,25 @@ contains
          step%resolves_overclosure)
       self%meant_overlap = 0.0_wp
       call judge_smooth(self%judge, scene, step%contact)
-      call judge_excuse(self%judge, scene%x, self%state%u_start)
+      call judge_excuse(self%judge, scene%x, self%state%u_start, overlap)
+      if (overlap%depth > touching_bar) call warn_of_overlap(self, scene, overlap)
       if (.not. step%resolves_overclosure) return
       call judge_step(self%judge, scene%x, self%state%u_start, at_rest(self%state%u), overlap)
       self%meant_overlap = overlap%depth
    end subroutine begin_overclosure
+
+   !> Bodies that overlap as a step begins, and no pair brings together: they stay so.
+   subroutine warn_of_overlap(self, scene, overlap)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(overlap_t), intent(in) :: overlap
+      character(len=:), allocatable :: text
+
+      call overlap_text(overlap, scene%node_label, self%system%space%body, text)
+      call note_add(self%warnings, overlap_at_start // ", by " // to_text(overlap%depth, 3) // &
+         " of an edge, " // text // ": no contact pair brings the two together, and their " // &
+         "overlap is not looked at further")
+   end subroutine warn_of_overlap
 
    !> The grid of the step, who controls sizes on it, and the time where it is taken up.
    subroutine begin_times(self, scene, step)

@@ -7,6 +7,7 @@ module emcon_verdict_lines
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : march_t
+   use emcon_march_begin, only : overlap_at_start
    use emcon_nodal_pull, only : nodal_pull_text
    use emcon_scene, only : scene_t
    use emcon_small_range, only : small_limit, small_range_t
@@ -66,11 +67,23 @@ contains
          else if (self%deepest > overlap_told) then
             line = line // "nothing penetrates by more than guards allow, "
          else if (size(self%largest_force) > 0) then
-            line = line // "nothing penetrates, "
+            line = line // "nothing " // trim(merge("else penetrates,", "penetrates,     ", &
+               overlaps_stay(self))) // " "
          end if
       end if
       line = line // "all residuals are within the tolerance"
    end subroutine good_line
+
+   !> Are there bodies that no pair brings together, and that overlapped as a step began?
+   pure logical function overlaps_stay(self)
+      type(verdict_t), intent(in) :: self
+      integer :: i
+
+      overlaps_stay = .false.
+      do i = 1, self%warnings%n
+         overlaps_stay = overlaps_stay .or. index(self%warnings%item(i)%text, overlap_at_start) == 1
+      end do
+   end function overlaps_stay
 
    !> The closing balance, the warnings and the verdict.
    subroutine verdict_balance_lines(self, scene, march, lines)

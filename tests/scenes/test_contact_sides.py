@@ -1,6 +1,7 @@
 """The decks of input_decks/ with contact of both sides, and of everything with everything."""
 
 import math
+import re
 
 import numpy as np
 import overlap
@@ -93,7 +94,12 @@ def test_bodies_without_a_pair_that_go_through_each_other_are_told(tmp_path, gap
     told = [text for text in run.verdict["reasons"] if "no contact pair brings the two" in text]
     assert len(told) == warns and run.verdict["verdict"] == ("bad" if warns else "good")
     assert (run.verdict["penetration"] > 0.1) is warns
-    assert ("nothing penetrates" in run.log) is not warns
+    assert ("nothing penetrates" in run.log) is is_paired
+    stays = [text for text in run.verdict["warnings"] if "overlap as a step begins" in text]
+    assert len(stays) == (gap < 0) == ("nothing else penetrates" in run.log)
+    if stays:
+        assert re.match(r"bodies overlap as a step begins, by 0\.2 of an edge, node \d+ of body [23] is 0\.05 "
+                        r"behind the edge .* of body [23]: no contact pair", stays[0])
 
 
 @pytest.mark.parametrize("cells", [(1, 1), (2, 3)])
