@@ -19,8 +19,9 @@
 !>    a type that extends `scheme_t`; by `stepper_give_force` and `stepper_give_mass` the solid of
 !>    a host code, a type that extends `host_force_t`; by `stepper_give_constraint` conditions that
 !>    always hold, a type that extends `constraint_t`; by `stepper_give_contact` the contact of a
-!>    pair, a type that extends `host_contact_t`; by `stepper_give_solver` a direct solver, a type
-!>    that extends `sparse_solver_t`.
+!>    pair, a type that extends `host_contact_t`; by `stepper_give_contact_law` a law of contact in
+!>    place of the penalty, one that extends `contact_law_t`; by `stepper_give_solver` a direct
+!>    solver, a type that extends `sparse_solver_t`.
 !> 2. `stepper_advance` until `stepper_is_done`: the grid of the deck. Or `stepper_step` with sizes
 !>    of the program's own, and `stepper_next_step` for the next step of the deck.
 !> 3. Between steps read `stepper%march%state` (`state_t`) and `stepper%march%ledger` (`ledger_t`),
@@ -48,7 +49,8 @@
 !> `query_overlap` judges the step by geometry alone.
 module emcon_api
    use emcon_contact, only : gap_state_t
-   use emcon_constraint, only : condition_t, constraint_t
+   use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
+   use emcon_constraint, only : condition_t, constraint_t, contact_response_t
    use emcon_csr, only : csr_from_elements, csr_from_entries, csr_multiply, &
       csr_multiply_transposed, csr_t, csr_transpose
    use emcon_csr_product, only : csr_product
@@ -92,8 +94,8 @@ module emcon_api
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
       stepper_set_state, stepper_snapshot, stepper_step
    use emcon_stepper_given, only : stepper_give_constraint, stepper_give_contact, &
-      stepper_give_element, stepper_give_force, stepper_give_law, stepper_give_mass, &
-      stepper_give_potential, stepper_give_scheme, stepper_give_solver
+      stepper_give_contact_law, stepper_give_element, stepper_give_force, stepper_give_law, &
+      stepper_give_mass, stepper_give_potential, stepper_give_scheme, stepper_give_solver
    use emcon_stepper_host, only : stepper_add_pair, stepper_add_surface, stepper_add_tie, &
       stepper_hold, stepper_new, stepper_set_contact, stepper_tie_matrices
    use emcon_stepper_loads, only : stepper_add_loads, stepper_find_load, stepper_set_load

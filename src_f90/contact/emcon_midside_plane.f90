@@ -248,8 +248,7 @@ contains
       if (item%rubs) then
          slip = item%slip(1)
          slip_first = both(item%t(:, :, 1), item%t1(:, :, 1))
-         if (.not. item%leaves_second) slip_second = item%ht(:size(first, 1), &
-            :size(first, 1), 1)
+         if (.not. item%leaves_second) slip_second = item%ht(:size(first, 1), :size(first, 1), 1)
       end if
       call condition_resize(item, to)
       item%node(:to) = list

@@ -2,8 +2,8 @@
 !>
 !> Patterns and orderings are kept as long as the active constraints stand on the same unknowns.
 module emcon_correction
-   use emcon_constraints, only : constraint_set_t, constraints_add_curvature, &
-      constraints_merge_pattern
+   use emcon_constraint_rows, only : constraints_add_curvature, constraints_merge_pattern
+   use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_independent_rows, only : independent_rows_find

@@ -3,8 +3,9 @@
 !>
 !> Source: docs/theory.md, eq. (22c).
 module emcon_layer_push
+   use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_place, constraint_set_t, constraints_evaluate, &
-      constraints_force, constraints_rows, constraints_select
+      constraints_force, constraints_select
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_solve
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp

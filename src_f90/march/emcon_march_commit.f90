@@ -249,8 +249,8 @@ contains
             state%is_active(set%id(k)) = .true.
             state%lam(set%id(k)) = set%lam(k)
             ! What has opened stores nothing that a later step could give back.
-            if (set%gives_way .and. set%is_stored .and. k > set%n_held) state%is_active(set%id(k)) = &
-               set%law(k)%law%closure() < 0.0_wp
+            if (set%gives_way .and. set%is_stored .and. k > set%n_held) &
+               state%is_active(set%id(k)) = set%law(k)%law%closure() < 0.0_wp
             if (.not. set%item(k)%rubs) cycle
             state%sliding(set%id(k)) = friction_slides(self%active%friction, set%id(k))
             drag = condition_drag(set%item(k), set%lam(k))

@@ -5,8 +5,9 @@
 !> eq. (25), so that no unit and no absolute size enters.
 module emcon_newton
    use emcon_constraint, only : condition_rate
+   use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_set_t, constraints_add_forces, constraints_evaluate, &
-      constraints_force, constraints_rows, constraints_take_hold
+      constraints_force, constraints_take_hold
    use emcon_convergence, only : convergence_begin, convergence_init, convergence_judge, &
       convergence_nears_end, convergence_t, most_rounding, next_done, next_give_up, next_tangent, &
       round_off

@@ -2,6 +2,7 @@
 !> the surfaces. Source: docs/theory.md, eqs. (20a) to (20e).
 module emcon_softness
    use emcon_constraints, only : constraint_place, constraint_set_t
+   use emcon_contact_law, only : contact_law_t, contact_place_t
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t, where_text
@@ -28,7 +29,9 @@ module emcon_softness
       logical :: is_at_ends = .false.            !! and pushes where steps begin and end: explicit
       real(wp) :: tolerance = 0.0_wp             !! of that, by the edge
       integer :: n_augmentation = 0              !! in the last increment
+      class(contact_law_t), allocatable :: law   !! of all contacts, where it gives way
       real(wp), allocatable :: stiffness(:)      !! (n_constraint) of contacts [M/T^2]
+      real(wp), allocatable :: area(:)           !! (n_constraint) of contacts [L^2]
       real(wp), allocatable :: edge(:)           !! (n_constraint) of the slave surface [L]
       real(wp), allocatable :: closure(:)        !! (n_constraint) that of `state_t` [L]
    end type softness_state_t
@@ -55,8 +58,16 @@ contains
       end do
       if (.not. self%is_on) return
       self%tolerance = step%softness%tolerance
+      if (self%augments) then
+         allocate(augmented_t :: self%law)
+      else if (allocated(system%contact_law)) then
+         allocate(self%law, source=system%contact_law)
+      else
+         allocate(penalty_t :: self%law)
+      end if
       allocate(self%closure(system%n_constraint), source=1.0_wp)
-      allocate(self%stiffness(system%n_constraint), self%edge(system%n_constraint), source=0.0_wp)
+      allocate(self%stiffness(system%n_constraint), self%area(system%n_constraint), &
+         self%edge(system%n_constraint), source=0.0_wp)
       inner = 0.0_wp
       do k = 1, size(system%term)
          call system%term(k)%term%add_stiffness(inner)
@@ -105,6 +116,8 @@ contains
             return
          end if
          contact%gives_way = .not. self%augments .and. step%scheme%masses_resist
+         self%area(before + 1:before + size(area)) = area*merge(0.5_wp, 1.0_wp, &
+            contact%both_sides)
          self%stiffness(before + 1:before + size(area)) = area*merge(0.5_wp, 1.0_wp, &
             contact%both_sides)*by_area
          ! Nodes at the ends of a surface have half of an edge.
@@ -134,7 +147,7 @@ contains
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(inout) :: set
       logical, intent(in) :: is_stored           !! pushes are discrete gradients of what is stored
-      type(penalty_t) :: law
+      type(contact_place_t) :: place
       integer :: k, pair, i
 
       set%gives_way = self%is_on .and. set%n > 0
@@ -143,18 +156,12 @@ contains
       do k = 1, set%n
          call constraint_place(system, set%id(k), pair, i)
          if (pair == 0) cycle
-         law%share = system%contact(pair)%contact%share(i)
-         law%stiffness = self%stiffness(set%id(k))
-         ! What is stored is a function of the integral of the gap. What is pushed back is a mean
-         ! gap, which gives way to a force as much where a part of the edges is covered.
-         if (.not. self%augments) law%stiffness = law%stiffness*law%share**2
-         if (.not. self%is_at_ends) law%before = self%closure(set%id(k))/law%share
-         if (set%is_stored) then
-            allocate(set%law(k)%law, source=law)
-         else
-            allocate(set%law(k)%law, source=augmented_t(penalty_t=law, base=merge(set%lam(k), &
-               0.0_wp, self%augments)))
-         end if
+         place = contact_place_t(self%area(set%id(k)), self%stiffness(set%id(k)), &
+            system%contact(pair)%contact%share(i))
+         if (set%is_stored .and. .not. self%is_at_ends) place%closure = self%closure(set%id(k))
+         allocate(set%law(k)%law, source=self%law)
+         call set%law(k)%law%begin(place)
+         call set%law(k)%law%push_on(set%lam(k))
       end do
    end subroutine softness_select
 
@@ -171,10 +178,7 @@ contains
       self%n_augmentation = self%n_augmentation + 1
       do k = set%n_held + 1, set%n
          if (abs(set%left(k)) > self%tolerance*set%item(k)%size) is_done = .false.
-         select type (law => set%law(k)%law)
-         type is (augmented_t)
-            law%base = set%lam(k)
-         end select
+         call set%law(k)%law%push_on(set%lam(k))
       end do
    end subroutine softness_augment
 

@@ -6,6 +6,7 @@
 !> elements only: the weight of given mass is for the giver to add.
 module emcon_stepper_given
    use emcon_constraint, only : constraint_t
+   use emcon_contact_law, only : contact_law_t
    use emcon_csr, only : csr_t
    use emcon_deck_given_scheme, only : check_given_scheme
    use emcon_element_kind, only : find_element_kind
@@ -31,12 +32,13 @@ module emcon_stepper_given
    use emcon_sparse_solver, only : solver_box_t, sparse_solver_t
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_that
+   use emcon_steps, only : method_penalty
    use emcon_text, only : squeezed, to_upper
    implicit none
    private
    public :: stepper_give_law, stepper_give_element, stepper_give_scheme, stepper_give_solver
    public :: stepper_give_potential, stepper_give_force, stepper_give_mass
-   public :: stepper_give_constraint, stepper_give_contact
+   public :: stepper_give_constraint, stepper_give_contact, stepper_give_contact_law
 
    !> Give the law of a *USER MATERIAL: its strain energy at points, or a type that extends `law_t`.
    interface stepper_give_law
@@ -262,13 +264,31 @@ contains
       if (.not. allocated(error)) call host_add_solver(self%given, word, solver)
    end subroutine stepper_give_solver
 
+   !> Give the law of all contacts in steps with *CONSTRAINT METHOD, TYPE=PENALTY, in place of the
+   !> penalty.
+   subroutine stepper_give_contact_law(self, law, error)
+      type(stepper_t), intent(inout) :: self
+      class(contact_law_t), intent(in) :: law
+      type(error_t), allocatable, intent(out) :: error   !! nothing was given
+
+      call check_stage(self, error)
+      if (allocated(error)) return
+      call check_that(.not. allocated(self%given%contact_law), "a law of contact is given " // &
+         "already", error)
+      call check_that(any(self%scene%step%constraint_method == method_penalty), "a law of " // &
+         "contact is given, but no step has a *CONSTRAINT METHOD, TYPE=PENALTY, in whose place " &
+         // "it acts", error)
+      if (.not. allocated(error)) allocate(self%given%contact_law, source=law)
+   end subroutine stepper_give_contact_law
+
    !> The deck is read, the model is not built.
    subroutine check_stage(self, error)
       type(stepper_t), intent(in) :: self
       type(error_t), allocatable, intent(inout) :: error
 
       call check_that(.not. allocated(self%march%scheme), "laws, elements, schemes, forces, " // &
-         "mass, constraints, contact and solvers are given before the model is built", error)
+         "mass, constraints, contact, its laws and solvers are given before the model is built", &
+         error)
       call check_that(self%is_read, "there is no scene to give anything to: no deck was read, " &
          // "or reading it failed", error)
    end subroutine check_stage

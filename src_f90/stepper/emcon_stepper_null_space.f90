@@ -1,7 +1,7 @@
 !> The null space of the constraints that act in the last evaluation, and the linear links, asked
 !> for from outside. Source: docs/theory.md, section 5.
 module emcon_stepper_null_space
-   use emcon_constraints, only : constraints_rows
+   use emcon_constraint_rows, only : constraints_rows
    use emcon_csr, only : csr_multiply, csr_t
    use emcon_csr_product, only : csr_product
    use emcon_errors, only : err_analysis, error_t, raise

@@ -7,8 +7,9 @@
 module emcon_stepper_query
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_active_set, only : active_set_select
-   use emcon_constraints, only : constraints_add_curvature, &
-      constraints_evaluate, constraints_force, constraints_merge_pattern, constraints_rows
+   use emcon_constraint_rows, only : constraints_add_curvature, constraints_merge_pattern, &
+      constraints_rows
+   use emcon_constraints, only : constraints_evaluate, constraints_force
    use emcon_contact, only : gap_state_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_analysis, error_t, raise

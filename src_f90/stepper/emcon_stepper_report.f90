@@ -1,7 +1,7 @@
 !> Constraints over a step that were evaluated: values, gradients, second derivatives.
 module emcon_stepper_report
-   use emcon_constraints, only : constraint_place, constraints_evaluate, constraints_rows, &
-      constraints_select
+   use emcon_constraint_rows, only : constraints_rows
+   use emcon_constraints, only : constraint_place, constraints_evaluate, constraints_select
    use emcon_contact, only : gap_state_t
    use emcon_csr, only : csr_copy_filled, csr_t
    use emcon_curvature, only : curvature_matrix, curvature_times

@@ -1,7 +1,8 @@
 !> Second derivatives of the selected conditions, summed with factors: what the tangent of a step
 !> gets less of, over all degrees of freedom.
 module emcon_curvature
-   use emcon_constraints, only : constraint_dof, constraint_set_t
+   use emcon_constraint_rows, only : constraint_dof
+   use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_from_values, csr_t
    use emcon_kinds, only : wp
    implicit none

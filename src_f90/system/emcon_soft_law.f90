@@ -1,12 +1,12 @@
 !> Laws of contact that gives way: the multiplier is a function of the gap, not an unknown.
 !>
 !> A penalty of stiffness k stores k/2 min(d, 0)^2 at the gap d. Over a step its force is the
-!> discrete gradient of that, so that what it takes is what it stores. An augmented Lagrangian
-!> pushes with a multiplier that is given, and k times what is left of the gap; with none it is a
-!> penalty that pushes by the value at the end. Source: docs/theory.md, eqs. (20a) to (20f).
+!> discrete gradient of that, so that what it takes is what it stores, or its value at the end. An
+!> augmented Lagrangian pushes with a multiplier that is given, and k times what is left of the gap.
+!> Source: docs/theory.md, eqs. (20a) to (20f).
 module emcon_soft_law
    use emcon_constraint, only : contact_response_t
-   use emcon_contact_law, only : contact_law_t, contact_values_t
+   use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
    use emcon_kinds, only : wp
    implicit none
    private
@@ -20,21 +20,50 @@ module emcon_soft_law
       real(wp) :: before = 1.0_wp
       real(wp) :: now = 0.0_wp                   !! where it is at the end [L]
    contains
+      procedure :: begin => penalty_begin
       procedure :: respond => penalty_respond
       procedure :: stored
       procedure :: stiffest
       procedure :: closure
-      procedure :: gives_back => penalty_gives_back
+      procedure :: gives_back
    end type penalty_t
 
    type, extends(penalty_t) :: augmented_t
       real(wp) :: base = 0.0_wp                  !! multiplier where nothing is left [M L/T^2]
    contains
+      procedure :: begin => augmented_begin
       procedure :: respond => augmented_respond
-      procedure :: gives_back => augmented_gives_back
+      procedure :: push_on
    end type augmented_t
 
 contains
+
+   pure subroutine penalty_begin(self, place)
+      class(penalty_t), intent(inout) :: self
+      type(contact_place_t), intent(in) :: place
+
+      self%share = place%share
+      self%stiffness = place%stiffness*place%share**2
+      self%before = place%closure/place%share
+   end subroutine penalty_begin
+
+   !> What a penalty stores is a function of the integral of the gap. What is pushed back is a mean
+   !> gap, which gives way to a force as much where a part of the edges is covered.
+   pure subroutine augmented_begin(self, place)
+      class(augmented_t), intent(inout) :: self
+      type(contact_place_t), intent(in) :: place
+
+      call self%penalty_t%begin(place)
+      self%stiffness = place%stiffness
+   end subroutine augmented_begin
+
+   !> An augmented Lagrangian goes on from the multiplier that has come out.
+   pure subroutine push_on(self, lam)
+      class(augmented_t), intent(inout) :: self
+      real(wp), intent(in) :: lam                !! [M L/T^2]
+
+      self%base = lam
+   end subroutine push_on
 
    !> k times the mean of min(d, 0) times the part of the way that is closed. What is stored goes on
    !> from what the step before has left, whatever the gap at its start is found to be now; what
@@ -47,6 +76,11 @@ contains
 
       start = at%gap0
       self%now = at%gap1
+      if (.not. at%is_stored) then
+         response%lam = -self%stiffness*at%left
+         response%stiffness(0, 0) = self%stiffness
+         return
+      end if
       if (self%before < 0.0_wp .or. (at%gap0 < 0.0_wp .and. .not. self%before > 0.0_wp)) then
          start = self%before
          self%now = start + at%dgap
@@ -102,17 +136,10 @@ contains
       closure = min(self%now, 0.0_wp)*self%share
    end function closure
 
-   pure logical function penalty_gives_back(self) result(gives_back)
+   pure logical function gives_back(self)
       class(penalty_t), intent(in) :: self
 
       gives_back = self%before < 0.0_wp
-   end function penalty_gives_back
-
-   !> What pushes by its value at the end has no energy that goes on.
-   pure logical function augmented_gives_back(self) result(gives_back)
-      class(augmented_t), intent(in) :: self
-
-      gives_back = .false.
-   end function augmented_gives_back
+   end function gives_back
 
 end module emcon_soft_law

@@ -8,6 +8,7 @@ module emcon_system
    use emcon_constraint, only : constraint_box_t
    use emcon_constraint_registry, only : constraints_create
    use emcon_contact, only : contact_box_t
+   use emcon_contact_law, only : contact_law_t
    use emcon_contact_registry, only : new_contact
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : err_analysis, err_input, error_t, raise
@@ -38,6 +39,7 @@ module emcon_system
       !> That hold at the end of every step: linear ones, then others
       type(constraint_box_t), allocatable :: held(:)
       type(contact_box_t), allocatable :: contact(:)
+      class(contact_law_t), allocatable :: contact_law   !! of contact that gives way; none: penalty
       integer :: n_pair = 0                      !! of the scene; guards come after them
       !> Conditions are numbered: those of `held`, those of `contact`
       integer :: n_constraint = 0
@@ -70,6 +72,9 @@ contains
       call space_init(self%space, scene, lists)
       if (scene%is_hosted) self%space%is_alive = .true.
       call constraints_create(scene, self%space%linear, self%held, given)
+      if (present(given)) then
+         if (allocated(given%contact_law)) allocate(self%contact_law, source=given%contact_law)
+      end if
       call init_contact(self, scene, error, given)
       if (allocated(error)) return
       call response_init(self%response, size(scene%x, 1), size(scene%x, 2), &

@@ -1,6 +1,7 @@
 !> What a model is given from outside between reading its deck and building it.
 module emcon_host
    use emcon_constraint, only : constraint_box_t, constraint_t
+   use emcon_contact_law, only : contact_law_t
    use emcon_csr, only : csr_t
    use emcon_host_contact, only : host_contact_box_t, host_contact_t
    use emcon_host_force, only : host_force_box_t, host_force_t
@@ -15,7 +16,8 @@ module emcon_host
       host_find_solver
 
    !> Laws by the names of materials, forces between nodes, mass beside that of elements, solvers
-   !> by what decks call them, constraints that always hold, contact of pairs.
+   !> by what decks call them, constraints that always hold, contact of pairs, a law of contact that
+   !> gives way.
    type :: host_t
       type(host_law_t), allocatable :: law(:)
       type(host_force_box_t), allocatable :: force(:)
@@ -23,6 +25,7 @@ module emcon_host
       type(solver_box_t), allocatable :: solver(:)
       type(constraint_box_t), allocatable :: constraint(:)
       type(host_contact_box_t), allocatable :: contact(:)
+      class(contact_law_t), allocatable :: contact_law
    end type host_t
 
    !> What `host_count` counts: forces and masses.

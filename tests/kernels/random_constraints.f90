@@ -1,7 +1,8 @@
 !> A random constrained linear problem: matrix N, constraint rows Gb and G1, right-hand sides.
 module random_constraints
-   use emcon_constraints, only : constraint_set_t, constraints_add_curvature, &
-      constraints_merge_pattern, constraints_rows, constraints_select
+   use emcon_constraint_rows, only : constraints_add_curvature, constraints_merge_pattern, &
+      constraints_rows
+   use emcon_constraints, only : constraint_set_t, constraints_select
    use emcon_condition_nodes, only : condition_resize
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_kinds, only : dp, wp

@@ -4,9 +4,10 @@ module test_condition_rows
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_constraint, only : condition_drag, condition_normal, condition_t, constraint_t, &
       contact_response_t
-   use emcon_constraints, only : constraint_set_t, constraints_add_curvature, &
-      constraints_add_forces, constraints_dissipated, constraints_evaluate, constraints_force, &
-      constraints_lam, constraints_merge_pattern, constraints_rows, constraints_select, &
+   use emcon_constraint_rows, only : constraints_add_curvature, constraints_merge_pattern, &
+      constraints_rows
+   use emcon_constraints, only : constraint_set_t, constraints_add_forces, constraints_dissipated, &
+      constraints_evaluate, constraints_force, constraints_lam, constraints_select, &
       constraints_stick
    use emcon_contact_law, only : contact_law_t, contact_values_t
    use emcon_csr, only : csr_from_entries, csr_t
@@ -88,20 +89,20 @@ contains
             q0 = reshape(motion%x(:, to%node) + motion%u0(:, to%node), [n_local])
             q1 = q0 + reshape(motion%du(:, to%node), [n_local])
             do s = 0, 2
-               at_mid = a(:, s) + matmul(b(:, :, s), 0.5_wp*(q0 + q1))
-               at_end = a(:, s) + matmul(b(:, :, s), q1)
+               at_mid = a(:, s + 1) + matmul(b(:, :, s + 1), 0.5_wp*(q0 + q1))
+               at_end = a(:, s + 1) + matmul(b(:, :, s + 1), q1)
                if (s == 0) then
-                  to%gap0 = dot_product(a(:, 0) + matmul(b(:, :, 0), 0.5_wp*q0), q0) - target(k)
+                  to%gap0 = dot_product(a(:, 1) + matmul(b(:, :, 1), 0.5_wp*q0), q0) - target(k)
                   to%dgap = dot_product(at_mid, q1 - q0)
                   to%gap1 = to%gap0 + to%dgap
                   to%g = reshape(at_mid, [3, 4])
                   to%c = reshape(at_end, [3, 4])
-                  to%h = 0.5_wp*b(:, :, 0)
+                  to%h = 0.5_wp*b(:, :, 1)
                else
                   to%slip(s) = dot_product(at_mid, q1 - q0)
                   to%t(:, :, s) = reshape(at_mid, [3, 4])
                   to%t1(:, :, s) = reshape(at_end, [3, 4])
-                  to%ht(:, :, s) = 0.5_wp*b(:, :, s)
+                  to%ht(:, :, s) = 0.5_wp*b(:, :, s + 1)
                end if
             end do
             if (to%is_mean) to%normal = condition_normal(to)

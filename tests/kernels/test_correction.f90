@@ -1,6 +1,7 @@
 !> Corrections of the constrained system: which method serves, and what has to be dropped.
 module test_correction
    use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_constraints, only : constraints_select
    use emcon_correction, only : correction_factorise, correction_free, correction_lay_out, &
       correction_multipliers, correction_reason, correction_reset, correction_solve, correction_t
    use emcon_csr, only : csr_multiply, csr_multiply_transposed
@@ -153,11 +154,11 @@ contains
       real(wp), allocatable :: dq(:), image(:)
       real(wp) :: dlam(0)
       logical :: is_singular
-      integer :: k, i, s
+      integer :: none(0), k, i, s
 
       call make_chain([1, 2, 3, 4], [1.0_wp, 4.0_wp, 1.0_wp]/6.0_wp, 4, 0, problem)
       call make_rows(problem)
-      problem%set%n = 0
+      call constraints_select(problem%set, none)
       system%space%numbering = problem%numbering
       system%matrix = problem%matrix
       system%is_symmetric = .true.

@@ -2,8 +2,9 @@
 module test_damped
    use check, only : check_near, check_true, test_case_t
    use emcon_constraint, only : condition_stiffness
-   use emcon_constraints, only : constraint_dof, constraint_set_t, constraints_dissipated, &
-      constraints_evaluate, constraints_force, constraints_select
+   use emcon_constraint_rows, only : constraint_dof
+   use emcon_constraints, only : constraint_set_t, constraints_dissipated, constraints_evaluate, &
+      constraints_force, constraints_select
    use emcon_dashpot_law, only : dashpot_t
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_damping_t, formulation_mortar, formulation_nts, &

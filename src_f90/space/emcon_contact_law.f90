@@ -9,7 +9,7 @@ module emcon_contact_law
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: contact_law_t, contact_law_box_t, contact_values_t
+   public :: contact_law_t, contact_law_box_t, contact_values_t, contact_place_t
 
    !> Where a condition has gone over a step.
    type :: contact_values_t
@@ -18,11 +18,26 @@ module emcon_contact_law
       real(wp) :: left = 0.0_wp                  !! of the gap, to what it is to be at the end [L]
       real(wp) :: slip(most_slips) = 0.0_wp      !! [L]
       real(wp) :: frequency = 0.0_wp             !! 1/h; 0 in statics [1/T]
+      !> Multipliers are to be discrete gradients over the step of what the law stores, else what
+      !> belongs to its end
+      logical :: is_stored = .true.
    end type contact_values_t
+
+   !> What a law acts on in a step.
+   type :: contact_place_t
+      real(wp) :: area = 0.0_wp                  !! of the condition [L^2]
+      real(wp) :: stiffness = 0.0_wp             !! that a penalty has on that area [M/T^2]
+      !> That gaps are means over, of the area: a law of d per area acts on share times d
+      real(wp) :: share = 1.0_wp
+      !> `closure` of the step before, <= 0: 0 where the law did not push; > 0: nothing is known
+      real(wp) :: closure = 1.0_wp
+   end type contact_place_t
 
    type, abstract :: contact_law_t
    contains
       procedure(respond_interface), deferred :: respond
+      procedure :: begin
+      procedure :: push_on
       procedure :: stored
       procedure :: dissipated
       procedure :: stiffest
@@ -49,6 +64,19 @@ module emcon_contact_law
    end interface
 
 contains
+
+   !> Told before each solve of a step; nothing to do unless overridden.
+   pure subroutine begin(self, place)
+      class(contact_law_t), intent(inout) :: self
+      type(contact_place_t), intent(in) :: place
+   end subroutine begin
+
+   !> A step is to be solved again with the multiplier `lam` that has come out, of laws that go on
+   !> from it; nothing to do unless overridden.
+   pure subroutine push_on(self, lam)
+      class(contact_law_t), intent(inout) :: self
+      real(wp), intent(in) :: lam                !! [M L/T^2]
+   end subroutine push_on
 
    !> What the law stores where the step ends, 0 unless overridden [M L^2/T^2].
    pure real(wp) function stored(self)
