@@ -80,11 +80,11 @@ contains
 
       do k = 1, 3
          call place(other(k), 0.3_wp, 0.0_wp, x, chain)
-         call check_near(error, top_width(chain, 2, [1, 2, 3], x, 0.0_wp*x), 0.0_wp, 0.0_wp, 1.0_wp, &
-            "master")
+         call check_near(error, top_width(chain, 2, [1, 2, 3], x, 0.0_wp*x), 0.0_wp, 0.0_wp, &
+            1.0_wp, "master")
          call place(0.3_wp, other(k), 0.0_wp, x, chain)
-         call check_near(error, top_width(chain, 2, [1, 2, 3], x, 0.0_wp*x), 0.0_wp, 0.0_wp, 1.0_wp, &
-            "slave")
+         call check_near(error, top_width(chain, 2, [1, 2, 3], x, 0.0_wp*x), 0.0_wp, 0.0_wp, &
+            1.0_wp, "slave")
       end do
       call place(1.04_wp, 0.3_wp, 0.0_wp, x, chain)
       call check_true(error, top_width(chain, 2, [1, 2, 3], x, 0.0_wp*x) > 0.0_wp, &

@@ -58,8 +58,8 @@ contains
       scene%u0(1, :) = 0.1_wp*scene%x(1, :)
    end subroutine make_thrown
 
-   !> What is taken stays the same with the rest, and materials never give back; momenta stay but for damping by mass,
-   !> which is alpha M du/h: they fall by (1 - alpha h/2)/(1 + alpha h/2).
+   !> What is taken stays the same with the rest, and materials never give back; momenta stay but
+   !> for damping by mass, which is alpha M du/h: they fall by (1 - alpha h/2)/(1 + alpha h/2).
    subroutine test_taken(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: alpha = 3.0_wp, beta = 0.01_wp
@@ -87,8 +87,8 @@ contains
                call march_increment(march, scene, increment, error)
                if (allocated(error)) return
                associate (ledger => march%ledger)
-                  call check_near(error, ledger%total + ledger%decay + ledger%damping, start%total, &
-                     tol, start%total, "energy, kind " // to_text(kind))
+                  call check_near(error, ledger%total + ledger%decay + ledger%damping, &
+                     start%total, tol, start%total, "energy, kind " // to_text(kind))
                   call check_true(error, ledger%damping - before%damping >= -tol*start%total, &
                      "materials take")
                   call check_near(error, ledger%momentum, fall*before%momentum, tol, &
@@ -99,7 +99,8 @@ contains
                if (allocated(error)) return
             end do
             associate (ledger => march%ledger)
-               call check_true(error, (ledger%decay > 1.0e-4_wp*start%total) .eqv. kind == 1, "decay")
+               call check_true(error, (ledger%decay > 1.0e-4_wp*start%total) .eqv. kind == 1, &
+                  "decay")
                call check_true(error, (ledger%damping > 1.0e-3_wp*start%total) .eqv. kind > 1, &
                   "damping")
             end associate

@@ -99,7 +99,7 @@ contains
          end do
          u = u + du
       end do
-      call check_true(error, list%n_list > 1 .and. list%n_list < 30, "lists are kept for some steps")
+      call check_true(error, list%n_list > 1 .and. list%n_list < 30, "lists are kept")
    end subroutine test_complete
 
    !> Within a step `within` never falls, as what acts has to stay near.
@@ -151,7 +151,7 @@ contains
       within = 0.0_wp
       call near_list_update(list, x, u, du, within)
       call check_equal(error, list%n_list, 1, "the same list")
-      call check_near(error, list%clearance, clearance - 0.3_wp*gap, 16.0_wp*eps, gap, "what is left")
+      call check_near(error, list%clearance, clearance - 0.3_wp*gap, 16.0_wp*eps, gap, "the rest")
       u(2, :n_item) = -0.6_wp*gap
       within = 0.0_wp
       call near_list_update(list, x, u, du, within)

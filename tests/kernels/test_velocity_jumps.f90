@@ -86,8 +86,8 @@ contains
             expected = jump(k)%lam*item%c(:, :3) + lam*reshape(matmul(item%h(:6, :6), &
                reshape(way(:, item%node(:3)), [6])), [2, 3])
             call check_near(error, jump(k)%impulse, expected, tol, 8.0_wp, "impulses")
-            moment = [(lam*(way(1, item%node(i))*item%c(2, i) - way(2, item%node(i))*item%c(1, i)), &
-               i = 1, 3)]
+            moment = [(lam*(way(1, item%node(i))*item%c(2, i) &
+               - way(2, item%node(i))*item%c(1, i)), i = 1, 3)]
             call check_near(error, [jump(k)%slave_moment, jump(k)%master_moment], &
                [moment(1), moment(2) + moment(3)], tol, 8.0_wp, "moments")
          end associate
@@ -112,9 +112,9 @@ contains
       call check_equal(error, all%id, [7, 9, 7, 9], "in their order")
       do k = 1, 2
          call check_near(error, all(k + 2)%impulse, 0.25_wp*all(k)%impulse, 0.0_wp, 1.0_wp, "part")
-         call check_near(error, [all(k + 2)%lam, all(k + 2)%slave_moment, all(k + 2)%master_moment], &
-            0.25_wp*[all(k)%lam, all(k)%slave_moment, all(k)%master_moment], 0.0_wp, 1.0_wp, &
-            "part of the rest")
+         call check_near(error, [all(k + 2)%lam, all(k + 2)%slave_moment, &
+            all(k + 2)%master_moment], 0.25_wp*[all(k)%lam, all(k)%slave_moment, &
+            all(k)%master_moment], 0.0_wp, 1.0_wp, "part of the rest")
       end do
    end subroutine test_parts
 

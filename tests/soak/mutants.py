@@ -99,7 +99,7 @@ def mistakes(line, is_behind=False):
 
 
 def statement(lines, number):
-    """Numbers of the lines of the statement that goes through a line, of which counters know one."""
+    """Numbers of the lines of the statement that goes through a line: counters know one of them."""
     first = last = number
     while first > 1 and lines[first - 2].endswith("&"):
         first -= 1
