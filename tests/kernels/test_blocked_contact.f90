@@ -25,8 +25,8 @@ contains
    !> motion closes it, it was left out, and all of the master is prescribed.
    subroutine test_text(error)
       type(error_t), allocatable, intent(out) :: error
-      character(len=*), parameter :: told = "slave node 12 of surface UPPER is 0.05 behind surface " &
-         // "LOWER: *BOUNDARY moves it"
+      character(len=*), parameter :: told = "slave node 12 of surface UPPER is 0.05 behind " &
+         // "surface LOWER: *BOUNDARY moves it"
 
       call expect(-0.15_wp, [.true., .true., .true.], 10, told, error)
       if (.not. allocated(error)) call expect(-0.15_wp, [.true., .true., .true.], 9, "", error)

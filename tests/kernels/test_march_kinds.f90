@@ -310,9 +310,10 @@ contains
                if (march_is_done(march)) exit
             end do
             call check_equal(error, n_event, 3, "nodes that land")
-            call check_true(error, meeting(1) < gap_start .and. meeting(2) >= gap_start - tol .and. &
-               meeting(2) - meeting(1) <= part*h*(1.0_wp + tol), "from " // to_text(meeting(1)) // &
-               " to " // to_text(meeting(2)))
+            call check_true(error, meeting(1) < gap_start .and. &
+               meeting(2) >= gap_start - tol .and. &
+               meeting(2) - meeting(1) <= part*h*(1.0_wp + tol), &
+               "from " // to_text(meeting(1)) // " to " // to_text(meeting(2)))
             call march_free(march)
          end block
          if (allocated(error)) return
@@ -347,8 +348,8 @@ contains
             push = sum(state%contact(2, 11:))
             call check_true(error, minval(gap_start + state%u(2, 11:13)) >= -tol, "nothing goes in")
             call check_true(error, all(state%contact(2, 11:13) >= -tol*young), "nothing pulls")
-            call check_near(error, ledger%momentum(2) - before%momentum(2), step*push, tol, 2.0_wp, &
-               "momentum")
+            call check_near(error, ledger%momentum(2) - before%momentum(2), step*push, tol, &
+               2.0_wp, "momentum")
             call check_true(error, ledger%contact_work - before%contact_work <= tol*start%total, &
                "contact makes no energy")
             call check_near(error, ledger%total - ledger%contact_work, start%total, 0.02_wp, &

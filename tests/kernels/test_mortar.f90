@@ -563,7 +563,8 @@ contains
             one%rubs = .true.
             one%normal = 0.0_wp
             call mortar%linearise([j], motion, [0.0_wp], one)
-            call check_near(error, one(1)%normal, expected, tol, 1.0_wp, "scheme " // to_text(scheme))
+            call check_near(error, one(1)%normal, expected, tol, 1.0_wp, "scheme " &
+               // to_text(scheme))
          end do
       end subroutine by_schemes
 

@@ -270,8 +270,9 @@ def call(command, folder, seconds, wall, place=None):
 
 def tests_of_runs():
     """Tests of whole runs, those first that see much for their time."""
-    first = ["scenes/test_friction.py", "scenes/test_contact_scenes.py", "scenes/test_soft_contact.py",
-             "scenes/test_explicit.py", "scenes/test_massless.py", "scenes/test_rigid.py"]
+    first = [f"scenes/test_{name}.py" for name in (
+        "schemes", "contact_output", "ring", "scene_report", "input_decks", "contact_scenes",
+        "friction", "soft_contact", "explicit", "massless", "rigid")]
     others = sorted(p.relative_to(ROOT / "tests").as_posix()
                     for p in (ROOT / "tests" / "scenes").glob("test_*.py"))
     return first + [name for name in others if name not in first]
