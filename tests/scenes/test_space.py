@@ -69,7 +69,7 @@ def test_patch_of_macneal_and_harder(kind, tmp_path):
 
 
 def flies(kind, law, tmp_path):
-    """A block that spins about no axis of its own, flies and vibrates, 1000 increments: energy and
+    """A block that spins about no axis of its own, flies and vibrates, 250 increments: energy and
     six momenta."""
     mesh = Block(kind, (2, 1, 1), (2, 1, 1))
     centre = np.array([1, 0.5, 0.5])
@@ -78,9 +78,9 @@ def flies(kind, law, tmp_path):
     speed = "".join(f"{k}, {a + 1}, {float(v[k - 1, a])!r}\n"
                     for k in range(1, len(v) + 1) for a in range(3))
     after = (f"*INITIAL CONDITIONS, TYPE=VELOCITY\n{speed}*STEP, NLGEOM, INC=2000\n"
-             "*DYNAMIC, DIRECT\n0.02, 20.\n*NODE FILE, FREQUENCY=1000\nU\n*END STEP\n")
+             "*DYNAMIC, DIRECT\n0.02, 5.\n*NODE FILE, FREQUENCY=250\nU\n*END STEP\n")
     history = run(mesh.deck(law, after), tmp_path).history
-    assert len(history) == 1001
+    assert len(history) == 251
     for names in (["total"], ["px", "py", "pz"], ["lx", "ly", "lz"]):
         size = np.sqrt(sum(history[name][0]**2 for name in names))
         for name in names:
