@@ -97,8 +97,10 @@ def assert_same_bits(run, reference, units):
         assert same.all(), f"{name} differs first in row {np.argmin(same)}"
 
 
-@pytest.mark.parametrize("units", UNITS)
-@pytest.mark.parametrize("method", ["NULL SPACE", "SADDLE POINT", "PENALTY", "AUGMENTED LAGRANGE"])
+@pytest.mark.parametrize(("method", "units"), [
+    *(("NULL SPACE", units) for units in UNITS),
+    *((method, UNITS[k]) for method in ("SADDLE POINT", "PENALTY", "AUGMENTED LAGRANGE")
+      for k in (3, -1))])
 def test_history_has_the_same_bits(tmp_path, reference, units, method):
     parameters = {"h": 0.05, "t_end": 1.5, "frame": 0.5, "method": method}
     run = run_deck(in_units(*units, **parameters), tmp_path)
