@@ -60,6 +60,8 @@ PY := .venv/bin/python
 # The dense blocks are small here: threads inside BLAS would spin more than they work.
 export OPENBLAS_NUM_THREADS ?= 1
 unexport PYTHONHOME PYTHONPATH
+# With it every process would compile the package anew, and every worker the tests.
+unexport PYTHONDONTWRITEBYTECODE
 
 # Two runs at a time take turns at building. Parallel, unless the caller has said how.
 BUILDING = +@flock build/.lock $(MAKE) --no-print-directory $(if $(V),,--silent) \
