@@ -99,7 +99,7 @@ def test_other_units_have_the_same_bits(kind: str, tmp_path: Path) -> None:
 def test_bits_do_not_depend_on_threads(kind: str, tmp_path: Path) -> None:
     text = scene(kind, cells=12, n=4 if kind == "C3D8" else 2)
     base = run(text, tmp_path/"1", "--threads", "1")
-    for n in (2, 3, 4, 7) if kind == "C3D8" else (2, 7):      # all kinds go through one loop
+    for n in (2, 3, 4, 7) if kind == "C3D8" else (7,):      # all kinds go through one loop
         assert_same(run(text, tmp_path/str(n), "--threads", str(n)), base)
 
 
