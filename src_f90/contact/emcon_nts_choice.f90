@@ -244,9 +244,13 @@ contains
       integer, intent(in) :: i, edge
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
       type(polygon_stencil_t), intent(out) :: stencil
+      real(wp) :: top
 
+      ! At rest a node may stand on a top for long.
+      top = merge(2.0_wp, 1.0_wp, self%meets_statics)
+      if (self%is_sharp) top = 0.0_wp
       call polygon_stencil(stencil, self%master, self%node(i), edge, &
-         self%rounding*[1.0_wp, merge(0.0_wp, 1.0_wp, self%is_sharp)], x, u0)
+         self%rounding*[1.0_wp, top], x, u0)
       ! Guards watch the mesh.
       if (.not. (self%is_sharp .or. self%meets_statics .or. self%slack > 0.0_wp)) &
          call corner_tops(self%slave, self%chain_node(i), self%master, edge, x, u0, stencil)

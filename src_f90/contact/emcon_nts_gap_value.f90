@@ -96,15 +96,16 @@ contains
       real(wp) :: hollow
 
       hollow = rounded_part(kappa, flat)
-      bent_value = (kappa - hollow)*over_top_value(tau, rounding(2)) &
+      bent_value = (kappa - hollow)*over_top_value(tau, rounding) &
          + hollow*rounded_negative(tau, rounding(1))
    end function bent_value
 
    !> min(tau, 0), rounded as in `over_top` of emcon_nts_gap.inc.
-   pure real(wp) function over_top_value(tau, width)
-      real(wp), intent(in) :: tau, width
+   pure real(wp) function over_top_value(tau, rounding) result(part)
+      real(wp), intent(in) :: tau, rounding(2)
 
-      over_top_value = 2.0_wp*above_negative(tau, width) - above_negative(tau, 0.5_wp*width)
+      part = above_negative(tau, rounding(2))
+      if (rounding(2) > rounding(1)) part = 2.0_wp*part - above_negative(tau, 0.5_wp*rounding(2))
    end function over_top_value
 
    pure real(wp) function cross(a, b)

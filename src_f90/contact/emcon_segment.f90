@@ -88,6 +88,7 @@ contains
       self%nts%reach = self%reach
       self%nts%rounding = self%rounding
       self%nts%is_sharp = self%is_sharp
+      self%nts%meets_statics = self%meets_statics
       call self%nts%begin_points(x, u0, du)
       call weighted_slips(self, x, u0, du)
       self%reach = self%nts%reach

@@ -201,7 +201,7 @@ contains
       end do
       call check_near(error, gap(1), up, tol, 1.0_wp, "sharp: the distance from the top")
       call check_true(error, gap(2) < gap(1) - min(tol, 0.01_wp*width) .and. &
-         gap(2) > gap(1) - 0.13_wp*width, "round: smaller by " // to_text(gap(1) - gap(2)))
+         gap(2) > gap(1) - 0.26_wp*width, "round: smaller by " // to_text(gap(1) - gap(2)))
    end subroutine test_sharp
 
    !> Two rhombs corner on corner, blunt as vertices of a curve: the top is round over a quarter of an edge, by the part of the
@@ -269,9 +269,9 @@ contains
          associate (stencil => nts%polygon(1, findloc(nts%node, node, 1)))
             side = merge(1, 2, norm2(scene%x(:, stencil%node(2)) - scene%x(:, node) - u(:, node)) &
                < 0.5_wp)
-            ! Where nothing faces, the top is as narrow as dents are wide.
+            ! Where nothing faces, the top is as narrow as dents are, or twice that.
             top_width = stencil%rounding(2, side)
-            if (top_width <= stencil%rounding(1, side)) top_width = 0.0_wp
+            if (top_width <= 2.0_wp*stencil%rounding(1, side)) top_width = 0.0_wp
          end associate
       end function top_width
 
