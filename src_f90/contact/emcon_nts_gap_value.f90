@@ -92,7 +92,7 @@ contains
 
    !> kappa min(tau, 0), rounded as in `bent_part` of emcon_nts_gap.inc.
    pure real(wp) function bent_value(tau, rounding, kappa)
-      real(wp), intent(in) :: tau, rounding(2), kappa
+      real(wp), intent(in) :: tau, rounding(:), kappa
       real(wp) :: hollow
 
       hollow = rounded_part(kappa, flat)
@@ -102,7 +102,7 @@ contains
 
    !> min(tau, 0), rounded as in `over_top` of emcon_nts_gap.inc.
    pure real(wp) function over_top_value(tau, rounding) result(part)
-      real(wp), intent(in) :: tau, rounding(2)
+      real(wp), intent(in) :: tau, rounding(:)
 
       part = above_negative(tau, rounding(2))
       if (rounding(2) > rounding(1)) part = 2.0_wp*part - above_negative(tau, 0.5_wp*rounding(2))
