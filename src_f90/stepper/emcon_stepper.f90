@@ -5,6 +5,7 @@ module emcon_stepper
    use emcon_blas, only : blas_is_shareable
    use emcon_deck, only : deck_read
    use emcon_deck_further, only : further_until
+   use emcon_deck_given_scheme, only : take_given_schemes
    use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_errors, only : err_input, err_interrupt, error_t, raise
@@ -139,7 +140,9 @@ contains
       type(stepper_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error
 
-      if (.not. self%scene%is_hosted) call host_check_scene(self%given, self%scene, error)
+      call take_given_schemes(self%march%given_scheme, self%scene, error)
+      if (.not. (allocated(error) .or. self%scene%is_hosted)) call host_check_scene(self%given, &
+         self%scene, error)
       if (allocated(error)) return
       call ties_prepare(self%scene, self%notes, error)
       if (.not. (allocated(error) .or. self%scene%is_hosted)) call prepare_contact(self, error)

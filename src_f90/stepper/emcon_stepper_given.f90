@@ -8,7 +8,6 @@ module emcon_stepper_given
    use emcon_constraint, only : constraint_t
    use emcon_contact_law, only : contact_law_t
    use emcon_csr, only : csr_t
-   use emcon_deck_given_scheme, only : check_given_scheme
    use emcon_element_kind, only : find_element_kind
    use emcon_element_registry, only : find_element_row
    use emcon_errors, only : error_t
@@ -17,8 +16,7 @@ module emcon_stepper_given
    use emcon_host_check, only : host_check_force, host_check_mass
    use emcon_host_contact, only : host_contact_t
    use emcon_host_force, only : host_force_t
-   use emcon_host_scheme, only : host_scheme_add, host_scheme_check, host_scheme_find, &
-      host_scheme_row
+   use emcon_host_scheme, only : host_scheme_add, host_scheme_check, host_scheme_find
    use emcon_interactions, only : formulation_given
    use emcon_law, only : law_t
    use emcon_law_registry, only : law_given
@@ -26,7 +24,7 @@ module emcon_stepper_given
    use emcon_point_function, only : point_function_t
    use emcon_scene, only : where_text
    use emcon_scheme, only : scheme_row_t, scheme_t
-   use emcon_scheme_registry, only : scheme_given, scheme_row
+   use emcon_scheme_registry, only : scheme_row
    use emcon_shape, only : shape_fault, shape_t
    use emcon_solver_registry, only : find_solver_row, is_foreign_solver, solver_names
    use emcon_sparse_solver, only : solver_box_t, sparse_solver_t
@@ -133,8 +131,6 @@ contains
       class(scheme_t), intent(in) :: scheme
       type(error_t), allocatable, intent(out) :: error   !! nothing was given
       type(scheme_row_t) :: own
-      type(scheme_row_t), allocatable :: before(:)
-      integer :: k
 
       call check_stage(self, error)
       if (.not. allocated(error)) call host_scheme_check(squeezed(name), scheme, error)
@@ -144,21 +140,8 @@ contains
          ": EMCON has its own", error)
       call check_that(host_scheme_find(self%march%given_scheme, squeezed(name)) == 0, &
          "the scheme " // squeezed(name) // " is given already", error)
-      if (allocated(error)) return
-      before = self%scene%step%scheme
-      own = host_scheme_row(squeezed(name), scheme)
-      do k = 1, size(before)
-         associate (step => self%scene%step(k))
-            if (step%scheme%code /= scheme_given) cycle
-            if (step%choice%name == squeezed(name)) step%scheme = own
-         end associate
-      end do
-      call check_given_scheme(self%scene, error)
-      if (allocated(error)) then
-         self%scene%step%scheme = before
-      else
-         call host_scheme_add(self%march%given_scheme, squeezed(name), scheme)
-      end if
+      if (.not. allocated(error)) call host_scheme_add(self%march%given_scheme, squeezed(name), &
+         scheme)
    end subroutine stepper_give_scheme
 
    !> Give a potential V(x, y) [M L^2/T^2] of the present position of each of some nodes.
