@@ -519,7 +519,8 @@ contains
       call refuse(law_code("yeoh"), [1.0_wp, 0.0_wp, 0.0_wp, -1.0_wp, 0.0_wp, 0.0_wp], &
          "D1 = -1 must not")
       call refuse(law_code("ogden 1"), [1.0_wp, 0.0_wp, 1.0_wp], "alpha = 0 must not be 0")
-      call refuse(law_code("ogden 1"), [1.0_wp, 2.0_wp, -1.0_wp, 1.0_wp, 1.0_wp, 0.0_wp], "sum of all mu = 0")
+      call refuse(law_code("ogden 1"), [1.0_wp, 2.0_wp, -1.0_wp, 1.0_wp, 1.0_wp, 0.0_wp], &
+         "sum of all mu = 0")
 
    contains
 

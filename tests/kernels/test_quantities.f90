@@ -40,7 +40,8 @@ contains
       call make_drop(scene, 8)
       call open_scene(stepper, scene, error)
       do i = 1, 6
-         if (.not. allocated(error)) call march_increment(stepper%march, stepper%scene, increment, error)
+         if (allocated(error)) return
+         call march_increment(stepper%march, stepper%scene, increment, error)
       end do
    end subroutine open_blocks
 
@@ -67,15 +68,16 @@ contains
       type(stepper_t) :: stepper
       type(quantity_row_t) :: row
       real(dp), allocatable :: values(:, :)
-      integer :: i
+      integer :: i, n
 
       call open_blocks(stepper, error)
       if (allocated(error)) return
       do i = 1, n_quantity_row()
          row = quantity_row(i)
          values = quantity_values(stepper, trim(row%variable), row%place)
-         call check_equal(error, shape(values), [quantity_components(trim(row%variable), row%place, &
-            2), n_place(stepper, row%place)], trim(row%variable) // " at " // to_text(row%place))
+         n = quantity_components(trim(row%variable), row%place, 2)
+         call check_equal(error, shape(values), [n, n_place(stepper, row%place)], &
+            trim(row%variable) // " at " // to_text(row%place))
       end do
       call march_free(stepper%march)
    end subroutine test_rows
