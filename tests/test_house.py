@@ -177,6 +177,15 @@ def statements(root, pattern, rooms_free):
                 yield f"{path.relative_to(root)}:{number}: {line.strip()}"
 
 
+def plain_simd(root):
+    """Sources with loops in lanes whose build tag does not let the compiler see the directive."""
+    for path in sources(root):
+        text = "".join(p.read_text() for p in [path, *module_order.included(path)])
+        if path.suffix != ".inc" and re.search(r"^\s*!\$omp\s+simd\b", text, re.I | re.M):
+            if not re.search(r"^! build: (lanes|streams)$", path.read_text(), re.M):
+                yield f"{path.relative_to(root)}: !$omp simd without a tag ! build: lanes or streams"
+
+
 def long_lines(root):
     """Lines of more columns than .fortitude.toml allows."""
     for path in sources(root):
@@ -302,6 +311,7 @@ CHECKS = {
     "kinds": named_kinds,
     "stop": lambda root: statements(root, STOP, {"app"}),
     "print": lambda root: statements(root, PRINT, {"app", "results"}),
+    "simd": plain_simd,
     "long lines": long_lines,
     "long procedures": long_procedures,
     "top level": top_level,
@@ -368,7 +378,7 @@ GOOD = {
     "stepper/emcon_stepper.f90": "module emcon_stepper\n   use :: emcon_text\n"
     "   use, intrinsic :: iso_c_binding\nend module emcon_stepper\n",
     "app/emcon.f90": "program emcon\n   use emcon_stepper\n   print *, 1\n   stop 1\nend program\n",
-    "laws/emcon_law_y.f90": "module emcon_law_y\n   type, extends(law_t) :: law_y_t\n"
+    "laws/emcon_law_y.f90": "! build: lanes\nmodule emcon_law_y\n   include 'lanes.inc'\n   type, extends(law_t) :: law_y_t\n"
     "   end type\nend module\n",
     "laws/emcon_law_registry.f90": "module emcon_law_registry\nend module\n",
     "laws/emcon_law_kinds.f90": "submodule (emcon_law_registry) emcon_law_kinds\n"
@@ -377,6 +387,7 @@ GOOD = {
     "../pywrap/emcon/mesh/read.py": "import os\nfrom .. import b\n",
     "../pywrap/emcon/mesh/__init__.py": "from .read import f\n",
     "../pywrap/emcon/b.py": "",
+    "laws/lanes.inc": "   !$omp simd\n",
     "order.py": "def f():\n    pass\n\n\nclass A:\n    def f(self):\n        pass\n",
 }
 BAD = {
@@ -422,6 +433,8 @@ BAD = {
     "python cycles": {"../pywrap/emcon/mesh/read.py": "def f():\n    from ..model import g\n"},
     "python cycles, package": {"../pywrap/emcon/b.py": "if True:\n    from .mesh import g\n",
                                "../pywrap/emcon/mesh/__init__.py": "from .. import b\n"},
+    "simd": {"laws/emcon_law_y.f90": "! biuld: lanes\nmodule emcon_law_y\n   include 'lanes.inc'\n"
+             "end module\n"},
     "long lines": {"base/emcon_a.f90": f"module emcon_a ! {'a'*100}\nend module emcon_a\n"},
     "kinds": {
         "laws/emcon_law_x.f90": "module emcon_law_x\n   type, extends(law_t) :: law_x_t\n"
