@@ -261,7 +261,7 @@ contains
          self%lam = 0.0_wp
       end where
       associate (set => self%active%set)
-         self%lam(set%id) = set%lam
+         self%lam(set%id(:set%n)) = set%lam(:set%n)
       end associate
       weight = merge(weight + self%lam, 0.0_wp, has_changed)
       call layer_find_push(self, weight, is_singular, error)

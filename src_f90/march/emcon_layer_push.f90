@@ -100,7 +100,7 @@ contains
          call correction_lay_out(correction, system, set)
          call correction_factorise(correction, system, set, is_singular, error)
          if (allocated(error) .or. is_singular) return
-         closed = pack([(k, k = 1, set%n)], abs(weight(set%id)) > 0.0_wp)
+         closed = pack([(k, k = 1, set%n)], abs(weight(set%id(:set%n))) > 0.0_wp)
          n = size(closed)
          allocate(residual(size(y)), ways(size(y), 0:n), forces(set%n, 0:n))
          call pick_unknowns(system%space%numbering, self%push, residual)

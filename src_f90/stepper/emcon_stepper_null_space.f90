@@ -91,7 +91,7 @@ contains
          end if
          call null_space_multipliers(self%null_space, set, system%space%numbering, of_unknown, &
             active)
-         lam(set%id) = active
+         lam(set%id(:set%n)) = active
       end associate
    end subroutine query_multipliers
 
