@@ -214,7 +214,7 @@ contains
          do k = 1, 2
             length = sqrt(sum(soft%item(k)%c(:, 2:3)**2, 1))
             total(soft%item(k)%node(2:3)) = total(soft%item(k)%node(2:3)) &
-               + soft%soft(k)%stiffness*length*sum(length)
+               + soft%law(k)%law%stiffest()*length*sum(length)
          end do
          met = total
          call explicit_soft_widen(march, has_grown)
