@@ -29,7 +29,7 @@ program bench_pair
    use emcon_nts_gap, only : nts_gap
    use emcon_nts_gap_first, only : nts_gap_first => nts_gap
    implicit none
-   real(wp), parameter :: sharp(3, 2) = 0.0_wp
+   real(wp), parameter :: sharp(2, 2) = 0.0_wp
    integer, parameter :: n_case = 200, n_run = 15, n_kind = 9
    character(len=40), parameter :: name(n_kind) = [character(len=40) :: "node over polygon edge", &
       "node over smoothed edge", "segment, edge normal", "segment, averaged normal", &
