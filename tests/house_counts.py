@@ -14,7 +14,7 @@ import sys
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 RECORD = ROOT / "tests/house_counts.json"
 #: Rooms whose procedures say what their arguments are.
-TOLD = "laws schemes solid contact terms system eliminate march".split()
+TOLD = "laws schemes solid surfaces touch contact terms system state solve active march".split()
 
 STRING = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'")
 
@@ -137,8 +137,8 @@ def planar_literals(path):
 # ---- words of the plane -------------------------------------------------------------------------
 
 #: Rooms that know surfaces. In those above, a chain is the rule of derivatives.
-SURFACED = ("scene deck space solid contact terms system eliminate prepare march results stepper "
-            "record border app").split()  # fmt: skip
+SURFACED = ("scene deck space solid surfaces touch contact terms system prepare state solve "
+            "active march results stepper record border app").split()  # fmt: skip
 WORD = re.compile(r"\b(?:[a-z]\w*_)?(?:chain|corner|edge|arc|outline)s?(?:_\w+)?\b", re.I)
 # Corners of elements are there in space, too; those of an amplitude are instants.
 ELSEWHERE = re.compile(

@@ -19,8 +19,8 @@ import pytest
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 ROOMS = (
-    "base algebra dgrad laws elements schemes scene deck space solid contact terms system "
-    "eliminate prepare march results stepper record border app".split()
+    "base algebra dgrad laws elements schemes scene deck space solid surfaces touch contact terms "
+    "system prepare state solve active march results stepper record border app".split()
 )
 # The program knows runs and the stepper only; texts and errors of base are common to all.
 ONLY = {"app": {"app", "record", "stepper", "base"}}

@@ -33,7 +33,7 @@ from kernel_coverage import lines_of_suites
 
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 RELEASE = pathlib.Path("build/release")
-FOLDERS = ["contact", "march", "terms", "solid"]
+FOLDERS = ["surfaces", "touch", "contact", "terms", "solid", "state", "active", "march"]
 GOAL = 0.95
 #: A mutant may never end: CPU time of a kernel suite, in times of what it takes and more [s].
 SLOWER, GRACE = 5, 2
