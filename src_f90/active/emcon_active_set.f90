@@ -1,25 +1,25 @@
 !> The constraints that act in a step: how the set begins, what it hands to the constraints, and
 !> what is let go, put off and dropped. How it goes on: emcon_active_set_update.
 module emcon_active_set
-   use emcon_constraints, only : constraint_place, constraint_set_t, constraints_gives_back, &
+   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_gives_back, &
       constraints_select
+   use emcon_contact_support, only : contact_support_forget, contact_support_t
    use emcon_dashpots, only : dashpots_idle, dashpots_look, dashpots_restart, dashpots_select, &
       dashpots_t
+   use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_friction, only : friction_begin, friction_init, friction_select, friction_t
    use emcon_gaps, only : gaps_forget, pair_measure, pair_search
-   use emcon_holding, only : holding_forget, holding_t
    use emcon_kinds, only : wp
    use emcon_motion, only : at_rest, motion_t
+   use emcon_motion_bound, only : largest_motion, motion_bound_t, motion_bound_add
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
-   use emcon_pose, only : pose_is_equilibrium
    use emcon_softness, only : softness_owes, softness_select, softness_state_t
    use emcon_state, only : state_t
    use emcon_system, only : system_t
-   use emcon_travel, only : largest_motion, travel_t, travel_to
    implicit none
    private
    public :: active_set_t, active_set_init, active_set_overclosure, active_set_begin, &
-      active_set_restart, active_set_select, active_set_look, active_set_pass
+      active_set_restart, active_set_select, active_set_update_gaps, active_set_pass
    public :: active_set_let_go, active_set_put_off, active_set_drop, touch_tol, most_sets
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
       step_stands_off, step_not_held, step_overlaps, step_unbalanced, step_rough, step_strikes, &
@@ -37,13 +37,13 @@ module emcon_active_set
    integer, parameter :: most_sets = 40
 
    !> Until when a contact whose surfaces are far apart need not be looked at.
-   type :: outlook_t
+   type :: skip_until_t
       real(wp) :: at = 0.0_wp                    !! `travel%total` as the step looked at began [L]
       real(wp) :: apart = 0.0_wp                 !! how far the surfaces were from each other [L]
       real(wp) :: reach = 0.0_wp                 !! and how near something would have counted [L]
       integer :: n_look = 0                      !! of the contact; another one: look again
       logical :: passes = .false.                !! nothing comes near: see `active_set_pass`
-   end type outlook_t
+   end type skip_until_t
 
    type :: active_set_t
       logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start,
@@ -86,9 +86,9 @@ module emcon_active_set
       type(friction_t) :: friction               !! what sticks, what slides
       type(softness_state_t) :: softness         !! how stiff contacts are that give way
       type(dashpots_t) :: dashpots               !! what is damped
-      type(holding_t) :: holding                 !! bodies that contact alone holds, in statics
-      type(travel_t) :: travel                   !! of all nodes, over the steps
-      type(outlook_t), allocatable :: outlook(:) !! (n_contact)
+      type(contact_support_t) :: support         !! bodies that contact alone holds, in statics
+      type(motion_bound_t) :: motion_bound       !! of all nodes, over the steps
+      type(skip_until_t), allocatable :: skip_until(:) !! (n_contact)
    end type active_set_t
 
 contains
@@ -100,9 +100,9 @@ contains
 
       if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%tried, &
          self%comes_and_goes, self%is_dropped, self%is_put_off, self%is_let_go, self%overclosure, &
-         self%closes, self%outlook, self%is_candidate)
+         self%closes, self%skip_until, self%is_candidate)
       allocate(self%closes(system%n_constraint), source=.false.)
-      allocate(self%outlook(size(system%contact)))
+      allocate(self%skip_until(size(system%contact)))
       allocate(self%overclosure(system%n_constraint), source=0.0_wp)
       allocate(self%is_active(system%n_constraint), source=.false.)
       allocate(self%is_candidate(system%n_constraint), source=.false.)
@@ -149,7 +149,7 @@ contains
       integer :: pair, left
 
       call phase_enter(system%phases, phase_gaps, left)
-      if (size(system%contact) > 0) call travel_to(self%travel, motion%u0)
+      if (size(system%contact) > 0) call motion_bound_add(self%motion_bound, motion%u0)
       self%was_active = state%is_active
       self%lam0 = state%lam
       self%softness%closure = state%closure
@@ -160,7 +160,8 @@ contains
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
             contact%is_sharp = .false.
-            contact%pushes_at_end = pose_is_equilibrium(motion%pose) .or. motion%pose%pushes_at_end
+            contact%pushes_at_end = evaluation_is_equilibrium(motion%evaluation) &
+               .or. motion%evaluation%pushes_at_end
          end associate
       end do
       call active_set_restart(self, system, motion)
@@ -176,7 +177,7 @@ contains
       if (size(system%contact) > 0) call gaps_forget(system)
       call begin_contact(self, system, motion)
       call friction_begin(self%friction, system, motion, self%was_active)
-      call holding_forget(self%holding)
+      call contact_support_forget(self%support)
       self%lam = self%lam0
       self%n_newton = 0
       self%n_tried = 0
@@ -195,7 +196,7 @@ contains
    end subroutine active_set_restart
 
    !> Choose the stencils of a contact for `motion`, and measure it over `du` if that is given.
-   subroutine active_set_look(self, system, pair, motion, du)
+   subroutine active_set_update_gaps(self, system, pair, motion, du)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       integer, intent(in) :: pair                !! number of the contact
@@ -205,10 +206,10 @@ contains
       call pair_search(system, pair, motion)
       if (present(du)) call pair_measure(system, pair, motion%x, motion%u0, du)
       associate (contact => system%contact(pair)%contact)
-         self%outlook(pair) = outlook_t(self%travel%total, contact%clearance, contact%reach, &
-            contact%n_look)
+         self%skip_until(pair) = skip_until_t(self%motion_bound%total, contact%clearance, &
+            contact%reach, contact%n_look)
       end associate
-   end subroutine active_set_look
+   end subroutine active_set_update_gaps
 
    !> Find the contacts whose surfaces `motion` cannot bring near: they are as last measured.
    pure subroutine active_set_pass(self, system, motion)
@@ -218,12 +219,12 @@ contains
       real(wp) :: closed
       integer :: pair
 
-      if (size(self%outlook) == 0) return
+      if (size(self%skip_until) == 0) return
       closed = 2.0_wp*largest_motion(motion%du)
-      do pair = 1, size(self%outlook)
-         associate (outlook => self%outlook(pair))
-            outlook%passes = is_empty(self, system, pair) .and. 2.0_wp*(self%travel%total &
-               - outlook%at) + max(closed, outlook%reach) < outlook%apart
+      do pair = 1, size(self%skip_until)
+         associate (skip_until => self%skip_until(pair))
+            skip_until%passes = is_empty(self, system, pair) .and. 2.0_wp*(self%motion_bound%total &
+               - skip_until%at) + max(closed, skip_until%reach) < skip_until%apart
          end associate
       end do
    end subroutine active_set_pass
@@ -236,7 +237,7 @@ contains
 
       associate (contact => system%contact(pair)%contact)
          is_empty = contact%clearance > 0.0_wp &
-            .and. contact%n_look == self%outlook(pair)%n_look
+            .and. contact%n_look == self%skip_until(pair)%n_look
       end associate
    end function is_empty
 
@@ -256,12 +257,12 @@ contains
                first => system%first_constraint(pair) + 1, &
                last => system%first_constraint(pair + 1))
             self%is_active(first:last) = .false.
-            if (self%outlook(pair)%passes .or. self%softness%is_at_ends) cycle
+            if (self%skip_until(pair)%passes .or. self%softness%is_at_ends) cycle
             if (.not. any(self%was_active(first:last))) then
-               call active_set_look(self, system, pair, motion)
+               call active_set_update_gaps(self, system, pair, motion)
                cycle
             end if
-            call active_set_look(self, system, pair, motion, at_rest(motion%u0))
+            call active_set_update_gaps(self, system, pair, motion, at_rest(motion%u0))
             self%is_active(first:last) = self%was_active(first:last) &
                .and. contact%state%is_near .and. (contact%state%is_over &
                .or. softness_owes(self%softness, first, last))
@@ -295,7 +296,7 @@ contains
       end if
       do k = 1, self%set%n
          self%set%lam(k) = self%lam(self%set%id(k))
-         call constraint_place(system, self%set%id(k), pair, i)
+         call constraint_index(system, self%set%id(k), pair, i)
          self%set%is_kept(k) = self%set%id(k) <= system%space%linear%n
          if (pair == 0) cycle
          self%set%is_firm(k) = .not. self%puts_off .or. self%only_adds &
@@ -312,10 +313,10 @@ contains
             if (self%set%is_kept(k)) self%set%target(k) = gap%gap0
          end associate
       end do
-      self%set%n_held = count(self%set%id(:self%set%n) <= system%first_constraint(1))
+      self%set%n_permanent = count(self%set%id(:self%set%n) <= system%first_constraint(1))
       call friction_select(self%friction, self%set, self%n_tried)
       call softness_select(self%softness, system, self%set, self%masses_resist .and. &
-         .not. motion%pose%pushes_at_end)
+         .not. motion%evaluation%pushes_at_end)
 
    contains
 
@@ -374,7 +375,7 @@ contains
 
       is_done = .true.
       if (self%only_adds) return
-      do k = self%set%n_held + 1, self%set%n
+      do k = self%set%n_permanent + 1, self%set%n
          associate (id => self%set%id(k))
             if (self%is_let_go(id) .or. .not. self%set%lam(k) < 0.0_wp) cycle
             if (constraints_gives_back(self%set, k)) cycle

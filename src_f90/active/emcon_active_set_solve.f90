@@ -14,11 +14,11 @@ module emcon_active_set_solve
       step_not_held
    use emcon_active_set_update, only : active_set_advance, active_set_leave, active_set_narrow, &
       most_early
+   use emcon_contact_support, only : contact_support_complete, contact_support_find_free
    use emcon_errors, only : error_t
    use emcon_friction, only : friction_holds, friction_idle, friction_keep
    use emcon_friction_referee, only : friction_referee
    use emcon_gaps, only : pair_search
-   use emcon_holding, only : holding_complete, holding_find_free
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_newton, only : newton_converged, newton_diverged, newton_early, newton_redundant, &
@@ -50,16 +50,16 @@ contains
       is_measured = .false.
       do
          call phase_enter(system%phases, phase_gaps, left)
-         if (self%holding%is_needed) call hold(self, system, scene, newton%driven, motion)
+         if (self%support%is_needed) call hold(self, system, scene, newton%driven, motion)
          call active_set_select(self, system, motion, is_measured .and. .not. &
-            self%holding%is_needed)
+            self%support%is_needed)
          is_measured = .false.
          call phase_leave(system%phases, left)
          status = step_not_held
-         if (allocated(self%holding%text)) return
+         if (allocated(self%support%text)) return
          self%before = motion%du
          newton%looks_early = (self%masses_resist .or. self%friction%is_on) .and. .not. &
-            (self%only_adds .or. self%holding%is_needed) .and. self%n_early < most_early
+            (self%only_adds .or. self%support%is_needed) .and. self%n_early < most_early
          call solve(self, system, newton, motion, status, error)
          if (allocated(error)) return
          call keep_multipliers(self)
@@ -104,8 +104,8 @@ contains
       integer, intent(inout) :: status           !! `step_not_held` if so
       logical :: is_held
 
-      if (status /= step_done .or. .not. self%holding%is_needed) return
-      call holding_find_free(self%holding, system, scene, motion, self%is_active, is_held)
+      if (status /= step_done .or. .not. self%support%is_needed) return
+      call contact_support_find_free(self%support, system, scene, motion, self%is_active, is_held)
       if (.not. is_held) status = step_not_held
    end subroutine look_for_free
 
@@ -207,8 +207,8 @@ contains
       integer :: pair
 
       motion%du = motion%du - driven
-      if (self%friction%is_on) self%holding%grips = friction_holds(self%friction)
-      call holding_complete(self%holding, system, scene, motion, self%is_active)
+      if (self%friction%is_on) self%support%grips = friction_holds(self%friction)
+      call contact_support_complete(self%support, system, scene, motion, self%is_active)
       motion%du = motion%du + driven
       ! What follows from others holds no more than these, and would be dropped again for ever.
       self%is_active = self%is_active .and. .not. self%is_dropped

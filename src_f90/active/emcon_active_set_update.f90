@@ -1,10 +1,10 @@
 !> The next set of active constraints, from the gaps and multipliers of one that solves the step.
 !> Source: docs/theory.md, section 6.
 module emcon_active_set_update
-   use emcon_active_set, only : active_set_look, active_set_pass, active_set_t, most_sets, &
+   use emcon_active_set, only : active_set_update_gaps, active_set_pass, active_set_t, most_sets, &
       step_cycling, step_done, step_stands_off, step_too_far, touch_tol
-   use emcon_constraints, only : constraint_place, constraints_gives_back
-   use emcon_contact, only : contact_t, deepest_arrival, gap_state_t
+   use emcon_constraints, only : constraint_index, constraints_gives_back
+   use emcon_contact, only : contact_t, max_penetration_on_entry, gap_state_t
    use emcon_dashpots, only : dashpots_idle, dashpots_look
    use emcon_friction, only : friction_close, friction_holds, friction_turn, most_lagged, most_shift
    use emcon_kinds, only : wp
@@ -64,7 +64,7 @@ contains
          is_done = .false.
          return
       end if
-      if (self%holding%is_needed) call find_grips(self, system)
+      if (self%support%is_needed) call find_grips(self, system)
       if (is_done) return
       ! What is damped only grows within a step: the same contacts beside more of it are no cycle.
       if (has_more) self%n_tried = 0
@@ -121,9 +121,9 @@ contains
       end do
       low = 0
       high = 0
-      do k = self%set%n_held + 1, self%set%n
+      do k = self%set%n_permanent + 1, self%set%n
          if (self%was_active(self%set%id(k))) cycle
-         call constraint_place(system, self%set%id(k), pair, i)
+         call constraint_index(system, self%set%id(k), pair, i)
          depth(k) = depth_of(self, system%contact(pair)%contact%state(i), self%set%id(k))
          associate (item => self%set%item(k))
             low(k) = minval(body(item%node(:item%n_node)))
@@ -166,9 +166,9 @@ contains
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
             ! The motion may be more than was expected.
-            if (self%outlook(pair)%passes .and. .not. any(self%is_active( &
+            if (self%skip_until(pair)%passes .and. .not. any(self%is_active( &
                system%first_constraint(pair) + 1:system%first_constraint(pair + 1)))) cycle
-            call active_set_look(self, system, pair, motion, motion%du)
+            call active_set_update_gaps(self, system, pair, motion, motion%du)
             if (.not. dashpots_idle(self%dashpots, contact)) call dashpots_look(self%dashpots, &
                system, pair, self%is_active, has_more)
             do i = 1, contact%n_constraint
@@ -177,7 +177,7 @@ contains
                   k = k + 1
                   call look_at_active(self, contact, i, k, motion, status)
                   changes = is_let_go(self, system, contact, i, k)
-                  if (changes .and. self%holding%is_needed) self%holding%has_pulled(id) = .true.
+                  if (changes .and. self%support%is_needed) self%support%has_pulled(id) = .true.
                   if (self%friction%is_on .and. .not. changes) then
                      call friction_turn(self%friction, system, self%set, k, turns)
                      has_changed = has_changed .or. turns
@@ -306,11 +306,11 @@ contains
       integer :: k, pair, i
 
       if (.not. self%friction%is_on) return
-      self%holding%grips = friction_holds(self%friction)
-      do k = self%set%n_held + 1, self%set%n
+      self%support%grips = friction_holds(self%friction)
+      do k = self%set%n_permanent + 1, self%set%n
          associate (id => self%set%id(k))
-            call constraint_place(system, id, pair, i)
-            self%holding%grips(id) = self%holding%grips(id) .and. self%set%lam(k) > &
+            call constraint_index(system, id, pair, i)
+            self%support%grips(id) = self%support%grips(id) .and. self%set%lam(k) > &
                noise_at(self, system, system%contact(pair)%contact%node(i))
          end associate
       end do
@@ -336,13 +336,14 @@ contains
                status = step_too_far
             end if
          else if (gap%is_arriving .and. contact%gives_way) then
-            closes = gap%gap1 < allowed(1) .and. gap%gap1 > -contact%deepest_start*gap%size
+            closes = gap%gap1 < allowed(1) &
+               .and. gap%gap1 > -contact%max_penetration_at_start*gap%size
          else if (gap%is_arriving .and. self%masses_resist .and. .not. may_arrive(gap)) then
             return
          else if (gap%is_arriving .and. self%masses_resist .and. self%may_cut) then
             status = step_too_far
          else if (self%was_active(id) .or. .not. gap%gap0 - allowed(0) &
-            < -contact%deepest_start*gap%size) then
+            < -contact%max_penetration_at_start*gap%size) then
             closes = .not. gap%gap1 - allowed(1) >= -merge(0.0_wp, gap_noise, contact%gives_way) &
                *gap%size
             if (self%holds_gap .and. self%is_candidate(id) .and. (self%has_cycled &
@@ -356,7 +357,7 @@ contains
    pure logical function may_arrive(gap)
       type(gap_state_t), intent(in) :: gap
 
-      may_arrive = gap%was_open .and. .not. gap%gap1 >= -deepest_arrival*gap%size
+      may_arrive = gap%was_open .and. .not. gap%gap1 >= -max_penetration_on_entry*gap%size
    end function may_arrive
 
    !> Would the `i`-th constraint of `contact` begin to act with a stencil chosen for another
@@ -369,7 +370,7 @@ contains
 
       associate (gap => contact%state(i))
          begins_unseen = .not. contact%covers(i, motion%x, motion%u0, motion%du) .or. &
-            (self%masses_resist .and. gap%gap0 > contact%farthest_start)
+            (self%masses_resist .and. gap%gap0 > contact%max_gap_on_entry)
       end associate
    end function begins_unseen
 

@@ -6,14 +6,14 @@
 !> to be candidates within the step. Source: docs/theory.md, section 4.13.
 module emcon_friction
    use emcon_constraint, only : condition_drag, condition_normal, condition_t, most_slips
-   use emcon_constraints, only : constraint_place, constraint_set_t, constraints_stick
+   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_stick
    use emcon_contact, only : contact_t
    use emcon_csr, only : csr_find
+   use emcon_evaluation, only : evaluation_is_equilibrium, evaluation_displacement
    use emcon_friction_law, only : friction_trial, friction_violation, slip_rounding, touch_free, &
       touch_open, touch_rests, touch_sticks, touch_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
-   use emcon_pose, only : pose_is_equilibrium, pose_way
    use emcon_system, only : system_t
    implicit none
    private
@@ -92,7 +92,8 @@ contains
       self%n_asked = 0
       self%n_lagged = 0
       self%lead = 0.0_wp
-      if (.not. pose_is_equilibrium(motion%pose)) call find_leads(self, system, motion, was_active)
+      if (.not. evaluation_is_equilibrium(motion%evaluation)) call find_leads(self, system, &
+         motion, was_active)
    end subroutine friction_begin
 
    !> The slips of what acted, as `friction_begin` has it.
@@ -104,7 +105,7 @@ contains
       real(wp) :: du(size(motion%du, 1), size(motion%du, 2))
       integer :: i, pair
 
-      du = pose_way(motion%pose, motion%v0, 0.0_wp)
+      du = evaluation_displacement(motion%evaluation, motion%v0, 0.0_wp)
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact, first => system%first_constraint(pair))
             if (.not. contact%friction > 0.0_wp) cycle
@@ -138,7 +139,7 @@ contains
       if (.not. self%is_on) return
       self%tried(:, n_tried) = self%way
       sticks = .false.
-      do k = set%n_held + 1, set%n
+      do k = set%n_permanent + 1, set%n
          associate (item => set%item(k), id => set%id(k))
             item%rubs = self%mu(id) > 0.0_wp
             if (.not. item%rubs) cycle
@@ -255,8 +256,9 @@ contains
 
       associate (id => system%first_constraint(pair) + i, contact => system%contact(pair)%contact)
          if (.not. self%mu(id) > 0.0_wp) return
-         if (is_new .and. .not. pose_is_equilibrium(motion%pose)) then
-            self%lead(id) = lead_of(contact, i, motion, pose_way(motion%pose, motion%v0, 0.0_wp))
+         if (is_new .and. .not. evaluation_is_equilibrium(motion%evaluation)) then
+            self%lead(id) = lead_of(contact, i, motion, evaluation_displacement(motion%evaluation, &
+               motion%v0, 0.0_wp))
          end if
          at%gap = min(gap, -tiny(gap))
          at%slip = contact%slip(i, motion%x, motion%u0, motion%du)
@@ -298,10 +300,10 @@ contains
 
       missed = 0.0_wp
       largest = 0.0_wp
-      if (.not. self%is_on .or. set%n == set%n_held) return
+      if (.not. self%is_on .or. set%n == set%n_permanent) return
       largest = largest_push(set)
       if (.not. largest > 0.0_wp) return
-      do k = set%n_held + 1, set%n
+      do k = set%n_permanent + 1, set%n
          associate (item => set%item(k))
             if (.not. item%rubs) cycle
             push = set%lam(k)
@@ -318,7 +320,8 @@ contains
    pure real(wp) function largest_push(set) result(largest)
       type(constraint_set_t), intent(in) :: set  !! some contact acts
 
-      largest = maxval(abs(set%item(set%n_held + 1:set%n)%normal*set%lam(set%n_held + 1:set%n)))
+      largest = maxval(abs(set%item(set%n_permanent + 1:set%n)%normal*set%lam(set%n_permanent &
+         + 1:set%n)))
    end function largest_push
 
    !> The mean stiffness of the system at the slave node of a condition: of its unknowns, or those

@@ -15,7 +15,7 @@ module emcon_friction_referee
    use emcon_friction_law, only : touch_open, touch_t
    use emcon_friction_solve, only : friction_problem_t, friction_solve
    use emcon_kinds, only : wp
-   use emcon_motion, only : motion_place, motion_t
+   use emcon_motion, only : motion_evaluate, motion_t
    use emcon_numbering, only : numbering_t, pick_unknowns
    use emcon_system, only : system_respond, system_t
    implicit none
@@ -45,10 +45,10 @@ contains
       if (.not. self%friction%is_on .or. self%friction%n_asked == most_asked) return
       self%n_tried = 0
       call active_set_select(self, system, motion)
-      associate (n => self%set%n - self%set%n_held)
+      associate (n => self%set%n - self%set%n_permanent)
          if (n == 0 .or. n > most_contacts) return
       end associate
-      call motion_place(motion)
+      call motion_evaluate(motion)
       call system_respond(system, motion, .true.)
       if (allocated(system%response%refusal) .or. allocated(system%response%failure)) return
       call constraints_evaluate(self%set, system, motion, .true.)
@@ -74,8 +74,8 @@ contains
       real(wp), dimension(system%space%numbering%n_unknown) :: force, way
       integer :: i, n, first
 
-      first = self%set%n_held + 1
-      n = self%set%n - self%set%n_held
+      first = self%set%n_permanent + 1
+      n = self%set%n - self%set%n_permanent
       allocate(problem%w(2*n, 2*n), source=0.0_wp)
       associate (item => self%set%item(first:), id => self%set%id(first:self%set%n), &
             numbering => system%space%numbering)
@@ -142,7 +142,7 @@ contains
       integer :: way(size(problem%mu))
       logical :: fell_back
 
-      associate (id => self%set%id(self%set%n_held + 1:self%set%n), friction => self%friction)
+      associate (id => self%set%id(self%set%n_permanent + 1:self%set%n), friction => self%friction)
          way = friction%way(id)
          call friction_solve(problem, way, at, is_solved, fell_back)
          if (.not. is_solved) return

@@ -12,13 +12,13 @@ module emcon_layer
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_select
    use emcon_correction, only : correction_free, correction_reset
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_at_end
    use emcon_host, only : host_t
    use emcon_kinds, only : wp
    use emcon_layer_push, only : layer_find_push
    use emcon_layer_type, only : layer_t
-   use emcon_motion, only : at_rest, motion_init, motion_place, motion_t
+   use emcon_motion, only : at_rest, motion_init, motion_evaluate, motion_t
    use emcon_newton, only : newton_init
-   use emcon_pose, only : pose_at_end
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_row
    use emcon_steps, only : initiation_admissible, load_point, load_t, method_saddle_point, &
@@ -46,7 +46,7 @@ contains
       integer :: n
 
       self%is_massless = is_massless
-      allocate(self%is_troubled(size(is_massless)), source=.false.)
+      allocate(self%needs_mass(size(is_massless)), source=.false.)
       self%is_on = any(is_massless)
       if (.not. self%is_on) return
       call cut_scene(self, scene)
@@ -231,7 +231,7 @@ contains
 
       status = step_done
       self%is_settled = .false.
-      self%is_troubled = .false.
+      self%needs_mass = .false.
       self%acts = active%is_active(self%n_before + 1:)
       has_changed = self%acts .neqv. active%was_active(self%n_before + 1:)
       if (.not. any(has_changed)) return
@@ -248,7 +248,7 @@ contains
          call mark_trouble(self, has_changed)
          return
       end if
-      call motion_place(self%motion)
+      call motion_evaluate(self%motion)
       call system_respond(self%system, self%motion, .true.)
       self%du = self%motion%du
       self%work = sum(load*self%du)
@@ -324,11 +324,11 @@ contains
       do i = 1, size(self%system%contact)
          associate (node => self%system%contact(i)%contact%node, &
                first => self%system%first_constraint(i))
-            self%is_troubled(pack(node, has_changed(first + 1:first + size(node)))) = .true.
+            self%needs_mass(pack(node, has_changed(first + 1:first + size(node)))) = .true.
          end associate
       end do
-      self%is_troubled = self%is_troubled .and. self%is_massless
-      if (.not. any(self%is_troubled)) self%is_troubled = self%is_massless
+      self%needs_mass = self%needs_mass .and. self%is_massless
+      if (.not. any(self%needs_mass)) self%needs_mass = self%is_massless
    end subroutine mark_trouble
 
    !> The contacts that z takes no part in: those between massive nodes alone stay as they are.
@@ -364,7 +364,7 @@ contains
       integer :: k
 
       self%lam = 0.0_wp
-      do k = active%set%n_held + 1, active%set%n
+      do k = active%set%n_permanent + 1, active%set%n
          self%lam(active%set%id(k) - self%n_before) = active%set%lam(k)
       end do
    end subroutine take_multipliers
@@ -378,15 +378,15 @@ contains
 
       do k = 1, size(self%scene%step(1)%load)
          associate (own => self%scene%step(1)%load(k))
-            own%value = load(own%place, own%target)
+            own%value = load(own%at, own%target)
             own%value_start = own%value
          end associate
       end do
       call system_renew(self%system, self%scene)
-      self%motion%pose = pose_at_end
+      self%motion%evaluation = evaluation_at_end
       self%motion%u0 = motion%u0 + motion%du
       self%motion%du = 0.0_wp
-      call motion_place(self%motion)
+      call motion_evaluate(self%motion)
       do k = 1, size(self%system%contact)
          self%system%contact(k)%contact%reach = 0.0_wp
       end do

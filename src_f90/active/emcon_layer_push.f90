@@ -4,7 +4,7 @@
 !> Source: docs/theory.md, eq. (22c).
 module emcon_layer_push
    use emcon_constraint_rows, only : constraints_rows
-   use emcon_constraints, only : constraint_place, constraint_set_t, constraints_evaluate, &
+   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate, &
       constraints_force, constraints_select
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_solve
    use emcon_errors, only : error_t
@@ -70,7 +70,7 @@ contains
       integer :: k, pair, i
 
       do k = 1, size(id)
-         call constraint_place(system, id(k), pair, i)
+         call constraint_index(system, id(k), pair, i)
          have_gaps(k) = pair == 0
          if (pair > 0) have_gaps(k) = system%contact(pair)%contact%state(i)%is_near
       end do

@@ -26,7 +26,7 @@ module emcon_layer_type
       type(motion_t) :: motion
       integer :: n_before = 0                    !! conditions of the model before its contact
       ! of `layer_settle`:
-      logical, allocatable :: is_troubled(:)     !! (n_node) where it found no balance
+      logical, allocatable :: needs_mass(:)      !! (n_node) where it found no balance
       logical :: is_settled = .false.            !! in the last increment
       real(wp), allocatable :: du(:, :)          !! (n_dim, n_node) how z has moved [L]
       real(wp) :: released = 0.0_wp              !! energy that z has given up [M L^2/T^2]

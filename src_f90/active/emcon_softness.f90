@@ -1,7 +1,7 @@
 !> Contact that gives way: how stiff each constraint of a step is, by the deck or by the elements at
 !> the surfaces. Source: docs/theory.md, eqs. (20a) to (20e).
 module emcon_softness
-   use emcon_constraints, only : constraint_place, constraint_set_t
+   use emcon_constraints, only : constraint_index, constraint_set_t
    use emcon_contact_law, only : contact_law_t, contact_place_t
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
@@ -154,7 +154,7 @@ contains
       if (.not. set%gives_way) return
       set%is_stored = is_stored .and. .not. self%augments
       do k = 1, set%n
-         call constraint_place(system, set%id(k), pair, i)
+         call constraint_index(system, set%id(k), pair, i)
          if (pair == 0) cycle
          place = contact_place_t(self%area(set%id(k)), self%stiffness(set%id(k)), &
             system%contact(pair)%contact%share(i))
@@ -176,7 +176,7 @@ contains
       is_done = .true.
       if (.not. (self%augments .and. set%gives_way)) return
       self%n_augmentation = self%n_augmentation + 1
-      do k = set%n_held + 1, set%n
+      do k = set%n_permanent + 1, set%n
          if (abs(set%left(k)) > self%tolerance*set%item(k)%size) is_done = .false.
          call set%law(k)%law%push_on(set%lam(k))
       end do
@@ -189,7 +189,7 @@ contains
       type(constraint_set_t), intent(in) :: set
       integer :: first
 
-      first = set%n_held + 1
+      first = set%n_permanent + 1
       pulls = self%augments .and. set%n >= first
       if (pulls) pulls = minval(set%lam(first:set%n)) < -pull*maxval(abs(set%lam(first:set%n)))
    end function softness_pulls
@@ -202,7 +202,7 @@ contains
 
       energy = 0.0_wp
       if (self%augments .or. .not. set%gives_way) return
-      do k = set%n_held + 1, set%n
+      do k = set%n_permanent + 1, set%n
          energy = energy + set%law(k)%law%stored()
       end do
    end function softness_stored
@@ -215,7 +215,7 @@ contains
       integer :: k
 
       if (self%augments .or. .not. set%gives_way) return
-      do k = set%n_held + 1, set%n
+      do k = set%n_permanent + 1, set%n
          closure(set%id(k)) = set%law(k)%law%closure()
       end do
    end subroutine softness_keep
@@ -240,7 +240,7 @@ contains
 
       depth = 0.0_wp
       if (.not. set%gives_way) return
-      do k = set%n_held + 1, set%n
+      do k = set%n_permanent + 1, set%n
          edge = set%item(k)%size
          if (self%edge(set%id(k)) > 0.0_wp .and. .not. self%augments) edge = min(edge, &
             self%edge(set%id(k)))

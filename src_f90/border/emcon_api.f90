@@ -64,13 +64,13 @@ module emcon_api
       formulation_nts, formulation_segment, integration_elements, integration_segments, &
       multiplier_dual, multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, &
       smoothing_none
-   use emcon_judge, only : overlap_t
+   use emcon_overlap_check, only : overlap_t
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t
    use emcon_motion, only : motion_t
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
-   use emcon_pose, only : instant_later, instant_t, pose_moving, pose_t
+   use emcon_evaluation, only : instant_later, instant_t, evaluation_moving, evaluation_t
    use emcon_quantities, only : contact_field, contact_quantity, element_quantity, &
       node_quantity, pair_quantity, quantity_components, quantity_values, quantity_variables
    use emcon_quantity_registry, only : at_contacts, at_elements, at_nodes, at_pairs

@@ -6,9 +6,9 @@ module emcon_model_contact
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t
-   use emcon_judge, only : overlap_t
    use emcon_kinds, only : wp
    use emcon_model, only : model_t
+   use emcon_overlap_check, only : overlap_t
    use emcon_stepper_contact, only : query_gaps, query_overlap, query_select
    use emcon_stepper_host, only : stepper_add_pair, stepper_set_contact
    use emcon_steps, only : initiation_persistent

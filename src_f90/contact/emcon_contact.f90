@@ -4,15 +4,15 @@
 !> its value, discrete gradient and derivatives. Which constraints act is not its business.
 module emcon_contact
    use emcon_constraint, only : condition_normal, condition_t, constraint_t
+   use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_interactions, only : contact_damping_t, contact_options_t
    use emcon_kinds, only : wp
    use emcon_midside_plane, only : midside_distribute, midside_points, midside_stretch, midside_t
    use emcon_motion, only : motion_t
-   use emcon_pose, only : pose_is_equilibrium
    implicit none
    private
    public :: contact_t, contact_box_t, gap_state_t
-   public :: deepest_arrival
+   public :: max_penetration_on_entry
 
    !> Corners of master surfaces are rounded over these fractions of an edge: with and without a
    !> static step among those to come.
@@ -20,7 +20,7 @@ module emcon_contact
 
    !> So far, per edge, a contact may close in the step in which it slides onto its surface: corners
    !> dip into edges; beyond, a body flies through.
-   real(wp), parameter :: deepest_arrival = 0.05_wp
+   real(wp), parameter :: max_penetration_on_entry = 0.05_wp
 
    !> Where one possible constraint stands at both ends of a step.
    type :: gap_state_t
@@ -63,13 +63,13 @@ module emcon_contact
       integer :: n_look = 0                           !! steps begun so far
       !> So far, per edge, a gap may be closed at the start of a step in which it begins to act;
       !> from there on the other side of a thin body is meant.
-      real(wp) :: deepest_start = 0.0_wp
+      real(wp) :: max_penetration_at_start = 0.0_wp
       !> From a larger gap at the start no contact may begin in a step with inertia: what it is made
       !> of would be seen only with a motion that goes through the surface [L].
-      real(wp) :: farthest_start = huge(1.0_wp)
+      real(wp) :: max_gap_on_entry = huge(1.0_wp)
       integer, allocatable :: node(:)                 !! (n_constraint) slave node of each
       !> (n_constraint) the other slave node at the same place of a surface of tied pieces; 0: none
-      integer, allocatable :: twin(:)
+      integer, allocatable :: duplicate(:)
       real(wp), allocatable :: thickness(:)           !! (n_constraint) of the slave side [L]
       !> (n_constraint) how far the arcs that edges stand for rise over them where a gap is measured
       !> in the step, in the mean: counted off the gap. 0 unless `follow_arcs` says so [L]
@@ -328,14 +328,16 @@ contains
       type(condition_t), allocatable :: over(:)
       integer :: k
 
-      if (motion%pose%is_gradient .and. .not. motion%pose%place > 0.0_wp) then
+      if (motion%evaluation%is_gradient .and. .not. motion%evaluation%at > 0.0_wp) then
          call from_start(self, wanted, motion, target, item)
          call find_normals(item)
          return
       end if
-      if (.not. pose_is_equilibrium(motion%pose) .or. any(item%rubs)) call self%evaluate(wanted, &
-         motion%x, motion%u0, motion%du, target, item)
-      if (.not. (pose_is_equilibrium(motion%pose) .or. motion%pose%pushes_at_end)) then
+      if (.not. evaluation_is_equilibrium(motion%evaluation) &
+         .or. any(item%rubs)) call self%evaluate(wanted, motion%x, motion%u0, motion%du, target, &
+         item)
+      if (.not. (evaluation_is_equilibrium(motion%evaluation) &
+         .or. motion%evaluation%pushes_at_end)) then
          call find_normals(item)
          return
       end if
@@ -352,7 +354,7 @@ contains
          item(k)%t1 = over(k)%t1
       end do
       call find_normals(item)
-      if (pose_is_equilibrium(motion%pose)) return
+      if (evaluation_is_equilibrium(motion%evaluation)) return
       item%gap0 = gap0
       item%dgap = dgap
    end subroutine linearise

@@ -1,6 +1,6 @@
 !> A formulation of contact that a program gives, for the pairs of the deck with TYPE=USER.
 module emcon_host_contact
-   use emcon_contact, only : contact_t, deepest_arrival
+   use emcon_contact, only : contact_t, max_penetration_on_entry
    use emcon_errors, only : err_input, error_t, raise
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
@@ -49,11 +49,12 @@ contains
       if (allocated(error)) return
       associate (n => self%n_constraint)
          if (.not. allocated(self%state)) allocate(self%state(n))
-         if (.not. allocated(self%twin)) allocate(self%twin(n), source=0)
+         if (.not. allocated(self%duplicate)) allocate(self%duplicate(n), source=0)
          if (.not. allocated(self%thickness)) allocate(self%thickness(n), source=1.0_wp)
          if (.not. allocated(self%sagitta)) allocate(self%sagitta(n), source=0.0_wp)
       end associate
-      if (.not. self%deepest_start > 0.0_wp) self%deepest_start = deepest_arrival
+      if (.not. self%max_penetration_at_start > 0.0_wp) self%max_penetration_at_start &
+         = max_penetration_on_entry
       self%restitution = pair%restitution
    end subroutine host_contact_set_up
 
@@ -71,7 +72,7 @@ contains
       else
          call check_size("node", size(self%node))
          if (allocated(self%state)) call check_size("state", size(self%state))
-         if (allocated(self%twin)) call check_size("twin", size(self%twin))
+         if (allocated(self%duplicate)) call check_size("twin", size(self%duplicate))
          if (allocated(self%thickness)) call check_size("thickness", size(self%thickness))
          if (allocated(self%sagitta)) call check_size("sagitta", size(self%sagitta))
       end if

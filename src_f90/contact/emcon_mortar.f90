@@ -6,9 +6,11 @@
 module emcon_mortar
    use emcon_arcs_plane, only : arc_rise, arcs_find
    use emcon_chain, only : chain_corners, chain_distance, chain_shorter
-   use emcon_edge_form, only : form_begin
+   use emcon_edge_moments, only : form_begin
    use emcon_errors, only : error_t
    use emcon_gauss, only : gauss_points
+   use emcon_integrated_gap, only : integrated_gap_init, integrated_gap_sagittas, &
+      integrated_gap_slips, integrated_gap_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, integration_elements, &
       multiplier_dual, normal_nodal, smoothing_hermite
    use emcon_kinds, only : wp
@@ -16,7 +18,7 @@ module emcon_mortar
       pairs_drop_far, pairs_seen
    use emcon_mortar_frame, only : frame_cover, frame_hit, frame_init, frame_lean, frame_moments, &
       frame_point, frame_t, moment_area, moment_area_xi, moment_cover, moment_gap, moment_gap_xi, &
-      n_moment, n_place, pair_stencil_t, place_after, place_before, place_master
+      n_moment, n_place, pair_stencil_t, place_after, place_before, local_master
    use emcon_mortar_pair2, only : segment_add2 => segment_add
    use emcon_mortar_pair2_first, only : segment_add2_first => segment_add
    use emcon_mortar_pair4, only : point_add, segment_add4 => segment_add
@@ -26,7 +28,6 @@ module emcon_mortar
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update
    use emcon_scene, only : scene_t
    use emcon_slip_point, only : slip_list_t, slip_point, slip_point_t
-   use emcon_weighted, only : weighted_init, weighted_sagittas, weighted_slips, weighted_t
    implicit none
    private
    public :: mortar_t, mortar_init
@@ -36,7 +37,7 @@ module emcon_mortar
    !> quadrature: in statics a few points more bring it below what Newton's method sees.
    integer, parameter :: segment_points = 2, element_points = 3, smooth_points = 4
 
-   type, extends(weighted_t) :: mortar_t
+   type, extends(integrated_gap_t) :: mortar_t
       type(contact_options_t) :: options
       type(near_list_t) :: near
       logical, allocatable :: slave_corner(:)         !! (n_edge) at the first node of each edge
@@ -67,11 +68,11 @@ contains
       type(contact_pair_t), intent(in) :: pair
       type(error_t), allocatable, intent(out) :: error
 
-      call weighted_init(self, scene, pair, error)
+      call integrated_gap_init(self, scene, pair, error)
       if (allocated(error)) return
       call near_list_init(self%near, self%slave%edge, self%master%edge, scene%x, scene%u0, &
          maxval(self%slave%length) + (self%offset + pair%damping%clearance))
-      self%farthest_start = maxval(self%slave%length)
+      self%max_gap_on_entry = maxval(self%slave%length)
       allocate(self%start(self%slave%n_edge + 1), source=1)
       allocate(self%pair(0))
       call self%configure(scene%x, self%options)
@@ -132,7 +133,7 @@ contains
             self%pair(self%start(e):n), self%master, self%point, x, u0, du, self%seen(:, :, e))
       end do
       self%start(e) = n + 1
-      call weighted_slips(self, x, u0, du)
+      call integrated_gap_slips(self, x, u0, du)
       if (allocated(self%slave_curvature)) call choose_sagittas(self, x, u0, du)
    end subroutine mortar_begin_step
 
@@ -156,7 +157,7 @@ contains
             end do
          end associate
       end do
-      call weighted_sagittas(self)
+      call integrated_gap_sagittas(self)
    end subroutine choose_sagittas
 
    !> Moments of pair `k` of slave edge `e`, with the rise of the arcs in the place of the gap.
@@ -211,7 +212,7 @@ contains
          e = self%node_edge(k, i)
          if (e == 0 .or. size(list%point) > 0) cycle
          if (self%start(e + 1) == self%start(e)) cycle
-         list%point = [slip_point(self%pair(self%start(e))%node(:place_master(1) + 1), &
+         list%point = [slip_point(self%pair(self%start(e))%node(:local_master(1) + 1), &
             merge(1.0_wp, 0.0_wp, k == 1), 1.0_wp)]
       end do
    end subroutine mortar_choose_slip
@@ -236,7 +237,7 @@ contains
             if (.not. part > 0.0_wp) cycle
             n = n + 1
             xi(n) = bound(0) + (bound(1) - bound(0))*self%point(i)
-            list(n) = slip_point(self%pair(k)%node(:place_master(1) + 1), xi(n), part)
+            list(n) = slip_point(self%pair(k)%node(:local_master(1) + 1), xi(n), part)
          end do
       end do
       theta = 0.0_wp
@@ -309,7 +310,7 @@ contains
             call stencil_gather(stencil, x, u0, du, local, dlocal)
             call frame_init(frame(0), stencil, local)
             call frame_init(frame(1), stencil, local + dlocal)
-            if (.not. pair_is_meant(stencil, frame, self%deepest_start)) cycle
+            if (.not. pair_is_meant(stencil, frame, self%max_penetration_at_start)) cycle
             if (is_wide .and. .not. stencil%is_smooth) call pair_cut_corners(stencil, frame(0))
             call pair_append(self%pair, n, stencil)
          end do
@@ -445,7 +446,7 @@ contains
       end do
       n_slave = n
       do k = self%start(e), self%start(e + 1) - 1
-         call collect(self%pair(k)%node(place_master), list, n)
+         call collect(self%pair(k)%node(local_master), list, n)
       end do
       call form_begin(self%form(e), list(:n), n_slave, self%leaves_second)
    end subroutine begin_form

@@ -2,10 +2,10 @@
 !>
 !> Source: docs/theory.md, section 4.5, choice of pairs.
 module emcon_mortar_choice
-   use emcon_chain, only : chain_is_joint, chain_t
+   use emcon_chain, only : chain_is_seam, chain_t
    use emcon_kinds, only : dp, wp
    use emcon_mortar_frame, only : frame_hit, frame_init, frame_project, frame_t, n_place, &
-      pair_stencil_t, place_master
+      pair_stencil_t, local_master
    use emcon_mortar_stencil, only : frame_faces, stencil_gather
    use emcon_sort, only : sort_order
    implicit none
@@ -101,8 +101,8 @@ contains
       type(pair_stencil_t), intent(inout) :: stencil
       type(frame_t), intent(in) :: frame
 
-      if (.not. frame_faces(frame, 3, 1)) stencil%node(place_master(3)) = 0
-      if (.not. frame_faces(frame, 2, 4)) stencil%node(place_master(4)) = 0
+      if (.not. frame_faces(frame, 3, 1)) stencil%node(local_master(3)) = 0
+      if (.not. frame_faces(frame, 2, 4)) stencil%node(local_master(4)) = 0
    end subroutine pair_cut_corners
 
    pure subroutine pair_append(list, n, stencil)
@@ -152,7 +152,7 @@ contains
             do j = 1, size(low)
                if (j == this .or. .not. is_kept(j)) cycle
                if (min(high(j), high(this)) - max(low(j), low(this)) <= same_part) cycle
-               if (chain_is_joint(master, list(first + j - 1)%edge, &
+               if (chain_is_seam(master, list(first + j - 1)%edge, &
                   list(first + this - 1)%edge)) cycle
                is_kept(this) = .false.
             end do
@@ -188,7 +188,7 @@ contains
          beyond = 0.0_wp
          do k = 1, size(pair)
             if (pass > 1) then
-               beyond = joint_width(master, pair(k)%edge, x, u0)
+               beyond = seam_width(master, pair(k)%edge, x, u0)
                if (.not. any(beyond > 0.0_wp)) cycle
             end if
             call stencil_gather(pair(k), x, u0, du, local, dlocal)
@@ -228,7 +228,7 @@ contains
 
    !> Distance of the nodes of a joint at either end of edge `e`, relative to its length; 0 where
    !> there is none.
-   pure function joint_width(master, e, x, u0) result(width)
+   pure function seam_width(master, e, x, u0) result(width)
       type(chain_t), intent(in) :: master
       integer, intent(in) :: e
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
@@ -245,6 +245,6 @@ contains
             end associate
          end do
       end associate
-   end function joint_width
+   end function seam_width
 
 end module emcon_mortar_choice

@@ -10,13 +10,13 @@ module emcon_mortar_frame
    private
    public :: pair_stencil_t, frame_t, frame_init, frame_project, frame_meet, frame_hit, &
       frame_point, frame_moments, frame_cover, frame_lean
-   public :: place_first, place_last, place_before, place_after, place_master
+   public :: place_first, place_last, place_before, place_after, local_master
    public :: moment_gap, moment_gap_xi, moment_area, moment_area_xi, moment_cover, n_moment
    public :: n_place, end_rounding
 
    !> Local numbers of the nodes: slave edge, master edge, neighbours of either.
    integer, parameter :: n_place = 8, place_first = 1, place_last = 2, place_before = 5, &
-      place_after = 6, place_master(4) = [3, 4, 7, 8]
+      place_after = 6, local_master(4) = [3, 4, 7, 8]
 
    !> What is integrated over the covered part of a slave edge: the gap and 1, with weights 1 and
    !> xi, over the area; and the covered fraction.
@@ -69,8 +69,8 @@ contains
          self%edge_along(i) = dot_product(a, t(:, i))
          self%edge_above(i) = cross(a, t(:, i))
          do k = 1, stencil%n_master
-            if (stencil%node(place_master(k)) == 0) cycle
-            b = x(:, place_master(k)) - x(:, place_first)
+            if (stencil%node(local_master(k)) == 0) cycle
+            b = x(:, local_master(k)) - x(:, place_first)
             self%along(i, k) = dot_product(b, t(:, i))
             self%above(i, k) = cross(b, t(:, i))
          end do
@@ -171,7 +171,7 @@ contains
       type(frame_t), intent(in) :: self
       real(wp), intent(in) :: xi                 !! on the slave edge, 0 to 1
       real(wp), intent(out) :: slave, master     !! -1 to 1
-      real(wp), dimension(size(place_master)) :: along, above
+      real(wp), dimension(size(local_master)) :: along, above
       real(wp) :: norm
 
       call look(self, xi, along, above, norm)
@@ -210,10 +210,10 @@ contains
       if (stencil%is_smooth .or. stencil%n_master < 4) return
       call look(self, xi, along, above, norm)
       slope = (above(2) - above(1))/(along(2) - along(1))
-      if (stencil%node(place_master(4)) > 0) gap = gap &
+      if (stencil%node(local_master(4)) > 0) gap = gap &
          + rounded_negative(-along(2), stencil%rounding(2))/norm &
          *((above(4) - above(2))/(along(4) - along(2)) - slope)
-      if (stencil%node(place_master(3)) > 0) gap = gap &
+      if (stencil%node(local_master(3)) > 0) gap = gap &
          - rounded_negative(along(1), stencil%rounding(1))/norm &
          *((above(1) - above(3))/(along(1) - along(3)) - slope)
    end subroutine frame_point

@@ -7,7 +7,7 @@ module emcon_mortar_pair2_first
    use emcon_kinds, only : wp
    use emcon_mortar_frame, only : end_rounding, frame_hit, frame_init, frame_meet, frame_t, &
       moment_area, moment_area_xi, moment_cover, moment_gap, moment_gap_xi, n_moment, &
-      pair_stencil_t, place_first, place_last, place_master
+      pair_stencil_t, place_first, place_last, local_master
    use emcon_rounded, only : rounded_clip
    implicit none
    private

@@ -3,7 +3,7 @@ module emcon_mortar_stencil
    use emcon_chain, only : chain_t
    use emcon_kinds, only : wp
    use emcon_mortar_frame, only : frame_t, n_place, pair_stencil_t, place_after, place_before, &
-      place_first, place_last, place_master
+      place_first, place_last, local_master
    implicit none
    private
    public :: stencil_slave, stencil_master, stencil_gather, frame_faces
@@ -66,19 +66,19 @@ contains
       real(wp) :: length(3)
 
       self%edge = m
-      self%node(place_master(:2)) = chain%edge(:, m)
-      self%node(place_master(3:)) = 0
+      self%node(local_master(:2)) = chain%edge(:, m)
+      self%node(local_master(3:)) = 0
       self%is_smooth = is_smooth
       self%n_master = merge(4, 2, is_smooth .or. is_wide)
       if (self%n_master == 2) return
       length = [0.0_wp, chain%length(m), 0.0_wp]
       associate (before => chain%previous(m), after => chain%next(m))
          if (before > 0 .and. .not. (is_smooth .and. is_corner(m))) then
-            self%node(place_master(3)) = chain%edge(1, before)
+            self%node(local_master(3)) = chain%edge(1, before)
             length(1) = chain%length(before)
          end if
          if (after > 0 .and. (.not. is_smooth .or. has_smooth_end(chain, m, is_corner))) then
-            self%node(place_master(4)) = chain%edge(2, after)
+            self%node(local_master(4)) = chain%edge(2, after)
             length(3) = chain%length(after)
          end if
       end associate

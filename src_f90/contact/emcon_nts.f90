@@ -13,15 +13,15 @@ module emcon_nts
    use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite, &
       smoothing_none
    use emcon_kinds, only : wp
-   use emcon_nts_choice, only : choice_covers, choice_init, choice_look, choice_make, &
+   use emcon_nts_choice, only : choice_covers, choice_init, update_candidates, choice_make, &
       choice_settle, choice_take_nearer, nts_choice_t
    use emcon_nts_constraint, only : polygon_constraint, smooth_constraint
    use emcon_nts_gap_value, only : nts_gap_value
    use emcon_nts_stencil, only : most_nodes, part_of_sector, polygon_slip, stencil_gather, &
       stencil_length
+   use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t
    use emcon_slip_point, only : slip_list_t, slip_over
-   use emcon_stance, only : stance_holds, stance_t, stance_take
    implicit none
    private
    public :: nts_t, nts_init, nts_nearest
@@ -33,17 +33,17 @@ module emcon_nts
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
 
    !> A gap over a polygon as a step begins.
-   type :: start_t
+   type :: start_gap_t
       type(gap_state_t) :: state                      !! without what the end of the step tells
       real(wp) :: xi = 0.0_wp                         !! projection on the edge
-   end type start_t
+   end type start_gap_t
 
    type, extends(nts_choice_t) :: nts_t
       real(wp), allocatable :: own_slack(:)           !! (n_node of the slave) only of a guard
-      type(stance_t) :: stance                        !! of the nodes as stencils were chosen:
+      type(position_memo_t) :: position_memo          !! of the nodes as stencils were chosen:
       real(wp) :: chosen_reach = 0.0_wp               !! among edges up to there [L],
       logical :: were_sharp = .false.                 !! with which corners,
-      type(start_t), allocatable :: start(:)          !! (n_constraint) and gaps if not smoothed
+      type(start_gap_t), allocatable :: start(:)      !! (n_constraint) and gaps if not smoothed
       real(wp), allocatable :: curvature(:)           !! (n_edge) of the arcs of the master if gaps
                                                       !! are measured to these [1/L]
       logical, allocatable :: is_lost(:)              !! (n_constraint) no unique closest point when
@@ -76,7 +76,7 @@ contains
       if (allocated(error)) return
       allocate(self%state(self%n_constraint), self%start(self%n_constraint))
       allocate(self%sagitta(self%n_constraint), source=0.0_wp)
-      self%deepest_start = touch_tol
+      self%max_penetration_at_start = touch_tol
       self%slack = pair%slack
       if (pair%slack > 0.0_wp) call guard_slack_find(self%slave, scene%x, pair%slack, &
          self%own_slack)
@@ -91,7 +91,7 @@ contains
       real(wp), intent(in), contiguous :: x(:, :)   !! (2, n_node) reference positions [L]
       type(contact_options_t), intent(in) :: options
 
-      self%stance%is_known = .false.
+      self%position_memo%is_known = .false.
       self%smoothing = options%smoothing
       if (self%slack > 0.0_wp) self%smoothing = smoothing_none       ! guards watch the mesh
       self%may_sharpen = self%smoothing /= smoothing_hermite
@@ -110,7 +110,7 @@ contains
       type(contact_options_t), intent(in) :: options
       logical, intent(in) :: is_wanted           !! else between edges
 
-      self%stance%is_known = .false.
+      self%position_memo%is_known = .false.
       self%sagitta = 0.0_wp
       if (allocated(self%curvature)) deallocate(self%curvature)
       if (.not. is_wanted .or. self%smoothing == smoothing_hermite) return
@@ -125,12 +125,12 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       integer :: i
 
-      call choice_look(self, x, u0, du)
+      call update_candidates(self, x, u0, du)
       if (abs(self%chosen_reach - self%reach) <= 0.0_wp .and. &
          (self%were_sharp .eqv. self%is_sharp)) then
-         if (stance_holds(self%stance, self%near%node, x, u0)) return
+         if (position_memo_holds(self%position_memo, self%near%node, x, u0)) return
       end if
-      call stance_take(self%stance, self%near%node, x, u0)
+      call position_memo_take(self%position_memo, self%near%node, x, u0)
       self%chosen_reach = self%reach
       self%were_sharp = self%is_sharp
       do i = 1, self%n_constraint
@@ -162,8 +162,8 @@ contains
       logical :: is_at_rest
       integer :: i
 
-      if (.not. stance_holds(self%stance, self%near%node, x, u0)) then
-         self%stance%is_known = .false.
+      if (.not. position_memo_holds(self%position_memo, self%near%node, x, u0)) then
+         self%position_memo%is_known = .false.
          do i = 1, self%n_constraint
             if (self%smoothing /= smoothing_hermite) self%start(i) = polygon_start(self, i, x, u0)
          end do
@@ -212,7 +212,7 @@ contains
       type(nts_t), intent(in) :: self
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      type(start_t) :: start
+      type(start_gap_t) :: start
       real(wp) :: local(2, 5), dlocal(2, 5)
 
       if (self%edge(i) == 0) return
@@ -253,7 +253,7 @@ contains
    pure function polygon_state(self, i, start, x, u0, du) result(state)
       type(nts_t), intent(in) :: self
       integer, intent(in) :: i
-      type(start_t), intent(in) :: start
+      type(start_gap_t), intent(in) :: start
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       type(gap_state_t) :: state
       real(wp) :: xi1
@@ -461,7 +461,7 @@ contains
          call choice_take_nearer(self, i, e, x, u, best)
       end do
       call choice_settle(self, i, x, u)
-      self%stance%is_known = .false.
+      self%position_memo%is_known = .false.
       self%start(i) = polygon_start(self, i, x, u)
       state = gap_state(self, i, x, u, still)
       gap = state%gap0

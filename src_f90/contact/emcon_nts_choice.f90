@@ -9,20 +9,21 @@ module emcon_nts_choice
    use emcon_errors, only : error_t
    use emcon_facing, only : facing_allows
    use emcon_interactions, only : contact_pair_t, smoothing_hermite, smoothing_none
-   use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, &
       near_list_within
    use emcon_nts_stencil, only : edge_distance, edge_of_sector, is_outside, polygon_stencil, &
       polygon_stencil_t, smooth_stencil, smooth_stencil_t
    use emcon_scene, only : scene_t
+   use emcon_seams, only : chain_join
    use emcon_self_contact, only : self_contact_is_apart
    use emcon_touch_rule, only : touch_rule_allows, touch_rule_init, touch_rule_may, &
       touch_rule_sees, touch_rule_t
    implicit none
    private
    public :: nts_choice_t
-   public :: choice_init, choice_look, choice_make, choice_take_nearer, choice_settle, choice_covers
+   public :: choice_init, update_candidates, choice_make, choice_take_nearer, choice_settle, &
+      choice_covers
 
    type, abstract, extends(contact_t) :: nts_choice_t
       type(chain_t) :: slave
@@ -73,7 +74,7 @@ contains
          self%class = [(1 + i/n, i = 0, n*self%rule%n_class - 1)]
       end associate
       self%node = self%slave%node(self%chain_node)
-      self%twin = self%slave%twin(self%chain_node)
+      self%duplicate = self%slave%duplicate(self%chain_node)
       if (present(has_twins)) then
          if (has_twins) call add_twins(self)
       end if
@@ -96,24 +97,24 @@ contains
    pure subroutine add_twins(self)
       class(nts_choice_t), intent(inout) :: self
 
-      associate (twin => self%slave%twin)
-         self%node = [self%node, pack(twin, twin > 0)]
-         self%chain_node = [self%chain_node, pack(self%chain_node, twin > 0)]
-         self%class = [self%class, pack(self%class, twin > 0)]
+      associate (duplicate => self%slave%duplicate)
+         self%node = [self%node, pack(duplicate, duplicate > 0)]
+         self%chain_node = [self%chain_node, pack(self%chain_node, duplicate > 0)]
+         self%class = [self%class, pack(self%class, duplicate > 0)]
       end associate
-      deallocate(self%twin)
-      allocate(self%twin(size(self%node)), source=0)
+      deallocate(self%duplicate)
+      allocate(self%duplicate(size(self%node)), source=0)
    end subroutine add_twins
 
    !> Renew the candidates for a step from `u0` with the expected motion `du`.
-   pure subroutine choice_look(self, x, u0, du)
+   pure subroutine update_candidates(self, x, u0, du)
       class(nts_choice_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
 
       call near_list_update(self%near, x, u0, du, self%reach)
       if (self%is_self .and. self%n_sifted /= self%near%n_list) call sift(self)
       call self%has_looked(self%near%clearance)
-   end subroutine choice_look
+   end subroutine update_candidates
 
    !> Choose for constraint `i` the nearest of the edges that are near at the start of the step.
    pure subroutine choice_make(self, i, x, u0)

@@ -7,8 +7,9 @@ module emcon_segment
    use emcon_constraint, only : condition_t
    use emcon_dgrad8, only : dg_dot, dg_sqrt, dg_t, difference
    use emcon_dgrad_wide, only : change_t, wide_add, wide_add_part, wide_add_product, wide_clear
-   use emcon_edge_form, only : form_begin
+   use emcon_edge_moments, only : form_begin
    use emcon_errors, only : error_t
+   use emcon_integrated_gap, only : integrated_gap_init, integrated_gap_slips, integrated_gap_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, multiplier_dual
    use emcon_kinds, only : wp
    use emcon_mortar_frame, only : moment_area, moment_area_xi, moment_cover, moment_gap, &
@@ -16,7 +17,6 @@ module emcon_segment
    use emcon_nts, only : nts_init, nts_t
    use emcon_scene, only : scene_t
    use emcon_slip_point, only : slip_list_t
-   use emcon_weighted, only : weighted_init, weighted_slips, weighted_t
    implicit none
    private
    public :: segment_t, segment_init
@@ -24,7 +24,7 @@ module emcon_segment
    !> What is left of weights that cancel.
    real(wp), parameter :: noise = 16.0_wp*epsilon(1.0_wp)
 
-   type, extends(weighted_t) :: segment_t
+   type, extends(integrated_gap_t) :: segment_t
       type(nts_t) :: nts                              !! gaps of the nodes
       integer, allocatable :: end_node(:, :)          !! (2, n_edge) nodes as numbers in `nts`
       type(condition_t) :: nodal(2)                  !! of one edge
@@ -48,7 +48,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: e, k
 
-      call weighted_init(self, scene, pair, error)
+      call integrated_gap_init(self, scene, pair, error)
       if (allocated(error)) return
       call nts_init(self%nts, scene, pair, error, has_twins=.true.)
       if (allocated(error)) return
@@ -90,7 +90,7 @@ contains
       self%nts%is_sharp = self%is_sharp
       self%nts%meets_statics = self%meets_statics
       call self%nts%begin_points(x, u0, du)
-      call weighted_slips(self, x, u0, du)
+      call integrated_gap_slips(self, x, u0, du)
       self%reach = self%nts%reach
       call self%has_looked(self%nts%near%clearance)
    end subroutine segment_begin_step

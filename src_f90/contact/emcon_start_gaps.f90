@@ -22,7 +22,7 @@ module emcon_start_gaps
       type(chain_t) :: slave
       type(chain_t), allocatable :: master       !! gfortran 12 loses a second one of its kind
       integer, allocatable :: node(:)            !! (n) node of the scene
-      integer, allocatable :: twin(:)            !! (n) the other one at its place; 0: none
+      integer, allocatable :: duplicate(:)       !! (n) the other one at its place; 0: none
       integer, allocatable :: chain_node(:)      !! (n) index into the slave's nodes
       integer, allocatable :: edge(:)            !! (n) nearest master edge; 0: none near
       type(gap_state_t), allocatable :: state(:) !! (n) as last measured
@@ -53,7 +53,7 @@ contains
       self%slave = self%nts%slave
       allocate(self%master, source=self%nts%master)
       self%node = self%nts%node
-      self%twin = self%nts%twin
+      self%duplicate = self%nts%duplicate
       self%chain_node = self%nts%chain_node
       self%edge = self%nts%edge
       self%state = self%nts%state

@@ -16,17 +16,17 @@ contains
    subroutine check_materials(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      logical, allocatable :: is_used(:), is_bare(:), has_weight(:), has_inertia(:), resists(:), &
-         moves(:)
+      logical, allocatable :: is_used(:), without_density(:), has_weight(:), has_inertia(:), &
+         resists(:), moves(:)
       integer :: i, k, material
       logical :: needs_mass
 
       if (reader%doubt_names .or. reader%doubt_elements .or. reader%doubt_rigid) return
-      is_bare = scene%element_section == 0
-      if (any(is_bare)) then
-         i = first_true(is_bare)
+      without_density = scene%element_section == 0
+      if (any(without_density)) then
+         i = first_true(without_density)
          call add_error(reader%log, scene%element_origin(i), "element " &
-            // label_list(pack(scene%element_label, is_bare)) &
+            // label_list(pack(scene%element_label, without_density)) &
             // " has no section; give one by *SOLID SECTION")
       end if
       allocate(is_used(size(scene%material)), has_weight(size(scene%material)), &
@@ -113,48 +113,49 @@ contains
    subroutine check_nodes(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      logical, allocatable :: is_bare(:), is_idle(:), is_loaded(:), is_coupled(:, :)
+      logical, allocatable :: without_density(:), is_idle(:), is_loaded(:), is_coupled(:, :)
       integer :: i, k
 
       if (reader%doubt_nodes .or. reader%doubt_elements .or. reader%doubt_positions &
          .or. reader%doubt_equations .or. reader%doubt_rigid) return
       if (any(scene%element_node(1, :) == 0)) return
-      allocate(is_bare(size(scene%node_label)), source=.true.)
+      allocate(without_density(size(scene%node_label)), source=.true.)
       do i = 1, size(scene%element_label)
          do k = 1, scene%kind(scene%element_kind(i))%n_node
-            is_bare(scene%element_node(k, i)) = .false.
+            without_density(scene%element_node(k, i)) = .false.
          end do
       end do
-      if (allocated(scene%given_node)) is_bare(scene%given_node) = .false.
+      if (allocated(scene%given_node)) without_density(scene%given_node) = .false.
       do i = 1, size(scene%rigid)
-         is_bare(scene%rigid(i)%node) = .false.
-         if (allocated(scene%rigid(i)%arm)) is_bare(scene%rigid(i)%arm) = .false.
+         without_density(scene%rigid(i)%node) = .false.
+         if (allocated(scene%rigid(i)%arm)) without_density(scene%rigid(i)%arm) = .false.
       end do
       do i = 1, size(scene%surface)
          associate (surface => scene%surface(i))
-            if (surface%is_profile) is_bare([surface%edge]) = .false.
-            if (surface%inner_node > 0) is_bare(surface%inner_node) = .false.
+            if (surface%is_profile) without_density([surface%edge]) = .false.
+            if (surface%inner_node > 0) without_density(surface%inner_node) = .false.
          end associate
       end do
-      if (.not. any(is_bare) .or. all(is_bare)) return
+      if (.not. any(without_density) .or. all(without_density)) return
       call mark_coupled(scene, is_coupled)
-      is_idle = is_bare .and. .not. any(is_coupled, 1)
+      is_idle = without_density .and. .not. any(is_coupled, 1)
       if (any(is_idle)) call add_warning(reader%log, scene%node_origin(first_true(is_idle)), &
          "node " // label_list(pack(scene%node_label, is_idle)) &
          // " belongs to no element; it is left out")
       call mark_loaded(scene, is_coupled, is_loaded)
       call tell_bare(is_loaded .and. is_idle, "but *CLOAD acts on it")
-      call tell_bare(is_loaded .and. is_bare .and. .not. is_idle, &
+      call tell_bare(is_loaded .and. without_density .and. .not. is_idle, &
          "but *CLOAD acts on it in a direction that is in no *EQUATION")
       is_loaded = .false.
       do i = 1, size(scene%pair)
          if (scene%pair(i)%slave > 0) call mark_nodes(scene, scene%surface(scene%pair(i)%slave), &
             is_loaded)
       end do
-      call tell_bare(is_loaded .and. is_bare, "but is a slave node of *CONTACT PAIR")
-      is_bare = is_bare .and. .not. is_loaded
+      call tell_bare(is_loaded .and. without_density, "but is a slave node of *CONTACT PAIR")
+      without_density = without_density .and. .not. is_loaded
       call mark_partners(scene, is_loaded)
-      call tell_bare(is_loaded .and. is_bare, "but is a node of a surface in *CONTACT PAIR or *TIE")
+      call tell_bare(is_loaded .and. without_density, &
+         "but is a node of a surface in *CONTACT PAIR or *TIE")
 
    contains
 

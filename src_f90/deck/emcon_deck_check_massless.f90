@@ -16,7 +16,7 @@ contains
    subroutine check_massless_sections(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      logical, allocatable :: is_massless(:), is_bare(:), meets(:)
+      logical, allocatable :: is_massless(:), without_density(:), meets(:)
       type(origin_t) :: origin
       integer :: k
 
@@ -45,21 +45,21 @@ contains
                "with MASSLESS sections; use SCHEME=ENERGY MOMENTUM")
          end associate
       end do
-      call mark_bare(scene, is_massless, is_bare)
+      call mark_bare(scene, is_massless, without_density)
       call mark_contact(scene, meets)
-      if (.not. any(meets .and. is_bare)) return
+      if (.not. any(meets .and. without_density)) return
       do k = 1, size(scene%step)
          if (.not. scene%step(k)%scheme%masses_resist) cycle
-         call check_step(reader, scene, k, is_bare)
+         call check_step(reader, scene, k, without_density)
       end do
    end subroutine check_massless_sections
 
    !> What is restored in a step by a jump of velocities goes along forces on masses.
-   subroutine check_step(reader, scene, k, is_bare)
+   subroutine check_step(reader, scene, k, without_density)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: k                   !! of a dynamic step
-      logical, intent(in) :: is_bare(:)          !! (n_node)
+      logical, intent(in) :: without_density(:)  !! (n_node)
       logical, allocatable :: is_joined(:)
 
       associate (step => scene%step(k))
@@ -68,24 +68,25 @@ contains
             // "in contact is of a MASSLESS section; use PERSISTENT or MASSLESS")
          if (step%initiation /= initiation_massless) return
          call mark_joined(scene, is_joined)
-         if (any(is_joined .and. is_bare)) call add_error(reader%log, step%origin, &
+         if (any(is_joined .and. without_density)) call add_error(reader%log, step%origin, &
             "*CONTACT INITIATION, TYPE=MASSLESS balances MASSLESS sections in contact by " // &
             "themselves, but one is in a *TIE or an *EQUATION; use PERSISTENT")
       end associate
    end subroutine check_step
 
    !> Nodes of massless elements alone.
-   pure subroutine mark_bare(scene, is_massless, is_bare)
+   pure subroutine mark_bare(scene, is_massless, without_density)
       type(scene_t), intent(in) :: scene
       logical, intent(in) :: is_massless(:)              !! (n_element)
-      logical, allocatable, intent(out) :: is_bare(:)    !! (n_node)
+      logical, allocatable, intent(out) :: without_density(:) !! (n_node)
       integer :: pass, e
 
-      allocate(is_bare(size(scene%x, 2)), source=.false.)
+      allocate(without_density(size(scene%x, 2)), source=.false.)
       do pass = 1, 2
          do e = 1, size(is_massless)
             if (is_massless(e) .neqv. pass == 1) cycle
-            is_bare(pack(scene%element_node(:, e), scene%element_node(:, e) > 0)) = pass == 1
+            without_density(pack(scene%element_node(:, e), scene%element_node(:, e) > 0)) = pass &
+               == 1
          end do
       end do
    end subroutine mark_bare

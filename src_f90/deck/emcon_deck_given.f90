@@ -39,7 +39,7 @@ contains
       type(scene_t), intent(in) :: scene
       integer, allocatable, intent(out) :: list(:)
       character(len=:), allocatable :: name
-      logical :: is_bare(0:size(scene%node_label))
+      logical :: without_density(0:size(scene%node_label))
       integer :: e, i, k
 
       if (has_option(card, "NSET")) then
@@ -52,13 +52,13 @@ contains
          if (name /= "" .and. .not. reader%doubt_names) call card_error(reader, card, &
             "unknown node set " // quoted(name) // suggestion(name, set_names(scene%node_set)))
       end if
-      is_bare = .true.
+      without_density = .true.
       do e = 1, size(scene%element_label)
          do k = 1, scene%kind(scene%element_kind(e))%n_node
-            is_bare(scene%element_node(k, e)) = .false.
+            without_density(scene%element_node(k, e)) = .false.
          end do
       end do
-      list = pack([(i, i = 1, size(scene%node_label))], is_bare(1:))
+      list = pack([(i, i = 1, size(scene%node_label))], without_density(1:))
       if (size(list) == 0 .and. .not. (has_option(card, "NSET") .or. reader%doubt_nodes &
          .or. reader%doubt_elements)) call card_error(reader, card, &
          "all nodes belong to elements; name those that are given forces by NSET=")

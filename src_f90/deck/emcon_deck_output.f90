@@ -197,14 +197,14 @@ contains
 
       select case (new%kind)
       case (output_node_file, output_node_print)
-         call look_up("NSET", "node set", scene%node_set, reader%node_sets)
+         call overlap_query_up("NSET", "node set", scene%node_set, reader%node_sets)
       case (output_element_file, output_element_print)
-         call look_up("ELSET", "element set", scene%element_set, reader%element_sets)
+         call overlap_query_up("ELSET", "element set", scene%element_set, reader%element_sets)
       end select
 
    contains
 
-      subroutine look_up(option, what, set, index_of)
+      subroutine overlap_query_up(option, what, set, index_of)
          character(len=*), intent(in) :: option, what
          type(named_set_t), intent(in) :: set(:)
          type(name_index_t), intent(in) :: index_of
@@ -221,7 +221,7 @@ contains
             call card_warning(reader, card, option &
                // "= does not narrow it: the field file holds all nodes and elements")
          end if
-      end subroutine look_up
+      end subroutine overlap_query_up
 
    end subroutine read_set
 

@@ -22,7 +22,7 @@ module emcon_critical_step
 
    !> Lanczos' method ends after so many vectors, and where so many more change its largest value by
    !> less than this part.
-   integer, parameter :: most_vectors = 400, look_every = 10
+   integer, parameter :: most_vectors = 400, overlap_query_every = 10
    real(wp), parameter :: settled = 1.0e-9_wp
 
 contains
@@ -111,7 +111,7 @@ contains
          image = product_of(system%matrix, value, solved)
          beta(i) = sqrt(max(0.0_wp, dot_product(solved, image)))
          largest = tridiagonal_largest(alpha(:i), beta(1:i - 1))
-         if (mod(i, look_every) == 0) then
+         if (mod(i, overlap_query_every) == 0) then
             if (abs(largest - last) <= settled*abs(largest)) exit
             last = largest
          end if

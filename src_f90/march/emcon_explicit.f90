@@ -11,17 +11,17 @@ module emcon_explicit
    use emcon_critical_step, only : critical_bound, critical_sharp
    use emcon_csr, only : csr_find
    use emcon_errors, only : err_analysis, err_input, error_t, raise
+   use emcon_evaluation, only : instant_later, instant_t, evaluation_at_end
    use emcon_explicit_push, only : explicit_push
    use emcon_explicit_soft, only : explicit_soft_force, explicit_soft_limit, explicit_soft_push, &
       explicit_soft_widen
-   use emcon_frozen, only : frozen_take
    use emcon_kinds, only : dp, wp
+   use emcon_lagged_forces, only : lagged_forces_take
    use emcon_march_guess, only : follow_links
    use emcon_march_types, only : march_t, part_t
-   use emcon_motion, only : motion_init, motion_place
+   use emcon_motion, only : motion_init, motion_evaluate
    use emcon_numbering, only : add_to_dofs, gather_dependent, pick_unknowns
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
-   use emcon_pose, only : instant_later, instant_t, pose_at_end
    use emcon_scene, only : scene_t, where_text
    use emcon_system, only : mass_times, system_check_response, system_find_energy, system_respond
    use emcon_term, only : role_external, role_internal
@@ -32,7 +32,7 @@ module emcon_explicit
    public :: explicit_prepare, explicit_begin, explicit_fly, explicit_end, explicit_commit
 
    !> After so many increments the critical step is looked at again.
-   integer, parameter :: look_every = 200
+   integer, parameter :: overlap_query_every = 200
    !> Energy that grows by so much more than what was put in grows without bound: at 0.9999 of the
    !> critical step the fastest vibration holds 5000 times its energy for a while.
    real(wp), parameter :: most_growth = 1.0e6_wp
@@ -51,7 +51,7 @@ contains
       logical :: is_known, is_bounded
 
       self%newton%correction%kept%most_products = most_products
-      self%system%frozen%is_known = .false.
+      self%system%lagged%is_known = .false.
       call check_mass(self, scene, error)
       if (allocated(error)) return
       call explicit_soft_limit(self, scene)
@@ -126,10 +126,10 @@ contains
       real(wp), intent(in), contiguous :: u(:, :)        !! (n_dim, n_node) [L]
 
       associate (place => self%explicit%place)
-         place%pose = pose_at_end
-         place%pose%load_instant = instant
+         place%evaluation = evaluation_at_end
+         place%evaluation%load_instant = instant
          place%u0 = u
-         call motion_place(place)
+         call motion_evaluate(place)
       end associate
    end subroutine rest_at
 
@@ -142,8 +142,8 @@ contains
       logical :: is_known, has_grown
 
       associate (system => self%system, explicit => self%explicit)
-         system%frozen%is_on = .false.
-         is_known = system%frozen%is_known
+         system%lagged%is_on = .false.
+         is_known = system%lagged%is_known
          if (is_known) is_known = all(abs(explicit%place%u0 - self%state%u) <= 0.0_wp)
          if (.not. is_known) then
             call rest_at(self, part%start, self%state%u)
@@ -151,16 +151,16 @@ contains
             call system_check_response(system, "at the start of the increment", error)
             if (allocated(error)) return
             call explicit_soft_push(self, is_end=.false.)
-            call frozen_take(system%frozen, system%response)
+            call lagged_forces_take(system%lagged, system%response)
          end if
          call explicit_soft_widen(self, has_grown)
-         if (mod(self%state%increment, look_every) == 0 .and. self%state%increment &
+         if (mod(self%state%increment, overlap_query_every) == 0 .and. self%state%increment &
             > self%state%n_before) call find_limit(self, part, error)
          if (has_grown .and. .not. allocated(error)) call critical_sharp(system, explicit%place, &
             0.0_wp*explicit%stiffness, self%state%critical_h, error, &
             explicit%soft(explicit%i_start))
          if (.not. allocated(error)) call check_limit(self, scene, part, error)
-         system%frozen%is_on = .not. allocated(error)
+         system%lagged%is_on = .not. allocated(error)
       end associate
    end subroutine explicit_begin
 
@@ -213,7 +213,7 @@ contains
       if (.not. allocated(self%explicit%mass)) return
       associate (system => self%system, motion => self%motion, active => self%active, &
             reached => self%newton%convergence)
-         call motion_place(motion)
+         call motion_evaluate(motion)
          call system_respond(system, motion, .false., .false.)
          call pick_unknowns(system%space%numbering, system%response%residual, push)
          call add_to_dofs(system%space%numbering, push/self%explicit%mass, -0.5_wp*h*h, motion%du)
@@ -243,12 +243,12 @@ contains
       real(wp) :: u1(size(scene%x, 1), size(scene%x, 2))
 
       is_refused = .false.
-      associate (system => self%system, ending => self%ending, explicit => self%explicit)
+      associate (system => self%system, end_state => self%end_state, explicit => self%explicit)
          explicit%start = system%response%residual
          explicit%load0 = system%response%part(role_external)%force
-         u1 = self%state%u + ending%du
+         u1 = self%state%u + end_state%du
          if (size(scene%rigid) > 0) call follow_links(system, u1)
-         system%frozen%is_on = .false.
+         system%lagged%is_on = .false.
          call check_finite(u1, "displacements", part, error)
          if (allocated(error)) return
          call rest_at(self, instant_later(part%start, part%h), u1)
@@ -262,12 +262,12 @@ contains
             return
          end if
          call system_find_energy(system, explicit%place)
-         ending%force = system%response%part(role_internal)%force
-         ending%energy = system%response%energy
-         ending%potential = system%response%potential
+         end_state%force = system%response%part(role_internal)%force
+         end_state%energy = system%response%energy
+         end_state%potential = system%response%potential
          explicit%load = system%response%part(role_external)%force
          call explicit_soft_push(self, is_end=.true.)
-         call frozen_take(system%frozen, system%response)
+         call lagged_forces_take(system%lagged, system%response)
          call explicit_push(self, part%h, error)
          if (allocated(error)) return
          call check_finite(explicit%v1, "velocities", part, error)
@@ -343,8 +343,8 @@ contains
 
       associate (budget => self%state%budget)
          call mass_times(self%system, self%v1, momentum)
-         energy = 0.5_wp*sum(self%v1*momentum) + abs(sum(self%ending%energy)) &
-            + abs(self%ending%potential)
+         energy = 0.5_wp*sum(self%v1*momentum) + abs(sum(self%end_state%energy)) &
+            + abs(self%end_state%potential)
          if (.not. budget > 0.0_wp) budget = energy
          budget = budget + work
          if (energy <= min(most_growth*budget, huge(energy))) return

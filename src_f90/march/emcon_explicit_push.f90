@@ -6,13 +6,13 @@ module emcon_explicit_push
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_analysis, error_t, raise
+   use emcon_evaluation, only : evaluation_velocity
    use emcon_kept_factor, only : kept_factor_correct, kept_factor_forget, &
       kept_factor_multipliers, kept_factor_renew, kept_factor_take
    use emcon_kinds, only : wp
    use emcon_march_guess, only : follow_links
    use emcon_march_types, only : march_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
-   use emcon_pose, only : pose_velocity
    use emcon_system, only : mass_times, system_respond
    use emcon_text, only : to_text
    implicit none
@@ -38,7 +38,8 @@ contains
          do i = 1, size(self%v1, 2)
             do a = 1, size(self%v1, 1)
                if (system%space%numbering%unknown(a, i) > 0) explicit%v1(a, i) = &
-                  pose_velocity(self%motion%pose, self%motion%v0(a, i), self%motion%du(a, i))
+                  evaluation_velocity(self%motion%evaluation, self%motion%v0(a, i), &
+                  self%motion%du(a, i))
             end do
          end do
          call follow_links(system, explicit%v1)
@@ -51,7 +52,7 @@ contains
          end if
          was_made = kept%is_made
          if (.not. was_made .and. size(dq) > 0) then
-            system%frozen%is_on = .true.
+            system%lagged%is_on = .true.
             call system_respond(system, self%motion, .true., .false.)
             call kept_factor_renew(kept, system%matrix, error)
             if (allocated(error)) return
@@ -98,9 +99,9 @@ contains
             call kept_factor_multipliers(kept, mu(:explicit%set%n))
             explicit%mu = 0.0_wp
             explicit%mu(explicit%row) = mu(:explicit%set%n)
-            if (.not. any(explicit%mu(set%n_held + 1:) < 0.0_wp)) exit
-            is_in(set%n_held + 1:) = is_in(set%n_held + 1:) .and. &
-               explicit%mu(set%n_held + 1:) >= 0.0_wp
+            if (.not. any(explicit%mu(set%n_permanent + 1:) < 0.0_wp)) exit
+            is_in(set%n_permanent + 1:) = is_in(set%n_permanent + 1:) .and. &
+               explicit%mu(set%n_permanent + 1:) >= 0.0_wp
          end do
       end associate
    end subroutine hold_velocities
@@ -142,7 +143,7 @@ contains
       integer :: k, i
 
       associate (explicit => self%explicit, set => self%active%set)
-         change = (2.0_wp/h)*(explicit%v1 - self%motion%pose%rate*self%motion%du)
+         change = (2.0_wp/h)*(explicit%v1 - self%motion%evaluation%rate*self%motion%du)
          call mass_times(self%system, change, product)
          explicit%residual = explicit%residual + product
          if (allocated(explicit%contact)) deallocate(explicit%contact)
@@ -152,7 +153,8 @@ contains
             do i = 1, set%item(k)%n_node
                associate (node => set%item(k)%node(i), force => explicit%mu(k)*set%item(k)%c(:, i))
                   explicit%residual(:, node) = explicit%residual(:, node) - force
-                  if (k > set%n_held) explicit%contact(:, node) = explicit%contact(:, node) + force
+                  if (k > set%n_permanent) explicit%contact(:, node) = explicit%contact(:, node) &
+                     + force
                end associate
             end do
          end do

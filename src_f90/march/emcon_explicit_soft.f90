@@ -4,17 +4,17 @@
 !> added to the internal forces that a step leaves to the next one. Source: docs/theory.md, section
 !> 14.
 module emcon_explicit_soft
-   use emcon_active_set, only : active_set_look, active_set_pass
-   use emcon_constraints, only : constraint_place, constraint_set_t, constraints_evaluate, &
+   use emcon_active_set, only : active_set_update_gaps, active_set_pass
+   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate, &
       constraints_force, constraints_select
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t
+   use emcon_motion_bound, only : largest_motion
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_scene, only : scene_t
    use emcon_softness, only : softness_select
    use emcon_surface_edges, only : surface_edges
    use emcon_term, only : role_internal
-   use emcon_travel, only : largest_motion
    implicit none
    private
    public :: explicit_soft_push, explicit_soft_force, explicit_soft_limit, explicit_soft_widen
@@ -61,30 +61,31 @@ contains
 
       is_closed = .false.
       way = 0.0_wp
-      if (is_end) way = 2.0_wp*largest_motion(self%ending%du)
+      if (is_end) way = 2.0_wp*largest_motion(self%end_state%du)
       associate (system => self%system, active => self%active, place => self%explicit%place)
          if (is_end) then
             call active_set_pass(active, system, self%motion)
          else
-            active%outlook%passes = .false.
+            active%skip_until%passes = .false.
          end if
          do pair = 1, size(system%contact)
-            if (active%outlook(pair)%passes) cycle
-            call active_set_look(active, system, pair, place, place%du)
+            if (active%skip_until(pair)%passes) cycle
+            call active_set_update_gaps(active, system, pair, place, place%du)
             associate (contact => system%contact(pair)%contact)
                do i = 1, contact%n_constraint
                   id = system%first_constraint(pair) + i
                   associate (gap => contact%state(i))
                      if (.not. (gap%is_near .and. gap%is_over)) cycle
                      is_closed(id) = gap%gap1 < gap%closed .and. (self%state%is_active(id) &
-                        .or. gap%gap1 - gap%closed > -contact%deepest_start*gap%size - way)
+                        .or. gap%gap1 - gap%closed > -contact%max_penetration_at_start*gap%size &
+                        - way)
                   end associate
                end do
             end associate
          end do
          call constraints_select(soft, pack([(k, k = 1, size(is_closed))], is_closed))
          do k = 1, soft%n
-            call constraint_place(system, soft%id(k), pair, i)
+            call constraint_index(system, soft%id(k), pair, i)
             soft%target(k) = system%contact(pair)%contact%state(i)%closed
          end do
          call softness_select(active%softness, system, soft, is_stored=.true.)

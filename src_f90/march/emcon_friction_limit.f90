@@ -5,13 +5,13 @@
 !> mu = Wnn/|Wnt| on it is closed by being pushed open. Source: docs/theory.md, eq. (14l).
 module emcon_friction_limit
    use emcon_constraint, only : most_slips
-   use emcon_constraints, only : constraint_place, constraint_set_t
+   use emcon_constraints, only : constraint_index, constraint_set_t
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_flexibility, only : flexibility_free, flexibility_make, flexibility_move, &
       flexibility_row, flexibility_t
    use emcon_kinds, only : wp
    use emcon_march_types, only : increment_t, march_t
-   use emcon_pose, only : pose_is_equilibrium
    use emcon_scene, only : scene_t
    use emcon_system, only : system_t
    use emcon_text, only : note_add, to_text
@@ -37,7 +37,8 @@ contains
       real(wp) :: limit(most_contacts)
       integer :: list(most_contacts), n, worst, pair, i
 
-      if (.not. march%active%friction%is_on .or. pose_is_equilibrium(march%motion%pose)) return
+      if (.not. march%active%friction%is_on &
+         .or. evaluation_is_equilibrium(march%motion%evaluation)) return
       call choose(march, list, n)
       if (n == 0) return
       call flexibility_make(flexibility, march%system, march%active%set, &
@@ -49,7 +50,7 @@ contains
       associate (id => march%active%set%id(list(:n)), mu => march%active%friction%mu)
          worst = maxloc(mu(id)/limit(:n), 1)
          if (.not. mu(id(worst)) > limit(worst)) return
-         call constraint_place(march%system, id(worst), pair, i)
+         call constraint_index(march%system, id(worst), pair, i)
          call note_add(increment%notes, "the coefficient of friction " // to_text(mu(id(worst))) &
             // " is above " // to_text(limit(worst), 4) // ", up to which the contact of slave " &
             // "node " // to_text(scene%node_label(march%system%contact(pair)%contact%node(i))) &
@@ -77,7 +78,7 @@ contains
             is_new(list(k)) = .false.
          end do
          do k = 1, n
-            call constraint_place(march%system, set%id(list(k)), pair, i)
+            call constraint_index(march%system, set%id(list(k)), pair, i)
             known(march%system%first_constraint(pair) + 1:march%system%first_constraint(pair + 1)) &
                = .true.
          end do

@@ -59,7 +59,7 @@ contains
       n = 0
       associate (set => march%active%set, friction => march%active%friction, &
             before => march%system%first_constraint)
-         do k = set%n_held + 1, set%n
+         do k = set%n_permanent + 1, set%n
             associate (id => set%id(k), item => set%item(k))
                if (id <= before(pair) .or. id > before(pair + 1)) cycle
                if (friction_slides(friction, id) == 0) cycle

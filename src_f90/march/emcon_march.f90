@@ -5,10 +5,9 @@ module emcon_march
    use emcon_active_set, only : active_set_init
    use emcon_correction, only : correction_free
    use emcon_errors, only : err_analysis, err_input, err_interrupt, error_t, raise
+   use emcon_factor_policy, only : factor_policy_forget
    use emcon_host, only : host_copy_solvers, host_t
    use emcon_host_scheme, only : host_scheme_find
-   use emcon_judge, only : judge_init
-   use emcon_keeping, only : keeping_forget
    use emcon_kinds, only : wp
    use emcon_layer, only : layer_free, layer_init
    use emcon_ledger, only : ledger_init, ledger_measure, ledger_t
@@ -21,8 +20,10 @@ module emcon_march
    use emcon_motion, only : at_rest, motion_init
    use emcon_newton, only : interrupt_interface
    use emcon_options, only : option_words
+   use emcon_overlap_check, only : overlap_check_init
    use emcon_pair_record, only : pair_record_init
    use emcon_pair_sums, only : pair_sums_init
+   use emcon_rigid_rotation, only : rigid_rotation_init
    use emcon_scene, only : scene_t, where_text
    use emcon_scheme_registry, only : scheme_given
    use emcon_state, only : state_t
@@ -30,7 +31,6 @@ module emcon_march
    use emcon_system, only : system_init
    use emcon_term_registry, only : terms_massless
    use emcon_text, only : to_text
-   use emcon_turn_record, only : turn_record_init
    use emcon_velocity_update, only : velocity_update_free
    implicit none
    private
@@ -50,9 +50,9 @@ contains
       call check_schemes(self, scene, error)
       if (.not. allocated(error)) call system_init(self%system, scene, error, given)
       if (allocated(error)) return
-      allocate(self%may_shed(size(scene%x, 2)), self%is_bare(size(scene%x, 2)))
-      call terms_massless(self%system%term, self%may_shed, self%is_bare)
-      call layer_init(self%layer, scene, self%may_shed, self%system, error, given)
+      allocate(self%may_be_massless(size(scene%x, 2)), self%without_density(size(scene%x, 2)))
+      call terms_massless(self%system%term, self%may_be_massless, self%without_density)
+      call layer_init(self%layer, scene, self%may_be_massless, self%system, error, given)
       if (allocated(error)) return
       call host_copy_solvers(given, self%solver)
       call motion_init(self%motion, scene%x)
@@ -68,14 +68,14 @@ contains
          allocate(state%energy(size(scene%element_kind)), source=0.0_wp)
       end associate
       call pair_record_init(self%state%pairs, self%system)
-      call turn_record_init(self%state%turns, scene%rigid, scene%x, self%state%u)
+      call rigid_rotation_init(self%state%turns, scene%rigid, scene%x, self%state%u)
       call pair_sums_init(self%state%sums, self%system, scene%pair)
       call active_set_init(self%active, self%system)
       allocate(self%state%sliding(size(self%active%friction%mu)), source=0)
       allocate(self%state%drag(size(self%active%friction%mu)), source=0.0_wp)
       allocate(self%state%slip, self%state%slip_path, source=self%state%drag)
       call ledger_init(self%ledger, scene%n_dim)
-      call judge_init(self%judge, scene)
+      call overlap_check_init(self%overlap_check, scene)
    end subroutine march_init
 
    !> Each scheme that the deck calls by name was given.
@@ -182,7 +182,7 @@ contains
       type(increment_t), intent(in) :: increment
       type(error_t), intent(in) :: error
 
-      call keeping_forget(self%newton%keeping, self%newton%correction)
+      call factor_policy_forget(self%newton%factor_policy, self%newton%correction)
       if (error%code == err_interrupt) then
          if (allocated(self%before)) then
             self%state = self%before%state
@@ -212,7 +212,7 @@ contains
 
       self%state = state
       self%ledger = ledger
-      call keeping_forget(self%newton%keeping, self%newton%correction)
+      call factor_policy_forget(self%newton%factor_policy, self%newton%correction)
    end subroutine march_go_back
 
    !> Go to grid point `n_end` in one step, or in dyadic parts of one.

@@ -5,10 +5,10 @@ module emcon_march_accuracy
    use emcon_active_set, only : step_rough, step_strikes
    use emcon_constraints, only : constraints_force
    use emcon_csr, only : csr_t
+   use emcon_evaluation, only : evaluation_velocity
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t, part_t
    use emcon_numbering, only : gather_dependent
-   use emcon_pose, only : pose_velocity
    use emcon_scene, only : scene_t
    use emcon_system, only : mass_times
    use emcon_term, only : role_inertia
@@ -60,24 +60,24 @@ contains
 
       call find_forces(self)
       if (.not. self%state%control%h_before > 0.0_wp) return
-      associate (control => self%state%control, finding => self%finding, force => self%force, &
-            contact => self%push)
+      associate (control => self%state%control, step_check => self%step_check, &
+            force => self%force, contact => self%push)
          motion = max(control%largest_kinetic, self%ledger%kinetic, kinetic_at_end(self))
          if (.not. motion > 0.0_wp) return
          call find_motion_change(self, part%h, change)
          smooth = sqrt(squared(self, force - control%force, part%h, change)/(2.0_wp*motion))
          whole = sqrt(squared(self, force - control%force + contact - control%contact, part%h, &
             change)/(2.0_wp*motion))
-         finding%ratio = smooth/tolerance
-         if (finding%ratio > 1.0_wp) then
+         step_check%ratio = smooth/tolerance
+         if (step_check%ratio > 1.0_wp) then
             if (may_shrink(self, part)) status = step_rough
             return
          end if
-         if (.not. finding%changes_contact) return
+         if (.not. step_check%changes_contact) return
          ! The motion turns in the time h sqrt(C/smooth).
-         finding%ratio = max(finding%ratio, &
+         step_check%ratio = max(step_check%ratio, &
             whole*sqrt(smooth/self%scheme%error_constant())/tolerance)
-         if (finding%ratio > 1.0_wp .and. may_shrink(self, part)) status = step_strikes
+         if (step_check%ratio > 1.0_wp .and. may_shrink(self, part)) status = step_strikes
       end associate
    end subroutine accuracy_judge
 
@@ -113,7 +113,7 @@ contains
 
       associate (set => self%active%set, numbering => self%system%space%numbering, &
             force => self%force, contact => self%push)
-         call constraints_force(set, set%n_held + 1, contact)
+         call constraints_force(set, set%n_permanent + 1, contact)
          force = self%system%response%part(role_inertia)%force - contact
          call gather_dependent(numbering, force)
          call gather_dependent(numbering, contact)
@@ -125,7 +125,8 @@ contains
       type(march_t), intent(in) :: self
       real(wp), dimension(size(self%v1, 1), size(self%v1, 2)) :: v, momentum
 
-      v = pose_velocity(self%motion%pose, self%motion%v0, self%motion%du + self%motion%offset)
+      v = evaluation_velocity(self%motion%evaluation, self%motion%v0, self%motion%du &
+         + self%motion%offset)
       call mass_times(self%system, v, momentum)
       kinetic_at_end = 0.5_wp*sum(v*momentum)
    end function kinetic_at_end

@@ -7,16 +7,17 @@ module emcon_march_begin
    use emcon_explicit, only : explicit_prepare
    use emcon_factor_base, only : factor_base_t
    use emcon_guards, only : touching_bar
-   use emcon_holding, only : holding_begin, holding_t
+   use emcon_contact_support, only : contact_support_begin, contact_support_t
    use emcon_dashpots, only : dashpots_begin_step
    use emcon_host, only : host_find_solver
    use emcon_host_scheme, only : host_scheme_find
    use emcon_interactions, only : contact_options_t
-   use emcon_judge, only : judge_excuse, judge_smooth, judge_step, overlap_t
+   use emcon_overlap_check, only : overlap_check_excuse, overlap_check_smooth, overlap_check_step, &
+      overlap_t
    use emcon_kinds, only : dp, wp
    use emcon_layer, only : layer_begin_step, layer_mark
    use emcon_ledger, only : ledger_measure, ledger_t
-   use emcon_look_plane, only : overlap_text
+   use emcon_overlap_query_plane, only : overlap_text
    use emcon_march_accuracy, only : accuracy_begin
    use emcon_march_grid, only : march_count_grid, march_grid_time, march_part_time
    use emcon_march_past, only : march_past_forget
@@ -27,7 +28,7 @@ module emcon_march_begin
    use emcon_newton, only : newton_init
    use emcon_numbering, only : spread_dependent
    use emcon_overclosure, only : overclosure_follow_arcs
-   use emcon_pose, only : pose_at_end
+   use emcon_evaluation, only : evaluation_at_end
    use emcon_quasi_static, only : quasi_static_begin, quasi_static_hold
    use emcon_scene, only : scene_t, where_text
    use emcon_scheme_registry, only : scheme_create, scheme_given
@@ -189,10 +190,10 @@ contains
          self%newton%deadline = deadline
          call choose_solver(self, step)
          state%base = factor_base_t()
-         self%newton%keeping%is_wanted = step%newton == newton_kept
+         self%newton%factor_policy%is_wanted = step%newton == newton_kept
          call begin_active(self%active, step, size(scene%rigid) > 0)
-         if (.not. step%scheme%masses_resist) call holding_begin(self%active%holding, self%system, &
-            scene, state%u)
+         if (.not. step%scheme%masses_resist) call contact_support_begin(self%active%support, &
+            self%system, scene, state%u)
          call configure_contact(self, scene)
          call softness_begin_step(self%active%softness, self%system, scene, step, error)
          if (allocated(error)) return
@@ -203,7 +204,7 @@ contains
          if (allocated(error)) return
          call begin_times(self, scene, step)
       end associate
-      self%system%frozen%is_on = .false.
+      self%system%lagged%is_on = .false.
       call measure_start(self, scene%x, error)
       if (.not. allocated(error) .and. self%scheme%row%is_explicit) call explicit_prepare(self, &
          scene, error)
@@ -252,11 +253,12 @@ contains
       call active_set_overclosure(self%active, self%system, scene%x, self%state%u_start, &
          step%resolves_overclosure)
       self%meant_overlap = 0.0_wp
-      call judge_smooth(self%judge, scene, step%contact)
-      call judge_excuse(self%judge, scene%x, self%state%u_start, overlap)
+      call overlap_check_smooth(self%overlap_check, scene, step%contact)
+      call overlap_check_excuse(self%overlap_check, scene%x, self%state%u_start, overlap)
       if (overlap%depth > touching_bar) call warn_of_overlap(self, scene, overlap)
       if (.not. step%resolves_overclosure) return
-      call judge_step(self%judge, scene%x, self%state%u_start, at_rest(self%state%u), overlap)
+      call overlap_check_step(self%overlap_check, scene%x, self%state%u_start, &
+         at_rest(self%state%u), overlap)
       self%meant_overlap = overlap%depth
    end subroutine begin_overclosure
 
@@ -295,7 +297,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       type(motion_t) :: place
 
-      place = motion_of(pose_at_end, x, self%state%u, at_rest(self%state%u))
+      place = motion_of(evaluation_at_end, x, self%state%u, at_rest(self%state%u))
       call system_respond(self%system, place, .false.)
       call system_check_response(self%system, "at the start of the step", error)
       if (allocated(error)) return
@@ -319,7 +321,7 @@ contains
          .and. active%masses_resist .and. step%constraint_method /= method_penalty
       active%closes = .false.
       active%gap_tolerance = step%gap_tolerance
-      active%holding = holding_t()
+      active%support = contact_support_t()
    end subroutine begin_active
 
    !> Set up the layer of massless nodes for a dynamic step, and tell how many there are.
@@ -357,7 +359,7 @@ contains
       integer :: i
 
       do i = 1, self%system%n_pair
-         sheds(i) = any(self%may_shed(self%system%contact(i)%contact%node))
+         sheds(i) = any(self%may_be_massless(self%system%contact(i)%contact%node))
       end do
       do i = 1, self%system%n_pair
          associate (pair => scene%pair(i))

@@ -8,8 +8,8 @@ module emcon_march_commit
    use emcon_explicit, only : explicit_commit
    use emcon_friction, only : friction_missed, friction_slides, friction_work
    use emcon_friction_limit, only : friction_limit_tell
-   use emcon_holding, only : holding_t
-   use emcon_keeping, only : keeping_commit
+   use emcon_contact_support, only : contact_support_t
+   use emcon_factor_policy, only : factor_policy_commit
    use emcon_interlock_plane, only : interlock_tell
    use emcon_kinds, only : wp
    use emcon_march_guess, only : follow_links
@@ -20,7 +20,7 @@ module emcon_march_commit
    use emcon_pair_record, only : pair_record_jump, pair_record_measure
    use emcon_pair_sums, only : pair_sums_add, pair_sums_begin, pair_sums_jump
    use emcon_phases, only : phase_enter, phase_leave, phase_restitution
-   use emcon_pose, only : pose_velocity
+   use emcon_evaluation, only : evaluation_velocity
    use emcon_quasi_static, only : quasi_static_move
    use emcon_restitution, only : restitution_take
    use emcon_scene, only : scene_t
@@ -28,9 +28,9 @@ module emcon_march_commit
    use emcon_stand_off, only : stand_off_add
    use emcon_steps, only : initiation_velocity_update
    use emcon_term, only : role_external, role_inertia, role_internal
-   use emcon_term_registry, only : terms_decay
+   use emcon_term_registry, only : terms_dissipation
    use emcon_text, only : note_add, notes_t, to_text
-   use emcon_turn_record, only : turn_record_measure
+   use emcon_rigid_rotation, only : rigid_rotation_measure
    use emcon_velocity_jumps, only : jumps_add, jumps_begin, jumps_join, jumps_scale
    use emcon_velocity_update, only : push_t, push_weights, velocity_update_apply, &
       velocity_update_push
@@ -55,8 +55,9 @@ contains
          call gather_dependent(system%space%numbering, system%response%residual)
          call book_stabilization(self, increment)
          call find_velocities(self)
-         state%reaction = system%response%residual/(1.0_wp + self%motion%pose%start_weight)
-         if (set%n_held > 0) call constraints_force(set, set%n_held + 1, self%newton%contact)
+         state%reaction = system%response%residual/(1.0_wp + self%motion%evaluation%start_weight)
+         if (set%n_permanent > 0) call constraints_force(set, set%n_permanent + 1, &
+            self%newton%contact)
          if (self%scheme%row%is_explicit) then
             call explicit_commit(self, h, error)
             if (allocated(error)) return
@@ -66,18 +67,18 @@ contains
          call march_past_keep(self, h)
          call restitute(self, scene, h, increment%notes, error)
          if (allocated(error)) return
-         state%u = state%u + self%ending%du
+         state%u = state%u + self%end_state%du
          if (size(scene%rigid) > 0) then
-            call turn_record_measure(state%turns, scene%rigid, self%motion, state%reaction)
+            call rigid_rotation_measure(state%turns, scene%rigid, self%motion, state%reaction)
             ! Else round-off adds up between the nodes of a rigid body.
             call follow_links(system, state%u)
          end if
          state%v = self%v1
          state%contact = self%newton%contact
          call record_pairs(self, scene, h)
-         state%internal = self%ending%force
-         state%energy = self%ending%energy
-         state%potential = self%ending%potential
+         state%internal = self%end_state%force
+         state%energy = self%end_state%energy
+         state%potential = self%end_state%potential
          if (self%newton%correction%fell_back .and. set%n > 0) call note_add(increment%notes, &
             trim(correction_reason(self%newton%correction)) // ": solved as a saddle point")
          call tell_gaps(self, h, increment)
@@ -97,7 +98,7 @@ contains
       end associate
       call keep_constraints(self)
       if (self%scheme%row%is_explicit .and. self%explicit%is_free) return
-      call keeping_commit(self%newton%keeping, self%newton%correction, self%motion, &
+      call factor_policy_commit(self%newton%factor_policy, self%newton%correction, self%motion, &
          self%state%base, is_due)
       if (is_due) self%system%phases%n_factorisation = self%system%phases%n_factorisation + 1
    end subroutine march_commit
@@ -113,11 +114,11 @@ contains
       associate (state => self%state, system => self%system, explicit => self%explicit)
          if (.not. self%active%softness%is_at_ends) then
             lag = merge(0.5_wp, 0.0_wp, self%scheme%row%masses_resist .and. &
-               .not. self%motion%pose%pushes_at_end)
+               .not. self%motion%evaluation%pushes_at_end)
             if (self%layer%is_settled) then
                ! Forces act where nodes without mass were before their balance.
                call pair_record_measure(state%pairs, system, self%active%set, scene%x, state%u &
-                  + (self%motion%du - self%ending%du), self%motion%du, lag)
+                  + (self%motion%du - self%end_state%du), self%motion%du, lag)
             else
                call pair_record_measure(state%pairs, system, self%active%set, scene%x, state%u, &
                   self%motion%du, lag)
@@ -193,7 +194,8 @@ contains
          do i = 1, size(self%v1, 2)
             do a = 1, size(self%v1, 1)
                if (.not. system%space%numbering%unknown(a, i) > 0) cycle
-               self%v1(a, i) = pose_velocity(motion%pose, self%state%v(a, i), motion%du(a, i))
+               self%v1(a, i) = evaluation_velocity(motion%evaluation, self%state%v(a, i), &
+                  motion%du(a, i))
                if (allocated(motion%v_past)) self%v1(a, i) = self%v1(a, i) + motion%v_past(a, i)
                system%response%residual(a, i) = 0.0_wp
             end do
@@ -216,7 +218,7 @@ contains
       call jumps_begin(self%jump)
       if (self%scheme%row%masses_resist .and. scene%step(self%state%i_step)%initiation &
          == initiation_velocity_update) call restore_energy(self, notes, error)
-      if (self%scheme%row%masses_resist .and. self%active%set%n > self%active%set%n_held &
+      if (self%scheme%row%masses_resist .and. self%active%set%n > self%active%set%n_permanent &
          .and. .not. allocated(error)) call restitution_take(self, notes, error)
       call quasi_static_move(self, h)
       if (self%layer%is_on .and. self%scheme%row%masses_resist .and. .not. allocated(error)) then
@@ -249,7 +251,7 @@ contains
             state%is_active(set%id(k)) = .true.
             state%lam(set%id(k)) = set%lam(k)
             ! What has opened stores nothing that a later step could give back.
-            if (set%gives_way .and. set%is_stored .and. k > set%n_held) &
+            if (set%gives_way .and. set%is_stored .and. k > set%n_permanent) &
                state%is_active(set%id(k)) = set%law(k)%law%closure() < 0.0_wp
             if (.not. set%item(k)%rubs) cycle
             state%sliding(set%id(k)) = friction_slides(self%active%friction, set%id(k))
@@ -277,11 +279,11 @@ contains
 
       associate (layer => self%layer, set => self%active%set)
          do i = 1, size(self%v1, 2)
-            if (layer%is_massless(i)) self%v1(:, i) = self%ending%du(:, i)/h
+            if (layer%is_massless(i)) self%v1(:, i) = self%end_state%du(:, i)/h
          end do
          if (.not. layer%is_settled) return
          lost = 0.0_wp
-         do k = set%n_held + 1, set%n
+         do k = set%n_permanent + 1, set%n
             lost = lost - set%lam(k)*set%item(k)%dgap
          end do
          self%ledger%external_work = self%ledger%external_work + layer%work
@@ -327,14 +329,14 @@ contains
       type(increment_t), intent(inout) :: increment
       integer :: i, a
 
-      associate (holding => self%active%holding, system => self%system)
-         if (.not. holding%is_needed) return
-         if (any(holding%brought > 0.0_wp .and. self%active%is_active)) call note_add( &
-            increment%warnings, holding%brought_text // ", on which no load does work: moved " // &
-            "over a gap of " // to_text(maxval(holding%brought, mask=self%active%is_active), 3) &
+      associate (support => self%active%support, system => self%system)
+         if (.not. support%is_needed) return
+         if (any(support%brought > 0.0_wp .and. self%active%is_active)) call note_add( &
+            increment%warnings, support%brought_text // ", on which no load does work: moved " // &
+            "over a gap of " // to_text(maxval(support%brought, mask=self%active%is_active), 3) &
             // " onto the surface nearest to it")
-         if (.not. allocated(holding%text)) return
-         call tell_stabilized(self%active%holding, increment)
+         if (.not. allocated(support%text)) return
+         call tell_stabilized(self%active%support, increment)
          do i = 1, size(self%motion%du, 2)
             do a = 1, size(self%motion%du, 1)
                if (system%space%numbering%unknown(a, i) == 0) cycle
@@ -346,17 +348,17 @@ contains
    end subroutine book_stabilization
 
    !> Tell once in a step of a body that moves with nothing to hold it.
-   subroutine tell_stabilized(holding, increment)
-      type(holding_t), intent(inout) :: holding
+   subroutine tell_stabilized(support, increment)
+      type(contact_support_t), intent(inout) :: support
       type(increment_t), intent(inout) :: increment
       integer :: n
 
-      n = index(holding%text, " free to ")
-      if (allocated(holding%told)) then
-         if (holding%told == holding%text(:n)) return
+      n = index(support%text, " free to ")
+      if (allocated(support%told)) then
+         if (support%told == support%text(:n)) return
       end if
-      holding%told = holding%text(:n)
-      call note_add(increment%warnings, holding%text // ", on which no load does work: the " // &
+      support%told = support%text(:n)
+      call note_add(increment%warnings, support%text // ", on which no load does work: the " // &
          "smallest motion is taken, as STABILIZE asks for")
    end subroutine tell_stabilized
 
@@ -372,16 +374,16 @@ contains
             set => self%active%set, motion => self%motion)
          contact_work = 0.0_wp
          friction = 0.0_wp
-         do k = set%n_held + 1, set%n
+         do k = set%n_permanent + 1, set%n
             friction = friction + friction_work(set, k)
          end do
-         if (motion%pose%pushes_at_end) then
-            contact_work = sum((motion%pose%start_weight*state%contact + self%newton%contact) &
-               *motion%du)/(1.0_wp + motion%pose%start_weight)
+         if (motion%evaluation%pushes_at_end) then
+            contact_work = sum((motion%evaluation%start_weight*state%contact &
+               + self%newton%contact) *motion%du)/(1.0_wp + motion%evaluation%start_weight)
             self%ledger%external_work = self%ledger%external_work &
                + 0.5_wp*sum((state%load + part(role_external)%force)*motion%du) &
                + sum(state%reaction*motion%du) + sum(part(role_inertia)%force*motion%offset) &
-               /(1.0_wp + motion%pose%start_weight)
+               /(1.0_wp + motion%evaluation%start_weight)
          else if (self%scheme%row%masses_resist) then
             do k = 1, set%n
                contact_work = contact_work + set%lam(k)*set%item(k)%dgap
@@ -399,7 +401,7 @@ contains
          self%ledger%contact_damping = self%ledger%contact_damping + dashpots_work(set)
          self%ledger%contact_work = self%ledger%contact_work + contact_work
          call book_stored(self)
-         call terms_decay(self%system%term, decay, damping)
+         call terms_dissipation(self%system%term, decay, damping)
          self%ledger%decay = self%ledger%decay + decay
          self%ledger%damping = self%ledger%damping + damping
       end associate

@@ -6,13 +6,13 @@ module emcon_march_control
    use emcon_active_set, only : step_diverged, step_passes_event, step_refused, step_rough, &
       step_singular, step_stands_off, step_strikes
    use emcon_errors, only : error_t
-   use emcon_keeping, only : keeping_forget
+   use emcon_factor_policy, only : factor_policy_forget
    use emcon_kinds, only : int64, wp
    use emcon_march_accuracy, only : accuracy_keep
    use emcon_march_events, only : events_tell
    use emcon_march_grid, only : march_next_corner, march_part_time, march_size
    use emcon_march_parts, only : march_attempt, march_match, march_stop
-   use emcon_march_types, only : increment_t, march_t, part_t, start_t
+   use emcon_march_types, only : increment_t, march_t, part_t, rollback_t
    use emcon_scene, only : scene_t
    use emcon_step_control, only : control_accept, control_refuse, why_contact, why_error, &
       why_event, why_newton, why_other, why_stand_off
@@ -68,7 +68,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer(int64) :: first, second
 
-      self%before = start_t(self%state, self%ledger)
+      self%before = rollback_t(self%state, self%ledger)
       do
          n = next_units(self, scene, from)
          if (n == self%n_least) then
@@ -87,7 +87,7 @@ contains
          self%before%state%control%n_less = self%state%control%n_less
          self%state = self%before%state
          self%ledger = self%before%ledger
-         call keeping_forget(self%newton%keeping, self%newton%correction)
+         call factor_policy_forget(self%newton%factor_policy, self%newton%correction)
          increment%done = 0.0_wp
       end do
       increment%h = march_size(self, scene%step(self%state%i_step), from, n)
@@ -147,11 +147,11 @@ contains
          if (step%event_fraction > 0.0_wp) call events_tell(self, scene, step, part, increment)
          is_slow = 2*self%newton%convergence%n_iteration > self%newton%convergence%maximum
          if (step%tolerance > 0.0_wp) then
-            if (self%finding%ratio > 1.0_wp) call note_add(increment%notes, "the error is " // &
-               to_text(self%finding%ratio, 3) // " times TOLERANCE with the smallest increment")
+            if (self%step_check%ratio > 1.0_wp) call note_add(increment%notes, "the error is " // &
+               to_text(self%step_check%ratio, 3) // " times TOLERANCE with the smallest increment")
             call accuracy_keep(self, part%h)
          end if
-         call control_accept(control, real(n, wp)/real(self%n_unit, wp), self%finding%ratio, &
+         call control_accept(control, real(n, wp)/real(self%n_unit, wp), self%step_check%ratio, &
             is_slow .and. step%tolerance > 0.0_wp, self%least_power, &
             self%largest_power)
       end associate
@@ -228,14 +228,14 @@ contains
       if (status == step_passes_event) then
          self%state%control%n_less(why_event) = self%state%control%n_less(why_event) + 1
          window = real(self%n_window, wp)
-         n = int(min(real(n, wp), max(0.0_wp, self%finding%event_at*real(n, wp) &
+         n = int(min(real(n, wp), max(0.0_wp, self%step_check%event_at*real(n, wp) &
             - margin*window)), int64)
          n = max(n, before/least_share, self%n_window)
          n = min(n, max(self%n_window, before - before/least_share))
          return
       end if
       ratio = 0.0_wp
-      if (any(status == [step_rough, step_strikes])) ratio = self%finding%ratio
+      if (any(status == [step_rough, step_strikes])) ratio = self%step_check%ratio
       associate (control => self%state%control)
          power = control%power
          call control_refuse(control, real(n, wp)/real(self%n_unit, wp), ratio, why_of(status), &

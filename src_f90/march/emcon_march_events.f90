@@ -2,7 +2,7 @@
 module emcon_march_events
    use emcon_active_set, only : step_passes_event
    use emcon_kinds, only : wp
-   use emcon_march_types, only : finding_t, increment_t, march_t, part_t
+   use emcon_march_types, only : step_check_t, increment_t, march_t, part_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : events_nodes, step_t
    use emcon_text, only : note_add, to_text
@@ -19,7 +19,7 @@ contains
 
       call find_acting(self, acts)
       associate (first => self%system%first_constraint)
-         self%finding%changes_contact = any(acts(first(1) + 1:first(self%system%n_pair + 1)) &
+         self%step_check%changes_contact = any(acts(first(1) + 1:first(self%system%n_pair + 1)) &
             .neqv. self%active%was_active(first(1) + 1:first(self%system%n_pair + 1)))
       end associate
    end subroutine events_look
@@ -42,12 +42,12 @@ contains
       integer, intent(inout) :: status           !! one of the `step_` codes
       logical :: acts(size(self%active%was_active)), is_event(size(self%active%was_active))
 
-      if (.not. self%finding%changes_contact .or. part%h <= window) return
+      if (.not. self%step_check%changes_contact .or. part%h <= window) return
       call find_acting(self, acts)
       call find_events(self, step, self%active%was_active, acts, is_event)
       if (.not. any(is_event)) return
       status = step_passes_event
-      call find_first(self, part%h, is_event, self%finding%event_at)
+      call find_first(self, part%h, is_event, self%step_check%event_at)
    end subroutine events_judge
 
    !> Which contacts begin or end: all, or the first and the last ones of a pair.
@@ -82,7 +82,7 @@ contains
       part = 1.0_wp
       if (any(is_event .and. self%active%was_active)) part = 0.5_wp
       associate (set => self%active%set)
-         do k = set%n_held + 1, set%n
+         do k = set%n_permanent + 1, set%n
             if (.not. is_event(set%id(k))) cycle
             associate (item => set%item(k))
                way = 0.0_wp

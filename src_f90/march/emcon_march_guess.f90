@@ -1,10 +1,10 @@
 !> The first guess of a step: prescribed motion, and what the velocities lead to.
 module emcon_march_guess
+   use emcon_evaluation, only : instant_later, instant_t, evaluation_displacement
    use emcon_kinds, only : wp
    use emcon_march_past, only : march_past_take
    use emcon_march_types, only : march_t
    use emcon_numbering, only : spread_dependent
-   use emcon_pose, only : instant_later, instant_t, pose_way
    use emcon_prescribed, only : prescribed_motion
    use emcon_scene, only : scene_t
    use emcon_system, only : system_t
@@ -29,7 +29,7 @@ contains
       finish = instant_later(start, h)
       begin = start
       begin%h_before = self%state%h_before
-      self%motion%pose = self%scheme%pose(begin, h)
+      self%motion%evaluation = self%scheme%evaluation(begin, h)
       call march_past_take(self)
       self%motion%u0 = self%state%u
       self%motion%v0 = self%state%v
@@ -48,8 +48,8 @@ contains
                if (self%scheme%row%is_explicit) cycle
                if (self%scheme%row%masses_resist) then
                   if (allocated(self%motion%v_past)) v = v - self%motion%v_past(a, i)
-                  self%motion%offset(a, i) = pose_way(self%motion%pose, state%v(a, i), v) &
-                     - self%motion%du(a, i)
+                  self%motion%offset(a, i) = evaluation_displacement(self%motion%evaluation, &
+                     state%v(a, i), v) - self%motion%du(a, i)
                else
                   self%newton%driven(a, i) = self%motion%du(a, i)
                end if

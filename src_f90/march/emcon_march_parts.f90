@@ -9,7 +9,7 @@ module emcon_march_parts
    use emcon_locking, only : strainless_element
    use emcon_march_begin, only : march_renumber
    use emcon_march_step, only : cycling_text, march_step, nodes_text
-   use emcon_march_types, only : increment_t, march_t, part_t, start_t
+   use emcon_march_types, only : increment_t, march_t, part_t, rollback_t
    use emcon_mass_return, only : mass_find_troubled, mass_match, mass_return
    use emcon_mechanism_text, only : free_motion_text
    use emcon_scene, only : scene_t
@@ -145,7 +145,7 @@ contains
       do
          call march_step(self, scene, part, increment, status, error)
          if (allocated(error) .or. status == step_done) return
-         if (.not. allocated(self%before)) self%before = start_t(self%state, self%ledger)
+         if (.not. allocated(self%before)) self%before = rollback_t(self%state, self%ledger)
          call reason_text(self, scene, status, reason)
          if (.not. may_return(self, status, part%level)) exit
          call return_mass(self, scene, status, reason, increment, error)
@@ -195,7 +195,7 @@ contains
       type(march_t), intent(in) :: self
       integer, intent(in) :: status, level
 
-      may_return = any(self%layer%is_massless .and. .not. self%is_bare) &
+      may_return = any(self%layer%is_massless .and. .not. self%without_density) &
          .and. self%scheme%row%masses_resist .and. any(status == [step_refused, step_diverged, &
          step_singular, step_cycling, step_too_far, step_unbalanced]) .and. &
          level >= min(return_level, self%n_level)
@@ -233,7 +233,7 @@ contains
       integer, intent(in) :: status
 
       is_hopeless = status == step_not_held .and. &
-         (self%active%n_newton == 0 .or. .not. self%active%holding%is_pushed)
+         (self%active%n_newton == 0 .or. .not. self%active%support%is_pushed)
    end function is_hopeless
 
    !> Does some contact of the step that failed slide?
@@ -290,20 +290,20 @@ contains
       case (step_stands_off)
          text = "a contact would close over more than the gap tolerance"
       case (step_not_held)
-         text = "nothing holds what moves without resistance: " // self%active%holding%text
-         if (.not. self%active%holding%is_pushed) text = text // ", on which no load does work"
+         text = "nothing holds what moves without resistance: " // self%active%support%text
+         if (.not. self%active%support%is_pushed) text = text // ", on which no load does work"
          if (slides(self)) text = text // ", where friction is at its limit"
          text = text // "; add *BOUNDARY conditions"
-         if (.not. self%active%holding%is_pushed) text = text // &
+         if (.not. self%active%support%is_pushed) text = text // &
             ", or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"
       case (step_unbalanced)
          text = "nodes without mass find no balance where contacts open or close"
       case (step_overlaps)
          text = "bodies would overlap where no contact acts"
       case (step_rough)
-         text = "the error is " // to_text(self%finding%ratio, 3) // " times TOLERANCE"
+         text = "the error is " // to_text(self%step_check%ratio, 3) // " times TOLERANCE"
       case (step_strikes)
-         text = "contact begins or ends: the error is " // to_text(self%finding%ratio, 3) // &
+         text = "contact begins or ends: the error is " // to_text(self%step_check%ratio, 3) // &
             " times TOLERANCE"
       case (step_loose)
          text = "gaps do not close to TOLERANCE of *CONSTRAINT METHOD in " // &
@@ -323,7 +323,7 @@ contains
       character(len=:), allocatable, intent(inout) :: text
       character(len=:), allocatable :: motion, holders
 
-      if (.not. self%scheme%row%masses_resist .and. .not. allocated(self%active%holding%text)) then
+      if (.not. self%scheme%row%masses_resist .and. .not. allocated(self%active%support%text)) then
          call free_motion_text(self%system, scene, &
             scene%step(self%state%i_step)%prescribed, motion, with_contact=.true., &
             u=self%state%u)

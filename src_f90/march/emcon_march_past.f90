@@ -5,10 +5,10 @@
 module emcon_march_past
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_select
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : instant_t, evaluation_at_end
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t
    use emcon_motion, only : at_rest, motion_of, motion_t
-   use emcon_pose, only : instant_t, pose_at_end
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_system, only : system_loads
@@ -42,8 +42,8 @@ contains
          if (allocated(state%past)) deallocate(state%past, state%load)
          allocate(state%past(size(scene%x, 1), size(scene%x, 2), row%n_past), source=0.0_wp)
          allocate(state%load, mold=scene%x)
-         place = motion_of(pose_at_end, scene%x, state%u, at_rest(scene%x), state%v)
-         place%pose%load_instant = start
+         place = motion_of(evaluation_at_end, scene%x, state%u, at_rest(scene%x), state%v)
+         place%evaluation%load_instant = start
          call system_loads(self%system, place, state%load)
          state%h_before = 0.0_wp
          state%has_past = .true.
@@ -77,15 +77,15 @@ contains
          if (allocated(motion%v_past)) deallocate(motion%v_past, motion%dv_past)
          if (allocated(motion%du_before)) deallocate(motion%du_before)
          if (.not. state%has_past) return
-         if (motion%pose%recalled > 0.0_wp) motion%du_before = state%past(:, :, 1)
-         if (motion%pose%start_weight > 0.0_wp) motion%carried = motion%pose%start_weight &
-            *(state%internal - state%load - state%contact)
+         if (motion%evaluation%recalled > 0.0_wp) motion%du_before = state%past(:, :, 1)
+         if (motion%evaluation%start_weight > 0.0_wp) motion%carried &
+            = motion%evaluation%start_weight *(state%internal - state%load - state%contact)
          if (size(state%past, 3) == 0) return
          motion%v_past = at_rest(motion%du)
          motion%dv_past = at_rest(motion%du)
          do k = 1, size(state%past, 3)
-            motion%v_past = motion%v_past + motion%pose%past_velocity(k)*state%past(:, :, k)
-            motion%dv_past = motion%dv_past + motion%pose%past_change(k)*state%past(:, :, k)
+            motion%v_past = motion%v_past + motion%evaluation%past_velocity(k)*state%past(:, :, k)
+            motion%dv_past = motion%dv_past + motion%evaluation%past_change(k)*state%past(:, :, k)
          end do
       end associate
    end subroutine march_past_take

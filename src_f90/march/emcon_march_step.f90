@@ -5,33 +5,33 @@ module emcon_march_step
    use emcon_active_set_solve, only : active_set_solve
    use emcon_amplitudes, only : find_amplitude_value
    use emcon_blocked_contact, only : blocked_contact_text
-   use emcon_constraints, only : constraint_place
+   use emcon_constraints, only : constraint_index
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_explicit, only : explicit_begin, explicit_end, explicit_fly
    use emcon_guards, only : guard_slack
-   use emcon_judge, only : judge_step, overlap_t
-   use emcon_keeping, only : keeping_forget, keeping_step
+   use emcon_overlap_check, only : overlap_check_step, overlap_t
+   use emcon_factor_policy, only : factor_policy_forget, factor_policy_step
    use emcon_kept_factor, only : kept_factor_renew
    use emcon_kinds, only : wp
-   use emcon_look_plane, only : overlap_names
+   use emcon_overlap_query_plane, only : overlap_names
    use emcon_march_accuracy, only : accuracy_judge
    use emcon_march_commit, only : march_commit
    use emcon_march_events, only : events_judge, events_look
    use emcon_march_guess, only : march_guess
    use emcon_march_past, only : march_past_begin
-   use emcon_march_types, only : finding_t, increment_t, march_t, part_t
+   use emcon_march_types, only : step_check_t, increment_t, march_t, part_t
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_layer, only : layer_settle
    use emcon_phases, only : phase_enter, phase_factorise, phase_judge, phase_leave, &
       phase_restitution
-   use emcon_pose, only : instant_later, pose_at_end
+   use emcon_evaluation, only : instant_later, evaluation_at_end
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_steps, only : method_null_space
    use emcon_system, only : system_find_energy, system_loads, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : joined, note_add, string_t, to_text
-   use emcon_travel, only : largest_motion
+   use emcon_motion_bound, only : largest_motion
    implicit none
    private
    public :: march_step, cycling_text, nodes_text
@@ -55,8 +55,8 @@ contains
       character(len=:), allocatable :: text
       integer :: left
 
-      self%layer%is_troubled = .false.
-      self%finding = finding_t()
+      self%layer%needs_mass = .false.
+      self%step_check = step_check_t()
       self%active%may_cut = part%may_cut
       self%active%gap_tolerance = 0.0_wp
       if (part%may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
@@ -71,9 +71,9 @@ contains
          call phase_leave(self%system%phases, left)
       end if
       if (status /= step_done .or. allocated(error)) return
-      self%ending%du = self%motion%du
-      if (self%layer%is_settled) self%ending%du = self%ending%du + self%layer%du
-      call judge(self, scene, part, increment, status)
+      self%end_state%du = self%motion%du
+      if (self%layer%is_settled) self%end_state%du = self%end_state%du + self%layer%du
+      call overlap_check(self, scene, part, increment, status)
       if (status == step_done .and. self%judges_size) call judge_size(self, scene, part, status)
       if (status == step_done) call find_ending(self, scene, part, status, error)
       if (status /= step_done .or. allocated(error)) return
@@ -154,15 +154,16 @@ contains
       logical :: is_lost
       integer :: left
 
-      associate (keeping => self%newton%keeping, correction => self%newton%correction)
-         keeping%is_allowed = keeping%is_wanted .and. self%scheme%row%masses_resist .and. &
-            .not. (self%active%friction%is_on .or. self%active%dashpots%is_on) .and. &
-            (correction%method == method_null_space .or. self%system%n_constraint == 0)
-         call keeping_step(keeping, correction, self%state%base, part%start, part%h, &
+      associate (factor_policy => self%newton%factor_policy, correction => self%newton%correction)
+         factor_policy%is_allowed = factor_policy%is_wanted &
+            .and. self%scheme%row%masses_resist .and. .not. (self%active%friction%is_on &
+            .or. self%active%dashpots%is_on) .and. (correction%method == method_null_space &
+            .or. self%system%n_constraint == 0)
+         call factor_policy_step(factor_policy, correction, self%state%base, part%start, part%h, &
             self%state%increment, is_lost)
          if (.not. is_lost) return
-         motion = motion_of(self%scheme%pose(keeping%base%start, keeping%base%h), self%motion%x, &
-            keeping%base%u0, keeping%base%du)
+         motion = motion_of(self%scheme%evaluation(factor_policy%base%start, &
+            factor_policy%base%h), self%motion%x, factor_policy%base%u0, factor_policy%base%du)
          call system_respond(self%system, motion, .true.)
          if (.not. (allocated(self%system%response%refusal) .or. &
             allocated(self%system%response%failure))) then
@@ -170,7 +171,7 @@ contains
             call kept_factor_renew(correction%kept, self%system%matrix, error)
             call phase_leave(self%system%phases, left)
          end if
-         if (.not. correction%kept%is_made) call keeping_forget(keeping, correction)
+         if (.not. correction%kept%is_made) call factor_policy_forget(factor_policy, correction)
       end associate
    end subroutine keep_factor
 
@@ -181,12 +182,12 @@ contains
       type(part_t), intent(in) :: part
       integer, intent(inout) :: status           !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      type(motion_t) :: ending
+      type(motion_t) :: end_state
       real(wp) :: load(size(scene%x, 1), size(scene%x, 2))
 
-      ending = motion_of(pose_at_end, scene%x, self%motion%u0, self%motion%du)
-      ending%pose%load_instant = instant_later(part%start, part%h)
-      call system_loads(self%system, ending, load)
+      end_state = motion_of(evaluation_at_end, scene%x, self%motion%u0, self%motion%du)
+      end_state%evaluation%load_instant = instant_later(part%start, part%h)
+      call system_loads(self%system, end_state, load)
       call layer_settle(self%layer, self%motion, self%active, load, status, error)
       if (status /= step_done) status = step_unbalanced
    end subroutine settle
@@ -206,10 +207,10 @@ contains
          if (is_elsewhere) status = step_refused
          return
       end if
-      is_elsewhere = self%motion%pose%place < 1.0_wp .or. self%layer%is_settled
-      associate (system => self%system, motion => self%motion, ending => self%ending)
+      is_elsewhere = self%motion%evaluation%at < 1.0_wp .or. self%layer%is_settled
+      associate (system => self%system, motion => self%motion, end_state => self%end_state)
          if (is_elsewhere) then
-            place = motion_of(pose_at_end, motion%x, motion%u0, ending%du)
+            place = motion_of(evaluation_at_end, motion%x, motion%u0, end_state%du)
             call system_respond(system, place, .false.)
             call system_find_energy(system, place)
          else
@@ -218,9 +219,9 @@ contains
          if (allocated(system%response%failure)) allocate(error, source=system%response%failure)
          if (allocated(system%response%refusal)) status = step_refused
          if (status /= step_done .or. allocated(error)) return
-         ending%force = system%response%part(role_internal)%force
-         ending%energy = system%response%energy
-         ending%potential = system%response%potential
+         end_state%force = system%response%part(role_internal)%force
+         end_state%energy = system%response%energy
+         end_state%potential = system%response%potential
          if (is_elsewhere) call system_respond(system, motion, .false.)
       end associate
    end subroutine find_ending
@@ -242,7 +243,7 @@ contains
    end function overclosure_left
 
    !> Let the judge look at the solved step: cut it, or keep what was found.
-   subroutine judge(self, scene, part, increment, status)
+   subroutine overlap_check(self, scene, part, increment, status)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(part_t), intent(in) :: part
@@ -251,12 +252,15 @@ contains
       type(overlap_t) :: overlap
       integer :: left
 
-      if (self%judge%look%outline%n_piece == 0) return
+      if (self%overlap_check%look%outline%n_piece == 0) return
       call phase_enter(self%system%phases, phase_judge, left)
-      if (self%active%travel%total + largest_motion(self%ending%du) >= self%clear_until) then
-         call judge_step(self%judge, scene%x, self%state%u, self%ending%du, overlap)
-         self%clear_until = self%active%travel%total + self%judge%clearance
-         if (self%judge%stray%depth > increment%stray%depth) increment%stray = self%judge%stray
+      if (self%active%motion_bound%total &
+         + largest_motion(self%end_state%du) >= self%clear_until) then
+         call overlap_check_step(self%overlap_check, scene%x, self%state%u, self%end_state%du, &
+            overlap)
+         self%clear_until = self%active%motion_bound%total + self%overlap_check%clearance
+         if (self%overlap_check%stray%depth > increment%stray%depth) increment%stray &
+            = self%overlap_check%stray
       end if
       overlap%depth = max(0.0_wp, overlap%depth - self%active%left(1)*self%meant_overlap)
       if (part%may_cut .and. part%h > scale(increment%h, -judge_levels)) then
@@ -267,7 +271,7 @@ contains
       overlap%of_edges = max(overlap%of_edges, increment%overlap%of_edges)
       if (overlap%depth > increment%overlap%depth) increment%overlap = overlap
       increment%overlap%of_edges = overlap%of_edges
-   end subroutine judge
+   end subroutine overlap_check
 
    !> Has the step brought bodies deeper into each other than guards allow, at nodes that contact of
    !> both sides could hold and does not? In a smaller step it sees them come.
@@ -289,7 +293,8 @@ contains
          end associate
       end do
       if (.not. goes_in) return
-      call judge_step(self%judge, scene%x, self%state%u, at_rest(self%motion%du), before)
+      call overlap_check_step(self%overlap_check, scene%x, self%state%u, at_rest(self%motion%du), &
+         before)
       goes_in = overlap%depth > before%depth + 0.1_wp*deepest_new
    end function goes_in
 
@@ -333,7 +338,7 @@ contains
       n = 0
       do id = 1, size(is_meant)
          if (.not. is_meant(id)) cycle
-         call constraint_place(self%system, id, pair, i)
+         call constraint_index(self%system, id, pair, i)
          if (pair == 0) cycle
          n = n + 1
          found(n)%text = to_text(scene%node_label(self%system%contact(pair)%contact%node(i)))

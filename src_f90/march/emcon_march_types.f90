@@ -1,16 +1,16 @@
 !> What a march through time holds, what one increment took, and what a step is.
 module emcon_march_types
    use emcon_active_set, only : active_set_t
+   use emcon_evaluation, only : instant_t
    use emcon_explicit_type, only : explicit_t
    use emcon_host_scheme, only : host_scheme_t
-   use emcon_judge, only : judge_t, overlap_t
    use emcon_kinds, only : int64, wp
    use emcon_layer, only : layer_t
    use emcon_ledger, only : ledger_t
    use emcon_motion, only : motion_t
    use emcon_newton, only : interrupt_interface, newton_t
    use emcon_nodal_pull, only : nodal_pull_t
-   use emcon_pose, only : instant_t
+   use emcon_overlap_check, only : overlap_check_t, overlap_t
    use emcon_scheme, only : scheme_t
    use emcon_sparse_solver, only : solver_box_t
    use emcon_stand_off, only : stand_off_t
@@ -21,7 +21,8 @@ module emcon_march_types
    use emcon_velocity_update, only : velocity_update_t
    implicit none
    private
-   public :: march_t, increment_t, part_t, ending_t, start_t, finding_t, grid_corner_t, watcher_t
+   public :: march_t, increment_t, part_t, end_state_t, rollback_t, step_check_t, grid_corner_t, &
+      watcher_t
 
    !> Somebody who is told how an increment goes that is made in parts.
    type, abstract :: watcher_t
@@ -76,12 +77,12 @@ module emcon_march_types
    end type increment_t
 
    !> What a step has come to at its end, and what the elements and the given forces are there.
-   type :: ending_t
+   type :: end_state_t
       real(wp), allocatable :: du(:, :)          !! (n_dim, n_node) displacement over the step [L]
       real(wp), allocatable :: force(:, :)       !! (n_dim, n_node) internal forces [M L/T^2]
       real(wp), allocatable :: energy(:)         !! (n_element) [M L^2/T^2]
       real(wp) :: potential = 0.0_wp             !! of the given forces [M L^2/T^2]
-   end type ending_t
+   end type end_state_t
 
    !> The part of an increment that is one step.
    type :: part_t
@@ -92,17 +93,17 @@ module emcon_march_types
    end type part_t
 
    !> What was found of the step that was solved last.
-   type :: finding_t
+   type :: step_check_t
       real(wp) :: ratio = -1.0_wp                !! of its error to the tolerance; < 0: not judged
       logical :: changes_contact = .false.       !! contacts begin or end in it
       real(wp) :: event_at = 0.0_wp              !! part of it before the first event
-   end type finding_t
+   end type step_check_t
 
    !> What an increment that is interrupted goes back to.
-   type :: start_t
+   type :: rollback_t
       type(state_t) :: state
       type(ledger_t) :: ledger
-   end type start_t
+   end type rollback_t
 
    type :: march_t
       type(system_t) :: system
@@ -115,12 +116,12 @@ module emcon_march_types
       type(velocity_update_t) :: velocity_update
       type(velocity_jump_t), allocatable :: jump(:)  !! at the end of the step
       type(layer_t) :: layer                     !! of massless contact surfaces
-      logical, allocatable :: may_shed(:)        !! (n_node) massless at first
-      logical, allocatable :: is_bare(:)         !! (n_node) of sections without inertia
+      logical, allocatable :: may_be_massless(:) !! (n_node) massless at first
+      logical, allocatable :: without_density(:) !! (n_node) of sections without inertia
       type(solver_box_t), allocatable :: solver(:)   !! that a program has given
       type(notes_t) :: warnings                  !! to be told with the next increment
       type(explicit_t) :: explicit               !! of explicit steps
-      type(judge_t) :: judge
+      type(overlap_check_t) :: overlap_check
       real(wp) :: clear_until = 0.0_wp           !! nothing for it to see, by `active%travel` [L]
       !> Overlap per edge with which a step began that resolves it
       real(wp) :: meant_overlap = 0.0_wp
@@ -136,7 +137,7 @@ module emcon_march_types
       integer(int64) :: n_least = 1              !! in the smallest one,
       integer(int64) :: n_window = 0             !! and in one in which an event may lie
       integer :: least_power = 0, largest_power = 0   !! of two, of sizes that the error asks for
-      type(finding_t) :: finding
+      type(step_check_t) :: step_check
       real(wp), allocatable :: mass(:, :)        !! (n_dim, n_node) of each unknown, else 0 [M]
       !> (n_dim, n_node) mean forces on it over the step: of contact, and all others [M L/T^2]
       real(wp), allocatable :: push(:, :), force(:, :)
@@ -145,8 +146,8 @@ module emcon_march_types
       integer :: revision = 0                    !! changes with the numbering of the unknowns
       type(motion_t) :: motion                   !! of the step
       real(wp), allocatable :: v1(:, :)          !! (n_dim, n_node) velocity at its end
-      type(ending_t) :: ending                   !! of the step that was solved last
-      type(start_t), allocatable :: before       !! of an increment that was cut
+      type(end_state_t) :: end_state             !! of the step that was solved last
+      type(rollback_t), allocatable :: before    !! of an increment that was cut
       !> Asked before each iteration, if there is one.
       procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
       class(watcher_t), pointer :: watcher => null()   !! told of each part, if there is one

@@ -6,7 +6,7 @@
 !> back is inertia relative to what has mass around the node, so that momenta and kinetic energy
 !> stay where it moves with that. Source: docs/theory.md, section 6.
 module emcon_mass_return
-   use emcon_constraints, only : constraint_place
+   use emcon_constraints, only : constraint_index
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_layer, only : layer_renew
@@ -28,44 +28,44 @@ contains
       logical, intent(out) :: has_changed        !! these are others
       type(error_t), allocatable, intent(out) :: error
 
-      has_changed = any((self%may_shed .and. .not. self%state%has_mass) &
+      has_changed = any((self%may_be_massless .and. .not. self%state%has_mass) &
          .neqv. self%layer%is_massless)
       if (.not. has_changed) return
-      call terms_return_mass(self%system%term, self%may_shed, self%state%has_mass, error)
+      call terms_return_mass(self%system%term, self%may_be_massless, self%state%has_mass, error)
       if (.not. allocated(error)) call layer_renew(self%layer, scene, &
-         self%may_shed .and. .not. self%state%has_mass, self%system, error)
+         self%may_be_massless .and. .not. self%state%has_mass, self%system, error)
    end subroutine mass_match
 
    !> The massless nodes that keep a step from being solved, and those of their elements: where the
    !> balance of the layer fails, those of the contacts that open or close; else the one that the
    !> largest force is left on, or all in contact.
-   subroutine mass_find_troubled(self, scene, has_residual, is_troubled)
+   subroutine mass_find_troubled(self, scene, has_residual, needs_mass)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       logical, intent(in) :: has_residual        !! of an iterate that is no solution
-      logical, intent(out) :: is_troubled(:)     !! (n_node)
-      real(wp) :: left(size(is_troubled))
-      logical :: may_have_mass(size(is_troubled))
+      logical, intent(out) :: needs_mass(:)      !! (n_node)
+      real(wp) :: left(size(needs_mass))
+      logical :: may_have_mass(size(needs_mass))
       integer :: i
 
-      may_have_mass = self%layer%is_massless .and. .not. self%is_bare
-      is_troubled = self%layer%is_troubled
-      if (.not. any(is_troubled)) then
+      may_have_mass = self%layer%is_massless .and. .not. self%without_density
+      needs_mass = self%layer%needs_mass
+      if (.not. any(needs_mass)) then
          left = 0.0_wp
          if (has_residual) left = maxval(abs(merge(self%newton%left, 0.0_wp, &
             self%system%space%numbering%unknown > 0)), 1)
          where (.not. self%layer%is_massless) left = 0.0_wp
          if (maxval(left) > 0.0_wp .and. maxval(left) <= huge(left)) then
-            is_troubled(maxloc(left, 1)) = .true.
+            needs_mass(maxloc(left, 1)) = .true.
          else
-            call mark_active(self, is_troubled)
+            call mark_active(self, needs_mass)
          end if
       end if
-      call mark_elements(scene, self%layer%is_massless .and. is_troubled, is_troubled)
-      do i = 1, size(is_troubled)
-         is_troubled(i) = is_troubled(i) .and. may_have_mass(i)
+      call mark_elements(scene, self%layer%is_massless .and. needs_mass, needs_mass)
+      do i = 1, size(needs_mass)
+         needs_mass(i) = needs_mass(i) .and. may_have_mass(i)
       end do
-      if (.not. any(is_troubled)) is_troubled = may_have_mass
+      if (.not. any(needs_mass)) needs_mass = may_have_mass
    end subroutine mass_find_troubled
 
    !> The slave nodes of contacts that act, if one of them is massless; else all nodes.
@@ -76,7 +76,7 @@ contains
 
       do id = self%system%first_constraint(1) + 1, self%system%n_constraint
          if (.not. (self%active%is_active(id) .or. self%state%is_active(id))) cycle
-         call constraint_place(self%system, id, pair, i)
+         call constraint_index(self%system, id, pair, i)
          is_marked(self%system%contact(pair)%contact%node(i)) = .true.
       end do
       if (.not. any(is_marked .and. self%layer%is_massless)) is_marked = .true.
@@ -105,7 +105,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       logical :: has_changed
 
-      call massless_follow(terms_solid(self%system%term), self%may_shed, is_back, self%state%v)
+      call massless_follow(terms_solid(self%system%term), self%may_be_massless, is_back, &
+         self%state%v)
       self%state%has_mass = self%state%has_mass .or. is_back
       call mass_match(self, scene, has_changed, error)
    end subroutine mass_return

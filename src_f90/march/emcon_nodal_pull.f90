@@ -27,9 +27,9 @@ contains
       type(constraint_set_t), intent(in) :: set
       integer, intent(in) :: n_node              !! of the scene
 
-      if (set%n == set%n_held) return
-      if (any(set%item(set%n_held + 1:set%n)%is_mean)) call add_all(self, set, n_node, &
-         size(set%item(set%n_held + 1)%g, 1))
+      if (set%n == set%n_permanent) return
+      if (any(set%item(set%n_permanent + 1:set%n)%is_mean)) call add_all(self, set, n_node, &
+         size(set%item(set%n_permanent + 1)%g, 1))
    end subroutine nodal_pull_add
 
    pure subroutine add_all(self, set, n_node, n_dim)
@@ -42,7 +42,7 @@ contains
 
       force = 0.0_wp
       push = 0.0_wp
-      do k = set%n_held + 1, set%n
+      do k = set%n_permanent + 1, set%n
          associate (item => set%item(k), lam => set%lam(k))
             if (.not. item%is_mean) cycle
             along = sum(item%g(:, item%n_slave + 1:item%n_node), dim=2)

@@ -5,12 +5,12 @@
 !> the start stays what it is with the other sign, from increment to increment, whatever their size.
 module emcon_quasi_static
    use emcon_errors, only : err_analysis, error_t, raise
+   use emcon_evaluation, only : instant_later, instant_t, evaluation_at_end
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : body_masses
    use emcon_march_types, only : march_t
    use emcon_mechanism_text, only : free_motion_text
    use emcon_motion, only : at_rest, motion_of, motion_t
-   use emcon_pose, only : instant_later, instant_t, pose_at_end
    use emcon_scene, only : scene_t
    use emcon_system, only : system_loads
    use emcon_text, only : note_add, to_text
@@ -32,7 +32,7 @@ contains
       character(len=:), allocatable :: text
       real(dp), allocatable :: mass(:)
 
-      if (.not. any(self%is_bare)) return
+      if (.not. any(self%without_density)) return
       call body_masses(self%system, mass)
       call free_motion_text(self%system, scene, scene%step(self%state%i_step)%prescribed, text, &
          with_contact=.true., is_held=mass > 0.0_dp, u=self%state%u)
@@ -48,14 +48,14 @@ contains
       real(wp), dimension(size(scene%x, 1), size(scene%x, 2)) :: load, left
       real(wp) :: largest
 
-      if (.not. (any(self%is_bare) .and. self%scheme%row%masses_resist)) return
+      if (.not. (any(self%without_density) .and. self%scheme%row%masses_resist)) return
       associate (state => self%state)
-         start = motion_of(pose_at_end, scene%x, state%u, at_rest(scene%x))
-         start%pose%load_instant = instant_later(instant_t(0.0_wp, state%start_time), 0.0_wp)
+         start = motion_of(evaluation_at_end, scene%x, state%u, at_rest(scene%x))
+         start%evaluation%load_instant = instant_later(instant_t(0.0_wp, state%start_time), 0.0_wp)
          call system_loads(self%system, start, load)
          left = abs(state%internal - load - state%contact)
          left = merge(left, 0.0_wp, self%system%space%numbering%unknown > 0 &
-            .and. spread(self%is_bare, 1, size(left, 1)))
+            .and. spread(self%without_density, 1, size(left, 1)))
          largest = maxval(left)
          if (largest <= out_of_balance*maxval(abs(load) + abs(state%internal))) return
          call note_add(self%warnings, "a force of " // to_text(largest, 3) // " is not balanced " &
@@ -72,8 +72,8 @@ contains
       integer :: i
 
       if (.not. self%scheme%row%masses_resist) return
-      do i = 1, size(self%is_bare)
-         if (self%is_bare(i)) self%v1(:, i) = self%ending%du(:, i)/h
+      do i = 1, size(self%without_density)
+         if (self%without_density(i)) self%v1(:, i) = self%end_state%du(:, i)/h
       end do
    end subroutine quasi_static_move
 

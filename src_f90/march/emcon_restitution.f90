@@ -4,7 +4,7 @@
 !> impulses along the normals: momenta stay, and the energy that goes is known.
 !> Source: docs/theory.md, eq. (22e).
 module emcon_restitution
-   use emcon_constraints, only : constraint_place
+   use emcon_constraints, only : constraint_index
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t
@@ -25,7 +25,7 @@ contains
       type(rate_jump_t) :: jump
       real(wp) :: lam(self%active%set%n)
 
-      if (self%active%set%n == self%active%set%n_held .or. .not. is_asked(self)) return
+      if (self%active%set%n == self%active%set%n_permanent .or. .not. is_asked(self)) return
       call find_impacts(self, jump)
       if (.not. any(jump%change < 0.0_wp)) return
       associate (set => self%active%set, ledger => self%ledger)
@@ -74,11 +74,11 @@ contains
             do i = 1, set%item(k)%n_node
                rate(k) = rate(k) + dot_product(set%item(k)%c(:, i), self%v1(:, set%item(k)%node(i)))
             end do
-            call constraint_place(self%system, set%id(k), pair, i)
+            call constraint_index(self%system, set%id(k), pair, i)
             if (pair == 0) cycle
             associate (contact => self%system%contact(pair)%contact, &
                   node => set%item(k)%node(:set%item(k)%n_node))
-               is_row(k) = .not. any(self%is_bare(node))
+               is_row(k) = .not. any(self%without_density(node))
                if (self%layer%is_on) then
                   is_row(k) = is_row(k) .and. .not. any(self%layer%is_massless(node))
                end if

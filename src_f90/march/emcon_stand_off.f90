@@ -1,6 +1,6 @@
 !> The air across which contact forces act: what the constraints hold open.
 module emcon_stand_off
-   use emcon_constraints, only : constraint_place, constraint_set_t
+   use emcon_constraints, only : constraint_index, constraint_set_t
    use emcon_kinds, only : wp
    use emcon_system, only : system_t
    implicit none
@@ -26,7 +26,7 @@ contains
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in) :: h                  !! [T]
 
-      if (set%n > set%n_held) call add_all(self, system, set, set%n_held + 1, h)
+      if (set%n > set%n_permanent) call add_all(self, system, set, set%n_permanent + 1, h)
    end subroutine stand_off_add
 
    pure subroutine add_all(self, system, set, first, h)
@@ -47,7 +47,7 @@ contains
       end do
       do k = first, set%n
          if (force(k) <= least_force*maxval(force(first:))) cycle
-         call constraint_place(system, set%id(k), pair, i)
+         call constraint_index(system, set%id(k), pair, i)
          associate (state => system%contact(pair)%contact%state(i))
             gap = max(0.0_wp, state%gap1)/state%size
          end associate

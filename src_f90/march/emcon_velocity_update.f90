@@ -99,7 +99,7 @@ contains
       has_root = .true.
       lost = 0.0_wp
       noise = 0.0_wp
-      do k = set%n_held + 1, set%n
+      do k = set%n_permanent + 1, set%n
          lost = lost - set%lam(k)*set%item(k)%dgap
          noise = noise + gap_noise*abs(set%lam(k))*set%item(k)%size
       end do
@@ -186,7 +186,7 @@ contains
       call pick(system, force, self%push)
       call self%mass%solve(self%push, self%jump, error)
       if (.not. allocated(error)) call keep_held(self, system, held, error, &
-         [(-bend(held%item(k), v), k = held%n_linear + 1, held%n_held)])
+         [(-bend(held%item(k), v), k = held%n_linear + 1, held%n_permanent)])
       if (.not. allocated(error)) call add_jump(self, system, 1.0_wp, acceleration)
    end subroutine velocity_update_accelerate
 
@@ -248,13 +248,14 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp), intent(in), optional :: wanted(:)    !! (conditions that are not linear)
       real(wp), allocatable :: row(:, :), way(:, :)
-      real(dp), dimension(set%n_held - set%n_linear, 1) :: rate, mu
+      real(dp), dimension(set%n_permanent - set%n_linear, 1) :: rate, mu
       real(dp) :: product(size(rate), size(rate))
       integer :: k, l
       logical :: is_singular
 
       if (size(rate) == 0) return
-      call find_ways(self, system, set, [(k, k = set%n_linear + 1, set%n_held)], row, way, error)
+      call find_ways(self, system, set, [(k, k = set%n_linear + 1, set%n_permanent)], row, way, &
+         error)
       if (allocated(error)) return
       do k = 1, size(rate)
          rate(k, 1) = -real(dot_product(row(:, k), self%jump), dp)
@@ -345,7 +346,7 @@ contains
       integer :: k, i, node
 
       force = 0.0_wp
-      do k = set%n_held + 1, set%n
+      do k = set%n_permanent + 1, set%n
          do i = 1, set%item(k)%n_node
             node = set%item(k)%node(i)
             force(:, node) = force(:, node) + weight(k)*set%item(k)%c(:, i)

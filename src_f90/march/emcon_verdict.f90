@@ -13,7 +13,7 @@ module emcon_verdict
    use emcon_kinds, only : wp
    use emcon_locking, only : locking_advice, locking_element
    use emcon_ledger, only : ledger_t
-   use emcon_look_plane, only : overlap_text
+   use emcon_overlap_query_plane, only : overlap_text
    use emcon_march, only : increment_t, march_is_done, march_t
    use emcon_nodal_pull, only : nodal_pull_join, nodal_pull_t
    use emcon_scene, only : scene_t

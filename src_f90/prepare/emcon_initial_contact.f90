@@ -298,9 +298,9 @@ contains
          n_moved = n_moved + 1
          do k = 1, most_moves
             call start_gaps_way(contact, i, scene, way, is_last)
-            associate (node => contact%node(i), twin => contact%twin(i))
+            associate (node => contact%node(i), duplicate => contact%duplicate(i))
                scene%x(:, node) = scene%x(:, node) - way
-               if (twin > 0) scene%x(:, twin) = scene%x(:, twin) - way
+               if (duplicate > 0) scene%x(:, duplicate) = scene%x(:, duplicate) - way
             end associate
             if (is_last) exit
          end do

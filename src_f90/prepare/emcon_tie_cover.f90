@@ -12,7 +12,7 @@ module emcon_tie_cover
    public :: tie_cover_find
 
    !> A free part at the end of an edge is bridged by a joint of the outlines up to this fraction
-   !> of it, or up to the position tolerance (`emcon_joints`); a slave that reaches less far over a
+   !> of it, or up to the position tolerance (`emcon_seams`); a slave that reaches less far over a
    !> node ends there.
    real(wp), parameter :: near = 0.1_wp
    !> Nothing is left free within this fraction of an edge: far above the rounding of coordinates.

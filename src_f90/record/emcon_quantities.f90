@@ -3,21 +3,21 @@
 module emcon_quantities
    use, intrinsic :: ieee_arithmetic, only : ieee_is_nan, ieee_quiet_nan, ieee_value
    use emcon_contact, only : gap_state_t
+   use emcon_evaluation, only : evaluation_at_end
    use emcon_gaps, only : gaps_search
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : at_rest, motion_of
-   use emcon_pose, only : pose_at_end
    use emcon_quantity_registry, only : at_contacts, at_elements, at_nodes, at_pairs, &
       n_quantity_row, of_rotation, of_strain, of_vector, of_wrench, quantity_row, &
       quantity_row_of, quantity_row_t
    use emcon_rigid_bodies, only : rigid_body_t
+   use emcon_rigid_rotation, only : rigid_rotation_spin
    use emcon_rotation, only : n_turn
    use emcon_solid, only : solid_t
    use emcon_stepper, only : stepper_t
    use emcon_stress, only : element_energies, element_means, nodal_stress, von_mises
    use emcon_term_registry, only : terms_solid
    use emcon_text, only : string_t
-   use emcon_turn_record, only : turn_record_spin
    use emcon_vtkhdf, only : field_t
    implicit none
    private
@@ -179,7 +179,7 @@ contains
          case ("UR")
             turning = real(state%turns%angle(b), dp)
          case ("VR")
-            turning = real(turn_record_spin(scene%rigid(b), scene%x, state%u, state%v), dp)
+            turning = real(rigid_rotation_spin(scene%rigid(b), scene%x, state%u, state%v), dp)
          case ("RM")
             turning = real(state%turns%moment(b), dp)
          end select
@@ -260,8 +260,8 @@ contains
       associate (state => stepper%march%state, u => stepper%march%state%u)
          select case (variable)
          case ("CDIS")
-            call gaps_search(stepper%march%system, motion_of(pose_at_end, stepper%scene%x, u, &
-               at_rest(u)), gap)
+            call gaps_search(stepper%march%system, motion_of(evaluation_at_end, stepper%scene%x, &
+               u, at_rest(u)), gap)
             values = reshape(merge(real(gap%gap0, dp), ieee_value(1.0_dp, ieee_quiet_nan), &
                gap%is_near .and. gap%is_over), [1, n])
          case ("CSTR")
@@ -334,9 +334,10 @@ contains
             do i = 1, system%contact(pair)%contact%n_constraint
                id = system%first_constraint(pair) + i
                associate (node => system%contact(pair)%contact%node(i), &
-                     twin => system%contact(pair)%contact%twin(i))
+                     duplicate => system%contact(pair)%contact%duplicate(i))
                   call take_over(row%last /= "", at_slave(:, id), values(:, node))
-                  if (twin > 0) call take_over(row%last /= "", at_slave(:, id), values(:, twin))
+                  if (duplicate > 0) call take_over(row%last /= "", at_slave(:, id), &
+                     values(:, duplicate))
                end associate
             end do
          end do

@@ -9,7 +9,7 @@ module emcon_scene_report
    use emcon_locking, only : locking_advice
    use emcon_motion, only : at_rest, motion_of
    use emcon_options, only : option_text
-   use emcon_pose, only : pose_at_end
+   use emcon_evaluation, only : evaluation_at_end
    use emcon_report_bodies, only : bodies_find, bodies_rows, body_t
    use emcon_report_row, only : report_row_t, report_rows_t, row_begin, row_put, rows_add
    use emcon_scene, only : scene_t
@@ -60,7 +60,7 @@ contains
       associate (system => stepper%march%system, scene => stepper%scene, &
             sums => stepper%march%state%sums)
          if (system%n_pair == 0) return
-         call gaps_search(system, motion_of(pose_at_end, scene%x, stepper%march%state%u, &
+         call gaps_search(system, motion_of(evaluation_at_end, scene%x, stepper%march%state%u, &
             at_rest(scene%x)), gap)
          call gaps_forget(system)
          allocate(is_of(size(gap)))

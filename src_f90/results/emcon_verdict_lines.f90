@@ -178,12 +178,12 @@ contains
       type(march_t), intent(in) :: march
       type(notes_t), intent(inout) :: lines
 
-      if (.not. march%judge%look%is_able) then
+      if (.not. march%overlap_check%look%is_able) then
          call note_add(lines, "overlap not looked for: in three dimensions it is not in this " // &
             "version")
          return
       end if
-      associate (outline => march%judge%look%outline)
+      associate (outline => march%overlap_check%look%outline)
          if (outline%n_piece == 0) then
             call note_add(lines, "overlap not checked: no *CONTACT PAIR or *CONTACT names " // &
                "a surface")

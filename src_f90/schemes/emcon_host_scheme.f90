@@ -2,8 +2,8 @@
 module emcon_host_scheme
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_evaluation, only : instant_t, most_past, evaluation_t
    use emcon_kinds, only : wp
-   use emcon_pose, only : instant_t, most_past, pose_t
    use emcon_scheme, only : scheme_row_t, scheme_t
    use emcon_scheme_registry, only : scheme_given_row
    use emcon_text, only : to_text
@@ -61,7 +61,7 @@ contains
    pure type(scheme_row_t) function host_scheme_row(name, scheme) result(row)
       character(len=*), intent(in) :: name       !! capital letters, without blanks
       class(scheme_t), intent(in) :: scheme      !! that was checked
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
       integer :: k
 
       row = scheme_given_row
@@ -70,13 +70,13 @@ contains
       row%is_accelerated = scheme%row%is_accelerated
       row%setting = scheme%row%setting
       do k = 1, size(before)
-         pose = scheme%pose(instant_t(h_before=before(k)), 1.0_wp)
-         row%dissipates = row%dissipates .or. pose%dissipation > 0.0_wp
-         if (pose%pushes_at_end .or. pose%start_weight > 0.0_wp) then
+         evaluation = scheme%evaluation(instant_t(h_before=before(k)), 1.0_wp)
+         row%dissipates = row%dissipates .or. evaluation%dissipation > 0.0_wp
+         if (evaluation%pushes_at_end .or. evaluation%start_weight > 0.0_wp) then
             row%takes_jumps = .false.
             row%takes_damping = .false.
          end if
-         if (pose%is_gradient .or. row%dissipates) row%takes_massless = .false.
+         if (evaluation%is_gradient .or. row%dissipates) row%takes_massless = .false.
       end do
       row%takes_massless = row%takes_massless .and. row%takes_damping
    end function host_scheme_row
@@ -99,41 +99,42 @@ contains
          "the scheme " // name // ": row%is_explicit is for schemes of EMCON alone")
       do k = 1, size(before)
          if (allocated(error)) return
-         call check_pose(name, scheme%pose(instant_t(h_before=before(k)), 1.0_wp), &
+         call check_pose(name, scheme%evaluation(instant_t(h_before=before(k)), 1.0_wp), &
             scheme%row%n_past, error)
       end do
    end subroutine host_scheme_check
 
    !> Are these weights and places, of a step of size 1?
-   subroutine check_pose(name, pose, n_past, error)
+   subroutine check_pose(name, evaluation, n_past, error)
       character(len=*), intent(in) :: name       !! for the message
-      type(pose_t), intent(in) :: pose
+      type(evaluation_t), intent(in) :: evaluation
       integer, intent(in) :: n_past              !! fields that the scheme keeps
       type(error_t), allocatable, intent(out) :: error
 
-      if (.not. (pose%mass_scale > 0.0_wp .and. pose%mass_scale <= huge(1.0_wp))) then
-         call refuse("mass_scale", pose%mass_scale, "must be positive")
-      else if (.not. (pose%rate > 0.0_wp .and. pose%rate <= huge(1.0_wp))) then
-         call refuse("rate", pose%rate, "must be positive")
-      else if (.not. abs(pose%rate*pose%lapse - 1.0_wp) <= rounding) then
-         call refuse("lapse", pose%lapse, "must be 1/rate")
-      else if (.not. ieee_is_finite(pose%v_weight)) then
-         call refuse("v_weight", pose%v_weight, "is not finite")
-      else if (.not. (pose%place > 0.0_wp .and. pose%place <= 1.0_wp)) then
-         call refuse("place", pose%place, "must be above 0 and at most 1")
-      else if (.not. (pose%load_place >= 0.0_wp .and. pose%load_place <= 1.0_wp)) then
-         call refuse("load_place", pose%load_place, "must be 0 to 1")
-      else if (.not. (pose%start_weight >= 0.0_wp .and. pose%start_weight <= huge(1.0_wp))) then
-         call refuse("start_weight", pose%start_weight, "must be 0 or more")
-      else if (.not. (pose%dissipation >= 0.0_wp .and. pose%dissipation <= 1.0_wp)) then
-         call refuse("dissipation", pose%dissipation, "must be 0 to 1")
-      else if (.not. (pose%recalled >= 0.0_wp .and. pose%recalled <= 1.0_wp)) then
-         call refuse("recalled", pose%recalled, "must be 0 to 1")
-      else if (pose%recalled > 0.0_wp .and. n_past < 1) then
-         call refuse("recalled", pose%recalled, "needs row%n_past = 1 or more")
+      if (.not. (evaluation%mass_scale > 0.0_wp .and. evaluation%mass_scale <= huge(1.0_wp))) then
+         call refuse("mass_scale", evaluation%mass_scale, "must be positive")
+      else if (.not. (evaluation%rate > 0.0_wp .and. evaluation%rate <= huge(1.0_wp))) then
+         call refuse("rate", evaluation%rate, "must be positive")
+      else if (.not. abs(evaluation%rate*evaluation%lapse - 1.0_wp) <= rounding) then
+         call refuse("lapse", evaluation%lapse, "must be 1/rate")
+      else if (.not. ieee_is_finite(evaluation%v_weight)) then
+         call refuse("v_weight", evaluation%v_weight, "is not finite")
+      else if (.not. (evaluation%at > 0.0_wp .and. evaluation%at <= 1.0_wp)) then
+         call refuse("place", evaluation%at, "must be above 0 and at most 1")
+      else if (.not. (evaluation%load_place >= 0.0_wp .and. evaluation%load_place <= 1.0_wp)) then
+         call refuse("load_place", evaluation%load_place, "must be 0 to 1")
+      else if (.not. (evaluation%start_weight >= 0.0_wp &
+         .and. evaluation%start_weight <= huge(1.0_wp))) then
+         call refuse("start_weight", evaluation%start_weight, "must be 0 or more")
+      else if (.not. (evaluation%dissipation >= 0.0_wp .and. evaluation%dissipation <= 1.0_wp)) then
+         call refuse("dissipation", evaluation%dissipation, "must be 0 to 1")
+      else if (.not. (evaluation%recalled >= 0.0_wp .and. evaluation%recalled <= 1.0_wp)) then
+         call refuse("recalled", evaluation%recalled, "must be 0 to 1")
+      else if (evaluation%recalled > 0.0_wp .and. n_past < 1) then
+         call refuse("recalled", evaluation%recalled, "needs row%n_past = 1 or more")
       end if
-      if (.not. allocated(error)) call check_past("past_velocity", pose%past_velocity)
-      if (.not. allocated(error)) call check_past("past_change", pose%past_change)
+      if (.not. allocated(error)) call check_past("past_velocity", evaluation%past_velocity)
+      if (.not. allocated(error)) call check_past("past_change", evaluation%past_change)
 
    contains
 

@@ -1,9 +1,9 @@
 !> What a time stepping scheme is: where in a step it evaluates forces, and how inertia enters; the
-!> velocity at the end follows from that (`pose_velocity`). The residual, Newton's method and the
-!> step loop serve all schemes.
+!> velocity at the end follows from that (`evaluation_velocity`). The residual, Newton's method and
+!> the step loop serve all schemes.
 module emcon_scheme
+   use emcon_evaluation, only : instant_t, evaluation_t
    use emcon_kinds, only : wp
-   use emcon_pose, only : instant_t, pose_t
    implicit none
    private
    public :: scheme_t, scheme_row_t, setting_t
@@ -37,7 +37,7 @@ module emcon_scheme
    type, abstract :: scheme_t
       type(scheme_row_t) :: row
    contains
-      procedure(pose_interface), deferred :: pose
+      procedure(pose_interface), deferred :: evaluation
       procedure :: keeps_energy
       procedure :: carry
       procedure :: error_constant
@@ -46,12 +46,12 @@ module emcon_scheme
    abstract interface
 
       !> Evaluation of a step of size `h` from `start`.
-      pure function pose_interface(self, start, h) result(pose)
-         import :: instant_t, pose_t, scheme_t, wp
+      pure function pose_interface(self, start, h) result(evaluation)
+         import :: instant_t, evaluation_t, scheme_t, wp
          class(scheme_t), intent(in) :: self
          type(instant_t), intent(in) :: start
          real(wp), intent(in) :: h               !! > 0 [T]
-         type(pose_t) :: pose
+         type(evaluation_t) :: evaluation
       end function pose_interface
 
    end interface

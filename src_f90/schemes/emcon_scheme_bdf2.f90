@@ -1,8 +1,8 @@
 !> Backward differences of second order, over steps of any size; the first step is the mid-point
 !> rule. Source: docs/theory.md, eq. (4d).
 module emcon_scheme_bdf2
+   use emcon_evaluation, only : instant_later, instant_t, evaluation_moving, evaluation_t
    use emcon_kinds, only : wp
-   use emcon_pose, only : instant_later, instant_t, pose_moving, pose_t
    use emcon_scheme, only : scheme_t
    implicit none
    private
@@ -10,7 +10,7 @@ module emcon_scheme_bdf2
 
    type, extends(scheme_t) :: scheme_bdf2_t
    contains
-      procedure :: pose => bdf2_pose
+      procedure :: evaluation => bdf2_pose
       procedure :: carry => bdf2_carry
    end type scheme_bdf2_t
 
@@ -18,31 +18,31 @@ contains
 
    !> r = M (k (v1 - v0) - l dv)/h + forces at the end, v1 = (k du - l du_before)/h, with dv the
    !> change of the velocity over the step before.
-   pure function bdf2_pose(self, start, h) result(pose)
+   pure function bdf2_pose(self, start, h) result(evaluation)
       class(scheme_bdf2_t), intent(in) :: self
       type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h                  !! > 0 [T]
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
       real(wp) :: ratio, k, l
 
       associate (unused => self)
       end associate
       if (.not. start%h_before > 0.0_wp) then
-         pose = pose_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
-         pose%place = 0.5_wp
-         pose%load_instant = instant_later(start, 0.5_wp*h)
+         evaluation = evaluation_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
+         evaluation%at = 0.5_wp
+         evaluation%load_instant = instant_later(start, 0.5_wp*h)
       else
          ratio = h/start%h_before
          k = (1.0_wp + 2.0_wp*ratio)/(1.0_wp + ratio)
          l = ratio**2/(1.0_wp + ratio)
-         pose = pose_moving(h/k, lapse=h/k, v_weight=1.0_wp)
-         pose%load_place = 1.0_wp
-         pose%load_instant = instant_later(start, h)
-         pose%pushes_at_end = .true.
-         pose%past_velocity(1) = -l/h
-         pose%past_change = -[l/h, l/k]
+         evaluation = evaluation_moving(h/k, lapse=h/k, v_weight=1.0_wp)
+         evaluation%load_place = 1.0_wp
+         evaluation%load_instant = instant_later(start, h)
+         evaluation%pushes_at_end = .true.
+         evaluation%past_velocity(1) = -l/h
+         evaluation%past_change = -[l/h, l/k]
       end if
-      pose%is_gradient = .true.
+      evaluation%is_gradient = .true.
    end function bdf2_pose
 
    !> The way and the change of the velocity.

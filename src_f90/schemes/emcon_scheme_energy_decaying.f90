@@ -3,8 +3,8 @@
 !>
 !> After an idea of Armero & Romero (2001); docs/theory.md, eqs. (4e) to (4g).
 module emcon_scheme_energy_decaying
+   use emcon_evaluation, only : instant_later, instant_t, evaluation_moving, evaluation_t
    use emcon_kinds, only : wp
-   use emcon_pose, only : instant_later, instant_t, pose_moving, pose_t
    use emcon_scheme, only : scheme_t
    implicit none
    private
@@ -12,7 +12,7 @@ module emcon_scheme_energy_decaying
 
    type, extends(scheme_t) :: scheme_energy_decaying_t
    contains
-      procedure :: pose => decaying_pose
+      procedure :: evaluation => decaying_evaluation
       procedure :: keeps_energy => decaying_keeps_energy
       procedure :: carry => decaying_carry
    end type scheme_energy_decaying_t
@@ -21,17 +21,17 @@ contains
 
    !> That of the energy-momentum scheme. A step that is longer than the one before sees an
    !> increment that is too small, which takes energy all the same.
-   pure function decaying_pose(self, start, h) result(pose)
+   pure function decaying_evaluation(self, start, h) result(evaluation)
       class(scheme_energy_decaying_t), intent(in) :: self
       type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h                  !! > 0 [T]
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
 
-      pose = pose_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
-      pose%load_instant = instant_later(start, 0.5_wp*h)
-      pose%dissipation = self%row%setting%value
-      if (start%h_before > 0.0_wp) pose%recalled = min(1.0_wp, h/start%h_before)
-   end function decaying_pose
+      evaluation = evaluation_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
+      evaluation%load_instant = instant_later(start, 0.5_wp*h)
+      evaluation%dissipation = self%row%setting%value
+      if (start%h_before > 0.0_wp) evaluation%recalled = min(1.0_wp, h/start%h_before)
+   end function decaying_evaluation
 
    !> With what the damping has taken.
    pure logical function decaying_keeps_energy(self) result(keeps_energy)

@@ -1,8 +1,8 @@
 !> The energy-momentum scheme, paper eq. (4): discrete gradients, mid-point inertia.
 !> Source: docs/theory.md, eqs. (2) and (3).
 module emcon_scheme_energy_momentum
+   use emcon_evaluation, only : instant_later, instant_t, evaluation_moving, evaluation_t
    use emcon_kinds, only : wp
-   use emcon_pose, only : instant_later, instant_t, pose_moving, pose_t
    use emcon_scheme, only : scheme_t
    implicit none
    private
@@ -10,7 +10,7 @@ module emcon_scheme_energy_momentum
 
    type, extends(scheme_t) :: scheme_energy_momentum_t
    contains
-      procedure :: pose => energy_momentum_pose
+      procedure :: evaluation => energy_momentum_pose
       procedure :: keeps_energy => energy_momentum_keeps_energy
       procedure :: error_constant => energy_momentum_error_constant
    end type scheme_energy_momentum_t
@@ -18,14 +18,14 @@ module emcon_scheme_energy_momentum
 contains
 
    !> r = M (2/h du - 2 v0)/h + forces; loads at mid-time on the mid-configuration.
-   pure function energy_momentum_pose(self, start, h) result(pose)
+   pure function energy_momentum_pose(self, start, h) result(evaluation)
       class(scheme_energy_momentum_t), intent(in) :: self
       type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h                  !! > 0 [T]
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
 
-      pose = pose_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
-      pose%load_instant = instant_later(start, 0.5_wp*h)
+      evaluation = evaluation_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
+      evaluation%load_instant = instant_later(start, 0.5_wp*h)
    end function energy_momentum_pose
 
    pure logical function energy_momentum_keeps_energy(self) result(keeps_energy)

@@ -3,8 +3,8 @@
 !>
 !> Source: Chung & Hulbert (1993), Hilber, Hughes & Taylor (1977); docs/theory.md, eqs. (4b), (4c).
 module emcon_scheme_generalized_alpha
+   use emcon_evaluation, only : instant_later, instant_t, evaluation_moving, evaluation_t
    use emcon_kinds, only : wp
-   use emcon_pose, only : instant_later, instant_t, pose_moving, pose_t
    use emcon_scheme, only : scheme_t, setting_t
    implicit none
    private
@@ -12,7 +12,7 @@ module emcon_scheme_generalized_alpha
 
    type, extends(scheme_t) :: scheme_generalized_alpha_t
    contains
-      procedure :: pose => alpha_pose
+      procedure :: evaluation => alpha_pose
       procedure :: carry => alpha_carry
    end type scheme_generalized_alpha_t
 
@@ -43,23 +43,23 @@ contains
 
    !> M ((1 - alpha_m) a1 + alpha_m a0) + (1 - alpha_f) forces at the end + alpha_f at the start,
    !> over 1 - alpha_f, with a1 of du by Newmark's formulas.
-   pure function alpha_pose(self, start, h) result(pose)
+   pure function alpha_pose(self, start, h) result(evaluation)
       class(scheme_generalized_alpha_t), intent(in) :: self
       type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h                  !! > 0 [T]
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
       type(weights_t) :: alpha
 
       alpha = weights_of(self%row%setting)
-      pose = pose_moving(alpha%gamma*h*(1.0_wp - alpha%force)/(1.0_wp - alpha%mass), &
+      evaluation = evaluation_moving(alpha%gamma*h*(1.0_wp - alpha%force)/(1.0_wp - alpha%mass), &
          lapse=alpha%beta*h/alpha%gamma, v_weight=alpha%gamma/alpha%beta)
-      pose%is_gradient = .true.
-      pose%load_place = 1.0_wp
-      pose%load_instant = instant_later(start, h)
-      pose%pushes_at_end = .true.
-      pose%start_weight = alpha%force/(1.0_wp - alpha%force)
-      pose%past_velocity(1) = h*(1.0_wp - 0.5_wp*alpha%gamma/alpha%beta)
-      pose%past_change(1) = alpha%gamma*h*(alpha%mass/(1.0_wp - alpha%mass) &
+      evaluation%is_gradient = .true.
+      evaluation%load_place = 1.0_wp
+      evaluation%load_instant = instant_later(start, h)
+      evaluation%pushes_at_end = .true.
+      evaluation%start_weight = alpha%force/(1.0_wp - alpha%force)
+      evaluation%past_velocity(1) = h*(1.0_wp - 0.5_wp*alpha%gamma/alpha%beta)
+      evaluation%past_change(1) = alpha%gamma*h*(alpha%mass/(1.0_wp - alpha%mass) &
          + (1.0_wp - 0.5_wp/alpha%beta))
    end function alpha_pose
 

@@ -1,8 +1,8 @@
 !> The mid-point rule: gradients at the middle of the step, which keep all momenta.
 !> Source: docs/theory.md, section 1.
 module emcon_scheme_midpoint
+   use emcon_evaluation, only : instant_later, instant_t, evaluation_moving, evaluation_t
    use emcon_kinds, only : wp
-   use emcon_pose, only : instant_later, instant_t, pose_moving, pose_t
    use emcon_scheme, only : scheme_t
    implicit none
    private
@@ -10,22 +10,22 @@ module emcon_scheme_midpoint
 
    type, extends(scheme_t) :: scheme_midpoint_t
    contains
-      procedure :: pose => midpoint_pose
+      procedure :: evaluation => midpoint_pose
    end type scheme_midpoint_t
 
 contains
 
    !> r = M (2/h du - 2 v0)/h + forces at u0 + du/2; loads there, at mid-time.
-   pure function midpoint_pose(self, start, h) result(pose)
+   pure function midpoint_pose(self, start, h) result(evaluation)
       class(scheme_midpoint_t), intent(in) :: self
       type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h                  !! > 0 [T]
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
 
-      pose = pose_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
-      pose%place = 0.5_wp
-      pose%is_gradient = .true.
-      pose%load_instant = instant_later(start, 0.5_wp*h)
+      evaluation = evaluation_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
+      evaluation%at = 0.5_wp
+      evaluation%is_gradient = .true.
+      evaluation%load_instant = instant_later(start, 0.5_wp*h)
    end function midpoint_pose
 
 end module emcon_scheme_midpoint

@@ -273,7 +273,7 @@ contains
       class(corotated_term_t), intent(in) :: self
       type(motion_t), intent(in) :: motion       !! placed
 
-      is_symmetric = motion%pose%is_gradient .or. size(self%frame) == 0
+      is_symmetric = motion%evaluation%is_gradient .or. size(self%frame) == 0
    end function is_symmetric
 
    !> The fastest of the elements. A frame that turns keeps the frequencies.

@@ -399,7 +399,7 @@ contains
       class(solid_term_t), intent(in) :: self
       type(motion_t), intent(in) :: motion       !! placed
 
-      is_symmetric = motion%pose%is_gradient .or. self%is_empty &
+      is_symmetric = motion%evaluation%is_gradient .or. self%is_empty &
          .or. (self%has_linear_laws .and. .not. self%nlgeom)
    end function is_symmetric
 

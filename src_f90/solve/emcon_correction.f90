@@ -145,15 +145,15 @@ contains
       type(constraint_set_t), intent(in) :: set
 
       self%uses_null_space = .false.
-      self%knows_multipliers = set%n_held == 0
+      self%knows_multipliers = set%n_permanent == 0
       if (.not. has_pattern(self, set)) call take_pattern(self, set)
-      if (set%n_held == 0) return
+      if (set%n_permanent == 0) return
       associate (rows => self%null_space%rows)
          call independent_rows_find(rows, set, system%space%numbering)
          self%redundant = pack(rows%redundant(:rows%n_redundant), &
-            rows%redundant(:rows%n_redundant) <= set%n_held)
+            rows%redundant(:rows%n_redundant) <= set%n_permanent)
          self%is_near = pack(rows%is_near(:rows%n_redundant), &
-            rows%redundant(:rows%n_redundant) <= set%n_held)
+            rows%redundant(:rows%n_redundant) <= set%n_permanent)
          self%n_redundant = size(self%redundant)
       end associate
    end subroutine lay_out_soft

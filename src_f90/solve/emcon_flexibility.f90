@@ -42,9 +42,9 @@ contains
       self%is_singular = self%solver%is_singular
       if (self%is_singular) return
       associate (numbering => system%space%numbering)
-         allocate(self%held(numbering%n_unknown, set%n_held), source=0.0_wp)
-         allocate(self%rate(set%n_held, numbering%n_unknown))
-         do k = 1, set%n_held
+         allocate(self%held(numbering%n_unknown, set%n_permanent), source=0.0_wp)
+         allocate(self%rate(set%n_permanent, numbering%n_unknown))
+         do k = 1, set%n_permanent
             self%rate(k, :) = flexibility_row(numbering, set%item(k), set%item(k)%c)
             call self%solver%solve(flexibility_row(numbering, set%item(k), set%item(k)%g), &
                self%held(:, k), error)

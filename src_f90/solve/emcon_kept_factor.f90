@@ -186,7 +186,7 @@ contains
       integer :: k
 
       self%l = self%product
-      do k = set%n_held + 1, set%n
+      do k = set%n_permanent + 1, set%n
          associate (diagonal => self%l(k, k))
             stiffness = real(set%slope(k), dp)*self%blocks%scale*diagonal
             self%compliance(k) = diagonal*max(rounding, 1.0_dp/max(stiffness, rounding))

@@ -13,19 +13,20 @@ module emcon_newton
       round_off
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
       correction_solve, correction_t, correction_ticks
-   use emcon_early_look, only : early_enough, early_look
+   use emcon_early_set, only : early_enough, predicts_new_set
    use emcon_errors, only : err_interrupt, error_t, raise
-   use emcon_keeping, only : keeping_begin, keeping_break_off, keeping_correct, keeping_give_up, &
-      keeping_looks, keeping_make, keeping_renew, keeping_t
+   use emcon_evaluation, only : evaluation_is_equilibrium
+   use emcon_factor_policy, only : factor_policy_begin, factor_policy_break_off, &
+      factor_policy_correct, factor_policy_give_up, factor_policy_looks, factor_policy_make, &
+      factor_policy_renew, factor_policy_t
    use emcon_kept_factor, only : kept_factor_has_room, kept_factor_serves
    use emcon_kinds, only : dp, int64, wp
    use emcon_lane_sums, only : relative_size, yardstick_of, yardstick_t
    use emcon_line_search, only : line_search_begin, line_search_t, line_search_take
-   use emcon_motion, only : motion_place, motion_t
+   use emcon_motion, only : motion_evaluate, motion_t
    use emcon_numbering, only : add_to_dofs, pick_magnitudes, pick_unknowns
    use emcon_phases, only : phase_eliminate, phase_enter, phase_factorise, phase_gaps, &
       phase_leave, phase_move, phase_solve
-   use emcon_pose, only : pose_is_equilibrium
    use emcon_system, only : system_respond, system_tangent_times, system_t
    use emcon_term, only : role_external, role_inertia
    use emcon_timer, only : cpu_seconds
@@ -75,7 +76,7 @@ module emcon_newton
       type(correction_t) :: correction           !! how linear systems are solved
       real(wp) :: work = 0.0_wp                  !! of the correction at its start; 0: no search
       type(line_search_t) :: line
-      type(keeping_t) :: keeping                 !! of a factor over steps
+      type(factor_policy_t) :: factor_policy     !! of a factor over steps
       logical :: looks_early = .false.           !! in the next solve: may it end as `newton_early`?
       logical :: is_idle = .false.               !! no load: all forces are round-off
    end type newton_t
@@ -116,11 +117,12 @@ contains
       real(wp), allocatable :: lam(:)
       logical :: is_done
 
-      set%is_under_way = set%gives_way .and. .not. pose_is_equilibrium(motion%pose)
+      set%is_under_way = set%gives_way .and. .not. evaluation_is_equilibrium(motion%evaluation)
       if (set%is_under_way) lam = set%lam
       is_done = .false.
-      if (self%keeping%is_allowed .and. size(self%residual) > 0) call solve_by_kept_factor(self, &
-         system, set, motion, status, is_done, error)
+      if (self%factor_policy%is_allowed &
+         .and. size(self%residual) > 0) call solve_by_kept_factor(self, system, set, motion, &
+         status, is_done, error)
       if (is_done .or. allocated(error)) return
       if (set%is_under_way) set%lam = lam
       call solve_by_tangents(self, system, set, motion, status, error)
@@ -141,8 +143,8 @@ contains
 
       call begin(self, set%n_row)
       self%convergence%is_kept = .true.
-      call keeping_begin(self%keeping, size(self%residual) + merge(set%n, 0, set%is_under_way), &
-         motion%du)
+      call factor_policy_begin(self%factor_policy, size(self%residual) &
+         + merge(set%n, 0, set%is_under_way), motion%du)
       is_done = .true.
       is_fit = .true.
       do
@@ -165,11 +167,11 @@ contains
          if (next == next_give_up) exit
          call look(self, system, set, motion, max(norm, defect), status)
          if (status == newton_early) then
-            call keeping_break_off(self%keeping)
+            call factor_policy_break_off(self%factor_policy)
             return
          end if
          if (next == next_tangent) then
-            call keeping_renew(self%keeping, self%correction)
+            call factor_policy_renew(self%factor_policy, self%correction)
             cycle
          end if
          call correct_by_kept_factor(self, system, set, motion%du, is_fit, error)
@@ -177,7 +179,7 @@ contains
          if (.not. is_fit) exit
       end do
       is_done = .false.
-      call keeping_give_up(self%keeping, self%correction, is_fit, motion%du)
+      call factor_policy_give_up(self%factor_policy, self%correction, is_fit, motion%du)
    end subroutine solve_by_kept_factor
 
    !> Let there be a factor that knows the constraints.
@@ -194,7 +196,8 @@ contains
          system%phases%n_factorisation = system%phases%n_factorisation + 1
       end if
       call phase_enter(system%phases, phase_factorise, left)
-      call keeping_make(self%keeping, self%correction, system, set, motion, is_fit, error)
+      call factor_policy_make(self%factor_policy, self%correction, system, set, motion, is_fit, &
+         error)
       if (is_fit .and. .not. set%gives_way) is_fit = kept_factor_serves( &
          self%correction%kept, set, self%convergence%knows_sizes)
       call phase_leave(system%phases, left)
@@ -211,8 +214,8 @@ contains
       integer :: left
 
       call phase_enter(system%phases, phase_solve, left)
-      call keeping_correct(self%keeping, self%correction, set, self%residual, self%dq, self%dlam, &
-         error)
+      call factor_policy_correct(self%factor_policy, self%correction, set, self%residual, self%dq, &
+         self%dlam, error)
       call phase_leave(system%phases, left)
       is_fit = .true.
       if (allocated(error)) return
@@ -279,7 +282,7 @@ contains
          end select
          call correct(self, system, set, motion%du, error)
          if (allocated(error)) return
-         if (pose_is_equilibrium(motion%pose) .and. is_too_far(self, motion%x)) then
+         if (evaluation_is_equilibrium(motion%evaluation) .and. is_too_far(self, motion%x)) then
             status = newton_singular
             return
          end if
@@ -299,7 +302,7 @@ contains
       ! Before any correction the multipliers are those of a guess: where that flies, round-off.
       if (.not. self%looks_early .or. size > early_enough .or. self%n_solve == 0) return
       self%looks_early = .false.
-      call early_look(system, set, motion, changes)
+      call predicts_new_set(system, set, motion, changes)
       if (changes) status = newton_early
    end subroutine look
 
@@ -312,7 +315,7 @@ contains
       logical, intent(out) :: goes_on            !! there is another place to look at
 
       goes_on = .false.
-      if (.not. pose_is_equilibrium(motion%pose) .or. set%n == set%n_held) return
+      if (.not. evaluation_is_equilibrium(motion%evaluation) .or. set%n == set%n_permanent) return
       if (self%line%is_on) then
          call line_search_take(self%line, dot_product(self%way, self%residual))
       else
@@ -452,7 +455,7 @@ contains
 
       status = newton_refused
       do i = 0, most_halvings
-         call motion_place(motion)
+         call motion_evaluate(motion)
          call system_respond(system, motion, with_tangent, .not. self%convergence%knows_sizes)
          if (allocated(system%response%failure)) allocate(error, source=system%response%failure)
          if (allocated(error)) return
@@ -467,8 +470,9 @@ contains
       call phase_enter(system%phases, phase_gaps, left)
       if (set%n_condition > 0) then
          leaves_second = .not. with_tangent
-         if (self%convergence%is_kept) leaves_second = .not. (keeping_looks(self%keeping) .and. &
-            kept_factor_has_room(self%correction%kept, set%n, size(system%matrix%column)))
+         if (self%convergence%is_kept) leaves_second &
+            = .not. (factor_policy_looks(self%factor_policy) &
+            .and. kept_factor_has_room(self%correction%kept, set%n, size(system%matrix%column)))
          call constraints_evaluate(set, system, motion, leaves_second)
          call constraints_rows(set, system%space%numbering)
       end if

@@ -71,7 +71,7 @@ contains
       n = matrix%n_row
       n_matrix = size(matrix%column)
       n_rows = set%force_rows%row_start(set%n_row + 1)
-      n_soft = merge(set%n - set%n_held, 0, set%gives_way)
+      n_soft = merge(set%n - set%n_permanent, 0, set%gives_way)
       allocate(row(n_matrix + 2*n_rows + n_soft), column(n_matrix + 2*n_rows + n_soft))
       do i = 1, n
          row(matrix%row_start(i) + 1:matrix%row_start(i + 1)) = i
@@ -122,9 +122,9 @@ contains
          self%full%value(self%slot(n_matrix + n_rows + k)) = self%scale*set%gap_rows%value(k)
       end do
       if (set%gives_way) then
-         do k = set%n_held + 1, set%n
-            self%full%value(self%slot(n_matrix + 2*n_rows + k - set%n_held)) = compliance(self, &
-               set%slope(k))
+         do k = set%n_permanent + 1, set%n
+            self%full%value(self%slot(n_matrix + 2*n_rows + k - set%n_permanent)) &
+               = compliance(self, set%slope(k))
          end do
       end if
       self%is_symmetric = is_mirrored(self, set, matrix)
@@ -195,7 +195,7 @@ contains
       self%rhs(:n) = -residual
       self%rhs(n + 1:) = -real(self%scale, wp)*set%defect
       if (set%gives_way) then
-         do k = set%n_held + 1, set%n
+         do k = set%n_permanent + 1, set%n
             self%rhs(n + k) = self%rhs(n + k) + real(compliance(self, set%slope(k)), wp) &
                *(set%lack(k)/real(self%scale, wp))
          end do

@@ -6,15 +6,15 @@
 !> Who takes a motion needs not know which: a derivative over the span times `weight` is that by
 !> the end of the step. Source: docs/theory.md, section 2.
 module emcon_motion
+   use emcon_evaluation, only : evaluation_t
    use emcon_kinds, only : wp
-   use emcon_pose, only : pose_t
    use emcon_vectors, only : vector_product, vector_sizes, vector_sum
    implicit none
    private
-   public :: motion_t, motion_init, motion_place, motion_of, at_rest
+   public :: motion_t, motion_init, motion_evaluate, motion_of, at_rest
 
    type :: motion_t
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
       real(wp), allocatable :: x(:, :)           !! (n_dim, n_node) reference positions [L]
       real(wp), allocatable :: u0(:, :)          !! displacement at the start [L]
       real(wp), allocatable :: v0(:, :)          !! velocity at the start [L/T]
@@ -25,7 +25,7 @@ module emcon_motion
       real(wp), allocatable :: dv_past(:, :)     !! and to the change that inertia sees [L/T]
       real(wp), allocatable :: du_before(:, :)   !! over the step before [L]
       real(wp), allocatable :: carried(:, :)     !! forces from the start, weighted [M L/T^2]
-      ! of `motion_place`:
+      ! of `motion_evaluate`:
       real(wp), allocatable :: from(:, :)        !! displacement where the span starts [L]
       real(wp), allocatable :: by(:, :)          !! displacement over the span [L]
       real(wp), allocatable :: at(:, :)          !! displacement on which loads act [L]
@@ -48,16 +48,16 @@ contains
       self%v0 = 0.0_wp
       self%du = 0.0_wp
       self%offset = 0.0_wp
-      call motion_place(self)
+      call motion_evaluate(self)
    end subroutine motion_init
 
    !> Find the span and the place of the loads for the present `pose`, `u0` and `du`: whoever
    !> changes these calls it before forces or constraints are evaluated.
-   pure subroutine motion_place(self)
+   pure subroutine motion_evaluate(self)
       type(motion_t), intent(inout) :: self
 
-      associate (place => self%pose%place)
-         if (self%pose%is_gradient) then
+      associate (place => self%evaluation%at)
+         if (self%evaluation%is_gradient) then
             self%from = self%u0 + place*self%du
             self%by = 0.0_wp
             self%computed = max(abs(self%from), abs(self%u0))
@@ -69,23 +69,23 @@ contains
             self%weight = place
          end if
       end associate
-      self%load_weight = self%pose%load_place
+      self%load_weight = self%evaluation%load_place
       call vector_sum(size(self%du), self%u0, self%load_weight, self%du, self%at)
-   end subroutine motion_place
+   end subroutine motion_evaluate
 
    !> The motion from `u0` by `du`, from rest unless `v0` is given, placed.
-   pure function motion_of(pose, x, u0, du, v0) result(motion)
-      type(pose_t), intent(in) :: pose
+   pure function motion_of(evaluation, x, u0, du, v0) result(motion)
+      type(evaluation_t), intent(in) :: evaluation
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)    !! (n_dim, n_node) [L]
       real(wp), intent(in), contiguous, optional :: v0(:, :)             !! (n_dim, n_node) [L/T]
       type(motion_t) :: motion
 
       call motion_init(motion, x)
-      motion%pose = pose
+      motion%evaluation = evaluation
       motion%u0 = u0
       motion%du = du
       if (present(v0)) motion%v0 = v0
-      call motion_place(motion)
+      call motion_evaluate(motion)
    end function motion_of
 
    !> No displacement over a step of nodes at `x`.

@@ -1,8 +1,8 @@
 !> What is prescribed as a function of time: amplitudes, and the motion of driven freedoms.
 module emcon_prescribed
    use emcon_amplitudes, only : amplitude_t, find_amplitude_value
+   use emcon_evaluation, only : instant_t
    use emcon_kinds, only : wp
-   use emcon_pose, only : instant_t
    use emcon_rotation, only : n_turn
    use emcon_scene, only : scene_t
    use emcon_steps, only : prescribed_find, prescribed_t, step_t

@@ -147,14 +147,14 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(csr_t) :: full
       integer, allocatable :: number(:), bare(:)
-      logical :: is_bare(size(self%is_alive))
+      logical :: without_density(size(self%is_alive))
       integer :: i
 
       is_too_full = .false.
-      is_bare = reshape(self%is_alive, [size(is_bare)])
-      is_bare(lists%freedom) = .false.
-      if (size(lists%freedom) == 0) is_bare = .false.    ! nothing is known to act: no matrix
-      bare = pack([(i, i = 1, size(is_bare))], is_bare)
+      without_density = reshape(self%is_alive, [size(without_density)])
+      without_density(lists%freedom) = .false.
+      if (size(lists%freedom) == 0) without_density = .false. ! nothing is known to act: no matrix
+      bare = pack([(i, i = 1, size(without_density))], without_density)
       allocate(number, source=freedom_numbers(self%numbering))
       associate (numbering => self%numbering, n => size(lists%freedom), &
             n_entry => sum((lists%start(2:) - lists%start(:size(lists%start) - 1))**2))

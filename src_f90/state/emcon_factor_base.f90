@@ -1,7 +1,7 @@
 !> Of which motion a factor was made that is kept over steps: with it the same factor is made again.
 module emcon_factor_base
+   use emcon_evaluation, only : instant_t
    use emcon_kinds, only : wp
-   use emcon_pose, only : instant_t
    implicit none
    private
    public :: factor_base_t

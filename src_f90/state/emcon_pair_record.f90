@@ -75,7 +75,7 @@ contains
       integer :: k
 
       self%total = pair_total_t()
-      own%last = set%n_held
+      own%last = set%n_permanent
       by_law%last = set%n
       do k = 1, size(system%contact)
          own = range_t(own%last + 1, count(set%id(:set%n) <= system%first_constraint(k + 1)))
@@ -130,7 +130,7 @@ contains
                if (i > jump(k)%n_slave) cycle
                associate (of => system%contact(contact)%contact)
                   own = findloc(of%node, node(i), 1)
-                  if (own == 0) own = findloc(of%twin, node(i), 1)
+                  if (own == 0) own = findloc(of%duplicate, node(i), 1)
                end associate
                if (own == 0) cycle
                own = own + system%first_constraint(contact)
@@ -226,10 +226,10 @@ contains
 
       first = system%first_constraint(k)
       associate (node => system%contact(k)%contact%node, &
-            twin => system%contact(k)%contact%twin)
+            duplicate => system%contact(k)%contact%duplicate)
          do i = 1, size(node)
             force(:, node(i)) = 0.0_wp
-            if (twin(i) > 0) force(:, twin(i)) = 0.0_wp
+            if (duplicate(i) > 0) force(:, duplicate(i)) = 0.0_wp
          end do
          do j = own%first, own%last
             call add_forces(j)
@@ -240,9 +240,9 @@ contains
          do i = 1, size(node)
             self%force(:, first + i) = force(:, node(i))
             force(:, node(i)) = 0.0_wp                    ! of several constraints the first has it
-            if (twin(i) == 0) cycle
-            self%force(:, first + i) = self%force(:, first + i) + force(:, twin(i))
-            force(:, twin(i)) = 0.0_wp
+            if (duplicate(i) == 0) cycle
+            self%force(:, first + i) = self%force(:, first + i) + force(:, duplicate(i))
+            force(:, duplicate(i)) = 0.0_wp
          end do
       end associate
 

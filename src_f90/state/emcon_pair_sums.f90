@@ -95,7 +95,7 @@ contains
       self%sum%span = self%sum%span + h
       self%sum%is_pressed = .false.
       contact = 1
-      do k = set%n_held + 1, set%n_condition
+      do k = set%n_permanent + 1, set%n_condition
          if (k == set%n + 1) contact = 1
          do while (set%id(k) > system%first_constraint(contact + 1))
             contact = contact + 1
@@ -128,7 +128,7 @@ contains
       real(wp) :: part
       integer :: i
 
-      part = merge(0.5_wp, 1.0_wp, side%masses_resist .and. .not. motion%pose%pushes_at_end)
+      part = merge(0.5_wp, 1.0_wp, side%masses_resist .and. .not. motion%evaluation%pushes_at_end)
       do i = 1, item%n_slave
          push = h*condition_force(item, lam, i)
          associate (node => item%node(i), n => size(push))

@@ -4,8 +4,8 @@ module emcon_state
    use emcon_kinds, only : wp
    use emcon_pair_record, only : pair_record_t
    use emcon_pair_sums, only : pair_sums_t
+   use emcon_rigid_rotation, only : rigid_rotation_t
    use emcon_step_control, only : step_control_t
-   use emcon_turn_record, only : turn_record_t
    implicit none
    private
    public :: state_t
@@ -39,7 +39,7 @@ module emcon_state
       type(pair_record_t) :: pairs               !! what each contact pair transmits
       type(pair_sums_t) :: sums                  !! and has transmitted so far
       real(wp), allocatable :: reaction(:, :)    !! (n_dim, n_node) forces at prescribed freedoms
-      type(turn_record_t) :: turns               !! angles and moments of rigid bodies
+      type(rigid_rotation_t) :: turns            !! angles and moments of rigid bodies
       real(wp), allocatable :: internal(:, :)    !! (n_dim, n_node) internal forces
       real(wp), allocatable :: energy(:)         !! (n_element) strain energy
       real(wp) :: potential = 0.0_wp             !! energy of the given forces

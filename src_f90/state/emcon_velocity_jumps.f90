@@ -42,11 +42,11 @@ contains
       type(constraint_set_t), intent(in) :: set  !! evaluated; with `way` second derivatives too
       real(wp), intent(in) :: lam(:)             !! (n of the set) [M L/T]
       real(wp), intent(in), optional :: way(:, :)    !! (n_dim, n_node) [L]
-      type(velocity_jump_t) :: more(set%n - set%n_held)
+      type(velocity_jump_t) :: more(set%n - set%n_permanent)
       integer :: k
 
       do k = 1, size(more)
-         associate (j => set%n_held + k)
+         associate (j => set%n_permanent + k)
             more(k) = jump_of(set%item(j), set%id(j), lam(j))
             if (present(way)) call turn(set%item(j), set%lam(j), way, more(k))
          end associate

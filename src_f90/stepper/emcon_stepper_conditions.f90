@@ -7,7 +7,7 @@ module emcon_stepper_conditions
    use emcon_kinds, only : wp
    use emcon_prescribed, only : prescribed_motion, ramp_turn
    use emcon_march, only : march_renumber
-   use emcon_pose, only : instant_t
+   use emcon_evaluation, only : instant_t
    use emcon_restart_data, only : restart_check, restart_exchange, restart_offers, restart_size, &
       restart_t
    use emcon_stepper, only : stepper_t

@@ -14,13 +14,13 @@ module emcon_stepper_contact
    use emcon_active_set, only : active_set_begin, active_set_drop, active_set_select, &
       step_cycling, step_done, step_stands_off, step_too_far
    use emcon_active_set_update, only : active_set_advance
-   use emcon_constraints, only : constraint_place, constraints_force, constraints_select
+   use emcon_constraints, only : constraint_index, constraints_force, constraints_select
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
-   use emcon_holding, only : holding_t
-   use emcon_judge, only : judge_step, overlap_t
+   use emcon_contact_support, only : contact_support_t
+   use emcon_overlap_check, only : overlap_check_step, overlap_t
    use emcon_kinds, only : wp
-   use emcon_pose, only : pose_at_end, pose_t
+   use emcon_evaluation, only : evaluation_at_end, evaluation_t
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_choice, check_field, check_list, check_size, check_that, &
       stepper_check_smooth
@@ -62,7 +62,7 @@ contains
          march%state%is_active = was_active
          march%state%lam = 0.0_wp
          march%active%puts_off = .false.
-         march%active%holding = holding_t()
+         march%active%support = contact_support_t()
          call constraints_select(march%active%set, [integer ::])
          call active_set_begin(march%active, march%system, march%motion, march%state)
          active = march%active%is_active
@@ -80,8 +80,8 @@ contains
          active%holds_gap = step%initiation == initiation_persistent .and. active%masses_resist
          active%gap_tolerance = step%gap_tolerance
          active%may_cut = stepper%may_cut
-         self%march%motion%pose = pose_t()
-         if (.not. active%masses_resist) self%march%motion%pose = pose_at_end
+         self%march%motion%evaluation = evaluation_t()
+         if (.not. active%masses_resist) self%march%motion%evaluation = evaluation_at_end
       end associate
    end subroutine take_options
 
@@ -169,7 +169,7 @@ contains
       if (allocated(error)) return
       call gaps_measure(self%march%system, self%march%motion, gap)
       do k = 1, size(id)
-         call constraint_place(self%march%system, id(k), pair, i)
+         call constraint_index(self%march%system, id(k), pair, i)
          if (pair == 0 .or. gap(id(k))%is_near) cycle
          associate (contact => self%march%system%contact(pair))
             call check_that(.false., "constraint " // to_text(id(k)) // " (slave node " // &
@@ -288,10 +288,10 @@ contains
 
       call query_sync(self, stepper, error)
       call query_place(self, stepper, u0, du, error)
-      call check_that(self%march%judge%look%is_able, "overlap in three dimensions is not in this " &
-         // "version", error)
-      if (.not. allocated(error)) call judge_step(self%march%judge, stepper%scene%x, u0, du, &
-         overlap)
+      call check_that(self%march%overlap_check%look%is_able, &
+         "overlap in three dimensions is not in this " // "version", error)
+      if (.not. allocated(error)) call overlap_check_step(self%march%overlap_check, &
+         stepper%scene%x, u0, du, overlap)
    end subroutine query_overlap
 
    !> One flag for each possible constraint.

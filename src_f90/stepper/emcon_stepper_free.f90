@@ -4,6 +4,7 @@
 module emcon_stepper_free
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_at_end
    use emcon_gaps, only : gaps_forget
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_measure, ledger_t
@@ -15,7 +16,7 @@ module emcon_stepper_free
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_pair_record, only : pair_record_init
    use emcon_pair_sums, only : pair_sums_begin
-   use emcon_pose, only : pose_at_end
+   use emcon_rigid_rotation, only : rigid_rotation_init
    use emcon_state, only : state_t
    use emcon_step_control, only : control_forget
    use emcon_stepper, only : stepper_check_solids, stepper_t
@@ -24,7 +25,6 @@ module emcon_stepper_free
    use emcon_system, only : system_check_response, system_find_energy, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : to_text
-   use emcon_turn_record, only : turn_record_init
    use emcon_verdict, only : verdict_move, verdict_t, verdict_update
    implicit none
    private
@@ -197,7 +197,7 @@ contains
 
       if (allocated(error)) return
       associate (system => self%march%system)
-         place = motion_of(pose_at_end, self%scene%x, next%u, at_rest(next%u))
+         place = motion_of(evaluation_at_end, self%scene%x, next%u, at_rest(next%u))
          call system_respond(system, place, .false.)
          call system_check_response(system, "u", error)
          if (allocated(error)) return
@@ -208,7 +208,7 @@ contains
          next%contact = 0.0_wp
          call march_past_forget(next)
          next%reaction = 0.0_wp
-         call turn_record_init(next%turns, self%scene%rigid, self%scene%x, next%u)
+         call rigid_rotation_init(next%turns, self%scene%rigid, self%scene%x, next%u)
          call pair_record_init(next%pairs, system)
          call pair_sums_begin(next%sums%sum)
       end associate

@@ -5,7 +5,7 @@
 !> are to the new value at the end of the step; in a dynamic step it holds from the next step on.
 module emcon_stepper_loads
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_keeping, only : keeping_forget
+   use emcon_factor_policy, only : factor_policy_forget
    use emcon_kinds, only : wp
    use emcon_march, only : march_renumber
    use emcon_prescribed, only : ramp_at, ramp_turn
@@ -75,7 +75,7 @@ contains
       end associate
       call system_renew(self%march%system, self%scene)
       self%march%state%base%is_set = .false.
-      call keeping_forget(self%march%newton%keeping, self%march%newton%correction)
+      call factor_policy_forget(self%march%newton%factor_policy, self%march%newton%correction)
    end subroutine stepper_set_load
 
    !> Add loads of one kind to the present step, where it has none of that kind; without amplitude.

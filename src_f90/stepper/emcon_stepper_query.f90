@@ -15,13 +15,13 @@ module emcon_stepper_query
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_kinds, only : wp
    use emcon_ledger, only : body_momenta
-   use emcon_motion, only : at_rest, motion_place
+   use emcon_motion, only : at_rest, motion_evaluate
    use emcon_march, only : march_free, march_init, march_resume, march_t
    use emcon_march_guess, only : follow_links, march_guess
    use emcon_march_past, only : march_past_begin
    use emcon_null_space, only : null_space_free, null_space_t
    use emcon_numbering, only : pick_unknowns
-   use emcon_pose, only : instant_t
+   use emcon_evaluation, only : instant_t
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_field, check_list, check_size, check_that, &
       stepper_check_open, stepper_check_smooth
@@ -226,7 +226,7 @@ contains
          march%motion%du = u1 - march%state%u
          call follow_links(march%system, march%motion%du)
          call follow_links(march%system, march%motion%offset)
-         call motion_place(march%motion)
+         call motion_evaluate(march%motion)
       end associate
    end subroutine take_motion
 
@@ -258,7 +258,7 @@ contains
       if (allocated(error)) return
       self%march%motion%u0 = u0
       self%march%motion%du = du
-      call motion_place(self%march%motion)
+      call motion_evaluate(self%march%motion)
    end subroutine query_place
 
    !> There is an evaluation to report on.

@@ -1,14 +1,14 @@
 !> Constraints over a step that were evaluated: values, gradients, second derivatives.
 module emcon_stepper_report
    use emcon_constraint_rows, only : constraints_rows
-   use emcon_constraints, only : constraint_place, constraints_evaluate, constraints_select
+   use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_select
    use emcon_contact, only : gap_state_t
    use emcon_csr, only : csr_copy_filled, csr_t
    use emcon_curvature, only : curvature_matrix, curvature_times
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_numbering, only : numbering_init, numbering_t
-   use emcon_pose, only : pose_t
+   use emcon_evaluation, only : evaluation_t
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_field, check_list, check_that
    use emcon_gaps, only : gaps_search
@@ -59,7 +59,7 @@ contains
       call check_field("u1", u1, stepper%scene, error)
       if (allocated(error)) return
       call query_forget(self)                    ! the stencils are others from here on
-      self%march%motion%pose = pose_t()
+      self%march%motion%evaluation = evaluation_t()
       call query_place(self, stepper, u0, u1 - u0, error)
       associate (system => self%march%system, set => self%march%active%set)
          call gaps_search(system, self%march%motion, gap)
@@ -92,7 +92,7 @@ contains
          report%id = set%id
          allocate(report%pair(set%n), report%node(set%n), source=0)
          do k = 1, set%n
-            call constraint_place(system, set%id(k), pair, i)
+            call constraint_index(system, set%id(k), pair, i)
             if (pair == 0) cycle
             report%pair(k) = abs(system%contact(pair)%of_pair)
             report%node(k) = system%contact(pair)%contact%node(i)

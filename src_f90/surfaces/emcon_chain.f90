@@ -14,7 +14,7 @@ module emcon_chain
    implicit none
    private
    public :: chain_t, chain_init, chain_number, chain_shorter, chain_shortest, chain_thickness, &
-      chain_tributary, chain_distance, chain_is_joint, chain_touches, chain_corners, &
+      chain_tributary, chain_distance, chain_is_seam, chain_touches, chain_corners, &
       chain_crossing, surface_edges
 
    type :: chain_t
@@ -24,7 +24,7 @@ module emcon_chain
       integer, allocatable :: next(:)            !! (n_edge) edge after
       real(wp), allocatable :: length(:)         !! (n_edge) in the reference configuration [L]
       integer, allocatable :: node(:)            !! (n_node) ascending; of a joint one node only
-      integer, allocatable :: twin(:)            !! (n_node) the other node of a joint; 0: none
+      integer, allocatable :: duplicate(:)       !! (n_node) the other node of a joint; 0: none
       integer, allocatable :: end_node(:, :)     !! (2, n_edge) the ends as indices into `node`
       integer, allocatable :: node_edge(:, :)    !! (2, n_node) edges that end and begin there or 0
       integer, allocatable :: part(:)            !! (n_edge) connected part the edge belongs to
@@ -99,7 +99,7 @@ contains
       allocate(self%previous(self%n_edge), source=0)
       allocate(self%next(self%n_edge), source=0)
       allocate(self%node_edge(2, size(self%node)), source=0)
-      allocate(self%twin(size(self%node)), source=0)
+      allocate(self%duplicate(size(self%node)), source=0)
       allocate(self%end_node(2, self%n_edge))
       do i = 1, self%n_edge
          k = find_sorted(self%node, self%edge(1, i))
@@ -178,14 +178,14 @@ contains
    end function chain_distance
 
    !> Do edges `a` and `b` follow each other over a joint, whose nodes may be a little apart?
-   pure logical function chain_is_joint(self, a, b) result(is_joint)
+   pure logical function chain_is_seam(self, a, b) result(is_seam)
       type(chain_t), intent(in) :: self
       integer, intent(in) :: a, b                !! edges, 1 to n_edge
 
-      is_joint = .false.
-      if (self%next(a) == b) is_joint = self%edge(2, a) /= self%edge(1, b)
-      if (self%next(b) == a .and. .not. is_joint) is_joint = self%edge(2, b) /= self%edge(1, a)
-   end function chain_is_joint
+      is_seam = .false.
+      if (self%next(a) == b) is_seam = self%edge(2, a) /= self%edge(1, b)
+      if (self%next(b) == a .and. .not. is_seam) is_seam = self%edge(2, b) /= self%edge(1, a)
+   end function chain_is_seam
 
    !> Does edge `e` end or begin at `node`, or at a joint with it?
    pure logical function chain_touches(self, e, node) result(touches)
@@ -194,7 +194,7 @@ contains
       integer, intent(in) :: node                !! of the scene
 
       touches = any(self%node(self%end_node(:, e)) == node) &
-         .or. any(self%twin(self%end_node(:, e)) == node)
+         .or. any(self%duplicate(self%end_node(:, e)) == node)
    end function chain_touches
 
    !> Thickness of the section at each node of the chain of `surface`, 1 where there is none or no

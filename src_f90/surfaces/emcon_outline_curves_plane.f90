@@ -10,10 +10,10 @@ module emcon_outline_curves_plane
    use emcon_hermite, only : hermite_curve, hermite_point, hermite_point_t, hermite_stencil_t, &
       joined_pieces
    use emcon_interactions, only : contact_options_t, formulation_segment, smoothing_hermite
-   use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
    use emcon_outline_plane, only : outline_t
    use emcon_scene, only : scene_t
+   use emcon_seams, only : chain_join
    implicit none
    private
    public :: outline_curves_t, outline_curves_init, outline_curves_overlap

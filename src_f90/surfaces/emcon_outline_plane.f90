@@ -8,7 +8,7 @@ module emcon_outline_plane
    use emcon_bodies, only : bodies_find, bodies_find_tied
    use emcon_chain, only : chain_init, chain_t
    use emcon_errors, only : error_t
-   use emcon_joints, only : chain_join
+   use emcon_seams, only : chain_join
    use emcon_face_edges_plane, only : face_edges, n_face_edge
    use emcon_kinds, only : dp, wp
    use emcon_mesh, only : surface_t
@@ -327,7 +327,7 @@ contains
       call chain_join(chain, scene)
       place = [(i, i = 1, size(place))]
       do k = 1, size(chain%node)
-         if (chain%twin(k) > 0) place(chain%twin(k)) = chain%node(k)
+         if (chain%duplicate(k) > 0) place(chain%duplicate(k)) = chain%node(k)
       end do
       do i = 1, size(self%edge, 2)
          self%place(:, i) = place(self%edge(:, i))

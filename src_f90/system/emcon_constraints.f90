@@ -17,7 +17,7 @@ module emcon_constraints
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_force
    public :: constraints_stick, constraints_take_hold, constraints_gives_back
    public :: constraints_add_forces, constraints_lam, constraints_dissipated
-   public :: constraint_place
+   public :: constraint_index
 
    !> Which conditions act, and their linearised rows on the unknowns. The first `n` have a row of
    !> their gap, of the same number; those of them that stick have rows of their slips too, after
@@ -26,7 +26,7 @@ module emcon_constraints
       integer :: n = 0
       integer :: n_condition = 0
       integer :: n_linear = 0                    !! the first ones: linear, without curvature
-      integer :: n_held = 0                      !! these and the next ones always act
+      integer :: n_permanent = 0                 !! these and the next ones always act
       !> (n_condition) numbers over all pairs, ascending up to `n` and from there on
       integer, allocatable :: id(:)
       type(condition_t), allocatable :: item(:)  !! (n_condition) values and derivatives
@@ -69,7 +69,7 @@ contains
       self%n_condition = self%n
       self%n_row = self%n
       self%n_linear = 0
-      self%n_held = 0
+      self%n_permanent = 0
       self%id = id
       self%condition = [(k, k = 1, self%n)]
       self%slip = 0*self%condition
@@ -128,7 +128,7 @@ contains
    end function constraints_gives_back
 
    !> Pair and number within the pair of constraint `id`; pair 0: it is not one of contact.
-   pure subroutine constraint_place(system, id, pair, i)
+   pure subroutine constraint_index(system, id, pair, i)
       type(system_t), intent(in) :: system
       integer, intent(in) :: id                  !! from 1
       integer, intent(out) :: pair               !! 0: it always holds
@@ -137,7 +137,7 @@ contains
       pair = count(system%first_constraint < id)
       i = id
       if (pair > 0) i = id - system%first_constraint(pair)
-   end subroutine constraint_place
+   end subroutine constraint_index
 
    !> Values and derivatives of all conditions over a motion, and what laws make of them.
    subroutine constraints_evaluate(self, system, motion, leaves_second)
@@ -151,8 +151,8 @@ contains
       self%item%leaves_second = .false.
       if (present(leaves_second)) self%item%leaves_second = leaves_second
       self%n_linear = count(self%id(:self%n) <= system%space%linear%n)
-      self%n_held = count(self%id(:self%n) <= system%first_constraint(1))
-      self%frequency = motion%pose%mass_scale
+      self%n_permanent = count(self%id(:self%n) <= system%first_constraint(1))
+      self%frequency = motion%evaluation%mass_scale
       call linearise_range(self, self%n + 1, self%n_condition, system, motion)
       call linearise_range(self, 1, self%n, system, motion)
       do k = 1, self%n
@@ -163,7 +163,7 @@ contains
             self%defect(k) = item%slip_target(s) - item%slip(s)
          end associate
       end do
-      do k = self%n_held + 1, self%n_condition
+      do k = self%n_permanent + 1, self%n_condition
          if (allocated(self%law(k)%law)) call respond(self, k)
       end do
    end subroutine constraints_evaluate
@@ -178,8 +178,8 @@ contains
 
       last = from - 1
       before = 0
-      do k = 1, size(system%held)
-         call linearise(system%held(k)%constraint)
+      do k = 1, size(system%permanent)
+         call linearise(system%permanent(k)%constraint)
       end do
       do k = 1, size(system%contact)
          call linearise(system%contact(k)%contact)

@@ -12,10 +12,10 @@ module emcon_system
    use emcon_contact_registry, only : new_contact
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : err_analysis, err_input, error_t, raise
-   use emcon_frozen, only : frozen_give, frozen_t
    use emcon_host, only : host_find_contact, host_t
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : dp, wp
+   use emcon_lagged_forces, only : lagged_forces_give, lagged_forces_t
    use emcon_motion, only : motion_t
    use emcon_phases, only : phase_assemble, phase_enter, phase_leave, phase_residual, phases_t
    use emcon_reduction, only : reduction_add
@@ -37,7 +37,7 @@ module emcon_system
    type :: system_t
       type(term_box_t), allocatable :: term(:)
       !> That hold at the end of every step: linear ones, then others
-      type(constraint_box_t), allocatable :: held(:)
+      type(constraint_box_t), allocatable :: permanent(:)
       type(contact_box_t), allocatable :: contact(:)
       class(contact_law_t), allocatable :: contact_law   !! of contact that gives way; none: penalty
       integer :: n_pair = 0                      !! of the scene; guards come after them
@@ -51,7 +51,7 @@ module emcon_system
       logical :: is_symmetric = .false.          !! `matrix` is, up to round-off
       type(stiffening_t) :: stiffening           !! of bodies that nothing holds, in `matrix`
       type(response_t) :: response               !! of the terms to the last motion
-      type(frozen_t) :: frozen                   !! forces that stand for those of the terms
+      type(lagged_forces_t) :: lagged            !! forces that stand for those of the terms
       type(notes_t) :: notes                     !! on the linear constraints of the step
       type(phases_t) :: phases                   !! where the time goes
    end type system_t
@@ -71,7 +71,7 @@ contains
       call lay_out(self, scene, lists)
       call space_init(self%space, scene, lists)
       if (scene%is_hosted) self%space%is_alive = .true.
-      call constraints_create(scene, self%space%linear, self%held, given)
+      call constraints_create(scene, self%space%linear, self%permanent, given)
       if (present(given)) then
          if (allocated(given%contact_law)) allocate(self%contact_law, source=given%contact_law)
       end if
@@ -90,8 +90,8 @@ contains
       type(contact_pair_t), allocatable :: pair(:)
       integer :: i, k
 
-      do i = 1, size(self%held)
-         self%n_constraint = self%n_constraint + self%held(i)%constraint%n_constraint
+      do i = 1, size(self%permanent)
+         self%n_constraint = self%n_constraint + self%permanent(i)%constraint%n_constraint
       end do
       allocate(self%acts(self%n_constraint), source=.false.)
       self%n_pair = size(scene%pair)
@@ -159,7 +159,7 @@ contains
       self%notes = notes_t()
       self%stiffening = stiffening_t()
       call lay_out(self, scene, lists, first)
-      self%frozen%is_known = .false.
+      self%lagged%is_known = .false.
       if (scene%step(i_step)%scheme%is_explicit) call lists_alone(lists)
       call space_begin_step(self%space, scene, i_step, lists, self%matrix, slot, error)
       if (allocated(error)) return
@@ -189,8 +189,8 @@ contains
          self%acts(:linear%n) = linear%is_used .and. .not. self%space%is_reduced
          n = linear%n
       end associate
-      do i = 2, size(self%held)
-         associate (constraint => self%held(i)%constraint)
+      do i = 2, size(self%permanent)
+         associate (constraint => self%permanent(i)%constraint)
             call constraint%find_idle(self%space%numbering, &
                self%acts(n + 1:n + constraint%n_constraint))
             n = n + constraint%n_constraint
@@ -245,8 +245,8 @@ contains
 
       call terms_may_hold(self%term, by_forces)
       by_constraints = .false.
-      do k = 1, size(self%held)
-         associate (constraint => self%held(k)%constraint)
+      do k = 1, size(self%permanent)
+         associate (constraint => self%permanent(k)%constraint)
             if (allocated(constraint%stands_on)) by_constraints(constraint%stands_on) = .true.
          end associate
       end do
@@ -258,7 +258,7 @@ contains
       type(scene_t), intent(in) :: scene
       integer :: k
 
-      self%frozen%is_known = .false.
+      self%lagged%is_known = .false.
       do k = 1, size(self%term)
          call self%term(k)%term%renew(scene, self%i_step)
       end do
@@ -279,13 +279,13 @@ contains
          self%phases%n_tangent = self%phases%n_tangent + 1
          self%is_symmetric = .true.
          self%matrix%value = 0.0_dp
-      else if (.not. self%frozen%is_on) then
+      else if (.not. self%lagged%is_on) then
          self%phases%n_residual = self%phases%n_residual + 1
       end if
-      if (self%frozen%is_on) call frozen_give(self%frozen, self%response)
+      if (self%lagged%is_on) call lagged_forces_give(self%lagged, self%response)
       do k = 1, size(self%term)
          associate (term => self%term(k)%term)
-            if (self%frozen%is_on .and. term%role == role_internal) cycle
+            if (self%lagged%is_on .and. term%role == role_internal) cycle
             if (with_tangent) then
                call term%respond(motion, self%response, self%matrix%value, &
                   self%space%reduction%side%value)

@@ -283,7 +283,7 @@ contains
       class(host_term_t), intent(in) :: self
       type(motion_t), intent(in) :: motion       !! placed
 
-      if (motion%pose%is_gradient) then
+      if (motion%evaluation%is_gradient) then
          is_symmetric = self%force%is_symmetric_at_end
       else
          is_symmetric = self%force%is_symmetric_in_steps

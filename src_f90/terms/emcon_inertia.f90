@@ -24,7 +24,7 @@ module emcon_inertia
       type(csr_t) :: mass                        !! (n_node x n_node) [M]
       real(dp), allocatable :: value(:)          !! mass in the pattern of the matrix
       logical, allocatable :: is_massless(:)     !! (n_node) it has given its mass to its neighbours
-      logical, allocatable :: is_bare(:)         !! (n_node) it has none of its own
+      logical, allocatable :: without_density(:) !! (n_node) it has none of its own
       type(csr_t), private :: given, added       !! (n_node x n_node) beside it [M]
       type(csr_t), private :: consistent, lumped     !! (n_node x n_node) one of them is `mass` [M]
       !> Their values in the precision of the state, and those of `mass`
@@ -244,21 +244,23 @@ contains
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
       integer :: n
 
-      associate (pose => motion%pose, total => response%part(self%role))
-         if (.not. pose%mass_scale > 0.0_wp) return
-         if (present(value)) value = value + real(pose%mass_scale*pose%rate, dp)*self%value
+      associate (evaluation => motion%evaluation, total => response%part(self%role))
+         if (.not. evaluation%mass_scale > 0.0_wp) return
+         if (present(value)) value = value + real(evaluation%mass_scale*evaluation%rate, &
+            dp)*self%value
          n = size(self%rate)
          call vector_sum(n, motion%du, 1.0_wp, motion%offset, self%rate)
-         call vector_scale(n, pose%rate, self%rate)
-         call vector_add(n, -pose%v_weight, motion%v0, self%rate)
+         call vector_scale(n, evaluation%rate, self%rate)
+         call vector_add(n, -evaluation%v_weight, motion%v0, self%rate)
          if (allocated(motion%dv_past)) call vector_add(n, 1.0_wp, motion%dv_past, self%rate)
          call inertia_times(self, self%rate, self%product)
-         call vector_add(n, pose%mass_scale, self%product, total%force)
+         call vector_add(n, evaluation%mass_scale, self%product, total%force)
          if (.not. response%with_sizes) return
-         self%rate = abs(pose%rate*(motion%du + motion%offset)) + abs(pose%v_weight*motion%v0)
+         self%rate = abs(evaluation%rate*(motion%du + motion%offset)) &
+            + abs(evaluation%v_weight*motion%v0)
          if (allocated(motion%dv_past)) self%rate = self%rate + abs(motion%dv_past)
          call inertia_times(self, self%rate, self%product)
-         total%magnitude = total%magnitude + pose%mass_scale*self%product
+         total%magnitude = total%magnitude + evaluation%mass_scale*self%product
       end associate
    end subroutine respond
 
@@ -269,7 +271,7 @@ contains
       real(wp), intent(in), contiguous :: direction(:, :)              !! (n_dim, n_node) [L]
       real(wp), intent(inout), contiguous :: product(:, :)             !! (n_dim, n_node) [M L/T^2]
 
-      self%rate = (motion%pose%mass_scale*motion%pose%rate)*direction
+      self%rate = (motion%evaluation%mass_scale*motion%evaluation%rate)*direction
       call inertia_times(self, self%rate, self%product)
       product = product + self%product
    end subroutine tangent_times

@@ -4,7 +4,7 @@ module emcon_loads
    use emcon_csr, only : csr_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
-   use emcon_pose, only : instant_t
+   use emcon_evaluation, only : instant_t
    use emcon_prescribed, only : amplitude_at
    use emcon_element_kind, only : max_face_nodes
    use emcon_element_registry, only : face_shape_create
@@ -229,7 +229,7 @@ contains
       self%force = 0.0_wp
       do i = 1, size(self%load)
          associate (load => self%load(i))
-            p = load_value(self, i, motion%pose%load_instant)
+            p = load_value(self, i, motion%evaluation%load_instant)
             select case (load%kind)
             case (load_point)
                self%force(load%place, load%target) = self%force(load%place, load%target) + p

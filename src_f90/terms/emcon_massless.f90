@@ -30,22 +30,24 @@ contains
    !> The nodes that have no mass of their own: those of elements without inertia alone, less those
    !> that are given mass or forces or stand in ties, equations and rigid bodies, whose masses they
    !> may bear.
-   pure subroutine massless_bare(scene, solid, is_given, is_bare)
+   pure subroutine massless_bare(scene, solid, is_given, without_density)
       type(scene_t), intent(in) :: scene
       type(solid_t), intent(in) :: solid
       logical, intent(in) :: is_given(:)         !! (n_node) mass or forces
-      logical, intent(out) :: is_bare(:)         !! (n_node)
+      logical, intent(out) :: without_density(:) !! (n_node)
       integer :: e
 
-      is_bare = .false.
+      without_density = .false.
       if (all(solid%has_inertia)) return
       do e = 1, solid%n_element
-         if (.not. solid%has_inertia(e)) is_bare(solid%node(:solid%geometry(e)%n_node, e)) = .true.
+         if (.not. solid%has_inertia(e)) without_density(solid%node(:solid%geometry(e)%n_node, &
+            e)) = .true.
       end do
       do e = 1, solid%n_element
-         if (solid%has_inertia(e)) is_bare(solid%node(:solid%geometry(e)%n_node, e)) = .false.
+         if (solid%has_inertia(e)) without_density(solid%node(:solid%geometry(e)%n_node, e)) &
+            = .false.
       end do
-      call leave_joined(scene, is_given, is_bare)
+      call leave_joined(scene, is_given, without_density)
    end subroutine massless_bare
 
    !> Nodes of ties, equations and rigid bodies, and those that are given something, are not meant.
@@ -71,11 +73,11 @@ contains
    !> that rub, those that are prescribed in such a step, of rigid bodies, in ties and equations, or
    !> given mass or forces, and those of elements that would keep none, and those that others would
    !> not hold. And all nodes that have none anyway.
-   pure subroutine massless_find(scene, solid, is_given, is_bare, is_massless)
+   pure subroutine massless_find(scene, solid, is_given, without_density, is_massless)
       type(scene_t), intent(in) :: scene
       type(solid_t), intent(in) :: solid
       logical, intent(in) :: is_given(:)         !! (n_node) mass or forces
-      logical, intent(in) :: is_bare(:)          !! (n_node) those of `massless_bare`
+      logical, intent(in) :: without_density(:)  !! (n_node) those of `massless_bare`
       logical, intent(out) :: is_massless(:)     !! (n_node)
       integer :: i
 
@@ -101,7 +103,7 @@ contains
       call leave_joined(scene, is_given, is_massless)
       call keep_one(solid, is_massless)
       call keep_swinging(solid, size(scene%x, 1), is_massless)
-      is_massless = is_massless .or. is_bare
+      is_massless = is_massless .or. without_density
    end subroutine massless_find
 
    !> Say of the nodes of surface `k`, if there is one, that they have no mass, or that they do.
@@ -204,9 +206,9 @@ contains
    !> Mass that comes back to nodes: that of their motion relative to what has kept its mass around
    !> them, m d d^T with d = 1 at the node and its weights of `massless_follow` taken from it. Total
    !> mass and centre stay, and so do momenta and energy of a node that moves with the others.
-   subroutine massless_return(solid, may_shed, has_mass, relative, error)
+   subroutine massless_return(solid, may_be_massless, has_mass, relative, error)
       type(solid_t), intent(in) :: solid
-      logical, intent(in) :: may_shed(:)         !! (n_node) massless at first
+      logical, intent(in) :: may_be_massless(:)  !! (n_node) massless at first
       logical, intent(in) :: has_mass(:)         !! (n_node) those of them that get mass
       type(csr_t), intent(out) :: relative       !! (n_node x n_node) [M]
       type(error_t), allocatable, intent(out) :: error
@@ -220,7 +222,7 @@ contains
       do i = 1, size(has_mass)
          if (.not. has_mass(i)) cycle
          k = k + 1
-         call find_stencil(solid, may_shed, i, stencil(k))
+         call find_stencil(solid, may_be_massless, i, stencil(k))
          list = [list, i, stencil(k)%node]
          start(k + 1) = size(list) + 1
       end do
@@ -242,9 +244,9 @@ contains
    end subroutine massless_return
 
    !> Let the nodes `has_mass` move with what has kept its mass around them.
-   subroutine massless_follow(solid, may_shed, has_mass, v)
+   subroutine massless_follow(solid, may_be_massless, has_mass, v)
       type(solid_t), intent(in) :: solid
-      logical, intent(in) :: may_shed(:)         !! (n_node) massless at first
+      logical, intent(in) :: may_be_massless(:)  !! (n_node) massless at first
       logical, intent(in) :: has_mass(:)         !! (n_node) those of them that get mass
       real(wp), intent(inout) :: v(:, :)         !! (n_dim, n_node) [L/T]
       type(stencil_t) :: stencil
@@ -252,19 +254,19 @@ contains
 
       do i = 1, size(has_mass)
          if (.not. has_mass(i)) cycle
-         call find_stencil(solid, may_shed, i, stencil)
+         call find_stencil(solid, may_be_massless, i, stencil)
          v(:, i) = matmul(v(:, stencil%node), stencil%weight)
       end do
    end subroutine massless_follow
 
    !> What has kept its mass around `node`: the mean in each of its elements, and of the elements by
    !> their mass.
-   pure subroutine find_stencil(solid, may_shed, node, stencil)
+   pure subroutine find_stencil(solid, may_be_massless, node, stencil)
       type(solid_t), intent(in) :: solid
-      logical, intent(in) :: may_shed(:)
+      logical, intent(in) :: may_be_massless(:)
       integer, intent(in) :: node
       type(stencil_t), intent(out) :: stencil
-      real(wp) :: weight(size(may_shed)), share
+      real(wp) :: weight(size(may_be_massless)), share
       integer :: e
 
       weight = 0.0_wp
@@ -273,7 +275,7 @@ contains
             if (.not. any(own == node)) cycle
             share = sum(solid%mass(:size(own), :size(own), e))/size(own)
             stencil%mass = stencil%mass + share
-            associate (kept => pack(own, .not. may_shed(own)))
+            associate (kept => pack(own, .not. may_be_massless(own)))
                weight(kept) = weight(kept) + share/size(kept)
             end associate
          end associate

@@ -114,7 +114,7 @@ contains
       item%gap0 = dot_product(w0, rest + 0.5_wp*w0)/length
       item%dgap = dot_product(rest + w0 + 0.5_wp*dw, dw)/length
       item%gap1 = dot_product(w0 + dw, rest + 0.5_wp*(w0 + dw))/length
-      mean = 1.0_wp/(1.0_wp + motion%pose%start_weight)
+      mean = 1.0_wp/(1.0_wp + motion%evaluation%start_weight)
       way = rest + between(motion%from) + 0.5_wp*between(motion%by)
       if (mean < 1.0_wp) way = rest + w0 + mean*dw
       way = way/length

@@ -1,7 +1,7 @@
 !> The kinds of terms, and those of them that are asked for by name.
 submodule (emcon_term_registry) emcon_term_kinds
    use emcon_corotated_term, only : corotated_term_init, corotated_term_t
-   use emcon_decay_plane, only : decay_term_init, decay_term_t
+   use emcon_dissipation_plane, only : dissipation_term_init, dissipation_term_t
    use emcon_host_check, only : host_check_mass
    use emcon_host_term, only : host_term_init, host_term_t
    use emcon_inertia, only : inertia_add, inertia_init, inertia_t, inertia_times
@@ -37,7 +37,7 @@ contains
       allocate(loads_t :: term(of_loads)%term)
       if (has_linear) allocate(linear_term_t :: term(n_own + 1)%term)
       if (turns) allocate(corotated_term_t :: term(n_own + count([has_linear, turns]))%term)
-      if (decays) allocate(decay_term_t :: term(first)%term)
+      if (decays) allocate(dissipation_term_t :: term(first)%term)
       call create_own(scene, term, error, given)
       do i = 1, n
          if (allocated(error)) return
@@ -58,7 +58,7 @@ contains
       type(csr_t) :: extra
       type(solid_t), pointer :: solid
       integer :: i
-      logical, dimension(size(scene%x, 2)) :: is_bare, is_massless, is_given
+      logical, dimension(size(scene%x, 2)) :: without_density, is_massless, is_given
 
       select type (part => term(of_solid)%term)
       type is (solid_term_t)
@@ -73,14 +73,14 @@ contains
       if (allocated(error)) return
       solid => terms_solid(term)
       call mark_given(size(scene%x, 1), extra, is_given, given)
-      call massless_bare(scene, solid, is_given, is_bare)
-      call massless_find(scene, solid, is_given, is_bare, is_massless)
+      call massless_bare(scene, solid, is_given, without_density)
+      call massless_find(scene, solid, is_given, without_density, is_massless)
       if (any(is_massless)) call massless_shed(solid, is_massless)
       select type (part => term(of_inertia)%term)
       type is (inertia_t)
          call inertia_init(part, solid, size(scene%x, 1), extra, error)
          part%is_massless = is_massless
-         part%is_bare = is_bare
+         part%without_density = without_density
       end select
       select type (part => term(of_loads)%term)
       type is (loads_t)
@@ -93,8 +93,8 @@ contains
             call linear_term_init(part, solid, size(scene%x, 1), error)
          type is (corotated_term_t)
             call corotated_term_init(part, solid, size(scene%x, 1))
-         type is (decay_term_t)
-            call decay_term_init(part, solid, scene)
+         type is (dissipation_term_t)
+            call dissipation_term_init(part, solid, scene)
          end select
       end do
    end subroutine create_own
@@ -151,11 +151,11 @@ contains
 
    module procedure terms_massless
       is_massless = .false.
-      is_bare = .false.
+      without_density = .false.
       select type (part => term(of_inertia)%term)
       type is (inertia_t)
          is_massless = part%is_massless
-         is_bare = part%is_bare
+         without_density = part%without_density
       end select
    end procedure terms_massless
 
@@ -164,11 +164,11 @@ contains
       type(csr_t) :: relative
 
       solid => terms_solid(term)
-      call massless_return(solid, may_shed, has_mass, relative, error)
+      call massless_return(solid, may_be_massless, has_mass, relative, error)
       if (allocated(error)) return
       select type (part => term(of_inertia)%term)
       type is (inertia_t)
-         part%is_massless = may_shed .and. .not. has_mass
+         part%is_massless = may_be_massless .and. .not. has_mass
          call inertia_add(part, solid, relative, error)
       end select
    end procedure terms_return_mass
@@ -180,19 +180,19 @@ contains
       end select
    end procedure terms_mass_values
 
-   module procedure terms_decay
+   module procedure terms_dissipation
       integer :: k
 
       work = 0.0_wp
       damping = 0.0_wp
       do k = n_own + 1, size(term)
          select type (part => term(k)%term)
-         type is (decay_term_t)
+         type is (dissipation_term_t)
             work = part%work
             damping = part%damping
          end select
       end do
-   end procedure terms_decay
+   end procedure terms_dissipation
 
    module procedure terms_mass_times
       select type (part => term(of_inertia)%term)

@@ -11,7 +11,7 @@ module emcon_term_registry
    implicit none
    private
    public :: terms_create, terms_solid, terms_mass, terms_mass_rows, terms_mass_times, &
-      terms_mass_values, terms_massless, terms_return_mass, terms_decay
+      terms_mass_values, terms_massless, terms_return_mass, terms_dissipation
 
    interface
       !> The terms of `scene`, and of what it is given.
@@ -55,26 +55,27 @@ module emcon_term_registry
 
       !> The nodes that contact finds without mass: those that have given theirs to their
       !> neighbours, and of sections without inertia.
-      pure module subroutine terms_massless(term, is_massless, is_bare)
+      pure module subroutine terms_massless(term, is_massless, without_density)
          type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
          logical, intent(out) :: is_massless(:)     !! (n_node)
-         logical, intent(out) :: is_bare(:)      !! (n_node) of such sections, whatever contact does
+         !> (n_node) of such sections, whatever contact does
+         logical, intent(out) :: without_density(:)
       end subroutine terms_massless
 
       !> Let the nodes `has_mass`, which had given theirs away, have mass again, and the others not.
       !> The step of the deck has to begin anew.
-      module subroutine terms_return_mass(term, may_shed, has_mass, error)
+      module subroutine terms_return_mass(term, may_be_massless, has_mass, error)
          type(term_box_t), intent(inout), target :: term(:)   !! of `terms_create`
-         logical, intent(in) :: may_shed(:)         !! (n_node) those of `terms_massless` at first
+         logical, intent(in) :: may_be_massless(:)  !! (n_node) those of `terms_massless` at first
          logical, intent(in) :: has_mass(:)         !! (n_node) of these
          type(error_t), allocatable, intent(out) :: error
       end subroutine terms_return_mass
 
       !> What the damping of the scheme has taken in the last motion, and that of materials.
-      pure module subroutine terms_decay(term, work, damping)
+      pure module subroutine terms_dissipation(term, work, damping)
          type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
          real(wp), intent(out) :: work, damping     !! [M L^2/T^2]
-      end subroutine terms_decay
+      end subroutine terms_dissipation
    end interface
 
 end module emcon_term_registry

@@ -10,7 +10,7 @@ program bench_element
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, int64, wp
    use emcon_law_registry, only : law_row, law_row_t, n_constant, n_law_row
-   use emcon_motion, only : motion_t, motion_init, motion_place
+   use emcon_motion, only : motion_t, motion_init, motion_evaluate
    use emcon_scene, only : scene_t
    use emcon_solid_term, only : solid_term_init, solid_term_t
    use emcon_space, only : space_t
@@ -63,13 +63,13 @@ contains
       call term%begin_step(scene, 1, space, matrix, slot)
       call response_init(response, size(scene%x, 1), size(scene%x, 2), size(scene%element_kind))
       call motion_init(motion, scene%x)
-      motion%pose%place = 1.0_wp
-      motion%pose%is_gradient = .false.
+      motion%evaluation%at = 1.0_wp
+      motion%evaluation%is_gradient = .false.
       call random_number(motion%u0)
       call random_number(motion%du)
       motion%u0 = 0.06_wp*motion%u0 + 0.1_wp*scene%x
       motion%du = 0.06_wp*motion%du
-      call motion_place(motion)
+      call motion_evaluate(motion)
       seconds = huge(seconds)
       do i = 1, n_run
          call time_of(term, motion, response, seconds(1))

@@ -3,8 +3,8 @@
 !>
 !> usage: fortran_contact
 program fortran_contact
-   use emcon_api, only : contact_options_t, contact_report_t, csr_multiply, csr_product, csr_t, dp, &
-      error_t, formulation_mortar, formulation_nts, formulation_segment, query_begin_contact, &
+   use emcon_api, only : contact_options_t, contact_report_t, csr_multiply, csr_product, csr_t, &
+      dp, error_t, formulation_mortar, formulation_nts, formulation_segment, query_begin_contact, &
       query_contact, query_free, query_null_space, query_select, query_t, stepper_add_pair, &
       stepper_add_surface, stepper_build, stepper_close, stepper_hold, stepper_new, stepper_t, wp
    implicit none

@@ -1,8 +1,9 @@
 !> A program that gives a scheme to EMCON and runs a deck with it. Arguments: the deck, the name by
 !> which the scheme is given (none if empty), and theta of the theta method, "end" behind it if
-!> contact pushes at the end, or which of EMCON's own schemes it is a copy of; behind that "again" if
-!> the run is to go on in another stepper after each increment. For the start and each increment it prints time, displacement and velocity of the last node in the first direction,
-!> energy, angular momentum, the work of contact and momentum.
+!> contact pushes at the end, or which of EMCON's own schemes it is a copy of; behind that "again"
+!> if the run is to go on in another stepper after each increment. For the start and each increment
+!> it prints time, displacement and velocity of the last node in the first direction, energy,
+!> angular momentum, the work of contact and momentum.
 program integrated
    use emcon_api, only : error_t, increment_t, restart_t, scheme_t, stepper_advance, &
       stepper_build, stepper_close, stepper_give_scheme, stepper_is_done, stepper_load, &

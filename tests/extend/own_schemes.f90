@@ -1,7 +1,7 @@
 !> Schemes that EMCON has, written again as a program would give them: together they set all that a
-!> `pose_t` has. Each has to do what its original does, to the last bit.
+!> `evaluation_t` has. Each has to do what its original does, to the last bit.
 module own_schemes
-   use emcon_api, only : instant_later, instant_t, pose_moving, pose_t, scheme_t, wp
+   use emcon_api, only : instant_later, instant_t, evaluation_moving, evaluation_t, scheme_t, wp
    implicit none
    private
    public :: own_scheme_t, own_scheme
@@ -12,7 +12,7 @@ module own_schemes
    type, extends(scheme_t) :: own_scheme_t
       character(len=16) :: kind = ""             !! the original, as decks call it
    contains
-      procedure :: pose
+      procedure :: evaluation
       procedure :: carry
       procedure :: keeps_energy
    end type own_scheme_t
@@ -35,72 +35,73 @@ contains
       end select
    end function own_scheme
 
-   pure function pose(self, start, h)
+   pure function evaluation(self, start, h)
       class(own_scheme_t), intent(in) :: self
       type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h                  !! > 0 [T]
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
 
       select case (self%kind)
       case ("TRAPEZOIDAL")
-         pose = pose_moving(0.5_wp*h, lapse=0.5_wp*h, v_weight=2.0_wp)
-         pose%start_weight = 1.0_wp
-         call push_at_end(pose, start, h)
+         evaluation = evaluation_moving(0.5_wp*h, lapse=0.5_wp*h, v_weight=2.0_wp)
+         evaluation%start_weight = 1.0_wp
+         call push_at_end(evaluation, start, h)
       case ("GENERALIZEDALPHA")
          associate (gamma => 0.5_wp + lag, beta => 0.25_wp*(1.0_wp + lag)**2)
-            pose = pose_moving(gamma*h*(1.0_wp - lag), lapse=beta*h/gamma, v_weight=gamma/beta)
-            pose%start_weight = lag/(1.0_wp - lag)
-            pose%past_velocity(1) = h*(1.0_wp - 0.5_wp*gamma/beta)
-            pose%past_change(1) = gamma*h*(1.0_wp - 0.5_wp/beta)
+            evaluation = evaluation_moving(gamma*h*(1.0_wp - lag), lapse=beta*h/gamma, &
+               v_weight=gamma/beta)
+            evaluation%start_weight = lag/(1.0_wp - lag)
+            evaluation%past_velocity(1) = h*(1.0_wp - 0.5_wp*gamma/beta)
+            evaluation%past_change(1) = gamma*h*(1.0_wp - 0.5_wp/beta)
          end associate
-         call push_at_end(pose, start, h)
+         call push_at_end(evaluation, start, h)
       case ("BDF2")
-         pose = of_differences(start, h)
+         evaluation = of_differences(start, h)
       case default
-         pose = pose_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
-         pose%load_instant = instant_later(start, 0.5_wp*h)
+         evaluation = evaluation_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
+         evaluation%load_instant = instant_later(start, 0.5_wp*h)
          if (self%kind == "MIDPOINT") then
-            pose%place = 0.5_wp
-            pose%is_gradient = .true.
+            evaluation%at = 0.5_wp
+            evaluation%is_gradient = .true.
          else if (self%kind == "ENERGYDECAYING") then
-            pose%dissipation = 0.125_wp
-            if (start%h_before > 0.0_wp) pose%recalled = min(1.0_wp, h/start%h_before)
+            evaluation%dissipation = 0.125_wp
+            if (start%h_before > 0.0_wp) evaluation%recalled = min(1.0_wp, h/start%h_before)
          end if
       end select
-   end function pose
+   end function evaluation
 
    !> Forces, loads and contact are those at the end.
-   pure subroutine push_at_end(pose, start, h)
-      type(pose_t), intent(inout) :: pose
+   pure subroutine push_at_end(evaluation, start, h)
+      type(evaluation_t), intent(inout) :: evaluation
       type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h                  !! > 0 [T]
 
-      pose%is_gradient = .true.
-      pose%load_place = 1.0_wp
-      pose%load_instant = instant_later(start, h)
-      pose%pushes_at_end = .true.
+      evaluation%is_gradient = .true.
+      evaluation%load_place = 1.0_wp
+      evaluation%load_instant = instant_later(start, h)
+      evaluation%pushes_at_end = .true.
    end subroutine push_at_end
 
    !> Backward differences, of which the first step is the mid-point rule.
-   pure function of_differences(start, h) result(pose)
+   pure function of_differences(start, h) result(evaluation)
       type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h                  !! > 0 [T]
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
       real(wp) :: ratio, k, l
 
       if (start%h_before > 0.0_wp) then
          ratio = h/start%h_before
          k = (1.0_wp + 2.0_wp*ratio)/(1.0_wp + ratio)
          l = ratio**2/(1.0_wp + ratio)
-         pose = pose_moving(h/k, lapse=h/k, v_weight=1.0_wp)
-         pose%past_velocity(1) = -l/h
-         pose%past_change = -[l/h, l/k]
-         call push_at_end(pose, start, h)
+         evaluation = evaluation_moving(h/k, lapse=h/k, v_weight=1.0_wp)
+         evaluation%past_velocity(1) = -l/h
+         evaluation%past_change = -[l/h, l/k]
+         call push_at_end(evaluation, start, h)
       else
-         pose = pose_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
-         pose%place = 0.5_wp
-         pose%is_gradient = .true.
-         pose%load_instant = instant_later(start, 0.5_wp*h)
+         evaluation = evaluation_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
+         evaluation%at = 0.5_wp
+         evaluation%is_gradient = .true.
+         evaluation%load_instant = instant_later(start, 0.5_wp*h)
       end if
    end function of_differences
 

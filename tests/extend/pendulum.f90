@@ -3,9 +3,9 @@
 !> length over that length, the largest change of the total energy, the largest work of loads, and
 !> the largest number of active contacts.
 program pendulum
-   use emcon_api, only : csr_from_entries, csr_t, dp, error_t, increment_t, stepper_advance, stepper_build, &
-      stepper_close, stepper_give_constraint, stepper_give_mass, stepper_is_done, stepper_read, &
-      stepper_t, string_t, wp
+   use emcon_api, only : csr_from_entries, csr_t, dp, error_t, increment_t, stepper_advance, &
+      stepper_build, stepper_close, stepper_give_constraint, stepper_give_mass, stepper_is_done, &
+      stepper_read, stepper_t, string_t, wp
    use rods, only : rods_t
    implicit none
    type(stepper_t) :: stepper

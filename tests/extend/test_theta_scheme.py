@@ -262,7 +262,7 @@ def test_contact_that_pushes_at_the_end(program: tuple[Path, dict[str, str]], tm
 @pytest.mark.parametrize("kind", KINDS)
 def test_copies_do_what_their_originals_do(program: tuple[Path, dict[str, str]], tmp_path: Path,
                                            kind: str) -> None:
-    """Together they set all that a `pose_t` has: what one of them leaves out would be seen here.
+    """Together they set all that a `evaluation_t` has: what one of them leaves out would be seen here.
     Nor does it matter that a run goes on in other steppers."""
     path = tmp_path/"deck.inp"
     lines = []

@@ -4,7 +4,7 @@
 !> A scheme from outside: one file against the installed modules. Its row is a *TIME INTEGRATION,
 !> SCHEME= with the name by which it is given.
 module theta_scheme
-   use emcon_api, only : instant_later, instant_t, pose_moving, pose_t, scheme_t, wp
+   use emcon_api, only : instant_later, instant_t, evaluation_moving, evaluation_t, scheme_t, wp
    implicit none
    private
    public :: theta_scheme_t
@@ -13,23 +13,23 @@ module theta_scheme
       real(wp) :: theta = 0.5_wp                 !! 0 < . <= 1
       logical :: pushes_at_end = .false.         !! contact pushes along gradients there
    contains
-      procedure :: pose
+      procedure :: evaluation
    end type theta_scheme_t
 
 contains
 
-   pure function pose(self, start, h)
+   pure function evaluation(self, start, h)
       class(theta_scheme_t), intent(in) :: self
       type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h                  !! > 0 [T]
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
 
-      pose = pose_moving(h, lapse=self%theta*h, v_weight=1.0_wp/self%theta)
-      pose%place = self%theta
-      pose%is_gradient = .true.
-      pose%load_place = self%theta
-      pose%pushes_at_end = self%pushes_at_end
-      pose%load_instant = instant_later(start, self%theta*h)
-   end function pose
+      evaluation = evaluation_moving(h, lapse=self%theta*h, v_weight=1.0_wp/self%theta)
+      evaluation%at = self%theta
+      evaluation%is_gradient = .true.
+      evaluation%load_place = self%theta
+      evaluation%pushes_at_end = self%pushes_at_end
+      evaluation%load_instant = instant_later(start, self%theta*h)
+   end function evaluation
 
 end module theta_scheme

@@ -3,12 +3,12 @@ module given_hosts
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use emcon_csr, only : csr_find, csr_from_elements
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_t
    use emcon_host_force, only : force_response_t, host_failed, host_force_t, host_ok, &
       host_outside
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_of, motion_t
    use emcon_point_function, only : point_function_t, point_ok
-   use emcon_pose, only : pose_t
    use emcon_scene, only : scene_t
    use emcon_solid_term, only : solid_term_init, solid_term_t
    use emcon_space, only : lists_begin, lists_t, space_t
@@ -79,7 +79,7 @@ contains
       type(motion_t) :: motion
       real(dp) :: side(0)
 
-      motion = motion_of(pose_t(), 0.0_wp*u0, u0, du)
+      motion = motion_of(evaluation_t(), 0.0_wp*u0, u0, du)
       call response_begin(self%response)
       if (wants_tangent) then
          call self%solid%respond(motion, self%response, response%tangent, side)

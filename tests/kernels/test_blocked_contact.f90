@@ -2,11 +2,11 @@
 module test_blocked_contact
    use check, only : check_equal, check_true, test_case_t
    use emcon_blocked_contact, only : blocked_contact_text
+   use emcon_contact_support_gaps, only : gaps_measure
    use emcon_errors, only : error_t
-   use emcon_holding_gaps, only : gaps_measure
    use emcon_kinds, only : wp
    use emcon_march, only : march_begin_step, march_free, march_init, march_t
-   use emcon_motion, only : motion_init, motion_place, motion_t
+   use emcon_motion, only : motion_init, motion_evaluate, motion_t
    use emcon_scene, only : scene_t
    use small_scenes, only : add_step, block_t, clamp, make_two_blocks, prescribe
    implicit none
@@ -59,7 +59,7 @@ contains
       if (allocated(error)) return
       call motion_init(motion, scene%x)
       motion%du(2, 11:) = way
-      call motion_place(motion)
+      call motion_evaluate(motion)
       call gaps_measure(march%system, motion)
       call blocked_contact_text(march%system, scene, is_dropped, text)
       if (start == "") then

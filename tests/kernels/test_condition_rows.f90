@@ -12,10 +12,10 @@ module test_condition_rows
    use emcon_contact_law, only : contact_law_t, contact_values_t
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_of, motion_t
    use emcon_numbering, only : numbering_init, numbering_t
-   use emcon_pose, only : pose_t
    use emcon_steps, only : prescribed_t
    use emcon_system, only : system_t
    use emcon_text, only : to_text
@@ -155,8 +155,8 @@ contains
       end do
       curved%n_constraint = n_condition
       associate (system => trial%system, set => trial%set)
-         allocate(system%held(1), system%contact(0))
-         allocate(system%held(1)%constraint, source=curved)
+         allocate(system%permanent(1), system%contact(0))
+         allocate(system%permanent(1)%constraint, source=curved)
          system%n_constraint = n_condition
          system%first_constraint = [n_condition]
          call numbering_init(trial%numbering, spread(spread(.true., 1, 3), 2, n_node), none)
@@ -172,7 +172,7 @@ contains
       call shake(x, 1.0_wp)
       call shake(u0, 0.1_wp)
       call shake(du, 0.1_wp)
-      trial%motion = motion_of(pose_t(mass_scale=10.0_wp), x, u0, du)
+      trial%motion = motion_of(evaluation_t(mass_scale=10.0_wp), x, u0, du)
       call constraints_evaluate(trial%set, trial%system, trial%motion)
       call constraints_rows(trial%set, trial%numbering)
    end subroutine begin

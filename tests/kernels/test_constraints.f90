@@ -1,7 +1,7 @@
 !> The constraint set: selection, rows, forces, merged pattern, curvature.
 module test_constraints
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_constraints, only : constraint_place, constraints_force, constraints_select
+   use emcon_constraints, only : constraint_index, constraints_force, constraints_select
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
@@ -186,7 +186,7 @@ contains
       if (allocated(error)) return
       call check_equal(error, system%first_constraint, [0, 3, 8], "constraints before each pair")
       do id = 1, system%n_constraint
-         call constraint_place(system, id, pair, i)
+         call constraint_index(system, id, pair, i)
          call check_equal(error, [pair, i], merge([1, id], [2, id - 3], id <= 3), "place")
       end do
    end subroutine test_place

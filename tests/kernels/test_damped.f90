@@ -7,11 +7,11 @@ module test_damped
       constraints_force, constraints_select
    use emcon_dashpot_law, only : dashpot_t
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_t
    use emcon_interactions, only : contact_damping_t, formulation_mortar, formulation_nts, &
       formulation_segment
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_of
-   use emcon_pose, only : pose_t
    use emcon_scene, only : scene_t
    use emcon_system, only : system_begin_step, system_init, system_t
    use emcon_text, only : to_text
@@ -85,7 +85,7 @@ contains
       real(wp), intent(in) :: du(:, :)
       real(wp), intent(out) :: force(:, :)
 
-      call constraints_evaluate(self%set, self%system, motion_of(pose_t(mass_scale=10.0_wp), &
+      call constraints_evaluate(self%set, self%system, motion_of(evaluation_t(mass_scale=10.0_wp), &
          self%scene%x, self%u0, du))
       call constraints_force(self%set, 1, force)
    end subroutine find_forces

@@ -182,7 +182,8 @@ contains
             call respond(sample, u0, du, .false., step)
             call check_true(error, .not. step%is_inverted, sample%what // ": is not inverted")
             call check_near(error, sum(step%force(:, :m)*du), step%energy - start%energy, tol, &
-               sum(step%magnitude(:, :m)*abs(du)) + merge(start%energy, 0.0_wp, k == 2), sample%what)
+               sum(step%magnitude(:, :m)*abs(du)) + merge(start%energy, 0.0_wp, k == 2), &
+               sample%what)
             call check_near(error, sum(step%force, dim=2), [0.0_wp, 0.0_wp], tol, &
                sum(step%magnitude), sample%what // ": force")
             place = sample%x

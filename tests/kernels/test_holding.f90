@@ -4,14 +4,15 @@ module test_holding
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_condition_nodes, only : condition_resize
    use emcon_constraints, only : constraint_set_t, constraints_select
+   use emcon_contact_support, only : contact_support_complete, contact_support_find_free, &
+      contact_support_forget
+   use emcon_contact_support_gaps, only : gaps_keep_closed, gaps_measure, gaps_next_to_close
    use emcon_errors, only : error_t
-   use emcon_holding, only : holding_complete, holding_find_free, holding_forget
-   use emcon_holding_gaps, only : gaps_keep_closed, gaps_measure, gaps_next_to_close
+   use emcon_evaluation, only : instant_t, evaluation_at_end
    use emcon_interactions, only : formulation_nts
    use emcon_kinds, only : wp
    use emcon_march, only : march_begin_step, march_free, march_init, march_t
-   use emcon_motion, only : motion_init, motion_place, motion_t
-   use emcon_pose, only : instant_t, pose_at_end
+   use emcon_motion, only : motion_init, motion_evaluate, motion_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : load_point, load_t
    use small_scenes, only : add_load, add_step, block_t, clamp, make_two_blocks, prescribe
@@ -118,9 +119,9 @@ contains
       if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
       if (allocated(error)) return
       call motion_init(motion, scene%x)
-      motion%pose = pose_at_end
-      motion%pose%load_instant = instant_t(step_time=1.0_wp, total_time=1.0_wp)
-      call motion_place(motion)
+      motion%evaluation = evaluation_at_end
+      motion%evaluation%load_instant = instant_t(step_time=1.0_wp, total_time=1.0_wp)
+      call motion_evaluate(motion)
    end subroutine begin
 
    !> Straight down by the gap if the load is in the middle, all nodes at once; else the block turns
@@ -141,8 +142,9 @@ contains
             call begin(scene, [0.25_wp, 0.5_wp, 0.25_wp*real(k, wp)], march, motion, error)
             if (allocated(error)) return
             associate (system => march%system, active => march%active)
-               call check_true(error, active%holding%is_needed, "nothing else holds it")
-               call holding_complete(active%holding, system, scene, motion, active%is_active)
+               call check_true(error, active%support%is_needed, "nothing else holds it")
+               call contact_support_complete(active%support, system, scene, motion, &
+                  active%is_active)
                if (k == 1) call check_near(error, motion%du(2, 11:), spread(-gap, 1, 6), &
                   64.0_wp*eps, 1.0_wp, "down")
                ! A turn by 0.01 bends the way by its square.
@@ -151,20 +153,20 @@ contains
                call check_near(error, motion%du(:, :10), 0.0_wp*motion%du(:, :10), 0.0_wp, 1.0_wp, &
                   "the floor stays")
                call check_true(error, all(active%is_active([1, 3])), "both corners are held")
-               call check_true(error, .not. allocated(active%holding%text) .and. &
-                  .not. any(active%holding%is_loose), "all is held")
-               call check_true(error, all(abs(active%holding%brought) <= 0.0_wp), &
+               call check_true(error, .not. allocated(active%support%text) .and. &
+                  .not. any(active%support%is_loose), "all is held")
+               call check_true(error, all(abs(active%support%brought) <= 0.0_wp), &
                   "a load closes them")
-               call motion_place(motion)
+               call motion_evaluate(motion)
                call gaps_measure(system, motion)
-               call holding_find_free(active%holding, system, scene, motion, active%is_active, &
-                  is_held)
+               call contact_support_find_free(active%support, system, scene, motion, &
+                  active%is_active, is_held)
                call check_true(error, is_held, "by the contacts")
                active%is_active = .false.
-               call holding_find_free(active%holding, system, scene, motion, active%is_active, &
-                  is_held)
-               call check_true(error, .not. is_held .and. active%holding%is_pushed .and. &
-                  allocated(active%holding%text), "not without")
+               call contact_support_find_free(active%support, system, scene, motion, &
+                  active%is_active, is_held)
+               call check_true(error, .not. is_held .and. active%support%is_pushed .and. &
+                  allocated(active%support%text), "not without")
             end associate
             call march_free(march)
          end block
@@ -190,19 +192,19 @@ contains
             scene%x(2, 11:) = scene%x(2, 11:) + 0.01_wp*(scene%x(1, 11:) - scene%x(1, 11))
             call begin(scene, [0.0_wp, 0.0_wp, 0.0_wp], march, motion, error)
             if (allocated(error)) return
-            associate (holding => march%active%holding, is_active => march%active%is_active)
+            associate (holding => march%active%support, is_active => march%active%is_active)
                expected = [gap, gap + 0.01_wp, 0.0_wp]
                if (k == 2) then
                   holding%has_pulled(2) = .true.
                   expected(2:) = [0.0_wp, gap + 0.02_wp]
                end if
-               call holding_complete(holding, march%system, scene, motion, is_active)
+               call contact_support_complete(holding, march%system, scene, motion, is_active)
                call check_near(error, holding%brought, expected, 64.0_wp*eps, 1.0_wp, "over gaps")
                call check_true(error, all(is_active .eqv. expected > 0.0_wp), "the nearest two")
                call check_true(error, allocated(holding%brought_text), "it is told")
                call check_near(error, motion%du, 0.0_wp*motion%du, 0.0_wp, 1.0_wp, "nothing moves")
                call check_true(error, .not. any(holding%is_loose), "all is held")
-               call holding_forget(holding)
+               call contact_support_forget(holding)
                call check_true(error, .not. any(holding%has_pulled) .and. &
                   all(abs(holding%brought) <= 0.0_wp), "forgotten")
             end associate
@@ -224,8 +226,9 @@ contains
       call begin(scene, [-0.25_wp, -0.5_wp, -0.25_wp], march, motion, error)
       if (allocated(error)) return
       associate (active => march%active)
-         call holding_complete(active%holding, march%system, scene, motion, active%is_active)
-         call check_true(error, active%holding%is_pushed .and. allocated(active%holding%text), &
+         call contact_support_complete(active%support, march%system, scene, motion, &
+            active%is_active)
+         call check_true(error, active%support%is_pushed .and. allocated(active%support%text), &
             "it is told")
          call check_true(error, .not. any(active%is_active), "nothing holds it")
       end associate

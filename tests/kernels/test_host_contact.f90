@@ -10,7 +10,7 @@ module test_host_contact
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_given
    use emcon_kinds, only : wp
-   use emcon_look_plane, only : look_init, look_t
+   use emcon_overlap_query_plane, only : overlap_query_init, overlap_query_t
    use emcon_scene, only : scene_t
    use emcon_surface_nodes, only : surface_nodes
    use emcon_text, only : notes_t
@@ -126,9 +126,9 @@ contains
       scene%pair%formulation = formulation_given
       call new_contact(scene, scene%pair(1), contact, error, floor_t())
       if (allocated(error)) return
-      call check_equal(error, [size(contact%state), size(contact%twin), size(contact%thickness), &
-         size(contact%sagitta)], [3, 3, 3, 3], "one each")
-      call check_true(error, contact%deepest_start > 0.0_wp, "gaps of 0 are closed")
+      call check_equal(error, [size(contact%state), size(contact%duplicate), &
+         size(contact%thickness), size(contact%sagitta)], [3, 3, 3, 3], "one each")
+      call check_true(error, contact%max_penetration_at_start > 0.0_wp, "gaps of 0 are closed")
    end subroutine test_set_up
 
    subroutine test_faults(error)
@@ -187,14 +187,14 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(block_t) :: lower, upper
-      type(look_t) :: look
+      type(overlap_query_t) :: look
 
       call make_two_blocks(scene, 0.0_wp, lower, upper)
-      call look_init(look, scene)
+      call overlap_query_init(look, scene)
       call check_true(error, look%is_able .and. look%outline%n_piece == 2, "two pieces")
       scene%n_dim = 3
       scene%x = reshape([scene%x, scene%x(:1, :)], [3, size(scene%x, 2)])
-      call look_init(look, scene)
+      call overlap_query_init(look, scene)
       call check_true(error, look%outline%n_piece == 0 .and. .not. look%is_able, "none in space")
    end subroutine test_outlines
 

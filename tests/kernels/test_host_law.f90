@@ -11,7 +11,7 @@ module test_host_law
    use emcon_march, only : increment_t
    use emcon_motion, only : motion_of, motion_t
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
-   use emcon_pose, only : pose_t
+   use emcon_evaluation, only : evaluation_t
    use emcon_restart_data, only : restart_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
@@ -213,14 +213,14 @@ contains
       call shake(du, 0.1_wp)
       call shake(way, 1.0_wp)
       if (law /= law_linear) du = 0.0_wp
-      call solid_answers(given, motion_of(pose_t(), scene%x, u0, du), one)
-      call solid_answers(own, motion_of(pose_t(), scene%x, u0, du), other)
+      call solid_answers(given, motion_of(evaluation_t(), scene%x, u0, du), one)
+      call solid_answers(own, motion_of(evaluation_t(), scene%x, u0, du), other)
       call check_near(error, one%part(role_internal)%force, other%part(role_internal)%force, &
          64.0_wp*eps, young, "force")
       call check_near(error, one%energy, other%energy, 64.0_wp*eps, young, "energy")
       call check_near(error, one%rounding, other%rounding, 16.0_wp*eps, young, "rounding")
-      call solid_times(given, motion_of(pose_t(), scene%x, u0, du), way, product)
-      call solid_times(own, motion_of(pose_t(), scene%x, u0, du), way, expected)
+      call solid_times(given, motion_of(evaluation_t(), scene%x, u0, du), way, product)
+      call solid_times(own, motion_of(evaluation_t(), scene%x, u0, du), way, expected)
       call check_near(error, product, expected, 256.0_wp*eps, young, "tangent")
       call stepper_close(given)
       call stepper_close(own)
@@ -244,9 +244,9 @@ contains
       call shake(u0, 0.1_wp)
       call shake(du, 0.2_wp)
       call shake(way, 1.0_wp)
-      call solid_times(given, motion_of(pose_t(), scene%x, u0, du), way, product)
-      call solid_answers(given, motion_of(pose_t(), scene%x, u0, du + d*way), up)
-      call solid_answers(given, motion_of(pose_t(), scene%x, u0, du - d*way), down)
+      call solid_times(given, motion_of(evaluation_t(), scene%x, u0, du), way, product)
+      call solid_answers(given, motion_of(evaluation_t(), scene%x, u0, du + d*way), up)
+      call solid_answers(given, motion_of(evaluation_t(), scene%x, u0, du - d*way), down)
       call check_true(error, .not. allocated(up%refusal), "a response")
       ! third derivatives of the law are a hundred times its modulus at such strains
       associate (up_force => up%part(role_internal)%force, &
@@ -254,8 +254,8 @@ contains
          call check_near(error, product, (up_force - down_force)/(2.0_wp*d), 1.0e4_wp*d**2, &
             young, "tangent")
       end associate
-      call solid_answers(given, motion_of(pose_t(), scene%x, u0, du), up)
-      call solid_answers(given, motion_of(pose_t(), scene%x, u0, 0.0_wp*du), down)
+      call solid_answers(given, motion_of(evaluation_t(), scene%x, u0, du), up)
+      call solid_answers(given, motion_of(evaluation_t(), scene%x, u0, 0.0_wp*du), down)
       associate (part => up%part(role_internal))
          call check_near(error, sum(part%force*du), sum(up%energy) - sum(down%energy), &
             256.0_wp*eps, sum(part%magnitude*abs(du)) + sum(up%energy), "work of the step")
@@ -409,7 +409,7 @@ contains
       call shake(u1, 0.1_wp)
       call query_evaluate(query, given, 0.1_wp, u1, .true., error)
       if (allocated(error)) return
-      call solid_answers(given, motion_of(pose_t(), scene%x, given%march%state%u, u1), &
+      call solid_answers(given, motion_of(evaluation_t(), scene%x, given%march%state%u, u1), &
          given%march%system%response)
       call check_near(error, query%march%system%response%part(role_internal)%force, &
          given%march%system%response%part(role_internal)%force, 64.0_wp*eps, young, "force")

@@ -3,7 +3,7 @@ module test_joints
    use check, only : check_equal, check_near, check_true, test_case_t
    use cut_scenes, only : add_tie, make_cut_blocks, make_cut_strip, merge_surfaces, same_node
    use emcon_chain, only : chain_corners, chain_crossing, chain_distance, chain_init, &
-      chain_is_joint, chain_t, chain_touches, chain_tributary
+      chain_is_seam, chain_t, chain_touches, chain_tributary
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t
    use emcon_contact_registry, only : new_contact
@@ -11,11 +11,11 @@ module test_joints
    use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_nts, &
       formulation_segment, integration_elements, integration_segments, multiplier_dual, &
       multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none
-   use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
    use emcon_mortar, only : mortar_init, mortar_t
    use emcon_mortar_frame, only : moment_cover
    use emcon_scene, only : scene_t
+   use emcon_seams, only : chain_join
    use emcon_text, only : notes_t, to_text
    use emcon_ties, only : ties_prepare
    use small_scenes, only : add_block, add_surface, bend_scene, block_t, bottom, left, &
@@ -72,15 +72,15 @@ contains
       call check_equal(error, chain%previous, [3, 1, 0], "previous")
       call check_equal(error, chain%next, [2, 0, 1], "next")
       call check_equal(error, chain%node, [4, 5, 9, 10], "nodes")
-      call check_equal(error, chain%twin, [0, 0, 6, 0], "twins")
+      call check_equal(error, chain%duplicate, [0, 0, 6, 0], "twins")
       call check_equal(error, reshape(chain%end_node, [6]), [3, 2, 2, 1, 4, 3], "ends")
       call check_equal(error, reshape(chain%node_edge, [8]), [2, 0, 1, 2, 3, 1, 0, 3], &
          "edges of the nodes")
       call check_equal(error, [chain%part, chain%place], [1, 1, 1, 2, 3, 1], "part and places")
       call check_equal(error, chain_distance(chain, 3, 2), 2, "distance")
       call check_true(error, .not. any(chain%is_closed), "open")
-      call check_true(error, chain_is_joint(chain, 1, 3) .and. chain_is_joint(chain, 3, 1) .and. &
-         .not. chain_is_joint(chain, 1, 2), "where the joint is")
+      call check_true(error, chain_is_seam(chain, 1, 3) .and. chain_is_seam(chain, 3, 1) .and. &
+         .not. chain_is_seam(chain, 1, 2), "where the joint is")
       call check_true(error, all([(chain_touches(chain, 1, i), i = 5, 10)] .eqv. &
          [.true., .true., .false., .false., .true., .false.]), "nodes of an edge")
       call chain_corners(chain, scene%x, 60.0_wp, is_corner)
@@ -152,7 +152,8 @@ contains
       call check_equal(error, chain%previous, [8, 1, 2, 3, 4, 5, 6, 7], "previous")
       call check_equal(error, chain%place, [(k, k = 1, 8)], "places")
       call check_true(error, size(chain%is_closed) == 1 .and. all(chain%is_closed), "closed")
-      call check_equal(error, [size(chain%node), count(chain%twin > 0)], [8, 4], "nodes, joints")
+      call check_equal(error, [size(chain%node), count(chain%duplicate > 0)], [8, 4], &
+         "nodes, joints")
       call check_equal(error, chain_distance(chain, 1, 8), 1, "distance")
       u = 0.0_wp
       call chain_crossing(chain, scene%x, u, first, second)
@@ -177,8 +178,8 @@ contains
          if (k == 3) call add_tie(scene, 1, 2)   ! of no use here, but node 6 is slave as well
          call joined_chain(scene, chain, error)
          if (allocated(error)) return
-         call check_equal(error, count(chain%twin > 0), 1, "one joint, case " // to_text(k))
-         call check_equal(error, [pack(chain%node, chain%twin > 0), maxval(chain%twin)], &
+         call check_equal(error, count(chain%duplicate > 0), 1, "one joint, case " // to_text(k))
+         call check_equal(error, [pack(chain%node, chain%duplicate > 0), maxval(chain%duplicate)], &
             [kept(k), 15 - kept(k)], "node and twin, case " // to_text(k))
       end do
    end subroutine test_kept
@@ -194,7 +195,7 @@ contains
       call make_pieces(scene)
       call joined_chain(scene, chain, error)
       if (allocated(error)) return
-      call check_true(error, .not. any(chain%twin > 0), "no tie, no joint")
+      call check_true(error, .not. any(chain%duplicate > 0), "no tie, no joint")
       call add_tie(scene, 4, 5)
       do k = 1, 5
          do side = -1, 1, 2
@@ -202,7 +203,8 @@ contains
             scene%tie(1)%tolerance = tolerance(k)
             call joined_chain(scene, chain, error)
             if (allocated(error)) return
-            call check_true(error, any(chain%twin > 0) .eqv. side < 0, "joint, case " // to_text(k))
+            call check_true(error, any(chain%duplicate > 0) .eqv. side < 0, "joint, case " &
+               // to_text(k))
          end do
       end do
    end subroutine test_tolerance
@@ -223,11 +225,11 @@ contains
       call add_tie(scene, 4, 5)
       call joined_chain(scene, chain, error)
       if (allocated(error)) return
-      call check_equal(error, count(chain%twin > 0), 1, "one continuation")
+      call check_equal(error, count(chain%duplicate > 0), 1, "one continuation")
       call add_tie(scene, 7, 4)
       call joined_chain(scene, chain, error)
       if (allocated(error)) return
-      call check_equal(error, count(chain%twin > 0), 0, "two continuations")
+      call check_equal(error, count(chain%duplicate > 0), 0, "two continuations")
       call check_equal(error, size(chain%node), 7, "nodes")
    end subroutine test_two_ways
 

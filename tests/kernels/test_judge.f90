@@ -5,9 +5,10 @@ module test_judge
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_segment, &
       smoothing_hermite
-   use emcon_judge, only : judge_init, judge_smooth, judge_step, judge_t, overlap_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
+   use emcon_overlap_check, only : overlap_check_init, overlap_check_smooth, overlap_check_step, &
+      overlap_check_t, overlap_t
    use emcon_scene, only : scene_t
    use emcon_text, only : notes_t
    use emcon_ties, only : ties_prepare
@@ -67,7 +68,7 @@ contains
       type(overlap_t), intent(out) :: overlap
       integer, intent(in), optional :: first
       real(wp), intent(in), optional :: motion(2)
-      type(judge_t) :: judge
+      type(overlap_check_t) :: judge
       real(wp) :: du(2, size(scene%x, 2))
       integer :: i
 
@@ -77,8 +78,8 @@ contains
             du(:, i) = motion
          end do
       end if
-      call judge_init(judge, scene)
-      call judge_step(judge, scene%x, scene%u0, du, overlap)
+      call overlap_check_init(judge, scene)
+      call overlap_check_step(judge, scene%x, scene%u0, du, overlap)
    end subroutine judged
 
    subroutine test_apart(error)
@@ -401,26 +402,26 @@ contains
    subroutine judged_smoothly(scene, overlap)
       type(scene_t), intent(in) :: scene
       type(overlap_t), intent(out) :: overlap
-      type(judge_t) :: judge
+      type(overlap_check_t) :: judge
 
-      call judge_init(judge, scene)
-      call judge_smooth(judge, scene, contact_options_t(smoothing=smoothing_hermite))
-      call judge_step(judge, scene%x, scene%u0, 0.0_wp*scene%u0, overlap)
+      call overlap_check_init(judge, scene)
+      call overlap_check_smooth(judge, scene, contact_options_t(smoothing=smoothing_hermite))
+      call overlap_check_step(judge, scene%x, scene%u0, 0.0_wp*scene%u0, overlap)
    end subroutine judged_smoothly
 
    subroutine test_no_pair(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(overlap_t) :: overlap
-      type(judge_t) :: judge
+      type(overlap_check_t) :: judge
 
       call make_scene(scene, [1.3_wp, 0.5_wp], [1.0_wp, 1.0_wp], [1, 1], .false.)
       deallocate(scene%pair)
       allocate(scene%pair(0))
       call judged(scene, overlap)
       call check_equal(error, overlap%node, 0, "no pair")
-      call judge_init(judge, scene)
-      call judge_step(judge, scene%x, scene%u0, 0.0_wp*scene%u0, overlap)
+      call overlap_check_init(judge, scene)
+      call overlap_check_step(judge, scene%x, scene%u0, 0.0_wp*scene%u0, overlap)
       call check_near(error, judge%stray%depth, 0.5_wp, 4.0_wp*eps, 1.0_wp, "stray")
    end subroutine test_no_pair
 

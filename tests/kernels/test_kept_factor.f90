@@ -96,7 +96,7 @@ contains
       m = problem%set%n
       associate (set => problem%set)
          set%defect = 0.0_wp
-         set%n_held = 0
+         set%n_permanent = 0
          set%gives_way = .true.
          set%slope = [(0.5_wp**k, k = 1, m)]
          set%lack = [((-2.0_wp)**(k - m), k = 1, m)]

@@ -7,7 +7,7 @@ module test_loads
    use emcon_kinds, only : dp, wp
    use emcon_prescribed, only : prescribed_motion
    use emcon_motion, only : motion_of
-   use emcon_pose, only : instant_t, pose_t
+   use emcon_evaluation, only : instant_t, evaluation_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : load_gravity, load_point, load_pressure, load_t, prescribed_t
    use emcon_system, only : system_begin_step, system_init, system_loads, system_t
@@ -75,7 +75,7 @@ contains
       real(wp), intent(in), contiguous :: u(:, :)
       real(wp), intent(out), contiguous :: force(:, :)
 
-      call system_loads(system, motion_of(pose_t(is_gradient=.true., load_place=1.0_wp, &
+      call system_loads(system, motion_of(evaluation_t(is_gradient=.true., load_place=1.0_wp, &
          load_instant=instant), scene%x, u, 0.0_wp*u), force)
    end subroutine forces
 
@@ -172,7 +172,7 @@ contains
       call response_begin(system%response)
       do k = 1, size(system%term)
          if (system%term(k)%term%role == role_external) call system%term(k)%term%respond( &
-            motion_of(pose_t(), scene%x, u, 0.0_wp*u), system%response, system%matrix%value, &
+            motion_of(evaluation_t(), scene%x, u, 0.0_wp*u), system%response, system%matrix%value, &
             system%space%reduction%side%value)
       end do
       associate (dof => system%space%numbering%dof)

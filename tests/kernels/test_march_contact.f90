@@ -100,7 +100,8 @@ contains
                associate (ledger => march%ledger)
                   call check_near(error, ledger%total + ledger%friction, start%total, tol, &
                      start%total, "energy and what friction took")
-                  call check_true(error, ledger%friction >= taken - tol*start%total, "friction takes")
+                  call check_true(error, ledger%friction >= taken - tol*start%total, &
+                     "friction takes")
                end associate
                push = sum(march%state%contact(:, 11:), 2)
                call check_true(error, abs(push(1)) <= mu*push(2) + tol*march%ledger%total, &

@@ -325,7 +325,8 @@ contains
                   "slip " // to_text(k))
                expected = (high(1)%t(:, :m, 1) - low(1)%t(:, :m, 1))/(2.0_wp*eps)
                call check_near(error, matmul(item(1)%ht(:2*m, :2*m, 1), w), &
-                  reshape(expected, [2*m]), rel, 1.0_wp, "second derivatives of the slip " // to_text(k))
+                  reshape(expected, [2*m]), rel, 1.0_wp, "second derivatives of the slip " &
+                  // to_text(k))
             end associate
             do j = 1, m
                call check_equal(error, count(item(1)%node(:m) == item(1)%node(j)), 1, "once each")

@@ -3,8 +3,9 @@
 module test_mortar
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_constraint, only : condition_normal, condition_normal_slope, condition_t
-   use emcon_edge_form, only : form_share
+   use emcon_edge_moments, only : form_share
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_at_end, evaluation_moving
    use emcon_interactions, only : contact_options_t, contact_pair_t, integration_elements, &
       integration_segments, multiplier_dual, multiplier_standard, normal_edge, normal_nodal, &
       smoothing_hermite, smoothing_none
@@ -12,8 +13,7 @@ module test_mortar
    use emcon_mortar, only : mortar_init, mortar_t
    use emcon_mortar_choice, only : pair_comes_near
    use emcon_mortar_frame, only : moment_cover, moment_gap
-   use emcon_motion, only : motion_init, motion_place, motion_t
-   use emcon_pose, only : pose_at_end, pose_moving
+   use emcon_motion, only : motion_init, motion_evaluate, motion_t
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
    use small_scenes, only : add_block, add_surface, bend_scene, block_node, block_t, bottom, left, &
@@ -554,12 +554,12 @@ contains
 
          call motion_init(motion, scene%x)
          do scheme = 1, 4
-            motion%pose = pose_at_end
-            if (scheme > 1) motion%pose = pose_moving(1.0_wp, 0.5_wp, 1.0_wp)
-            motion%pose%pushes_at_end = scheme == 3
-            if (scheme == 4) motion%pose%is_gradient = .true.
-            if (scheme == 4) motion%pose%place = 0.0_wp
-            call motion_place(motion)
+            motion%evaluation = evaluation_at_end
+            if (scheme > 1) motion%evaluation = evaluation_moving(1.0_wp, 0.5_wp, 1.0_wp)
+            motion%evaluation%pushes_at_end = scheme == 3
+            if (scheme == 4) motion%evaluation%is_gradient = .true.
+            if (scheme == 4) motion%evaluation%at = 0.0_wp
+            call motion_evaluate(motion)
             one%rubs = .true.
             one%normal = 0.0_wp
             call mortar%linearise([j], motion, [0.0_wp], one)

@@ -4,11 +4,11 @@ module test_newton
    use emcon_constraints, only : constraint_set_t, constraints_select
    use emcon_correction, only : correction_free, correction_reset, correction_t
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : instant_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_init, motion_t
    use emcon_newton, only : newton_converged, newton_diverged, newton_init, newton_refused, &
       newton_singular, newton_solve, newton_t
-   use emcon_pose, only : instant_t
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_solver_registry, only : solver_default
@@ -71,8 +71,8 @@ contains
       call correction_reset(trial%newton%correction, method, solver_default)
       call constraints_select(trial%set, none)
       call motion_init(trial%motion, scene%x)
-      trial%motion%pose%is_gradient = .not. h > 0.0_wp
-      if (h > 0.0_wp) trial%motion%pose = scheme%pose(instant_t(), h)
+      trial%motion%evaluation%is_gradient = .not. h > 0.0_wp
+      if (h > 0.0_wp) trial%motion%evaluation = scheme%evaluation(instant_t(), h)
       trial%motion%u0 = scene%u0
       trial%motion%v0 = scene%v0
    end subroutine prepare
@@ -239,7 +239,7 @@ contains
       call add_load(scene%step(1), load)
       call prepare(trial, scene, 0.0_wp, 20, method_null_space, error)
       if (allocated(error)) return
-      trial%motion%pose%load_instant%step_time = 1.0_wp
+      trial%motion%evaluation%load_instant%step_time = 1.0_wp
       call solve(trial, error)
       if (allocated(error)) return
       call check_true(error, trial%status /= newton_converged, "no solution is claimed")
@@ -288,7 +288,7 @@ contains
       end do
       call prepare(trial, scene, 0.0_wp, 60, method_null_space, error)
       if (allocated(error)) return
-      trial%motion%pose%load_instant%step_time = 1.0_wp
+      trial%motion%evaluation%load_instant%step_time = 1.0_wp
       call solve(trial, error)
       if (allocated(error)) return
       call check_equal(error, trial%status, newton_converged, "status")

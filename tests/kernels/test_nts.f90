@@ -204,9 +204,10 @@ contains
          gap(2) > gap(1) - 0.26_wp*width, "round: smaller by " // to_text(gap(1) - gap(2)))
    end subroutine test_sharp
 
-   !> Two rhombs corner on corner, blunt as vertices of a curve: the top is round over a quarter of an edge, by the part of the
-   !> normals that both corners have. Turned by half of their turn half of them are left, by all one;
-   !> the corner of a block that lies flat on another one has one normal only.
+   !> Two rhombs corner on corner, blunt as vertices of a curve: the top is round over a quarter of
+   !> an edge, by the part of the normals that both corners have. Turned by half of their turn half
+   !> of them are left, by all one; the corner of a block that lies flat on another one has one
+   !> normal only.
    subroutine test_wide_tops(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: pi = acos(-1.0_wp)

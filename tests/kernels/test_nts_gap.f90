@@ -197,7 +197,8 @@ contains
          call check_near(error, a%f1, 0.0_wp, tol + turn**2/nearly_flat*maxval(round), 1.0_wp, &
             "gap: " // to_text(turn))
          call check_near(error, a%g([3, 4, 7, 8, 9, 10]), spread(0.0_wp, 1, 6), &
-            tol + 4.0_wp*abs(turn)/nearly_flat*maxval(round), 1.0_wp, "other nodes: " // to_text(turn))
+            tol + 4.0_wp*abs(turn)/nearly_flat*maxval(round), 1.0_wp, "other nodes: " &
+            // to_text(turn))
       end do
    end subroutine test_nearly_flat
 

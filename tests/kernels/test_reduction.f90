@@ -4,11 +4,11 @@ module test_reduction
    use emcon_amplitudes, only : amplitude_t
    use emcon_csr, only : csr_from_elements, csr_t
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : instant_t, evaluation_t
    use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_t
    use emcon_motion, only : motion_of
    use emcon_numbering, only : numbering_init, numbering_t, pick_unknowns
-   use emcon_pose, only : instant_t, pose_t
    use emcon_reduction, only : freedom_numbers, reduction_init, reduction_t
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
@@ -121,9 +121,9 @@ contains
 
    !> Respond in both systems at the same random state and compare matrices and residuals. An entry
    !> of T^T N T is a sum of some 100 terms, each of which is rounded a few times.
-   subroutine compare(scene, pose, error)
+   subroutine compare(scene, evaluation, error)
       type(scene_t), intent(in) :: scene
-      type(pose_t), intent(in) :: pose
+      type(evaluation_t), intent(in) :: evaluation
       type(error_t), allocatable, intent(out) :: error
       type(system_t) :: reduced, full
       real(wp), allocatable :: u0(:, :), v0(:, :), du(:, :), t(:, :), expected(:, :), found(:, :)
@@ -135,8 +135,8 @@ contains
       call shake(u0, 0.05_wp)
       call shake(v0, 1.0_wp)
       call shake(du, 0.05_wp)
-      call system_respond(reduced, motion_of(pose, scene%x, u0, du, v0), .true.)
-      call system_respond(full, motion_of(pose, scene%x, u0, du, v0), .true.)
+      call system_respond(reduced, motion_of(evaluation, scene%x, u0, du, v0), .true.)
+      call system_respond(full, motion_of(evaluation, scene%x, u0, du, v0), .true.)
       call check_true(error, .not. allocated(reduced%response%refusal), "a response")
       allocate(t, source=dense_terms(reduced%space%numbering))
       t = t(full%space%numbering%dof, :)
@@ -158,7 +158,7 @@ contains
       type(scene_t) :: scene
 
       call make_scene(.false., .false., scene)
-      call compare(scene, scheme%pose(instant_t(0.5_wp, 0.5_wp), 0.25_wp), error)
+      call compare(scene, scheme%evaluation(instant_t(0.5_wp, 0.5_wp), 0.25_wp), error)
    end subroutine test_short
 
    subroutine test_long(error)
@@ -167,7 +167,7 @@ contains
       type(scene_t) :: scene
 
       call make_scene(.false., .true., scene)
-      call compare(scene, scheme%pose(instant_t(0.5_wp, 0.5_wp), 0.25_wp), error)
+      call compare(scene, scheme%evaluation(instant_t(0.5_wp, 0.5_wp), 0.25_wp), error)
    end subroutine test_long
 
    subroutine test_static(error)
@@ -178,7 +178,7 @@ contains
 
       do k = 1, 2
          call make_scene(.true., k == 2, scene)
-         call compare(scene, scheme%pose(instant_t(0.5_wp, 0.5_wp), 0.25_wp), error)
+         call compare(scene, scheme%evaluation(instant_t(0.5_wp, 0.5_wp), 0.25_wp), error)
          if (allocated(error)) return
       end do
    end subroutine test_static
@@ -198,7 +198,7 @@ contains
       if (allocated(error)) return
       allocate(u, source=scene%x)
       call shake(u, 0.05_wp)
-      call system_respond(reduced, motion_of(scheme%pose(instant_t(), 0.25_wp), scene%x, &
+      call system_respond(reduced, motion_of(scheme%evaluation(instant_t(), 0.25_wp), scene%x, &
          0.0_wp*u, u), .true.)
       call check_true(error, reduced%is_symmetric, "known as symmetric")
       a = real(dense_of(reduced%matrix), wp)
@@ -248,8 +248,8 @@ contains
       call shake(u, 0.05_wp)
       call shake(other, 0.05_wp)
       do k = 1, 3
-         call system_respond(reduced, motion_of(scheme%pose(instant_t(), 0.25_wp), scene%x, u, &
-            merge(other, u, k == 2)), .true.)
+         call system_respond(reduced, motion_of(scheme%evaluation(instant_t(), 0.25_wp), scene%x, &
+            u, merge(other, u, k == 2)), .true.)
          if (k == 1) first = reduced%matrix%value
          call check_true(error, all(reduced%matrix%value == first) .eqv. k /= 2, &
             "bits of response " // to_text(k))

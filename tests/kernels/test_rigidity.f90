@@ -3,11 +3,11 @@ module test_rigidity
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_constraint, only : condition_t
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_at_end, evaluation_moving, evaluation_t
    use emcon_kinds, only : wp
    use emcon_linear_rows, only : linear_rows_init, linear_rows_t
    use emcon_motion, only : motion_of, motion_t
    use emcon_numbering, only : numbering_init, numbering_t, spread_dependent
-   use emcon_pose, only : pose_at_end, pose_moving, pose_t
    use emcon_rigid_bodies, only : rigid_frame_choose, rigid_weights
    use emcon_rigidity, only : rigidity_init, rigidity_t
    use emcon_scene, only : scene_t
@@ -87,7 +87,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: step = 2.0_wp**(-6), noise = tol/step
       type(scene_t) :: scene
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
       type(rigidity_t) :: rigidity
       type(condition_t) :: item(3), plus(3), minus(3)
       real(wp), allocatable :: u0(:, :), du(:, :), change(:, :)
@@ -98,8 +98,8 @@ contains
       call check_equal(error, rigidity%n_constraint, 3, "one for each two nodes")
       allocate(u0, du, change, mold=scene%x)
       do p = 1, 2
-         pose = pose_moving(0.5_wp, 0.25_wp, 2.0_wp)
-         if (p == 2) pose = pose_at_end
+         evaluation = evaluation_moving(0.5_wp, 0.25_wp, 2.0_wp)
+         if (p == 2) evaluation = evaluation_at_end
          call shake(u0, 0.3_wp)
          call shake(du, 0.3_wp)
          call evaluate(0.0_wp*du, item)
@@ -137,7 +137,7 @@ contains
          type(motion_t) :: motion
          integer :: j
 
-         motion = motion_of(pose, scene%x, u0, du + change)
+         motion = motion_of(evaluation, scene%x, u0, du + change)
          call rigidity%linearise([(j, j = 1, 3)], motion, [(0.0_wp, j = 1, 3)], item)
       end subroutine evaluate
 
@@ -175,7 +175,7 @@ contains
       call spread_dependent(numbering, u)
       call check_near(error, u, expected, tol, 8.0_wp, "all nodes")
       call rigidity_init(rigidity, scene%rigid)
-      call rigidity%linearise([1, 2, 3], motion_of(pose_at_end, scene%x, u, 0.0_wp*u), &
+      call rigidity%linearise([1, 2, 3], motion_of(evaluation_at_end, scene%x, u, 0.0_wp*u), &
          [(0.0_wp, i = 1, 3)], item)
       call check_near(error, item%gap1, [(0.0_wp, i = 1, 3)], tol, 8.0_wp, "shape")
    end subroutine test_follow

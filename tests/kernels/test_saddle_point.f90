@@ -118,8 +118,8 @@ contains
       call saddle%solver%free()
    end subroutine test_singular
 
-   !> N dq - Gb^T dlam = -r, dlam = lack - slope (defect + G1 dq): by products of dense matrices. One
-   !> of the slopes is so large that the contact hardly gives way.
+   !> N dq - Gb^T dlam = -r, dlam = lack - slope (defect + G1 dq): by products of dense matrices.
+   !> One of the slopes is so large that the contact hardly gives way.
    subroutine test_springs(error)
       type(error_t), allocatable, intent(out) :: error
       type(problem_t) :: problem

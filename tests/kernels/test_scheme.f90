@@ -2,13 +2,13 @@
 module test_scheme
    use check, only : check_error, check_near, check_true, test_case_t
    use emcon_errors, only : err_input, error_t
+   use emcon_evaluation, only : instant_t, evaluation_is_equilibrium, evaluation_moving, &
+      evaluation_t, evaluation_velocity, evaluation_displacement
    use emcon_host_scheme, only : host_scheme_check, host_scheme_row
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : body_momenta, ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
-   use emcon_pose, only : instant_t, pose_is_equilibrium, pose_moving, pose_t, pose_velocity, &
-      pose_way
    use emcon_scene, only : scene_t
    use emcon_scheme, only : scheme_row_t, scheme_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
@@ -23,9 +23,9 @@ module test_scheme
 
    !> A scheme that a program gives: the same pose in all steps.
    type, extends(scheme_t) :: given_t
-      type(pose_t) :: own
+      type(evaluation_t) :: own
    contains
-      procedure :: pose => given_pose
+      procedure :: evaluation => given_pose
    end type given_t
 
    real(wp), parameter :: eps = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
@@ -50,32 +50,33 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scheme_energy_momentum_t) :: dynamic
       type(scheme_static_t) :: static
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
 
-      pose = dynamic%pose(instant_t(1.0_wp, 10.0_wp), 0.5_wp)
-      call check_near(error, [pose%mass_scale*pose%rate, pose%mass_scale*pose%v_weight, &
-         pose%load_instant%step_time, pose%load_instant%total_time], &
-         [8.0_wp, 4.0_wp, 1.25_wp, 10.25_wp], 0.0_wp, 1.0_wp, "mid-point")
-      call check_true(error, .not. pose%is_gradient, "discrete gradients")
-      call check_near(error, pose_velocity(pose, 3.0_wp, 2.0_wp), 5.0_wp, 0.0_wp, 1.0_wp, &
-         "mean velocity is du/h")
-      pose = static%pose(instant_t(1.0_wp, 10.0_wp), 0.5_wp)
-      call check_near(error, [pose%mass_scale, pose%load_instant%step_time, &
-         pose%load_instant%total_time], [0.0_wp, 1.5_wp, 10.5_wp], 0.0_wp, 1.0_wp, "end")
-      call check_true(error, pose%is_gradient, "gradients at the end")
-      call check_near(error, pose_velocity(pose, 3.0_wp, 2.0_wp), 0.0_wp, 0.0_wp, 1.0_wp, &
-         "rest")
+      evaluation = dynamic%evaluation(instant_t(1.0_wp, 10.0_wp), 0.5_wp)
+      call check_near(error, [evaluation%mass_scale*evaluation%rate, &
+         evaluation%mass_scale*evaluation%v_weight, evaluation%load_instant%step_time, &
+         evaluation%load_instant%total_time], [8.0_wp, 4.0_wp, 1.25_wp, 10.25_wp], 0.0_wp, 1.0_wp, &
+         "mid-point")
+      call check_true(error, .not. evaluation%is_gradient, "discrete gradients")
+      call check_near(error, evaluation_velocity(evaluation, 3.0_wp, 2.0_wp), 5.0_wp, 0.0_wp, &
+         1.0_wp, "mean velocity is du/h")
+      evaluation = static%evaluation(instant_t(1.0_wp, 10.0_wp), 0.5_wp)
+      call check_near(error, [evaluation%mass_scale, evaluation%load_instant%step_time, &
+         evaluation%load_instant%total_time], [0.0_wp, 1.5_wp, 10.5_wp], 0.0_wp, 1.0_wp, "end")
+      call check_true(error, evaluation%is_gradient, "gradients at the end")
+      call check_near(error, evaluation_velocity(evaluation, 3.0_wp, 2.0_wp), 0.0_wp, 0.0_wp, &
+         1.0_wp, "rest")
    end subroutine test_pose
 
-   pure function given_pose(self, start, h) result(pose)
+   pure function given_pose(self, start, h) result(evaluation)
       class(given_t), intent(in) :: self
       type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
 
       associate (unused => start, nor_this => h)
       end associate
-      pose = self%own
+      evaluation = self%own
    end function given_pose
 
    !> What a scheme does not go with follows from where it evaluates forces: for those of the table
@@ -107,11 +108,11 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(given_t) :: given, bad
 
-      given%own = pose_moving(1.0_wp, lapse=0.5_wp, v_weight=2.0_wp)
+      given%own = evaluation_moving(1.0_wp, lapse=0.5_wp, v_weight=2.0_wp)
       call host_scheme_check("X", given, error)
       if (allocated(error)) return
       bad = given
-      bad%own%place = 0.0_wp
+      bad%own%at = 0.0_wp
       call expect("place")
       bad%own%mass_scale = 0.0_wp
       call expect("mass_scale")
@@ -160,7 +161,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       class(scheme_t), allocatable :: scheme
       type(scheme_row_t) :: row, listed
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
       integer :: i
 
       do i = 1, n_scheme_row()
@@ -168,13 +169,16 @@ contains
          row = scheme_row(listed%card, squeezed(listed%word))
          call check_true(error, row%code == listed%code, "a card and a word make a row")
          call scheme_create(row, scheme)
-         pose = scheme%pose(instant_t(), 0.5_wp)
+         evaluation = scheme%evaluation(instant_t(), 0.5_wp)
          call check_true(error, scheme%row%code == row%code, "the row is kept")
-         call check_true(error, pose%mass_scale > 0.0_wp .eqv. row%masses_resist, "masses resist")
-         call check_true(error, pose_is_equilibrium(pose) .neqv. row%masses_resist, "equilibrium")
+         call check_true(error, evaluation%mass_scale > 0.0_wp .eqv. row%masses_resist, &
+            "masses resist")
+         call check_true(error, evaluation_is_equilibrium(evaluation) .neqv. row%masses_resist, &
+            "equilibrium")
          if (.not. row%masses_resist) cycle
-         call check_near(error, pose_velocity(pose, 3.0_wp, pose_way(pose, 3.0_wp, 7.0_wp)), &
-            7.0_wp, 8.0_wp*eps, 1.0_wp, "the velocity that a way ends with")
+         call check_near(error, evaluation_velocity(evaluation, 3.0_wp, &
+            evaluation_displacement(evaluation, 3.0_wp, 7.0_wp)), 7.0_wp, 8.0_wp*eps, 1.0_wp, &
+            "the velocity that a way ends with")
       end do
       row = scheme_row("DYNAMIC", "")
       call check_true(error, row%code == scheme_energy_momentum, "the default of *DYNAMIC")
@@ -211,9 +215,9 @@ contains
    end subroutine fly
 
    !> px, py, lz and total at every 50th step, to 4.5 eps per step; ten times that at the largest h,
-   !> some periods of the vibration and cut now and then: it flies so far that u itself is rounded. Over n
-   !> steps of a way d these roundings are at most n d eps/4, a lever of the momentum; lz is held to
-   !> that in single, where increments of equal size are rounded the same way each time.
+   !> some periods of the vibration and cut now and then: it flies so far that u itself is rounded.
+   !> Over n steps of a way d these roundings are at most n d eps/4, a lever of the momentum; lz is
+   !> held to that in single, where increments of equal size are rounded the same way each time.
    subroutine test_free_flight(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene

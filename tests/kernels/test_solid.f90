@@ -6,7 +6,7 @@ module test_solid
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_of
-   use emcon_pose, only : pose_t
+   use emcon_evaluation, only : evaluation_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_t
    use emcon_solid_respond, only : solid_element_respond
@@ -112,7 +112,7 @@ contains
       allocate(u0, du, force, source=scene%x)
       call shake(u0, 0.1_wp)
       call shake(du, 0.1_wp)
-      call term%respond(motion_of(pose_t(), scene%x, u0, du), response)
+      call term%respond(motion_of(evaluation_t(), scene%x, u0, du), response)
       force = 0.0_wp
       associate (solid => term%solid)
          do e = 1, solid%n_element
@@ -167,7 +167,7 @@ contains
       u0 = 1.0e8_wp
       du = 0.0_wp
       du(1, :) = -3.0e7_wp
-      call term%respond(motion_of(pose_t(), scene%x, u0, du), response)
+      call term%respond(motion_of(evaluation_t(), scene%x, u0, du), response)
       call check_near(error, response%energy, 0.0_wp*response%energy, (4.0e8_wp*eps)**2, young, &
          "energy")
       call check_near(error, abs(response%part(role_internal)%force)/response%rounding, &
@@ -188,12 +188,12 @@ contains
       if (allocated(error)) return
       allocate(u0, du, source=0.0_wp*scene%x)
       du(1, [4, 8]) = -1.5_wp                    ! the right side of element 3
-      call term%respond(motion_of(pose_t(), scene%x, u0, du), response)
+      call term%respond(motion_of(evaluation_t(), scene%x, u0, du), response)
       call check_true(error, allocated(response%refusal), "refused")
       if (allocated(response%refusal)) call check_equal(error, response%refusal, &
          "element 3 is inverted", "refusal")
       call response_begin(response)
-      call term%respond(motion_of(pose_t(), scene%x, u0, 0.5_wp*du), response)
+      call term%respond(motion_of(evaluation_t(), scene%x, u0, 0.5_wp*du), response)
       call check_true(error, .not. allocated(response%refusal), "half of it is not")
    end subroutine test_inverted
 

@@ -3,10 +3,10 @@ module test_system
    use check, only : check_near, test_case_t
    use emcon_csr, only : csr_multiply
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : instant_t, evaluation_moving, evaluation_t, evaluation_velocity
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_of, motion_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
-   use emcon_pose, only : instant_t, pose_moving, pose_t, pose_velocity
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
@@ -70,7 +70,8 @@ contains
 
       call make_system(scene, system, .false., error)
       if (allocated(error)) return
-      call check_tangent(error, scene, system, scheme%pose(instant_t(0.5_wp, 0.5_wp), 0.25_wp))
+      call check_tangent(error, scene, system, scheme%evaluation(instant_t(0.5_wp, 0.5_wp), &
+         0.25_wp))
    end subroutine test_dynamic_tangent
 
    subroutine test_static_tangent(error)
@@ -81,7 +82,8 @@ contains
 
       call make_system(scene, system, .true., error)
       if (allocated(error)) return
-      call check_tangent(error, scene, system, scheme%pose(instant_t(0.5_wp, 0.5_wp), 0.25_wp))
+      call check_tangent(error, scene, system, scheme%evaluation(instant_t(0.5_wp, 0.5_wp), &
+         0.25_wp))
    end subroutine test_static_tangent
 
    !> Gradients at a place, discrete gradients from the start to it, and loads at another.
@@ -89,24 +91,24 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(system_t) :: system
-      type(pose_t) :: pose
+      type(evaluation_t) :: evaluation
 
       call make_system(scene, system, .false., error)
       if (allocated(error)) return
-      pose = pose_moving(0.25_wp, lapse=0.2_wp, v_weight=1.5_wp)
-      pose%place = 0.375_wp
-      pose%load_place = 0.75_wp
-      call check_tangent(error, scene, system, pose)
-      pose%is_gradient = .true.
-      call check_tangent(error, scene, system, pose)
+      evaluation = evaluation_moving(0.25_wp, lapse=0.2_wp, v_weight=1.5_wp)
+      evaluation%at = 0.375_wp
+      evaluation%load_place = 0.75_wp
+      call check_tangent(error, scene, system, evaluation)
+      evaluation%is_gradient = .true.
+      call check_tangent(error, scene, system, evaluation)
    end subroutine test_tangent_within
 
    !> Against central differences of step eps^(1/3): error a multiple of eps^(2/3).
-   subroutine check_tangent(error, scene, system, pose)
+   subroutine check_tangent(error, scene, system, evaluation)
       type(error_t), allocatable, intent(inout) :: error
       type(scene_t), intent(in) :: scene
       type(system_t), intent(inout) :: system
-      type(pose_t), intent(in) :: pose
+      type(evaluation_t), intent(in) :: evaluation
       real(wp), allocatable :: u0(:, :), v0(:, :), du(:, :), up(:), down(:), way(:)
       real(wp), allocatable :: matrix(:, :)
       real(wp), parameter :: rounding = real(epsilon(1.0_dp), wp)   ! of the matrix
@@ -121,16 +123,16 @@ contains
       call shake(v0, 1.0_wp)
       call shake(du, 0.1_wp)
       step = epsilon(1.0_wp)**(1.0_wp/3.0_wp)
-      call system_respond(system, motion_of(pose, scene%x, u0, du, v0), .true.)
+      call system_respond(system, motion_of(evaluation, scene%x, u0, du, v0), .true.)
       matrix = real(dense_of(system%matrix), wp)
       do j = 1, size(way)
          way = 0.0_wp
          way(j) = step
          call add_to_dofs(system%space%numbering, way, 1.0_wp, du)
-         call system_respond(system, motion_of(pose, scene%x, u0, du, v0), .false.)
+         call system_respond(system, motion_of(evaluation, scene%x, u0, du, v0), .false.)
          call pick_unknowns(system%space%numbering, system%response%residual, up)
          call add_to_dofs(system%space%numbering, way, -2.0_wp, du)
-         call system_respond(system, motion_of(pose, scene%x, u0, du, v0), .false.)
+         call system_respond(system, motion_of(evaluation, scene%x, u0, du, v0), .false.)
          call pick_unknowns(system%space%numbering, system%response%residual, down)
          call add_to_dofs(system%space%numbering, way, 1.0_wp, du)
          call check_near(error, matrix(:, j), (up - down)/(2.0_wp*step), &
@@ -145,7 +147,7 @@ contains
       type(scheme_static_t) :: static
       type(scene_t) :: scene
       type(system_t) :: system
-      type(pose_t) :: pose(2)
+      type(evaluation_t) :: evaluation(2)
       type(motion_t) :: motion
       real(wp), allocatable :: u0(:, :), du(:, :), way(:, :), product(:, :), x(:), y(:), z(:)
       integer :: k
@@ -154,8 +156,8 @@ contains
       if (allocated(error)) return
       scene%step(1)%load = scene%step(1)%load(:0)
       call system_renew(system, scene)
-      pose(1) = dynamic%pose(instant_t(), 0.25_wp)
-      pose(2) = static%pose(instant_t(), 0.25_wp)
+      evaluation(1) = dynamic%evaluation(instant_t(), 0.25_wp)
+      evaluation(2) = static%evaluation(instant_t(), 0.25_wp)
       allocate(u0, du, way, product, source=scene%x)
       allocate(x(system%space%numbering%n_unknown), y(system%space%numbering%n_unknown))
       allocate(z(system%space%numbering%n_unknown))
@@ -165,7 +167,7 @@ contains
          call draw_random(x)
          way = 0.0_wp
          call add_to_dofs(system%space%numbering, x, 1.0_wp, way)
-         motion = motion_of(pose(k), scene%x, u0, du)
+         motion = motion_of(evaluation(k), scene%x, u0, du)
          call system_respond(system, motion, .true.)
          call csr_multiply(system%matrix, x, y)
          call system_tangent_times(system, motion, way, product)
@@ -191,10 +193,10 @@ contains
       call shake(v0, 1.0_wp)
       call shake(du, 0.1_wp)
       call shake(offset, 0.1_wp)
-      motion = motion_of(scheme%pose(instant_t(), h), scene%x, u0, du, v0)
+      motion = motion_of(scheme%evaluation(instant_t(), h), scene%x, u0, du, v0)
       motion%offset = offset
       call system_respond(system, motion, .false.)
-      change = (pose_velocity(motion%pose, v0, du + offset) - v0)/h
+      change = (evaluation_velocity(motion%evaluation, v0, du + offset) - v0)/h
       call mass_times(system, change, expected)
       associate (part => system%response%part)
          call check_near(error, part(role_inertia)%force, expected, tol, 20.0_wp, "inertia")

@@ -285,7 +285,7 @@ contains
          start = march%ledger
          n_touched = 0
          associate (system => march%system)
-            place = system%first_constraint(1) + findloc(system%contact(1)%contact%twin > 0, &
+            place = system%first_constraint(1) + findloc(system%contact(1)%contact%duplicate > 0, &
                .true., 1)
          end associate
          do while (.not. march_is_done(march))

@@ -30,7 +30,7 @@ contains
       integer :: k
 
       call constraints_select(set, [4, 7, 9])
-      set%n_held = 1
+      set%n_permanent = 1
       set%lam = [3.0_wp, -2.0_wp, 5.0_wp]
       do k = 1, 3
          associate (item => set%item(k))

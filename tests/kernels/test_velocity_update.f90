@@ -3,9 +3,9 @@ module test_velocity_update
    use check, only : check_near, check_true, test_case_t
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_select
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_of
-   use emcon_pose, only : pose_t
    use emcon_scene, only : scene_t
    use emcon_system, only : mass_times, system_begin_step, system_init, system_t
    use emcon_velocity_update, only : velocity_update_apply, velocity_update_free, velocity_update_t
@@ -58,7 +58,7 @@ contains
       call system%contact(1)%contact%begin_step(scene%x, u0, du)
       call constraints_select(set, [1, 2, 3])
       set%lam = lam
-      call constraints_evaluate(set, system, motion_of(pose_t(), scene%x, u0, du))
+      call constraints_evaluate(set, system, motion_of(evaluation_t(), scene%x, u0, du))
       lost = -sum(set%lam*set%item%dgap)
       v1 = v0
       call velocity_update_apply(update, system, set, v1, restored, has_root, error)

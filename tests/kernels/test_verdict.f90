@@ -297,7 +297,7 @@ contains
       call check_near(error, found%pull, 0.3_wp, 8.0_wp*epsilon(1.0_wp), 1.0_wp, "two")
       call check_near(error, nodal_pull_share(found), 0.3_wp/4.1_wp, 8.0_wp*epsilon(1.0_wp), &
          1.0_wp, "share")
-      set%n_held = 1
+      set%n_permanent = 1
       found = nodal_pull_t()
       call nodal_pull_add(found, set, 5)
       call nodal_pull_text(found, text)

@@ -122,7 +122,7 @@ def test_without_a_pair_no_code_of_contact_runs(plain):
     sets = {"constraints_select", "constraints_evaluate", "constraints_rows", "linearise"}
     assert not [name for name in calls if name.split("_MOD_")[-1] in sets]
     assert not called(calls, "emcon_layer", "emcon_layer_push", "emcon_velocity_update",
-                      "emcon_gaps", "emcon_holding_gaps", "emcon_overclosure")
+                      "emcon_gaps", "emcon_contact_support_gaps", "emcon_overclosure")
 
 
 def test_without_a_tie_nothing_is_eliminated(plain):
@@ -227,7 +227,7 @@ def test_nothing_of_a_far_pair_is_called(tmp_path):
     calls, _ = per_increment(deck.text(), tmp_path)
     contact = [name for name in FOLDER if FOLDER[name] == "contact"]
     assert called(calls, *contact) == []
-    assert called(calls, "emcon_gaps", "emcon_judge") == ["__emcon_gaps_MOD_gaps_forget"]
+    assert called(calls, "emcon_gaps", "emcon_overlap_check") == ["__emcon_gaps_MOD_gaps_forget"]
 
 
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])

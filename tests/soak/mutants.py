@@ -1,7 +1,7 @@
 """Do the tests notice a wrong line of the numerics? `make mutants COUNT=80`
 
     .venv/bin/python tests/soak/mutants.py [--count N] [--seed N] [--since COMMIT] [--folders ...]
-    .venv/bin/python tests/soak/mutants.py --try src_f90/march/emcon_judge.f90:120 'n = n - 1'
+    .venv/bin/python tests/soak/mutants.py --try src_f90/march/emcon_overlap_check.f90:120 'n = n - 1'
 
 Each mutant is the library with one small mistake in one line: a relation or a sign turned round, a
 factor halved, a condition left out, an assignment not made. Lines are drawn by chance from those of

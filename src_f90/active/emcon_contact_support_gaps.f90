@@ -1,7 +1,7 @@
 !> Gaps of contacts along motions of bodies: which close first, which are in the way.
-module emcon_holding_gaps
+module emcon_contact_support_gaps
    use emcon_constraint, only : condition_rate
-   use emcon_constraints, only : constraint_place, constraint_set_t, constraints_evaluate, &
+   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate, &
       constraints_select
    use emcon_gaps, only : pair_measure, pair_search
    use emcon_kinds, only : dp, wp
@@ -47,7 +47,7 @@ contains
          is_meant .and. [(k > system%first_constraint(1), k = 1, size(is_meant))]))
       do k = 1, set%n
          id = set%id(k)
-         call constraint_place(system, id, pair, i)
+         call constraint_index(system, id, pair, i)
          set%target(k) = system%contact(pair)%contact%state(i)%gap1
          if (present(grips)) set%item(k)%rubs = grips(id)
       end do
@@ -69,7 +69,7 @@ contains
             is_meant(first:last) = contact%state%is_near .and. contact%state%is_over &
                .and. .not. contact%state%is_leaving
             is_meant(first:last) = is_meant(first:last) .and. &
-               contact%state%gap1 > -contact%deepest_start*contact%state%size
+               contact%state%gap1 > -contact%max_penetration_at_start*contact%state%size
          end associate
       end do
    end function gaps_that_can_act
@@ -139,4 +139,4 @@ contains
       end do
    end subroutine gaps_keep_closed
 
-end module emcon_holding_gaps
+end module emcon_contact_support_gaps

@@ -3,30 +3,30 @@
 !> One constraint per slave node A: the gap integrated over the slave edges with the multiplier
 !> basis of A, as a mean over the covered part. A formulation gives the integrals of each slave
 !> edge. Source: docs/theory.md, eq. (15).
-module emcon_weighted
+module emcon_integrated_gap
    use emcon_chain, only : chain_init, chain_t, chain_thickness
    use emcon_condition_nodes, only : condition_include, condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : contact_t, deepest_arrival
+   use emcon_contact, only : contact_t, max_penetration_on_entry
    use emcon_dgrad_wide, only : wide_t
-   use emcon_edge_form, only : edge_form_t, form_constraint, form_share, weighted_gap_t
+   use emcon_edge_moments, only : edge_moments_t, form_constraint, form_share, gap_integral_t
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_pair_t
-   use emcon_joints, only : chain_join
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
+   use emcon_seams, only : chain_join
    use emcon_slip_point, only : slip_add, slip_list_t, slip_over, slip_point_t, slip_share
    implicit none
    private
-   public :: weighted_t, weighted_init, weighted_slips, weighted_sagittas
+   public :: integrated_gap_t, integrated_gap_init, integrated_gap_slips, integrated_gap_sagittas
 
    !> A slave node is let go where less than this fraction of its surface is covered: a smaller part
    !> says hardly more than the constraint of its neighbour.
    real(wp), parameter :: least_cover = 0.02_wp
    !> So far, per edge, a mean gap may be closed where contact begins: corners dip into edges.
-   real(wp), parameter :: deepest_mean = 0.2_wp
+   real(wp), parameter :: max_penetration_mean = 0.2_wp
 
-   type, abstract, extends(contact_t) :: weighted_t
+   type, abstract, extends(contact_t) :: integrated_gap_t
       type(chain_t) :: slave
       type(chain_t), allocatable :: master            !! gfortran 12 loses a second one of its kind
       logical :: is_self = .false.                    !! a surface in contact with itself
@@ -35,32 +35,32 @@ module emcon_weighted
       real(wp), allocatable :: whole(:)               !! (n_constraint) reference length [L]
       real(wp), allocatable :: scale(:)               !! (n_constraint) covered at the start [L]
       real(wp), allocatable :: cover(:)               !! (n_constraint) covered at the end [L]
-      type(edge_form_t), allocatable :: form(:)       !! (n_edge)
+      type(edge_moments_t), allocatable :: form(:)    !! (n_edge)
       logical, allocatable :: is_formed(:)            !! (n_edge)
       logical :: leaves_second = .false.              !! of `form`: no second derivatives
       type(slip_list_t), allocatable :: slide(:)      !! (n_constraint) if it counts: of the step
       real(wp), allocatable :: own_slip(:)            !! (n_constraint) part of it at the own node
       type(wide_t) :: work(3)
    contains
-      procedure :: measure_points => weighted_measure
-      procedure :: evaluate_points => weighted_evaluate
-      procedure :: area_points => weighted_area
-      procedure :: own_area => weighted_own_area
-      procedure :: share => weighted_share
-      procedure :: mean_gap => weighted_mean_gap
-      procedure :: slip_points => weighted_slip
+      procedure :: measure_points => integrated_gap_measure
+      procedure :: evaluate_points => integrated_gap_evaluate
+      procedure :: area_points => integrated_gap_area
+      procedure :: own_area => integrated_gap_own_area
+      procedure :: share => integrated_gap_share
+      procedure :: mean_gap => integrated_gap_mean_gap
+      procedure :: slip_points => integrated_gap_slip
       procedure(slip_interface), deferred :: choose_slip
       procedure(measure_interface), deferred :: measure_edges
       procedure(form_interface), deferred :: form_edge
-   end type weighted_t
+   end type integrated_gap_t
 
    abstract interface
 
       !> What constraint `i` slides by in the step that begins, with weights of any sum > 0; of no
       !> points where it cannot act.
       pure subroutine slip_interface(self, i, x, u0, du, list)
-         import :: slip_list_t, weighted_t, wp
-         class(weighted_t), intent(in) :: self
+         import :: slip_list_t, integrated_gap_t, wp
+         class(integrated_gap_t), intent(in) :: self
          integer, intent(in) :: i                !! 1..n_constraint
          real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
          type(slip_list_t), intent(inout) :: list     !! empty
@@ -68,15 +68,15 @@ module emcon_weighted
 
       !> Fill `form%value`: the moments of all slave edges at both ends of the step.
       pure subroutine measure_interface(self, x, u0, du)
-         import :: weighted_t, wp
-         class(weighted_t), intent(inout) :: self
+         import :: integrated_gap_t, wp
+         class(integrated_gap_t), intent(inout) :: self
          real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       end subroutine measure_interface
 
       !> Fill `form(e)` with nodes and moments in the arithmetic; `leaves_second` says which.
       pure subroutine form_interface(self, e, x, u0, du)
-         import :: weighted_t, wp
-         class(weighted_t), intent(inout) :: self
+         import :: integrated_gap_t, wp
+         class(integrated_gap_t), intent(inout) :: self
          integer, intent(in) :: e                !! slave edge
          real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       end subroutine form_interface
@@ -86,8 +86,8 @@ module emcon_weighted
 contains
 
    !> Set up what does not depend on the formulation.
-   subroutine weighted_init(self, scene, pair, error)
-      class(weighted_t), intent(inout) :: self
+   subroutine integrated_gap_init(self, scene, pair, error)
+      class(integrated_gap_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       type(error_t), allocatable, intent(out) :: error
@@ -103,10 +103,10 @@ contains
       self%is_self = pair%slave == pair%master
       self%may_leave = .true.
       self%node = self%slave%node
-      self%twin = self%slave%twin
+      self%duplicate = self%slave%duplicate
       n = size(self%node)
       self%n_constraint = n
-      self%deepest_start = deepest_mean
+      self%max_penetration_at_start = max_penetration_mean
       self%offset = pair%offset
       self%restitution = pair%restitution
       self%friction = pair%friction
@@ -130,12 +130,12 @@ contains
          self%state(i)%size = 2.0_wp*self%whole(i)       ! the end of a chain has one edge
       end do
       self%scale = self%whole
-   end subroutine weighted_init
+   end subroutine integrated_gap_init
 
    !> Choose what the constraints slide by, for a formulation that has chosen its stencils. The
    !> weights are kept over the step, with the sum 1: docs/theory.md, eq. (14j).
-   pure subroutine weighted_slips(self, x, u0, du)
-      class(weighted_t), intent(inout) :: self
+   pure subroutine integrated_gap_slips(self, x, u0, du)
+      class(integrated_gap_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       type(slip_point_t), parameter :: nothing(0) = slip_point_t()
       real(wp) :: own
@@ -152,12 +152,12 @@ contains
          self%state(i)%slip_shift = abs(own - self%own_slip(i))
          self%own_slip(i) = own
       end do
-   end subroutine weighted_slips
+   end subroutine integrated_gap_slips
 
    !> Take the sagittas of the constraints from `form%value`, where the place of the gap has them:
    !> where the step begins, or where it is expected to end of what is covered there first.
-   pure subroutine weighted_sagittas(self)
-      class(weighted_t), intent(inout) :: self
+   pure subroutine integrated_gap_sagittas(self)
+      class(integrated_gap_t), intent(inout) :: self
       real(wp) :: rise(0:1), area(0:1), part_rise(0:1), part_area(0:1)
       integer :: i, k
 
@@ -176,10 +176,10 @@ contains
             if (area(k) >= least_cover*self%whole(i)) self%sagitta(i) = rise(k)/area(k)
          end do
       end do
-   end subroutine weighted_sagittas
+   end subroutine integrated_gap_sagittas
 
-   pure real(wp) function weighted_slip(self, i, x, u0, du) result(slip)
-      class(weighted_t), intent(in) :: self
+   pure real(wp) function integrated_gap_slip(self, i, x, u0, du) result(slip)
+      class(integrated_gap_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       integer :: k
@@ -189,11 +189,11 @@ contains
       do k = 1, size(self%slide(i)%point)
          slip = slip + slip_over(self%slide(i)%point(k), x, u0, du)
       end do
-   end function weighted_slip
+   end function integrated_gap_slip
 
    !> Mean gaps at both ends of the step; 0 where nothing is covered.
-   pure subroutine weighted_measure(self, x, u0, du)
-      class(weighted_t), intent(inout) :: self
+   pure subroutine integrated_gap_measure(self, x, u0, du)
+      class(integrated_gap_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp) :: gap(0:1), area(0:1), part_gap(0:1), part_area(0:1), least
       integer :: i, k
@@ -229,11 +229,11 @@ contains
             self%cover(i) = area(1)
          end associate
       end do
-   end subroutine weighted_measure
+   end subroutine integrated_gap_measure
 
    !> Are the parts that come to be covered in the step seen from the front at its start?
    pure logical function is_open(self, i)
-      class(weighted_t), intent(in) :: self
+      class(integrated_gap_t), intent(in) :: self
       integer, intent(in) :: i
       integer :: k
 
@@ -241,12 +241,12 @@ contains
       do k = 1, 2
          if (self%node_edge(k, i) == 0) cycle
          is_open = is_open .and. self%form(self%node_edge(k, i))%ahead &
-            >= -deepest_arrival*self%state(i)%size
+            >= -max_penetration_on_entry*self%state(i)%size
       end do
    end function is_open
 
-   pure subroutine weighted_evaluate(self, wanted, x, u0, du, target, item)
-      class(weighted_t), intent(inout) :: self
+   pure subroutine integrated_gap_evaluate(self, wanted, x, u0, du, target, item)
+      class(integrated_gap_t), intent(inout) :: self
       integer, intent(in) :: wanted(:)           !! (n) numbers of constraints, ascending
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp), intent(in) :: target(:)          !! (n) [L]
@@ -265,14 +265,14 @@ contains
                self%is_formed(e) = .true.
             end associate
          end do
-         call form_constraint(self%form, weighted_gap_t(self%node(i), self%node_edge(:, i), &
+         call form_constraint(self%form, gap_integral_t(self%node(i), self%node_edge(:, i), &
             self%is_dual, target(n) + self%offset + self%sagitta(i), self%scale(i)), &
             self%work, item(n))
          item(n)%size = self%state(i)%size
          item(n)%is_mean = .true.
          if (item(n)%rubs) call add_slip(self%slide(i)%point, x, u0, du, item(n))
       end do
-   end subroutine weighted_evaluate
+   end subroutine integrated_gap_evaluate
 
    !> Slip and its derivatives of a condition whose gap is there.
    pure subroutine add_slip(point, x, u0, du, item)
@@ -291,39 +291,39 @@ contains
    end subroutine add_slip
 
    !> The multipliers are forces by the scale of their constraints: docs/theory.md, eq. (15a).
-   pure subroutine weighted_area(self, x, u, area, length)
-      class(weighted_t), intent(in) :: self
+   pure subroutine integrated_gap_area(self, x, u, area, length)
+      class(integrated_gap_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
       real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
       real(wp), intent(out) :: length(:)         !! (n_constraint) [L]
 
       area = self%scale*self%thickness
       length = self%cover
-   end subroutine weighted_area
+   end subroutine integrated_gap_area
 
-   pure subroutine weighted_own_area(self, x, area)
-      class(weighted_t), intent(in) :: self
+   pure subroutine integrated_gap_own_area(self, x, area)
+      class(integrated_gap_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)    !! (2, n_node) [L]
       real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
 
       area = self%whole*self%thickness
-   end subroutine weighted_own_area
+   end subroutine integrated_gap_own_area
 
    !> Integrals of gaps are functions of the positions alone; their means know what was covered.
-   pure real(wp) function weighted_share(self, i) result(share)
-      class(weighted_t), intent(in) :: self
+   pure real(wp) function integrated_gap_share(self, i) result(share)
+      class(integrated_gap_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
 
       share = self%scale(i)/self%whole(i)
-   end function weighted_share
+   end function integrated_gap_share
 
-   pure real(wp) function weighted_mean_gap(self, i, gap) result(mean_gap)
-      class(weighted_t), intent(in) :: self
+   pure real(wp) function integrated_gap_mean_gap(self, i, gap) result(mean_gap)
+      class(integrated_gap_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in) :: gap                !! integral by what was covered at the start [L]
 
       mean_gap = 0.0_wp
       if (self%cover(i) > 0.0_wp) mean_gap = gap*self%scale(i)/self%cover(i)
-   end function weighted_mean_gap
+   end function integrated_gap_mean_gap
 
-end module emcon_weighted
+end module emcon_integrated_gap

@@ -4,7 +4,7 @@
 !> change: what is left of the way with this one leads nowhere. Only that it changes is told here;
 !> which set follows is judged by the rules of emcon_active_set_update, and a set that stands has
 !> always been solved to the end. Source: docs/theory.md, section 6.
-module emcon_early_look
+module emcon_early_set
    use emcon_constraints, only : constraint_set_t
    use emcon_gaps, only : pair_measure
    use emcon_kinds, only : wp
@@ -12,7 +12,7 @@ module emcon_early_look
    use emcon_system, only : system_t
    implicit none
    private
-   public :: early_look, early_enough
+   public :: predicts_new_set, early_enough
 
    !> Relative residual from which on a look is worth while.
    real(wp), parameter :: early_enough = 1.0e-4_wp
@@ -23,7 +23,7 @@ module emcon_early_look
 contains
 
    !> Does the motion, which solves the step to a few digits, ask for another set?
-   subroutine early_look(system, set, motion, changes)
+   subroutine predicts_new_set(system, set, motion, changes)
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(in) :: set
       type(motion_t), intent(in) :: motion
@@ -31,10 +31,10 @@ contains
       integer :: pair, i, id, k
 
       changes = .false.
-      if (set%n > set%n_held) changes = minval(set%lam(set%n_held + 1:set%n)) &
-         < -clearly*maxval(abs(set%lam(set%n_held + 1:set%n)))
+      if (set%n > set%n_permanent) changes = minval(set%lam(set%n_permanent + 1:set%n)) &
+         < -clearly*maxval(abs(set%lam(set%n_permanent + 1:set%n)))
       if (changes) return
-      k = set%n_held                             ! active ones so far; they ascend
+      k = set%n_permanent                        ! active ones so far; they ascend
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair))
@@ -57,6 +57,6 @@ contains
          end associate
          if (changes) return
       end do
-   end subroutine early_look
+   end subroutine predicts_new_set
 
-end module emcon_early_look
+end module emcon_early_set

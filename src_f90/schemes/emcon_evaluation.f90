@@ -1,12 +1,13 @@
 !> Where in a step forces are evaluated, and how inertia enters: all that a scheme decides.
 !>
 !> Source: docs/theory.md, section 1.
-module emcon_pose
+module emcon_evaluation
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: instant_t, pose_t, pose_at_end, most_past
-   public :: pose_moving, pose_velocity, pose_way, pose_is_equilibrium, instant_later
+   public :: instant_t, evaluation_t, evaluation_at_end, most_past
+   public :: evaluation_moving, evaluation_velocity, evaluation_displacement, &
+      evaluation_is_equilibrium, instant_later
 
    !> Fields that a scheme keeps of the steps before, at most.
    integer, parameter :: most_past = 2
@@ -23,12 +24,12 @@ module emcon_pose
    !> Fields of the steps before add to both.
    !> Forces are discrete gradients from the start of the step to a place in it, or gradients there,
    !> to which those at the start may be added.
-   type :: pose_t
+   type :: evaluation_t
       real(wp) :: mass_scale = 0.0_wp            !! s [1/T]; 0: masses do not resist
       real(wp) :: rate = 0.0_wp                  !! b [1/T]
       real(wp) :: lapse = 0.0_wp                 !! 1/b, as the scheme rounds it [T]
       real(wp) :: v_weight = 0.0_wp              !! w
-      real(wp) :: place = 1.0_wp                 !! part of the way from start to end: 0 < . <= 1
+      real(wp) :: at = 1.0_wp                    !! part of the way from start to end: 0 < . <= 1
       logical :: is_gradient = .false.           !! at `place`, else discrete from the start to it
       real(wp) :: load_place = 0.5_wp            !! part of the way at which loads act: 0..1
       type(instant_t) :: load_instant            !! when loads are taken
@@ -39,50 +40,51 @@ module emcon_pose
       real(wp) :: recalled = 0.0_wp              !! part of the last strain increments: 0..1
       real(wp) :: past_velocity(most_past) = 0.0_wp  !! weights of the past in the velocity
       real(wp) :: past_change(most_past) = 0.0_wp    !! and in b du - w v0
-   end type pose_t
+   end type evaluation_t
 
    !> Gradients at the end of the step, where masses do not resist.
-   type(pose_t), parameter :: pose_at_end = pose_t(is_gradient=.true., load_place=1.0_wp)
+   type(evaluation_t), parameter :: evaluation_at_end = evaluation_t(is_gradient=.true., &
+      load_place=1.0_wp)
 
 contains
 
    !> Inertia M (v1 - v0)/h with v1 - v0 = du/lapse - v_weight v0.
-   pure type(pose_t) function pose_moving(h, lapse, v_weight) result(pose)
+   pure type(evaluation_t) function evaluation_moving(h, lapse, v_weight) result(evaluation)
       real(wp), intent(in) :: h                  !! > 0, size of the step [T]
       real(wp), intent(in) :: lapse              !! > 0 [T]
       real(wp), intent(in) :: v_weight           !! (1)
 
-      pose%mass_scale = 1.0_wp/h
-      pose%rate = 1.0_wp/lapse
-      pose%lapse = lapse
-      pose%v_weight = v_weight
-   end function pose_moving
+      evaluation%mass_scale = 1.0_wp/h
+      evaluation%rate = 1.0_wp/lapse
+      evaluation%lapse = lapse
+      evaluation%v_weight = v_weight
+   end function evaluation_moving
 
    !> Velocity at the end of a step from `v0` that moved by `du`: v1 = b du + (1 - w) v0, and what
    !> the past adds.
-   elemental real(wp) function pose_velocity(pose, v0, du) result(v1)
-      type(pose_t), intent(in) :: pose
+   elemental real(wp) function evaluation_velocity(evaluation, v0, du) result(v1)
+      type(evaluation_t), intent(in) :: evaluation
       real(wp), intent(in) :: v0                 !! at the start [L/T]
       real(wp), intent(in) :: du                 !! [L]
 
-      v1 = pose%rate*du + (1.0_wp - pose%v_weight)*v0
-   end function pose_velocity
+      v1 = evaluation%rate*du + (1.0_wp - evaluation%v_weight)*v0
+   end function evaluation_velocity
 
-   !> The way over a step from `v0` that ends with `v1`: the inverse of `pose_velocity`.
-   elemental real(wp) function pose_way(pose, v0, v1) result(du)
-      type(pose_t), intent(in) :: pose
+   !> The way over a step from `v0` that ends with `v1`: the inverse of `evaluation_velocity`.
+   elemental real(wp) function evaluation_displacement(evaluation, v0, v1) result(du)
+      type(evaluation_t), intent(in) :: evaluation
       real(wp), intent(in) :: v0                 !! at the start [L/T]
       real(wp), intent(in) :: v1                 !! at the end [L/T]
 
-      du = pose%lapse*((pose%v_weight - 1.0_wp)*v0 + v1)
-   end function pose_way
+      du = evaluation%lapse*((evaluation%v_weight - 1.0_wp)*v0 + v1)
+   end function evaluation_displacement
 
    !> Are forces to balance without inertia, as gradients of their energies?
-   elemental logical function pose_is_equilibrium(pose) result(is_equilibrium)
-      type(pose_t), intent(in) :: pose
+   elemental logical function evaluation_is_equilibrium(evaluation) result(is_equilibrium)
+      type(evaluation_t), intent(in) :: evaluation
 
-      is_equilibrium = pose%is_gradient .and. .not. pose%mass_scale > 0.0_wp
-   end function pose_is_equilibrium
+      is_equilibrium = evaluation%is_gradient .and. .not. evaluation%mass_scale > 0.0_wp
+   end function evaluation_is_equilibrium
 
    elemental type(instant_t) function instant_later(instant, h) result(later)
       type(instant_t), intent(in) :: instant
@@ -91,4 +93,4 @@ contains
       later = instant_t(instant%step_time + h, instant%total_time + h)
    end function instant_later
 
-end module emcon_pose
+end module emcon_evaluation

@@ -1,35 +1,35 @@
 !> Internal forces that stay the same over a step: those at its start, of a scheme that takes them
 !> there.
-module emcon_frozen
+module emcon_lagged_forces
    use emcon_kinds, only : wp
    use emcon_term, only : forces_t, response_t, role_internal
    use emcon_vectors, only : vector_copy
    implicit none
    private
-   public :: frozen_t, frozen_take, frozen_give
+   public :: lagged_forces_t, lagged_forces_take, lagged_forces_give
 
-   type :: frozen_t
+   type :: lagged_forces_t
       logical :: is_known = .false.              !! there are such forces
       logical :: is_on = .false.                 !! they stand for those of the terms
       type(forces_t), private :: internal
       real(wp), allocatable, private :: rounding(:, :)   !! (n_dim, n_node)
-   end type frozen_t
+   end type lagged_forces_t
 
 contains
 
    !> Keep the forces of a response to a motion that does not move.
-   subroutine frozen_take(self, response)
-      type(frozen_t), intent(inout) :: self
+   subroutine lagged_forces_take(self, response)
+      type(lagged_forces_t), intent(inout) :: self
       type(response_t), intent(in) :: response
 
       self%internal = response%part(role_internal)
       self%rounding = response%rounding
       self%is_known = .true.
-   end subroutine frozen_take
+   end subroutine lagged_forces_take
 
    !> Give them to a response that has begun.
-   subroutine frozen_give(self, response)
-      type(frozen_t), intent(in) :: self         !! known
+   subroutine lagged_forces_give(self, response)
+      type(lagged_forces_t), intent(in) :: self  !! known
       type(response_t), intent(inout) :: response
       integer :: n
 
@@ -40,6 +40,6 @@ contains
          call vector_copy(n, self%internal%magnitude, to%magnitude)
          call vector_copy(n, self%rounding, response%rounding)
       end associate
-   end subroutine frozen_give
+   end subroutine lagged_forces_give
 
-end module emcon_frozen
+end module emcon_lagged_forces

@@ -1,21 +1,21 @@
 !> Where some nodes stood when something was found out about them: as long as they stand there, it
 !> need not be found out again.
-module emcon_stance
+module emcon_position_memo
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: stance_t, stance_take, stance_holds
+   public :: position_memo_t, position_memo_take, position_memo_holds
 
-   type :: stance_t
+   type :: position_memo_t
       logical :: is_known = .false.
       real(wp), allocatable, private :: x(:, :), u(:, :)   !! (n_dim, size of `node`) [L]
-   end type stance_t
+   end type position_memo_t
 
 contains
 
    !> The nodes `node` stand at x + u.
-   pure subroutine stance_take(self, node, x, u)
-      type(stance_t), intent(inout) :: self
+   pure subroutine position_memo_take(self, node, x, u)
+      type(position_memo_t), intent(inout) :: self
       integer, intent(in) :: node(:)             !! of the scene; always the same ones
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
       integer :: i
@@ -27,12 +27,12 @@ contains
          self%u(:, i) = u(:, node(i))
       end do
       self%is_known = .true.
-   end subroutine stance_take
+   end subroutine position_memo_take
 
    !> Do they stand at x + u, to the last bit?
-   pure logical function stance_holds(self, node, x, u) result(holds)
-      type(stance_t), intent(in) :: self
-      integer, intent(in) :: node(:)             !! as in `stance_take`
+   pure logical function position_memo_holds(self, node, x, u) result(holds)
+      type(position_memo_t), intent(in) :: self
+      integer, intent(in) :: node(:)             !! as in `position_memo_take`
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
       integer :: i, a
 
@@ -45,6 +45,6 @@ contains
             if (.not. holds) return
          end do
       end do
-   end function stance_holds
+   end function position_memo_holds
 
-end module emcon_stance
+end module emcon_position_memo

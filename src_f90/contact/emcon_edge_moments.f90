@@ -1,7 +1,7 @@
 !> What a slave edge gives to the constraints of its two nodes: integrals over its covered part.
 !>
 !> Source: docs/theory.md, eqs. (15) and (15b).
-module emcon_edge_form
+module emcon_edge_moments
    use emcon_condition_nodes, only : condition_resize
    use emcon_constraint, only : condition_t
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
@@ -11,12 +11,12 @@ module emcon_edge_form
       moment_gap_xi, n_moment
    implicit none
    private
-   public :: edge_form_t, weighted_gap_t, form_begin, form_share, form_constraint
+   public :: edge_moments_t, gap_integral_t, form_begin, form_share, form_constraint
 
    !> Covered but for round-off: the dual basis needs no care.
    real(wp), parameter :: whole = 256.0_wp*epsilon(1.0_wp)
 
-   type :: edge_form_t
+   type :: edge_moments_t
       real(wp) :: value(n_moment, 0:1) = 0.0_wp  !! the moments at both ends of the step
       !> Lowest gap at the start, on the line of the master edge, of what only the end covers [L].
       real(wp) :: ahead = 0.0_wp
@@ -24,22 +24,22 @@ module emcon_edge_form
       integer :: n_slave = 0                     !! they come first, the edge's own two before
       integer, allocatable :: node(:)            !! (>= n_node)
       type(wide_t) :: moment(n_moment)           !! over the coordinates of nodes 2 to n_node
-   end type edge_form_t
+   end type edge_moments_t
 
    !> Which weighted gap a constraint holds: that of one slave node.
-   type :: weighted_gap_t
+   type :: gap_integral_t
       integer :: node = 0                        !! of the scene
       integer :: edge(2) = 0                     !! that ends there, that begins there; 0: none
       logical :: is_dual = .true.                !! else the standard basis
       real(wp) :: target = 0.0_wp                !! mean gap to hold [L]
       real(wp) :: scale = 1.0_wp                 !! > 0 [L^2]
-   end type weighted_gap_t
+   end type gap_integral_t
 
 contains
 
    !> Begin to sum moments over the nodes `node`.
    pure subroutine form_begin(self, node, n_slave, leaves_second)
-      type(edge_form_t), intent(inout) :: self
+      type(edge_moments_t), intent(inout) :: self
       integer, intent(in) :: node(:)             !! (n) distinct, slave nodes first
       integer, intent(in) :: n_slave             !! number of these
       logical, intent(in) :: leaves_second       !! without second derivatives
@@ -80,7 +80,7 @@ contains
    !> 0 the standard one. Where the edge is covered in part, theta is the square of the part, so
    !> that the integral of a weight is never negative: docs/theory.md, eqs. (15b) to (15d).
    pure subroutine form_share(self, side, is_dual, gap, area)
-      type(edge_form_t), intent(in) :: self
+      type(edge_moments_t), intent(in) :: self
       integer, intent(in) :: side                !! 1: first node of the edge, 2: last
       logical, intent(in) :: is_dual             !! else the standard basis
       real(wp), intent(out) :: gap(0:1)          !! at start and end [L^3]
@@ -109,8 +109,8 @@ contains
 
    !> The constraint (Phi - target W)/scale of a slave node: docs/theory.md, eq. (15).
    pure subroutine form_constraint(form, gap, work, item)
-      type(edge_form_t), intent(in) :: form(:)   !! (n_edge) of the slave side
-      type(weighted_gap_t), intent(in) :: gap
+      type(edge_moments_t), intent(in) :: form(:) !! (n_edge) of the slave side
+      type(gap_integral_t), intent(in) :: gap
       type(wide_t), intent(inout) :: work(3)     !! work space
       type(condition_t), intent(inout) :: item
       integer :: list(1 + sum(form(pack(gap%edge, gap%edge > 0))%n_node)), n, k, i
@@ -165,7 +165,7 @@ contains
 
    !> Share of node `side` in Phi - target W.
    pure subroutine weighted(edge, side, is_dual, target, part, skew, theta)
-      type(edge_form_t), intent(in) :: edge
+      type(edge_moments_t), intent(in) :: edge
       integer, intent(in) :: side
       logical, intent(in) :: is_dual
       real(wp), intent(in) :: target
@@ -212,4 +212,4 @@ contains
       call nodes_add_second(factor, size(item%g, 1), part%h, place, item%h)
    end subroutine add
 
-end module emcon_edge_form
+end module emcon_edge_moments

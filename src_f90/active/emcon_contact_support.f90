@@ -5,14 +5,14 @@
 !> touches, which is taken in; along a motion that no load works on the nearest contact is, unless
 !> it has pulled. The active set lets go of what turns out to pull. What is left at the end is
 !> told; with STABILIZE a motion that no load works on may be. Source: docs/theory.md, section 6.
-module emcon_holding
+module emcon_contact_support
    use emcon_constraints, only : constraint_set_t
    use emcon_first_touch_plane, only : touch_time
    use emcon_free_motions, only : find_assemblies, find_free_motions
-   use emcon_holding_gaps, only : gaps_evaluate, gaps_keep_closed, gaps_measure, gaps_nearest, &
-      gaps_next_to_close, gaps_that_can_act, in_the_way
+   use emcon_contact_support_gaps, only : gaps_evaluate, gaps_keep_closed, gaps_measure, &
+      gaps_nearest, gaps_next_to_close, gaps_that_can_act, in_the_way
    use emcon_kinds, only : dp, wp
-   use emcon_motion, only : motion_place, motion_t
+   use emcon_motion, only : motion_evaluate, motion_t
    use emcon_numbering, only : add_to_dofs
    use emcon_mechanisms, only : mechanisms_find, mechanisms_t, mechanism_field, mechanism_force, &
       mechanism_places
@@ -22,12 +22,13 @@ module emcon_holding
    use emcon_system, only : system_loads, system_stiffen, system_t
    implicit none
    private
-   public :: holding_t, holding_begin, holding_forget, holding_complete, holding_find_free
+   public :: contact_support_t, contact_support_begin, contact_support_forget, &
+      contact_support_complete, contact_support_find_free
 
    !> Bodies turn by less than this at once, in radians: then gaps are measured anew.
    real(wp), parameter :: largest_turn = 0.1_wp
 
-   type :: holding_t
+   type :: contact_support_t
       logical :: is_needed = .false.             !! contact alone holds some body
       logical :: stabilizes = .false.            !! what no load works on needs not be held
       real(wp) :: tolerance = 0.0_wp             !! loads below this part of all are none
@@ -43,15 +44,15 @@ module emcon_holding
       !> (n_constraint) [L] gaps that were closed though no load closes them, and of which bodies
       real(wp), allocatable :: brought(:)
       character(len=:), allocatable :: brought_text
-   end type holding_t
+   end type contact_support_t
 
    !> The bodies and contacts of one look at the scene.
-   type :: look_t
+   type :: overlap_query_t
       type(mechanisms_t) :: bodies
       type(mechanism_rows_t) :: rows
       integer, allocatable :: assembly(:), order(:)
       integer :: n_assembly = 0
-   end type look_t
+   end type overlap_query_t
 
    !> An assembly of bodies and the motions that are left of it.
    type :: free_t
@@ -65,12 +66,12 @@ module emcon_holding
 contains
 
    !> Find out whether contact alone holds some body in step `system%i_step`, which is static.
-   subroutine holding_begin(self, system, scene, u)
-      type(holding_t), intent(out) :: self
+   subroutine contact_support_begin(self, system, scene, u)
+      type(contact_support_t), intent(out) :: self
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node)
-      type(look_t) :: look
+      type(overlap_query_t) :: look
       type(free_t), allocatable :: free(:)
 
       associate (step => scene%step(system%i_step))
@@ -86,27 +87,27 @@ contains
       call take_look(self, system, scene, u, look)
       call find_free(look, free)
       self%is_needed = size(free) > 0
-   end subroutine holding_begin
+   end subroutine contact_support_begin
 
    !> Forget what an attempt at a step has found.
-   pure subroutine holding_forget(self)
-      type(holding_t), intent(inout) :: self
+   pure subroutine contact_support_forget(self)
+      type(contact_support_t), intent(inout) :: self
 
       if (.not. self%is_needed) return
       self%has_pulled = .false.
       self%brought = 0.0_wp
-   end subroutine holding_forget
+   end subroutine contact_support_forget
 
    !> Take contacts into `is_active`, and move bodies in `motion`, until contact holds all that it
    !> can.
    !> `self%text` tells of a motion that a load works on with nothing in its way.
-   subroutine holding_complete(self, system, scene, motion, is_active)
-      type(holding_t), intent(inout) :: self
+   subroutine contact_support_complete(self, system, scene, motion, is_active)
+      type(contact_support_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(motion_t), intent(inout) :: motion
       logical, intent(inout) :: is_active(:)             !! (n_constraint)
-      type(look_t) :: look
+      type(overlap_query_t) :: look
       type(free_t), allocatable :: free(:)
       logical :: has_changed
       integer :: i, round, n_active
@@ -114,7 +115,7 @@ contains
       self%is_loose = .false.
       if (allocated(self%text)) deallocate(self%text)
       do round = 1, 6*system%space%n_body + size(is_active)
-         call motion_place(motion)
+         call motion_evaluate(motion)
          call gaps_measure(system, motion)
          call look_at_contacts(self, system, scene, motion, is_active, look)
          call find_free(look, free)
@@ -141,18 +142,18 @@ contains
          self%is_loose(pack(free(i)%member, free(i)%member <= system%space%n_body)) = .true.
       end do
       call system_stiffen(system, self%is_loose)
-   end subroutine holding_complete
+   end subroutine contact_support_complete
 
    !> Whether supports and the contacts `is_active` leave a motion at the end of the step; `is_held`
    !> unless it is one that must be.
-   subroutine holding_find_free(self, system, scene, motion, is_active, is_held)
-      type(holding_t), intent(inout) :: self
+   subroutine contact_support_find_free(self, system, scene, motion, is_active, is_held)
+      type(contact_support_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(motion_t), intent(in) :: motion                       !! placed
       logical, intent(in) :: is_active(:)                        !! (n_constraint)
       logical, intent(out) :: is_held            !! no motion is free, or one that may stay
-      type(look_t) :: look
+      type(overlap_query_t) :: look
       type(free_t), allocatable :: free(:)
       integer :: i, k
 
@@ -169,7 +170,7 @@ contains
       end do
       if (k > 0) call tell(look%bodies, system, scene, free(k), self%text)
       is_held = k == 0 .or. (self%stabilizes .and. .not. self%is_pushed)
-   end subroutine holding_find_free
+   end subroutine contact_support_find_free
 
    !> The bodies of an assembly that move, and how.
    subroutine tell(bodies, system, scene, free, text)
@@ -186,11 +187,11 @@ contains
 
    !> Bodies at x + u with their supports.
    subroutine take_look(self, system, scene, u, look)
-      type(holding_t), intent(in) :: self
+      type(contact_support_t), intent(in) :: self
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node)
-      type(look_t), intent(out) :: look
+      type(overlap_query_t), intent(out) :: look
 
       look%rows = self%supports
       if (scene%step(system%i_step)%nlgeom) then
@@ -202,12 +203,12 @@ contains
 
    !> The same with the contacts `is_active`; gaps have been measured.
    subroutine look_at_contacts(self, system, scene, motion, is_active, look)
-      type(holding_t), intent(in) :: self
+      type(contact_support_t), intent(in) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(motion_t), intent(in) :: motion
       logical, intent(in) :: is_active(:)
-      type(look_t), intent(out) :: look
+      type(overlap_query_t), intent(out) :: look
       type(constraint_set_t) :: set
 
       call take_look(self, system, scene, motion%u0 + motion%du, look)
@@ -217,7 +218,7 @@ contains
 
    !> The assemblies that can move.
    subroutine find_free(look, free)
-      type(look_t), intent(inout) :: look
+      type(overlap_query_t), intent(inout) :: look
       type(free_t), allocatable, intent(out) :: free(:)
       type(free_t) :: found
       integer :: i, n, first, last
@@ -241,7 +242,7 @@ contains
    !> Let an assembly follow its load to the next contact and take that in. `self%is_pushed`: there
    !> is nothing in its way.
    subroutine follow_load(self, system, scene, motion, bodies, free, is_active)
-      type(holding_t), intent(inout) :: self
+      type(contact_support_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(motion_t), intent(inout) :: motion
@@ -287,7 +288,7 @@ contains
    !> Along motions that no load works on take in the contacts that touch already; where no load
    !> acts on the bodies at all, those with the smallest gap. What has pulled is not asked again.
    subroutine take_nearest(self, system, scene, motion, bodies, free, is_active)
-      type(holding_t), intent(inout) :: self
+      type(contact_support_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(motion_t), intent(in) :: motion
@@ -308,7 +309,7 @@ contains
 
    !> Remember contacts that are closed over a gap with no load to close it.
    subroutine note_brought(self, system, scene, bodies, free, set, is_next)
-      type(holding_t), intent(inout) :: self
+      type(contact_support_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
       type(mechanisms_t), intent(in) :: bodies
@@ -327,7 +328,7 @@ contains
 
    !> The load along each free motion; 0 if it is nothing against all loads on these bodies.
    subroutine find_load(self, system, motion, bodies, free)
-      type(holding_t), intent(in) :: self
+      type(contact_support_t), intent(in) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       type(mechanisms_t), intent(in) :: bodies
@@ -360,4 +361,4 @@ contains
       call add_to_dofs(system%space%numbering, vector, time, du)
    end subroutine move
 
-end module emcon_holding
+end module emcon_contact_support

@@ -5,7 +5,7 @@
 !> with one constraint: two would nearly depend on each other, as the one node follows the other.
 !> Edges keep their own nodes: what acts on an edge acts on its element.
 !> Source: docs/theory.md, section 4.
-module emcon_joints
+module emcon_seams
    use emcon_chain, only : chain_number, chain_t, surface_edges
    use emcon_couplings, only : tie_t
    use emcon_kinds, only : wp
@@ -26,20 +26,20 @@ contains
    pure subroutine chain_join(self, scene)
       type(chain_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      integer, allocatable :: joint(:, :)
+      integer, allocatable :: seam(:, :)
 
       if (size(scene%tie) == 0) return
-      call find_joints(self, scene, joint)
-      if (size(joint, 2) == 0) return
-      call merge_nodes(self, joint)
+      call find_seams(self, scene, seam)
+      if (size(seam, 2) == 0) return
+      call merge_nodes(self, seam)
       call chain_number(self)
    end subroutine chain_join
 
    !> The joints as indices into the nodes of `chain`: the one that stands for both, and its twin.
-   pure subroutine find_joints(chain, scene, joint)
+   pure subroutine find_seams(chain, scene, seam)
       type(chain_t), intent(in) :: chain
       type(scene_t), intent(in) :: scene
-      integer, allocatable, intent(out) :: joint(:, :)       !! (2, n)
+      integer, allocatable, intent(out) :: seam(:, :)        !! (2, n)
       integer :: partner(2, size(chain%node))    ! of an end, of a beginning; 0: none, -1: several
       logical :: is_slave(size(chain%node))
       integer :: i, k, n
@@ -50,18 +50,18 @@ contains
          call find_partners(chain, scene, scene%tie(k), partner, is_slave)
       end do
       n = 0
-      allocate(joint(2, count(partner(1, :) > 0)))
+      allocate(seam(2, count(partner(1, :) > 0)))
       do i = 1, size(chain%node)
          if (partner(1, i) <= 0) cycle
          if (partner(2, partner(1, i)) <= 0) cycle
          n = n + 1
-         joint(:, n) = [min(i, partner(1, i)), max(i, partner(1, i))]
-         if (is_slave(joint(1, n)) .and. .not. is_slave(joint(2, n))) then
-            joint(:, n) = joint([2, 1], n)
+         seam(:, n) = [min(i, partner(1, i)), max(i, partner(1, i))]
+         if (is_slave(seam(1, n)) .and. .not. is_slave(seam(2, n))) then
+            seam(:, n) = seam([2, 1], n)
          end if
       end do
-      joint = joint(:, :n)
-   end subroutine find_joints
+      seam = seam(:, :n)
+   end subroutine find_seams
 
    !> To which nodes, where parts of `chain` begin, does `tie` connect nodes where parts end? And
    !> which of them are on its slave side?
@@ -150,33 +150,33 @@ contains
    end function is_near
 
    !> Make one of the two nodes of each joint and link the edges there.
-   pure subroutine merge_nodes(chain, joint)
+   pure subroutine merge_nodes(chain, seam)
       type(chain_t), intent(inout) :: chain
-      integer, intent(in) :: joint(:, :)         !! (2, n) from `find_joints`
+      integer, intent(in) :: seam(:, :)          !! (2, n) from `find_seams`
       logical :: stays(size(chain%node))
       integer :: number(size(chain%node)), k, e
 
       stays = .true.
-      stays(joint(2, :)) = .false.
-      do k = 1, size(joint, 2)
-         associate (at => chain%node_edge(:, joint(1, k)))
-            at = max(at, chain%node_edge(:, joint(2, k)))
+      stays(seam(2, :)) = .false.
+      do k = 1, size(seam, 2)
+         associate (at => chain%node_edge(:, seam(1, k)))
+            at = max(at, chain%node_edge(:, seam(2, k)))
             chain%next(at(1)) = at(2)
             chain%previous(at(2)) = at(1)
          end associate
-         chain%twin(joint(1, k)) = chain%node(joint(2, k))
+         chain%duplicate(seam(1, k)) = chain%node(seam(2, k))
       end do
       number(1) = merge(1, 0, stays(1))
       do k = 2, size(number)
          number(k) = number(k - 1) + merge(1, 0, stays(k))
       end do
-      number(joint(2, :)) = number(joint(1, :))
+      number(seam(2, :)) = number(seam(1, :))
       do e = 1, chain%n_edge
          chain%end_node(:, e) = number(chain%end_node(:, e))
       end do
       chain%node_edge = chain%node_edge(:, pack([(k, k = 1, size(number))], stays))
-      chain%twin = pack(chain%twin, stays)
+      chain%duplicate = pack(chain%duplicate, stays)
       chain%node = pack(chain%node, stays)
    end subroutine merge_nodes
 
-end module emcon_joints
+end module emcon_seams

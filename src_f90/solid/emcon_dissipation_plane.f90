@@ -3,7 +3,7 @@
 !> strain, beta C dE/h, and against velocity, alpha M du/h. C are the moduli at rest.
 !>
 !> Source: docs/theory.md, eqs. (4e) to (4g), (11a) and (11b).
-module emcon_decay_plane
+module emcon_dissipation_plane
    use emcon_csr, only : csr_t
    use emcon_element, only : element_geometry_t
    use emcon_element_lists, only : element_lists
@@ -18,12 +18,12 @@ module emcon_decay_plane
    use emcon_term, only : response_t, role_internal, term_t
    implicit none
    private
-   public :: decay_term_t, decay_term_init
+   public :: dissipation_term_t, dissipation_term_init
 
    !> Components of strain and stress.
    integer, parameter :: n_strain = 3
 
-   type, extends(term_t) :: decay_term_t
+   type, extends(term_t) :: dissipation_term_t
       type(solid_t), private :: solid
       logical, allocatable, private :: is_damped(:)      !! (n_element) it may take energy
       logical, allocatable, private :: deforms(:)        !! (n_element) and has moduli
@@ -42,13 +42,13 @@ module emcon_decay_plane
       procedure :: begin_step
       procedure :: respond
       procedure :: is_symmetric
-   end type decay_term_t
+   end type dissipation_term_t
 
 contains
 
    !> The elements of `solid` that deform by a law of EMCON, and those that have mass.
-   subroutine decay_term_init(self, solid, scene)
-      type(decay_term_t), intent(out) :: self
+   subroutine dissipation_term_init(self, solid, scene)
+      type(dissipation_term_t), intent(out) :: self
       type(solid_t), intent(in) :: solid
       type(scene_t), intent(in) :: scene
       real(wp), parameter :: rest(n_strain) = 0.0_wp
@@ -76,11 +76,11 @@ contains
       end associate
       self%is_damped = self%alpha > 0.0_wp .or. self%beta > 0.0_wp
       if (any(scene%step%scheme%dissipates)) self%is_damped = self%is_damped .or. self%deforms
-   end subroutine decay_term_init
+   end subroutine dissipation_term_init
 
    !> The freedoms of each element.
    pure subroutine lay_out(self, lists)
-      class(decay_term_t), intent(in) :: self
+      class(dissipation_term_t), intent(in) :: self
       type(lists_t), intent(inout) :: lists
       integer, allocatable :: start(:), freedom(:)
 
@@ -90,7 +90,7 @@ contains
 
    !> As `term_t` has it.
    subroutine begin_step(self, scene, i_step, space, matrix, slot)
-      class(decay_term_t), intent(inout) :: self
+      class(dissipation_term_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: i_step              !! from 1
       type(space_t), intent(in) :: space
@@ -105,7 +105,7 @@ contains
 
    !> Forces of a motion; none where masses do not resist.
    subroutine respond(self, motion, response, value, side)
-      class(decay_term_t), intent(inout) :: self
+      class(dissipation_term_t), intent(inout) :: self
       type(motion_t), intent(in) :: motion                     !! placed
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
@@ -113,7 +113,7 @@ contains
 
       self%work = 0.0_wp
       self%damping = 0.0_wp
-      if (.not. motion%pose%mass_scale > 0.0_wp) return
+      if (.not. motion%evaluation%mass_scale > 0.0_wp) return
       first = 0
       do e = 1, self%solid%n_element
          if (.not. self%is_damped(e)) cycle
@@ -125,7 +125,7 @@ contains
 
    !> The motions of an element over the step, and over the one before.
    pure subroutine gather(self, e, motion, now, before)
-      type(decay_term_t), intent(in) :: self
+      type(dissipation_term_t), intent(in) :: self
       integer, intent(in) :: e
       type(motion_t), intent(in) :: motion
       type(element_motion_t), intent(out) :: now, before
@@ -147,7 +147,7 @@ contains
 
    !> Add the forces of element `e`, and their derivatives to the places from `first` on.
    subroutine add_element(self, e, first, motion, response, value, side)
-      type(decay_term_t), intent(inout) :: self
+      type(dissipation_term_t), intent(inout) :: self
       integer, intent(in) :: e, first
       type(motion_t), intent(in) :: motion
       type(response_t), intent(inout) :: response
@@ -159,18 +159,18 @@ contains
       real(wp) :: s(n_strain), rate(n_strain), f(size(motion%du, 1))
       integer :: g, i
 
-      if (.not. (motion%pose%dissipation > 0.0_wp .or. self%beta(e) > 0.0_wp)) return
+      if (.not. (motion%evaluation%dissipation > 0.0_wp .or. self%beta(e) > 0.0_wp)) return
       call gather(self, e, motion, now, before)
       call find_increments(self%solid%geometry(e), now, strain)
       call find_increments(self%solid%geometry(e), before, last)
       associate (geometry => self%solid%geometry(e), total => response%part(self%role))
          do g = 1, geometry%n_gp
             call element_point(geometry, g, now, point)
-            c = 0.5_wp*motion%pose%dissipation*geometry%weight(g) &
+            c = 0.5_wp*motion%evaluation%dissipation*geometry%weight(g) &
                *self%moduli(:, :, self%moduli_of(e))
-            viscous = (self%beta(e)*motion%pose%mass_scale)*geometry%weight(g) &
+            viscous = (self%beta(e)*motion%evaluation%mass_scale)*geometry%weight(g) &
                *self%moduli(:, :, self%moduli_of(e))
-            s = matmul(c, strain(:, g) - motion%pose%recalled*last(:, g))
+            s = matmul(c, strain(:, g) - motion%evaluation%recalled*last(:, g))
             rate = matmul(viscous, strain(:, g))
             self%work = self%work + dot_product(s, strain(:, g))
             self%damping = self%damping + dot_product(rate, strain(:, g))
@@ -207,7 +207,7 @@ contains
 
    !> Add the drag of the mass of element `e`, and its derivatives to the places from `first` on.
    pure subroutine add_drag(self, e, first, motion, response, value, side)
-      type(decay_term_t), intent(inout) :: self
+      type(dissipation_term_t), intent(inout) :: self
       integer, intent(in) :: e, first
       type(motion_t), intent(in) :: motion
       type(response_t), intent(inout) :: response
@@ -220,7 +220,7 @@ contains
             total => response%part(self%role))
          do j = 1, n
             do i = 1, n
-               part = self%alpha(e)*motion%pose%mass_scale*self%solid%mass(i, j, e)
+               part = self%alpha(e)*motion%evaluation%mass_scale*self%solid%mass(i, j, e)
                f = part*motion%du(:, node(j))
                self%damping = self%damping + dot_product(f, motion%du(:, node(i)))
                total%force(:, node(i)) = total%force(:, node(i)) + f
@@ -293,11 +293,11 @@ contains
 
    !> The strain increment has its derivative by the end, its forces act at the middle.
    pure logical function is_symmetric(self, motion)
-      class(decay_term_t), intent(in) :: self
+      class(dissipation_term_t), intent(in) :: self
       type(motion_t), intent(in) :: motion       !! placed
 
-      is_symmetric = .not. (motion%pose%mass_scale > 0.0_wp .and. (self%nlgeom .or. &
+      is_symmetric = .not. (motion%evaluation%mass_scale > 0.0_wp .and. (self%nlgeom .or. &
          any(self%solid%is_corotated)))
    end function is_symmetric
 
-end module emcon_decay_plane
+end module emcon_dissipation_plane

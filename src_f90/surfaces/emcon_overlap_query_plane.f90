@@ -3,7 +3,7 @@
 !>
 !> A look places the outlines; what they look at is placed before. Source: docs/theory.md,
 !> section 4.11.
-module emcon_look_plane
+module emcon_overlap_query_plane
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
    use emcon_kinds, only : wp
    use emcon_outline_curves_plane, only : outline_curves_overlap, outline_curves_t
@@ -14,7 +14,8 @@ module emcon_look_plane
    use emcon_text, only : to_text
    implicit none
    private
-   public :: look_t, look_init, look_longest, look_place, look_one_way
+   public :: overlap_query_t, overlap_query_init, overlap_query_longest, overlap_query_place, &
+      overlap_query_one_way
    public :: overlap_t, overlap_names, overlap_text
 
    !> On the way, overlap below the smaller of these, by the edge and by the thickness of the
@@ -45,7 +46,7 @@ module emcon_look_plane
       integer :: edge(most_crossings) = 0        !! that is crossed
    end type crossings_t
 
-   type :: look_t
+   type :: overlap_query_t
       logical :: is_able = .true.                !! there are outlines: not in three dimensions
       type(outline_t) :: outline
       type(outline_curves_t) :: curves           !! that edges stand for
@@ -53,13 +54,13 @@ module emcon_look_plane
       real(wp), allocatable :: low(:, :), high(:, :)   !! (2, n_edge) boxes of edges there [L]
       logical :: is_passing = .false.            !! it is on the way, not at the end of a step
       integer, allocatable, private :: near(:), found(:), around(:)   !! work space: lists of edges
-   end type look_t
+   end type overlap_query_t
 
 contains
 
    !> Set up for the outlines of `scene`.
-   subroutine look_init(self, scene)
-      type(look_t), intent(out) :: self
+   subroutine overlap_query_init(self, scene)
+      type(overlap_query_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       integer :: n
 
@@ -69,11 +70,11 @@ contains
       allocate(self%near(n), self%found(n), self%around(n))
       allocate(self%low(2, n), self%high(2, n), source=0.0_wp)
       allocate(self%u(2, size(scene%x, 2)), source=0.0_wp)
-   end subroutine look_init
+   end subroutine overlap_query_init
 
    !> The longest edge of piece `p` at x + u.
-   pure real(wp) function look_longest(self, p, x, u) result(longest)
-      type(look_t), intent(in) :: self
+   pure real(wp) function overlap_query_longest(self, p, x, u) result(longest)
+      type(overlap_query_t), intent(in) :: self
       integer, intent(in) :: p                   !! from 1
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)     !! (2, n_node) [L]
       real(wp) :: way(2)
@@ -85,7 +86,7 @@ contains
          longest = max(longest, dot_product(way, way))
       end do
       longest = sqrt(longest)
-   end function look_longest
+   end function overlap_query_longest
 
    !> Does the overlap stand on `node`?
    elemental logical function overlap_names(self, node)
@@ -111,8 +112,8 @@ contains
    end subroutine overlap_text
 
    !> Place piece `p`: displacements of its nodes, boxes of its edges.
-   pure subroutine look_place(self, p, x, u0, du, share)
-      type(look_t), intent(inout) :: self
+   pure subroutine overlap_query_place(self, p, x, u0, du, share)
+      type(overlap_query_t), intent(inout) :: self
       integer, intent(in) :: p                   !! from 1
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp), intent(in) :: share              !! of the step that lies behind, 0 to 1
@@ -129,11 +130,11 @@ contains
          self%low(:, e) = min(a, b)
          self%high(:, e) = max(a, b)
       end do
-   end subroutine look_place
+   end subroutine overlap_query_place
 
    !> Nodes and parts of edges of piece `p` in piece `q`, both placed; the same one: in itself.
-   subroutine look_one_way(self, p, q, x, reach, overlap)
-      type(look_t), intent(inout) :: self
+   subroutine overlap_query_one_way(self, p, q, x, reach, overlap)
+      type(overlap_query_t), intent(inout) :: self
       integer, intent(in) :: p, q                !! from 1
       real(wp), intent(in), contiguous :: x(:, :)  !! (2, n_node) [L]
       real(wp), intent(in) :: reach              !! length of the longest edge of both [L]
@@ -167,11 +168,11 @@ contains
          call try_edge(self, x, e, self%near(self%found(:n_found)), p == q, reach, &
             overlap)
       end do
-   end subroutine look_one_way
+   end subroutine overlap_query_one_way
 
    !> The box of piece `p` at the present look.
    pure subroutine box_of(self, p, low, high)
-      type(look_t), intent(in) :: self
+      type(overlap_query_t), intent(in) :: self
       integer, intent(in) :: p
       real(wp), intent(out) :: low(2), high(2)
 
@@ -184,7 +185,7 @@ contains
    !> Is the node at an end of edge `e` behind the outline of which `other` are the edges within
    !> `reach`?
    pure subroutine try_node(self, x, e, side, other, reach, overlap)
-      type(look_t), intent(in) :: self
+      type(overlap_query_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e, side             !! 1: first node, 2: last one
       integer, intent(in) :: other(:)
@@ -210,7 +211,7 @@ contains
    !> outline from the crossings, past what lies behind the piece's own surface. Neighbours do not
    !> cross.
    pure subroutine try_edge(self, x, e, other, is_own, reach, overlap)
-      type(look_t), intent(inout) :: self
+      type(overlap_query_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e
       integer, intent(in) :: other(:)
@@ -255,7 +256,7 @@ contains
    !> An edge that crosses nothing lies in the other piece all the same where its ends stand exactly
    !> on the sides of that.
    pure subroutine try_middle(self, x, e, other, reach, overlap)
-      type(look_t), intent(in) :: self
+      type(overlap_query_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e
       integer, intent(in) :: other(:)
@@ -275,7 +276,7 @@ contains
 
    !> Is a node on one of these edges, to round-off?
    pure logical function stands_on(self, x, node, other) result(stands)
-      type(look_t), intent(in) :: self
+      type(overlap_query_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: node
       integer, intent(in) :: other(:)
@@ -295,7 +296,7 @@ contains
    !> The edges `crossed`, and those along the outline on either side of them within `reach` of edge
    !> `e`: `self%around`.
    pure subroutine find_around(self, e, crossed, reach, n)
-      type(look_t), intent(inout) :: self
+      type(overlap_query_t), intent(inout) :: self
       integer, intent(in) :: e, crossed(:)
       real(wp), intent(in) :: reach              !! [L]
       integer, intent(out) :: n
@@ -320,7 +321,7 @@ contains
 
    !> Where edge `e` crosses `other` edges.
    pure subroutine find_crossings(self, x, e, other, crossings)
-      type(look_t), intent(in) :: self
+      type(overlap_query_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e
       integer, intent(in) :: other(:)
@@ -354,7 +355,7 @@ contains
 
    !> Do edges `e` and `f` meet in a node, at a joint, or where a tied piece ends on one of them?
    pure logical function are_neighbours(self, e, f)
-      type(look_t), intent(in) :: self
+      type(overlap_query_t), intent(in) :: self
       integer, intent(in) :: e, f
 
       associate (a => self%outline%place(:, e), b => self%outline%place(:, f))
@@ -368,7 +369,7 @@ contains
 
    !> How deep is the place `share` along edge `e` in `other` edges, that are not its neighbours?
    pure subroutine try_place(self, x, e, share, other, overlap, reach)
-      type(look_t), intent(in) :: self
+      type(overlap_query_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e
       real(wp), intent(in) :: share
@@ -398,7 +399,7 @@ contains
    !> off. An edge of a profile is a small part of a line or an arc: it counts as no shorter than
    !> the edge that is in it.
    pure subroutine take_deeper(self, x, nearest, e, share, overlap)
-      type(look_t), intent(in) :: self
+      type(overlap_query_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       type(nearest_t), intent(in) :: nearest
       integer, intent(in) :: e                   !! the edge that is judged
@@ -443,4 +444,4 @@ contains
       way = (x(:, j) - x(:, i)) + (u(:, j) - u(:, i))
    end function between
 
-end module emcon_look_plane
+end module emcon_overlap_query_plane

@@ -4,19 +4,21 @@
 !> much, on the straight way there. Those that no pair brings together may overlap if they do at
 !> the start of a step of the deck, or if ties hold them together. While boxes are apart nothing is
 !> done. Source: docs/theory.md, section 4.11.
-module emcon_judge
+module emcon_overlap_check
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
    use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
-   use emcon_look_plane, only : look_init, look_longest, look_one_way, look_place, look_t, overlap_t
    use emcon_mesh, only : surface_t
    use emcon_midside_plane, only : midside_init, midside_points, midside_stretch, midside_t
    use emcon_outline_curves_plane, only : outline_curves_init
    use emcon_outline_plane, only : outline_meets
+   use emcon_overlap_query_plane, only : overlap_query_init, overlap_query_longest, &
+      overlap_query_one_way, overlap_query_place, overlap_query_t, overlap_t
    use emcon_scene, only : scene_t
    implicit none
    private
-   public :: judge_t, overlap_t, judge_init, judge_smooth, judge_excuse, judge_step
+   public :: overlap_check_t, overlap_t, overlap_check_init, overlap_check_smooth, &
+      overlap_check_excuse, overlap_check_step
 
    !> Between two looks pieces move against each other by less than this part of the thinnest
    !> element: one look at what goes through it is then at least half as deep.
@@ -31,8 +33,8 @@ module emcon_judge
       integer :: first = 0, second = 0
    end type meeting_t
 
-   type :: judge_t
-      type(look_t) :: look
+   type :: overlap_check_t
+      type(overlap_query_t) :: look
       type(midside_t) :: midside                 !! of outlines, by contact points
       ! Where each piece is in a step:
       real(wp), allocatable :: low(:, :), high(:, :)     !! (n_dim, n_piece) box over the step [L]
@@ -45,17 +47,17 @@ module emcon_judge
       !> As long as no node has moved farther since the start of the step that was last looked at,
       !> there is no overlap [L].
       real(wp) :: clearance = 0.0_wp
-   end type judge_t
+   end type overlap_check_t
 
 contains
 
    !> Set up for the contact pairs of `scene`.
-   subroutine judge_init(self, scene)
-      type(judge_t), intent(out) :: self
+   subroutine overlap_check_init(self, scene)
+      type(overlap_check_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(surface_t) :: outline
 
-      call look_init(self%look, scene)
+      call overlap_query_init(self%look, scene)
       outline%edge = self%look%outline%edge
       call midside_init(self%midside, scene, [integer ::], outline)
       associate (n => self%look%outline%n_piece)
@@ -63,21 +65,21 @@ contains
             self%least(scene%n_dim, n), self%most(scene%n_dim, n))
          allocate(self%thinnest(n), self%longest(n), self%other(n), self%excused(0))
       end associate
-      call judge_smooth(self, scene, contact_options_t())
-   end subroutine judge_init
+      call overlap_check_smooth(self, scene, contact_options_t())
+   end subroutine overlap_check_init
 
    !> Begin a step of `scene` with the options `options` of contact: what edges stand for.
-   subroutine judge_smooth(self, scene, options)
-      type(judge_t), intent(inout) :: self
+   subroutine overlap_check_smooth(self, scene, options)
+      type(overlap_check_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(contact_options_t), intent(in) :: options
 
       call outline_curves_init(self%look%curves, self%look%outline, scene, options)
-   end subroutine judge_smooth
+   end subroutine overlap_check_smooth
 
    !> What overlaps at `u`, and no pair brings together, is left as it is from then on.
-   subroutine judge_excuse(self, x, u, overlap)
-      type(judge_t), intent(inout) :: self
+   subroutine overlap_check_excuse(self, x, u, overlap)
+      type(overlap_check_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
       type(overlap_t), intent(out) :: overlap    !! the deepest of these
 
@@ -86,11 +88,11 @@ contains
       else
          call excuse_points(self, x, midside_points(self%midside, u), overlap)
       end if
-   end subroutine judge_excuse
+   end subroutine overlap_check_excuse
 
    !> The same, by the displacements of contact points.
    subroutine excuse_points(self, x, u, deepest)
-      type(judge_t), intent(inout) :: self
+      type(overlap_check_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
       type(overlap_t), intent(out) :: deepest
       type(overlap_t) :: overlap
@@ -108,7 +110,7 @@ contains
             if (self%look%outline%body(p) == self%look%outline%body(self%other(i))) cycle
             if (outline_meets(self%look%outline, p, self%other(i))) cycle
             overlap = overlap_t()
-            call judge_pieces(self, p, self%other(i), x, u, rest, overlap)
+            call overlap_check_pieces(self, p, self%other(i), x, u, rest, overlap)
             if (overlap%depth > 0.0_wp) meant = [meant, meeting_t(p, self%other(i))]
             if (overlap%depth > deepest%depth) deepest = overlap
          end do
@@ -117,8 +119,8 @@ contains
    end subroutine excuse_points
 
    !> The deepest overlap in the step from `u0` by `du`.
-   subroutine judge_step(self, x, u0, du, overlap)
-      type(judge_t), intent(inout) :: self
+   subroutine overlap_check_step(self, x, u0, du, overlap)
+      type(overlap_check_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)      !! (n_dim, n_node) [L]
       type(overlap_t), intent(out) :: overlap
 
@@ -129,11 +131,11 @@ contains
             midside_points(self%midside, du), overlap)
          self%clearance = self%clearance/midside_stretch(self%midside)
       end if
-   end subroutine judge_step
+   end subroutine overlap_check_step
 
    !> The same, by the displacements of contact points.
    subroutine judge_points(self, x, u0, du, overlap)
-      type(judge_t), intent(inout) :: self
+      type(overlap_check_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)      !! (n_dim, n_node) [L]
       type(overlap_t), intent(out) :: overlap
       type(box_tree_t) :: tree
@@ -149,9 +151,9 @@ contains
          do i = 1, n
             if (is_excused(self, p, self%other(i))) cycle
             if (outline_meets(self%look%outline, p, self%other(i))) then
-               call judge_pieces(self, p, self%other(i), x, u0, du, overlap)
+               call overlap_check_pieces(self, p, self%other(i), x, u0, du, overlap)
             else
-               call judge_pieces(self, p, self%other(i), x, u0, du, self%stray)
+               call overlap_check_pieces(self, p, self%other(i), x, u0, du, self%stray)
             end if
             is_apart = .false.
          end do
@@ -162,7 +164,7 @@ contains
 
    !> Measure all pieces over the step, and put their boxes into a tree.
    pure subroutine place(self, x, u0, du, tree)
-      type(judge_t), intent(inout) :: self
+      type(overlap_check_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       type(box_tree_t), intent(out) :: tree
       integer :: p
@@ -175,7 +177,7 @@ contains
 
    !> The pieces from `p` on whose boxes meet that of `p`: the first `n` of `self%other`.
    pure subroutine find_later(self, tree, p, n)
-      type(judge_t), intent(inout) :: self
+      type(overlap_check_t), intent(inout) :: self
       type(box_tree_t), intent(in) :: tree
       integer, intent(in) :: p
       integer, intent(out) :: n
@@ -193,7 +195,7 @@ contains
 
    !> May `p` and `q` overlap, without a pair: as at first, or as parts of one body?
    pure logical function is_excused(self, p, q)
-      type(judge_t), intent(in) :: self
+      type(overlap_check_t), intent(in) :: self
       integer, intent(in) :: p, q                !! p <= q
 
       associate (body => self%look%outline%body)
@@ -206,7 +208,7 @@ contains
    !> Smallest distance of the boxes of two pieces that are looked at, by the axis where it is
    !> largest.
    pure real(wp) function least_distance(self)
-      type(judge_t), intent(in) :: self
+      type(overlap_check_t), intent(in) :: self
       integer :: p, q
 
       least_distance = huge(least_distance)
@@ -220,8 +222,8 @@ contains
    end function least_distance
 
    !> Look at two pieces, or one and itself, as often as the step needs.
-   subroutine judge_pieces(self, p, q, x, u0, du, overlap)
-      type(judge_t), intent(inout) :: self
+   subroutine overlap_check_pieces(self, p, q, x, u0, du, overlap)
+      type(overlap_check_t), intent(inout) :: self
       integer, intent(in) :: p, q
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       type(overlap_t), intent(inout) :: overlap
@@ -233,16 +235,16 @@ contains
       do k = 1, n
          share = real(k, wp)/real(n, wp)
          self%look%is_passing = k < n
-         call look_place(self%look, p, x, u0, du, share)
-         if (q /= p) call look_place(self%look, q, x, u0, du, share)
-         call look_one_way(self%look, p, q, x, reach, overlap)
-         if (q /= p) call look_one_way(self%look, q, p, x, reach, overlap)
+         call overlap_query_place(self%look, p, x, u0, du, share)
+         if (q /= p) call overlap_query_place(self%look, q, x, u0, du, share)
+         call overlap_query_one_way(self%look, p, q, x, reach, overlap)
+         if (q /= p) call overlap_query_one_way(self%look, q, p, x, reach, overlap)
       end do
-   end subroutine judge_pieces
+   end subroutine overlap_check_pieces
 
    !> Box, motion and edges of piece `p` over the step.
    pure subroutine measure(self, p, x, u0, du)
-      type(judge_t), intent(inout) :: self
+      type(overlap_check_t), intent(inout) :: self
       integer, intent(in) :: p
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       real(wp) :: here(size(x, 1))
@@ -267,12 +269,12 @@ contains
          end do
          self%thinnest(p) = minval(self%look%outline%thickness(first:last))
       end associate
-      self%longest(p) = look_longest(self%look, p, x, u0)
+      self%longest(p) = overlap_query_longest(self%look, p, x, u0)
    end subroutine measure
 
    !> Looks at the step for two pieces, so that they move by little in between.
    pure integer function count_looks(self, p, q) result(n)
-      type(judge_t), intent(in) :: self
+      type(overlap_check_t), intent(in) :: self
       integer, intent(in) :: p, q
       real(wp) :: way(size(self%most, 1)), motion
 
@@ -284,4 +286,4 @@ contains
       end associate
    end function count_looks
 
-end module emcon_judge
+end module emcon_overlap_check

@@ -5,10 +5,11 @@
 !> worth, and for another size of the step: of the place that was found last, as that of a first
 !> guess is a worse one. The state knows of which motion it was made, so that a run that was resumed
 !> makes the same one and has the bits of one that was not. Source: docs/theory.md, section 8.
-module emcon_keeping
+module emcon_factor_policy
    use emcon_constraints, only : constraint_set_t
    use emcon_correction, only : correction_t
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : instant_t
    use emcon_factor_base, only : factor_base_t
    use emcon_kept_factor, only : kept_factor_correct, kept_factor_forget, &
       kept_factor_is_possible, kept_factor_look, kept_factor_multipliers, kept_factor_reach, &
@@ -16,13 +17,12 @@ module emcon_keeping
    use emcon_kinds, only : wp
    use emcon_mixing, only : mixing_begin, mixing_move, mixing_t
    use emcon_motion, only : at_rest, motion_t
-   use emcon_pose, only : instant_t
    use emcon_system, only : system_t
    implicit none
    private
-   public :: keeping_t, keeping_step, keeping_begin, keeping_make, keeping_renew, &
-      keeping_correct, keeping_break_off, keeping_give_up, keeping_commit, keeping_forget, &
-      keeping_looks
+   public :: factor_policy_t, factor_policy_step, factor_policy_begin, factor_policy_make, &
+      factor_policy_renew, factor_policy_correct, factor_policy_break_off, factor_policy_give_up, &
+      factor_policy_commit, factor_policy_forget, factor_policy_looks
 
    !> A factor serves so many increments at most, and until its solves have taken so many
    !> corrections more than short ones: about as many as a new one costs.
@@ -34,7 +34,7 @@ module emcon_keeping
    !> Looks at the second derivatives of constraints in a solve.
    integer, parameter :: most_looks = 2
 
-   type :: keeping_t
+   type :: factor_policy_t
       logical :: is_wanted = .true.              !! in steps that it may serve
       logical :: is_allowed = .false.            !! in the present step
       type(factor_base_t) :: base                !! of the present factor
@@ -52,22 +52,22 @@ module emcon_keeping
       real(wp), allocatable, private :: guess(:, :)      !! (n_dim, n_node) the solve's first [L]
       !> Correction before mixing, with multipliers that are under way, and the last one after it
       real(wp), allocatable, private :: proposed(:), made(:)
-   end type keeping_t
+   end type factor_policy_t
 
 contains
 
    !> Forget the factor, as what it is made of has changed.
-   pure subroutine keeping_forget(self, correction)
-      type(keeping_t), intent(inout) :: self
+   pure subroutine factor_policy_forget(self, correction)
+      type(factor_policy_t), intent(inout) :: self
       type(correction_t), intent(inout) :: correction
 
       call kept_factor_forget(correction%kept)
       self%base%is_set = .false.
-   end subroutine keeping_forget
+   end subroutine factor_policy_forget
 
    !> Before a step: may a factor be kept in it, and does the one there is still serve, or is lost?
-   pure subroutine keeping_step(self, correction, base, start, h, increment, is_lost)
-      type(keeping_t), intent(inout) :: self         !! `is_allowed` is set
+   pure subroutine factor_policy_step(self, correction, base, start, h, increment, is_lost)
+      type(factor_policy_t), intent(inout) :: self   !! `is_allowed` is set
       type(correction_t), intent(inout) :: correction
       type(factor_base_t), intent(in) :: base        !! of the state
       type(instant_t), intent(in) :: start           !! of the step
@@ -94,11 +94,11 @@ contains
       self%n_least = self%base%n_least
       self%n_excess = self%base%n_excess
       self%n_correction = 0
-   end subroutine keeping_step
+   end subroutine factor_policy_step
 
    !> The last solve is over: how many corrections has it taken, beside the shortest one?
    pure subroutine count_solve(self)
-      type(keeping_t), intent(inout) :: self
+      type(factor_policy_t), intent(inout) :: self
 
       if (self%n_correction > 0) then
          self%n_least = min(self%n_least, self%n_correction)
@@ -108,8 +108,8 @@ contains
    end subroutine count_solve
 
    !> A solve begins from `du`.
-   pure subroutine keeping_begin(self, n_unknown, du)
-      type(keeping_t), intent(inout) :: self
+   pure subroutine factor_policy_begin(self, n_unknown, du)
+      type(factor_policy_t), intent(inout) :: self
       integer, intent(in) :: n_unknown           !! > 0, with multipliers that are under way
       real(wp), intent(in) :: du(:, :)           !! (n_dim, n_node) [L]
 
@@ -123,19 +123,19 @@ contains
       self%knows_set = .false.
       self%n_look = 0
       call mixing_begin(self%mixing, n_unknown)
-   end subroutine keeping_begin
+   end subroutine factor_policy_begin
 
    !> Are second derivatives of the constraints to be looked at? They are as a solve begins and
    !> after its first correction, which takes it most of the way.
-   pure logical function keeping_looks(self)
-      type(keeping_t), intent(in) :: self
+   pure logical function factor_policy_looks(self)
+      type(factor_policy_t), intent(in) :: self
 
-      keeping_looks = self%n_look < most_looks
-   end function keeping_looks
+      factor_policy_looks = self%n_look < most_looks
+   end function factor_policy_looks
 
    !> Let there be a factor, of the present tangent if it is a new one, that knows the constraints.
-   subroutine keeping_make(self, correction, system, set, motion, is_fit, error)
-      type(keeping_t), intent(inout) :: self
+   subroutine factor_policy_make(self, correction, system, set, motion, is_fit, error)
+      type(factor_policy_t), intent(inout) :: self
       type(correction_t), intent(inout) :: correction
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
@@ -161,26 +161,26 @@ contains
          self%knows_set = is_fit
       end if
       if (.not. is_fit) return
-      if (keeping_looks(self)) then
+      if (factor_policy_looks(self)) then
          call kept_factor_look(correction%kept, set, system%space%numbering)
          self%n_look = self%n_look + 1
       end if
-   end subroutine keeping_make
+   end subroutine factor_policy_make
 
    !> The next factor is to be of the tangent at the present place.
-   pure subroutine keeping_renew(self, correction)
-      type(keeping_t), intent(inout) :: self
+   pure subroutine factor_policy_renew(self, correction)
+      type(factor_policy_t), intent(inout) :: self
       type(correction_t), intent(inout) :: correction
 
-      call keeping_forget(self, correction)
+      call factor_policy_forget(self, correction)
       self%knows_set = .false.
       self%n_look = 0
       call mixing_begin(self%mixing, size(self%proposed))
-   end subroutine keeping_renew
+   end subroutine factor_policy_renew
 
    !> The next correction, where the last one was `dq`, and `dlam` of multipliers under way.
-   subroutine keeping_correct(self, correction, set, residual, dq, dlam, error)
-      type(keeping_t), intent(inout) :: self
+   subroutine factor_policy_correct(self, correction, set, residual, dq, dlam, error)
+      type(factor_policy_t), intent(inout) :: self
       type(correction_t), intent(inout) :: correction
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in), contiguous :: residual(:)    !! (n_unknown) with contact forces
@@ -196,11 +196,11 @@ contains
       else
          call mixing_move(self%mixing, self%proposed, dq)
       end if
-   end subroutine keeping_correct
+   end subroutine factor_policy_correct
 
    !> The next move of unknowns and multipliers together, these by how far they reach.
    subroutine move_with_multipliers(self, correction, dq, dlam)
-      type(keeping_t), intent(inout) :: self
+      type(factor_policy_t), intent(inout) :: self
       type(correction_t), intent(in) :: correction
       real(wp), intent(inout) :: dq(:)           !! (n_unknown) [L]
       real(wp), intent(inout) :: dlam(:)         !! (n) [M L/T^2]
@@ -219,29 +219,29 @@ contains
    end subroutine move_with_multipliers
 
    !> A solve ends before its end: it tells nothing of what the factor costs.
-   pure subroutine keeping_break_off(self)
-      type(keeping_t), intent(inout) :: self
+   pure subroutine factor_policy_break_off(self)
+      type(factor_policy_t), intent(inout) :: self
 
       self%n_correction = 0
-   end subroutine keeping_break_off
+   end subroutine factor_policy_break_off
 
    !> The factor does not lead to an end: back to the first guess. Other sets of the step may do
    !> with a new one. One that cannot take the set's constraints may take those of the next step.
-   pure subroutine keeping_give_up(self, correction, is_fit, du)
-      type(keeping_t), intent(inout) :: self
+   pure subroutine factor_policy_give_up(self, correction, is_fit, du)
+      type(factor_policy_t), intent(inout) :: self
       type(correction_t), intent(inout) :: correction
       logical, intent(in) :: is_fit              !! it was, and has failed
       real(wp), intent(out) :: du(:, :)          !! (n_dim, n_node) [L]
 
-      if (is_fit) call keeping_forget(self, correction)
+      if (is_fit) call factor_policy_forget(self, correction)
       self%n_failure = self%n_failure + 1
       self%is_allowed = self%knows_set .and. self%n_failure < most_failures
       du = self%guess
-   end subroutine keeping_give_up
+   end subroutine factor_policy_give_up
 
    !> After a step by `motion`: what the state has to know of the factor, or of the next one.
-   pure subroutine keeping_commit(self, correction, motion, base, is_due)
-      type(keeping_t), intent(inout) :: self
+   pure subroutine factor_policy_commit(self, correction, motion, base, is_due)
+      type(factor_policy_t), intent(inout) :: self
       type(correction_t), intent(inout) :: correction
       type(motion_t), intent(in) :: motion
       type(factor_base_t), intent(inout) :: base     !! of the state
@@ -262,6 +262,6 @@ contains
       base%is_set = self%base%is_set
       base%n_least = self%base%n_least
       base%n_excess = self%base%n_excess
-   end subroutine keeping_commit
+   end subroutine factor_policy_commit
 
-end module emcon_keeping
+end module emcon_factor_policy

@@ -2,7 +2,7 @@
 !>
 !> Where the rotation of a body is prescribed, forces on its arms turn it: their moment about the
 !> reference node is what the support has to give. Source: docs/theory.md, section 13.
-module emcon_turn_record
+module emcon_rigid_rotation
    use emcon_kinds, only : wp
    use emcon_moment_plane, only : moment_of
    use emcon_motion, only : motion_t
@@ -11,20 +11,20 @@ module emcon_turn_record
    use emcon_turn_plane, only : turned_by
    implicit none
    private
-   public :: turn_record_t, turn_record_init, turn_record_measure, turn_record_spin
+   public :: rigid_rotation_t, rigid_rotation_init, rigid_rotation_measure, rigid_rotation_spin
 
-   type :: turn_record_t
+   type :: rigid_rotation_t
       !> (n_rigid, 0 in space) from the reference positions on
       real(wp), allocatable :: angle(:)
       !> (likewise) of the last step, about the reference node, on the body [M L^2/T^2]
       real(wp), allocatable :: moment(:)
-   end type turn_record_t
+   end type rigid_rotation_t
 
 contains
 
    !> Bodies are where `u` says.
-   pure subroutine turn_record_init(self, rigid, x, u)
-      type(turn_record_t), intent(out) :: self
+   pure subroutine rigid_rotation_init(self, rigid, x, u)
+      type(rigid_rotation_t), intent(out) :: self
       type(rigid_body_t), intent(in) :: rigid(:)             !! with their frames
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
       integer :: b
@@ -34,11 +34,11 @@ contains
       do b = 1, size(self%angle)
          self%angle(b) = turned_by(arm_of(rigid(b), 2, x), arm_of(rigid(b), 2, x + u))
       end do
-   end subroutine turn_record_init
+   end subroutine rigid_rotation_init
 
    !> Take over a step; no body turns by more than a half turn in it.
-   pure subroutine turn_record_measure(self, rigid, motion, reaction)
-      type(turn_record_t), intent(inout) :: self
+   pure subroutine rigid_rotation_measure(self, rigid, motion, reaction)
+      type(rigid_rotation_t), intent(inout) :: self
       type(rigid_body_t), intent(in) :: rigid(:)         !! with their frames
       type(motion_t), intent(in) :: motion               !! of the step
       real(wp), intent(in) :: reaction(:, :)             !! (n_dim, n_node) [M L/T^2]
@@ -51,19 +51,19 @@ contains
             first = arm_of(rigid(b), k, motion%x) + arm_of(rigid(b), k, motion%u0)
             way = arm_of(rigid(b), k, motion%du)
             node = rigid(b)%frame(k)
-            self%moment(b) = self%moment(b) + moment_of(first + motion%pose%load_place*way, &
+            self%moment(b) = self%moment(b) + moment_of(first + motion%evaluation%load_place*way, &
                reaction(:, node))
             if (.not. allocated(rigid(b)%arm)) cycle
             node = rigid(b)%arm(k - 1)
-            self%moment(b) = self%moment(b) + moment_of(first + motion%pose%load_place*way, &
+            self%moment(b) = self%moment(b) + moment_of(first + motion%evaluation%load_place*way, &
                reaction(:, node))
          end do
          self%angle(b) = self%angle(b) + turned_by(first, first + way)
       end do
-   end subroutine turn_record_measure
+   end subroutine rigid_rotation_measure
 
    !> The spin of a body whose nodes move with `v`.
-   pure real(wp) function turn_record_spin(rigid, x, u, v) result(spin)
+   pure real(wp) function rigid_rotation_spin(rigid, x, u, v) result(spin)
       type(rigid_body_t), intent(in) :: rigid            !! with its frame
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
       real(wp), intent(in), contiguous :: v(:, :)            !! (n_dim, n_node) [L/T]
@@ -71,7 +71,7 @@ contains
       associate (arm => arm_of(rigid, 2, x) + arm_of(rigid, 2, u))
          spin = moment_of(arm, arm_of(rigid, 2, v))/sum(arm**2)
       end associate
-   end function turn_record_spin
+   end function rigid_rotation_spin
 
    !> From the reference node to node `k` of the frame.
    pure function arm_of(rigid, k, field) result(arm)
@@ -83,4 +83,4 @@ contains
       arm = field(:, rigid%frame(k)) - field(:, rigid%frame(1))
    end function arm_of
 
-end module emcon_turn_record
+end module emcon_rigid_rotation

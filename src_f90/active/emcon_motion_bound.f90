@@ -1,22 +1,22 @@
 !> How far nodes have moved since some time, at most: an odometer for all of them together.
 !>
 !> What is so far apart that the odometer cannot have closed it is not looked at.
-module emcon_travel
+module emcon_motion_bound
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: travel_t, travel_to, largest_motion
+   public :: motion_bound_t, motion_bound_add, largest_motion
 
-   type :: travel_t
+   type :: motion_bound_t
       real(wp) :: total = 0.0_wp                 !! no node has gone farther, since the start [L]
       real(wp), allocatable, private :: u(:, :)  !! (n_dim, n_node) where they were last seen [L]
-   end type travel_t
+   end type motion_bound_t
 
 contains
 
    !> The nodes have gone to `u`, wherever that is.
-   pure subroutine travel_to(self, u)
-      type(travel_t), intent(inout) :: self
+   pure subroutine motion_bound_add(self, u)
+      type(motion_bound_t), intent(inout) :: self
       real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node) [L]
       real(wp) :: largest
       integer :: i
@@ -28,7 +28,7 @@ contains
          self%u(:, i) = u(:, i)
       end do
       self%total = self%total + sqrt(largest)
-   end subroutine travel_to
+   end subroutine motion_bound_add
 
    !> Largest of the motions `du` of all nodes [L].
    pure real(wp) function largest_motion(du)
@@ -42,4 +42,4 @@ contains
       largest_motion = sqrt(largest_motion)
    end function largest_motion
 
-end module emcon_travel
+end module emcon_motion_bound
