@@ -150,12 +150,12 @@ contains
 
       call phase_enter(system%phases, phase_gaps, left)
       if (size(system%contact) > 0) call motion_bound_add(self%motion_bound, motion%u0)
-      self%was_active = state%is_active
-      self%lam0 = state%lam
-      self%softness%closure = state%closure
+      self%was_active = state%contacts%is_active
+      self%lam0 = state%contacts%lam
+      self%softness%closure = state%contacts%closure
       if (self%friction%is_on) then
-         self%friction%way0 = state%sliding
-         self%friction%tau0 = state%drag
+         self%friction%way0 = state%contacts%sliding
+         self%friction%tau0 = state%contacts%drag
       end if
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)

@@ -65,8 +65,8 @@ contains
       self%system%contact%of_pair = model%contact%of_pair
       allocate(self%acts(n), source=.false.)
       allocate(self%lam(n), source=0.0_wp)
-      allocate(self%state%is_active, source=self%acts)
-      allocate(self%state%lam, self%state%closure, source=self%lam)
+      allocate(self%state%contacts%is_active, source=self%acts)
+      allocate(self%state%contacts%lam, self%state%contacts%closure, source=self%lam)
       call motion_init(self%motion, scene%x)
       allocate(self%du, self%push, source=at_rest(scene%x))
       call active_set_init(self%active, self%system)
@@ -283,8 +283,8 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
 
-      self%state%is_active = self%acts .and. .not. stays
-      self%state%lam = self%lam
+      self%state%contacts%is_active = self%acts .and. .not. stays
+      self%state%contacts%lam = self%lam
       call active_set_begin(self%active, self%system, self%motion, self%state)
       self%active%is_dropped = stays
       self%newton%driven = 0.0_wp

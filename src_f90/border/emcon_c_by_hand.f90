@@ -128,7 +128,8 @@ contains
       end if
       tell => null()
       if (c_associated(progress)) call c_f_procpointer(progress, tell)
-      if (model%stepper%march%state%increment == 0) call log_lines(model_lines(model%stepper), 0)
+      if (model%stepper%march%state%clock%increment &
+         == 0) call log_lines(model_lines(model%stepper), 0)
       do while (.not. is_reached())
          call model_go(model, made, increment, error)
          if (allocated(made%notes%item)) call log_lines(made%notes%item, made%notes%n)
@@ -149,7 +150,8 @@ contains
          is_reached = stepper_is_done(model%stepper)
          if (is_reached) return
          associate (state => model%stepper%march%state)
-            is_reached = state%time >= real(time, wp) - 64.0_wp*epsilon(1.0_wp)*abs(state%time)
+            is_reached = state%clock%time >= real(time, wp) &
+               - 64.0_wp*epsilon(1.0_wp)*abs(state%clock%time)
          end associate
       end function is_reached
 

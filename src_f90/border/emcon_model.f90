@@ -150,7 +150,7 @@ contains
          sizes%n_body = system%space%n_body
          sizes%n_unknown = system%space%numbering%n_unknown
          sizes%n_constraint = system%n_constraint
-         sizes%i_step = model%stepper%march%state%i_step
+         sizes%i_step = model%stepper%march%state%clock%i_step
          sizes%n_load = size(model%stepper%scene%step(sizes%i_step)%load)
       end associate
    end subroutine model_sizes

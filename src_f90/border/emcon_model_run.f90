@@ -149,7 +149,7 @@ contains
       type(increment_t), intent(in) :: made
 
       as_increment%h = real(made%h, c_double)
-      as_increment%time = real(model%stepper%march%state%time, c_double)
+      as_increment%time = real(model%stepper%march%state%clock%time, c_double)
       as_increment%n_newton = made%n_newton
       as_increment%n_cut = made%n_cut
       as_increment%n_active = made%n_active

@@ -24,7 +24,7 @@ contains
       type(model_t), intent(in) :: model
       real(wp), intent(out) :: time
 
-      time = model%stepper%march%state%time
+      time = model%stepper%march%state%clock%time
    end subroutine model_time
 
    subroutine model_progress(model, fraction, t_end)
@@ -147,8 +147,8 @@ contains
       real(wp), allocatable, intent(out) :: lam(:)           !! (n_constraint)
       logical, allocatable, intent(out) :: is_active(:)      !! (n_constraint)
 
-      allocate(lam, source=model%stepper%march%state%lam)
-      allocate(is_active, source=model%stepper%march%state%is_active)
+      allocate(lam, source=model%stepper%march%state%contacts%lam)
+      allocate(is_active, source=model%stepper%march%state%contacts%is_active)
    end subroutine model_get_multipliers
 
    pure subroutine model_contact(model, lam, is_active, label, pair)
@@ -159,8 +159,8 @@ contains
       integer :: i
 
       associate (system => model%stepper%march%system, state => model%stepper%march%state)
-         lam = state%lam(system%first_constraint(1) + 1:)
-         is_active = state%is_active(system%first_constraint(1) + 1:)
+         lam = state%contacts%lam(system%first_constraint(1) + 1:)
+         is_active = state%contacts%is_active(system%first_constraint(1) + 1:)
          allocate(label(0), pair(0))
          do i = 1, size(system%contact)
             associate (node => system%contact(i)%contact%node)

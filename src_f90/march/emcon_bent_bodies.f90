@@ -38,9 +38,9 @@ contains
 
       found%advice = ""
       solid => terms_solid(march%system%term)
-      if (.not. any(solid%is_stiff_bent) .or. march%state%i_step == 0) return
+      if (.not. any(solid%is_stiff_bent) .or. march%state%clock%i_step == 0) return
       call bending_measure(bending, solid, march%system%space%body, scene%x, march%state%u, &
-         scene%step(march%state%i_step)%nlgeom)
+         scene%step(march%state%clock%i_step)%nlgeom)
       do b = 1, size(bending%strain)
          if (.not. bending%strain(b) > rounding*largest_energy) cycle
          if (.not. bending%missed(b) > told_part*bending%strain(b)) cycle

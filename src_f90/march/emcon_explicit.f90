@@ -55,15 +55,15 @@ contains
       call check_mass(self, scene, error)
       if (allocated(error)) return
       call explicit_soft_limit(self, scene)
-      associate (place => self%explicit%place, step => scene%step(self%state%i_step), &
-            limit => self%state%critical_h)
+      associate (place => self%explicit%place, step => scene%step(self%state%clock%i_step), &
+            limit => self%state%explicit%critical_h)
          call motion_init(place, scene%x)
          call rest_at(self, instant_t(), self%state%u)
          is_known = limit > 0.0_wp
          if (.not. is_known) then
-            self%state%budget = 0.0_wp
+            self%state%explicit%budget = 0.0_wp
             call critical_bound(self%system, place, self%explicit%stiffness, limit, &
-               self%state%critical_element, is_bounded)
+               self%state%explicit%critical_element, is_bounded)
             if (step%h > limit .or. .not. is_bounded) call critical_sharp(self%system, place, &
                self%explicit%stiffness, limit, error)
             if (allocated(error)) return
@@ -86,10 +86,10 @@ contains
       type(scene_t), intent(in) :: scene
       character(len=:), allocatable, intent(out) :: text
 
-      text = "the critical step " // to_text(self%state%critical_h)
+      text = "the critical step " // to_text(self%state%explicit%critical_h)
       if (self%active%softness%is_at_ends) text = text // " with closed contacts"
-      if (self%state%critical_element > 0) text = text // " (the fastest element is " // &
-         to_text(scene%element_label(self%state%critical_element)) // ")"
+      if (self%state%explicit%critical_element > 0) text = text // " (the fastest element is " // &
+         to_text(scene%element_label(self%state%explicit%critical_element)) // ")"
    end subroutine limit_text
 
    !> Each unknown has mass: it is kept where that is a diagonal.
@@ -106,7 +106,7 @@ contains
          do k = 1, numbering%n_unknown
             if (value(csr_find(matrix, k, k)) > 0.0_dp) cycle
             call raise(error, err_input, where_text(scene, &
-               scene%step(self%state%i_step)%origin) // ": error: node " // &
+               scene%step(self%state%clock%i_step)%origin) // ": error: node " // &
                to_text(scene%node_label((numbering%dof(k) - 1)/size(scene%x, 1) + 1)) // &
                " has no mass: in an explicit step all that moves freely needs some")
             return
@@ -154,10 +154,11 @@ contains
             call lagged_forces_take(system%lagged, system%response)
          end if
          call explicit_soft_widen(self, has_grown)
-         if (mod(self%state%increment, overlap_query_every) == 0 .and. self%state%increment &
-            > self%state%n_before) call find_limit(self, part, error)
+         if (mod(self%state%clock%increment, overlap_query_every) == 0 &
+            .and. self%state%clock%increment > self%state%clock%n_before) call find_limit(self, &
+            part, error)
          if (has_grown .and. .not. allocated(error)) call critical_sharp(system, explicit%place, &
-            0.0_wp*explicit%stiffness, self%state%critical_h, error, &
+            0.0_wp*explicit%stiffness, self%state%explicit%critical_h, error, &
             explicit%soft(explicit%i_start))
          if (.not. allocated(error)) call check_limit(self, scene, part, error)
          system%lagged%is_on = .not. allocated(error)
@@ -172,7 +173,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       character(len=:), allocatable :: text
 
-      if (part%h <= self%state%critical_h) return
+      if (part%h <= self%state%explicit%critical_h) return
       call limit_text(self, scene, text)
       call raise(error, err_analysis, "the analysis stops at time " // &
          to_text(part%start%total_time, 9) // ": the increment " // to_text(part%h) // &
@@ -193,8 +194,8 @@ contains
             is_bounded)
          if (part%h <= bound .and. is_bounded) return
          call critical_sharp(self%system, explicit%place, explicit%stiffness, &
-            self%state%critical_h, error)
-         self%state%critical_element = element
+            self%state%explicit%critical_h, error)
+         self%state%explicit%critical_element = element
       end associate
    end subroutine find_limit
 
@@ -341,7 +342,7 @@ contains
       real(wp) :: energy, momentum(size(self%v1, 1), size(self%v1, 2))
       character(len=:), allocatable :: text
 
-      associate (budget => self%state%budget)
+      associate (budget => self%state%explicit%budget)
          call mass_times(self%system, self%v1, momentum)
          energy = 0.5_wp*sum(self%v1*momentum) + abs(sum(self%end_state%energy)) &
             + abs(self%end_state%potential)
@@ -352,8 +353,8 @@ contains
          if (energy <= huge(energy)) text = "its energy " // to_text(energy) // " is " // &
             to_text(energy/budget, 3) // " times what was put in"
          call raise(error, err_analysis, "the analysis stops at time " // &
-            to_text(self%state%time, 9) // ": the explicit step grows without bound, " // text // &
-            "; give a smaller increment")
+            to_text(self%state%clock%time, 9) // ": the explicit step grows without bound, " &
+            // text // "; give a smaller increment")
       end associate
    end subroutine check_growth
 

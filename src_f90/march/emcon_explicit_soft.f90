@@ -76,9 +76,9 @@ contains
                   id = system%first_constraint(pair) + i
                   associate (gap => contact%state(i))
                      if (.not. (gap%is_near .and. gap%is_over)) cycle
-                     is_closed(id) = gap%gap1 < gap%closed .and. (self%state%is_active(id) &
-                        .or. gap%gap1 - gap%closed > -contact%max_penetration_at_start*gap%size &
-                        - way)
+                     is_closed(id) = gap%gap1 < gap%closed &
+                        .and. (self%state%contacts%is_active(id) .or. gap%gap1 &
+                        - gap%closed > -contact%max_penetration_at_start*gap%size - way)
                   end associate
                end do
             end associate

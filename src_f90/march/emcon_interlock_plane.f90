@@ -63,7 +63,7 @@ contains
             associate (id => set%id(k), item => set%item(k))
                if (id <= before(pair) .or. id > before(pair + 1)) cycle
                if (friction_slides(friction, id) == 0) cycle
-               if (.not. march%state%slip_path(id) > item%size) cycle
+               if (.not. march%state%contacts%slip_path(id) > item%size) cycle
                push = set%lam(k)*sum(item%c(:, :item%n_slave), 2)
             end associate
             n = n + 1
@@ -85,7 +85,7 @@ contains
       type(surface_shape_t) :: slave, master
 
       turn = 0.0_wp
-      options = scene%step(march%state%i_step)%contact
+      options = scene%step(march%state%clock%i_step)%contact
       if (scene%pair(pair)%has_options) options = scene%pair(pair)%options
       if (options%smoothing /= smoothing_none) return
       slave = surface_shape(scene, scene%surface(scene%pair(pair)%slave))

@@ -61,19 +61,20 @@ contains
          allocate(state%u, source=scene%u0)
          allocate(state%v, source=scene%v0)
          allocate(state%u_start, state%contact, state%reaction, state%internal, source=self%v1)
-         allocate(state%has_mass(size(scene%x, 2)), source=.false.)
-         allocate(state%is_active(self%system%n_constraint), source=.false.)
-         allocate(state%lam(self%system%n_constraint), source=0.0_wp)
-         allocate(state%closure, source=state%lam)
+         allocate(state%contacts%has_mass(size(scene%x, 2)), source=.false.)
+         allocate(state%contacts%is_active(self%system%n_constraint), source=.false.)
+         allocate(state%contacts%lam(self%system%n_constraint), source=0.0_wp)
+         allocate(state%contacts%closure, source=state%contacts%lam)
          allocate(state%energy(size(scene%element_kind)), source=0.0_wp)
       end associate
       call pair_record_init(self%state%pairs, self%system)
       call rigid_rotation_init(self%state%turns, scene%rigid, scene%x, self%state%u)
       call pair_sums_init(self%state%sums, self%system, scene%pair)
       call active_set_init(self%active, self%system)
-      allocate(self%state%sliding(size(self%active%friction%mu)), source=0)
-      allocate(self%state%drag(size(self%active%friction%mu)), source=0.0_wp)
-      allocate(self%state%slip, self%state%slip_path, source=self%state%drag)
+      allocate(self%state%contacts%sliding(size(self%active%friction%mu)), source=0)
+      allocate(self%state%contacts%drag(size(self%active%friction%mu)), source=0.0_wp)
+      allocate(self%state%contacts%slip, self%state%contacts%slip_path, &
+         source=self%state%contacts%drag)
       call ledger_init(self%ledger, scene%n_dim)
       call overlap_check_init(self%overlap_check, scene)
    end subroutine march_init
@@ -130,45 +131,47 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: stride
 
-      associate (state => self%state, step => scene%step(self%state%i_step))
+      associate (state => self%state, step => scene%step(self%state%clock%i_step))
          if (step%max_increments > 0 .and. &
-            state%increment - state%n_before >= step%max_increments) then
+            state%clock%increment - state%clock%n_before >= step%max_increments) then
             call raise(error, err_analysis, "the " // to_text(step%max_increments) // &
-               " increments of *STEP, INC= are used up at time " // to_text(state%time))
+               " increments of *STEP, INC= are used up at time " // to_text(state%clock%time))
             return
          end if
-         if (state%is_off_grid) then
-            call raise(error, err_input, "time " // to_text(state%time, 9) // " lies between " // &
-               "two increments of the deck; go on to time " // to_text(state%start_time + &
-               march_grid_time(self, step, state%n_grid + 1), 9) // &
-               " with a step of a size of its own")
+         if (state%clock%is_off_grid) then
+            call raise(error, err_input, "time " // to_text(state%clock%time, 9) &
+               // " lies between " // "two increments of the deck; go on to time " &
+               // to_text(state%clock%start_time + march_grid_time(self, step, state%clock%n_grid &
+               + 1), 9) // " with a step of a size of its own")
             return
          end if
-         stride = min(state%grid_stride, march_next_corner(self, state%n_grid) - state%n_grid)
-         if (self%is_controlled) then
+         stride = min(state%clock%grid_stride, march_next_corner(self, state%clock%n_grid) &
+            - state%clock%n_grid)
+         if (self%grid%is_controlled) then
             call march_controlled(self, scene, increment, error)
          else
-            call cross_grid(self, scene, state%n_grid + stride, increment, error)
+            call cross_grid(self, scene, state%clock%n_grid + stride, increment, error)
          end if
          if (allocated(error)) then
             call end_failed(self, scene, increment, error)
             return
          end if
-         if (.not. self%is_controlled) then
-            state%n_grid = state%n_grid + stride
-            state%step_time = march_grid_time(self, step, state%n_grid)
+         if (.not. self%grid%is_controlled) then
+            state%clock%n_grid = state%clock%n_grid + stride
+            state%clock%step_time = march_grid_time(self, step, state%clock%n_grid)
          end if
-         state%increment = state%increment + 1
-         state%time = state%start_time + state%step_time
-         increment%n_active = count(state%is_active(self%system%first_constraint(1) + 1:))
+         state%clock%increment = state%clock%increment + 1
+         state%clock%time = state%clock%start_time + state%clock%step_time
+         increment%n_active = count(state%contacts%is_active(self%system%first_constraint(1) + 1:))
          if (increment%n_cut > 0) then
-            state%n_easy = 0
-            state%grid_stride = max(1, state%grid_stride/2)
+            state%clock%n_easy = 0
+            state%clock%grid_stride = max(1, state%clock%grid_stride/2)
          else
-            state%n_easy = state%n_easy + 1
-            if (state%n_easy >= easy_increments .and. 2*state%grid_stride <= self%most_stride) then
-               state%grid_stride = 2*state%grid_stride
-               state%n_easy = 0
+            state%clock%n_easy = state%clock%n_easy + 1
+            if (state%clock%n_easy >= easy_increments &
+               .and. 2*state%clock%grid_stride <= self%grid%most_stride) then
+               state%clock%grid_stride = 2*state%clock%grid_stride
+               state%clock%n_easy = 0
             end if
          end if
       end associate
@@ -190,7 +193,7 @@ contains
          end if
          return
       end if
-      if (increment%done > 0.0_wp) call march_set_time(self, scene, self%state%step_time &
+      if (increment%done > 0.0_wp) call march_set_time(self, scene, self%state%clock%step_time &
          + increment%done)
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
    end subroutine end_failed
@@ -224,9 +227,9 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: t0
 
-      associate (step => scene%step(self%state%i_step))
-         t0 = march_grid_time(self, step, self%state%n_grid)
-         increment%h = march_span(self, step, self%state%n_grid, n_end)
+      associate (step => scene%step(self%state%clock%i_step))
+         t0 = march_grid_time(self, step, self%state%clock%n_grid)
+         increment%h = march_span(self, step, self%state%clock%n_grid, n_end)
       end associate
       if (allocated(self%before)) deallocate(self%before)
       call march_in_parts(self, scene, t0, increment, error)
@@ -247,16 +250,16 @@ contains
       before = self%state
       ledger_before = self%ledger
       increment%h = h
-      self%judges_size = .false.
+      self%grid%judges_size = .false.
       call control_forget(self%state%control)
-      call march_in_parts(self, scene, self%state%step_time, increment, error)
+      call march_in_parts(self, scene, self%state%clock%step_time, increment, error)
       if (allocated(error)) then
          call march_go_back(self, before, ledger_before)
          return
       end if
-      self%state%increment = self%state%increment + 1
-      call march_set_time(self, scene, before%step_time + h)
-      increment%n_active = count(self%state%is_active( &
+      self%state%clock%increment = self%state%clock%increment + 1
+      call march_set_time(self, scene, before%clock%step_time + h)
+      increment%n_active = count(self%state%contacts%is_active( &
          self%system%first_constraint(1) + 1:))
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
    end subroutine march_free_increment

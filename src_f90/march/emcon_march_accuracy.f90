@@ -42,10 +42,10 @@ contains
          call gather_dependent(numbering, mass)
          where (numbering%unknown <= 0) mass = 0.0_wp
       end associate
-      self%mass = mass
-      if (.not. allocated(self%force)) then
-         allocate(self%force, source=mass)
-         allocate(self%push, source=mass)
+      self%estimate%mass = mass
+      if (.not. allocated(self%estimate%force)) then
+         allocate(self%estimate%force, source=mass)
+         allocate(self%estimate%push, source=mass)
       end if
    end subroutine accuracy_begin
 
@@ -61,7 +61,7 @@ contains
       call find_forces(self)
       if (.not. self%state%control%h_before > 0.0_wp) return
       associate (control => self%state%control, step_check => self%step_check, &
-            force => self%force, contact => self%push)
+            force => self%estimate%force, contact => self%estimate%push)
          motion = max(control%largest_kinetic, self%ledger%kinetic, kinetic_at_end(self))
          if (.not. motion > 0.0_wp) return
          call find_motion_change(self, part%h, change)
@@ -86,7 +86,7 @@ contains
       type(march_t), intent(in) :: self
       type(part_t), intent(in) :: part
 
-      may_shrink = part%may_cut .and. exponent(part%h/self%h_deck) - 1 > self%least_power
+      may_shrink = part%may_cut .and. exponent(part%h/self%grid%h_deck) - 1 > self%grid%least_power
    end function may_shrink
 
    !> Remember of the solved step what the next one is compared with.
@@ -95,9 +95,9 @@ contains
       real(wp), intent(in) :: h                  !! > 0 [T]
 
       associate (control => self%state%control)
-         control%force = self%force
-         control%contact = self%push
-         if (control%n_known > 0) control%rate = self%rate
+         control%force = self%estimate%force
+         control%contact = self%estimate%push
+         if (control%n_known > 0) control%rate = self%estimate%rate
          control%velocity = self%motion%du/h
          control%n_known = min(2, control%n_known + 1)
          control%span = 0.5_wp*(control%h_before + h)
@@ -112,7 +112,7 @@ contains
       type(march_t), intent(inout) :: self       !! solved, not committed
 
       associate (set => self%active%set, numbering => self%system%space%numbering, &
-            force => self%force, contact => self%push)
+            force => self%estimate%force, contact => self%estimate%push)
          call constraints_force(set, set%n_permanent + 1, contact)
          force = self%system%response%part(role_inertia)%force - contact
          call gather_dependent(numbering, force)
@@ -141,8 +141,9 @@ contains
       change = huge(1.0_wp)
       associate (control => self%state%control)
          span = 0.5_wp*(control%h_before + h)
-         self%rate = (self%motion%du/h - control%velocity)/span
-         if (control%n_known > 1) change = 2.0_wp*(self%rate - control%rate)/(span + control%span)
+         self%estimate%rate = (self%motion%du/h - control%velocity)/span
+         if (control%n_known > 1) change = 2.0_wp*(self%estimate%rate - control%rate)/(span &
+            + control%span)
       end associate
    end subroutine find_motion_change
 
@@ -161,7 +162,7 @@ contains
       squared = 0.0_wp
       do i = 1, size(force, 2)
          do a = 1, size(force, 1)
-            associate (m => self%mass(a, i))
+            associate (m => self%estimate%mass(a, i))
                if (m > 0.0_wp) squared = squared &
                   + m*(factor*min(abs(force(a, i)/(m*span)), abs(change(a, i))))**2
             end associate

@@ -62,16 +62,16 @@ contains
       integer, intent(in) :: i_step              !! from 1
       type(error_t), allocatable, intent(out) :: error
 
-      self%state%i_step = i_step
-      self%state%n_grid = 0
-      self%state%n_part = 0
+      self%state%clock%i_step = i_step
+      self%state%clock%n_grid = 0
+      self%state%clock%n_part = 0
       call control_begin(self%state%control)
-      self%state%is_off_grid = .false.
-      self%state%grid_stride = 1
-      self%state%n_easy = 0
-      self%state%n_before = self%state%increment
-      self%state%start_time = self%state%time
-      self%state%critical_h = 0.0_wp
+      self%state%clock%is_off_grid = .false.
+      self%state%clock%grid_stride = 1
+      self%state%clock%n_easy = 0
+      self%state%clock%n_before = self%state%clock%increment
+      self%state%clock%start_time = self%state%clock%time
+      self%state%explicit%critical_h = 0.0_wp
       call march_past_forget(self%state)
       if (.not. scene%step(i_step)%scheme%masses_resist) self%state%v = 0.0_wp
       call system_begin_step(self%system, scene, i_step, error)
@@ -93,7 +93,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: text
 
-      associate (step => scene%step(self%state%i_step))
+      associate (step => scene%step(self%state%clock%i_step))
          if (step%scheme%masses_resist) then
             call quasi_static_hold(self, scene, error)
             return
@@ -142,8 +142,8 @@ contains
       logical :: has_changed
 
       call mass_match(self, scene, has_changed, error)
-      if (.not. allocated(error)) call system_begin_step(self%system, scene, self%state%i_step, &
-         error)
+      if (.not. allocated(error)) call system_begin_step(self%system, scene, &
+         self%state%clock%i_step, error)
       if (.not. allocated(error)) call prepare(self, scene, error)
    end subroutine march_resume
 
@@ -158,14 +158,14 @@ contains
 
       before = self%state
       ledger_before = self%ledger
-      call system_begin_step(self%system, scene, self%state%i_step, error)
+      call system_begin_step(self%system, scene, self%state%clock%i_step, error)
       if (.not. allocated(error)) call report_unresolved(scene, self%system, self%state%u, &
          self%system%notes, error)
       if (.not. allocated(error)) call check_held(self, scene, error)
-      self%state%critical_h = 0.0_wp
+      self%state%explicit%critical_h = 0.0_wp
       if (.not. allocated(error)) call prepare(self, scene, error)
-      before%critical_h = self%state%critical_h
-      before%critical_element = self%state%critical_element
+      before%explicit%critical_h = self%state%explicit%critical_h
+      before%explicit%critical_element = self%state%explicit%critical_element
       self%state = before
       self%state%base = factor_base_t()
       self%ledger = ledger_before
@@ -178,7 +178,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(dp) :: deadline
 
-      associate (step => scene%step(self%state%i_step), state => self%state)
+      associate (step => scene%step(self%state%clock%i_step), state => self%state)
          call choose_scheme(self, step)
          call check_tolerance(self, scene, error)
          if (allocated(error)) return
@@ -223,7 +223,7 @@ contains
       integer :: i
 
       do i = 1, size(self%system%contact)
-         options = scene%step(self%state%i_step)%contact
+         options = scene%step(self%state%clock%i_step)%contact
          if (i <= size(scene%pair)) then
             if (scene%pair(i)%has_options) options = scene%pair(i)%options
          end if
@@ -233,7 +233,7 @@ contains
             if (.not. scene%step(1)%resolves_overclosure) cycle
             call overclosure_follow_arcs(contact, scene%x, scene%u0, options, change)
          end associate
-         if (i > size(scene%pair) .or. .not. change > 0.0_wp .or. self%state%i_step > 1) cycle
+         if (i > size(scene%pair) .or. .not. change > 0.0_wp .or. self%state%clock%i_step > 1) cycle
          associate (pair => scene%pair(i))
             call note_add(self%system%notes, "surfaces " // scene%surface(pair%slave)%name // &
                " and " // scene%surface(pair%master)%name // ": gaps are measured between the " // &
@@ -282,11 +282,12 @@ contains
       type(step_t), intent(in) :: step
 
       call march_count_grid(self, step)
-      if (self%is_controlled .and. step%tolerance > 0.0_wp) call accuracy_begin(self, scene)
+      if (self%grid%is_controlled .and. step%tolerance > 0.0_wp) call accuracy_begin(self, scene)
       associate (state => self%state)
-         if (.not. state%is_off_grid) state%step_time = march_grid_time(self, step, state%n_grid)
-         if (state%n_part > 0) state%step_time = march_part_time(self, step, &
-            state%n_grid*self%n_unit + state%n_part)
+         if (.not. state%clock%is_off_grid) state%clock%step_time &
+            = march_grid_time(self, step, state%clock%n_grid)
+         if (state%clock%n_part > 0) state%clock%step_time = march_part_time(self, step, &
+            state%clock%n_grid*self%grid%n_unit + state%clock%n_part)
       end associate
    end subroutine begin_times
 
@@ -397,7 +398,7 @@ contains
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
 
-      associate (step => scene%step(self%state%i_step))
+      associate (step => scene%step(self%state%clock%i_step))
          if (.not. step%scheme%masses_resist .or. .not. step%tolerance > 0.0_wp) return
          if (self%scheme%error_constant() > 0.0_wp) return
          call raise(error, err_input, where_text(scene, step%tolerance_origin) // ": error: " // &

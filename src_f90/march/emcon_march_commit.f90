@@ -216,7 +216,7 @@ contains
 
       call phase_enter(self%system%phases, phase_restitution, left)
       call jumps_begin(self%jump)
-      if (self%scheme%row%masses_resist .and. scene%step(self%state%i_step)%initiation &
+      if (self%scheme%row%masses_resist .and. scene%step(self%state%clock%i_step)%initiation &
          == initiation_velocity_update) call restore_energy(self, notes, error)
       if (self%scheme%row%masses_resist .and. self%active%set%n > self%active%set%n_permanent &
          .and. .not. allocated(error)) call restitution_take(self, notes, error)
@@ -236,33 +236,34 @@ contains
 
       associate (state => self%state, set => self%active%set, layer => self%layer, &
             soft => self%explicit%soft(self%explicit%i_start))
-         state%is_active = .false.
-         state%lam = 0.0_wp
-         state%closure = 0.0_wp
-         state%sliding = 0
-         state%drag = 0.0_wp
-         call softness_keep(self%active%softness, set, state%closure)
+         state%contacts%is_active = .false.
+         state%contacts%lam = 0.0_wp
+         state%contacts%closure = 0.0_wp
+         state%contacts%sliding = 0
+         state%contacts%drag = 0.0_wp
+         call softness_keep(self%active%softness, set, state%contacts%closure)
          if (self%active%softness%is_at_ends) then
-            state%is_active(soft%id) = .true.
-            state%lam(soft%id) = soft%lam
-            call softness_keep(self%active%softness, soft, state%closure)
+            state%contacts%is_active(soft%id) = .true.
+            state%contacts%lam(soft%id) = soft%lam
+            call softness_keep(self%active%softness, soft, state%contacts%closure)
          end if
          do k = 1, set%n
-            state%is_active(set%id(k)) = .true.
-            state%lam(set%id(k)) = set%lam(k)
+            state%contacts%is_active(set%id(k)) = .true.
+            state%contacts%lam(set%id(k)) = set%lam(k)
             ! What has opened stores nothing that a later step could give back.
             if (set%gives_way .and. set%is_stored .and. k > set%n_permanent) &
-               state%is_active(set%id(k)) = set%law(k)%law%closure() < 0.0_wp
+               state%contacts%is_active(set%id(k)) = set%law(k)%law%closure() < 0.0_wp
             if (.not. set%item(k)%rubs) cycle
-            state%sliding(set%id(k)) = friction_slides(self%active%friction, set%id(k))
+            state%contacts%sliding(set%id(k)) = friction_slides(self%active%friction, set%id(k))
             drag = condition_drag(set%item(k), set%lam(k))
-            state%drag(set%id(k)) = drag(1)
-            state%slip(set%id(k)) = state%slip(set%id(k)) + set%item(k)%slip(1)
-            state%slip_path(set%id(k)) = state%slip_path(set%id(k)) + norm2(set%item(k)%slip)
+            state%contacts%drag(set%id(k)) = drag(1)
+            state%contacts%slip(set%id(k)) = state%contacts%slip(set%id(k)) + set%item(k)%slip(1)
+            state%contacts%slip_path(set%id(k)) = state%contacts%slip_path(set%id(k)) &
+               + norm2(set%item(k)%slip)
          end do
          if (.not. layer%is_settled) return
-         state%is_active(layer%n_before + 1:) = layer%acts
-         state%lam(layer%n_before + 1:) = layer%lam
+         state%contacts%is_active(layer%n_before + 1:) = layer%acts
+         state%contacts%lam(layer%n_before + 1:) = layer%lam
       end associate
    end subroutine keep_constraints
 
@@ -381,7 +382,7 @@ contains
             contact_work = sum((motion%evaluation%start_weight*state%contact &
                + self%newton%contact) *motion%du)/(1.0_wp + motion%evaluation%start_weight)
             self%ledger%external_work = self%ledger%external_work &
-               + 0.5_wp*sum((state%load + part(role_external)%force)*motion%du) &
+               + 0.5_wp*sum((state%history%load + part(role_external)%force)*motion%du) &
                + sum(state%reaction*motion%du) + sum(part(role_inertia)%force*motion%offset) &
                /(1.0_wp + motion%evaluation%start_weight)
          else if (self%scheme%row%masses_resist) then

@@ -37,12 +37,12 @@ contains
       integer(int64) :: from, n
 
       if (allocated(self%before)) deallocate(self%before)
-      self%judges_size = .true.
+      self%grid%judges_size = .true.
       call march_match(self, scene, increment, error)
       if (allocated(error)) return
       associate (state => self%state)
          from = place_of(self)
-         if (state%control%h_before > 0.0_wp .or. .not. scene%step(state%i_step)%tolerance &
+         if (state%control%h_before > 0.0_wp .or. .not. scene%step(state%clock%i_step)%tolerance &
             > 0.0_wp) then
             n = next_units(self, scene, from)
             call go(self, scene, from, n, increment, error)
@@ -51,9 +51,9 @@ contains
          end if
          if (allocated(error)) return
          from = from + n
-         state%n_grid = int(from/self%n_unit)
-         state%n_part = int(mod(from, self%n_unit))
-         state%step_time = march_part_time(self, scene%step(state%i_step), from)
+         state%clock%n_grid = int(from/self%grid%n_unit)
+         state%clock%n_part = int(mod(from, self%grid%n_unit))
+         state%clock%step_time = march_part_time(self, scene%step(state%clock%i_step), from)
       end associate
    end subroutine march_controlled
 
@@ -71,7 +71,7 @@ contains
       self%before = rollback_t(self%state, self%ledger)
       do
          n = next_units(self, scene, from)
-         if (n == self%n_least) then
+         if (n == self%grid%n_least) then
             call go(self, scene, from, n, increment, error)
             return
          end if
@@ -90,7 +90,7 @@ contains
          call factor_policy_forget(self%newton%factor_policy, self%newton%correction)
          increment%done = 0.0_wp
       end do
-      increment%h = march_size(self, scene%step(self%state%i_step), from, n)
+      increment%h = march_size(self, scene%step(self%state%clock%i_step), from, n)
    end subroutine start
 
    !> Go on by `n` units, or by fewer where that fails.
@@ -106,18 +106,18 @@ contains
       character(len=:), allocatable :: reason
       integer :: status
 
-      associate (step => scene%step(self%state%i_step))
+      associate (step => scene%step(self%state%clock%i_step))
          do
             part%h = march_size(self, step, from, n)
             part%start%step_time = march_part_time(self, step, from)
-            part%start%total_time = self%state%start_time + part%start%step_time
-            part%start%h_before = self%state%h_before
-            part%may_cut = n > self%n_least
+            part%start%total_time = self%state%clock%start_time + part%start%step_time
+            part%start%h_before = self%state%history%h_before
+            part%may_cut = n > self%grid%n_least
             increment%h = part%h
             call march_attempt(self, scene, part, increment, status, reason, error)
             if (allocated(error)) return
             if (status == 0) exit
-            if (n <= self%n_least .and. status /= step_passes_event) then
+            if (n <= self%grid%n_least .and. status /= step_passes_event) then
                call march_stop(self, scene, part, "with h = " // to_text(part%h) // &
                   ", the smallest allowed, " // reason, error)
                return
@@ -143,7 +143,7 @@ contains
       logical :: is_slow
 
       increment%done = increment%done + part%h
-      associate (step => scene%step(self%state%i_step), control => self%state%control)
+      associate (step => scene%step(self%state%clock%i_step), control => self%state%control)
          if (step%event_fraction > 0.0_wp) call events_tell(self, scene, step, part, increment)
          is_slow = 2*self%newton%convergence%n_iteration > self%newton%convergence%maximum
          if (step%tolerance > 0.0_wp) then
@@ -151,9 +151,9 @@ contains
                to_text(self%step_check%ratio, 3) // " times TOLERANCE with the smallest increment")
             call accuracy_keep(self, part%h)
          end if
-         call control_accept(control, real(n, wp)/real(self%n_unit, wp), self%step_check%ratio, &
-            is_slow .and. step%tolerance > 0.0_wp, self%least_power, &
-            self%largest_power)
+         call control_accept(control, real(n, wp)/real(self%grid%n_unit, wp), &
+            self%step_check%ratio, is_slow .and. step%tolerance > 0.0_wp, self%grid%least_power, &
+            self%grid%largest_power)
       end associate
    end subroutine take_over
 
@@ -168,16 +168,16 @@ contains
       power = self%state%control%power
       if (power > 0) then
          do while (power > 0)
-            if (keeps_apart(self, scene, scale(scene%step(self%state%i_step)%h, power))) exit
+            if (keeps_apart(self, scene, scale(scene%step(self%state%clock%i_step)%h, power))) exit
             power = power - 1
          end do
       end if
-      size = self%n_unit
+      size = self%grid%n_unit
       if (power >= 0) size = size*2_int64**power
       if (power < 0) size = size/2_int64**(-power)
-      size = max(self%n_least, size)
+      size = max(self%grid%n_least, size)
       n = size - mod(from, size)
-      n = min(n, march_next_corner(self, int(from/self%n_unit))*self%n_unit - from)
+      n = min(n, march_next_corner(self, int(from/self%grid%n_unit))*self%grid%n_unit - from)
    end function next_units
 
    !> Do boxes about the bodies stay apart for a time `h`? Only then may increments be longer than
@@ -227,27 +227,27 @@ contains
       before = n
       if (status == step_passes_event) then
          self%state%control%n_less(why_event) = self%state%control%n_less(why_event) + 1
-         window = real(self%n_window, wp)
+         window = real(self%grid%n_window, wp)
          n = int(min(real(n, wp), max(0.0_wp, self%step_check%event_at*real(n, wp) &
             - margin*window)), int64)
-         n = max(n, before/least_share, self%n_window)
-         n = min(n, max(self%n_window, before - before/least_share))
+         n = max(n, before/least_share, self%grid%n_window)
+         n = min(n, max(self%grid%n_window, before - before/least_share))
          return
       end if
       ratio = 0.0_wp
       if (any(status == [step_rough, step_strikes])) ratio = self%step_check%ratio
       associate (control => self%state%control)
          power = control%power
-         call control_refuse(control, real(n, wp)/real(self%n_unit, wp), ratio, why_of(status), &
-            self%least_power)
+         call control_refuse(control, real(n, wp)/real(self%grid%n_unit, wp), ratio, &
+            why_of(status), self%grid%least_power)
          n = next_units(self, scene, from)
-         do while (n >= before .and. control%power > self%least_power)
+         do while (n >= before .and. control%power > self%grid%least_power)
             control%power = control%power - 1
             n = next_units(self, scene, from)
          end do
-         if (n >= before) n = max(self%n_least, before/2)
+         if (n >= before) n = max(self%grid%n_least, before/2)
          ! What is no matter of accuracy is over with the increment.
-         if (.not. scene%step(self%state%i_step)%tolerance > 0.0_wp) control%power = &
+         if (.not. scene%step(self%state%clock%i_step)%tolerance > 0.0_wp) control%power = &
             max(0, power - 1)
       end associate
    end subroutine shorten
@@ -274,7 +274,8 @@ contains
    pure integer(int64) function place_of(self)
       type(march_t), intent(in) :: self
 
-      place_of = int(self%state%n_grid, int64)*self%n_unit + int(self%state%n_part, int64)
+      place_of = int(self%state%clock%n_grid, int64)*self%grid%n_unit &
+         + int(self%state%clock%n_part, int64)
    end function place_of
 
 end module emcon_march_control

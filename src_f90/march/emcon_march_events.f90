@@ -110,13 +110,13 @@ contains
       character(len=:), allocatable :: what
       integer :: pair, i, id
 
-      call find_events(self, step, self%active%was_active, self%state%is_active, is_event)
+      call find_events(self, step, self%active%was_active, self%state%contacts%is_active, is_event)
       do pair = 1, self%system%n_pair
          do i = 1, self%system%contact(pair)%contact%n_constraint
             id = self%system%first_constraint(pair) + i
             if (.not. is_event(id)) cycle
             what = "ends"
-            if (self%state%is_active(id)) what = "begins"
+            if (self%state%contacts%is_active(id)) what = "begins"
             self%state%control%n_event = self%state%control%n_event + 1
             call note_add(increment%notes, "event: contact " // what // " in pair " // &
                to_text(pair) // " at slave node " // &

@@ -32,15 +32,16 @@ contains
       if (.not. h_max > 0.0_wp) then
          h_max = merge(step%h, step%duration, step%scheme%masses_resist)
       end if
-      self%most_stride = 1
+      self%grid%most_stride = 1
       if (.not. step%is_direct) then
-         do while (2*self%most_stride*step%h <= h_max .and. self%most_stride < self%n_grid)
-            self%most_stride = 2*self%most_stride
+         do while (2*self%grid%most_stride*step%h <= h_max &
+            .and. self%grid%most_stride < self%grid%n_grid)
+            self%grid%most_stride = 2*self%grid%most_stride
          end do
       end if
-      self%n_level = default_levels
+      self%grid%n_level = default_levels
       if (step%h_min > 0.0_wp) then
-         self%n_level = max(0, min(most_levels, exponent(step%h/step%h_min) - 1))
+         self%grid%n_level = max(0, min(most_levels, exponent(step%h/step%h_min) - 1))
       end if
       call count_units(self, step)
    end subroutine march_count_grid
@@ -53,17 +54,17 @@ contains
       type(grid_corner_t) :: next
       integer :: i
 
-      if (allocated(self%corner)) deallocate(self%corner)
-      allocate(self%corner(0))
+      if (allocated(self%grid%corner)) deallocate(self%grid%corner)
+      allocate(self%grid%corner(0))
       if (allocated(step%corner) .and. .not. (step%is_direct .or. step%scheme%is_explicit)) then
          do i = 1, size(step%corner)
             next = point_at(self, step, step%corner(i))
-            if (next%n > last_point(self)) self%corner = [self%corner, next]
+            if (next%n > last_point(self)) self%grid%corner = [self%grid%corner, next]
          end do
       end if
       next = point_at(self, step, step%duration)
-      self%n_grid = max(1, next%n)
-      self%corner = pack(self%corner, self%corner%n < self%n_grid)
+      self%grid%n_grid = max(1, next%n)
+      self%grid%corner = pack(self%grid%corner, self%grid%corner%n < self%grid%n_grid)
    end subroutine count_points
 
    !> The point of the grid at `time`, after all corners so far.
@@ -88,7 +89,7 @@ contains
       type(march_t), intent(in) :: self
 
       last_point = 0
-      if (size(self%corner) > 0) last_point = self%corner(size(self%corner))%n
+      if (size(self%grid%corner) > 0) last_point = self%grid%corner(size(self%grid%corner))%n
    end function last_point
 
    !> Where the whole increments begin that reach point `n`: the last corner between such, or the
@@ -99,9 +100,9 @@ contains
       type(grid_corner_t) :: base
       integer :: i
 
-      do i = size(self%corner), 1, -1
-         if (.not. self%corner(i)%is_between .or. self%corner(i)%n > n) cycle
-         base = self%corner(i)
+      do i = size(self%grid%corner), 1, -1
+         if (.not. self%grid%corner(i)%is_between .or. self%grid%corner(i)%n > n) cycle
+         base = self%grid%corner(i)
          return
       end do
    end function base_of
@@ -112,10 +113,10 @@ contains
       integer, intent(in) :: n                   !! >= 0
       integer :: i
 
-      next = self%n_grid
-      do i = size(self%corner), 1, -1
-         if (self%corner(i)%n <= n) return
-         next = self%corner(i)%n
+      next = self%grid%n_grid
+      do i = size(self%grid%corner), 1, -1
+         if (self%grid%corner(i)%n <= n) return
+         next = self%grid%corner(i)%n
       end do
    end function march_next_corner
 
@@ -125,25 +126,26 @@ contains
       type(step_t), intent(in) :: step
       integer :: n, power
 
-      self%judges_size = .false.
-      self%is_controlled = step%scheme%masses_resist .and. .not. step%scheme%is_explicit .and. &
-         (step%tolerance > 0.0_wp .or. step%event_fraction > 0.0_wp)
-      if (.not. self%is_controlled) return
-      self%h_deck = step%h
-      n = self%n_level
+      self%grid%judges_size = .false.
+      self%grid%is_controlled = step%scheme%masses_resist &
+         .and. .not. step%scheme%is_explicit .and. (step%tolerance > 0.0_wp &
+         .or. step%event_fraction > 0.0_wp)
+      if (.not. self%grid%is_controlled) return
+      self%grid%h_deck = step%h
+      n = self%grid%n_level
       if (step%event_fraction > 0.0_wp) n = max(n, min(most_levels, &
          1 - exponent(step%event_fraction)))
-      self%n_unit = 2_int64**n
-      self%n_least = 2_int64**(n - self%n_level)
-      self%n_window = 0
-      if (step%event_fraction > 0.0_wp) self%n_window = max(1_int64, &
-         int(step%event_fraction*real(self%n_unit, wp), int64))
-      power = exponent(real(self%most_stride, wp)) - 1
+      self%grid%n_unit = 2_int64**n
+      self%grid%n_least = 2_int64**(n - self%grid%n_level)
+      self%grid%n_window = 0
+      if (step%event_fraction > 0.0_wp) self%grid%n_window = max(1_int64, &
+         int(step%event_fraction*real(self%grid%n_unit, wp), int64))
+      power = exponent(real(self%grid%most_stride, wp)) - 1
       if (step%tolerance > 0.0_wp .and. .not. step%h_max > 0.0_wp) power = &
-         exponent(real(self%n_grid, wp)) - 1
-      self%largest_power = min(power, most_power)
-      self%least_power = -self%n_level
-      if (.not. step%h_min > 0.0_wp) self%least_power = -min(self%n_level, error_levels)
+         exponent(real(self%grid%n_grid, wp)) - 1
+      self%grid%largest_power = min(power, most_power)
+      self%grid%least_power = -self%grid%n_level
+      if (.not. step%h_min > 0.0_wp) self%grid%least_power = -min(self%grid%n_level, error_levels)
    end subroutine count_units
 
    !> Increments of a step in which none is cut.
@@ -156,10 +158,10 @@ contains
       n = 0
       done = 0
       stride = 1
-      do while (done < march%n_grid)
+      do while (done < march%grid%n_grid)
          done = min(done + stride, march_next_corner(march, done))
          n = n + 1
-         if (mod(n, easy_increments) == 0) stride = min(2*stride, march%most_stride)
+         if (mod(n, easy_increments) == 0) stride = min(2*stride, march%grid%most_stride)
       end do
    end function march_count_increments
 
@@ -167,7 +169,7 @@ contains
    pure logical function march_is_done(self)
       type(march_t), intent(in) :: self
 
-      march_is_done = self%state%n_grid >= self%n_grid
+      march_is_done = self%state%clock%n_grid >= self%grid%n_grid
    end function march_is_done
 
    !> Time since the start of the step at grid point `n`.
@@ -180,7 +182,7 @@ contains
 
       base = base_of(self, n)
       march_grid_time = base%time + real(n - base%n, wp)*step%h
-      if (n >= self%n_grid) march_grid_time = step%duration
+      if (n >= self%grid%n_grid) march_grid_time = step%duration
    end function march_grid_time
 
    !> Time since the start of the step after `n` units.
@@ -191,10 +193,10 @@ contains
       integer :: whole
       real(wp) :: part
 
-      whole = int(n/self%n_unit)
+      whole = int(n/self%grid%n_unit)
       march_part_time = march_grid_time(self, step, whole)
-      if (mod(n, self%n_unit) == 0) return
-      part = real(mod(n, self%n_unit), wp)/real(self%n_unit, wp)
+      if (mod(n, self%grid%n_unit) == 0) return
+      part = real(mod(n, self%grid%n_unit), wp)/real(self%grid%n_unit, wp)
       march_part_time = march_part_time + part*interval(self, step, whole)
    end function march_part_time
 
@@ -233,9 +235,9 @@ contains
       integer(int64), intent(in) :: from, n      !! >= 0, > 0
       integer :: first, last
 
-      first = int(from/self%n_unit)
-      last = int((from + n - 1)/self%n_unit)
-      h = real(n, wp)/real(self%n_unit, wp)*interval(self, step, last)
+      first = int(from/self%grid%n_unit)
+      last = int((from + n - 1)/self%grid%n_unit)
+      h = real(n, wp)/real(self%grid%n_unit, wp)*interval(self, step, last)
       if (last == first) return
       if (interval(self, step, last) < step%h) h = march_part_time(self, step, from + n) &
          - march_part_time(self, step, from)
@@ -250,18 +252,18 @@ contains
       type(grid_corner_t) :: base
       integer :: n
 
-      associate (state => self%state, step => scene%step(self%state%i_step))
-         n = self%n_grid
+      associate (state => self%state, step => scene%step(self%state%clock%i_step))
+         n = self%grid%n_grid
          base = base_before(time)
          if (time < step%duration) n = min(n, base%n + nint((time - base%time)/step%h))
-         if (n == self%n_grid - 1 .and. is_same(time, step%duration)) n = self%n_grid
-         state%is_off_grid = .not. is_same(time, march_grid_time(self, step, n))
-         state%step_time = time
-         if (.not. state%is_off_grid) state%step_time = march_grid_time(self, step, n)
-         if (state%step_time < march_grid_time(self, step, n)) n = n - 1
-         state%n_grid = n
-         state%n_part = 0
-         state%time = state%start_time + state%step_time
+         if (n == self%grid%n_grid - 1 .and. is_same(time, step%duration)) n = self%grid%n_grid
+         state%clock%is_off_grid = .not. is_same(time, march_grid_time(self, step, n))
+         state%clock%step_time = time
+         if (.not. state%clock%is_off_grid) state%clock%step_time = march_grid_time(self, step, n)
+         if (state%clock%step_time < march_grid_time(self, step, n)) n = n - 1
+         state%clock%n_grid = n
+         state%clock%n_part = 0
+         state%clock%time = state%clock%start_time + state%clock%step_time
       end associate
 
    contains
@@ -272,8 +274,8 @@ contains
          type(grid_corner_t) :: base
          integer :: i
 
-         do i = size(self%corner), 1, -1
-            base = base_of(self, self%corner(i)%n)
+         do i = size(self%grid%corner), 1, -1
+            base = base_of(self, self%grid%corner(i)%n)
             if (base%time <= (1.0_wp + grid_whole)*time) return
          end do
          base = grid_corner_t()

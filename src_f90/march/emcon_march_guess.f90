@@ -28,7 +28,7 @@ contains
 
       finish = instant_later(start, h)
       begin = start
-      begin%h_before = self%state%h_before
+      begin%h_before = self%state%history%h_before
       self%motion%evaluation = self%scheme%evaluation(begin, h)
       call march_past_take(self)
       self%motion%u0 = self%state%u
@@ -38,7 +38,7 @@ contains
       if (self%scheme%row%masses_resist .and. .not. is_at_rest) self%motion%du = h*self%state%v
       where (.not. self%system%space%is_alive) self%motion%du = 0.0_wp
       self%newton%driven = 0.0_wp
-      associate (state => self%state, step => scene%step(self%state%i_step))
+      associate (state => self%state, step => scene%step(self%state%clock%i_step))
          do k = 1, size(step%prescribed)
             associate (a => step%prescribed(k)%dof, i => step%prescribed(k)%node)
                call prescribed_motion(scene, step, step%prescribed(k), finish, &

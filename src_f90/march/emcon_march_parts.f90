@@ -57,29 +57,30 @@ contains
       if (allocated(error)) return
       level = 0
       place = 0
-      do while (place < 2**self%n_level)
+      do while (place < 2**self%grid%n_level)
          part%h = scale(increment%h, -level)
-         part%start%step_time = t0 + scale(real(place, wp), -self%n_level)*increment%h
-         part%start%total_time = self%state%start_time + part%start%step_time
-         part%start%h_before = self%state%h_before
-         part%may_cut = level < self%n_level
+         part%start%step_time = t0 + scale(real(place, wp), -self%grid%n_level)*increment%h
+         part%start%total_time = self%state%clock%start_time + part%start%step_time
+         part%start%h_before = self%state%history%h_before
+         part%may_cut = level < self%grid%n_level
          part%level = level
          call march_attempt(self, scene, part, increment, status, reason, error)
          if (allocated(error)) return
          call count_part(self, part, level > 0 .or. status /= step_done, parts)
          if (status == step_done) then
-            place = place + 2**(self%n_level - level)
-            increment%done = scale(real(place, wp), -self%n_level)*increment%h
-            if (level > 0 .and. mod(place, 2**(self%n_level - level + 1)) == 0) level = level - 1
+            place = place + 2**(self%grid%n_level - level)
+            increment%done = scale(real(place, wp), -self%grid%n_level)*increment%h
+            if (level > 0 .and. mod(place, 2**(self%grid%n_level - level + 1)) == 0) level &
+               = level - 1
          else
             level = level + 1
          end if
-         if (parts%n >= most_parts .and. place < 2**self%n_level) then
+         if (parts%n >= most_parts .and. place < 2**self%grid%n_level) then
             call stop_crawl(self, scene, increment, parts, error)
             return
          end if
          if (status == step_done) cycle
-         if (level <= self%n_level) cycle
+         if (level <= self%grid%n_level) cycle
          call march_stop(self, scene, part, "with h = " // to_text(part%h) // &
             ", the smallest allowed, " // reason, error)
          return
@@ -96,7 +97,7 @@ contains
       parts%n = parts%n + 1
       if (.not. is_cut) return
       if (parts%n == 1 .or. part%h < parts%h_least) parts%h_least = part%h
-      associate (is_active => self%state%is_active)
+      associate (is_active => self%state%contacts%is_active)
          if (.not. allocated(parts%changes)) then
             parts%was_active = is_active
             allocate(parts%changes(size(is_active)), source=.false.)
@@ -105,7 +106,7 @@ contains
             self%active%comes_and_goes
          parts%was_active = is_active
       end associate
-      if (associated(self%watcher)) call self%watcher%tell(self%state%increment + 1, &
+      if (associated(self%watcher)) call self%watcher%tell(self%state%clock%increment + 1, &
          part%start%total_time, parts%n, parts%h_least)
    end subroutine count_part
 
@@ -119,7 +120,7 @@ contains
       character(len=:), allocatable :: nodes
       type(part_t) :: last
 
-      last%start%total_time = self%state%time + increment%done
+      last%start%total_time = self%state%clock%time + increment%done
       nodes = ""
       if (any(parts%changes)) then
          call nodes_text(self, scene, parts%changes, nodes)
@@ -198,7 +199,7 @@ contains
       may_return = any(self%layer%is_massless .and. .not. self%without_density) &
          .and. self%scheme%row%masses_resist .and. any(status == [step_refused, step_diverged, &
          step_singular, step_cycling, step_too_far, step_unbalanced]) .and. &
-         level >= min(return_level, self%n_level)
+         level >= min(return_level, self%grid%n_level)
    end function may_return
 
    !> Give the nodes that seem to be the reason their mass back.
@@ -325,7 +326,7 @@ contains
 
       if (.not. self%scheme%row%masses_resist .and. .not. allocated(self%active%support%text)) then
          call free_motion_text(self%system, scene, &
-            scene%step(self%state%i_step)%prescribed, motion, with_contact=.true., &
+            scene%step(self%state%clock%i_step)%prescribed, motion, with_contact=.true., &
             u=self%state%u)
          if (len(motion) == 0) return
          call holders_text(self%system, size(scene%x, 2), holders)

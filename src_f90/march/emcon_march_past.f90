@@ -24,8 +24,8 @@ contains
    pure subroutine march_past_forget(state)
       type(state_t), intent(inout) :: state
 
-      state%has_past = .false.
-      state%h_before = 0.0_wp
+      state%history%has_past = .false.
+      state%history%h_before = 0.0_wp
    end subroutine march_past_forget
 
    !> Let there be a past, where the scheme asks for one: loads, and what the balance at `start`
@@ -38,15 +38,15 @@ contains
       type(motion_t) :: place
 
       associate (state => self%state, row => self%scheme%row)
-         if (state%has_past .or. .not. row%looks_back) return
-         if (allocated(state%past)) deallocate(state%past, state%load)
-         allocate(state%past(size(scene%x, 1), size(scene%x, 2), row%n_past), source=0.0_wp)
-         allocate(state%load, mold=scene%x)
+         if (state%history%has_past .or. .not. row%looks_back) return
+         if (allocated(state%history%past)) deallocate(state%history%past, state%history%load)
+         allocate(state%history%past(size(scene%x, 1), size(scene%x, 2), row%n_past), source=0.0_wp)
+         allocate(state%history%load, mold=scene%x)
          place = motion_of(evaluation_at_end, scene%x, state%u, at_rest(scene%x), state%v)
          place%evaluation%load_instant = start
-         call system_loads(self%system, place, state%load)
-         state%h_before = 0.0_wp
-         state%has_past = .true.
+         call system_loads(self%system, place, state%history%load)
+         state%history%h_before = 0.0_wp
+         state%history%has_past = .true.
          if (row%is_accelerated) call accelerate(self, place, error)
       end associate
    end subroutine march_past_begin
@@ -63,7 +63,8 @@ contains
       call constraints_evaluate(held, self%system, place)
       associate (state => self%state)
          call velocity_update_accelerate(self%velocity_update, self%system, held, &
-            state%load + state%contact - state%internal, state%v, state%past(:, :, 1), error)
+            state%history%load + state%contact - state%internal, state%v, &
+            state%history%past(:, :, 1), error)
       end associate
    end subroutine accelerate
 
@@ -76,16 +77,18 @@ contains
          if (allocated(motion%carried)) deallocate(motion%carried)
          if (allocated(motion%v_past)) deallocate(motion%v_past, motion%dv_past)
          if (allocated(motion%du_before)) deallocate(motion%du_before)
-         if (.not. state%has_past) return
-         if (motion%evaluation%recalled > 0.0_wp) motion%du_before = state%past(:, :, 1)
+         if (.not. state%history%has_past) return
+         if (motion%evaluation%recalled > 0.0_wp) motion%du_before = state%history%past(:, :, 1)
          if (motion%evaluation%start_weight > 0.0_wp) motion%carried &
-            = motion%evaluation%start_weight *(state%internal - state%load - state%contact)
-         if (size(state%past, 3) == 0) return
+            = motion%evaluation%start_weight *(state%internal - state%history%load - state%contact)
+         if (size(state%history%past, 3) == 0) return
          motion%v_past = at_rest(motion%du)
          motion%dv_past = at_rest(motion%du)
-         do k = 1, size(state%past, 3)
-            motion%v_past = motion%v_past + motion%evaluation%past_velocity(k)*state%past(:, :, k)
-            motion%dv_past = motion%dv_past + motion%evaluation%past_change(k)*state%past(:, :, k)
+         do k = 1, size(state%history%past, 3)
+            motion%v_past = motion%v_past &
+               + motion%evaluation%past_velocity(k)*state%history%past(:, :, k)
+            motion%dv_past = motion%dv_past &
+               + motion%evaluation%past_change(k)*state%history%past(:, :, k)
          end do
       end associate
    end subroutine march_past_take
@@ -97,11 +100,11 @@ contains
       real(wp), intent(in) :: h                  !! of the step, > 0 [T]
 
       associate (state => self%state)
-         if (.not. state%has_past) return
-         if (size(state%past, 3) > 0) call self%scheme%carry(h, self%motion%du, self%motion%v0, &
-            self%v1, state%past)
-         state%load = self%system%response%part(role_external)%force
-         state%h_before = h
+         if (.not. state%history%has_past) return
+         if (size(state%history%past, 3) > 0) call self%scheme%carry(h, self%motion%du, &
+            self%motion%v0, self%v1, state%history%past)
+         state%history%load = self%system%response%part(role_external)%force
+         state%history%h_before = h
       end associate
    end subroutine march_past_keep
 

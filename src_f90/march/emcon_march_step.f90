@@ -59,7 +59,8 @@ contains
       self%step_check = step_check_t()
       self%active%may_cut = part%may_cut
       self%active%gap_tolerance = 0.0_wp
-      if (part%may_cut) self%active%gap_tolerance = scene%step(self%state%i_step)%gap_tolerance
+      if (part%may_cut) self%active%gap_tolerance &
+         = scene%step(self%state%clock%i_step)%gap_tolerance
       self%active%left = [overclosure_left(scene, self%state, part%start%step_time), &
          overclosure_left(scene, self%state, part%start%step_time + part%h)]
       call solve(self, scene, part, increment, status, error)
@@ -74,7 +75,8 @@ contains
       self%end_state%du = self%motion%du
       if (self%layer%is_settled) self%end_state%du = self%end_state%du + self%layer%du
       call overlap_check(self, scene, part, increment, status)
-      if (status == step_done .and. self%judges_size) call judge_size(self, scene, part, status)
+      if (status == step_done .and. self%grid%judges_size) call judge_size(self, scene, part, &
+         status)
       if (status == step_done) call find_ending(self, scene, part, status, error)
       if (status /= step_done .or. allocated(error)) return
       if (any(self%active%comes_and_goes)) call tell_held(self, scene, increment)
@@ -135,9 +137,9 @@ contains
       integer, intent(inout) :: status           !! one of the `step_` codes
       real(wp) :: window
 
-      associate (step => scene%step(self%state%i_step))
+      associate (step => scene%step(self%state%clock%i_step))
          call events_look(self)
-         window = real(self%n_window, wp)/real(self%n_unit, wp)*step%h
+         window = real(self%grid%n_window, wp)/real(self%grid%n_unit, wp)*step%h
          if (window > 0.0_wp) call events_judge(self, step, part, window, status)
          if (step%tolerance > 0.0_wp .and. status == step_done) call accuracy_judge(self, &
             part, step%tolerance, status)
@@ -160,7 +162,7 @@ contains
             .or. self%active%dashpots%is_on) .and. (correction%method == method_null_space &
             .or. self%system%n_constraint == 0)
          call factor_policy_step(factor_policy, correction, self%state%base, part%start, part%h, &
-            self%state%increment, is_lost)
+            self%state%clock%increment, is_lost)
          if (.not. is_lost) return
          motion = motion_of(self%scheme%evaluation(factor_policy%base%start, &
             factor_policy%base%h), self%motion%x, factor_policy%base%u0, factor_policy%base%du)
@@ -233,7 +235,7 @@ contains
       real(wp), intent(in) :: step_time          !! [T]
       real(wp) :: slope
 
-      associate (step => scene%step(state%i_step))
+      associate (step => scene%step(state%clock%i_step))
          overclosure_left = 1.0_wp - step_time/step%duration
          if (step%overclosure_amplitude == 0) return
          associate (amplitude => scene%amplitude(step%overclosure_amplitude))

@@ -21,7 +21,7 @@ module emcon_march_types
    use emcon_velocity_update, only : velocity_update_t
    implicit none
    private
-   public :: march_t, increment_t, part_t, end_state_t, rollback_t, step_check_t, grid_corner_t, &
+   public :: march_t, time_grid_t, error_estimate_t, increment_t, part_t, end_state_t, rollback_t, step_check_t, grid_corner_t, &
       watcher_t
 
    !> Somebody who is told how an increment goes that is made in parts.
@@ -105,7 +105,33 @@ module emcon_march_types
       type(ledger_t) :: ledger
    end type rollback_t
 
+   !> The increments of a step of the deck: its grid of time, and the sizes that there may be.
+   type :: time_grid_t
+      integer :: n_grid = 0                      !! grid increments in the step
+      type(grid_corner_t), allocatable :: corner(:)   !! ascending, before its end
+      integer :: most_stride = 1                 !! largest increment, in grid increments
+      integer :: n_level = 0                     !! halvings allowed
+      logical :: is_controlled = .false.
+      logical :: judges_size = .false.           !! in this increment: it is none of a given size
+      real(wp) :: h_deck = 0.0_wp                !! increment of the deck [T]
+      integer(int64) :: n_unit = 1               !! units of time in the increment of the deck,
+      integer(int64) :: n_least = 1              !! in the smallest one,
+      integer(int64) :: n_window = 0             !! and in one in which an event may lie
+      integer :: least_power = 0, largest_power = 0   !! of two, of sizes that the error asks for
+   end type time_grid_t
+
+   !> What the error of a step is estimated from.
+   type :: error_estimate_t
+      real(wp), allocatable :: mass(:, :)        !! (n_dim, n_node) of each unknown, else 0 [M]
+      !> (n_dim, n_node) mean forces on it over the step: of contact, and all others [M L/T^2]
+      real(wp), allocatable :: push(:, :), force(:, :)
+      !> (n_dim, n_node) change of the mean velocity over the mean of two steps [L/T^2]
+      real(wp), allocatable :: rate(:, :)
+   end type error_estimate_t
+
    type :: march_t
+      type(time_grid_t) :: grid                  !! increments of the step
+      type(error_estimate_t) :: estimate         !! of the error of a step
       type(system_t) :: system
       type(state_t) :: state
       type(ledger_t) :: ledger
@@ -125,24 +151,7 @@ module emcon_march_types
       real(wp) :: clear_until = 0.0_wp           !! nothing for it to see, by `active%travel` [L]
       !> Overlap per edge with which a step began that resolves it
       real(wp) :: meant_overlap = 0.0_wp
-      integer :: n_grid = 0                      !! grid increments in the step
-      type(grid_corner_t), allocatable :: corner(:)   !! ascending, before its end
-      integer :: most_stride = 1                 !! largest increment, in grid increments
-      integer :: n_level = 0                     !! halvings allowed
-      ! Of steps with increments that follow the error or end at events:
-      logical :: is_controlled = .false.
-      logical :: judges_size = .false.           !! in this increment: it is none of a given size
-      real(wp) :: h_deck = 0.0_wp                !! increment of the deck [T]
-      integer(int64) :: n_unit = 1               !! units of time in the increment of the deck,
-      integer(int64) :: n_least = 1              !! in the smallest one,
-      integer(int64) :: n_window = 0             !! and in one in which an event may lie
-      integer :: least_power = 0, largest_power = 0   !! of two, of sizes that the error asks for
       type(step_check_t) :: step_check
-      real(wp), allocatable :: mass(:, :)        !! (n_dim, n_node) of each unknown, else 0 [M]
-      !> (n_dim, n_node) mean forces on it over the step: of contact, and all others [M L/T^2]
-      real(wp), allocatable :: push(:, :), force(:, :)
-      !> (n_dim, n_node) change of the mean velocity over the mean of two steps [L/T^2]
-      real(wp), allocatable :: rate(:, :)
       integer :: revision = 0                    !! changes with the numbering of the unknowns
       type(motion_t) :: motion                   !! of the step
       real(wp), allocatable :: v1(:, :)          !! (n_dim, n_node) velocity at its end

@@ -28,12 +28,13 @@ contains
       logical, intent(out) :: has_changed        !! these are others
       type(error_t), allocatable, intent(out) :: error
 
-      has_changed = any((self%may_be_massless .and. .not. self%state%has_mass) &
+      has_changed = any((self%may_be_massless .and. .not. self%state%contacts%has_mass) &
          .neqv. self%layer%is_massless)
       if (.not. has_changed) return
-      call terms_return_mass(self%system%term, self%may_be_massless, self%state%has_mass, error)
+      call terms_return_mass(self%system%term, self%may_be_massless, self%state%contacts%has_mass, &
+         error)
       if (.not. allocated(error)) call layer_renew(self%layer, scene, &
-         self%may_be_massless .and. .not. self%state%has_mass, self%system, error)
+         self%may_be_massless .and. .not. self%state%contacts%has_mass, self%system, error)
    end subroutine mass_match
 
    !> The massless nodes that keep a step from being solved, and those of their elements: where the
@@ -75,7 +76,7 @@ contains
       integer :: id, pair, i
 
       do id = self%system%first_constraint(1) + 1, self%system%n_constraint
-         if (.not. (self%active%is_active(id) .or. self%state%is_active(id))) cycle
+         if (.not. (self%active%is_active(id) .or. self%state%contacts%is_active(id))) cycle
          call constraint_index(self%system, id, pair, i)
          is_marked(self%system%contact(pair)%contact%node(i)) = .true.
       end do
@@ -107,7 +108,7 @@ contains
 
       call massless_follow(terms_solid(self%system%term), self%may_be_massless, is_back, &
          self%state%v)
-      self%state%has_mass = self%state%has_mass .or. is_back
+      self%state%contacts%has_mass = self%state%contacts%has_mass .or. is_back
       call mass_match(self, scene, has_changed, error)
    end subroutine mass_return
 

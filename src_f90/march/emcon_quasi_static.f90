@@ -34,8 +34,8 @@ contains
 
       if (.not. any(self%without_density)) return
       call body_masses(self%system, mass)
-      call free_motion_text(self%system, scene, scene%step(self%state%i_step)%prescribed, text, &
-         with_contact=.true., is_held=mass > 0.0_dp, u=self%state%u)
+      call free_motion_text(self%system, scene, scene%step(self%state%clock%i_step)%prescribed, &
+         text, with_contact=.true., is_held=mass > 0.0_dp, u=self%state%u)
       if (len(text) > 0) call raise(error, err_analysis, "a MASSLESS section has no inertia to " &
          // "hold it, and contact may open: " // text)
    end subroutine quasi_static_hold
@@ -51,7 +51,8 @@ contains
       if (.not. (any(self%without_density) .and. self%scheme%row%masses_resist)) return
       associate (state => self%state)
          start = motion_of(evaluation_at_end, scene%x, state%u, at_rest(scene%x))
-         start%evaluation%load_instant = instant_later(instant_t(0.0_wp, state%start_time), 0.0_wp)
+         start%evaluation%load_instant = instant_later(instant_t(0.0_wp, state%clock%start_time), &
+            0.0_wp)
          call system_loads(self%system, start, load)
          left = abs(state%internal - load - state%contact)
          left = merge(left, 0.0_wp, self%system%space%numbering%unknown > 0 &

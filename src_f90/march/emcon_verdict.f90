@@ -153,12 +153,12 @@ contains
          call scatter_follow(self%scatter, state%sums%sum, march%scheme%row%masses_resist)
          if (increment%give > self%give) then
             self%give = increment%give
-            self%give_time = state%time
+            self%give_time = state%clock%time
          end if
          self%most_augmentations = max(self%most_augmentations, increment%n_augmentation)
          if (increment%unconverged > self%unconverged) then
             self%unconverged = increment%unconverged
-            self%unconverged_time = state%time
+            self%unconverged_time = state%clock%time
          end if
          do i = 1, size(state%pairs%total)
             self%largest_force(i) = max(self%largest_force(i), &
@@ -208,7 +208,7 @@ contains
       associate (overlap => increment%overlap, stray => increment%stray)
          if (max(overlap%depth, stray%depth) <= self%deepest) return
          self%deepest = max(overlap%depth, stray%depth)
-         self%deepest_time = march%state%time
+         self%deepest_time = march%state%clock%time
          if (overlap%depth >= stray%depth) then
             call overlap_text(overlap, scene%node_label, march%system%space%body, self%place)
          else
@@ -235,7 +235,7 @@ contains
          if (max(self%small%rotation(i), self%small%strain(i)) <= small_limit) cycle
          call add_warning(self, "section " // scene%section(self%small%section(i))%set // &
             " is linear, but its rotations or strains are not small from time " // &
-            to_text(march%state%time, 9) // " on: KINEMATICS=NONLINEAR would follow them")
+            to_text(march%state%clock%time, 9) // " on: KINEMATICS=NONLINEAR would follow them")
       end do
    end subroutine follow_linear
 

@@ -223,16 +223,17 @@ contains
 
       associate (state => stepper%march%state)
          if (allocated(output%time)) then
-            slack = 0.5_wp*sqrt(epsilon(1.0_wp))*stepper%scene%step(state%i_step)%duration
-            before = last_time - state%start_time
-            now = state%time - state%start_time
+            slack = 0.5_wp*sqrt(epsilon(1.0_wp))*stepper%scene%step(state%clock%i_step)%duration
+            before = last_time - state%clock%start_time
+            now = state%clock%time - state%clock%start_time
             is_due = any(output%time > before + slack .and. output%time <= now + slack)
          else if (output%frequency == 0) then
             is_due = .false.
          else
-            is_due = mod(state%increment - state%n_before, output%frequency) == 0
+            is_due = mod(state%clock%increment - state%clock%n_before, output%frequency) == 0
          end if
-         is_due = is_due .or. (output%frequency > 0 .and. state%n_grid >= stepper%march%n_grid)
+         is_due = is_due .or. (output%frequency > 0 &
+            .and. state%clock%n_grid >= stepper%march%grid%n_grid)
       end associate
    end function is_due
 
@@ -249,7 +250,7 @@ contains
 
       is_written = .false.
       do i = 1, size(self)
-         associate (series => self(i), i_step => stepper%march%state%i_step)
+         associate (series => self(i), i_step => stepper%march%state%clock%i_step)
             if (series%step /= i_step) cycle
             if (.not. is_due(stepper, stepper%scene%step(i_step)%output(series%request), &
                last_time)) cycle
@@ -258,8 +259,8 @@ contains
             values = quantity_values(stepper, trim(series%variable), series%place)
             values = values(:, series%item)
             if (series%is_total) values = reshape(sum(values, dim=2), [size(values, 1), 1])
-            call history_set_append(history, series%i_set, real(stepper%march%state%time, dp), &
-               values, error)
+            call history_set_append(history, series%i_set, real(stepper%march%state%clock%time, &
+               dp), values, error)
             if (allocated(error)) return
          end associate
       end do

@@ -243,7 +243,7 @@ contains
    pure logical function is_large(stepper)
       type(stepper_t), intent(in) :: stepper
 
-      is_large = stepper%scene%step(stepper%march%state%i_step)%nlgeom
+      is_large = stepper%scene%step(stepper%march%state%clock%i_step)%nlgeom
    end function is_large
 
    !> CDIS gap, + open, NaN where not measured (1); CSTR pressure and active flag (2); CF force of
@@ -267,12 +267,13 @@ contains
          case ("CSTR")
             allocate(values(2, n))
             values(1, :) = 0.0_dp
-            where (state%pairs%area > 0.0_wp) values(1, :) = real(state%lam/state%pairs%area, dp)
+            where (state%pairs%area > 0.0_wp) values(1, :) &
+               = real(state%contacts%lam/state%pairs%area, dp)
             if (allocated(state%pairs%jump_lam)) then
                where (state%pairs%area > 0.0_wp) values(1, :) = values(1, :) &
                   + real(state%pairs%jump_lam/state%pairs%area, dp)
             end if
-            values(2, :) = merge(1.0_dp, 0.0_dp, state%is_active)
+            values(2, :) = merge(1.0_dp, 0.0_dp, state%contacts%is_active)
          case ("CSHEAR", "CSLIP")
             values = rubbing(stepper, variable)
          case ("CF")
@@ -296,14 +297,14 @@ contains
       if (.not. stepper%march%active%friction%is_on) return
       associate (state => stepper%march%state, mu => stepper%march%active%friction%mu)
          if (variable == "CSLIP") then
-            values(1, :) = real(state%slip, dp)
-            values(n, :) = real(state%slip_path, dp)
+            values(1, :) = real(state%contacts%slip, dp)
+            values(n, :) = real(state%contacts%slip_path, dp)
             return
          end if
-         where (state%pairs%shear_area > 0.0_wp) values(1, :) = real(state%drag &
+         where (state%pairs%shear_area > 0.0_wp) values(1, :) = real(state%contacts%drag &
             /state%pairs%shear_area, dp)
-         where (state%is_active .and. mu > 0.0_wp) values(n, :) = merge(1.0_dp, 2.0_dp, &
-            state%sliding == 0)
+         where (state%contacts%is_active .and. mu > 0.0_wp) values(n, :) = merge(1.0_dp, 2.0_dp, &
+            state%contacts%sliding == 0)
       end associate
    end function rubbing
 

@@ -53,8 +53,8 @@ contains
          call log_start(self%log, stepper, diagnostic, source%file_name(source%file(1))%text)
       end associate
       associate (state => stepper%march%state)
-         if (state%increment > 0) call log_line(self%log, "recorded from increment " // &
-            to_text(state%increment) // " on, time " // to_text(state%time, 9))
+         if (state%clock%increment > 0) call log_line(self%log, "recorded from increment " // &
+            to_text(state%clock%increment) // " on, time " // to_text(state%clock%time, 9))
       end associate
       call write_down(self, stepper, nothing, error)
    end subroutine record_begin

@@ -171,7 +171,7 @@ contains
       call history_resume(self%history, base, run, column, n_row, error)
       if (allocated(error)) return
       self%n_row = n_row
-      self%last_time = stepper%march%state%time
+      self%last_time = stepper%march%state%clock%time
       call define_sets(self, stepper, error)
    end subroutine recorder_resume
 
@@ -245,8 +245,8 @@ contains
       real(wp) :: momenta(n_momentum(stepper%scene), stepper%march%system%space%n_body)
 
       associate (state => stepper%march%state, ledger => stepper%march%ledger)
-         call history_append(self%history, [real(dp) :: real(state%increment, dp), &
-            real(state%time, dp), real(increment%h, dp), real(ledger%kinetic, dp), &
+         call history_append(self%history, [real(dp) :: real(state%clock%increment, dp), &
+            real(state%clock%time, dp), real(increment%h, dp), real(ledger%kinetic, dp), &
             real(ledger%strain, dp), real(ledger%external_work, dp), &
             real(ledger%contact_work, dp), real(ledger%stabilization, dp), &
             real(ledger%restitution, dp), real(ledger%decay, dp), real(ledger%damping, dp), &
@@ -261,14 +261,14 @@ contains
          if (allocated(error)) return
          self%n_row = self%n_row + 1
          call ledger_momenta(ledger, stepper%march%system, stepper%scene%x, state, momenta)
-         call history_set_append(self%history, self%momentum_set, real(state%time, dp), &
+         call history_set_append(self%history, self%momentum_set, real(state%clock%time, dp), &
             real(momenta, dp), error)
       end associate
       if (allocated(error)) return
       call print_series_write(self%series, self%history, stepper, self%last_time, error)
       if (allocated(error)) return
       call write_fields(self, stepper, error)
-      self%last_time = stepper%march%state%time
+      self%last_time = stepper%march%state%clock%time
    end subroutine recorder_write
 
    !> Append a frame if a FILE request is due.
@@ -281,7 +281,7 @@ contains
 
       due = self%fields%n_frame == 0
       has_request = .false.
-      associate (step => stepper%scene%step(stepper%march%state%i_step))
+      associate (step => stepper%scene%step(stepper%march%state%clock%i_step))
          do i = 1, size(step%output)
             if (step%output(i)%kind > output_contact_file) cycle
             has_request = .true.
@@ -289,11 +289,11 @@ contains
          end do
       end associate
       if (.not. has_request) then
-         due = due .or. default_frame(stepper, stepper%march%state%time) &
+         due = due .or. default_frame(stepper, stepper%march%state%clock%time) &
             > default_frame(stepper, self%last_time)
       end if
       if (.not. due) return
-      call vtkhdf_begin_frame(self%fields, real(stepper%march%state%time, dp))
+      call vtkhdf_begin_frame(self%fields, real(stepper%march%state%clock%time, dp))
       if (self%fields%n_frame == 0) then
          ! Bodies stay what they are, and so does a field that is not written again.
          call vtkhdf_write(self%fields, trim(body_field%name), cell_bodies(stepper), error)
@@ -327,8 +327,8 @@ contains
 
       associate (state => stepper%march%state)
          default_frame = 0
-         if (time <= state%start_time) return
-         part = (time - state%start_time)/stepper%scene%step(state%i_step)%duration
+         if (time <= state%clock%start_time) return
+         part = (time - state%clock%start_time)/stepper%scene%step(state%clock%i_step)%duration
          default_frame = floor(real(default_frames, wp)*part + sqrt(epsilon(1.0_wp)))
       end associate
    end function default_frame

@@ -202,8 +202,8 @@ contains
       if (allocated(error)) return
       call log_lines(run%log, "", differences)
       call log_line(run%log, "resumed after increment " // &
-         to_text(run%stepper%march%state%increment) // ", time " // &
-         to_text(run%stepper%march%state%time, 9))
+         to_text(run%stepper%march%state%clock%increment) // ", time " // &
+         to_text(run%stepper%march%state%clock%time, 9))
       call march_on(run, options, is_interrupted, report, error)
    end subroutine run_restart
 
@@ -330,14 +330,15 @@ contains
          if (.not. allocated(error)) call recorder_publish(run%recorder, .false., error)
          associate (state => run%stepper%march%state)
             call progress_show(run%progress, real(stepper_fraction(run%stepper), dp), &
-               real(state%time, dp), real(increment%h, dp), increment%n_newton, increment%n_active)
+               real(state%clock%time, dp), real(increment%h, dp), increment%n_newton, &
+               increment%n_active)
          end associate
       end do
       call progress_end(run%progress)
       if (has_stopped) then
          call save(run, error)
          if (.not. allocated(error)) call raise(error, err_interrupt, &
-            "interrupted after increment " // to_text(run%stepper%march%state%increment) // &
+            "interrupted after increment " // to_text(run%stepper%march%state%clock%increment) // &
             "; go on with: emcon restart " // run%base // ".rst.h5")
       end if
       call finish(run, options%is_strict, report, error)
@@ -404,7 +405,7 @@ contains
    pure logical function saves(run)
       type(run_t), intent(in) :: run
 
-      saves = run%stepper%scene%step(run%stepper%march%state%i_step)%restart_frequency /= 0
+      saves = run%stepper%scene%step(run%stepper%march%state%clock%i_step)%restart_frequency /= 0
    end function saves
 
    !> Does it after this increment, before the end of the run? Within a step the last one has to be
@@ -415,9 +416,9 @@ contains
       is_save_due = saves(run) .and. .not. run%saves_end
       if (.not. is_save_due) return
       associate (state => run%stepper%march%state, &
-            frequency => run%stepper%scene%step(run%stepper%march%state%i_step)%restart_frequency)
-         is_save_due = mod(state%increment - state%n_before, frequency) == 0
-         if (is_save_due .and. state%n_grid < run%stepper%march%n_grid) then
+            frequency => run%stepper%scene%step(run%stepper%march%state%clock%i_step)%restart_frequency)
+         is_save_due = mod(state%clock%increment - state%clock%n_before, frequency) == 0
+         if (is_save_due .and. state%clock%n_grid < run%stepper%march%grid%n_grid) then
             is_save_due = pace_is_due(run%pace)
          end if
       end associate

@@ -180,9 +180,9 @@ contains
       call log_lines(log, "   ", increment%notes)
       call log_lines(log, "   warning: ", increment%warnings)
       associate (state => stepper%march%state, ledger => stepper%march%ledger)
-         write(line, "(i10, 2es14.6, i7, i5, i7, 3es17.9)") state%increment, state%time, &
-            increment%h, increment%n_newton, increment%n_cut, increment%n_active, &
-            ledger%kinetic, ledger%strain, ledger%total
+         write(line, "(i10, 2es14.6, i7, i5, i7, 3es17.9)") state%clock%increment, &
+            state%clock%time, increment%h, increment%n_newton, increment%n_cut, &
+            increment%n_active, ledger%kinetic, ledger%strain, ledger%total
       end associate
       if (allocated(increment%residual)) then
          n = min(size(increment%residual), most_residuals)

@@ -235,8 +235,8 @@ contains
       call row_put(row, "step", k, " #")
       associate (step => stepper%scene%step(k), march => stepper%march)
          call row_put(row, "h", step%h, ": h = #")
-         if (step%scheme%is_explicit .and. march%state%i_step == k) call row_put(row, &
-            "critical_h", march%state%critical_h, ", critical h = #")
+         if (step%scheme%is_explicit .and. march%state%clock%i_step == k) call row_put(row, &
+            "critical_h", march%state%explicit%critical_h, ", critical h = #")
          call row_put(row, "courant_number", step%h/transit, &
             ", # wave transit times of the smallest element")
          call row_put(row, "recommended_h", transit, "; to resolve waves: h = #")

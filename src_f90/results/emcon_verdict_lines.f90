@@ -93,10 +93,10 @@ contains
       type(notes_t), intent(out) :: lines
       character(len=:), allocatable :: text
 
-      if (march%state%increment > 0) then
-         call note_add(lines, "increments " // to_text(march%state%increment) // ", time " // &
-            to_text(march%state%time, 9) // ", Newton iterations " // to_text(self%n_newton) // &
-            ", cuts " // to_text(self%n_cut))
+      if (march%state%clock%increment > 0) then
+         call note_add(lines, "increments " // to_text(march%state%clock%increment) &
+            // ", time " // to_text(march%state%clock%time, 9) // ", Newton iterations " &
+            // to_text(self%n_newton) // ", cuts " // to_text(self%n_cut))
          call add_energies(self, march%ledger, lines)
          call add_checked(self, march, lines)
          if (self%n_guarded > 0) then

@@ -8,9 +8,10 @@ module emcon_state
    use emcon_step_control, only : step_control_t
    implicit none
    private
-   public :: state_t
+   public :: state_t, clock_t, contact_state_t, past_t, explicit_state_t
 
-   type :: state_t
+   !> Where it stands in time.
+   type :: clock_t
       integer :: i_step = 0                      !! step of the deck, from 1
       integer :: n_grid = 0                      !! grid increments of h done in this step
       integer :: n_part = 0                      !! and units of the next one
@@ -22,9 +23,10 @@ module emcon_state
       real(wp) :: time = 0.0_wp                  !! total time [T]
       real(wp) :: step_time = 0.0_wp             !! since the start of the step [T]
       logical :: is_off_grid = .false.           !! after grid point `n_grid`, not at it
-      real(wp), allocatable :: u(:, :)           !! (n_dim, n_node) displacement [L]
-      real(wp), allocatable :: v(:, :)           !! (n_dim, n_node) velocity [L/T]
-      real(wp), allocatable :: u_start(:, :)     !! (n_dim, n_node) displacement at the step's start
+   end type clock_t
+
+   !> What is known of contacts, of each constraint.
+   type :: contact_state_t
       logical, allocatable :: has_mass(:)        !! (n_node) contact nodes: it has come back
       logical, allocatable :: is_active(:)       !! (n_constraint)
       real(wp), allocatable :: lam(:)            !! (n_constraint) contact forces, 0 where inactive
@@ -35,6 +37,31 @@ module emcon_state
       real(wp), allocatable :: drag(:)           !! (n_constraint) friction against slip
       real(wp), allocatable :: slip(:)           !! (n_constraint) so far, to and fro [L]
       real(wp), allocatable :: slip_path(:)      !! (n_constraint) the same, all of it >= 0 [L]
+   end type contact_state_t
+
+   !> What schemes look back on.
+   type :: past_t
+      logical :: has_past = .false.              !! the rest is known
+      real(wp) :: h_before = 0.0_wp              !! size of the last step; 0: there is none [T]
+      real(wp), allocatable :: load(:, :)        !! (n_dim, n_node) external forces
+      real(wp), allocatable :: past(:, :, :)     !! (n_dim, n_node, n_past) as the scheme has it
+   end type past_t
+
+   !> What explicit steps know.
+   type :: explicit_state_t
+      real(wp) :: critical_h = 0.0_wp            !! the critical step as last found; 0: not yet [T]
+      integer :: critical_element = 0            !! the fastest one
+      real(wp) :: budget = 0.0_wp                !! energy that there may be [M L^2/T^2]
+   end type explicit_state_t
+
+   type :: state_t
+      type(clock_t) :: clock                     !! where in time
+      type(contact_state_t) :: contacts          !! what acts, with which forces
+      type(past_t) :: history                    !! of schemes that look back
+      type(explicit_state_t) :: explicit         !! of explicit steps
+      real(wp), allocatable :: u(:, :)           !! (n_dim, n_node) displacement [L]
+      real(wp), allocatable :: v(:, :)           !! (n_dim, n_node) velocity [L/T]
+      real(wp), allocatable :: u_start(:, :)     !! (n_dim, n_node) displacement at the step's start
       real(wp), allocatable :: contact(:, :)     !! (n_dim, n_node) nodal contact forces
       type(pair_record_t) :: pairs               !! what each contact pair transmits
       type(pair_sums_t) :: sums                  !! and has transmitted so far
@@ -43,15 +70,6 @@ module emcon_state
       real(wp), allocatable :: internal(:, :)    !! (n_dim, n_node) internal forces
       real(wp), allocatable :: energy(:)         !! (n_element) strain energy
       real(wp) :: potential = 0.0_wp             !! energy of the given forces
-      ! for schemes that look back:
-      logical :: has_past = .false.              !! the rest is known
-      real(wp) :: h_before = 0.0_wp              !! size of the last step; 0: there is none [T]
-      real(wp), allocatable :: load(:, :)        !! (n_dim, n_node) external forces
-      real(wp), allocatable :: past(:, :, :)     !! (n_dim, n_node, n_past) as the scheme has it
-      ! of explicit steps:
-      real(wp) :: critical_h = 0.0_wp            !! the critical step as last found; 0: not yet [T]
-      integer :: critical_element = 0            !! the fastest one
-      real(wp) :: budget = 0.0_wp                !! energy that there may be [M L^2/T^2]
       type(factor_base_t) :: base                !! of the factor that is kept over steps
       type(step_control_t) :: control            !! of the size of increments
    end type state_t

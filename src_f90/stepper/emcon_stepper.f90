@@ -189,7 +189,7 @@ contains
    pure logical function stepper_is_done(self)
       type(stepper_t), intent(in) :: self
 
-      stepper_is_done = self%march%state%i_step >= size(self%scene%step) &
+      stepper_is_done = self%march%state%clock%i_step >= size(self%scene%step) &
          .and. march_is_done(self%march)
    end function stepper_is_done
 
@@ -202,7 +202,7 @@ contains
       call stepper_check_solids(self, error)
       if (stepper_is_done(self) .or. allocated(error)) return
       if (march_is_done(self%march)) then
-         call march_begin_step(self%march, self%scene, self%march%state%i_step + 1, error)
+         call march_begin_step(self%march, self%scene, self%march%state%clock%i_step + 1, error)
          if (allocated(error)) return
          call march_increment(self%march, self%scene, increment, error)
          call notes_append(increment%notes, self%march%system%notes)
@@ -228,7 +228,7 @@ contains
    pure real(wp) function stepper_fraction(self)
       type(stepper_t), intent(in) :: self
 
-      stepper_fraction = min(1.0_wp, self%march%state%time/sum(self%scene%step%duration))
+      stepper_fraction = min(1.0_wp, self%march%state%clock%time/sum(self%scene%step%duration))
    end function stepper_fraction
 
 end module emcon_stepper

@@ -39,16 +39,16 @@ contains
       call check_freedom(label, dof, "is not prescribed", k > 0, error)
       call check_number("the value", value, error)
       if (allocated(error)) return
-      associate (item => self%scene%step(self%march%state%i_step)%prescribed(k))
+      associate (item => self%scene%step(self%march%state%clock%i_step)%prescribed(k))
          if (item%turn > 0) call check_deformable(self, label, node, error)
       end associate
       if (allocated(error)) return
-      associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
-         now = instant_t(state%step_time, state%time)
+      associate (state => self%march%state, step => self%scene%step(self%march%state%clock%i_step))
+         now = instant_t(state%clock%step_time, state%clock%time)
          call prescribed_motion(self%scene, step, step%prescribed(k), now, &
             state%u_start, u, v)
-         if (step%prescribed(k)%amplitude == 0) call ramp_turn(step, state%step_time, u, value, &
-            state%u_start(dof, node))
+         if (step%prescribed(k)%amplitude == 0) call ramp_turn(step, state%clock%step_time, u, &
+            value, state%u_start(dof, node))
          step%prescribed(k)%value = value
          step%prescribed(k)%is_frozen = .false.
       end associate
@@ -76,8 +76,8 @@ contains
       added%dof = dof
       added%value = value
       u_start = self%march%state%u_start(dof, node)
-      associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
-         call ramp_turn(step, state%step_time, state%u(dof, node), value, &
+      associate (state => self%march%state, step => self%scene%step(self%march%state%clock%i_step))
+         call ramp_turn(step, state%clock%step_time, state%u(dof, node), value, &
             state%u_start(dof, node))
          list = [step%prescribed, added]
       end associate
@@ -113,7 +113,7 @@ contains
       call check_freedom(label, dof, "is not prescribed", k > 0, error)
       call check_deformable(self, label, node, error)
       if (allocated(error)) return
-      associate (all_of => self%scene%step(self%march%state%i_step)%prescribed)
+      associate (all_of => self%scene%step(self%march%state%clock%i_step)%prescribed)
          list = pack(all_of, [(i /= k, i = 1, size(all_of))])
       end associate
       call renumber(self, list, error)
@@ -128,7 +128,7 @@ contains
       type(error_t), allocatable :: ignored
       type(prescribed_t), allocatable :: before(:)
 
-      associate (step => self%scene%step(self%march%state%i_step))
+      associate (step => self%scene%step(self%march%state%clock%i_step))
          call move_alloc(step%prescribed, before)
          call move_alloc(list, step%prescribed)
          call march_renumber(self%march, self%scene, error)
@@ -153,15 +153,15 @@ contains
       if (.not. restart_offers(restart, "step_time", .true.)) return
       call stepper_check_open(self, error)
       if (allocated(error)) return
-      associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
+      associate (state => self%march%state, step => self%scene%step(self%march%state%clock%i_step))
          if (restart%is_reading) then
             allocate(list(max(0, restart_size(restart, "prescribed_value"))))
          else
             allocate(list, source=step%prescribed)
          end if
-         call restart_exchange(restart, "step_time", state%step_time)
-         call restart_exchange(restart, "is_off_grid", state%is_off_grid)
-         call loads_exchange(restart, self%scene, state%i_step, load, error)
+         call restart_exchange(restart, "step_time", state%clock%step_time)
+         call restart_exchange(restart, "is_off_grid", state%clock%is_off_grid)
+         call loads_exchange(restart, self%scene, state%clock%i_step, load, error)
          if (allocated(error)) return
       end associate
       call restart_exchange(restart, "prescribed_place", list%node)
@@ -173,7 +173,7 @@ contains
       call restart_check(restart, error)
       if (.not. restart%is_reading .or. allocated(error)) return
       base = self%march%state%base
-      associate (step => self%scene%step(self%march%state%i_step))
+      associate (step => self%scene%step(self%march%state%clock%i_step))
          call move_alloc(step%load, before)
          call move_alloc(load, step%load)
          call renumber(self, list, error)
@@ -197,7 +197,7 @@ contains
       call check_that(dof >= 1 .and. dof <= self%scene%n_dim, "a node has the degrees of " // &
          "freedom 1 to " // to_text(self%scene%n_dim) // ", not " // to_text(dof), error)
       if (allocated(error)) return
-      associate (list => self%scene%step(self%march%state%i_step)%prescribed)
+      associate (list => self%scene%step(self%march%state%clock%i_step)%prescribed)
          k = findloc(list%node == node .and. list%dof == dof, .true., 1)
       end associate
    end subroutine find_prescribed

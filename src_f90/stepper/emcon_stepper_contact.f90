@@ -59,8 +59,8 @@ contains
       associate (march => self%march)
          call gaps_forget(march%system)
          march%state%u = u0
-         march%state%is_active = was_active
-         march%state%lam = 0.0_wp
+         march%state%contacts%is_active = was_active
+         march%state%contacts%lam = 0.0_wp
          march%active%puts_off = .false.
          march%active%support = contact_support_t()
          call constraints_select(march%active%set, [integer ::])
@@ -74,7 +74,8 @@ contains
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
 
-      associate (active => self%march%active, step => stepper%scene%step(self%march%state%i_step))
+      associate (active => self%march%active, &
+         step => stepper%scene%step(self%march%state%clock%i_step))
          active%masses_resist = step%scheme%masses_resist
          active%pushes_out = .not. active%masses_resist
          active%holds_gap = step%initiation == initiation_persistent .and. active%masses_resist

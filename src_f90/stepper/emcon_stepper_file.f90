@@ -132,7 +132,7 @@ contains
       real(wp), intent(in) :: until              !! 0: none was asked for [T]
       type(error_t), allocatable, intent(out) :: error
 
-      associate (time => self%march%state%time)
+      associate (time => self%march%state%clock%time)
          if (until > 0.0_wp .and. .not. until > time) call raise(error, err_input, "--until " // &
             to_text(until) // ": the run is at time " // to_text(time) // " already")
       end associate
@@ -187,22 +187,23 @@ contains
             call restart_exchange(restart, "turned", state%turns%angle)
             call restart_exchange(restart, "moment", state%turns%moment)
          end if
-         call restart_exchange(restart, "lam", state%lam)
-         call restart_exchange(restart, "is_active", state%is_active)
-         if (restart_offers(restart, "closure", any(abs(state%closure) > 0.0_wp))) then
-            call restart_exchange(restart, "closure", state%closure)
+         call restart_exchange(restart, "lam", state%contacts%lam)
+         call restart_exchange(restart, "is_active", state%contacts%is_active)
+         if (restart_offers(restart, "closure", any(abs(state%contacts%closure) > 0.0_wp))) then
+            call restart_exchange(restart, "closure", state%contacts%closure)
          else
-            state%closure = 0.0_wp
+            state%contacts%closure = 0.0_wp
          end if
-         if (restart_offers(restart, "sliding", size(state%sliding) > 0)) then
-            call restart_exchange(restart, "sliding", state%sliding)
-            call restart_exchange(restart, "drag", state%drag)
-            call restart_exchange(restart, "slip", state%slip)
-            call restart_exchange(restart, "slip_path", state%slip_path)
+         if (restart_offers(restart, "sliding", size(state%contacts%sliding) > 0)) then
+            call restart_exchange(restart, "sliding", state%contacts%sliding)
+            call restart_exchange(restart, "drag", state%contacts%drag)
+            call restart_exchange(restart, "slip", state%contacts%slip)
+            call restart_exchange(restart, "slip_path", state%contacts%slip_path)
          end if
          call exchange_past(state, restart)
-         if (restart_offers(restart, "has_mass", any(state%has_mass))) call restart_exchange( &
-            restart, "has_mass", state%has_mass)
+         if (restart_offers(restart, "has_mass", &
+            any(state%contacts%has_mass))) call restart_exchange( restart, "has_mass", &
+            state%contacts%has_mass)
          call exchange_bounds(state, restart)
       end associate
       call exchange_base(self%march%state%base, self%march%state%u, restart)
@@ -217,12 +218,12 @@ contains
       type(state_t), intent(inout) :: state
       type(restart_t), intent(inout) :: restart
 
-      if (restart_offers(restart, "critical_h", state%critical_h > 0.0_wp)) then
-         call restart_exchange(restart, "critical_h", state%critical_h)
-         call restart_exchange(restart, "critical_element", state%critical_element)
-         call restart_exchange(restart, "budget", state%budget)
+      if (restart_offers(restart, "critical_h", state%explicit%critical_h > 0.0_wp)) then
+         call restart_exchange(restart, "critical_h", state%explicit%critical_h)
+         call restart_exchange(restart, "critical_element", state%explicit%critical_element)
+         call restart_exchange(restart, "budget", state%explicit%budget)
       else
-         state%critical_h = 0.0_wp
+         state%explicit%critical_h = 0.0_wp
       end if
    end subroutine exchange_bounds
 
@@ -231,24 +232,24 @@ contains
       type(state_t), intent(inout) :: state
       type(restart_t), intent(inout) :: restart
 
-      if (restart_offers(restart, "load", state%has_past)) then
-         if (.not. allocated(state%load)) allocate(state%load, mold=state%u)
-         call restart_exchange(restart, "load", state%load)
-         call restart_exchange(restart, "h_before", state%h_before)
-         if (.not. allocated(state%past)) allocate(state%past(size(state%u, 1), size(state%u, 2), &
-            restart_size(restart, "past")/size(state%u)))
+      if (restart_offers(restart, "load", state%history%has_past)) then
+         if (.not. allocated(state%history%load)) allocate(state%history%load, mold=state%u)
+         call restart_exchange(restart, "load", state%history%load)
+         call restart_exchange(restart, "h_before", state%history%h_before)
+         if (.not. allocated(state%history%past)) allocate(state%history%past(size(state%u, 1), &
+            size(state%u, 2), restart_size(restart, "past")/size(state%u)))
          call exchange_fields()
-         state%has_past = .true.
+         state%history%has_past = .true.
       end if
 
    contains
 
       subroutine exchange_fields()
-         real(wp) :: flat(size(state%past))
+         real(wp) :: flat(size(state%history%past))
 
-         flat = reshape(state%past, shape(flat))
+         flat = reshape(state%history%past, shape(flat))
          call restart_exchange(restart, "past", flat)
-         state%past = reshape(flat, shape(state%past))
+         state%history%past = reshape(flat, shape(state%history%past))
       end subroutine exchange_fields
 
    end subroutine exchange_past
@@ -257,14 +258,14 @@ contains
       type(state_t), intent(inout) :: state
       type(restart_t), intent(inout) :: restart
 
-      call restart_exchange(restart, "progress", state%i_step)
-      call restart_exchange(restart, "progress", state%n_grid)
-      call restart_exchange(restart, "progress", state%grid_stride)
-      call restart_exchange(restart, "progress", state%n_easy)
-      call restart_exchange(restart, "progress", state%increment)
-      call restart_exchange(restart, "progress", state%n_before)
-      call restart_exchange(restart, "time", state%start_time)
-      call restart_exchange(restart, "time", state%time)
+      call restart_exchange(restart, "progress", state%clock%i_step)
+      call restart_exchange(restart, "progress", state%clock%n_grid)
+      call restart_exchange(restart, "progress", state%clock%grid_stride)
+      call restart_exchange(restart, "progress", state%clock%n_easy)
+      call restart_exchange(restart, "progress", state%clock%increment)
+      call restart_exchange(restart, "progress", state%clock%n_before)
+      call restart_exchange(restart, "time", state%clock%start_time)
+      call restart_exchange(restart, "time", state%clock%time)
    end subroutine exchange_progress
 
    !> What the sizes of increments follow; only in files of runs in which they do.
@@ -274,7 +275,7 @@ contains
 
       associate (control => state%control)
          if (.not. restart_offers(restart, "control", any(control%n_size > 0))) return
-         call restart_exchange(restart, "control", state%n_part)
+         call restart_exchange(restart, "control", state%clock%n_part)
          call restart_exchange(restart, "control", control%power)
          call restart_exchange(restart, "control", control%n_same)
          call restart_exchange(restart, "control", control%n_size)

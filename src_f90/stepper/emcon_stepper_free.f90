@@ -60,8 +60,9 @@ contains
       call stepper_check_solids(self, error)
       call check_that(ieee_is_finite(h), "a step needs a size h > 0 that is finite", error)
       if (allocated(error)) return
-      call check_that(h > least_step*self%march%state%step_time, "a step needs a size h > 0 " // &
-         "that time " // to_text(self%march%state%time) // " can tell, not " // to_text(h), error)
+      call check_that(h > least_step*self%march%state%clock%step_time, &
+         "a step needs a size h > 0 " // "that time " // to_text(self%march%state%clock%time) &
+         // " can tell, not " // to_text(h), error)
       if (allocated(error)) return
       call march_free_increment(self%march, self%scene, h, increment, error)
       if (.not. allocated(error)) call verdict_update(self%verdict, self%scene, self%march, &
@@ -75,11 +76,11 @@ contains
       type(snapshot_t) :: before
 
       call stepper_check_open(self, error)
-      if (.not. allocated(error)) call check_that(self%march%state%i_step < size(self%scene%step), &
-         "step " // to_text(self%march%state%i_step) // " is the last one of the deck", error)
+      if (.not. allocated(error)) call check_that(self%march%state%clock%i_step < size(self%scene%step), &
+         "step " // to_text(self%march%state%clock%i_step) // " is the last one of the deck", error)
       if (allocated(error)) return
       call stepper_snapshot(self, before)
-      call march_begin_step(self%march, self%scene, self%march%state%i_step + 1, error)
+      call march_begin_step(self%march, self%scene, self%march%state%clock%i_step + 1, error)
       if (allocated(error)) call put_back(self, before)
    end subroutine stepper_next_step
 
@@ -120,13 +121,13 @@ contains
       call check_motion(self, next%v, error, time)
       if (present(u)) call measure_rest(self, next, error)
       if (allocated(error)) return
-      if (present(u)) next%closure = 1.0_wp
+      if (present(u)) next%contacts%closure = 1.0_wp
       next%base%is_set = .false.
       call control_forget(next%control)
       call march_go_back(self%march, next, self%march%ledger)
       call gaps_forget(self%march%system)
       if (present(time)) call march_set_time(self%march, self%scene, &
-         time - self%march%state%start_time)
+         time - self%march%state%clock%start_time)
       call ledger_measure(self%march%ledger, self%march%system, self%scene%x, self%march%state)
       call verdict_move(self%verdict, before, self%march%ledger)
    end subroutine stepper_set_state
@@ -154,18 +155,18 @@ contains
       integer :: i
 
       if (present(is_active)) then
-         call check_size("the active set", size(is_active), size(next%lam), error)
+         call check_size("the active set", size(is_active), size(next%contacts%lam), error)
          if (allocated(error)) return
-         next%is_active = is_active
-         where (.not. is_active) next%lam = 0.0_wp
+         next%contacts%is_active = is_active
+         where (.not. is_active) next%contacts%lam = 0.0_wp
       end if
       if (.not. present(lam)) return
-      call check_list("lam", lam, size(next%lam), error)
+      call check_list("lam", lam, size(next%contacts%lam), error)
       if (allocated(error)) return
-      i = findloc(abs(lam) > 0.0_wp .and. .not. next%is_active, .true., 1)
+      i = findloc(abs(lam) > 0.0_wp .and. .not. next%contacts%is_active, .true., 1)
       call check_that(i == 0, "lam is not 0 at constraint " // to_text(i) // &
          ", which does not act", error)
-      next%lam = lam
+      next%contacts%lam = lam
    end subroutine take_contact
 
    !> Velocities and time have to fit the present step of the deck.
@@ -176,15 +177,15 @@ contains
       real(wp), intent(in), optional :: time
 
       if (allocated(error)) return
-      associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
+      associate (state => self%march%state, step => self%scene%step(self%march%state%clock%i_step))
          call check_that(step%scheme%masses_resist .or. .not. any(abs(v) > 0.0_wp), "step " // &
-            to_text(state%i_step) // " of the deck is static: there are no velocities", error)
+            to_text(state%clock%i_step) // " of the deck is static: there are no velocities", error)
          if (.not. present(time)) return
          call check_number("the time", time, error)
          if (allocated(error)) return
-         call check_that(time >= state%start_time, "time " // to_text(time) // " is before the " &
-            // "start of step " // to_text(state%i_step) // " of the deck, " // &
-            to_text(state%start_time), error)
+         call check_that(time >= state%clock%start_time, "time " // to_text(time) &
+            // " is before the " // "start of step " // to_text(state%clock%i_step) &
+            // " of the deck, " // to_text(state%clock%start_time), error)
       end associate
    end subroutine check_motion
 
@@ -239,7 +240,7 @@ contains
       if (allocated(error)) return
       call stepper_snapshot(self, before)
       self%march%state = snapshot%state
-      if (snapshot%state%i_step /= before%state%i_step) then
+      if (snapshot%state%clock%i_step /= before%state%clock%i_step) then
          call march_resume(self%march, self%scene, error)
          if (allocated(error)) then
             call put_back(self, before)
@@ -259,7 +260,7 @@ contains
 
       fits = snapshot%is_taken
       if (fits) fits = size(snapshot%state%u) == size(state%u) &
-         .and. size(snapshot%state%lam) == size(state%lam) &
+         .and. size(snapshot%state%contacts%lam) == size(state%contacts%lam) &
          .and. size(snapshot%state%energy) == size(state%energy)
    end function fits
 

@@ -42,7 +42,7 @@ contains
       load = 0
       call stepper_check_open(self, error)
       if (allocated(error)) return
-      associate (i_step => self%march%state%i_step)
+      associate (i_step => self%march%state%clock%i_step)
          load = place_in(self%scene%step(i_step)%load, kind, find_target(self%scene, kind, label), &
             place)
          call check_that(load > 0, "there is no load of this kind on " // &
@@ -62,14 +62,14 @@ contains
       call stepper_check_open(self, error)
       call check_number("the value", value, error)
       if (allocated(error)) return
-      associate (state => self%march%state, step => self%scene%step(self%march%state%i_step))
+      associate (state => self%march%state, step => self%scene%step(self%march%state%clock%i_step))
          call check_that(load >= 1 .and. load <= size(step%load), "there is no load " // &
-            to_text(load) // ": step " // to_text(state%i_step) // " of the deck has " // &
+            to_text(load) // ": step " // to_text(state%clock%i_step) // " of the deck has " // &
             to_text(size(step%load)), error)
          if (allocated(error)) return
          associate (own => step%load(load))
-            now = ramp_at(step, state%step_time, own%value_start, own%value)
-            call ramp_turn(step, state%step_time, now, value, own%value_start)
+            now = ramp_at(step, state%clock%step_time, own%value_start, own%value)
+            call ramp_turn(step, state%clock%step_time, now, value, own%value_start)
             own%value = value
          end associate
       end associate
@@ -101,7 +101,7 @@ contains
       if (kind == load_gravity) call check_direction(self%scene, direction, error)
       if (allocated(error) .or. size(label) == 0) return
       allocate(number, source=freedom_numbers(self%march%system%space%numbering))
-      associate (step => self%scene%step(self%march%state%i_step))
+      associate (step => self%scene%step(self%march%state%clock%i_step))
          n = size(step%load)
          allocate(list(n + size(label)))
          list(:n) = step%load
@@ -116,7 +116,8 @@ contains
                   to_text(label(i)) // " already: it can be given another value", error)
                if (allocated(error)) return
                new%value = value(i)
-               call ramp_turn(step, self%march%state%step_time, 0.0_wp, value(i), new%value_start)
+               call ramp_turn(step, self%march%state%clock%step_time, 0.0_wp, value(i), &
+                  new%value_start)
                if (kind == load_gravity) new%direction = direction/norm2(direction)
             end associate
          end do
@@ -196,9 +197,9 @@ contains
          call check_choice("the degree of freedom", load%place, 1, self%scene%n_dim, error)
          if (allocated(error)) return
          call check_that(number(self%scene%n_dim*(load%target - 1) + load%place) > 0 .or. &
-            prescribed_find(self%scene%step(self%march%state%i_step)%prescribed, load%target, &
-            load%place) > 0, "node " // to_text(label) // " belongs to no element and no " // &
-            "equation", error)
+            prescribed_find(self%scene%step(self%march%state%clock%i_step)%prescribed, &
+            load%target, load%place) > 0, "node " // to_text(label) &
+            // " belongs to no element and no " // "equation", error)
       case (load_pressure)
          call check_choice("the face", load%place, 1, &
             self%scene%kind(self%scene%element_kind(load%target))%n_face, error)

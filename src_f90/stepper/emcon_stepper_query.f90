@@ -137,8 +137,8 @@ contains
    pure type(instant_t) function now(self)
       type(query_t), intent(in) :: self
 
-      now%step_time = self%march%state%step_time
-      now%total_time = self%march%state%start_time + self%march%state%step_time
+      now%step_time = self%march%state%clock%step_time
+      now%total_time = self%march%state%clock%start_time + self%march%state%clock%step_time
    end function now
 
    !> Evaluate the step of size `h` from the present state to `u1`: what the functions below give
@@ -193,12 +193,12 @@ contains
       logical, intent(in), optional :: is_active(:)
 
       associate (state => self%march%state)
-         if (present(lam)) call check_list("lam", lam, size(state%lam), error)
+         if (present(lam)) call check_list("lam", lam, size(state%contacts%lam), error)
          if (present(is_active)) call check_size("the active set", size(is_active), &
-            size(state%lam), error)
+            size(state%contacts%lam), error)
          if (allocated(error)) return
-         if (present(is_active)) state%is_active = is_active
-         if (present(lam)) state%lam = lam
+         if (present(is_active)) state%contacts%is_active = is_active
+         if (present(lam)) state%contacts%lam = lam
       end associate
    end subroutine take_contact
 
@@ -214,7 +214,7 @@ contains
 
       associate (march => self%march)
          call march_guess(march, stepper%scene, now(self), h, is_at_rest=.true.)
-         associate (list => stepper%scene%step(march%state%i_step)%prescribed)
+         associate (list => stepper%scene%step(march%state%clock%i_step)%prescribed)
             do k = 1, size(list)
                associate (a => list(k)%dof, i => list(k)%node)
                   du = u1(a, i) - march%state%u(a, i)
@@ -238,10 +238,10 @@ contains
       associate (system => self%march%system, active => self%march%active, &
             state => self%march%state)
          call gaps_search(system, self%march%motion, gap)
-         active%is_active = state%is_active .and. gap%is_near
+         active%is_active = state%contacts%is_active .and. gap%is_near
          active%is_active(:system%first_constraint(1)) = system%acts
-         active%lam = state%lam
-         active%softness%closure = state%closure
+         active%lam = state%contacts%lam
+         active%softness%closure = state%contacts%closure
          active%n_tried = 0
       end associate
    end subroutine begin_contact

@@ -28,7 +28,7 @@ program fortran_host
       call go_on(model(2), h(2), 2)
       do i = 1, 2
          associate (ledger => model(i)%march%ledger)
-            print "(a, i0, 4es25.16)", "model ", i, model(i)%march%state%time, ledger%total, &
+            print "(a, i0, 4es25.16)", "model ", i, model(i)%march%state%clock%time, ledger%total, &
                ledger%momentum
          end associate
       end do
@@ -79,7 +79,7 @@ contains
       call require(error)
       call go_on(stepper, 0.03_wp, 3)
       print "(a, 3(1x, l1))", "same", all(abs(stepper%march%state%u - first%state%u) <= 0.0_wp), &
-         all(abs(stepper%march%state%lam - first%state%lam) <= 0.0_wp), &
+         all(abs(stepper%march%state%contacts%lam - first%state%contacts%lam) <= 0.0_wp), &
          any(abs(first%state%u - start%state%u) > 0.0_wp)
    end subroutine go_and_come_back
 
@@ -104,15 +104,15 @@ contains
       call query_guess(query, stepper, h, u1, error)
       call require(error)
       do i = 1, 2
-         call query_evaluate(query, stepper, h, u1, .false., error, after%state%lam, &
-            after%state%is_active)
+         call query_evaluate(query, stepper, h, u1, .false., error, after%state%contacts%lam, &
+            after%state%contacts%is_active)
          call require(error)
          call query_residual(query, .true., nodal, residual, error)
          call require(error)
          norm(i) = norm2(residual)
          u1 = after%state%u
       end do
-      print "(a, 2es25.16, i4)", "residual", norm, count(after%state%is_active)
+      print "(a, 2es25.16, i4)", "residual", norm, count(after%state%contacts%is_active)
       call query_free(query)
    end subroutine look_at_step
 

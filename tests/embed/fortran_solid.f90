@@ -281,7 +281,7 @@ program fortran_solid
    increment = increment_t()
    do
       associate (ledger => model%march%ledger)
-         print "(7(es24.16, 1x), i0)", model%march%state%time, ledger%total, ledger%kinetic, &
+         print "(7(es24.16, 1x), i0)", model%march%state%clock%time, ledger%total, ledger%kinetic, &
             ledger%strain, ledger%potential, ledger%momentum, increment%n_active
       end associate
       if (stepper_is_done(model)) exit

@@ -36,7 +36,8 @@ program cushion
       end associate
    end do
    associate (state => stepper%march%state)
-      write(*, "(4es24.16)") drift/largest, sum(state%lam), -minval(state%closure), most
+      write(*, "(4es24.16)") drift/largest, sum(state%contacts%lam), &
+         -minval(state%contacts%closure), most
    end associate
    call stepper_close(stepper)
 

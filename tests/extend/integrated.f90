@@ -86,7 +86,7 @@ contains
 
       associate (state => stepper%march%state, ledger => stepper%march%ledger)
          n = size(state%u, 2)
-         write (*, "(8es25.16e3)") state%time, state%u(1, n), state%v(1, n), ledger%total, &
+         write (*, "(8es25.16e3)") state%clock%time, state%u(1, n), state%v(1, n), ledger%total, &
             ledger%angular, ledger%contact_work, ledger%momentum
       end associate
    end subroutine show

@@ -46,7 +46,7 @@ contains
    subroutine show()
       associate (state => stepper%march%state, ledger => stepper%march%ledger, &
             force => pair_quantity(stepper, "CF"), master => pair_quantity(stepper, "CF_MASTER"))
-         write (*, "(22es25.16e3)") state%time, ledger%total, ledger%contact_work, &
+         write (*, "(22es25.16e3)") state%clock%time, ledger%total, ledger%contact_work, &
             ledger%momentum, ledger%angular, real(state%pairs%total(1)%n_active), force(:, 1), &
             master(:, 1)
       end associate

@@ -96,8 +96,8 @@ contains
       associate (p => a%march%state, q => b%march%state)
          call check_near(error, p%u, q%u, 0.0_wp, 1.0_wp, what // ": u")
          call check_near(error, p%v, q%v, 0.0_wp, 1.0_wp, what // ": v")
-         call check_near(error, p%lam, q%lam, 0.0_wp, 1.0_wp, what // ": lam")
-         call check_near(error, p%time, q%time, 0.0_wp, 1.0_wp, what // ": time")
+         call check_near(error, p%contacts%lam, q%contacts%lam, 0.0_wp, 1.0_wp, what // ": lam")
+         call check_near(error, p%clock%time, q%clock%time, 0.0_wp, 1.0_wp, what // ": time")
          call check_near(error, a%march%ledger%total, b%march%ledger%total, 0.0_wp, 1.0_wp, &
             what // ": energy")
       end associate

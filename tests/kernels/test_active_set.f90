@@ -91,7 +91,7 @@ contains
 
       start = march%ledger
       do k = 1, n
-         n_before = count(march%state%is_active)
+         n_before = count(march%state%contacts%is_active)
          call march_increment(march, scene, increment, error)
          if (allocated(error)) return
          seen%drift = max(seen%drift, abs(march%ledger%total - start%total))
@@ -124,7 +124,7 @@ contains
       call check_true(error, seen%n_contact > 1 .and. seen%n_release > 0, &
          "contact " // to_text(seen%n_contact) // ", release " // to_text(seen%n_release))
       call check_true(error, march%ledger%momentum(2) > 0.0_wp, "it has bounced off")
-      call check_equal(error, count(march%state%is_active), 0, "constraints at the end")
+      call check_equal(error, count(march%state%contacts%is_active), 0, "constraints at the end")
       call march_free(march)
    end subroutine test_persistent
 
@@ -147,7 +147,7 @@ contains
          if (increment%n_active > 0) exit
          call check_near(error, march%ledger%total, before, tol, before, "free flight")
       end do
-      loss = sum(march%state%lam*gap)
+      loss = sum(march%state%contacts%lam*gap)
       call check_equal(error, increment%n_active, 3, "active constraints")
       call check_equal(error, increment%n_cut, 0, "cuts")
       call check_true(error, loss > 1.0e-3_wp*before, "a loss worth the name")
@@ -197,7 +197,7 @@ contains
             do
                call march_increment(fresh, scene, increment, error)
                if (allocated(error)) return
-               if (increment%n_active > 0 .or. fresh%state%n_grid == n_step) exit
+               if (increment%n_active > 0 .or. fresh%state%clock%n_grid == n_step) exit
             end do
             call check_true(error, increment%n_active > 0, "first contact")
             call check_near(error, fresh%ledger%total, start%total, tol, start%total, "energy")
@@ -264,8 +264,10 @@ contains
          n_cut = n_cut + increment%n_cut
          n_contact = n_contact + increment%n_active
          gap = scene%x(2, slave) + march%state%u(2, slave)
-         call check_true(error, all(gap <= limit .or. .not. march%state%is_active), "stand-off")
-         call check_near(error, march%state%time, h*real(k, wp), 0.0_wp, 1.0_wp, "on the grid")
+         call check_true(error, all(gap <= limit .or. .not. march%state%contacts%is_active), &
+            "stand-off")
+         call check_near(error, march%state%clock%time, h*real(k, wp), 0.0_wp, 1.0_wp, &
+            "on the grid")
          call check_near(error, march%ledger%total, total, tol, total, "energy")
       end do
       call check_true(error, n_cut > 2 .and. n_contact > 0, "cuts " // to_text(n_cut) // &
@@ -294,8 +296,9 @@ contains
          end do
          call check_near(error, march(1)%state%u, march(2)%state%u, 1.0e5_wp*eps, 1.0_wp, &
             "displacements in increment " // to_text(k))
-         call check_near(error, march(1)%state%lam, march(2)%state%lam, 1.0e6_wp*eps, &
-            maxval(march(1)%state%lam) + 1.0_wp, "multipliers in increment " // to_text(k))
+         call check_near(error, march(1)%state%contacts%lam, march(2)%state%contacts%lam, &
+            1.0e6_wp*eps, maxval(march(1)%state%contacts%lam) + 1.0_wp, &
+            "multipliers in increment " // to_text(k))
       end do
       call check_true(error, march(1)%newton%correction%uses_null_space &
          .and. .not. march(2)%newton%correction%uses_null_space, "each by its own method")

@@ -319,14 +319,14 @@ contains
       do k = 1, 10
          if (allocated(raised)) exit
          u = stepper%march%state%u
-         time = stepper%march%state%time
+         time = stepper%march%state%clock%time
          call stepper_advance(stepper, increment, raised)
       end do
       call check_error(error, raised, merge(err_input, err_analysis, way == 1), text, "way " // &
          to_text(way))
       if (ends_at > 1) then
          call check_near(error, stepper%march%state%u, u, 0.0_wp, 1.0_wp, "the state stays")
-         call check_near(error, stepper%march%state%time, time, 0.0_wp, 1.0_wp, "time stays")
+         call check_near(error, stepper%march%state%clock%time, time, 0.0_wp, 1.0_wp, "time stays")
       end if
       call stepper_close(stepper)
    end subroutine expect_failure

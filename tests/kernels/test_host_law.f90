@@ -450,7 +450,7 @@ contains
       type(increment_t) :: increment
 
       call open_pull(stepper, 0.38_wp, point_outside, error)
-      do while (.not. allocated(error) .and. stepper%march%state%n_grid < 3)
+      do while (.not. allocated(error) .and. stepper%march%state%clock%n_grid < 3)
          call stepper_advance(stepper, increment, error)
       end do
       if (allocated(error)) return
@@ -472,7 +472,7 @@ contains
       real(wp) :: u(2, 4)
 
       call open_pull(stepper, 0.25_wp, point_failed, error)
-      do while (.not. allocated(error) .and. stepper%march%state%n_grid < 2)
+      do while (.not. allocated(error) .and. stepper%march%state%clock%n_grid < 2)
          call stepper_advance(stepper, increment, error)
       end do
       if (allocated(error)) return
@@ -481,7 +481,7 @@ contains
       call check_error(error, refused, err_analysis, &
          "the law given for material RUBBER has failed", "failed")
       call check_equal(error, increment%n_cut, 0, "cuts")
-      call check_equal(error, stepper%march%state%n_grid, 2, "grid point")
+      call check_equal(error, stepper%march%state%clock%n_grid, 2, "grid point")
       call check_near(error, stepper%march%state%u, u, 0.0_wp, 1.0_wp, "displacements")
       call stepper_close(stepper)
    end subroutine test_failed

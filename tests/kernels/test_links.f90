@@ -554,7 +554,7 @@ contains
       subroutine reset(march)
          type(march_t), intent(out) :: march
 
-         march%n_grid = 0
+         march%grid%n_grid = 0
       end subroutine reset
 
    end subroutine test_start

@@ -158,7 +158,7 @@ contains
          if (allocated(error)) return
          n_cut = n_cut + increment%n_cut
          call check_equal(error, increment%notes%n, increment%n_cut, "notes of cuts")
-         call check_near(error, march%state%time, real(k, wp)*h, 0.0_wp, 1.0_wp, "time")
+         call check_near(error, march%state%clock%time, real(k, wp)*h, 0.0_wp, 1.0_wp, "time")
          call check_near(error, increment%h, h, 2.0_wp*eps, 1.0_wp, "increment")
          call check_near(error, march%ledger%total, start%total, tol, start%total, "energy")
          call check_near(error, [march%ledger%momentum, march%ledger%angular], &
@@ -188,7 +188,7 @@ contains
       call check_true(error, all(scene%x(1, [3, 6]) + march%state%u(1, [3, 6]) &
          > scene%x(1, [2, 5]) + march%state%u(1, [2, 5])), "the right half stays on the right")
       call check_near(error, march%ledger%total, total, tol, total, "energy")
-      call check_near(error, march%state%time, 0.5_wp, 0.0_wp, 1.0_wp, "time")
+      call check_near(error, march%state%clock%time, 0.5_wp, 0.0_wp, 1.0_wp, "time")
       call march_free(march)
    end subroutine test_inversion
 
@@ -211,7 +211,7 @@ contains
          n = n + 1
       end do
       call check_equal(error, n, 4, "increments")
-      call check_near(error, march%state%time, 0.35_wp, 0.0_wp, 1.0_wp, "time at the end")
+      call check_near(error, march%state%clock%time, 0.35_wp, 0.0_wp, 1.0_wp, "time at the end")
       call check_near(error, increment%h, 0.05_wp, 8.0_wp*eps, 1.0_wp, "last increment")
       call march_free(march)
    end subroutine test_remainder
@@ -240,11 +240,11 @@ contains
          if (allocated(error)) return
          n = n + 1
          largest = max(largest, increment%h)
-         call check_near(error, march%state%time/0.01_wp, anint(march%state%time/0.01_wp), &
-            8.0_wp*eps, 100.0_wp, "time over h")
+         call check_near(error, march%state%clock%time/0.01_wp, &
+            anint(march%state%clock%time/0.01_wp), 8.0_wp*eps, 100.0_wp, "time over h")
       end do
       call check_true(error, n < 50 .and. largest > 0.03_wp, "increments grow: " // to_text(n))
-      call check_near(error, march%state%time, 1.0_wp, 0.0_wp, 1.0_wp, "time at the end")
+      call check_near(error, march%state%clock%time, 1.0_wp, 0.0_wp, 1.0_wp, "time at the end")
       call check_near(error, march%state%u(1, 3), 0.2_wp, 4.0_wp*eps, 1.0_wp, "driven node")
       call march_free(march)
    end subroutine test_growth
@@ -383,7 +383,7 @@ contains
          call check_near(error, march%ledger%total, start%total, tol, &
             start%total + abs(march%ledger%external_work), "total")
          call check_near(error, march%ledger%momentum, &
-            start%momentum + [0.0_wp, -20.0_wp*march%state%time], tol, 40.0_wp, "momentum")
+            start%momentum + [0.0_wp, -20.0_wp*march%state%clock%time], tol, 40.0_wp, "momentum")
       end do
       call march_free(march)
    end subroutine test_gravity

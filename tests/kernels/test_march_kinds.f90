@@ -260,7 +260,8 @@ contains
                if (allocated(error)) return
                n(i) = n(i) + 1
                done = done + increment%done
-               call check_near(error, march%state%step_time, done, 64.0_wp*eps, 20.0_wp*h, "times")
+               call check_near(error, march%state%clock%step_time, done, 64.0_wp*eps, 20.0_wp*h, &
+                  "times")
                call check_near(error, march%ledger%total, start%total, tol, start%total, "energy")
                if (allocated(error)) return
                if (march_is_done(march)) exit
@@ -299,11 +300,11 @@ contains
             meeting = -1.0_wp
             n_event = 0
             do k = 1, 100
-               before = march%state%step_time
+               before = march%state%clock%step_time
                call march_increment(march, scene, increment, error)
                if (allocated(error)) return
                if (n_event == 0 .and. march%state%control%n_event > 0) then
-                  meeting = [before, march%state%step_time]
+                  meeting = [before, march%state%clock%step_time]
                   n_event = march%state%control%n_event
                   call check_true(error, increment%notes%n >= 3, "they are told")
                end if

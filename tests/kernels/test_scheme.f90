@@ -253,7 +253,8 @@ contains
                if (allocated(error)) return
             end do
             call check_near(error, 0.25_wp*sum(march%state%u(1, :) - scene%u0(1, :)), &
-               start%momentum(1)*march%state%time, tol, march%state%time, "centre of mass")
+               start%momentum(1)*march%state%clock%time, tol, march%state%clock%time, &
+               "centre of mass")
             call march_free(march)
          end block
          if (allocated(error)) return

@@ -68,7 +68,7 @@ contains
          if (allocated(error)) return
          n_contact = n_contact + merge(1, 0, increment%n_active > 0)
          call check_same_state(error, free, grid, "step " // to_text(k))
-         call check_equal(error, free%march%state%n_grid, k, "grid point")
+         call check_equal(error, free%march%state%clock%n_grid, k, "grid point")
       end do
       call check_true(error, n_contact > 1, "there was contact")
       call check_true(error, stepper_is_done(free), "the deck is done")
@@ -92,19 +92,19 @@ contains
             if (allocated(error)) return
             call stepper_step(stepper, drop_h/3.0_wp, increment, error)
             if (allocated(error)) return
-            call check_equal(error, stepper%march%state%n_grid, 2*(n - 1) + k/3, "grid point")
+            call check_equal(error, stepper%march%state%clock%n_grid, 2*(n - 1) + k/3, "grid point")
             if (k == 3) exit
             call stepper_advance(stepper, increment, refused)
             call check_error(error, refused, err_input, "between two increments", "refused")
          end do
          if (allocated(error)) return
-         call check_near(error, stepper%march%state%time, real(2*n - 1, wp)*drop_h, 0.0_wp, &
+         call check_near(error, stepper%march%state%clock%time, real(2*n - 1, wp)*drop_h, 0.0_wp, &
             1.0_wp, "at a grid point, exactly")
          if (allocated(error)) return
          call stepper_advance(stepper, increment, error)
          if (allocated(error)) return
-         call check_near(error, stepper%march%state%time, real(2*n, wp)*drop_h, 0.0_wp, 1.0_wp, &
-            "at the next one")
+         call check_near(error, stepper%march%state%clock%time, real(2*n, wp)*drop_h, 0.0_wp, &
+            1.0_wp, "at the next one")
       end do
       call stepper_close(stepper)
    end subroutine test_off_grid
@@ -127,7 +127,7 @@ contains
       if (allocated(error)) return
       call check_near(error, stepper%march%state%u(1, [2, 4]), 0.2_wp*[1.0_wp, 1.0_wp], &
          4.0_wp*eps, 1.0_wp, "beyond the end")
-      call check_near(error, stepper%march%state%time, 1.75_wp, 0.0_wp, 1.0_wp, "time")
+      call check_near(error, stepper%march%state%clock%time, 1.75_wp, 0.0_wp, 1.0_wp, "time")
       call check_true(error, stepper_is_done(stepper), "the deck is done")
       call stepper_close(stepper)
    end subroutine test_beyond
@@ -161,9 +161,9 @@ contains
       if (.not. allocated(error)) call stepper_next_step(stepper, error)
       if (.not. allocated(error)) call stepper_advance(stepper, increment, error)
       if (allocated(error)) return
-      call check_equal(error, stepper%march%state%i_step, 2, "step of the deck")
-      call check_near(error, stepper%march%state%time, 0.5_wp*drop_h + drop_h, 0.0_wp, 1.0_wp, &
-         "time")
+      call check_equal(error, stepper%march%state%clock%i_step, 2, "step of the deck")
+      call check_near(error, stepper%march%state%clock%time, 0.5_wp*drop_h + drop_h, 0.0_wp, &
+         1.0_wp, "time")
       call stepper_next_step(stepper, refused)
       call check_error(error, refused, err_input, "is the last one", "refused")
       call stepper_close(stepper)
@@ -293,7 +293,7 @@ contains
          if (.not. allocated(error)) call stepper_advance(stepper, increment, error)
       end do
       if (allocated(error)) return
-      call check_equal(error, stepper%march%state%i_step, 2, "step of the deck")
+      call check_equal(error, stepper%march%state%clock%i_step, 2, "step of the deck")
       call check_same_state(error, stepper, straight, "once more")
       call stepper_close(stepper)
       call stepper_close(straight)
@@ -317,11 +317,11 @@ contains
          if (allocated(error)) return
          if (increment%n_active > 0) exit
       end do
-      call check_true(error, any(stepper%march%state%is_active), "in contact")
+      call check_true(error, any(stepper%march%state%contacts%is_active), "in contact")
       if (allocated(error)) return
       associate (state => stepper%march%state)
-         call stepper_set_state(fresh, error, u=state%u, v=state%v, lam=state%lam, &
-            is_active=state%is_active, time=state%time)
+         call stepper_set_state(fresh, error, u=state%u, v=state%v, lam=state%contacts%lam, &
+            is_active=state%contacts%is_active, time=state%clock%time)
       end associate
       if (allocated(error)) return
       associate (a => stepper%march%ledger, b => fresh%march%ledger)
@@ -385,7 +385,7 @@ contains
       if (allocated(error)) return
       u = 0.5_wp*stepper%march%state%u
       v = 0.5_wp*stepper%march%state%v
-      lam = stepper%march%state%lam
+      lam = stepper%march%state%contacts%lam
       call stepper_set_state(stepper, failed, v=v, u=u(:, 2:))
       call judge(err_input, "u is to have 2 components at each of 16 nodes, not 2 at 15")
       call stepper_set_state(stepper, failed, u=u, v=transpose(v))
@@ -633,8 +633,8 @@ contains
       call conditions_exchange(stepper, restart, error)
       if (allocated(error)) return
       call stepper_snapshot(stepper, snapshot)
-      snapshot%state%is_off_grid = .false.
-      snapshot%state%step_time = 0.0_wp
+      snapshot%state%clock%is_off_grid = .false.
+      snapshot%state%clock%step_time = 0.0_wp
       call stepper_restore(other, snapshot, error)
       call restart_rewind(none)
       if (.not. allocated(error)) call conditions_exchange(other, none, error)
@@ -649,7 +649,7 @@ contains
       if (allocated(error)) return
       call check_same_state(error, other, stepper, "later")
       call check_near(error, other%march%state%u(1, 5), 0.01_wp, eps, 1.0_wp, "prescribed")
-      call check_true(error, other%march%state%is_off_grid, "off the grid")
+      call check_true(error, other%march%state%clock%is_off_grid, "off the grid")
       call stepper_close(stepper)
       call stepper_close(other)
    end subroutine test_saved

@@ -163,7 +163,7 @@ contains
          call open_number(k, stepper, error)
          if (.not. allocated(error)) call go_to_contact(stepper, after, error)
          if (.not. allocated(error)) call query_evaluate(query, stepper, drop_h, after%state%u, &
-            .false., error, after%state%lam, after%state%is_active)
+            .false., error, after%state%contacts%lam, after%state%contacts%is_active)
          if (.not. allocated(error)) call query_residual(query, .false., nodal, unknown, error)
          if (allocated(error)) return
          largest = maxval(abs(unknown))
@@ -181,7 +181,7 @@ contains
          if (allocated(error)) return
          call query_multipliers(query, stepper, lam, error)
          if (allocated(error)) return
-         call check_near(error, lam, after%state%lam, 1.0e4_wp*eps, maxval(abs(lam)), &
+         call check_near(error, lam, after%state%contacts%lam, 1.0e4_wp*eps, maxval(abs(lam)), &
             "multipliers")
          call query_free(query)
          call stepper_close(stepper)
@@ -280,7 +280,7 @@ contains
          call csr_multiply(links, dq, motion)
          u1 = after%state%u + t*reshape(motion, shape(u1))
          call query_evaluate(query, stepper, drop_h, u1, .true., error, &
-            1.0e2_wp*after%state%lam, after%state%is_active)
+            1.0e2_wp*after%state%contacts%lam, after%state%contacts%is_active)
          if (.not. allocated(error)) call query_residual(query, .true., nodal, unknown, error)
       end subroutine residual_at
 
@@ -438,13 +438,14 @@ contains
       if (.not. allocated(error)) call go_to_contact(stepper, after, error)
       if (.not. allocated(error)) call query_links(stepper, links, error)
       if (.not. allocated(error)) call query_evaluate(query, stepper, drop_h, after%state%u, &
-         .false., error, after%state%lam, after%state%is_active)
+         .false., error, after%state%contacts%lam, after%state%contacts%is_active)
       if (.not. allocated(error)) call query_null_space(query, p, d, redundant, error)
       if (.not. allocated(error)) call query_constraints(query, stepper, &
          stepper%march%state%u, after%state%u, .true., report, error)
       if (allocated(error)) return
-      acts = after%state%is_active(report%id)
-      call check_equal(error, count(acts), count(after%state%is_active), "all that act are near")
+      acts = after%state%contacts%is_active(report%id)
+      call check_equal(error, count(acts), count(after%state%contacts%is_active), &
+         "all that act are near")
       call check_equal(error, p%n_col, links%n_col - count(acts), "independent unknowns")
       call csr_product(report%discrete_gradient, p, rows)
       call check_rows(rows, "P")
@@ -516,7 +517,7 @@ contains
       call open_number(1, stepper, error)
       if (allocated(error)) return
       u1 = stepper%march%state%u
-      lam = stepper%march%state%lam
+      lam = stepper%march%state%contacts%lam
       call query_evaluate(query, closed, drop_h, u1, .true., failed)
       call check_error(error, failed, err_input, "there is no model", "closed")
       call query_null_space(query, p, d, redundant, failed)

@@ -291,7 +291,7 @@ contains
          do while (.not. march_is_done(march))
             call march_increment(march, scene, increment, error)
             if (allocated(error)) return
-            if (march%state%is_active(place)) n_touched = n_touched + 1
+            if (march%state%contacts%is_active(place)) n_touched = n_touched + 1
             call check_near(error, march%ledger%total, start%total, 10.0_wp*tol, start%total, &
                "energy, variant " // to_text(i))
             call check_near(error, [march%ledger%momentum, march%ledger%angular], &
