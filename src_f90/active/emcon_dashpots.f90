@@ -95,7 +95,8 @@ contains
       associate (gap => contact%state(i))
          comes_near = gap%is_near .and. gap%is_over .and. .not. (gap%is_arriving .or. &
             gap%is_leaving)
-         comes_near = comes_near .and. gap%gap0 >= -contact%max_penetration_at_start*gap%size .and. &
+         comes_near = comes_near .and. &
+            gap%gap0 >= -contact%max_penetration_at_start*gap%size .and. &
             (min(gap%gap0, gap%gap1) < contact%damping%clearance .or. touches(contact, i))
       end associate
    end function comes_near

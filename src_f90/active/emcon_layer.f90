@@ -378,7 +378,7 @@ contains
 
       do k = 1, size(self%scene%step(1)%load)
          associate (own => self%scene%step(1)%load(k))
-            own%value = load(own%at, own%target)
+            own%value = load(own%place, own%target)
             own%value_start = own%value
          end associate
       end do

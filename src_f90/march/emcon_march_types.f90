@@ -21,8 +21,8 @@ module emcon_march_types
    use emcon_velocity_update, only : velocity_update_t
    implicit none
    private
-   public :: march_t, time_grid_t, error_estimate_t, increment_t, part_t, end_state_t, rollback_t, step_check_t, grid_corner_t, &
-      watcher_t
+   public :: march_t, time_grid_t, error_estimate_t, increment_t, part_t, end_state_t, rollback_t, &
+      step_check_t, grid_corner_t, watcher_t
 
    !> Somebody who is told how an increment goes that is made in parts.
    type, abstract :: watcher_t

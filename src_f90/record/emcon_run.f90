@@ -416,8 +416,8 @@ contains
       is_save_due = saves(run) .and. .not. run%saves_end
       if (.not. is_save_due) return
       associate (state => run%stepper%march%state, &
-            frequency => run%stepper%scene%step(run%stepper%march%state%clock%i_step)%restart_frequency)
-         is_save_due = mod(state%clock%increment - state%clock%n_before, frequency) == 0
+            step => run%stepper%scene%step(run%stepper%march%state%clock%i_step))
+         is_save_due = mod(state%clock%increment - state%clock%n_before, step%restart_frequency) == 0
          if (is_save_due .and. state%clock%n_grid < run%stepper%march%grid%n_grid) then
             is_save_due = pace_is_due(run%pace)
          end if

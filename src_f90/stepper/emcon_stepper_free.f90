@@ -76,8 +76,10 @@ contains
       type(snapshot_t) :: before
 
       call stepper_check_open(self, error)
-      if (.not. allocated(error)) call check_that(self%march%state%clock%i_step < size(self%scene%step), &
-         "step " // to_text(self%march%state%clock%i_step) // " is the last one of the deck", error)
+      associate (i_step => self%march%state%clock%i_step)
+         if (.not. allocated(error)) call check_that(i_step < size(self%scene%step), &
+            "step " // to_text(i_step) // " is the last one of the deck", error)
+      end associate
       if (allocated(error)) return
       call stepper_snapshot(self, before)
       call march_begin_step(self%march, self%scene, self%march%state%clock%i_step + 1, error)
