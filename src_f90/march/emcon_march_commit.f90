@@ -87,21 +87,28 @@ contains
          call interlock_tell(self, scene, increment)
          increment%is_guarded = increment%is_guarded .or. &
             any(set%id(:set%n) > system%first_constraint(system%n_pair + 1))
-         associate (reached => self%newton%convergence)
-            increment%residual = reached%history(:reached%n_history)
-            if (reached%last > reached%tolerance .and. .not. self%newton%is_idle) then
-               increment%unconverged = max(increment%unconverged, reached%last)
-               call note_add(increment%notes, "a relative residual of " // &
-                  to_text(reached%last, 3) // " is accepted as round-off")
-            end if
-         end associate
       end associate
+      call tell_residual(self, increment)
       call keep_constraints(self)
       if (self%scheme%row%is_explicit .and. self%explicit%is_free) return
       call factor_policy_commit(self%newton%factor_policy, self%newton%correction, self%motion, &
          self%state%base, is_due)
       if (is_due) self%system%phases%n_factorisation = self%system%phases%n_factorisation + 1
    end subroutine march_commit
+
+   !> The residuals that were reached, and whether more than Newton's tolerance was accepted.
+   subroutine tell_residual(self, increment)
+      type(march_t), intent(in) :: self
+      type(increment_t), intent(inout) :: increment
+
+      associate (reached => self%newton%convergence)
+         increment%residual = reached%history(:reached%n_history)
+         if (.not. reached%last > reached%tolerance .or. self%newton%is_idle) return
+         increment%unconverged = max(increment%unconverged, reached%last)
+         call note_add(increment%notes, "a relative residual of " // to_text(reached%last, 3) &
+            // " is accepted as round-off")
+      end associate
+   end subroutine tell_residual
 
    !> What the pairs have transmitted; where contacts push at both ends of the step, half of it at
    !> each.

@@ -75,10 +75,9 @@ contains
                call check_crossing(scene, pair%slave, contact%slave, is_checked, error)
                if (.not. allocated(error)) call check_crossing(scene, pair%master, &
                   contact%master, is_checked, error)
-               if (.not. allocated(error)) call check_sides(scene, pair, contact, &
-                  noise, "master", error)
-               if (.not. allocated(error)) call check_slave_sides(scene, pair, noise, &
-                  error)
+               if (.not. allocated(error)) call check_sides(scene, pair, contact, noise, &
+                  "master", error)
+               if (.not. allocated(error)) call check_slave_sides(scene, pair, noise, error)
                if (allocated(error)) return
             end if
             if (pair%adjust_distance >= 0.0_wp .or. pair%adjust_set > 0) then
@@ -99,8 +98,7 @@ contains
                call become_guard(scene, pair, notes)
                cycle
             end if
-            if (.not. allocated(error)) call check_corners(scene, pair, options, &
-               noise, error)
+            if (.not. allocated(error)) call check_corners(scene, pair, options, noise, error)
             if (allocated(error)) return
          end associate
       end do

@@ -417,7 +417,8 @@ contains
       if (.not. is_save_due) return
       associate (state => run%stepper%march%state, &
             step => run%stepper%scene%step(run%stepper%march%state%clock%i_step))
-         is_save_due = mod(state%clock%increment - state%clock%n_before, step%restart_frequency) == 0
+         is_save_due = mod(state%clock%increment - state%clock%n_before, &
+            step%restart_frequency) == 0
          if (is_save_due .and. state%clock%n_grid < run%stepper%march%grid%n_grid) then
             is_save_due = pace_is_due(run%pace)
          end if
