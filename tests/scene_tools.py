@@ -170,13 +170,13 @@ class Run:
             group = file["sets"][place]
             return group[f"{variable}_time"][:], group[variable][:]
 
-    @functools.cached_property
-    def _fields(self):
-        return Fields(self.file(".vtkhdf"))
-
     def fields(self):
-        """NAME.vtkhdf, read once."""
-        return self._fields
+        """NAME.vtkhdf, read once as long as nobody writes to it."""
+        path = self.file(".vtkhdf")
+        written = path.stat().st_mtime_ns
+        if self.__dict__.get("_read", (None, None))[0] != written:
+            self.__dict__["_read"] = written, Fields(path)
+        return self.__dict__["_read"][1]
 
 
 class Fields:

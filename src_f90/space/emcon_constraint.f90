@@ -8,9 +8,9 @@ module emcon_constraint
    use emcon_numbering, only : numbering_t
    implicit none
    private
-   public :: condition_t, contact_response_t, condition_force, condition_row_force, &
-      condition_row_gradient, condition_rate, condition_drag, condition_stiffness, &
-      condition_normal, condition_normal_slope, constraint_t, constraint_box_t
+   public :: condition_t, contact_response_t, condition_force, condition_find_force, &
+      condition_row_force, condition_row_gradient, condition_rate, condition_drag, &
+      condition_stiffness, condition_normal, condition_normal_slope, constraint_t, constraint_box_t
 
    !> A condition has so many slips at most: one less than there are dimensions.
    integer, parameter, public :: most_slips = 2
@@ -110,7 +110,18 @@ contains
       type(condition_t), intent(in) :: self
       real(wp), intent(in) :: lam                     !! of the row of its gap; 0: none [M L/T^2]
       integer, intent(in) :: i                        !! 1..n_node
-      real(wp) :: force(size(self%g, 1)), tau(most_slips)
+      real(wp) :: force(size(self%g, 1))              !! (n_dim) [M L/T^2]
+
+      call condition_find_force(self, lam, i, force)
+   end function condition_force
+
+   !> The same, without an array of its own.
+   pure subroutine condition_find_force(self, lam, i, force)
+      type(condition_t), intent(in) :: self
+      real(wp), intent(in) :: lam                     !! of the row of its gap; 0: none [M L/T^2]
+      integer, intent(in) :: i                        !! 1..n_node
+      real(wp), intent(out) :: force(:)               !! (n_dim) [M L/T^2]
+      real(wp) :: tau(most_slips)
       integer :: s
 
       force = (lam + self%response%lam)*self%g(:, i)
@@ -119,7 +130,7 @@ contains
       do s = 1, size(self%t, 3)
          force = force - tau(s)*self%t(:, i, s)
       end do
-   end function condition_force
+   end subroutine condition_find_force
 
    !> The normal force by a multiplier of 1, where friction of 1 acts along the surface with 1:
    !> resultants on the slave side. docs/theory.md, eq. (14r).

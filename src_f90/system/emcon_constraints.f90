@@ -5,7 +5,7 @@
 !> a sum of displacements; it stands here only where it is not eliminated in the numbering. Sign:
 !> docs/theory.md, eq. (1).
 module emcon_constraints
-   use emcon_constraint, only : condition_force, condition_t, constraint_t, contact_response_t
+   use emcon_constraint, only : condition_find_force, condition_t, constraint_t, contact_response_t
    use emcon_contact_law, only : contact_law_box_t, contact_values_t
    use emcon_csr, only : csr_t
    use emcon_kinds, only : wp
@@ -249,7 +249,8 @@ contains
       real(wp), intent(inout), contiguous, optional :: magnitude(:, :)   !! (n_dim, n_node)
 
       call vector_zero(size(force), force)
-      call constraints_add_forces(self, first, self%n_condition, force, magnitude)
+      if (first <= self%n_condition) call constraints_add_forces(self, first, self%n_condition, &
+         force, magnitude)
    end subroutine constraints_force
 
    !> Add the forces of the conditions `first` to `last`.
@@ -265,7 +266,7 @@ contains
          lam = constraints_lam(self, k)
          do i = 1, self%item(k)%n_node
             node = self%item(k)%node(i)
-            part = condition_force(self%item(k), lam, i)
+            call condition_find_force(self%item(k), lam, i, part)
             force(:, node) = force(:, node) + part
             if (present(magnitude)) magnitude(:, node) = magnitude(:, node) + abs(part)
          end do
