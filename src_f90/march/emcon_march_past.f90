@@ -68,7 +68,7 @@ contains
       end associate
    end subroutine accelerate
 
-   !> What the past adds to the next step, for the `pose` of its motion.
+   !> What the past adds to the next step, for the `evaluation` of its motion.
    pure subroutine march_past_take(self)
       type(march_t), intent(inout) :: self
       integer :: k

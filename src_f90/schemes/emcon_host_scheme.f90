@@ -120,7 +120,7 @@ contains
       else if (.not. ieee_is_finite(evaluation%v_weight)) then
          call refuse("v_weight", evaluation%v_weight, "is not finite")
       else if (.not. (evaluation%at > 0.0_wp .and. evaluation%at <= 1.0_wp)) then
-         call refuse("place", evaluation%at, "must be above 0 and at most 1")
+         call refuse("at", evaluation%at, "must be above 0 and at most 1")
       else if (.not. (evaluation%load_place >= 0.0_wp .and. evaluation%load_place <= 1.0_wp)) then
          call refuse("load_place", evaluation%load_place, "must be 0 to 1")
       else if (.not. (evaluation%start_weight >= 0.0_wp &

@@ -51,7 +51,7 @@ contains
       call motion_evaluate(self)
    end subroutine motion_init
 
-   !> Find the span and the place of the loads for the present `pose`, `u0` and `du`: whoever
+   !> Find the span and the place of the loads for the present `evaluation`, `u0` and `du`: whoever
    !> changes these calls it before forces or constraints are evaluated.
    pure subroutine motion_evaluate(self)
       type(motion_t), intent(inout) :: self

@@ -291,7 +291,7 @@ def test_contact_leaves_momentum(program: tuple[Path, dict[str, str]], tmp_path:
     ("", 0.5, "deck.inp:25: error: SCHEME=THETA: no program has given this scheme"),
     ("other", 0.5, "deck.inp:25: error: SCHEME=THETA: no program has given this scheme"),
     ("energy momentum", 0.5, "cannot be given as ENERGY MOMENTUM: EMCON has its own"),
-    ("theta", 1.5, "the scheme THETA: place = 1.5 must be above 0 and at most 1")])
+    ("theta", 1.5, "the scheme THETA: at = 1.5 must be above 0 and at most 1")])
 def test_refusals(program: tuple[Path, dict[str, str]], tmp_path: Path, name: str, theta: float,
                   words: str) -> None:
     path = tmp_path/"deck.inp"

@@ -113,7 +113,7 @@ contains
       if (allocated(error)) return
       bad = given
       bad%own%at = 0.0_wp
-      call expect("place")
+      call expect(": at = ")
       bad%own%mass_scale = 0.0_wp
       call expect("mass_scale")
       bad%own%rate = -1.0_wp
