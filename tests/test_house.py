@@ -34,12 +34,14 @@ REGISTRY = {
     "shape_t": {"emcon_element_kinds"},
     "scheme_t": {"emcon_scheme_kinds"},
     "contact_t": {"emcon_contact_kinds"},
+    "start_gaps_t": {"emcon_contact_kinds"},
+    "overlap_query_t": {"emcon_overlap_query_kinds"},
     "term_t": {"emcon_term_kinds"},
     "constraint_t": {"emcon_constraint_kinds"},
     "host_force_t": {"emcon_stepper_given", "emcon_c_given"},
 }
 #: What is made of another kind of its room: gaps of nodes, interpolated or looked at.
-MADE_OF = {("emcon_segment", "emcon_nts"), ("emcon_start_gaps", "emcon_nts")}
+MADE_OF = {("emcon_segment", "emcon_nts"), ("emcon_start_gaps_plane", "emcon_nts")}
 
 COLUMNS = 100
 #: A procedure fits a screen, and its arguments a line; but what C hands over one by one.

@@ -17,7 +17,7 @@ module emcon_march_begin
    use emcon_kinds, only : dp, wp
    use emcon_layer, only : layer_begin_step, layer_mark
    use emcon_ledger, only : ledger_measure, ledger_t
-   use emcon_overlap_query_plane, only : overlap_text
+   use emcon_overlap_query, only : overlap_text
    use emcon_march_accuracy, only : accuracy_begin
    use emcon_march_grid, only : march_count_grid, march_grid_time, march_part_time
    use emcon_march_past, only : march_past_forget

@@ -13,7 +13,7 @@ module emcon_march_step
    use emcon_factor_policy, only : factor_policy_forget, factor_policy_step
    use emcon_kept_factor, only : kept_factor_renew
    use emcon_kinds, only : wp
-   use emcon_overlap_query_plane, only : overlap_names
+   use emcon_overlap_query, only : overlap_names
    use emcon_march_accuracy, only : accuracy_judge
    use emcon_march_commit, only : march_commit
    use emcon_march_events, only : events_judge, events_look
@@ -254,7 +254,7 @@ contains
       type(overlap_t) :: overlap
       integer :: left
 
-      if (self%overlap_check%look%outline%n_piece == 0) return
+      if (self%overlap_check%n_piece == 0) return
       call phase_enter(self%system%phases, phase_judge, left)
       if (self%active%motion_bound%total &
          + largest_motion(self%end_state%du) >= self%clear_until) then
@@ -270,9 +270,9 @@ contains
       end if
       call phase_leave(self%system%phases, left)
       if (status /= step_done) return
-      overlap%of_edges = max(overlap%of_edges, increment%overlap%of_edges)
+      overlap%of_facets = max(overlap%of_facets, increment%overlap%of_facets)
       if (overlap%depth > increment%overlap%depth) increment%overlap = overlap
-      increment%overlap%of_edges = overlap%of_edges
+      increment%overlap%of_facets = overlap%of_facets
    end subroutine overlap_check
 
    !> Has the step brought bodies deeper into each other than guards allow, at nodes that contact of

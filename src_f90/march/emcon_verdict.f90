@@ -13,7 +13,7 @@ module emcon_verdict
    use emcon_kinds, only : wp
    use emcon_locking, only : locking_advice, locking_element
    use emcon_ledger, only : ledger_t
-   use emcon_overlap_query_plane, only : overlap_text
+   use emcon_overlap_query, only : overlap_text
    use emcon_march, only : increment_t, march_is_done, march_t
    use emcon_nodal_pull, only : nodal_pull_join, nodal_pull_t
    use emcon_scene, only : scene_t
@@ -55,7 +55,7 @@ module emcon_verdict
       real(wp) :: bar = touching_bar
       real(wp) :: deepest = 0.0_wp               !! penetration per edge
       real(wp) :: deepest_time = 0.0_wp          !! [T]
-      real(wp) :: of_edges = 0.0_wp              !! of edges that stand for curves, per edge
+      real(wp) :: of_facets = 0.0_wp              !! of edges that stand for curves, per edge
       character(len=:), allocatable :: place     !! of the deepest one: bodies and nodes
       real(wp) :: unconverged = 0.0_wp           !! largest residual accepted above the tolerance
       real(wp) :: unconverged_time = 0.0_wp      !! [T]
@@ -204,7 +204,7 @@ contains
       type(march_t), intent(in) :: march
       type(increment_t), intent(in) :: increment
 
-      self%of_edges = max(self%of_edges, increment%overlap%of_edges)
+      self%of_facets = max(self%of_facets, increment%overlap%of_facets)
       associate (overlap => increment%overlap, stray => increment%stray)
          if (max(overlap%depth, stray%depth) <= self%deepest) return
          self%deepest = max(overlap%depth, stray%depth)

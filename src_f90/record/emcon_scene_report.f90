@@ -16,7 +16,7 @@ module emcon_scene_report
    use emcon_solid, only : solid_t
    use emcon_steps, only : initiation_massless, initiation_persistent, initiation_velocity_update
    use emcon_stepper, only : stepper_t
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_facets, only : surface_facets
    use emcon_term_registry, only : terms_solid
    use emcon_text, only : to_text
    implicit none
@@ -120,7 +120,7 @@ contains
 
          associate (surface => scene%surface(number))
             if (scene%n_dim == n_plane) then
-               call surface_edges(scene, surface, edge)
+               call surface_facets(scene, surface, edge)
                call row_put(row, side // "_edges", size(edge, 2), " (# edges)")
             else
                call row_put(row, side // "_faces", size(surface%face), " (# faces)")

@@ -42,6 +42,7 @@ program main
    use test_corner_tops, only : collect_corner_tops
    use test_blocked_contact, only : collect_blocked_contact
    use test_explicit, only : collect_explicit
+   use test_facets, only : collect_facets
    use test_friction, only : collect_friction
    use test_gauss, only : collect_gauss
    use test_holding, only : collect_holding
@@ -177,6 +178,7 @@ program main
    call run("corotated", collect_corotated)
    call run("soft_law", collect_soft_law)
    call run("solid", collect_solid)
+   call run("facets", collect_facets)
    call run("chain", collect_chain)
    call run("search", collect_search)
    call run("nts_gap", collect_nts_gap)
