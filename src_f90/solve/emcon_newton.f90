@@ -280,7 +280,7 @@ contains
             call factorise(self, system, set, status, error)
             if (allocated(error) .or. status /= newton_converged) return
          end select
-         call correct(self, system, set, motion%du, error)
+         call correct(self, system, set, motion, error)
          if (allocated(error)) return
          if (evaluation_is_equilibrium(motion%evaluation) .and. is_too_far(self, motion%x)) then
             status = newton_singular
@@ -392,12 +392,12 @@ contains
       status = merge(newton_singular, newton_converged, is_singular)
    end subroutine factorise
 
-   !> Correct `du` and the multipliers for the present residual.
-   subroutine correct(self, system, set, du, error)
+   !> Correct the motion and the multipliers for the present residual.
+   subroutine correct(self, system, set, motion, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
-      real(wp), intent(inout), contiguous :: du(:, :)
+      type(motion_t), intent(inout) :: motion
       type(error_t), allocatable, intent(out) :: error
       integer :: left
 
@@ -409,12 +409,12 @@ contains
       self%n_solve = self%n_solve + 1
       if (set%n > set%n_linear .and. .not. self%convergence%is_polish) then
          ! Where gaps are all that is to be closed, c.r0 is round-off.
-         self%work = self%convergence%damping*min(dot_product(self%dq, self%residual), &
-            -correction_work(self%correction, self%dq))
+         if (evaluation_is_equilibrium(motion%evaluation)) self%work = self%convergence%damping &
+            *min(dot_product(self%dq, self%residual), -correction_work(self%correction, self%dq))
          self%dq = self%convergence%damping*self%dq
          self%dlam = self%convergence%damping*self%dlam
       end if
-      call add_to_dofs(system%space%numbering, self%dq, 1.0_wp, du)
+      call add_to_dofs(system%space%numbering, self%dq, 1.0_wp, motion%du)
       set%lam = set%lam + self%dlam
    end subroutine correct
 
@@ -438,7 +438,7 @@ contains
       end do
       call factorise(self, system, set, status, error)
       if (allocated(error) .or. status /= newton_converged) return
-      call correct(self, system, set, motion%du, error)
+      call correct(self, system, set, motion, error)
       self%work = 0.0_wp
       motion%du = motion%du + self%driven
    end subroutine start_driven
