@@ -77,7 +77,7 @@ contains
       type(march_t), intent(inout) :: march
       procedure(interrupt_interface), pointer :: is_interrupted
 
-      is_interrupted => march%is_interrupted
+      is_interrupted => march%newton%is_interrupted
       call clear(march)
       if (associated(is_interrupted)) call march_watch(march, is_interrupted)
 
