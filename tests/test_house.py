@@ -550,6 +550,17 @@ def test_what_is_counted(tmp_path):
     assert len(list(house_counts.risen(house_counts.counts(tmp_path), counts))) == 1
 
 
+def test_flags_asked_in_many_files_are_counted(tmp_path):
+    """By the name of the component: not where it is set, nor up to five files."""
+    scene = ("module emcon_a\n   type :: a_t\n      logical :: is_on = .true., has(2), &\n"
+             "         is_off\n   end type a_t\nend module\n")
+    asks = "module emcon_{0}\n   if (a%is_on) b%c = a%is_off\n   a%has(1) = .true.\nend module\n"
+    files = {f"march/emcon_{name}.f90": asks.format(name) for name in "bcdefg"}
+    files["march/emcon_g.f90"] = files["march/emcon_g.f90"].replace("a%is_off", "a%has(2)")
+    build(tmp_path, {"scene/emcon_a.f90": scene, **files})
+    assert house_counts.counts(tmp_path)["flags asked"] == {"is_on": 6}
+
+
 @pytest.mark.parametrize("in_git", [False, True])
 def test_stray_file_at_the_top_fails(in_git, tmp_path):
     if in_git:

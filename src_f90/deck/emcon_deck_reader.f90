@@ -48,6 +48,8 @@ module emcon_deck_reader
       type(card_t), allocatable :: card(:)
       type(diagnostics_t) :: log
       logical :: is_lenient = .false.
+      integer :: n_dim = 0                               !! of the model
+      logical :: is_axial = .false.                      !! it is one of solids of revolution
       logical :: doubt_nodes = .false., doubt_elements = .false., doubt_names = .false.
       logical :: doubt_positions = .false.               !! some node is not where it should be
       logical :: doubt_shapes = .false.                  !! some element is not what it should be

@@ -31,7 +31,7 @@ contains
    subroutine explicit_soft_push(self, is_end)
       type(march_t), intent(inout) :: self
       logical, intent(in) :: is_end              !! of the step, else its start
-      real(wp) :: force(size(self%v1, 1), size(self%v1, 2))
+      real(wp) :: force(size(self%end_state%v, 1), size(self%end_state%v, 2))
       integer :: left
 
       if (.not. self%active%softness%is_at_ends) return
@@ -179,7 +179,7 @@ contains
    subroutine explicit_soft_widen(self, has_grown)
       type(march_t), intent(inout) :: self
       logical, intent(out) :: has_grown          !! the critical step is to be found with them
-      real(wp) :: total(size(self%v1, 2)), slope(size(self%explicit%stiffness))
+      real(wp) :: total(size(self%end_state%v, 2)), slope(size(self%explicit%stiffness))
       integer :: k, i
 
       has_grown = .false.

@@ -49,6 +49,9 @@ module emcon_overlap_check
       !> As long as no node has moved farther since the start of the step that was last looked at,
       !> there is no overlap [L].
       real(wp) :: clearance = 0.0_wp
+      real(wp) :: clear_until = 0.0_wp           !! the same, as a total by `motion_bound_t` [L]
+      !> Overlap per edge with which a step began that resolves it
+      real(wp) :: meant_overlap = 0.0_wp
    end type overlap_check_t
 
 contains

@@ -7,6 +7,7 @@ module emcon_verdict
    use emcon_bent_bodies, only : bent_body_find, bent_body_t
    use emcon_energy_watch, only : energy_follow, energy_is_failure, energy_move, energy_reasons, &
       energy_start, energy_warnings, energy_watch_t
+   use emcon_evaluation, only : evaluation_has_inertia
    use emcon_far_nodes, only : far_element_find
    use emcon_force_scatter, only : force_scatter_t, scatter_follow
    use emcon_guards, only : overlap_bar, overlap_told, touching_bar
@@ -150,7 +151,8 @@ contains
       associate (state => march%state)
          self%law_missed = max(self%law_missed, increment%law_missed)
          self%largest_push = max(self%largest_push, increment%largest_push)
-         call scatter_follow(self%scatter, state%sums%sum, march%scheme%row%masses_resist)
+         call scatter_follow(self%scatter, state%sums%sum, &
+            evaluation_has_inertia(march%motion%evaluation))
          if (increment%give > self%give) then
             self%give = increment%give
             self%give_time = state%clock%time

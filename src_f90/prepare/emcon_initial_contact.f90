@@ -14,6 +14,7 @@ module emcon_initial_contact
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted
    use emcon_start_gaps, only : is_master, is_slave, start_gaps_t
+   use emcon_steps, only : step_is_dynamic
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
    implicit none
    private
@@ -333,7 +334,7 @@ contains
       if (k == 0) return                         ! `system_init` tells that it is missing
       call new_contact(scene, scene%pair(i), contact, error, given%contact(k)%contact)
       if (allocated(error)) return
-      call contact%suit_steps(any(.not. scene%step%scheme%masses_resist))
+      call contact%suit_steps(any(.not. step_is_dynamic(scene%step)))
       call contact%configure(scene%x, options)
       still = 0.0_wp
       call contact%begin_step(scene%x, scene%u0, still)

@@ -4,9 +4,9 @@
 !> not the equilibrium of a constant stress: the multipliers that balance the slave side leave a
 !> residual at the master nodes. `tie_balance` changes the integrals M, D stands, by the least
 !> that removes it: row sums stay, slave nodes follow from D X_s = M X_m, and D^T L = s_s,
-!> M^T L = s_g hold to round-off (emcon_tie_balance_data). Newton's method on M, X_s and L; where
-!> the residual is round-off from the start, as on straight interfaces, nothing is touched. All of
-!> it in double precision at least; the rows are rounded at the end.
+!> M^T L = s_g hold to round-off (emcon_tie_balance_data_plane). Newton's method on M, X_s and L;
+!> where the residual is round-off from the start, as on straight interfaces, nothing is touched.
+!> All of it in double precision at least; the rows are rounded at the end.
 !>
 !> The ends of an open slave chain should have no row, and lie on the master chain: the multipliers
 !> of the chain end belong to their neighbours then. An end with a row keeps equilibrium only by

@@ -11,18 +11,18 @@ module emcon_steps
    public :: prescribed_t, turn_t, load_t, scheme_choice_t, softness_t, step_t
    public :: load_point, load_pressure, load_gravity, load_moment, load_centrifugal
    public :: by_node, by_element, by_surface
-   public :: initiation_persistent, initiation_admissible, initiation_velocity_update, &
-      initiation_massless
+   public :: initiation_none, initiation_persistent, initiation_admissible, &
+      initiation_velocity_update, initiation_massless
    public :: method_null_space, method_saddle_point, method_penalty, method_augmented_lagrange
    public :: newton_kept, newton_full
    public :: events_pairs, events_nodes
-   public :: prescribed_find
+   public :: prescribed_find, step_is_dynamic, step_initiation
 
    integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3, load_moment = 4, &
       load_centrifugal = 5
    integer, parameter :: by_node = 1, by_element = 2, by_surface = 3
-   integer, parameter :: initiation_persistent = 1, initiation_admissible = 2, &
-      initiation_velocity_update = 3, initiation_massless = 4
+   integer, parameter :: initiation_none = 0, initiation_persistent = 1, &
+      initiation_admissible = 2, initiation_velocity_update = 3, initiation_massless = 4
    integer, parameter :: method_null_space = 1, method_saddle_point = 2, method_penalty = 3, &
       method_augmented_lagrange = 4
    integer, parameter :: newton_kept = 1, newton_full = 2
@@ -104,7 +104,7 @@ module emcon_steps
       integer :: solver = solver_default             !! one of `solver_`
       character(len=:), allocatable :: solver_name   !! of `solver_given`, upper case, no blanks
       type(origin_t) :: solver_origin
-      integer :: initiation = initiation_persistent
+      integer :: initiation = initiation_persistent  !! of dynamic steps: `step_initiation`
       real(wp) :: gap_tolerance = 0.0_wp             !! fraction of element size; 0: no limit
       type(contact_options_t) :: contact
       logical :: resolves_overclosure = .false.      !! what is closed at the start opens to 0
@@ -122,6 +122,19 @@ module emcon_steps
    end type step_t
 
 contains
+
+   elemental logical function step_is_dynamic(step)
+      type(step_t), intent(in) :: step
+
+      step_is_dynamic = step%scheme%has_inertia
+   end function step_is_dynamic
+
+   !> How contact begins in a step: one of `initiation_`, none in statics.
+   elemental integer function step_initiation(step)
+      type(step_t), intent(in) :: step
+
+      step_initiation = merge(step%initiation, initiation_none, step_is_dynamic(step))
+   end function step_initiation
 
    !> Where a degree of freedom stands in the list; 0: it is not prescribed.
    pure integer function prescribed_find(list, node, dof) result(k)

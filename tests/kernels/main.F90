@@ -44,6 +44,7 @@ program main
    use test_explicit, only : collect_explicit
    use test_facets, only : collect_facets
    use test_friction, only : collect_friction
+   use test_friction_referee, only : collect_friction_referee
    use test_gauss, only : collect_gauss
    use test_holding, only : collect_holding
    use test_host_check, only : collect_host_check
@@ -157,6 +158,7 @@ program main
    call run("initial_contact", collect_initial_contact)
    call run("lapack", collect_lapack)
    call run("friction", collect_friction)
+   call run("friction_referee", collect_friction_referee)
    call run("dashpot_law", collect_dashpot_law)
    call run("gauss", collect_gauss)
    call run("band_blocks", collect_band_blocks)

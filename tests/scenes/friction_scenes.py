@@ -249,9 +249,9 @@ def belt_way(time, mu, k, v):
                      end + v/w*np.sin(w*(time - t2)))
 
 
-def ring(mu):
-    """That of the paper against its block, which is free."""
-    deck = rubbing(Deck.read(DECKS / "ring.inp"), mu, "FRICTIONLESS")
+def ring(mu, scene=None):
+    """That of the paper, or another `scene` of it, against its block, which is free."""
+    deck = rubbing(scene or Deck.read(DECKS / "ring.inp"), mu, "FRICTIONLESS")
     deck.remove("*BOUNDARY")
     return deck
 

@@ -6,7 +6,7 @@ import re
 import numpy as np
 import pytest
 from plain_scenes import BOTH, ONE, SCENES, UNGUARDED, Scene, below
-from scene_tools import DECKS, attempt, run_deck
+from scene_tools import DECKS, attempt, coarse_ring, run_deck
 from test_contact_output import data_sets, restart
 from test_explicit import EVERY, LINEAR, bar, block, critical_step, stiffness_and_mass
 from test_statics import E, FORCE, FORMULATIONS, NU, ACCURACY, displacement, tower
@@ -170,7 +170,7 @@ def test_a_stiff_penalty_costs_what_exact_contact_does(formulation, tmp_path):
 @pytest.mark.parametrize("smoothing", ["NONE", "HERMITE"])
 def test_a_penalty_with_integrated_gaps_on_a_flat_surface(smoothing, tmp_path):
     """Which edges a gap is made of does not change there: energy as for nodes."""
-    run = run_deck(DECKS/"ring.inp", tmp_path, h=0.02, t_end=1.5, method=PENALTY,
+    run = run_deck(coarse_ring(), tmp_path, h=0.02, t_end=1.5, method=PENALTY,
                    formulation="MORTAR", smoothing=smoothing)
     assert run.history["active"].max() > 2
     assert max(balance(run.history)) < 1e-12
