@@ -123,7 +123,7 @@ def test_nodes_of_one_side_and_few_points_fail_the_patch_test(tmp_path):
 # ---- Hertz --------------------------------------------------------------------------------------
 
 
-LEVELS = (4, 8, 16)
+LEVELS = (3, 6, 12)
 
 
 def hertz_pressure(run):

@@ -312,7 +312,7 @@ def test_a_plate_as_it_is_outside_the_program(tmp_path):
 def test_partial_slip(tmp_path):
     """Cattaneo and Mindlin: a strip sticks whose width by that in contact is sqrt(1 - Q/(mu P)), to
     one distance of nodes, until all slides."""
-    deck, place = pressed_round(64)
+    deck, place = pressed_round(64, layers=10)
     run = run_deck(deck, tmp_path, **NODES)
     assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] <= 1e-9
     assert run.history["cuts"].sum() == 0
