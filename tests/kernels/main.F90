@@ -71,6 +71,7 @@ program main
    use test_loads, only : collect_loads
    use test_march, only : collect_march
    use test_march_contact, only : collect_march_contact
+   use test_march_grid, only : collect_march_grid
    use test_march_kinds, only : collect_march_kinds
    use test_midside, only : collect_midside
    use test_mortar, only : collect_mortar
@@ -98,6 +99,7 @@ program main
    use test_scheme, only : collect_scheme
    use test_search, only : collect_search
    use test_shape, only : collect_shape
+   use test_single_elements, only : collect_single_elements
    use test_soft_law, only : collect_soft_law
    use test_solid, only : collect_solid
    use test_solvers, only : collect_solvers
@@ -178,6 +180,7 @@ program main
    call run("element_axial", collect_element_axial)
    call run("element_space", collect_element_space)
    call run("corotated", collect_corotated)
+   call run("single_elements", collect_single_elements)
    call run("soft_law", collect_soft_law)
    call run("solid", collect_solid)
    call run("facets", collect_facets)
@@ -235,6 +238,7 @@ program main
    call run("holding", collect_holding)
    call run("march", collect_march)
    call run("march_contact", collect_march_contact)
+   call run("march_grid", collect_march_grid)
    call run("march_kinds", collect_march_kinds)
    call run("ties", collect_ties)
    call run("links", collect_links)
