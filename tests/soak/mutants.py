@@ -289,7 +289,7 @@ def main():
     options = read_options()
     since = last_version() if options.since is None else options.since
     if options.put:
-        waiting = [Mutant.of(*options.put)]
+        waiting = [Mutant.of(*put) for put in options.put]
     else:
         waiting = draw(options.folders, since, options.seed)
         print(f"{len(waiting)} mutants of lines "
@@ -333,7 +333,7 @@ def read_options():
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
     parser.add_argument("--kernels", action="store_true", help="ask the kernel tests alone")
     parser.add_argument("--all", action="store_true", help="print what is noticed too, and by what")
-    parser.add_argument("--try", dest="put", nargs=2, metavar=("FILE:LINE", "TEXT"))
+    parser.add_argument("--try", dest="put", nargs=2, action="append", metavar=("FILE:LINE", "TEXT"))
     return parser.parse_args()
 
 
