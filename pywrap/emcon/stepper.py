@@ -73,9 +73,9 @@ class PairTotal:
 class Friction(NamedTuple):
     """Contacts that rub, all 0 without `*FRICTION`: CSHEAR and CSLIP of the deck."""
 
-    shear: NDArray[np.float64]     #: traction against slip [M/(L T^2)]
+    shear: NDArray[np.float64]     #: (n_constraint, n_dim - 1) traction against slip [M/(L T^2)]
     status: NDArray[np.int32]      #: 1 where it sticks, 2 where it slides
-    slip: NDArray[np.float64]      #: along the surface so far [L]
+    slip: NDArray[np.float64]      #: (n_constraint, n_dim - 1) along the surface so far [L]
     path: NDArray[np.float64]      #: the length of that way [L]
 
 
@@ -451,7 +451,7 @@ class Stepper(Queries, Conditions, Meshes):
                 for row, n, taken in zip(total, active, loss)]
 
     def friction(self) -> Friction:
-        """How each contact rubs, arrays of shape (n_constraint,) as those of `contact`."""
+        """How each contact rubs, in the order of `contact`; vectors along the surface."""
         return Friction(*self._handle.call(_core.emcon_get_friction, self.n_constraint))
 
     def verdict(self) -> dict[str, Any]:

@@ -4,8 +4,8 @@ module emcon_active_set
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_gives_back, &
       constraints_select
    use emcon_contact_support, only : contact_support_forget, contact_support_t
-   use emcon_dashpots, only : dashpots_idle, dashpots_look, dashpots_restart, dashpots_select, &
-      dashpots_t
+   use emcon_near_laws, only : near_laws_are_none, near_laws_restart, near_laws_select, &
+      near_laws_t, near_laws_update
    use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_friction, only : friction_begin, friction_init, friction_select, friction_t
    use emcon_gaps, only : gaps_forget, pair_measure, pair_search
@@ -87,7 +87,7 @@ module emcon_active_set
       real(wp) :: left(0:1) = 0.0_wp
       type(friction_t) :: friction               !! what sticks, what slides
       type(softness_state_t) :: softness         !! how stiff contacts are that give way
-      type(dashpots_t) :: dashpots               !! what is damped
+      type(near_laws_t) :: near_laws             !! what laws act on that is near
       type(contact_support_t) :: support         !! bodies that contact alone holds, in statics
       type(motion_bound_t) :: motion_bound       !! of all nodes, over the steps
       type(skip_until_t), allocatable :: skip_until(:) !! (n_contact)
@@ -166,13 +166,13 @@ contains
       self%lam0 = state%contacts%lam
       self%softness%closure = state%contacts%closure
       if (self%friction%is_on) then
-         self%friction%way0 = state%contacts%sliding
+         self%friction%direction0 = state%contacts%slides_along
          self%friction%tau0 = state%contacts%drag
       end if
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
-            contact%is_sharp = .false.
-            contact%pushes_at_end = evaluation_is_equilibrium(motion%evaluation) &
+            contact%step%is_sharp = .false.
+            contact%step%pushes_at_end = evaluation_is_equilibrium(motion%evaluation) &
                .or. motion%evaluation%pushes_at_end
          end associate
       end do
@@ -196,7 +196,7 @@ contains
       self%n_stale = 0
       self%n_early = 0
       self%softness%n_augmentation = 0
-      call dashpots_restart(self%dashpots)
+      call near_laws_restart(self%near_laws)
       self%only_adds = .false.
       self%has_cycled = .false.
       self%is_candidate = self%was_active
@@ -295,14 +295,14 @@ contains
       integer :: k, pair, i
 
       call remember(self)
-      if (self%set%n_condition == 0 .and. .not. (any(self%is_active) .or. self%dashpots%is_on)) &
+      if (self%set%n_condition == 0 .and. .not. (any(self%is_active) .or. self%near_laws%is_on)) &
          return
       if (.not. knows_gaps()) call measure_all(self, system, motion)
-      if (self%dashpots%is_on) then
-         call look_for_damped(self, system)
+      if (self%near_laws%is_on) then
+         call find_near(self, system)
          call constraints_select(self%set, places_of(self%is_active), &
-            places_of(self%dashpots%is_near))
-         call dashpots_select(self%dashpots, system, self%is_active, self%set)
+            places_of(self%near_laws%is_near .and. .not. self%is_active))
+         call near_laws_select(self%near_laws, system, self%set)
       else
          call constraints_select(self%set, places_of(self%is_active))
       end if
@@ -348,8 +348,8 @@ contains
       place = pack([(k, k = 1, size(is_meant))], is_meant)
    end function places_of
 
-   !> What is near enough to be damped, by the gaps as they were measured.
-   subroutine look_for_damped(self, system)
+   !> What is near enough for laws that act there, by the gaps as they were measured.
+   subroutine find_near(self, system)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       logical :: grows
@@ -357,11 +357,11 @@ contains
 
       grows = .false.
       do k = 1, size(system%contact)
-         if (dashpots_idle(self%dashpots, system%contact(k)%contact)) cycle
-         if (.not. is_empty(self, system, k)) call dashpots_look(self%dashpots, system, k, &
+         if (near_laws_are_none(self%near_laws, system%contact(k)%contact)) cycle
+         if (.not. is_empty(self, system, k)) call near_laws_update(self%near_laws, system, k, &
             self%is_active, grows)
       end do
-   end subroutine look_for_damped
+   end subroutine find_near
 
    !> Measure the gaps of all contacts that something is near.
    subroutine measure_all(self, system, motion)

@@ -182,7 +182,7 @@ contains
       is_done = .true.
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
-            if (contact%may_sharpen .and. .not. contact%is_sharp) is_done = .false.
+            if (contact%may_sharpen .and. .not. contact%step%is_sharp) is_done = .false.
          end associate
       end do
       if (is_done) return
@@ -190,7 +190,7 @@ contains
       motion%du = self%first
       newton%driven = self%driven
       do pair = 1, size(system%contact)
-         system%contact(pair)%contact%is_sharp = system%contact(pair)%contact%may_sharpen
+         system%contact(pair)%contact%step%is_sharp = system%contact(pair)%contact%may_sharpen
       end do
       call active_set_restart(self, system, motion)
       self%n_newton = n_newton

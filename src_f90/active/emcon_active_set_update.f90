@@ -5,8 +5,10 @@ module emcon_active_set_update
       step_cycling, step_done, step_stands_off, step_too_far, touch_tol
    use emcon_constraints, only : constraint_index, constraints_gives_back
    use emcon_contact, only : contact_t, max_penetration_on_entry, gap_state_t
-   use emcon_dashpots, only : dashpots_idle, dashpots_look
-   use emcon_friction, only : friction_close, friction_holds, friction_turn, most_lagged, most_shift
+   use emcon_near_laws, only : near_laws_are_none, near_laws_update
+   use emcon_coulomb_law, only : slip_status_t
+   use emcon_friction, only : friction_close, friction_holds, friction_is_same, friction_turn, &
+      most_lagged, most_shift
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_scene, only : scene_t
@@ -80,10 +82,11 @@ contains
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       logical :: before(size(self%is_active)), has_changed, has_more
-      integer :: way(size(self%friction%way)), status
+      type(slip_status_t) :: slips(size(self%friction%law))
+      integer :: status
 
       before = self%is_active
-      way = self%friction%way
+      slips = self%friction%law%status
       call update(self, system, motion, has_changed, status, has_more)
       self%n_tried = self%n_tried - 1
       self%n_early = self%n_early + 1
@@ -93,7 +96,7 @@ contains
          return
       end if
       self%is_active = before
-      self%friction%way = way
+      self%friction%law%status = slips
       self%n_early = most_early
    end subroutine active_set_leave
 
@@ -169,8 +172,8 @@ contains
             if (self%skip_until(pair)%passes .and. .not. any(self%is_active( &
                system%first_constraint(pair) + 1:system%first_constraint(pair + 1)))) cycle
             call active_set_update_gaps(self, system, pair, motion, motion%du)
-            if (.not. dashpots_idle(self%dashpots, contact)) call dashpots_look(self%dashpots, &
-               system, pair, self%is_active, has_more)
+            if (.not. near_laws_are_none(self%near_laws, contact)) call near_laws_update( &
+               self%near_laws, system, pair, self%is_active, has_more)
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i
                if (self%is_active(id)) then
@@ -181,7 +184,7 @@ contains
                   if (self%friction%is_on .and. .not. changes) then
                      call friction_turn(self%friction, system, self%set, k, turns)
                      has_changed = has_changed .or. turns
-                     if (self%friction%mu(id) > 0.0_wp) self%friction%lags = self%friction%lags &
+                     if (rubs(self, id)) self%friction%lags = self%friction%lags &
                         .or. contact%state(i)%slip_shift > most_shift
                   end if
                else
@@ -268,7 +271,7 @@ contains
          if (is_new .and. self%gap_tolerance > 0.0_wp &
             .and. gap%gap0 > self%gap_tolerance*gap%size) status = step_stands_off
          held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
-         if (self%set%gives_way) held = held + contact%mean_gap(i, self%set%left(k))
+         if (self%set%soft%is_on) held = held + contact%mean_gap(i, self%set%soft%left(k))
          self%is_stale = self%is_stale .or. &
             (.not. gap%is_leaving .and. abs(gap%gap1 - held) > touch_tol*gap%size)
       end associate
@@ -335,7 +338,7 @@ contains
             if (self%may_cut .and. gap%gap1 < min(gap%gap0, allowed(1)) - touch_tol*gap%size) then
                status = step_too_far
             end if
-         else if (gap%is_arriving .and. contact%gives_way) then
+         else if (gap%is_arriving .and. contact%step%gives_way) then
             closes = gap%gap1 < allowed(1) &
                .and. gap%gap1 > -contact%max_penetration_at_start*gap%size
          else if (gap%is_arriving .and. self%has_impacts .and. .not. may_arrive(gap)) then
@@ -344,13 +347,22 @@ contains
             status = step_too_far
          else if (self%was_active(id) .or. .not. gap%gap0 - allowed(0) &
             < -contact%max_penetration_at_start*gap%size) then
-            closes = .not. gap%gap1 - allowed(1) >= -merge(0.0_wp, gap_noise, contact%gives_way) &
-               *gap%size
+            closes = .not. gap%gap1 - allowed(1) >= -merge(0.0_wp, gap_noise, &
+               contact%step%gives_way)*gap%size
             if (self%holds_gap .and. self%is_candidate(id) .and. (self%has_cycled &
-               .or. contact%friction > 0.0_wp)) closes = gap%gap1 - gap%gap0 < -gap_noise*gap%size
+               .or. rubs(self, id))) closes = gap%gap1 - gap%gap0 < -gap_noise*gap%size
          end if
       end associate
    end subroutine look_at_open
+
+   !> Does friction act on contact `id`?
+   pure logical function rubs(self, id)
+      type(active_set_t), intent(in) :: self
+      integer, intent(in) :: id
+
+      rubs = self%friction%is_on
+      if (rubs) rubs = self%friction%law(id)%mu > 0.0_wp
+   end function rubs
 
    !> With nothing to hold at its start, a contact begins with the next step, or in a smaller one;
    !> in the smallest it begins at once, if it is deep.
@@ -380,9 +392,7 @@ contains
 
       do first_tried = 1, self%n_tried
          if (.not. all(self%tried(:, first_tried) .eqv. self%is_active)) cycle
-         if (.not. self%friction%is_on) return
-         if (all(self%friction%tried(:, first_tried) == self%friction%way &
-            .or. .not. self%is_active)) return
+         if (friction_is_same(self%friction, first_tried, self%is_active)) return
       end do
       first_tried = 0
    end function first_tried

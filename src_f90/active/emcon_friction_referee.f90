@@ -1,8 +1,8 @@
 !> Which contacts act, stick and slide where sets that are tried one after the other come back.
 !>
 !> The step is linearised where it is. In forces and gaps of its contacts alone it is the problem of
-!> emcon_friction_solve, which has a solution for any coefficient and is solved by trials of all
-!> contacts at once or by Lemke's method; Newton's method goes on with its set. Source:
+!> emcon_friction_solve_plane, which has a solution for any coefficient and is solved by trials of
+!> all contacts at once or by Lemke's method; Newton's method goes on with its set. Source:
 !> docs/theory.md, section 4.13, eq. (14i).
 module emcon_friction_referee
    use emcon_active_set, only : active_set_select, active_set_t, step_cycling, step_done
@@ -12,8 +12,8 @@ module emcon_friction_referee
    use emcon_errors, only : error_t
    use emcon_flexibility, only : flexibility_free, flexibility_make, flexibility_move, &
       flexibility_row, flexibility_t
-   use emcon_friction_law, only : touch_open, touch_t
-   use emcon_friction_solve, only : friction_problem_t, friction_solve
+   use emcon_coulomb_law, only : contact_open, contact_trial_t, slip_status_t
+   use emcon_friction_solve_plane, only : friction_problem_t, friction_solve
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_numbering, only : numbering_t, pick_unknowns
@@ -79,8 +79,8 @@ contains
       allocate(problem%w(2*n, 2*n), source=0.0_wp)
       associate (item => self%set%item(first:), id => self%set%id(first:self%set%n), &
             numbering => system%space%numbering)
-         problem%mu = self%friction%mu(id)*item(:n)%normal
-         problem%lead = self%friction%lead(id)
+         problem%mu = self%friction%law(id)%mu*item(:n)%normal
+         problem%slip_target = self%friction%law(id)%slip_target(1)
          call pick_unknowns(numbering, system%response%residual, force)
          call flexibility_move(flexibility, -force, way, error)
          if (allocated(error)) return
@@ -138,21 +138,24 @@ contains
       type(active_set_t), intent(inout) :: self
       type(friction_problem_t), intent(in) :: problem
       logical, intent(out) :: is_solved
-      type(touch_t) :: at(size(problem%mu))
-      integer :: way(size(problem%mu))
+      type(contact_trial_t) :: at(size(problem%mu))
+      type(slip_status_t) :: status(size(problem%mu))
       logical :: fell_back
+      integer :: i
 
       associate (id => self%set%id(self%set%n_permanent + 1:self%set%n), friction => self%friction)
-         way = friction%way(id)
-         call friction_solve(problem, way, at, is_solved, fell_back)
+         status = friction%law(id)%status
+         call friction_solve(problem, status, at, is_solved, fell_back)
          if (.not. is_solved) return
          friction%n_asked = friction%n_asked + 1
-         self%is_active(id) = way /= touch_open
+         self%is_active(id) = status%kind /= contact_open
          self%lam(id) = at%lam
-         friction%tau(id) = at%tau
+         friction%tau(1, id) = at%tau(1)
          friction%is_idle(id) = .false.
          friction%is_needed(id) = .false.
-         where (way /= touch_open) friction%way(id) = way
+         do i = 1, size(id)
+            if (status(i)%kind /= contact_open) friction%law(id(i))%status = status(i)
+         end do
       end associate
       self%comes_and_goes = .false.
    end subroutine follow

@@ -3,10 +3,10 @@
 module emcon_softness
    use emcon_constraints, only : constraint_index, constraint_set_t
    use emcon_contact_law, only : contact_law_t, contact_place_t
+   use emcon_contact_law_registry, only : contact_law_of_method
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t, where_text
-   use emcon_soft_law, only : augmented_t, penalty_t
    use emcon_steps, only : method_augmented_lagrange, method_penalty, step_is_dynamic, step_t
    use emcon_system, only : system_t
    use emcon_term_registry, only : terms_mass_rows
@@ -53,17 +53,15 @@ contains
          size(system%contact) > 0
       self%is_at_ends = self%is_on .and. step%scheme%is_explicit
       do k = 1, size(system%contact)
-         system%contact(k)%contact%is_soft = self%is_on
-         system%contact(k)%contact%gives_way = .false.
+         system%contact(k)%contact%step%is_soft = self%is_on
+         system%contact(k)%contact%step%gives_way = .false.
       end do
       if (.not. self%is_on) return
       self%tolerance = step%softness%tolerance
-      if (self%augments) then
-         allocate(augmented_t :: self%law)
-      else if (allocated(system%contact_law)) then
+      if (allocated(system%contact_law) .and. .not. self%augments) then
          allocate(self%law, source=system%contact_law)
       else
-         allocate(penalty_t :: self%law)
+         call contact_law_of_method(step%constraint_method, self%law)
       end if
       allocate(self%closure(system%n_constraint), source=1.0_wp)
       allocate(self%stiffness(system%n_constraint), self%area(system%n_constraint), &
@@ -115,7 +113,7 @@ contains
                // "pair: give its STIFFNESS, pressure by penetration")
             return
          end if
-         contact%gives_way = .not. self%augments .and. step_is_dynamic(step)
+         contact%step%gives_way = .not. self%augments .and. step_is_dynamic(step)
          self%area(before + 1:before + size(area)) = area*merge(0.5_wp, 1.0_wp, &
             contact%both_sides)
          self%stiffness(before + 1:before + size(area)) = area*merge(0.5_wp, 1.0_wp, &
@@ -150,18 +148,18 @@ contains
       type(contact_place_t) :: place
       integer :: k, pair, i
 
-      set%gives_way = self%is_on .and. set%n > 0
-      if (.not. set%gives_way) return
-      set%is_stored = is_stored .and. .not. self%augments
+      set%soft%is_on = self%is_on .and. set%n > 0
+      if (.not. set%soft%is_on) return
+      set%soft%is_stored = is_stored .and. .not. self%augments
       do k = 1, set%n
          call constraint_index(system, set%id(k), pair, i)
          if (pair == 0) cycle
          place = contact_place_t(self%area(set%id(k)), self%stiffness(set%id(k)), &
             system%contact(pair)%contact%share(i))
-         if (set%is_stored .and. .not. self%is_at_ends) place%closure = self%closure(set%id(k))
-         allocate(set%law(k)%law, source=self%law)
-         call set%law(k)%law%begin(place)
-         call set%law(k)%law%push_on(set%lam(k))
+         if (set%soft%is_stored .and. .not. self%is_at_ends) place%closure = self%closure(set%id(k))
+         allocate(set%law(k)%row, source=self%law)
+         call set%law(k)%row%begin(place)
+         call set%law(k)%row%push_on(set%lam(k))
       end do
    end subroutine softness_select
 
@@ -174,11 +172,11 @@ contains
       integer :: k
 
       is_done = .true.
-      if (.not. (self%augments .and. set%gives_way)) return
+      if (.not. (self%augments .and. set%soft%is_on)) return
       self%n_augmentation = self%n_augmentation + 1
       do k = set%n_permanent + 1, set%n
-         if (abs(set%left(k)) > self%tolerance*set%item(k)%size) is_done = .false.
-         call set%law(k)%law%push_on(set%lam(k))
+         if (abs(set%soft%left(k)) > self%tolerance*set%item(k)%size) is_done = .false.
+         call set%law(k)%row%push_on(set%lam(k))
       end do
    end subroutine softness_augment
 
@@ -201,9 +199,9 @@ contains
       integer :: k
 
       energy = 0.0_wp
-      if (self%augments .or. .not. set%gives_way) return
+      if (self%augments .or. .not. set%soft%is_on) return
       do k = set%n_permanent + 1, set%n
-         energy = energy + set%law(k)%law%stored()
+         energy = energy + set%law(k)%row%stored()
       end do
    end function softness_stored
 
@@ -214,9 +212,9 @@ contains
       real(wp), intent(inout) :: closure(:)      !! (n_constraint) those of others stand [L]
       integer :: k
 
-      if (self%augments .or. .not. set%gives_way) return
+      if (self%augments .or. .not. set%soft%is_on) return
       do k = set%n_permanent + 1, set%n
-         closure(set%id(k)) = set%law(k)%law%closure()
+         closure(set%id(k)) = set%law(k)%row%closure()
       end do
    end subroutine softness_keep
 
@@ -239,12 +237,12 @@ contains
       integer :: k
 
       depth = 0.0_wp
-      if (.not. set%gives_way) return
+      if (.not. set%soft%is_on) return
       do k = set%n_permanent + 1, set%n
          edge = set%item(k)%size
          if (self%edge(set%id(k)) > 0.0_wp .and. .not. self%augments) edge = min(edge, &
             self%edge(set%id(k)))
-         depth = max(depth, -set%left(k)/edge)
+         depth = max(depth, -set%soft%left(k)/edge)
       end do
    end function softness_depth
 

@@ -70,6 +70,7 @@ typedef struct emcon_sizes {
    int n_tie;
    int n_selected;   /* constraints that were selected or evaluated last */
    int n_dim;        /* 2: in the plane; 3: in space */
+   int n_slip;       /* components of slips along surfaces: n_dim - 1 */
    int n_momentum;   /* momenta of a body: n_dim linear ones, then 1 angular one, in space 3 */
 } emcon_sizes;
 
@@ -434,9 +435,9 @@ int emcon_get_pressures(emcon_model *model, int n_contact, double *pressure /* n
 
 /* Of each possible contact, 0 without *FRICTION: its traction against slip, 1 where it sticks and 2
  * where it slides, its slip along the surface so far, and the length of that way: CSHEAR and CSLIP
- * of the deck. */
-int emcon_get_friction(emcon_model *model, int n_contact, double *shear /* n_contact */,
-                       int *way /* n_contact */, double *slip /* n_contact */,
+ * of the deck. Traction and slip are vectors along the surface, in the plane of one component. */
+int emcon_get_friction(emcon_model *model, int n_contact, double *shear /* n_contact x n_slip */,
+                       int *way /* n_contact */, double *slip /* n_contact x n_slip */,
                        double *path /* n_contact */);
 
 /* Of each pair: the energy that friction has taken since the start, >= 0; of one that holds both

@@ -85,7 +85,8 @@ struct Verdict {
 };
 
 // Of each possible contact; NaN is the gap where no surface is near. With *FRICTION its traction,
-// slip and the length of that way; `way` is 1 where it sticks, 2 where it slides.
+// slip, vectors of n_dim - 1 components, and the length of that way; `way` is 1 where it sticks, 2
+// where it slides.
 struct Contact {
    std::vector<double> lam, pressure, gap, shear, slip, path;
    std::vector<int> is_active, label, pair, way;
@@ -274,9 +275,10 @@ public:
       const int n = sizes().n_contact;
       const std::size_t size = static_cast<std::size_t>(n);
       Contact found;
-      for (std::vector<double> *array : {&found.lam, &found.pressure, &found.gap, &found.shear,
-                                         &found.slip, &found.path})
+      for (std::vector<double> *array : {&found.lam, &found.pressure, &found.gap, &found.path})
          array->resize(size);
+      found.shear.resize(size*static_cast<std::size_t>(sizes().n_slip));
+      found.slip.resize(found.shear.size());
       for (std::vector<int> *array : {&found.is_active, &found.label, &found.pair, &found.way})
          array->resize(size);
       call(emcon_get_contact, n, found.lam.data(), found.is_active.data(), found.label.data(),

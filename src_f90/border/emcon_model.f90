@@ -140,6 +140,7 @@ contains
          sizes%n_surface = size(scene%surface)
          sizes%n_tie = size(scene%tie)
          sizes%n_dim = scene%n_dim
+         sizes%n_slip = scene%n_dim - 1
          sizes%n_momentum = scene%n_dim + n_turn(scene%n_dim)
       end associate
       sizes%n_selected = model%query%march%active%set%n

@@ -194,7 +194,8 @@ contains
 
    subroutine model_friction(model, shear, way, slip, path)
       type(model_t), intent(inout) :: model
-      real(wp), allocatable, intent(out) :: shear(:), slip(:), path(:)   !! (n_contact)
+      real(wp), allocatable, intent(out) :: shear(:, :), slip(:, :)      !! (n_slip, n_contact)
+      real(wp), allocatable, intent(out) :: path(:)                      !! (n_contact)
       integer, allocatable, intent(out) :: way(:)                        !! (n_contact)
       real(dp), allocatable :: rubs(:, :), slid(:, :)
       integer :: first
@@ -202,10 +203,12 @@ contains
       allocate(rubs, source=contact_quantity(model%stepper, "CSHEAR"))
       allocate(slid, source=contact_quantity(model%stepper, "CSLIP"))
       first = model%stepper%march%system%first_constraint(1) + 1
-      shear = real(rubs(1, first:), wp)
-      way = nint(rubs(size(rubs, 1), first:))
-      slip = real(slid(1, first:), wp)
-      path = real(slid(size(slid, 1), first:), wp)
+      associate (n => size(slid, 1))
+         shear = real(rubs(:n - 1, first:), wp)
+         way = nint(rubs(n, first:))
+         slip = real(slid(:n - 1, first:), wp)
+         path = real(slid(n, first:), wp)
+      end associate
    end subroutine model_friction
 
    !> Pairs that are one in the sums have it at the first of them.

@@ -4,14 +4,15 @@
 !> its value, discrete gradient and derivatives. Which constraints act is not its business.
 module emcon_contact
    use emcon_constraint, only : condition_normal, condition_t, constraint_t
+   use emcon_contact_law, only : contact_laws_t
    use emcon_evaluation, only : evaluation_is_equilibrium
-   use emcon_interactions, only : contact_damping_t, contact_options_t
+   use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
    use emcon_midside_plane, only : midside_distribute, midside_points, midside_stretch, midside_t
    use emcon_motion, only : motion_t
    implicit none
    private
-   public :: contact_t, contact_box_t, gap_state_t
+   public :: contact_t, contact_box_t, contact_step_t, gap_state_t
    public :: max_penetration_on_entry
 
    !> Corners of master surfaces are rounded over these fractions of an edge: with and without a
@@ -39,23 +40,24 @@ module emcon_contact
       real(wp) :: slip_shift = 0.0_wp
    end type gap_state_t
 
+   !> What the present step asks of a contact.
+   type :: contact_step_t
+      logical :: is_sharp = .false.                   !! convex corners are not rounded
+      logical :: pushes_at_end = .false.              !! forces act at its end, else all over it
+      logical :: is_soft = .false.                    !! by a penalty, or augmented
+      logical :: gives_way = .false.                  !! it stores what it takes: a penalty
+   end type contact_step_t
+
    type, abstract, extends(constraint_t) :: contact_t
       real(wp) :: rounding = 0.0_wp                   !! of corners, as a fraction of a master edge
       logical :: may_sharpen = .false.                !! of polygons: convex corners are rounded
-      logical :: is_sharp = .false.                   !! but not in this step
-      logical :: pushes_at_end = .false.              !! forces act at the end of this step, else
-                                                      !! all over it
       logical :: meets_statics = .false.              !! a step of the deck is static
       logical :: may_leave = .false.                  !! constraints lose their surface, in a step
-      logical :: is_soft = .false.                    !! in this step: a penalty, or augmented
-      logical :: gives_way = .false.                  !! it stores what it takes: a penalty
+      type(contact_step_t) :: step
       logical :: both_sides = .false.                 !! this and others hold nodes of both surfaces
       real(wp) :: slack = 0.0_wp                      !! > 0: a guard, closed at -slack by the edge
       real(wp) :: offset = 0.0_wp                     !! gaps are counted from it on, >= 0 [L]
-      real(wp) :: restitution = 1.0_wp                !! of impacts, 0 to 1
-      real(wp) :: friction = 0.0_wp                   !! mu >= 0 of Coulomb's law
-      real(wp) :: rebound = 0.0_wp                    !! along the surface, of what sticks, 0 to 1
-      type(contact_damping_t) :: damping              !! of what is near, too
+      type(contact_laws_t) :: laws                    !! that conditions get copies of
       real(wp) :: reach = 0.0_wp                      !! so far it is near; 0: a step begins [L]
       !> Where nothing was near in the last step: how far apart the surfaces were as it began, by
       !> the largest motion of nodes; else 0 [L].
@@ -278,10 +280,11 @@ contains
 
    !> How far the contact point of constraint `i` slides along the surface over the step, or would
    !> by a field `du` that is small: docs/theory.md, eq. (14e).
-   pure real(wp) function slip(self, i, x, u0, du)
+   pure function slip(self, i, x, u0, du)
       class(contact_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+      real(wp) :: slip(size(x, 1) - 1)           !! [L]
 
       if (self%midside%n == 0) then
          slip = self%slip_points(i, x, u0, du)
@@ -292,10 +295,11 @@ contains
    end function slip
 
    !> The same by contact points.
-   pure real(wp) function slip_points(self, i, x, u0, du) result(slip)
+   pure function slip_points(self, i, x, u0, du) result(slip)
       class(contact_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+      real(wp) :: slip(size(x, 1) - 1)           !! [L]
 
       slip = 0.0_wp
    end function slip_points

@@ -1,6 +1,7 @@
 !> A formulation of contact that a program gives, for the pairs of the deck with TYPE=USER.
 module emcon_host_contact
    use emcon_contact, only : contact_t, max_penetration_on_entry
+   use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : err_input, error_t, raise
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
@@ -55,7 +56,7 @@ contains
       end associate
       if (.not. self%max_penetration_at_start > 0.0_wp) self%max_penetration_at_start &
          = max_penetration_on_entry
-      self%restitution = pair%restitution
+      call contact_laws_of_surface(pair%laws, self%laws)
    end subroutine host_contact_set_up
 
    !> Does each constraint have what belongs to it?

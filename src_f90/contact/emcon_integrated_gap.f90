@@ -8,6 +8,8 @@ module emcon_integrated_gap
    use emcon_condition_nodes, only : condition_include, condition_resize_slip
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, max_penetration_on_entry
+   use emcon_contact_law, only : contact_laws_rub
+   use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_dgrad_wide, only : wide_t
    use emcon_edge_moments, only : edge_moments_t, form_constraint, form_share, gap_integral_t
    use emcon_errors, only : error_t
@@ -108,10 +110,7 @@ contains
       self%n_constraint = n
       self%max_penetration_at_start = max_penetration_mean
       self%offset = pair%offset
-      self%restitution = pair%restitution
-      self%friction = pair%friction
-      self%rebound = pair%rebound
-      self%damping = pair%damping
+      call contact_laws_of_surface(pair%laws, self%laws)
       self%node_edge = self%slave%node_edge
       allocate(self%state(n), self%form(self%slave%n_facet), self%slide(n))
       allocate(self%is_formed(self%slave%n_facet), source=.false.)
@@ -141,7 +140,7 @@ contains
       real(wp) :: own
       integer :: i
 
-      if (.not. (self%friction > 0.0_wp .or. self%damping%tangent > 0.0_wp)) return
+      if (.not. contact_laws_rub(self%laws)) return
       do i = 1, self%n_constraint
          self%slide(i)%point = nothing
          call self%choose_slip(i, x, u0, du, self%slide(i))
@@ -178,10 +177,11 @@ contains
       end do
    end subroutine integrated_gap_sagittas
 
-   pure real(wp) function integrated_gap_slip(self, i, x, u0, du) result(slip)
+   pure function integrated_gap_slip(self, i, x, u0, du) result(slip)
       class(integrated_gap_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp) :: slip(size(x, 1) - 1)           !! (1) [L]
       integer :: k
 
       slip = 0.0_wp
@@ -213,10 +213,10 @@ contains
             ! What stores energy is followed as long as there is any to give back.
             least = least_cover*self%whole(i)
             self%scale(i) = max(area(0), least)
-            if (self%gives_way) least = tiny(least)
+            if (self%step%gives_way) least = tiny(least)
             state%is_near = maxval(area) > 0.0_wp
             state%is_covered = .true.
-            state%is_over = area(1) >= least .or. (self%gives_way .and. area(0) >= least)
+            state%is_over = area(1) >= least .or. (self%step%gives_way .and. area(0) >= least)
             state%is_leaving = .not. state%is_over
             state%is_arriving = area(0) < least
             state%gap0 = 0.0_wp

@@ -6,6 +6,7 @@
 module emcon_mortar
    use emcon_arcs_plane, only : arc_rise, arcs_find
    use emcon_chain_plane, only : chain_corners, chain_distance, chain_shorter
+   use emcon_contact_law, only : contact_laws_reach
    use emcon_edge_moments, only : form_begin
    use emcon_errors, only : error_t
    use emcon_gauss, only : gauss_points
@@ -71,7 +72,7 @@ contains
       call integrated_gap_init(self, scene, pair, error)
       if (allocated(error)) return
       call near_list_init(self%near, self%slave%facet, self%master%facet, scene%x, scene%u0, &
-         maxval(self%slave%size) + (self%offset + pair%damping%clearance))
+         maxval(self%slave%size) + (self%offset + pair%laws%damping%clearance))
       self%max_gap_on_entry = maxval(self%slave%size)
       allocate(self%start(self%slave%n_facet + 1), source=1)
       allocate(self%pair(0))
@@ -201,7 +202,7 @@ contains
 
       do pass = 1, 2
          at = 0.0_wp                             ! where nothing is covered there: at the start
-         if (pass == 1) at = merge(1.0_wp, 0.5_wp, self%pushes_at_end)
+         if (pass == 1) at = merge(1.0_wp, 0.5_wp, self%step%pushes_at_end)
          do k = 1, 2
             e = self%node_edge(k, i)
             if (e > 0) list%point = [list%point, edge_slips(self, e, 3 - k, x, u0, du, at)]
@@ -288,7 +289,9 @@ contains
       real(wp) :: local(2, n_place), dlocal(2, n_place), corner(2, 4), motion(2, 4)
       integer :: k, m
       logical :: is_wide
+      real(wp) :: reach
 
+      reach = max(0.0_wp, contact_laws_reach(self%laws))
       associate (list => self%near%candidates, options => self%options)
          is_wide = options%integration == integration_elements
          if (list%start(e + 1) > list%start(e)) call stencil_slave(stencil, self%slave, e, &
@@ -302,8 +305,7 @@ contains
             end if
             call place_edge(self%master%facet(:, m), self%slave%facet(1, e), &
                size(self%slave%facet, 1), corner, motion)
-            if (.not. pair_comes_near(self%slave%size(e) + self%damping%clearance, corner, &
-               motion)) cycle
+            if (.not. pair_comes_near(self%slave%size(e) + reach, corner, motion)) cycle
             call stencil_master(stencil, self%master, m, options%smoothing == smoothing_hermite, &
                is_wide, self%master_corner)
             if (is_wide) stencil%rounding = self%rounding*chain_shorter(self%master, m)

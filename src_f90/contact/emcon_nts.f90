@@ -7,11 +7,12 @@ module emcon_nts
    use emcon_chain_plane, only : chain_corners, chain_tributary
    use emcon_constraint, only : condition_t
    use emcon_contact, only : gap_state_t
+   use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : error_t
    use emcon_guard_slack_plane, only : guard_slack_find
    use emcon_hermite_gap_value, only : hermite_gap_value, hermite_slip_value
-   use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite, &
-      smoothing_none
+   use emcon_interactions, only : contact_damping_t, contact_options_t, contact_pair_t, &
+      smoothing_hermite, smoothing_none, surface_laws_t
    use emcon_kinds, only : wp
    use emcon_nts_choice, only : choice_covers, choice_init, update_candidates, choice_make, &
       choice_settle, choice_take_nearer, nts_choice_t
@@ -71,6 +72,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       logical, intent(in), optional :: has_twins !! both nodes of a joint have a gap: as parts of
                                                  !! other constraints
+      type(surface_laws_t) :: surface
 
       call choice_init(self, scene, pair, error, has_twins)
       if (allocated(error)) return
@@ -80,10 +82,9 @@ contains
       self%slack = pair%slack
       if (pair%slack > 0.0_wp) call guard_slack_find(self%slave, scene%x, pair%slack, &
          self%own_slack)
-      self%restitution = pair%restitution
-      self%friction = pair%friction
-      if (.not. pair%slack > 0.0_wp) self%damping = pair%damping
-      self%rebound = pair%rebound
+      surface = pair%laws
+      if (pair%slack > 0.0_wp) surface%damping = contact_damping_t()
+      call contact_laws_of_surface(surface, self%laws)
    end subroutine nts_init
 
    pure subroutine nts_configure(self, x, options)
@@ -127,12 +128,12 @@ contains
 
       call update_candidates(self, x, u0, du)
       if (abs(self%chosen_reach - self%reach) <= 0.0_wp .and. &
-         (self%were_sharp .eqv. self%is_sharp)) then
+         (self%were_sharp .eqv. self%step%is_sharp)) then
          if (position_memo_holds(self%position_memo, self%near%node, x, u0)) return
       end if
       call position_memo_take(self%position_memo, self%near%node, x, u0)
       self%chosen_reach = self%reach
-      self%were_sharp = self%is_sharp
+      self%were_sharp = self%step%is_sharp
       do i = 1, self%n_constraint
          call choice_make(self, i, x, u0)
          if (allocated(self%curvature)) self%sagitta(i) = sagitta_under(self, i, x, u0)
@@ -223,7 +224,7 @@ contains
          state%gap0 = state%gap0 - self%offset - self%sagitta(i)
          state%size = stencil_length(x, stencil%node)
          if (allocated(self%own_slack)) state%closed = -min(state%size, self%own_size(i)) &
-            *merge(self%slack, self%own_slack(self%chain_node(i)), self%is_soft)
+            *merge(self%slack, self%own_slack(self%chain_node(i)), self%step%is_soft)
          state%is_near = .true.
       end associate
    end function polygon_start
@@ -378,10 +379,11 @@ contains
 
    !> As `contact_t` has it: by the places on the line of the edge at both ends of the step, or on
    !> the smoothed surface, if that has a closest point at both.
-   pure real(wp) function nts_slip(self, i, x, u0, du) result(slip)
+   pure function nts_slip(self, i, x, u0, du) result(slip)
       class(nts_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp) :: slip(size(x, 1) - 1)           !! (1) [L]
       real(wp), dimension(size(x, 1), most_nodes) :: local, dlocal
       integer :: k, n
       logical :: is_found
@@ -393,7 +395,7 @@ contains
             n = smooth%n
             call stencil_gather(x, u0, du, n, smooth%node, local, dlocal)
             call hermite_slip_value(smooth%curve, local(:, :n), dlocal(:, :n), smooth%place(1), &
-               slip, is_found)
+               slip(1), is_found)
          end associate
          if (is_found) return
       end if

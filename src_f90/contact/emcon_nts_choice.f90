@@ -90,7 +90,7 @@ contains
       associate (n => self%n_constraint/self%rule%n_class)
          self%near_item = [(1 + mod(i, n), i = 0, self%n_constraint - 1)]
          call near_list_init(self%near, reshape(self%node(:n), [1, n]), self%master%facet, &
-            scene%x, scene%u0, self%offset + pair%damping%clearance)
+            scene%x, scene%u0, self%offset + pair%laws%damping%clearance)
       end associate
    end subroutine choice_init
 
@@ -250,11 +250,11 @@ contains
 
       ! At rest a node may stand on a top for long.
       top = merge(2.0_wp, 1.0_wp, self%meets_statics)
-      if (self%is_sharp) top = 0.0_wp
+      if (self%step%is_sharp) top = 0.0_wp
       call polygon_stencil(stencil, self%master, self%node(i), edge, &
          self%rounding*[1.0_wp, top], x, u0)
       ! Guards watch the mesh.
-      if (.not. (self%is_sharp .or. self%meets_statics .or. self%slack > 0.0_wp)) &
+      if (.not. (self%step%is_sharp .or. self%meets_statics .or. self%slack > 0.0_wp)) &
          call corner_tops(self%slave, self%chain_node(i), self%master, edge, x, u0, stencil)
       stencil%goes_around = self%offset > 0.0_wp
       associate (n => stencil%n, before => stencil%before, after => stencil%after)

@@ -87,7 +87,7 @@ contains
 
       self%nts%reach = self%reach
       self%nts%rounding = self%rounding
-      self%nts%is_sharp = self%is_sharp
+      self%nts%step%is_sharp = self%step%is_sharp
       self%nts%meets_statics = self%meets_statics
       call self%nts%begin_points(x, u0, du)
       call integrated_gap_slips(self, x, u0, du)

@@ -32,10 +32,8 @@ contains
       integer :: i, n, rubs
 
       allocate(reader%interaction(size(reader%card)))
-      allocate(reader%pad(size(reader%card)), reader%friction(size(reader%card)), source=0.0_wp)
-      allocate(reader%rebound(size(reader%card)), source=0.0_wp)
-      allocate(reader%damping(size(reader%card)))
-      allocate(reader%restitution(size(reader%card)), source=1.0_wp)
+      allocate(reader%pad(size(reader%card)), source=0.0_wp)
+      allocate(reader%laws(size(reader%card)))
       n = 0
       rubs = 0                                   ! the last interaction with *FRICTION
       do i = 1, size(reader%card)
@@ -50,21 +48,21 @@ contains
                   // "surfaces apart; overlap at the start is resolved by *CONTACT INTERFERENCE", &
                   reader%pad(n))
                call read_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is left " &
-                  // "of the velocity at which bodies meet", reader%restitution(n))
+                  // "of the velocity at which bodies meet", reader%laws(n)%restitution)
             case ("SURFACEBEHAVIOR", "FRICTION", "CONTACTDAMPING")
                if (n == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
                   "there is no *SURFACE INTERACTION before")
                if (card%name == "CONTACTDAMPING") then
-                  call read_contact_damping(reader, card, reader%damping(max(1, n)))
-                  if (n == 0) reader%damping(1) = contact_damping_t()
+                  call read_contact_damping(reader, card, reader%laws(max(1, n))%damping)
+                  if (n == 0) reader%laws(1)%damping = contact_damping_t()
                else if (card%name == "FRICTION") then
                   if (n > 0 .and. n == rubs) call card_error(reader, card, &
                      "the surface interaction has *FRICTION already")
                   rubs = n
-                  call read_friction(reader, card, reader%friction(max(1, n)))
+                  call read_friction(reader, card, reader%laws(max(1, n))%friction)
                   call read_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
                      // "left of the velocity along the surface of what sticks", &
-                     reader%rebound(max(1, n)))
+                     reader%laws(max(1, n))%rebound)
                else
                   call check_behavior(reader, card)
                end if
@@ -73,10 +71,7 @@ contains
       end do
       reader%interaction = reader%interaction(:n)
       reader%pad = reader%pad(:n)
-      reader%friction = reader%friction(:n)
-      reader%rebound = reader%rebound(:n)
-      reader%restitution = reader%restitution(:n)
-      reader%damping = reader%damping(:n)
+      reader%laws = reader%laws(:n)
    end subroutine read_interactions
 
    !> The value of a parameter, 0 or more; of RESTITUTION up to 1.
@@ -350,10 +345,7 @@ contains
          pair(i)%adjust_set = of_card%adjust_set
          pair(i)%is_guarded = of_card%is_guarded
          pair(i)%offset = of_card%offset
-         pair(i)%restitution = of_card%restitution
-         pair(i)%friction = of_card%friction
-         pair(i)%rebound = of_card%rebound
-         pair(i)%damping = of_card%damping
+         pair(i)%laws = of_card%laws
          pair(i)%initiation = of_card%initiation
       end do
    end subroutine read_pair_options
@@ -368,8 +360,8 @@ contains
       of_card%is_guarded = .false.
       if (has_option(card, "ADJUST")) call refuse("ADJUST")
       if (of_card%offset > 0.0_wp) call refuse("PAD THICKNESS of its surface interaction")
-      if (of_card%friction > 0.0_wp) call refuse("*FRICTION of its surface interaction")
-      if (of_card%damping%coefficient > 0.0_wp) call refuse( &
+      if (of_card%laws%friction > 0.0_wp) call refuse("*FRICTION of its surface interaction")
+      if (of_card%laws%damping%coefficient > 0.0_wp) call refuse( &
          "*CONTACT DAMPING of its surface interaction")
 
    contains
@@ -396,10 +388,7 @@ contains
       i = name_index_find(reader%interactions, name)
       if (i > 0) then
          of_card%offset = reader%pad(i)
-         of_card%restitution = reader%restitution(i)
-         of_card%friction = reader%friction(i)
-         of_card%rebound = reader%rebound(i)
-         of_card%damping = reader%damping(i)
+         of_card%laws = reader%laws(i)
       end if
       if (.not. (i > 0 .or. name == "" .or. reader%doubt_names)) call card_error( &
          reader, card, "unknown surface interaction " &

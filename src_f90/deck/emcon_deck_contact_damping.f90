@@ -113,7 +113,7 @@ contains
       integer :: i, k
 
       do i = 1, size(pair)
-         if (.not. pair(i)%damping%coefficient > 0.0_wp .or. pair(i)%is_reverse) cycle
+         if (.not. pair(i)%laws%damping%coefficient > 0.0_wp .or. pair(i)%is_reverse) cycle
          do k = 1, size(step)
             if (step(k)%scheme%takes_damping) cycle
             call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
@@ -129,7 +129,8 @@ contains
          if (any(step_initiation(step) == initiation_massless)) call &
             warn(pair(i), "asks for mass: both surfaces keep theirs, and hold gaps as " // &
             "PERSISTENT does")
-         if (pair(i)%damping%clearance > 0.0_wp .or. pair(i)%damping%tangent > 0.0_wp) cycle
+         if (pair(i)%laws%damping%clearance > 0.0_wp) cycle
+         if (pair(i)%laws%damping%tangent > 0.0_wp) cycle
          if (.not. any(step%constraint_method == method_penalty)) call warn(pair(i), &
             "damps nothing: what contact holds exactly does not move along its normal; give a " // &
             "clearance or a TANGENT FRACTION")

@@ -163,11 +163,11 @@ contains
       type(step_t), intent(in) :: step(:)
       integer :: i, k
 
-      i = findloc(pair%restitution < 1.0_wp, .true., 1)
+      i = findloc(pair%laws%restitution < 1.0_wp, .true., 1)
       if (i == 0) return
       k = findloc(step_initiation(step), initiation_admissible, 1)
       if (k > 0) call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface " // &
-         "interaction has RESTITUTION=" // to_text(pair(i)%restitution) // ", but step " // &
+         "interaction has RESTITUTION=" // to_text(pair(i)%laws%restitution) // ", but step " // &
          to_text(k) // " has *CONTACT INITIATION, TYPE=ADMISSIBLE, which loses energy by " // &
          "itself; use PERSISTENT")
    end subroutine check_restitution

@@ -75,10 +75,10 @@ contains
                // "but slave nodes are to be MASSLESS: what has no mass has no acceleration")
             cycle
          end if
-         i = findloc(pair%restitution < 1.0_wp, .true., 1)
+         i = findloc(pair%laws%restitution < 1.0_wp, .true., 1)
          if (i > 0) then
             call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
-               // "has RESTITUTION=" // to_text(pair(i)%restitution) // ", but step " // &
+               // "has RESTITUTION=" // to_text(pair(i)%laws%restitution) // ", but step " // &
                to_text(k) // " is explicit: what rebounds there is the bodies alone")
             cycle
          end if

@@ -70,8 +70,8 @@ contains
       do i = 1, size(pair)
          if (pair(i)%slave == 0 .or. pair(i)%master == 0) cycle   ! its surface is unknown, and told
          call check_other_way(reader, pair(:i), given)
-         if (.not. pair(i)%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
-         if (pair(i)%restitution < 1.0_wp) call refuse(reader, pair(i), &
+         if (.not. pair(i)%laws%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
+         if (pair(i)%laws%restitution < 1.0_wp) call refuse(reader, pair(i), &
             "RESTITUTION below 1: velocities would " &
             // "jump along the surface too; use RESTITUTION=1")
          do k = 1, size(step)
@@ -100,8 +100,8 @@ contains
             call name_index_put(given, name_index_pair(new%slave, new%master), size(pair))
          end if
          if (j == 0) return
-         if (abs(pair(j)%friction - new%friction) <= 0.0_wp .and. &
-            abs(pair(j)%rebound - new%rebound) <= 0.0_wp) return
+         if (abs(pair(j)%laws%friction - new%laws%friction) <= 0.0_wp .and. &
+            abs(pair(j)%laws%rebound - new%laws%rebound) <= 0.0_wp) return
          call add_error(reader%log, new%origin, "*CONTACT PAIR: the surfaces are a pair in the " &
             // "other order too, with another *FRICTION: give both the same interaction")
       end associate

@@ -232,15 +232,15 @@ contains
          i = name_index_find(reader%interactions, name)
          is_known = i > 0 .or. reader%doubt_names
          if (i > 0) then
-            if (reader%restitution(i) < 1.0_wp) call data_error(reader, data, "the surface " // &
-               "interaction " // quoted(name) // " has a RESTITUTION, which is of pairs only; " // &
-               "name what it is of by *CONTACT PAIR")
-            if (reader%friction(i) > 0.0_wp) call data_error(reader, data, "the surface " // &
+            if (reader%laws(i)%restitution < 1.0_wp) call data_error(reader, data, "the " // &
+               "surface interaction " // quoted(name) // " has a RESTITUTION, which is of pairs " // &
+               "only; name what it is of by *CONTACT PAIR")
+            if (reader%laws(i)%friction > 0.0_wp) call data_error(reader, data, "the surface " // &
                "interaction " // quoted(name) // " has *FRICTION, which is of pairs only; " // &
                "name what it is of by *CONTACT PAIR")
-            if (reader%damping(i)%coefficient > 0.0_wp) call data_error(reader, data, "the " // &
-               "surface interaction " // quoted(name) // " has *CONTACT DAMPING, which is of " // &
-               "pairs only; name what it is of by *CONTACT PAIR")
+            if (reader%laws(i)%damping%coefficient > 0.0_wp) call data_error(reader, data, &
+               "the surface interaction " // quoted(name) // " has *CONTACT DAMPING, which is " // &
+               "of pairs only; name what it is of by *CONTACT PAIR")
             if (reader%pad(i) > 0.0_wp) call data_error(reader, data, "the surface interaction " &
                // quoted(name) // " has a PAD THICKNESS, which has no meaning where surfaces may " &
                // "be in contact with themselves; name what it keeps apart by *CONTACT PAIR")

@@ -3,7 +3,7 @@ module emcon_deck_reader
    use emcon_amplitudes, only : amplitude_t
    use emcon_deck_labels, only : label_map_t
    use emcon_diagnostics, only : add_error, add_warning, diagnostics_t, quoted, suggestion
-   use emcon_interactions, only : contact_damping_t
+   use emcon_interactions, only : surface_laws_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : named_set_t
    use emcon_name_index, only : name_index_t
@@ -64,10 +64,7 @@ module emcon_deck_reader
       type(name_index_t) :: surfaces, materials, amplitudes, interactions, times
       type(string_t), allocatable :: interaction(:)      !! names of surface interactions
       real(wp), allocatable :: pad(:)                    !! PAD THICKNESS of each [L]
-      real(wp), allocatable :: restitution(:)            !! RESTITUTION of each
-      real(wp), allocatable :: friction(:)               !! coefficient of each
-      real(wp), allocatable :: rebound(:)                !! RESTITUTION of its *FRICTION
-      type(contact_damping_t), allocatable :: damping(:) !! its *CONTACT DAMPING
+      type(surface_laws_t), allocatable :: laws(:)       !! of each
       type(amplitude_t), allocatable :: time_points(:)   !! only names and times
    end type reader_t
 

@@ -84,7 +84,7 @@ contains
             if (row%takes_jumps) cycle
             if (initiation == initiation_velocity_update) call refuse( &
                "*CONTACT INITIATION, TYPE=VELOCITY UPDATE, in step ", "velocities that jump")
-            if (any(pair%restitution < 1.0_wp)) call refuse("RESTITUTION below 1, in step ", &
+            if (any(pair%laws%restitution < 1.0_wp)) call refuse("RESTITUTION below 1, in step ", &
                "velocities that jump")
          end associate
       end do

@@ -59,8 +59,8 @@ contains
             if (initiation == initiation_velocity_update) call refuse("*CONTACT INITIATION, " // &
                "TYPE=VELOCITY UPDATE: what is left of gaps would count as energy that impacts took")
             if (method /= method_penalty) cycle
-            if (any(pair%restitution < 1.0_wp)) call refuse("RESTITUTION below 1: a penalty has " &
-               // "no instant at which velocities jump")
+            if (any(pair%laws%restitution < 1.0_wp)) call refuse( &
+               "RESTITUTION below 1: a penalty has no instant at which velocities jump")
          end associate
       end do
 

@@ -145,7 +145,7 @@ contains
       if (present(closed)) then
          do k = 1, closed%n
             associate (item => closed%item(k))
-               push = closed%law(k)%law%stiffest()*condition_rate(item, way)
+               push = closed%law(k)%row%stiffest()*condition_rate(item, way)
                do i = 1, item%n_node
                   force(:, item%node(i)) = force(:, item%node(i)) + push*item%c(:, i)
                end do

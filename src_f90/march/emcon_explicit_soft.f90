@@ -195,7 +195,7 @@ contains
                end do
                do i = 1, item%n_node
                   total(item%node(i)) = total(item%node(i)) &
-                     + soft%law(k)%law%stiffest()*slope(i)*sum(slope(:item%n_node))
+                     + soft%law(k)%row%stiffest()*slope(i)*sum(slope(:item%n_node))
                end do
             end associate
          end do

@@ -47,12 +47,12 @@ contains
          list(:n), flexibility, limit(:n), error)
       call flexibility_free(flexibility)
       if (allocated(error)) return
-      associate (id => march%active%set%id(list(:n)), mu => march%active%friction%mu)
-         worst = maxloc(mu(id)/limit(:n), 1)
-         if (.not. mu(id(worst)) > limit(worst)) return
+      associate (id => march%active%set%id(list(:n)), law => march%active%friction%law)
+         worst = maxloc(law(id)%mu/limit(:n), 1)
+         if (.not. law(id(worst))%mu > limit(worst)) return
          call constraint_index(march%system, id(worst), pair, i)
-         call note_add(increment%notes, "the coefficient of friction " // to_text(mu(id(worst))) &
-            // " is above " // to_text(limit(worst), 4) // ", up to which the contact of slave " &
+         call note_add(increment%notes, "the coefficient of friction " &
+            // to_text(law(id(worst))%mu) // " is above " // to_text(limit(worst), 4) // ", up to which the contact of slave " &
             // "node " // to_text(scene%node_label(march%system%contact(pair)%contact%node(i))) &
             // " by itself has one solution in an increment: there may be several")
       end associate
@@ -67,11 +67,9 @@ contains
       logical :: is_new(march%active%set%n)
       integer :: k, pair, i
 
-      associate (set => march%active%set, known => march%active%friction%knows_limit)
-         do k = 1, set%n
-            is_new(k) = set%item(k)%rubs
-            if (is_new(k)) is_new(k) = .not. known(set%id(k))
-         end do
+      associate (set => march%active%set, known => march%active%friction%knows_limit, &
+            law => march%active%friction%law)
+         is_new = .not. known(set%id(:set%n)) .and. law(set%id(:set%n))%mu > 0.0_wp
          n = min(size(list), count(is_new))
          do k = 1, n
             list(k) = maxloc(set%lam(:set%n), 1, is_new)

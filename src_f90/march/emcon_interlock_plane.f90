@@ -4,7 +4,7 @@
 !> the curve. With edges about as long on both sides many do so at once, and the sum is told from
 !> friction by nothing. Source: docs/theory.md, section 4.13.
 module emcon_interlock_plane
-   use emcon_friction, only : friction_slides
+   use emcon_coulomb_law, only : contact_slides
    use emcon_interactions, only : contact_options_t, smoothing_none
    use emcon_kinds, only : wp
    use emcon_march_types, only : increment_t, march_t
@@ -32,7 +32,7 @@ contains
 
       if (.not. march%active%friction%is_on) return
       do pair = 1, min(size(march%system%contact), size(scene%pair))
-         associate (mu => march%system%contact(pair)%contact%friction, &
+         associate (mu => scene%pair(pair)%laws%friction, &
                knows => march%active%friction%knows_corners(pair))
             if (knows .or. .not. mu > 0.0_wp) cycle
             spread = spread_of(march, pair)
@@ -62,7 +62,7 @@ contains
          do k = set%n_permanent + 1, set%n
             associate (id => set%id(k), item => set%item(k))
                if (id <= before(pair) .or. id > before(pair + 1)) cycle
-               if (friction_slides(friction, id) == 0) cycle
+               if (friction%law(id)%status%kind /= contact_slides) cycle
                if (.not. march%state%contacts%slip_path(id) > item%size) cycle
                push = set%lam(k)*sum(item%c(:, :item%n_slave), 2)
             end associate

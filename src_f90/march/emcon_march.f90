@@ -73,10 +73,10 @@ contains
       call rigid_rotation_init(self%state%turns, scene%rigid, scene%x, self%state%u)
       call pair_sums_init(self%state%sums, self%system, scene%pair)
       call active_set_init(self%active, self%system)
-      allocate(self%state%contacts%sliding(size(self%active%friction%mu)), source=0)
-      allocate(self%state%contacts%drag(size(self%active%friction%mu)), source=0.0_wp)
-      allocate(self%state%contacts%slip, self%state%contacts%slip_path, &
-         source=self%state%contacts%drag)
+      associate (contacts => self%state%contacts, friction => self%active%friction)
+         allocate(contacts%slip_path(size(friction%law)), source=0.0_wp)
+         allocate(contacts%slides_along, contacts%drag, contacts%slip, source=0.0_wp*friction%tau)
+      end associate
       call ledger_init(self%ledger, scene%n_dim)
       call overlap_check_init(self%overlap_check, scene)
    end subroutine march_init

@@ -8,7 +8,7 @@ module emcon_march_begin
    use emcon_factor_base, only : factor_base_t
    use emcon_guards, only : touching_bar
    use emcon_contact_support, only : contact_support_begin, contact_support_t
-   use emcon_dashpots, only : dashpots_begin_step
+   use emcon_near_laws, only : near_laws_begin_step
    use emcon_host, only : host_find_solver
    use emcon_host_scheme, only : host_scheme_find
    use emcon_interactions, only : contact_options_t
@@ -197,7 +197,7 @@ contains
          call configure_contact(self, scene)
          call softness_begin_step(self%active%softness, self%system, scene, step, error)
          if (allocated(error)) return
-         call dashpots_begin_step(self%active%dashpots, self%system, &
+         call near_laws_begin_step(self%active%near_laws, self%system, &
             scene, step)
          call begin_overclosure(self, scene, step)
          call begin_massless(self, scene, step, error)

@@ -1,12 +1,12 @@
 !> What follows from a solved step: velocities, works, forces, and what the user is told.
 module emcon_march_commit
-   use emcon_constraint, only : condition_drag, most_slips
-   use emcon_constraints, only : constraints_force
+   use emcon_constraint, only : condition_friction, most_slips
+   use emcon_constraints, only : constraints_dissipated, constraints_force
    use emcon_correction, only : correction_reason
-   use emcon_dashpots, only : dashpots_work
+   use emcon_contact_law, only : loss_damping, loss_friction
    use emcon_errors, only : error_t
    use emcon_explicit, only : explicit_commit
-   use emcon_friction, only : friction_missed, friction_slides, friction_work
+   use emcon_friction, only : friction_missed
    use emcon_friction_limit, only : friction_limit_tell
    use emcon_contact_support, only : contact_support_t
    use emcon_factor_policy, only : factor_policy_commit
@@ -240,7 +240,6 @@ contains
    !> of what has no mass.
    subroutine keep_constraints(self)
       type(march_t), intent(inout) :: self
-      real(wp) :: drag(most_slips)
       integer :: k
 
       associate (state => self%state, set => self%active%set, layer => self%layer, &
@@ -248,7 +247,7 @@ contains
          state%contacts%is_active = .false.
          state%contacts%lam = 0.0_wp
          state%contacts%closure = 0.0_wp
-         state%contacts%sliding = 0
+         state%contacts%slides_along = 0.0_wp
          state%contacts%drag = 0.0_wp
          call softness_keep(self%active%softness, set, state%contacts%closure)
          if (self%active%softness%is_at_ends) then
@@ -260,21 +259,32 @@ contains
             state%contacts%is_active(set%id(k)) = .true.
             state%contacts%lam(set%id(k)) = set%lam(k)
             ! What has opened stores nothing that a later step could give back.
-            if (set%gives_way .and. set%is_stored .and. k > set%n_permanent) &
-               state%contacts%is_active(set%id(k)) = set%law(k)%law%closure() < 0.0_wp
-            if (.not. set%item(k)%rubs) cycle
-            state%contacts%sliding(set%id(k)) = friction_slides(self%active%friction, set%id(k))
-            drag = condition_drag(set%item(k), set%lam(k))
-            state%contacts%drag(set%id(k)) = drag(1)
-            state%contacts%slip(set%id(k)) = state%contacts%slip(set%id(k)) + set%item(k)%slip(1)
-            state%contacts%slip_path(set%id(k)) = state%contacts%slip_path(set%id(k)) &
-               + norm2(set%item(k)%slip)
+            if (set%soft%is_on .and. set%soft%is_stored .and. k > set%n_permanent) &
+               state%contacts%is_active(set%id(k)) = set%law(k)%row%closure() < 0.0_wp
+            if (size(state%contacts%drag) > 0) call keep_slip(self, k)
          end do
          if (.not. layer%is_settled) return
          state%contacts%is_active(layer%n_before + 1:) = layer%acts
          state%contacts%lam(layer%n_before + 1:) = layer%lam
       end associate
    end subroutine keep_constraints
+
+   !> How condition `k` has slid.
+   subroutine keep_slip(self, k)
+      type(march_t), intent(inout) :: self       !! some contact rubs
+      integer, intent(in) :: k                   !! place in the set, up to n
+      real(wp) :: drag(most_slips)
+
+      associate (contacts => self%state%contacts, item => self%active%set%item(k), &
+            id => self%active%set%id(k), n => self%active%friction%n_slip)
+         if (.not. self%active%friction%law(id)%mu > 0.0_wp) return
+         contacts%slides_along(:, id) = self%active%friction%law(id)%status%direction(:n)
+         drag = condition_friction(item, self%active%set%lam(k))
+         contacts%drag(:, id) = drag(:n)
+         contacts%slip(:, id) = contacts%slip(:, id) + item%slip(:n)
+         contacts%slip_path(id) = contacts%slip_path(id) + norm2(item%slip)
+      end associate
+   end subroutine keep_slip
 
    !> What has no mass moves as its displacement says. Where it was balanced anew, what that and
    !> closing contacts have taken is given back by a jump of the velocities.
@@ -377,15 +387,17 @@ contains
    !> taken as linear over the step.
    subroutine book_work(self)
       type(march_t), intent(inout) :: self
-      real(wp) :: contact_work, decay, damping, friction
+      real(wp) :: contact_work, decay, damped, damping, friction
       integer :: k
 
       associate (state => self%state, part => self%system%response%part, &
             set => self%active%set, motion => self%motion)
          contact_work = 0.0_wp
          friction = 0.0_wp
-         do k = set%n_permanent + 1, set%n
-            friction = friction + friction_work(set, k)
+         damped = 0.0_wp
+         do k = set%n_permanent + 1, set%n_condition
+            friction = friction + constraints_dissipated(set, k, loss_friction)
+            damped = damped + constraints_dissipated(set, k, loss_damping)
          end do
          if (motion%evaluation%pushes_at_end) then
             contact_work = sum((motion%evaluation%start_weight*state%contact &
@@ -408,7 +420,7 @@ contains
             contact_work = contact_work + friction
          end if
          self%ledger%friction = self%ledger%friction + friction
-         self%ledger%contact_damping = self%ledger%contact_damping + dashpots_work(set)
+         self%ledger%contact_damping = self%ledger%contact_damping + damped
          self%ledger%contact_work = self%ledger%contact_work + contact_work
          call book_stored(self)
          call terms_dissipation(self%system%term, decay, damping)

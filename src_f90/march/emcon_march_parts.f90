@@ -244,8 +244,8 @@ contains
       type(march_t), intent(in) :: self
 
       slides = self%active%friction%is_on
-      if (slides) slides = any(self%active%is_active .and. self%active%friction%mu > 0.0_wp .and. &
-         .not. friction_holds(self%active%friction))
+      if (slides) slides = any(self%active%is_active .and. self%active%friction%law%mu > 0.0_wp &
+         .and. .not. friction_holds(self%active%friction))
    end function slides
 
    !> A singular system; elements with few points keep motions without strain that neighbours on

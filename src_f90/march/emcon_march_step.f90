@@ -159,7 +159,7 @@ contains
       associate (factor_policy => self%newton%factor_policy, correction => self%newton%correction)
          factor_policy%is_allowed = factor_policy%is_wanted &
             .and. .not. (self%active%friction%is_on &
-            .or. self%active%dashpots%is_on) .and. (correction%method == method_null_space &
+            .or. self%active%near_laws%is_on) .and. (correction%method == method_null_space &
             .or. self%system%n_constraint == 0)
          call factor_policy_step(factor_policy, correction, self%state%base, part%start, part%h, &
             self%state%clock%increment, is_lost)

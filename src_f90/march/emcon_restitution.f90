@@ -5,6 +5,7 @@
 !> Source: docs/theory.md, eq. (22e).
 module emcon_restitution
    use emcon_constraints, only : constraint_index
+   use emcon_contact_law, only : contact_laws_rate_change
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t
@@ -46,14 +47,16 @@ contains
       end associate
    end subroutine restitution_take
 
-   !> Has some pair a restitution below 1?
+   !> Has some pair a law that changes rates?
    pure logical function is_asked(self)
       type(march_t), intent(in) :: self
       integer :: k
 
       is_asked = .false.
       do k = 1, size(self%system%contact)
-         is_asked = is_asked .or. self%system%contact(k)%contact%restitution < 1.0_wp
+         associate (laws => self%system%contact(k)%contact%laws)
+            is_asked = is_asked .or. abs(contact_laws_rate_change(laws, 1.0_wp)) > 0.0_wp
+         end associate
       end do
    end function is_asked
 
@@ -84,7 +87,7 @@ contains
                if (self%layer%is_on) then
                   is_row(k) = is_row(k) .and. .not. any(self%layer%is_massless(node))
                end if
-               if (is_row(k)) change(k) = (contact%restitution - 1.0_wp)*max(0.0_wp, rate(k))
+               if (is_row(k)) change(k) = contact_laws_rate_change(contact%laws, rate(k))
             end associate
          end do
          jump%row = pack([(k, k = 1, set%n)], is_row)

@@ -176,7 +176,7 @@ contains
       end do
       call follow_overlaps(self, scene, march, increment)
       if (size(self%small%section) > 0) call follow_linear(self, scene, march)
-      call energy_follow(self%energy, march%ledger, march%scheme, march%active%set%is_stored, &
+      call energy_follow(self%energy, march%ledger, march%scheme, march%active%set%soft%is_stored, &
          increment%work_scale)
       if (.not. march_is_done(march)) return
       call follow_bending(self, scene, march)

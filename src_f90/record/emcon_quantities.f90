@@ -284,27 +284,30 @@ contains
       end associate
    end function contact_quantity
 
-   !> CSHEAR traction against slip, and 1 where a contact sticks, 2 where it slides, 0 where nothing
-   !> rubs; CSLIP slip along the surface so far, and the length of its path (2).
+   !> CSHEAR traction against slip (n_dim - 1), and 1 where a contact sticks, 2 where it slides, 0
+   !> where nothing rubs; CSLIP slip along the surface so far (n_dim - 1), and the length of its
+   !> path.
    pure function rubbing(stepper, variable) result(values)
       type(stepper_t), intent(in) :: stepper
       character(len=*), intent(in) :: variable
       real(dp), allocatable :: values(:, :)
-      integer :: n
+      integer :: n, i
 
       n = quantity_components(variable, at_contacts, stepper%scene%n_dim)
       allocate(values(n, stepper%march%system%n_constraint), source=0.0_dp)
       if (.not. stepper%march%active%friction%is_on) return
-      associate (state => stepper%march%state, mu => stepper%march%active%friction%mu)
+      associate (state => stepper%march%state, law => stepper%march%active%friction%law)
          if (variable == "CSLIP") then
-            values(1, :) = real(state%contacts%slip, dp)
+            values(:n - 1, :) = real(state%contacts%slip, dp)
             values(n, :) = real(state%contacts%slip_path, dp)
             return
          end if
-         where (state%pairs%shear_area > 0.0_wp) values(1, :) = real(state%contacts%drag &
-            /state%pairs%shear_area, dp)
-         where (state%contacts%is_active .and. mu > 0.0_wp) values(n, :) = merge(1.0_dp, 2.0_dp, &
-            state%contacts%sliding == 0)
+         do i = 1, size(values, 2)
+            if (state%pairs%shear_area(i) > 0.0_wp) values(:n - 1, i) &
+               = real(state%contacts%drag(:, i)/state%pairs%shear_area(i), dp)
+            if (state%contacts%is_active(i) .and. law(i)%mu > 0.0_wp) values(n, i) = merge(2.0_dp, &
+               1.0_dp, any(abs(state%contacts%slides_along(:, i)) > 0.0_wp))
+         end do
       end associate
    end function rubbing
 
@@ -352,8 +355,10 @@ contains
       real(dp), intent(inout) :: value(:)
 
       if (has_last) then
-         value(1) = value(1) + more(1)
-         value(2) = max(value(2), more(2))
+         associate (n => size(value))
+            value(:n - 1) = value(:n - 1) + more(:n - 1)
+            value(n) = max(value(n), more(n))
+         end associate
       else if (ieee_is_nan(value(1))) then
          value = more
       else if (.not. ieee_is_nan(more(1))) then

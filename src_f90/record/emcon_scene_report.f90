@@ -102,8 +102,9 @@ contains
       how = "both"
       if (.not. pair%both_sides) how = "one"
       call row_put(row, "sides", how, "")
-      if (pair%friction > 0.0_wp) call row_put(row, "friction", pair%friction, ", friction #")
-      associate (damping => pair%damping)
+      if (pair%laws%friction > 0.0_wp) call row_put(row, "friction", &
+         pair%laws%friction, ", friction #")
+      associate (damping => pair%laws%damping)
          if (.not. damping%coefficient > 0.0_wp) return
          call row_put(row, "damping", damping%coefficient, ", damping #")
          call row_put(row, "damping_clearance", damping%clearance, " up to a clearance of #")

@@ -21,15 +21,17 @@ submodule (emcon_quantity_registry) emcon_quantity_rows
       quantity_row_t("ELSE", at_elements, 1, "strain_energy", card=at_elements), &
       quantity_row_t("ELKE", at_elements, 1, "kinetic_energy", card=at_elements), &
       quantity_row_t("EVOL", at_elements, 1, "volume", card=at_elements), &
-      ! gap [L]; pressure, and is it active; force; traction against slip, and status; slip and path
+      ! gap [L]; pressure, and is it active; force; vectors along the surface: traction
+      ! against slip, and status; slip, and path
       quantity_row_t("CDIS", at_contacts, 1, "contact_gap", "", .true., at_contacts, "CDISP"), &
       quantity_row_t("CSTR", at_contacts, 2, "contact_pressure", "contact_active", .true., &
          at_contacts, "CSTRESS"), &
       quantity_row_t("CF", at_contacts, of_vector, "contact_force", "", .true., at_contacts, &
          "CFORCE"), &
-      quantity_row_t("CSHEAR", at_contacts, 2, "contact_shear", "contact_status", .true., &
+      quantity_row_t("CSHEAR", at_contacts, of_vector, "contact_shear", "contact_status", .true., &
          at_contacts), &
-      quantity_row_t("CSLIP", at_contacts, 2, "contact_slip", "slip_path", .true., at_contacts), &
+      quantity_row_t("CSLIP", at_contacts, of_vector, "contact_slip", "slip_path", .true., &
+         at_contacts), &
       ! force on the slave side with its moment, on the master side; length in contact; how many
       quantity_row_t("CF", at_pairs, of_wrench), &
       quantity_row_t("CF_MASTER", at_pairs, of_wrench), &

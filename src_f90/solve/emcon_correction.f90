@@ -108,7 +108,7 @@ contains
          if (.not. has_pattern(self, set)) call take_pattern(self, set)
          return
       end if
-      if (set%gives_way) then
+      if (set%soft%is_on) then
          call lay_out_soft(self, system, set)
          return
       end if
@@ -238,7 +238,7 @@ contains
          call factorise_free(self, system, self%merged, .false., is_singular, error)
          return
       end if
-      self%is_reduced = self%method == method_null_space .and. .not. set%gives_way
+      self%is_reduced = self%method == method_null_space .and. .not. set%soft%is_on
       self%obstacle = obstacle_none
       if (self%is_reduced) then
          call null_space_factorise(self%null_space, set, self%merged, is_singular, error)

@@ -167,7 +167,7 @@ contains
       end do
       self%n_forward = self%n_forward + set%n
       call fill_products(self)
-      if (set%gives_way) then
+      if (set%soft%is_on) then
          self%product = self%l
          self%compliance = 0.0_dp*self%mu
          call soften(self, set, is_fit)
@@ -188,7 +188,7 @@ contains
       self%l = self%product
       do k = set%n_permanent + 1, set%n
          associate (diagonal => self%l(k, k))
-            stiffness = real(set%slope(k), dp)*self%blocks%scale*diagonal
+            stiffness = real(set%soft%slope(k), dp)*self%blocks%scale*diagonal
             self%compliance(k) = diagonal*max(rounding, 1.0_dp/max(stiffness, rounding))
             diagonal = diagonal + self%compliance(k)
          end associate
@@ -303,7 +303,7 @@ contains
       most = merge(most_curved, most_curved_far, is_near)
       do k = set%n_linear + 1, set%n
          lam = real(set%lam(k), dp)
-         if (set%gives_way) lam = lam + self%mu(k)
+         if (set%soft%is_on) lam = lam + self%mu(k)
          if (abs(lam)*self%bend(k) > most) kept_factor_serves = .false.
       end do
    end function kept_factor_serves
@@ -319,14 +319,14 @@ contains
       integer :: k, j
       logical :: is_fit
 
-      if (set%gives_way) call soften(self, set, is_fit)
+      if (set%soft%is_on) call soften(self, set, is_fit)
       self%x = -real(residual, dp)
       call blocks_solve(self%blocks, .false., self%x, self%y, error)
       if (allocated(error)) return
       do k = 1, set%n
          self%mu(k) = -real(set%defect(k), dp)/self%blocks%scale
-         if (set%gives_way) self%mu(k) = self%mu(k) &
-            + self%compliance(k)*real(set%lack(k), dp)
+         if (set%soft%is_on) self%mu(k) = self%mu(k) &
+            + self%compliance(k)*real(set%soft%lack(k), dp)
          do j = self%start(k) + 1, self%start(k + 1)
             self%mu(k) = self%mu(k) - self%w(j)*self%y(self%index(j) + 1)
          end do

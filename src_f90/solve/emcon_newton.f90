@@ -6,8 +6,9 @@
 module emcon_newton
    use emcon_constraint, only : condition_rate
    use emcon_constraint_rows, only : constraints_rows
-   use emcon_constraints, only : constraint_set_t, constraints_add_forces, constraints_evaluate, &
-      constraints_force, constraints_take_hold
+   use emcon_constraints, only : constraint_set_t, constraints_add_law_forces, &
+      constraints_add_row_forces, constraints_evaluate, constraints_force, &
+      constraints_have_law_forces, constraints_take_hold
    use emcon_convergence, only : convergence_begin, convergence_init, convergence_judge, &
       convergence_nears_end, convergence_t, most_rounding, next_done, next_give_up, next_tangent, &
       round_off
@@ -117,14 +118,15 @@ contains
       real(wp), allocatable :: lam(:)
       logical :: is_done
 
-      set%is_under_way = set%gives_way .and. .not. evaluation_is_equilibrium(motion%evaluation)
-      if (set%is_under_way) lam = set%lam
+      set%soft%is_under_way = set%soft%is_on .and. &
+         .not. evaluation_is_equilibrium(motion%evaluation)
+      if (set%soft%is_under_way) lam = set%lam
       is_done = .false.
       if (self%factor_policy%is_allowed &
          .and. size(self%residual) > 0) call solve_by_kept_factor(self, system, set, motion, &
          status, is_done, error)
       if (is_done .or. allocated(error)) return
-      if (set%is_under_way) set%lam = lam
+      if (set%soft%is_under_way) set%lam = lam
       call solve_by_tangents(self, system, set, motion, status, error)
    end subroutine newton_solve
 
@@ -144,7 +146,7 @@ contains
       call begin(self, set%n_row)
       self%convergence%is_kept = .true.
       call factor_policy_begin(self%factor_policy, size(self%residual) &
-         + merge(set%n, 0, set%is_under_way), motion%du)
+         + merge(set%n, 0, set%soft%is_under_way), motion%du)
       is_done = .true.
       is_fit = .true.
       do
@@ -198,7 +200,7 @@ contains
       call phase_enter(system%phases, phase_factorise, left)
       call factor_policy_make(self%factor_policy, self%correction, system, set, motion, is_fit, &
          error)
-      if (is_fit .and. .not. set%gives_way) is_fit = kept_factor_serves( &
+      if (is_fit .and. .not. set%soft%is_on) is_fit = kept_factor_serves( &
          self%correction%kept, set, self%convergence%knows_sizes)
       call phase_leave(system%phases, left)
    end subroutine make_factor
@@ -219,13 +221,13 @@ contains
       call phase_leave(system%phases, left)
       is_fit = .true.
       if (allocated(error)) return
-      if (set%gives_way) is_fit = kept_factor_serves(self%correction%kept, set, &
+      if (set%soft%is_on) is_fit = kept_factor_serves(self%correction%kept, set, &
          self%convergence%knows_sizes)
       if (.not. is_fit) return
       system%phases%n_solve = system%phases%n_solve + 1
       self%n_solve = self%n_solve + 1
       call add_to_dofs(system%space%numbering, self%dq, 1.0_wp, du)
-      if (set%is_under_way) set%lam = set%lam + self%dlam
+      if (set%soft%is_under_way) set%lam = set%lam + self%dlam
    end subroutine correct_by_kept_factor
 
    !> The step by Newton's method.
@@ -516,24 +518,24 @@ contains
       end do
       is_rounding = relative_size(self%residual, self%rounding) <= round_off &
          .and. defect <= round_off
-      if (set%is_under_way) call measure_lack(self, system, set, norm, is_rounding)
+      if (set%soft%is_under_way) call measure_lack(self, system, set, norm, is_rounding)
       ! A body that moves as a rigid one has no forces to compare its round-off with.
       self%is_idle = is_rounding .and. .not. has_load(system)
       if (.not. self%is_idle) is_rounding = is_rounding .and. norm <= most_rounding
    end subroutine measure
 
-   !> The residual without the forces of constraints, which conditions of laws alone have a part in.
+   !> The residual without the forces of rows, which those of laws beside them are a part of.
    subroutine pick_residual(self, system, set)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
 
-      if (set%n_condition == set%n) then
+      if (.not. constraints_have_law_forces(set)) then
          call pick_unknowns(system%space%numbering, system%response%residual, self%residual)
          return
       end if
       call vector_zero(size(self%contact), self%contact)
-      call constraints_add_forces(set, set%n + 1, set%n_condition, self%contact)
+      call constraints_add_law_forces(set, self%contact)
       call vector_sum(size(self%left), system%response%residual, -1.0_wp, self%contact, self%left)
       call pick_unknowns(system%space%numbering, self%left, self%residual)
    end subroutine pick_residual
@@ -542,16 +544,12 @@ contains
    subroutine measure_lack(self, system, set, norm, is_rounding)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(in) :: system
-      type(constraint_set_t), intent(inout) :: set
+      type(constraint_set_t), intent(in) :: set
       real(wp), intent(inout) :: norm
       logical, intent(inout) :: is_rounding
-      real(wp) :: lam(set%n)
 
-      lam = set%lam
-      set%lam = set%lack
       call vector_zero(size(self%left), self%left)
-      call constraints_add_forces(set, 1, set%n, self%left)
-      set%lam = lam
+      call constraints_add_row_forces(set, set%soft%lack, self%left)
       call pick_unknowns(system%space%numbering, self%left, self%scale)
       norm = max(norm, relative_size(self%scale, self%forces))
       is_rounding = is_rounding .and. relative_size(self%scale, self%rounding) <= round_off

@@ -71,7 +71,7 @@ contains
       n = matrix%n_row
       n_matrix = size(matrix%column)
       n_rows = set%force_rows%row_start(set%n_row + 1)
-      n_soft = merge(set%n - set%n_permanent, 0, set%gives_way)
+      n_soft = merge(set%n - set%n_permanent, 0, set%soft%is_on)
       allocate(row(n_matrix + 2*n_rows + n_soft), column(n_matrix + 2*n_rows + n_soft))
       do i = 1, n
          row(matrix%row_start(i) + 1:matrix%row_start(i + 1)) = i
@@ -121,10 +121,10 @@ contains
          self%full%value(self%slot(n_matrix + k)) = -self%scale*set%force_rows%value(k)
          self%full%value(self%slot(n_matrix + n_rows + k)) = self%scale*set%gap_rows%value(k)
       end do
-      if (set%gives_way) then
+      if (set%soft%is_on) then
          do k = set%n_permanent + 1, set%n
             self%full%value(self%slot(n_matrix + 2*n_rows + k - set%n_permanent)) &
-               = compliance(self, set%slope(k))
+               = compliance(self, set%soft%slope(k))
          end do
       end if
       self%is_symmetric = is_mirrored(self, set, matrix)
@@ -194,10 +194,10 @@ contains
       n = size(residual)
       self%rhs(:n) = -residual
       self%rhs(n + 1:) = -real(self%scale, wp)*set%defect
-      if (set%gives_way) then
+      if (set%soft%is_on) then
          do k = set%n_permanent + 1, set%n
-            self%rhs(n + k) = self%rhs(n + k) + real(compliance(self, set%slope(k)), wp) &
-               *(set%lack(k)/real(self%scale, wp))
+            self%rhs(n + k) = self%rhs(n + k) + real(compliance(self, set%soft%slope(k)), wp) &
+               *(set%soft%lack(k)/real(self%scale, wp))
          end do
       end if
       if (self%is_symmetric) then

@@ -9,8 +9,9 @@ module emcon_constraint
    implicit none
    private
    public :: condition_t, contact_response_t, condition_force, condition_find_force, &
-      condition_row_force, condition_row_gradient, condition_rate, condition_drag, &
-      condition_stiffness, condition_normal, condition_normal_slope, constraint_t, constraint_box_t
+      condition_find_law_force, condition_row_force, condition_row_gradient, condition_rate, &
+      condition_drag, condition_friction, condition_stiffness, condition_normal, &
+      condition_normal_slope, constraint_t, constraint_box_t
 
    !> A condition has so many slips at most: one less than there are dimensions.
    integer, parameter, public :: most_slips = 2
@@ -19,8 +20,7 @@ module emcon_constraint
    !> with gap (0) and slips. Entries past the slips of a condition are 0.
    type :: contact_response_t
       real(wp) :: lam = 0.0_wp                        !! of the gap, beside its row's [M L/T^2]
-      !> Against slips: by these laws, or of the rows that stick [M L/T^2]
-      real(wp) :: tau(most_slips) = 0.0_wp
+      real(wp) :: tau(most_slips) = 0.0_wp            !! against slips [M L/T^2]
       !> Against slips by the normal force: mu sigma where it slides, 0 where it sticks
       real(wp) :: mu_sigma(most_slips) = 0.0_wp
       !> (row, by): -d lam or d tau, by the gap or slip at the end [M/T^2]
@@ -45,7 +45,8 @@ module emcon_constraint
       logical :: rubs = .false.                       !! the rest is known
       real(wp) :: slip(most_slips) = 0.0_wp           !! s over the step [L]
       real(wp) :: slip_target(most_slips) = 0.0_wp    !! a, at which it sticks [L]
-      type(contact_response_t) :: response            !! of the laws of contact
+      real(wp) :: stick(most_slips) = 0.0_wp          !! multipliers of the rows of slips [M L/T^2]
+      type(contact_response_t) :: response            !! of the laws of contact beside its rows
       !> Of integrated gaps, whose normal force is not the multiplier: see `condition_normal`
       logical :: is_mean = .false.
       real(wp) :: normal = 1.0_wp
@@ -132,6 +133,20 @@ contains
       end do
    end subroutine condition_find_force
 
+   !> The part of it that laws give beside the rows.
+   pure subroutine condition_find_law_force(self, i, force)
+      type(condition_t), intent(in) :: self
+      integer, intent(in) :: i                        !! 1..n_node
+      real(wp), intent(out) :: force(:)               !! (n_dim) [M L/T^2]
+      integer :: s
+
+      force = self%response%lam*self%g(:, i)
+      if (.not. self%rubs) return
+      do s = 1, size(self%t, 3)
+         force = force - self%response%tau(s)*self%t(:, i, s)
+      end do
+   end subroutine condition_find_law_force
+
    !> The normal force by a multiplier of 1, where friction of 1 acts along the surface with 1:
    !> resultants on the slave side. docs/theory.md, eq. (14r).
    pure real(wp) function condition_normal(self) result(normal)
@@ -173,8 +188,17 @@ contains
       real(wp), intent(in) :: lam                     !! of the row of its gap; 0: none [M L/T^2]
       real(wp) :: tau(most_slips)                     !! 0 past the last slip [M L/T^2]
 
-      tau = self%response%mu_sigma*self%normal*lam + self%response%tau
+      tau = condition_friction(self, lam) + self%response%tau
    end function condition_drag
+
+   !> Those of its rows: where it slides, and where it sticks.
+   pure function condition_friction(self, lam) result(tau)
+      type(condition_t), intent(in) :: self
+      real(wp), intent(in) :: lam                     !! of the row of its gap; 0: none [M L/T^2]
+      real(wp) :: tau(most_slips)                     !! 0 past the last slip [M L/T^2]
+
+      tau = self%response%mu_sigma*self%normal*lam + self%stick
+   end function condition_friction
 
    !> The directions in which a unit of the multiplier of a row pushes: where the condition slides
    !> that of its gap is tilted against slip.

@@ -3,8 +3,9 @@
 !> A pair that is held in both orders, or watched by guards, is one here. Forces are those on the
 !> surface that the deck names first.
 module emcon_pair_sums
-   use emcon_constraint, only : condition_drag, condition_force, condition_t
+   use emcon_constraint, only : condition_force, condition_t
    use emcon_constraints, only : constraint_set_t, constraints_dissipated, constraints_lam
+   use emcon_contact_law, only : loss_damping, loss_friction
    use emcon_evaluation, only : evaluation_contact_place, evaluation_has_inertia
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
@@ -105,13 +106,9 @@ contains
          associate (item => set%item(k), sum => self%sum(abs(self%of_pair(contact))))
             call add_forces(sum, item, constraints_lam(set, k), motion, h, side_t( &
                self%of_pair(contact) > 0, is_dynamic))
-            if (k > set%n) then
-               sum%damping = sum%damping + constraints_dissipated(set, k)
-               cycle
-            end if
-            if (item%rubs) sum%friction = sum%friction &
-               + dot_product(condition_drag(item, set%lam(k)), item%slip)
-            sum%is_pressed = sum%is_pressed .or. abs(set%lam(k)) > 0.0_wp
+            sum%damping = sum%damping + constraints_dissipated(set, k, loss_damping)
+            sum%friction = sum%friction + constraints_dissipated(set, k, loss_friction)
+            sum%is_pressed = sum%is_pressed .or. abs(constraints_lam(set, k)) > 0.0_wp
          end associate
       end do
       if (.not. is_dynamic) return

@@ -32,10 +32,11 @@ module emcon_state
       real(wp), allocatable :: lam(:)            !! (n_constraint) contact forces, 0 where inactive
       !> (n_constraint) how far contact by penalty is closed as it stores, <= 0; > 0: as its gap [L]
       real(wp), allocatable :: closure(:)
-      !> (n_constraint) 0: it sticks, else the sign of its slip; only with friction, as the next
-      integer, allocatable :: sliding(:)
-      real(wp), allocatable :: drag(:)           !! (n_constraint) friction against slip
-      real(wp), allocatable :: slip(:)           !! (n_constraint) so far, to and fro [L]
+      ! Vectors along the surface, of n_dim - 1 components; with friction, else of no constraint:
+      !> (n_slip, n_constraint) direction of slip where it slides, of length 1; 0: it sticks
+      real(wp), allocatable :: slides_along(:, :)
+      real(wp), allocatable :: drag(:, :)        !! (n_slip, n_constraint) friction against slip
+      real(wp), allocatable :: slip(:, :)        !! (n_slip, n_constraint) so far, to and fro [L]
       real(wp), allocatable :: slip_path(:)      !! (n_constraint) the same, all of it >= 0 [L]
    end type contact_state_t
 

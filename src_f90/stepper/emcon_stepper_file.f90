@@ -198,8 +198,8 @@ contains
          else
             state%contacts%closure = 0.0_wp
          end if
-         if (restart_offers(restart, "sliding", size(state%contacts%sliding) > 0)) then
-            call restart_exchange(restart, "sliding", state%contacts%sliding)
+         if (restart_offers(restart, "drag", size(state%contacts%drag) > 0)) then
+            call exchange_directions(state, restart)
             call restart_exchange(restart, "drag", state%contacts%drag)
             call restart_exchange(restart, "slip", state%contacts%slip)
             call restart_exchange(restart, "slip_path", state%contacts%slip_path)
@@ -216,6 +216,20 @@ contains
       call verdict_exchange(self%verdict, restart)
       call exchange_control(self%march%state, restart)
    end subroutine exchange_state
+
+   !> Where contacts slide to. Files of 0.4 have the sign of the one slip of the plane.
+   subroutine exchange_directions(state, restart)
+      type(state_t), intent(inout) :: state
+      type(restart_t), intent(inout) :: restart
+      integer :: way(size(state%contacts%slides_along, 2))
+
+      if (restart_offers(restart, "sliding", .false.)) then
+         call restart_exchange(restart, "sliding", way)
+         state%contacts%slides_along(1, :) = real(way, wp)
+      else
+         call restart_exchange(restart, "slides_along", state%contacts%slides_along)
+      end if
+   end subroutine exchange_directions
 
    !> What bounds explicit steps.
    subroutine exchange_bounds(state, restart)

@@ -287,7 +287,7 @@ contains
       do k = self%n_linear + 1, self%n_condition
          associate (item => self%item(k))
             n = size(item%g, 1)*item%n_node
-            if (item%rubs .or. k > self%n) then
+            if (item%rubs .or. allocated(self%law(k)%beside)) then
                call subtract_sum(item, -1.0_wp, condition_stiffness(item, &
                   constraints_lam(self, k)), numbering, merged)
             else if (any(abs(item%h(:n, :n)) > 0.0_wp)) then

@@ -5,8 +5,11 @@
 !> a sum of displacements; it stands here only where it is not eliminated in the numbering. Sign:
 !> docs/theory.md, eq. (1).
 module emcon_constraints
-   use emcon_constraint, only : condition_find_force, condition_t, constraint_t, contact_response_t
-   use emcon_contact_law, only : contact_law_box_t, contact_values_t
+   use emcon_constraint, only : condition_find_force, condition_find_law_force, &
+      condition_friction, condition_row_force, condition_t, &
+      constraint_t, contact_response_t
+   use emcon_contact_law, only : contact_laws_dissipated, contact_laws_respond, contact_laws_t, &
+      contact_values_t
    use emcon_csr, only : csr_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
@@ -16,12 +19,24 @@ module emcon_constraints
    private
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_force
    public :: constraints_stick, constraints_take_hold, constraints_gives_back
-   public :: constraints_add_forces, constraints_lam, constraints_dissipated
+   public :: constraints_add_forces, constraints_add_law_forces, constraints_add_row_forces, &
+      constraints_have_law_forces, constraints_lam, constraints_dissipated
    public :: constraint_index
+
+   !> Of the rows of gaps that do not hold: laws give their multipliers.
+   type :: soft_rows_t
+      logical :: is_on = .false.                 !! contacts are such ones
+      logical :: is_stored = .false.             !! by discrete gradients of what the laws store
+      !> Multipliers are on the way to what the gaps say, as unknowns of a solve
+      logical :: is_under_way = .false.
+      real(wp), allocatable :: left(:)           !! (n) of the gap to the target, at the end [L]
+      real(wp), allocatable :: slope(:)          !! (n) -d multiplier / d gap, >= 0 [M/T^2]
+      real(wp), allocatable :: lack(:)           !! (n) what one on its way lacks [M L/T^2]
+   end type soft_rows_t
 
    !> Which conditions act, and their linearised rows on the unknowns. The first `n` have a row of
    !> their gap, of the same number; those of them that stick have rows of their slips too, after
-   !> these. The others are of laws alone, beside those or where only these act.
+   !> these. The others have none: laws alone act there.
    type :: constraint_set_t
       integer :: n = 0
       integer :: n_condition = 0
@@ -31,13 +46,8 @@ module emcon_constraints
       integer, allocatable :: id(:)
       type(condition_t), allocatable :: item(:)  !! (n_condition) values and derivatives
       real(wp), allocatable :: target(:)         !! (n_condition) mean gap to hold, or to count from
-      type(contact_law_box_t), allocatable :: law(:)   !! (n_condition) none: its row holds it
+      type(contact_laws_t), allocatable :: law(:)      !! (n_condition)
       logical, allocatable :: is_kept(:)         !! (n) target is gap(q0): hold the difference at 0
-      !> Contacts give way: laws give the multipliers of their rows
-      logical :: gives_way = .false.
-      logical :: is_stored = .false.             !! by discrete gradients of what these store
-      !> Their multipliers are on the way to what the gaps say, as unknowns of a solve
-      logical :: is_under_way = .false.
       real(wp) :: frequency = 0.0_wp             !! 1/h of the motion evaluated; statics: 0 [1/T]
       integer :: n_row = 0
       integer, allocatable :: condition(:)       !! (n_row) that each row is of
@@ -46,10 +56,7 @@ module emcon_constraints
       logical, allocatable :: is_firm(:)
       real(wp), allocatable :: lam(:)            !! (n_row) multipliers [M L/T^2]
       real(wp), allocatable :: defect(:)         !! (n_row) what is left to the target [L]
-      ! Of the gaps of contacts that give way:
-      real(wp), allocatable :: left(:)           !! (n) of the gap to the target, at the end [L]
-      real(wp), allocatable :: slope(:)          !! (n) -d multiplier / d gap, >= 0 [M/T^2]
-      real(wp), allocatable :: lack(:)           !! (n) what one on its way lacks [M L/T^2]
+      type(soft_rows_t) :: soft                  !! what laws make of rows of gaps
       type(csr_t) :: force_rows                  !! (n_row x n_unknown) directions of forces
       type(csr_t) :: gap_rows                    !! (n_row x n_unknown) gradients at the end
       type(csr_t) :: law_rows                    !! of conditions without a row, directions
@@ -73,10 +80,9 @@ contains
       self%id = id
       self%condition = [(k, k = 1, self%n)]
       self%slip = 0*self%condition
-      self%is_under_way = .false.
-      self%gives_way = .false.
+      self%soft = soft_rows_t(is_stored=self%soft%is_stored)
       if (allocated(self%item)) deallocate(self%item, self%law, self%target, self%is_kept, &
-         self%is_firm, self%lam, self%defect, self%left, self%slope, self%lack)
+         self%is_firm, self%lam, self%defect)
       if (present(by_law)) then
          self%n_condition = self%n + size(by_law)
          self%id = [id, by_law]
@@ -84,7 +90,7 @@ contains
       allocate(self%item(self%n_condition), self%law(self%n_condition), self%is_kept(self%n), &
          self%is_firm(self%n))
       allocate(self%target(self%n_condition), self%lam(self%n), self%defect(self%n), &
-         self%left(self%n), self%slope(self%n), self%lack(self%n), source=0.0_wp)
+         self%soft%left(self%n), self%soft%slope(self%n), self%soft%lack(self%n), source=0.0_wp)
       self%is_kept = .false.
       self%is_firm = .true.
    end subroutine constraints_select
@@ -114,7 +120,7 @@ contains
       integer :: k
 
       do k = self%n + 1, self%n_row
-         self%item(self%condition(k))%response%tau(self%slip(k)) = self%lam(k)
+         self%item(self%condition(k))%stick(self%slip(k)) = self%lam(k)
       end do
    end subroutine constraints_take_hold
 
@@ -123,8 +129,8 @@ contains
       type(constraint_set_t), intent(in) :: self
       integer, intent(in) :: k                   !! place in the set, from 1
 
-      gives_back = allocated(self%law(k)%law)
-      if (gives_back) gives_back = self%law(k)%law%gives_back()
+      gives_back = allocated(self%law(k)%row)
+      if (gives_back) gives_back = self%law(k)%row%gives_back()
    end function constraints_gives_back
 
    !> Pair and number within the pair of constraint `id`; pair 0: it is not one of contact.
@@ -164,7 +170,7 @@ contains
          end associate
       end do
       do k = self%n_permanent + 1, self%n_condition
-         if (allocated(self%law(k)%law)) call respond(self, k)
+         call respond(self, k)
       end do
    end subroutine constraints_evaluate
 
@@ -208,36 +214,41 @@ contains
 
       associate (item => self%item(k))
          values = contact_values_t(item%gap0, item%gap1, item%dgap, item%gap1, item%slip, &
-            self%frequency, self%is_stored)
+            frequency=self%frequency, is_stored=self%soft%is_stored)
          if (k <= self%n) values%left = self%defect(k)
+         if (item%rubs) values%friction = condition_friction(item, constraints_lam(self, k))
       end associate
    end function values_of
 
-   !> What the law of condition `k` has taken over the motion that was evaluated.
-   pure real(wp) function constraints_dissipated(self, k) result(dissipated)
+   !> What laws beside the rows of condition `k` have taken over the motion that was evaluated.
+   pure real(wp) function constraints_dissipated(self, k, kind) result(dissipated)
       type(constraint_set_t), intent(in) :: self
-      integer, intent(in) :: k                   !! n + 1..n_condition
+      integer, intent(in) :: k                   !! n_permanent + 1..n_condition
+      integer, intent(in) :: kind                !! `loss_damping` or `loss_friction`
 
-      dissipated = self%law(k)%law%dissipated(values_of(self, k), self%item(k)%response)
+      dissipated = 0.0_wp
+      if (allocated(self%law(k)%beside)) dissipated = contact_laws_dissipated(self%law(k), &
+         values_of(self, k), kind)
    end function constraints_dissipated
 
-   !> What the law of condition `k` gives. Where the condition has a row of its gap, that takes the
-   !> multiplier, or what one under way lacks of it, and has no defect.
+   !> What the laws of condition `k` give. One in place of the row of its gap gives the multiplier,
+   !> or what one under way lacks of it, and leaves no defect.
    pure subroutine respond(self, k)
       type(constraint_set_t), intent(inout) :: self
-      integer, intent(in) :: k                   !! n_held + 1..n_condition
+      integer, intent(in) :: k                   !! n_permanent + 1..n_condition
       type(contact_response_t) :: response
 
-      call self%law(k)%law%respond(values_of(self, k), response)
-      if (k > self%n) then
-         self%item(k)%response = response
-         return
-      end if
-      self%left(k) = self%defect(k)
-      self%slope(k) = response%stiffness(0, 0)
-      self%lack(k) = merge(response%lam - self%lam(k), 0.0_wp, self%is_under_way)
-      self%lam(k) = response%lam - self%lack(k)
-      self%defect(k) = 0.0_wp
+      associate (law => self%law(k), soft => self%soft)
+         if (allocated(law%beside)) call contact_laws_respond(law, values_of(self, k), &
+            self%item(k)%response)
+         if (.not. allocated(law%row)) return
+         call law%row%respond(values_of(self, k), response)
+         soft%left(k) = self%defect(k)
+         soft%slope(k) = response%stiffness(0, 0)
+         soft%lack(k) = merge(response%lam - self%lam(k), 0.0_wp, soft%is_under_way)
+         self%lam(k) = response%lam - soft%lack(k)
+         self%defect(k) = 0.0_wp
+      end associate
    end subroutine respond
 
    !> Forces on all nodes of the conditions from the `first` one on, and of laws; with `magnitude`
@@ -272,6 +283,54 @@ contains
          end do
       end do
    end subroutine constraints_add_forces
+
+   !> Have laws beside the rows any forces?
+   pure logical function constraints_have_law_forces(self) result(have)
+      type(constraint_set_t), intent(in) :: self
+      integer :: k
+
+      have = .true.
+      do k = self%n_permanent + 1, self%n_condition
+         if (.not. allocated(self%law(k)%beside)) cycle
+         associate (response => self%item(k)%response)
+            if (abs(response%lam) > 0.0_wp .or. any(abs(response%tau) > 0.0_wp)) return
+         end associate
+      end do
+      have = .false.
+   end function constraints_have_law_forces
+
+   !> Add the forces of laws beside the rows.
+   pure subroutine constraints_add_law_forces(self, force)
+      type(constraint_set_t), intent(in) :: self
+      real(wp), intent(inout), contiguous :: force(:, :)                 !! (n_dim, n_node)
+      real(wp) :: part(size(force, 1))
+      integer :: k, i
+
+      do k = self%n_permanent + 1, self%n_condition
+         if (.not. allocated(self%law(k)%beside)) cycle
+         do i = 1, self%item(k)%n_node
+            call condition_find_law_force(self%item(k), i, part)
+            associate (node => self%item(k)%node(i))
+               force(:, node) = force(:, node) + part
+            end associate
+         end do
+      end do
+   end subroutine constraints_add_law_forces
+
+   !> Add the forces that rows of gaps have by multipliers `lam`.
+   pure subroutine constraints_add_row_forces(self, lam, force)
+      type(constraint_set_t), intent(in) :: self
+      real(wp), intent(in) :: lam(:)             !! (n) [M L/T^2]
+      real(wp), intent(inout), contiguous :: force(:, :)                 !! (n_dim, n_node)
+      integer :: k, n
+
+      do k = 1, self%n
+         associate (item => self%item(k))
+            n = item%n_node
+            force(:, item%node(:n)) = force(:, item%node(:n)) + lam(k)*condition_row_force(item, 0)
+         end associate
+      end do
+   end subroutine constraints_add_row_forces
 
    !> The multiplier of the row that condition `k` has of its gap; 0 if there is none.
    pure real(wp) function constraints_lam(self, k) result(lam)

@@ -91,8 +91,8 @@ contains
       ! With friction what has no mass would balance without a minimum principle, with damping it
       ! would jump to where it rests.
       do i = 1, size(scene%pair)
-         if (.not. (scene%pair(i)%friction > 0.0_wp &
-            .or. scene%pair(i)%damping%coefficient > 0.0_wp)) cycle
+         if (.not. (scene%pair(i)%laws%friction > 0.0_wp &
+            .or. scene%pair(i)%laws%damping%coefficient > 0.0_wp)) cycle
          call mark_surface(scene, scene%pair(i)%slave, .false., is_massless)
          call mark_surface(scene, scene%pair(i)%master, .false., is_massless)
       end do

@@ -7,8 +7,8 @@
 !> docs/theory.md, eqs. (14n) to (14q).
 module emcon_dashpot_law
    use emcon_constraint, only : contact_response_t
-   use emcon_contact_law, only : contact_law_t, contact_values_t
-   use emcon_interactions, only : contact_damping_t
+   use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
+   use emcon_interactions, only : contact_damping_t, surface_laws_t
    use emcon_kinds, only : wp
    implicit none
    private
@@ -21,11 +21,53 @@ module emcon_dashpot_law
       real(wp) :: gap = 0.0_wp                   !! mean gap as the step begins [L]
       logical :: is_closed = .false.             !! contact holds it: it slides by the whole mu
    contains
+      procedure :: take => dashpot_take
+      procedure :: begin => dashpot_begin
       procedure :: respond => dashpot_respond
       procedure :: dissipated => dashpot_dissipated
+      procedure :: acts_near => dashpot_acts_near
+      procedure :: reach => dashpot_reach
+      procedure :: rubs => dashpot_rubs
    end type dashpot_t
 
 contains
+
+   pure subroutine dashpot_take(self, surface, method, acts)
+      class(dashpot_t), intent(inout) :: self
+      type(surface_laws_t), intent(in) :: surface
+      integer, intent(in) :: method              !! of the step, or 0
+      logical, intent(out) :: acts               !! the deck asks for it
+
+      self%coefficients = surface%damping
+      acts = self%coefficients%coefficient > 0.0_wp
+   end subroutine dashpot_take
+
+   pure subroutine dashpot_begin(self, place)
+      class(dashpot_t), intent(inout) :: self
+      type(contact_place_t), intent(in) :: place
+
+      self%area = place%share*place%area
+      self%gap = place%gap
+      self%is_closed = place%is_closed
+   end subroutine dashpot_begin
+
+   pure logical function dashpot_acts_near(self) result(acts_near)
+      class(dashpot_t), intent(in) :: self
+
+      acts_near = .true.
+   end function dashpot_acts_near
+
+   pure real(wp) function dashpot_reach(self) result(reach)
+      class(dashpot_t), intent(in) :: self
+
+      reach = self%coefficients%clearance
+   end function dashpot_reach
+
+   pure logical function dashpot_rubs(self) result(rubs)
+      class(dashpot_t), intent(in) :: self
+
+      rubs = self%coefficients%tangent > 0.0_wp
+   end function dashpot_rubs
 
    !> Push and drag of a condition, docs/theory.md, eqs. (14o) and (14p).
    pure subroutine dashpot_respond(self, at, response)

@@ -7,7 +7,9 @@
 module emcon_soft_law
    use emcon_constraint, only : contact_response_t
    use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
+   use emcon_interactions, only : surface_laws_t
    use emcon_kinds, only : wp
+   use emcon_steps, only : method_augmented_lagrange, method_penalty
    implicit none
    private
    public :: penalty_t, augmented_t
@@ -20,6 +22,7 @@ module emcon_soft_law
       real(wp) :: before = 1.0_wp
       real(wp) :: now = 0.0_wp                   !! where it is at the end [L]
    contains
+      procedure :: take => penalty_take
       procedure :: begin => penalty_begin
       procedure :: respond => penalty_respond
       procedure :: stored
@@ -31,12 +34,31 @@ module emcon_soft_law
    type, extends(penalty_t) :: augmented_t
       real(wp) :: base = 0.0_wp                  !! multiplier where nothing is left [M L/T^2]
    contains
+      procedure :: take => augmented_take
       procedure :: begin => augmented_begin
       procedure :: respond => augmented_respond
       procedure :: push_on
    end type augmented_t
 
 contains
+
+   pure subroutine penalty_take(self, surface, method, acts)
+      class(penalty_t), intent(inout) :: self
+      type(surface_laws_t), intent(in) :: surface
+      integer, intent(in) :: method              !! of the step, or 0
+      logical, intent(out) :: acts               !! the deck asks for it
+
+      acts = method == method_penalty
+   end subroutine penalty_take
+
+   pure subroutine augmented_take(self, surface, method, acts)
+      class(augmented_t), intent(inout) :: self
+      type(surface_laws_t), intent(in) :: surface
+      integer, intent(in) :: method              !! of the step, or 0
+      logical, intent(out) :: acts               !! the deck asks for it
+
+      acts = method == method_augmented_lagrange
+   end subroutine augmented_take
 
    pure subroutine penalty_begin(self, place)
       class(penalty_t), intent(inout) :: self

@@ -5,6 +5,7 @@ module test_damped
    use emcon_constraint_rows, only : constraint_dof
    use emcon_constraints, only : constraint_set_t, constraints_dissipated, constraints_evaluate, &
       constraints_force, constraints_select
+   use emcon_contact_law, only : contact_laws_add, loss_damping
    use emcon_dashpot_law, only : dashpot_t
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_t
@@ -59,7 +60,7 @@ contains
       allocate(none(0))
       call make_two_blocks(self%scene, 0.125_wp, lower, upper)
       self%scene%pair%formulation = formulations(k)
-      self%scene%pair%damping = law
+      self%scene%pair%laws%damping = law
       call add_step(self%scene, .false., 0.1_wp, 1)
       call system_init(self%system, self%scene, error)
       if (.not. allocated(error)) call system_begin_step(self%system, self%scene, 1, error)
@@ -74,7 +75,7 @@ contains
          self%set%item%rubs = .true.
          do i = 1, contact%n_constraint
             self%set%target(i) = contact%state(i)%gap0
-            allocate(self%set%law(i)%law, source=dashpot_t(law, 0.5_wp, contact%state(i)%gap0))
+            call contact_laws_add(self%set%law(i), dashpot_t(law, 0.5_wp, contact%state(i)%gap0))
          end do
       end associate
    end subroutine begin
@@ -104,9 +105,9 @@ contains
          call find_forces(trial, trial%du, force)
          work = 0.0_wp
          do i = 1, trial%set%n_condition
-            call check_true(error, constraints_dissipated(trial%set, i) > 0.0_wp, &
+            call check_true(error, constraints_dissipated(trial%set, i, loss_damping) > 0.0_wp, &
                "it takes something")
-            work = work + constraints_dissipated(trial%set, i)
+            work = work + constraints_dissipated(trial%set, i, loss_damping)
          end do
          call check_near(error, -sum(force*trial%du), work, tol, 1.0_wp, "work")
       end do

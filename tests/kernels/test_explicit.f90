@@ -128,7 +128,7 @@ contains
                do j = 1, closed%n
                   associate (item => closed%item(j))
                      force(:, item%node(:3)) = force(:, item%node(:3)) &
-                        + closed%law(j)%law%stiffest()*sum(item%c(:, :3)*way(:, item%node(:3))) &
+                        + closed%law(j)%row%stiffest()*sum(item%c(:, :3)*way(:, item%node(:3))) &
                         *item%c(:, :3)
                   end associate
                end do
@@ -166,7 +166,7 @@ contains
          closed%item(k)%node(:3) = [7, 11, 11 + k]
          call shake(closed%item(k)%c, 1.0_wp)
          closed%item(k)%c = closed%item(k)%c + 2.0_wp
-         allocate(closed%law(k)%law, source=penalty_t(stiffness=100.0_wp*real(k, wp)))
+         allocate(closed%law(k)%row, source=penalty_t(stiffness=100.0_wp*real(k, wp)))
       end do
    end subroutine make_closed
 
@@ -214,7 +214,7 @@ contains
          do k = 1, 2
             length = sqrt(sum(soft%item(k)%c(:, 2:3)**2, 1))
             total(soft%item(k)%node(2:3)) = total(soft%item(k)%node(2:3)) &
-               + soft%law(k)%law%stiffest()*length*sum(length)
+               + soft%law(k)%row%stiffest()*length*sum(length)
          end do
          met = total
          call explicit_soft_widen(march, has_grown)

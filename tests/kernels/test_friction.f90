@@ -2,12 +2,15 @@
 module test_friction
    use, intrinsic :: iso_fortran_env, only : output_unit
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_constraint, only : condition_drag, condition_force, condition_t
+   use emcon_constraint, only : condition_drag, condition_force, condition_t, contact_response_t, &
+      most_slips
    use emcon_condition_nodes, only : condition_include, condition_resize, condition_resize_slip
    use emcon_errors, only : error_t
-   use emcon_friction_law, only : friction_trial, friction_violation, touch_free, touch_open, &
-      touch_rests, touch_sticks, touch_t
-   use emcon_friction_solve, only : friction_problem_t, friction_solve
+   use emcon_contact_law, only : contact_values_t, loss_friction
+   use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
+      contact_sticks, contact_trial_t, coulomb_map, coulomb_t, coulomb_trial, coulomb_violation, &
+      is_same_status, slip_status_t
+   use emcon_friction_solve_plane, only : friction_problem_t, friction_solve
    use emcon_kinds, only : dp, wp
    use emcon_lemke, only : lemke_solve
    use emcon_nts_constraint, only : polygon_constraint
@@ -32,6 +35,10 @@ contains
          test_case_t("violation of the law", test_violation), &
          test_case_t("trials of what is led to a slip", test_led_trial), &
          test_case_t("the law of what is led to a slip", test_led), &
+         test_case_t("vectors of slips: the cone, work, and trials that stand", test_vectors), &
+         test_case_t("vectors of slips turn with the surface", test_turned), &
+         test_case_t("the slope of the natural map is its derivative", test_slope), &
+         test_case_t("as a law beside the rows of a condition", test_law), &
          test_case_t("slip: work, rigid motions, differences", test_slip), &
          test_case_t("mean slip of points of an edge", test_points), &
          test_case_t("slip along an edge, and of the force", test_along), &
@@ -45,28 +52,72 @@ contains
       real(wp), parameter :: mu = 0.5_wp, c = 4.0_wp
       integer :: next(9)
 
-      next = [friction_trial(touch_open, touch_t(gap=1.0_wp), mu, c, 0.0_wp), &
-         friction_trial(touch_open, touch_t(gap=-1.0_wp, slip=0.4_wp), mu, c, 0.0_wp), &
-         friction_trial(touch_open, touch_t(gap=-1.0_wp, slip=-0.6_wp), mu, c, 0.0_wp), &
-         friction_trial(touch_sticks, touch_t(2.0_wp, 1.1_wp), mu, c, 0.0_wp), &
-         friction_trial(touch_sticks, touch_t(2.0_wp, 1.1_wp), mu, c, 0.2_wp), &
-         friction_trial(1, touch_t(2.0_wp, 1.0_wp, slip=-0.4_wp), mu, c, 0.0_wp), &
-         friction_trial(1, touch_t(2.0_wp, 1.0_wp, slip=-0.6_wp), mu, c, 0.0_wp), &
-         friction_trial(-1, touch_t(-0.1_wp, -0.05_wp, slip=-0.6_wp), mu, c, 0.0_wp), &
-         friction_trial(1, touch_t(2.0_wp, 1.0_wp, slip=-0.4_wp, rounding=0.5_wp), mu, c, 0.0_wp)]
-      call check_equal(error, next, [touch_open, touch_sticks, -1, 1, touch_sticks, touch_sticks, &
-         -1, touch_open, 1], "ways")
+      next = [trial(contact_open, contact_trial_t(gap=1.0_wp)), &
+         trial(contact_open, place(0.0_wp, 0.0_wp, 0.4_wp, gap=-1.0_wp)), &
+         trial(contact_open, place(0.0_wp, 0.0_wp, -0.6_wp, gap=-1.0_wp)), &
+         trial(contact_sticks, place(2.0_wp, 1.1_wp, 0.0_wp)), &
+         trial(contact_sticks, place(2.0_wp, 1.1_wp, 0.0_wp), 0.2_wp), &
+         trial(1, place(2.0_wp, 1.0_wp, -0.4_wp)), &
+         trial(1, place(2.0_wp, 1.0_wp, -0.6_wp)), &
+         trial(-1, place(-0.1_wp, -0.05_wp, -0.6_wp)), &
+         trial(1, place(2.0_wp, 1.0_wp, -0.4_wp, rounding=0.5_wp))]
+      call check_equal(error, next, [contact_open, contact_sticks, -1, 1, contact_sticks, &
+         contact_sticks, -1, contact_open, 1], "ways")
+
+   contains
+
+      pure integer function trial(was, at, tie)
+         integer, intent(in) :: was
+         type(contact_trial_t), intent(in) :: at
+         real(wp), intent(in), optional :: tie
+         real(wp) :: unsure
+
+         unsure = 0.0_wp
+         if (present(tie)) unsure = tie
+         trial = code_of(coulomb_trial(status_of(was), at, mu, c, unsure))
+      end function trial
+
    end subroutine test_trial
+
+   !> A place with one slip.
+   pure type(contact_trial_t) function place(lam, tau, slip, slip_target, gap, rounding) result(at)
+      real(wp), intent(in) :: lam, tau, slip
+      real(wp), intent(in), optional :: slip_target, gap, rounding
+
+      at%lam = lam
+      at%tau(1) = tau
+      at%slip(1) = slip
+      if (present(slip_target)) at%slip_target(1) = slip_target
+      if (present(gap)) at%gap = gap
+      if (present(rounding)) at%rounding = rounding
+   end function place
+
+   !> Statuses as codes: where it slides the sign of the one slip.
+   elemental integer function code_of(status) result(code)
+      type(slip_status_t), intent(in) :: status
+
+      code = status%kind
+      if (code == contact_slides) code = nint(status%direction(1))
+   end function code_of
+
+   elemental type(slip_status_t) function status_of(code) result(status)
+      integer, intent(in) :: code
+
+      status%kind = code
+      if (abs(code) /= 1) return
+      status%kind = contact_slides
+      status%direction(1) = real(code, wp)
+   end function status_of
 
    subroutine test_violation(error)
       type(error_t), allocatable, intent(out) :: error
 
-      call check_near(error, [friction_violation(touch_t(2.0_wp, 1.0_wp, slip=3.0_wp), 0.5_wp, &
-         1.0_wp), friction_violation(touch_t(2.0_wp, 1.0_wp, slip=-3.0_wp), 0.5_wp, 1.0_wp), &
-         friction_violation(touch_t(2.0_wp, 1.5_wp), 0.5_wp, 1.0_wp), &
-         friction_violation(touch_t(gap=-0.25_wp), 0.5_wp, 2.0_wp), &
-         friction_violation(touch_t(2.0_wp, 1.0_wp, slip=-3.0_wp, rounding=0.5_wp), 0.5_wp, &
-         1.0_wp)], [0.0_wp, 2.0_wp, 0.5_wp, 0.5_wp, 1.5_wp], tol, 1.0_wp, "missed")
+      call check_near(error, [coulomb_violation(place(2.0_wp, 1.0_wp, 3.0_wp), 0.5_wp, 1.0_wp), &
+         coulomb_violation(place(2.0_wp, 1.0_wp, -3.0_wp), 0.5_wp, 1.0_wp), &
+         coulomb_violation(place(2.0_wp, 1.5_wp, 0.0_wp), 0.5_wp, 1.0_wp), &
+         coulomb_violation(contact_trial_t(gap=-0.25_wp), 0.5_wp, 2.0_wp), &
+         coulomb_violation(place(2.0_wp, 1.0_wp, -3.0_wp, rounding=0.5_wp), 0.5_wp, 1.0_wp)], &
+         [0.0_wp, 2.0_wp, 0.5_wp, 0.5_wp, 1.5_wp], tol, 1.0_wp, "missed")
    end subroutine test_violation
 
    !> Each way, and where it leads to next; what slides or is free holds its slip on the way. The
@@ -75,25 +126,25 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: mu = 0.5_wp, c = 4.0_wp, lam = 2.0_wp, a = 0.5_wp
       integer, parameter :: n = 12
-      integer, parameter :: was(n) = [touch_open, touch_open, touch_open, touch_open, touch_open, &
-         touch_sticks, touch_sticks, touch_rests, touch_free, touch_free, 1, -1]
+      integer, parameter :: was(n) = [contact_open, contact_open, contact_open, contact_open, contact_open, &
+         contact_sticks, contact_sticks, contact_rests, contact_free, contact_free, 1, -1]
       real(wp), parameter :: tau(n) = [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, -0.2_wp, 1.1_wp, &
          0.2_wp, 0.0_wp, 0.0_wp, 1.0_wp, -1.0_wp]
       real(wp), parameter :: slip(n) = [-0.6_wp, -0.1_wp, 0.3_wp, 0.6_wp, 0.8_wp, a, a, 0.0_wp, &
          1.5_wp, -1.5_wp, -2.0_wp, 2.0_wp]
-      integer, parameter :: expected(n) = [-1, touch_rests, touch_free, touch_sticks, 1, &
-         touch_free, 1, touch_free, touch_sticks, touch_rests, touch_sticks, touch_rests]
+      integer, parameter :: expected(n) = [-1, contact_rests, contact_free, contact_sticks, 1, &
+         contact_free, 1, contact_free, contact_sticks, contact_rests, contact_sticks, contact_rests]
       integer :: next(n), side, k
 
       do side = -1, 1, 2
          do k = 1, n
-            next(k) = friction_trial(turned(was(k)), touch_t(lam, side*tau(k), 0.0_wp, &
-               side*slip(k), side*a), mu, c, 0.0_wp)
+            next(k) = code_of(coulomb_trial(status_of(turned(was(k))), place(lam, side*tau(k), &
+               side*slip(k), side*a), mu, c, 0.0_wp))
          end do
          call check_equal(error, next, [(turned(expected(k)), k = 1, n)], "ways")
       end do
-      call check_equal(error, friction_trial(touch_free, touch_t(lam, 0.0_wp, 0.0_wp, &
-         a + 0.01_wp, a), mu, c, 0.05_wp), touch_free, "undecided")
+      call check_equal(error, code_of(coulomb_trial(status_of(contact_free), place(lam, 0.0_wp, &
+         a + 0.01_wp, a), mu, c, 0.05_wp)), contact_free, "undecided")
 
    contains
 
@@ -117,25 +168,179 @@ contains
 
       call check_true(error, all(tau*slip >= 0.0_wp), "work")
       do side = -1, 1, 2
-         missed = [(friction_violation(touch_t(lam, side*tau(k), 0.0_wp, side*slip(k), side*a), &
-            mu, 4.0_wp), k = 1, 7)]
+         missed = [(coulomb_violation(place(lam, side*tau(k), side*slip(k), side*a), mu, 4.0_wp), &
+            k = 1, 7)]
          call check_near(error, missed, 0.0_wp*tau, tol, 1.0_wp, "on the graph")
-         off = [friction_violation(at(-0.3_wp, a), mu, 4.0_wp), &
-            friction_violation(at(0.1_wp, 0.2_wp), mu, 4.0_wp), &
-            friction_violation(at(0.3_wp, 0.0_wp), mu, 4.0_wp), &
-            friction_violation(at(0.5_wp, 5.0_wp), mu, 4.0_wp)]
+         off = [coulomb_violation(at(-0.3_wp, a), mu, 4.0_wp), &
+            coulomb_violation(at(0.1_wp, 0.2_wp), mu, 4.0_wp), &
+            coulomb_violation(at(0.3_wp, 0.0_wp), mu, 4.0_wp), &
+            coulomb_violation(at(0.5_wp, 5.0_wp), mu, 4.0_wp)]
          call check_near(error, off, [0.3_wp, 0.1_wp, 0.3_wp, 0.5_wp], tol, 1.0_wp, "off it")
       end do
 
    contains
 
-      pure type(touch_t) function at(tau, slip)
+      pure type(contact_trial_t) function at(tau, slip)
          real(wp), intent(in) :: tau, slip
 
-         at = touch_t(lam, side*tau, 0.0_wp, side*slip, side*a)
+         at = place(lam, side*tau, side*slip, side*a)
       end function at
 
    end subroutine test_led
+
+   !> Random forces and slips of one place, of `n` slips, and what they are led to in every second.
+   subroutine draw_place(n, case, at)
+      integer, intent(in) :: n, case
+      type(contact_trial_t), intent(out) :: at
+      real(wp) :: u(8)
+
+      call draw_random(u)
+      at%lam = 2.0_wp*u(1)
+      u = 2.0_wp*u - 1.0_wp
+      at%gap = 0.2_wp*u(2)
+      at%tau(:n) = 2.0_wp*u(3:2 + n)
+      at%slip(:n) = u(5:4 + n)
+      if (mod(case, 2) == 0) at%slip_target(:n) = u(7:6 + n)
+   end subroutine draw_place
+
+   !> Forces that the natural map gives obey the law with slips that make them a fixed point: inside
+   !> the cone, against slip, and a trial stands where it has been.
+   subroutine test_vectors(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: mu = 0.5_wp, c = 3.0_wp
+      type(contact_trial_t) :: at
+      type(slip_status_t) :: status
+      real(wp) :: force(0:most_slips), slope(0:most_slips, 0:most_slips)
+      integer :: case, i, n, seen(0:4)
+
+      seen = 0
+      do case = 1, 4000
+         n = 1 + mod(case/2, 2)
+         call draw_place(n, case, at)
+         call coulomb_map(at, mu, c, force, slope)
+         ! lam - c g and tau + c s stay as they are.
+         at%gap = at%gap + (force(0) - at%lam)/c
+         at%slip = at%slip - (force(1:) - at%tau)/c
+         at%lam = force(0)
+         at%tau = force(1:)
+         call check_true(error, at%lam >= 0.0_wp .and. at%gap >= -tol .and. &
+            abs(at%lam*at%gap) <= tol, "push")
+         call check_true(error, norm2(at%tau) <= mu*at%lam + tol, "cone")
+         call check_true(error, dot_product(at%tau, at%slip) >= -tol, "work")
+         call check_true(error, coulomb_violation(at, mu, c) <= tol, "fixed point")
+         status = slip_status_t(contact_open)
+         do i = 1, 2
+            status = coulomb_trial(status, at, mu, c, 0.0_wp)
+         end do
+         call check_true(error, is_same_status(coulomb_trial(status, at, mu, c, tol), status), &
+            "it stands")
+         if (status%kind == contact_slides) call check_near(error, at%tau, &
+            mu*at%lam*status%direction, tol, 1.0_wp, "along slip")
+         seen(status%kind) = seen(status%kind) + 1
+         if (allocated(error)) return
+      end do
+      call check_true(error, all(seen > 50), "all ways")
+   end subroutine test_vectors
+
+   subroutine test_turned(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: mu = 0.5_wp, c = 3.0_wp
+      real(wp), parameter :: turn(2, 2) = reshape([0.6_wp, 0.8_wp, -0.8_wp, 0.6_wp], [2, 2])
+      type(contact_trial_t) :: at, turned
+      type(slip_status_t) :: status, other
+      real(wp), dimension(0:most_slips) :: force, again
+      real(wp), dimension(0:most_slips, 0:most_slips) :: slope, slope_again
+      integer :: case
+
+      do case = 1, 200
+         call draw_place(2, case, at)
+         turned = at
+         turned%tau = matmul(turn, at%tau)
+         turned%slip = matmul(turn, at%slip)
+         turned%slip_target = matmul(turn, at%slip_target)
+         call coulomb_map(at, mu, c, force, slope)
+         call coulomb_map(turned, mu, c, again, slope_again)
+         call check_near(error, again, [force(0), matmul(turn, force(1:))], tol, 1.0_wp, "forces")
+         call check_near(error, [slope_again(1:, 1:)], [matmul(matmul(turn, slope(1:, 1:)), &
+            transpose(turn))], tol, 1.0_wp, "slopes")
+         status = coulomb_trial(slip_status_t(contact_open), at, mu, c, 0.0_wp)
+         other = coulomb_trial(slip_status_t(contact_open), turned, mu, c, 0.0_wp)
+         call check_equal(error, other%kind, status%kind, "status")
+         call check_near(error, other%direction, matmul(turn, status%direction), tol, 1.0_wp, &
+            "direction")
+         if (allocated(error)) return
+      end do
+   end subroutine test_turned
+
+   !> Central differences by the trial, exact but for their square and for rounding over it, away
+   !> from kinks: steps over one are left out.
+   subroutine test_slope(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: mu = 0.5_wp, c = 3.0_wp
+      real(wp), parameter :: small = epsilon(1.0_wp)**(1.0_wp/3.0_wp)
+      type(contact_trial_t) :: at
+      type(slip_status_t) :: status(-1:1)
+      real(wp) :: force(0:most_slips, -1:1), slope(0:most_slips, 0:most_slips, -1:1), worst
+      integer :: case, i, k, n, n_seen
+
+      worst = 0.0_wp
+      n_seen = 0
+      do case = 1, 1000
+         n = 1 + mod(case/2, 2)
+         call draw_place(n, case, at)
+         do i = 0, n
+            do k = -1, 1
+               status(k) = coulomb_trial(slip_status_t(contact_open), moved(k*small), mu, c, 0.0_wp)
+               call coulomb_map(moved(k*small), mu, c, force(:, k), slope(:, :, k))
+            end do
+            if (any(status%kind /= status(0)%kind)) cycle
+            if (norm2(slope(:, :, 1) - slope(:, :, -1)) > 0.01_wp) cycle
+            n_seen = n_seen + 1
+            worst = max(worst, maxval(abs((force(:, 1) - force(:, -1))/(2.0_wp*small) &
+               - slope(:, i, 0))))
+         end do
+      end do
+      call check_true(error, n_seen > 2000, "away from kinks")
+      call check_true(error, worst < 100.0_wp*small**2/0.01_wp, "differences: " // to_text(worst))
+
+   contains
+
+      !> The place with its trial moved by `way`.
+      pure type(contact_trial_t) function moved(way)
+         real(wp), intent(in) :: way
+
+         moved = at
+         if (i == 0) moved%lam = at%lam + way
+         if (i > 0) moved%tau(i) = at%tau(i) + way
+      end function moved
+
+   end subroutine test_slope
+
+   !> What slides takes mu times the push over its way; what it holds is what it is led to, or none.
+   subroutine test_law(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(coulomb_t) :: law
+      type(contact_response_t) :: response
+      type(contact_values_t) :: at
+
+      law = coulomb_t(mu=0.25_wp, restitution=0.5_wp)
+      law%status = slip_status_t(contact_slides, [0.6_wp, -0.8_wp])
+      call law%respond(at, response)
+      call check_near(error, response%mu_sigma, [0.15_wp, -0.2_wp], tol, 1.0_wp, "part of the push")
+      at%friction = 4.0_wp*response%mu_sigma
+      at%slip = [0.6_wp, -0.8_wp]
+      call check_near(error, [law%dissipated(at, response)], [1.0_wp], tol, 1.0_wp, "work")
+      call check_equal(error, law%loss(), loss_friction, "loss")
+      call check_true(error, law%rubs() .and. .not. law%holds_slip(), "it slides")
+      call law%leads_to([0.4_wp, 0.2_wp], 0.0_wp)
+      law%status = slip_status_t(contact_sticks)
+      call check_near(error, law%slip_held(), [0.2_wp, 0.1_wp], tol, 1.0_wp, "it sticks there")
+      law%status = slip_status_t(contact_rests)
+      call check_true(error, law%holds_slip() .and. .not. any(abs(law%slip_held()) > 0.0_wp), &
+         "it rests")
+      call law%leads_to([0.4_wp, 0.2_wp], 1.0_wp)
+      call check_true(error, .not. any(abs(law%slip_target) > 0.0_wp), "rounded")
+   end subroutine test_law
 
    !> A node over one polygon, and over the two of a corner, in random motions.
    subroutine test_slip(error)
@@ -315,8 +520,9 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: n_case = 10000
       type(friction_problem_t) :: problem
-      type(touch_t) :: at(4)
-      integer :: way(4), i, k, n, n_back
+      type(contact_trial_t) :: at(4)
+      type(slip_status_t) :: status(4)
+      integer :: i, k, n, n_back
       logical :: is_solved, fell_back
       real(wp) :: worst, scale, u(1)
 
@@ -327,15 +533,15 @@ contains
          call make_problem(problem, n)
          do k = 1, n
             call draw_random(u)
-            way(k) = int(4.0_wp*u(1)) - 1
+            status(k) = status_of(int(4.0_wp*u(1)) - 1)
          end do
-         call friction_solve(problem, way(:n), at(:n), is_solved, fell_back)
+         call friction_solve(problem, status(:n), at(:n), is_solved, fell_back)
          call check_true(error, is_solved, "solved: case " // to_text(i))
          if (allocated(error)) return
          if (fell_back) n_back = n_back + 1
          scale = max(maxval(abs(at(:n)%lam)), maxval(abs(problem%gap)), maxval(abs(problem%slip)))
          do k = 1, n
-            worst = max(worst, friction_violation(at(k), problem%mu(k), 1.0_wp)/scale)
+            worst = max(worst, coulomb_violation(at(k), problem%mu(k), 1.0_wp)/scale)
          end do
       end do
       write(output_unit, "(a)") "   " // to_text(n_case) // " problems, " // to_text(n_back) &
@@ -351,8 +557,9 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: n_case = 2000
       type(friction_problem_t) :: problem
-      type(touch_t) :: at(4)
-      integer :: way(4), i, k, n, n_back
+      type(contact_trial_t) :: at(4)
+      type(slip_status_t) :: status(4)
+      integer :: i, k, n, n_back
       logical :: is_solved, fell_back
       real(wp) :: scale, bound, u(4)
 
@@ -362,19 +569,19 @@ contains
          n = 1 + mod(i, 4)
          call make_problem(problem, n)
          call draw_random(u)
-         problem%lead = u(:n) - 0.5_wp
-         way = touch_open
-         call friction_solve(problem, way(:n), at(:n), is_solved, fell_back)
+         problem%slip_target = u(:n) - 0.5_wp
+         status = slip_status_t(contact_open)
+         call friction_solve(problem, status(:n), at(:n), is_solved, fell_back)
          call check_true(error, is_solved, "solved: case " // to_text(i))
          if (allocated(error)) return
          scale = max(maxval(abs(at(:n)%lam)), maxval(abs(problem%gap)), maxval(abs(problem%slip)))
          if (fell_back) n_back = n_back + 1
          do k = 1, n
-            if (fell_back) at(k)%slip = at(k)%slip - problem%lead(k)
-            if (.not. fell_back) at(k)%lead = problem%lead(k)
-            call check_true(error, friction_violation(at(k), problem%mu(k), 1.0_wp) < bound*scale, &
+            if (fell_back) at(k)%slip(1) = at(k)%slip(1) - problem%slip_target(k)
+            if (.not. fell_back) at(k)%slip_target(1) = problem%slip_target(k)
+            call check_true(error, coulomb_violation(at(k), problem%mu(k), 1.0_wp) < bound*scale, &
                "law: case " // to_text(i))
-            if (.not. fell_back) call check_true(error, at(k)%tau*at(k)%slip >= -bound*scale**2, &
+            if (.not. fell_back) call check_true(error, at(k)%tau(1)*at(k)%slip(1) >= -bound*scale**2, &
                "dissipation: case " // to_text(i))
             if (allocated(error)) return
          end do
@@ -404,7 +611,7 @@ contains
       problem%slip = 2.0_wp*u - 1.0_wp
       call draw_random(u)
       problem%mu = 0.1_wp + 3.0_wp*u
-      problem%lead = 0.0_wp*u
+      problem%slip_target = 0.0_wp*u
    end subroutine make_problem
 
 end module test_friction

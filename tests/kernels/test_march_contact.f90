@@ -85,7 +85,7 @@ contains
 
       do formulation = formulation_nts, formulation_mortar
          call make_drop(scene, formulation, 0.6_wp)
-         scene%pair(1)%friction = mu
+         scene%pair(1)%laws%friction = mu
          block
             type(march_t) :: march
 
@@ -184,7 +184,7 @@ contains
       integer :: k
 
       call make_drop(scene, formulation_nts, 0.3_wp)
-      scene%pair(1)%restitution = 0.5_wp
+      scene%pair(1)%laws%restitution = 0.5_wp
       call begin(scene, march, error)
       if (allocated(error)) return
       start = march%ledger
@@ -299,9 +299,9 @@ contains
       do k = 1, 4
          formulation = merge(formulation_nts, formulation_mortar, mod(k, 2) == 0)
          call make_drop(scene, formulation, 0.3_wp)
-         scene%pair(1)%damping%coefficient = coefficient
-         scene%pair(1)%damping%clearance = 2.0_wp*gap_start
-         scene%pair(1)%damping%flat = 1.0_wp
+         scene%pair(1)%laws%damping%coefficient = coefficient
+         scene%pair(1)%laws%damping%clearance = 2.0_wp*gap_start
+         scene%pair(1)%laws%damping%flat = 1.0_wp
          if (k > 2) scene%step(1)%h = short
          deallocate(scene%step(1)%prescribed)
          allocate(scene%step(1)%prescribed(0))

@@ -9,7 +9,7 @@ module test_midside
    use emcon_element_registry, only : find_element_row
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
-      formulation_nts, formulation_segment, smoothing_hermite
+      formulation_nts, formulation_segment, smoothing_hermite, surface_laws_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_midside_plane, only : midside_distribute, midside_distribute_rows, midside_init, &
@@ -106,7 +106,7 @@ contains
       type(contact_options_t) :: options
 
       call new_contact(scene, contact_pair_t(slave=2, master=1, formulation=formulations(k), &
-         friction=0.2_wp), contact, error)
+         laws=surface_laws_t(friction=0.2_wp)), contact, error)
       if (allocated(error)) return
       if (k == 2) options%smoothing = smoothing_hermite
       call contact%suit_steps(.false.)

@@ -193,7 +193,7 @@ contains
       u(1, 5:) = up - 0.5_wp*width
       u(2, 5:) = up
       do k = 1, 2
-         nts%is_sharp = k == 1
+         nts%step%is_sharp = k == 1
          call nts%begin_step(scene%x, u, zero)
          call nts%evaluate([findloc(nts%node, block_node(upper, 0, 0), 1)], scene%x, u, zero, &
             [0.0_wp], item)
@@ -265,7 +265,7 @@ contains
          integer :: node, side
 
          node = block_node(upper, 0, 0)
-         nts%were_sharp = .not. nts%is_sharp     ! stencils are to be chosen anew
+         nts%were_sharp = .not. nts%step%is_sharp     ! stencils are to be chosen anew
          call nts%begin_step(scene%x, u, 0.0_wp*u)
          associate (stencil => nts%polygon(1, findloc(nts%node, node, 1)))
             side = merge(1, 2, norm2(scene%x(:, stencil%node(2)) - scene%x(:, node) - u(:, node)) &

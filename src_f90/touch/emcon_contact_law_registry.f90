@@ -1,0 +1,54 @@
+!> The registry of laws of contact: what others see of it. Which kinds there are is known to
+!> `emcon_contact_law_kinds` alone.
+module emcon_contact_law_registry
+   use emcon_contact_law, only : contact_law_t, contact_laws_add, contact_laws_t
+   use emcon_interactions, only : surface_laws_t
+   implicit none
+   private
+   public :: contact_laws_of_surface, contact_law_of_method
+
+   interface
+      !> Number of kinds.
+      pure module integer function n_kind()
+      end function n_kind
+
+      !> A law of a kind, without what the deck says of it.
+      module subroutine allocate_law(kind, law)
+         integer, intent(in) :: kind             !! 1..n_kind()
+         class(contact_law_t), allocatable, intent(out) :: law
+      end subroutine allocate_law
+   end interface
+
+contains
+
+   !> The laws that act beside the rows of a pair whose surfaces are `surface`.
+   subroutine contact_laws_of_surface(surface, laws)
+      type(surface_laws_t), intent(in) :: surface
+      type(contact_laws_t), intent(out) :: laws
+      class(contact_law_t), allocatable :: law
+      logical :: acts
+      integer :: kind
+
+      do kind = 1, n_kind()
+         call allocate_law(kind, law)
+         call law%take(surface, 0, acts)
+         if (acts) call contact_laws_add(laws, law)
+      end do
+   end subroutine contact_laws_of_surface
+
+   !> The law that acts in place of the rows of gaps in steps of a method.
+   subroutine contact_law_of_method(method, law)
+      integer, intent(in) :: method              !! of `emcon_steps`
+      class(contact_law_t), allocatable, intent(out) :: law      !! not allocated: rows hold
+      logical :: acts
+      integer :: kind
+
+      do kind = 1, n_kind()
+         call allocate_law(kind, law)
+         call law%take(surface_laws_t(), method, acts)
+         if (acts) return
+      end do
+      deallocate(law)
+   end subroutine contact_law_of_method
+
+end module emcon_contact_law_registry

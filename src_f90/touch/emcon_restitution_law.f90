@@ -1,0 +1,46 @@
+!> Restitution below 1: of the rate with which a gap opens after an impact a part is kept.
+!> Source: docs/theory.md, eq. (22e).
+module emcon_restitution_law
+   use emcon_constraint, only : contact_response_t
+   use emcon_contact_law, only : contact_law_t, contact_values_t
+   use emcon_interactions, only : surface_laws_t
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: restitution_t
+
+   type, extends(contact_law_t) :: restitution_t
+      real(wp) :: part = 1.0_wp                  !! that is kept, 0 to 1
+   contains
+      procedure :: take
+      procedure :: respond
+      procedure :: rate_change
+   end type restitution_t
+
+contains
+
+   pure subroutine take(self, surface, method, acts)
+      class(restitution_t), intent(inout) :: self
+      type(surface_laws_t), intent(in) :: surface
+      integer, intent(in) :: method              !! of the step, or 0
+      logical, intent(out) :: acts               !! the deck asks for it
+
+      self%part = surface%restitution
+      acts = self%part < 1.0_wp
+   end subroutine take
+
+   !> Over a step there is no force.
+   pure subroutine respond(self, at, response)
+      class(restitution_t), intent(inout) :: self
+      type(contact_values_t), intent(in) :: at
+      type(contact_response_t), intent(inout) :: response
+   end subroutine respond
+
+   pure real(wp) function rate_change(self, rate)
+      class(restitution_t), intent(in) :: self
+      real(wp), intent(in) :: rate               !! [L/T]
+
+      rate_change = (self%part - 1.0_wp)*max(0.0_wp, rate)
+   end function rate_change
+
+end module emcon_restitution_law
