@@ -2,14 +2,14 @@
 !>
 !> Source: docs/theory.md, eqs. (12) to (14). Sign: gap > 0 is open.
 module emcon_nts_gap
-   use emcon_dgrad8, only : dg_above_negative, dg_chain, dg_cross, dg_dot, dg_negative_part, &
-      dg_sqrt, dg_t, difference, difference_t, operator(*), operator(+), operator(-), operator(/)
+   use emcon_dgrad8, only : cross_ends, dg_above_negative, dg_cross, dg_dot, dg_negative_part, &
+      dg_rounded_part, dg_sqrt, dg_t, difference, difference_t, dot_ends, ends, operator(*), &
+      operator(+), operator(-), operator(/)
    use emcon_kinds, only : wp
-   use emcon_nts_gap_value, only : first, flat, has_arc, last, slave
-   use emcon_rounded, only : rounded_chord, rounded_part, rounded_part_slope
+   use emcon_nts_gap_value, only : first, flat, last, right_angle, slave
    implicit none
    private
 
-   include "emcon_nts_gap.inc"
+   include "emcon_nts_gap_step.inc"
 
 end module emcon_nts_gap
