@@ -142,7 +142,7 @@ SURFACED = ("scene deck space solid surfaces touch contact terms system prepare 
 WORD = re.compile(r"\b(?:[a-z]\w*_)?(?:chain|corner|edge|arc|outline)s?(?:_\w+)?\b", re.I)
 # Corners of elements are there in space, too; those of an amplitude are instants.
 ELSEWHERE = re.compile(
-    r"\b(?:n_corner|amplitude_corners|\w*grid_corner_t|march_next_corner|step%corner)\b", re.I
+    r"\b(?:n_corner|amplitude_corners|\w*grid_corner_t|march_next_corner|step%time%corner)\b", re.I
 )
 
 

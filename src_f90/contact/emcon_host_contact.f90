@@ -55,7 +55,7 @@ contains
       end associate
       if (.not. self%max_penetration_at_start > 0.0_wp) self%max_penetration_at_start &
          = max_penetration_on_entry
-      self%restitution = pair%restitution
+      self%restitution = pair%interaction%restitution
    end subroutine host_contact_set_up
 
    !> Does each constraint have what belongs to it?

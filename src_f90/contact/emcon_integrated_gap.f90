@@ -107,11 +107,11 @@ contains
       n = size(self%node)
       self%n_constraint = n
       self%max_penetration_at_start = max_penetration_mean
-      self%offset = pair%offset
-      self%restitution = pair%restitution
-      self%friction = pair%friction
-      self%rebound = pair%rebound
-      self%damping = pair%damping
+      self%offset = pair%interaction%offset
+      self%restitution = pair%interaction%restitution
+      self%friction = pair%interaction%friction
+      self%rebound = pair%interaction%rebound
+      self%damping = pair%interaction%damping
       self%node_edge = self%slave%node_edge
       allocate(self%state(n), self%form(self%slave%n_edge), self%slide(n))
       allocate(self%is_formed(self%slave%n_edge), source=.false.)

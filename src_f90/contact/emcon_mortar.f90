@@ -71,7 +71,7 @@ contains
       call integrated_gap_init(self, scene, pair, error)
       if (allocated(error)) return
       call near_list_init(self%near, self%slave%edge, self%master%edge, scene%x, scene%u0, &
-         maxval(self%slave%length) + (self%offset + pair%damping%clearance))
+         maxval(self%slave%length) + (self%offset + pair%interaction%damping%clearance))
       self%max_gap_on_entry = maxval(self%slave%length)
       allocate(self%start(self%slave%n_edge + 1), source=1)
       allocate(self%pair(0))

@@ -80,10 +80,10 @@ contains
       self%slack = pair%slack
       if (pair%slack > 0.0_wp) call guard_slack_find(self%slave, scene%x, pair%slack, &
          self%own_slack)
-      self%restitution = pair%restitution
-      self%friction = pair%friction
-      if (.not. pair%slack > 0.0_wp) self%damping = pair%damping
-      self%rebound = pair%rebound
+      self%restitution = pair%interaction%restitution
+      self%friction = pair%interaction%friction
+      if (.not. pair%slack > 0.0_wp) self%damping = pair%interaction%damping
+      self%rebound = pair%interaction%rebound
    end subroutine nts_init
 
    pure subroutine nts_configure(self, x, options)

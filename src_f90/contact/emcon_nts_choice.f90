@@ -81,7 +81,7 @@ contains
       self%n_constraint = size(self%node)
       allocate(self%edge(self%n_constraint), self%other(self%n_constraint), source=0)
       allocate(self%polygon(2, self%n_constraint))
-      self%offset = pair%offset
+      self%offset = pair%interaction%offset
       self%both_sides = pair%both_sides
       self%own_size = [(chain_shortest(self%slave, self%chain_node(i)), i = 1, self%n_constraint)]
       call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)
@@ -89,7 +89,7 @@ contains
       associate (n => self%n_constraint/self%rule%n_class)
          self%near_item = [(1 + mod(i, n), i = 0, self%n_constraint - 1)]
          call near_list_init(self%near, reshape(self%node(:n), [1, n]), self%master%edge, &
-            scene%x, scene%u0, self%offset + pair%damping%clearance)
+            scene%x, scene%u0, self%offset + pair%interaction%damping%clearance)
       end associate
    end subroutine choice_init
 

@@ -112,7 +112,7 @@ contains
       integer :: i, k
 
       do i = 1, size(pair)
-         if (.not. pair(i)%damping%coefficient > 0.0_wp .or. pair(i)%is_reverse) cycle
+         if (.not. pair(i)%interaction%damping%coefficient > 0.0_wp .or. pair(i)%is_reverse) cycle
          do k = 1, size(step)
             if (.not. step(k)%scheme%masses_resist .or. step(k)%scheme%takes_damping) cycle
             call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
@@ -125,11 +125,13 @@ contains
             call warn(pair(i), "damps nothing: there is no dynamic step")
             cycle
          end if
-         if (any(step%initiation == initiation_massless .and. step%scheme%masses_resist)) call &
+         if (any(step%contact%initiation == initiation_massless &
+            .and. step%scheme%masses_resist)) call &
             warn(pair(i), "asks for mass: both surfaces keep theirs, and hold gaps as " // &
             "PERSISTENT does")
-         if (pair(i)%damping%clearance > 0.0_wp .or. pair(i)%damping%tangent > 0.0_wp) cycle
-         if (.not. any(step%constraint_method == method_penalty)) call warn(pair(i), &
+         if (pair(i)%interaction%damping%clearance > 0.0_wp &
+            .or. pair(i)%interaction%damping%tangent > 0.0_wp) cycle
+         if (.not. any(step%contact%method == method_penalty)) call warn(pair(i), &
             "damps nothing: what contact holds exactly does not move along its normal; give a " // &
             "clearance or a TANGENT FRACTION")
       end do

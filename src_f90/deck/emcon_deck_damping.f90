@@ -66,7 +66,7 @@ contains
             if (k > 0) call refuse("step " // to_text(k) // " has SCHEME=" // &
                trim(scene%step(k)%scheme%word) // ", which does not go with damped materials; " // &
                "use SCHEME=ENERGY MOMENTUM, MIDPOINT or ENERGY DECAYING")
-            k = findloc(scene%step%scheme%masses_resist .and. scene%step%initiation &
+            k = findloc(scene%step%scheme%masses_resist .and. scene%step%contact%initiation &
                == initiation_massless, .true., 1)
             if (k > 0) call refuse("step " // to_text(k) // " has *CONTACT INITIATION, " // &
                "TYPE=MASSLESS: what has no mass would be balanced without what damps it; use " // &

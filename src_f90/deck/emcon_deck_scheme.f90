@@ -72,14 +72,14 @@ contains
 
       do k = 1, size(step)
          if (.not. step(k)%scheme%masses_resist) cycle
-         associate (row => step(k)%scheme, initiation => step(k)%initiation)
+         associate (row => step(k)%scheme, initiation => step(k)%contact%initiation)
             if (initiation == initiation_massless .and. .not. row%takes_massless) call refuse( &
                "*CONTACT INITIATION, TYPE=MASSLESS, in step ", "nodes without mass")
             if (row%takes_jumps) cycle
             if (initiation == initiation_velocity_update) call refuse( &
                "*CONTACT INITIATION, TYPE=VELOCITY UPDATE, in step ", "velocities that jump")
-            if (any(pair%restitution < 1.0_wp)) call refuse("RESTITUTION below 1, in step ", &
-               "velocities that jump")
+            if (any(pair%interaction%restitution < 1.0_wp)) call refuse( &
+               "RESTITUTION below 1, in step ", "velocities that jump")
          end associate
       end do
 

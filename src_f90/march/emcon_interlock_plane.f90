@@ -85,7 +85,7 @@ contains
       type(surface_shape_t) :: slave, master
 
       turn = 0.0_wp
-      options = scene%step(march%state%clock%i_step)%contact
+      options = scene%step(march%state%clock%i_step)%contact%options
       if (scene%pair(pair)%has_options) options = scene%pair(pair)%options
       if (options%smoothing /= smoothing_none) return
       slave = surface_shape(scene, scene%surface(scene%pair(pair)%slave))

@@ -129,7 +129,7 @@ contains
          if (change(i) > deck_rounding*largest) call note_add(self%system%notes, "the " // name // &
             " at the start does not fit the ties and equations: dependent nodes follow the " // &
             "others, largest change " // to_text(change(i)) // " at node " // &
-            to_text(scene%node_label(i)))
+            to_text(scene%node%label(i)))
       end subroutine follow
 
    end subroutine follow_links
@@ -184,13 +184,13 @@ contains
          if (allocated(error)) return
          deadline = self%newton%deadline
          call newton_init(self%newton, self%system%space%numbering%n_unknown, &
-            scene%x, step%newton_tolerance, step%newton_maximum)
-         self%newton%convergence%polishes = step%polishes
+            scene%x, step%solution%newton_tolerance, step%solution%newton_maximum)
+         self%newton%convergence%polishes = step%solution%polishes
          self%newton%is_interrupted => self%is_interrupted
          self%newton%deadline = deadline
          call choose_solver(self, step)
          state%base = factor_base_t()
-         self%newton%factor_policy%is_wanted = step%newton == newton_kept
+         self%newton%factor_policy%is_wanted = step%solution%newton == newton_kept
          call begin_active(self%active, step, size(scene%rigid) > 0)
          if (.not. step%scheme%masses_resist) call contact_support_begin(self%active%support, &
             self%system, scene, state%u)
@@ -223,14 +223,14 @@ contains
       integer :: i
 
       do i = 1, size(self%system%contact)
-         options = scene%step(self%state%clock%i_step)%contact
+         options = scene%step(self%state%clock%i_step)%contact%options
          if (i <= size(scene%pair)) then
             if (scene%pair(i)%has_options) options = scene%pair(i)%options
          end if
          associate (contact => self%system%contact(i)%contact)
             call contact%suit_steps(any(.not. scene%step%scheme%masses_resist))
             call contact%configure(scene%x, options)
-            if (.not. scene%step(1)%resolves_overclosure) cycle
+            if (.not. scene%step(1)%contact%resolves_overclosure) cycle
             call overclosure_follow_arcs(contact, scene%x, scene%u0, options, change)
          end associate
          if (i > size(scene%pair) .or. .not. change > 0.0_wp .or. self%state%clock%i_step > 1) cycle
@@ -251,12 +251,12 @@ contains
       type(overlap_t) :: overlap
 
       call active_set_overclosure(self%active, self%system, scene%x, self%state%u_start, &
-         step%resolves_overclosure)
+         step%contact%resolves_overclosure)
       self%meant_overlap = 0.0_wp
-      call overlap_check_smooth(self%overlap_check, scene, step%contact)
+      call overlap_check_smooth(self%overlap_check, scene, step%contact%options)
       call overlap_check_excuse(self%overlap_check, scene%x, self%state%u_start, overlap)
       if (overlap%depth > touching_bar) call warn_of_overlap(self, scene, overlap)
-      if (.not. step%resolves_overclosure) return
+      if (.not. step%contact%resolves_overclosure) return
       call overlap_check_step(self%overlap_check, scene%x, self%state%u_start, &
          at_rest(self%state%u), overlap)
       self%meant_overlap = overlap%depth
@@ -269,7 +269,7 @@ contains
       type(overlap_t), intent(in) :: overlap
       character(len=:), allocatable :: text
 
-      call overlap_text(overlap, scene%node_label, self%system%space%body, text)
+      call overlap_text(overlap, scene%node%label, self%system%space%body, text)
       call note_add(self%warnings, overlap_at_start // ", by " // to_text(overlap%depth, 3) // &
          " of an edge, " // text // ": no contact pair brings the two together, and their " // &
          "overlap is not looked at further")
@@ -282,7 +282,8 @@ contains
       type(step_t), intent(in) :: step
 
       call march_count_grid(self, step)
-      if (self%grid%is_controlled .and. step%tolerance > 0.0_wp) call accuracy_begin(self, scene)
+      if (self%grid%is_controlled .and. step%time%tolerance > 0.0_wp) call accuracy_begin(self, &
+         scene)
       associate (state => self%state)
          if (.not. state%clock%is_off_grid) state%clock%step_time &
             = march_grid_time(self, step, state%clock%n_grid)
@@ -318,10 +319,11 @@ contains
       active%has_rigid = has_rigid
       active%masses_resist = step%scheme%masses_resist
       active%pushes_out = .not. active%masses_resist
-      active%holds_gap = any(step%initiation == [initiation_persistent, initiation_massless]) &
-         .and. active%masses_resist .and. step%constraint_method /= method_penalty
+      active%holds_gap = any(step%contact%initiation == [initiation_persistent, &
+         initiation_massless]) &
+         .and. active%masses_resist .and. step%contact%method /= method_penalty
       active%closes = .false.
-      active%gap_tolerance = step%gap_tolerance
+      active%gap_tolerance = step%contact%gap_tolerance
       active%support = contact_support_t()
    end subroutine begin_active
 
@@ -334,7 +336,8 @@ contains
       logical :: is_slave(size(scene%x, 2))
       integer :: i, n
 
-      if (step%initiation /= initiation_massless .or. .not. step%scheme%masses_resist) return
+      if (step%contact%initiation /= initiation_massless &
+         .or. .not. step%scheme%masses_resist) return
       call warn_of_mass(self, scene)
       if (self%layer%is_on) then
          call layer_mark(self%layer, self%system, self%active%closes)
@@ -381,11 +384,11 @@ contains
       integer :: i, method
 
       method = merge(method_null_space, method_saddle_point, self%system%space%is_reduced)
-      if (step%solver /= solver_given) then
-         call correction_reset(self%newton%correction, method, step%solver)
-         call velocity_update_reset(self%velocity_update, step%solver)
+      if (step%solution%solver /= solver_given) then
+         call correction_reset(self%newton%correction, method, step%solution%solver)
+         call velocity_update_reset(self%velocity_update, step%solution%solver)
       else
-         i = host_find_solver(self%solver, step%solver_name)
+         i = host_find_solver(self%solver, step%solution%solver_name)
          call correction_reset(self%newton%correction, method, solver_given + i, &
             self%solver(i)%solver)
          call velocity_update_reset(self%velocity_update, solver_given + i, self%solver(i)%solver)
@@ -399,9 +402,10 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       associate (step => scene%step(self%state%clock%i_step))
-         if (.not. step%scheme%masses_resist .or. .not. step%tolerance > 0.0_wp) return
+         if (.not. step%scheme%masses_resist .or. .not. step%time%tolerance > 0.0_wp) return
          if (self%scheme%error_constant() > 0.0_wp) return
-         call raise(error, err_input, where_text(scene, step%tolerance_origin) // ": error: " // &
+         call raise(error, err_input, where_text(scene, step%time%tolerance_origin) &
+            // ": error: " // &
             "TOLERANCE= needs a scheme that tells its error, and this one does not")
       end associate
    end subroutine check_tolerance

@@ -223,7 +223,8 @@ contains
 
       call phase_enter(self%system%phases, phase_restitution, left)
       call jumps_begin(self%jump)
-      if (self%scheme%row%masses_resist .and. scene%step(self%state%clock%i_step)%initiation &
+      if (self%scheme%row%masses_resist &
+         .and. scene%step(self%state%clock%i_step)%contact%initiation &
          == initiation_velocity_update) call restore_energy(self, notes, error)
       if (self%scheme%row%masses_resist .and. self%active%set%n > self%active%set%n_permanent &
          .and. .not. allocated(error)) call restitution_take(self, notes, error)

@@ -27,11 +27,11 @@ contains
       if (n == 0) return
       n = 0
       do i = 1, size(surface%element)
-         associate (e => surface%element(i), kind => scene%kind(scene%element_kind( &
+         associate (e => surface%element(i), kind => scene%element%kinds(scene%element%kind( &
                surface%element(i))))
             associate (new => face_edges(kind, surface%face(i)))
                do k = 1, size(new, 2)
-                  edge(:, n + k) = scene%element_node(new(:, k), e)
+                  edge(:, n + k) = scene%element%node(new(:, k), e)
                end do
             end associate
             n = n + n_face_edge(kind)
@@ -49,7 +49,7 @@ contains
       edges_before = 0
       do k = 1, i - 1
          edges_before = edges_before &
-            + n_face_edge(scene%kind(scene%element_kind(surface%element(k))))
+            + n_face_edge(scene%element%kinds(scene%element%kind(surface%element(k))))
       end do
    end function edges_before
 
@@ -63,7 +63,8 @@ contains
       allocate(face(edges_before(scene, surface, size(surface%element) + 1)))
       n = 0
       do i = 1, size(surface%element)
-         associate (more => n_face_edge(scene%kind(scene%element_kind(surface%element(i)))))
+         associate (more => &
+            n_face_edge(scene%element%kinds(scene%element%kind(surface%element(i)))))
             face(n + 1:n + more) = i
             n = n + more
          end associate

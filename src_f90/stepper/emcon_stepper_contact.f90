@@ -78,8 +78,9 @@ contains
          step => stepper%scene%step(self%march%state%clock%i_step))
          active%masses_resist = step%scheme%masses_resist
          active%pushes_out = .not. active%masses_resist
-         active%holds_gap = step%initiation == initiation_persistent .and. active%masses_resist
-         active%gap_tolerance = step%gap_tolerance
+         active%holds_gap = step%contact%initiation == initiation_persistent &
+            .and. active%masses_resist
+         active%gap_tolerance = step%contact%gap_tolerance
          active%may_cut = stepper%may_cut
          self%march%motion%evaluation = evaluation_t()
          if (.not. active%masses_resist) self%march%motion%evaluation = evaluation_at_end
@@ -174,7 +175,7 @@ contains
          if (pair == 0 .or. gap(id(k))%is_near) cycle
          associate (contact => self%march%system%contact(pair))
             call check_that(.false., "constraint " // to_text(id(k)) // " (slave node " // &
-               to_text(stepper%scene%node_label(contact%contact%node(i))) // " of pair " // &
+               to_text(stepper%scene%node%label(contact%contact%node(i))) // " of pair " // &
                to_text(abs(contact%of_pair)) // ") has no surface within reach", error)
          end associate
       end do

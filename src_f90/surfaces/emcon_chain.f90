@@ -109,7 +109,7 @@ contains
             if (self%node_edge(2, k) == 0) k = end_node
             call raise(error, err_input, where_text(scene, surface%origin) // ": surface " // &
                surface%name // " is not a chain: it branches at node " // &
-               to_text(scene%node_label(self%node(k))))
+               to_text(scene%node%label(self%node(k))))
             return
          end if
          self%node_edge(2, k) = i
@@ -214,7 +214,7 @@ contains
          do side = 1, 2
             associate (e => self%node_edge(side, i))
                if (e == 0) cycle
-               thickness(i) = scene%section(scene%element_section( &
+               thickness(i) = scene%section(scene%element%section( &
                   surface%element(face(e))))%thickness
             end associate
          end do

@@ -66,12 +66,12 @@ contains
          allocate(face(4, size(surface%element)))
          do i = 1, size(surface%element)
             associate (e => surface%element(i))
-               if (scene%kind(scene%element_kind(e))%n_face_node /= size(face, 1)) then
+               if (scene%element%kinds(scene%element%kind(e))%n_face_node /= size(face, 1)) then
                   allocate(error)
                   error%message = "faces have to have four nodes"
                   return
                end if
-               face(:, i) = scene%element_node(scene%kind(scene%element_kind(e)) &
+               face(:, i) = scene%element%node(scene%element%kinds(scene%element%kind(e)) &
                   %face(surface%face(i)), e)
             end associate
          end do

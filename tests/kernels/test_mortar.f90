@@ -696,8 +696,8 @@ contains
       integer :: last
 
       call add_block(scene, "CPE4", [1, 1], [real(column, wp), 0.0_wp], [1.0_wp, 1.0_wp], wall)
-      last = size(scene%element_kind)
-      scene%element_node(1:2, last) = [block_node(block, column, 1), block_node(block, column + 1, &
+      last = size(scene%element%kind)
+      scene%element%node(1:2, last) = [block_node(block, column, 1), block_node(block, column + 1, &
          1)]
    end subroutine add_wall
 
