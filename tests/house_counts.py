@@ -102,7 +102,7 @@ def silent_arguments(path):
 # ---- literals of the plane ----------------------------------------------------------------------
 
 #: Rooms where what is of three dimensions by nature ends in `_space`: a 2 there is a second of three.
-SOLID = {"elements", "laws", "solid"}
+SOLID = {"dgrad", "elements", "laws", "solid"}
 
 # A 2 here counts or names what it says itself: a dimension of an array, a pass, a power,
 # a constant of a law, a figure of a record.
