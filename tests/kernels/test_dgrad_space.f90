@@ -14,8 +14,8 @@ module test_dgrad_space
    !> Some 100 roundings of quantities of size 1.
    real(wp), parameter :: tol = 128.0_wp*eps
    integer, parameter :: n_leaf = 5
-   character(len=12), parameter :: name(n_leaf) = [character(len=12) :: "dot product", "area", "xi", &
-      "eta", "height"]
+   character(len=12), parameter :: name(n_leaf) = [character(len=12) :: "dot product", "area", &
+      "xi", "eta", "height"]
    !> A facet and a point over it: n = (0, 0, 1), |a x b| = 1.
    real(wp), parameter :: plain(3, 4) = reshape([0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, &
       0.0_wp, 1.0_wp, 0.0_wp, 0.25_wp, 0.5_wp, 0.75_wp], [3, 4])
