@@ -416,7 +416,6 @@ coverage: .venv/test.stamp  ## print the lines of each folder that the kernel te
 COUNT ?= 80
 mutants: .venv/test.stamp  ## change COUNT=80 lines of the numerics, one at a time: does a test notice?
 	$(BUILDING) MODE=release PRECISION=double lib app kernels pywrap
-	$(BUILDING) MODE=coverage PRECISION=double app kernels
 	@$(PY) tests/soak/mutants.py --count $(COUNT)
 
 docs: .venv/run.stamp build/site/tools/docs.stamp  ## the site, build/site/html/index.html: gallery, references, all pages

@@ -1,4 +1,4 @@
-"""What the house has too much of, counted per room: these counts may only fall.
+"""What the house has too much of, counted per room, or per flag: these counts may only fall.
 
 `house_counts.py` prints the counts of today beside those of tests/house_counts.json,
 `--list WHAT ROOM` the places, `--update` writes down what has fallen and refuses what has risen.
@@ -156,6 +156,47 @@ def planar_words(path):
             yield number, code
 
 
+# ---- flags that are asked in many files ---------------------------------------------------------
+
+#: Rooms whose logical components are data of a scene, a scheme or a state.
+FLAGGED = {"scene", "schemes", "state"}
+MOST_ASKING = 5
+#: What a statement sets: it is not asked.
+SET = re.compile(r"^(?:\w|%|\([^()]*\))*%\w+(?:\([^()]*\))?(?=\s*=[^=>])")
+
+
+def components(path):
+    """Names of the logical components of the types of a file."""
+    inside = False
+    for _, code, _ in statements(path):
+        low = code.lower()
+        if re.match(r"type\b(?!\s*\(|\s+is\b)", low):
+            inside = True
+        elif re.match(r"end\s*type\b|contains\b", low):
+            inside = False
+        elif inside and (match := re.match(r"logical\b.*?::(.*)", low)):
+            yield from re.findall(r"(\w+)(?:\([^()]*\))?\s*(?:=[^,]*)?(?:,|$)", match[1])
+
+
+def flags_asked(root):
+    """(flag, file, (line, statement)) of flags of `FLAGGED` that more than `MOST_ASKING` files name.
+
+    A flag is known by its name: where types of two rooms have one of a name, files of both count.
+    """
+    flags = {name for room, path in sources(root) if room in FLAGGED for name in components(path)}
+    asked = collections.defaultdict(dict)
+    for _, path in sources(root):
+        for number, code, _ in statements(path):
+            read = SET.sub("", code.lower())
+            for name in re.findall(r"%\s*(\w+)", read):
+                if name in flags:
+                    asked[name].setdefault(path, (number, code))
+    for name, found in sorted(asked.items()):
+        if len(found) > MOST_ASKING:
+            for path, finding in found.items():
+                yield name, path.relative_to(root), finding
+
+
 # ---- counts against the record ------------------------------------------------------------------
 
 
@@ -163,12 +204,16 @@ KINDS = {
     "silent arguments": (silent_arguments, TOLD),
     "planar literals": (planar_literals, None),
     "planar words": (planar_words, SURFACED),
+    "flags asked": (flags_asked, None),
 }
 
 
 def places(root, kind):
-    """(room, file, finding) of one kind."""
+    """(room, file, finding) of one kind; of flags their name is in place of the room."""
     find, rooms = KINDS[kind]
+    if find is flags_asked:
+        yield from flags_asked(root)
+        return
     for room, path in sources(root):
         if rooms is None or room in rooms:
             for finding in find(path):
@@ -184,7 +229,7 @@ def counts(root):
 
 
 def risen(found, record):
-    """Counts above the record, as lines; a room that the record does not know may have none.
+    """Counts above the record, as lines; a room, or a flag, that it does not know may have none.
 
     A kind that it does not know is a new one, whose counts `--update` writes down.
     """

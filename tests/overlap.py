@@ -96,6 +96,20 @@ def parts(a, b, c, d, alike):
 # ---- bodies -------------------------------------------------------------------------------------
 
 
+@dataclasses.dataclass(frozen=True)
+class Outline:
+    """Of a body: edges (n, 2) of its outline, their nodes with those before and after them, edges that
+    a node touches (n_node, n), edges that share one (n, n), and its cells by their number of nodes."""
+
+    edge: np.ndarray
+    node: np.ndarray
+    after: np.ndarray
+    before: np.ndarray
+    touches: np.ndarray
+    alike: np.ndarray
+    cells: list
+
+
 class Bodies:
     """The bodies of a mesh: cells (0-based nodes, counter-clockwise) and outlines of each."""
 
@@ -107,6 +121,7 @@ class Bodies:
         self.edge = np.array([face for face in faces if face not in twice])
         body = self._together()
         self.n = 1 + max(body.values())
+        self._outline = {}
         self.body_of_edge = np.array([body[i] for i in self.edge[:, 0]])
         self.body_of_cell = np.array([body[int(cell[0])] for cell in self.cells])
 
@@ -127,7 +142,27 @@ class Bodies:
         return {i: numbers[top(i)] for i in above}
 
     def edges(self, body):
-        return self.edge[self.body_of_edge == body]
+        return self.outline(body).edge
+
+    def outline(self, body):
+        """What of a body does not change with the places of its nodes."""
+        if body not in self._outline:
+            self._outline[body] = self._made(body)
+        return self._outline[body]
+
+    def _made(self, body):
+        edge = self.edge[self.body_of_edge == body]
+        into = {node: k for k, node in enumerate(edge[:, 1])}
+        out_of = {node: k for k, node in enumerate(edge[:, 0])}
+        node = np.unique(edge)
+        cells = [cell for cell, of in zip(self.cells, self.body_of_cell, strict=True) if of == body]
+        sizes = dict.fromkeys(map(len, cells))
+        return Outline(
+            edge, node,
+            after=edge[[out_of[n] for n in node], 1], before=edge[[into[n] for n in node], 0],
+            touches=(edge[None] == node[:, None, None]).any(-1),
+            alike=(edge[:, None, :, None] == edge[None, :, None, :]).any((-1, -2)),
+            cells=[np.array([cell for cell in cells if len(cell) == n]) for n in sizes])
 
     def overlap(self, x, time=0.0, alone=()):
         """The deepest overlap of the configuration `x` (n_node, 2).
@@ -148,31 +183,25 @@ class Bodies:
 
     def _inside(self, x, i, j, box):
         """The deepest of the points of body i that are inside body j."""
-        edge, own = self.edges(j), self.edges(i)
+        edge, inner = self.edges(j), self.outline(i)
+        own = inner.edge
         near = ((x[own].max(1) >= box[0]) & (x[own].min(1) <= box[1])).all(1)
         middles, _ = parts(*x[own[near].T], *x[edge.T], False)
-        centres = [x[cell].mean(0) for cell in
-                   itertools.compress(self.cells, self.body_of_cell == i)]
-        p = np.vstack([x[np.unique(own)], middles, centres])
+        p = np.vstack([x[inner.node], middles, *(x[cells].mean(1) for cells in inner.cells)])
         p = p[((p >= box[0]) & (p <= box[1])).all(1)]
         p = p[layers(p, *x[edge.T]) > 0]
         return deepest(p, x[edge], to_edges(p, *x[edge.T]), (i, j))
 
     def _with_itself(self, x, i):
         """The deepest point of the outline of body i in another part of the body."""
-        edge = self.edges(i)
-        into = {node: k for k, node in enumerate(edge[:, 1])}
-        out_of = {node: k for k, node in enumerate(edge[:, 0])}
-        node = np.unique(edge)
-        after = x[edge[[out_of[n] for n in node], 1]] - x[node]
-        before = x[edge[[into[n] for n in node], 0]] - x[node]
+        own = self.outline(i)
+        edge, node = own.edge, own.node
+        after, before = x[own.after] - x[node], x[own.before] - x[node]
         inside = np.arctan2(cross(after, before), (after*before).sum(-1)) % (2*np.pi)
-        touches = (edge[None] == node[:, None, None]).any(-1)
-        alike = (edge[:, None, :, None] == edge[None, :, None, :]).any((-1, -2))
-        middles, k = parts(*x[edge.T], *x[edge.T], alike)
+        middles, k = parts(*x[edge.T], *x[edge.T], own.alike)
         p = np.vstack([x[node], middles])
         inside = np.append(inside, np.full(len(middles), np.pi))
-        touches = np.vstack([touches, k[:, None] == np.arange(len(edge))])
+        touches = np.vstack([own.touches, k[:, None] == np.arange(len(edge))])
         deep = more_layers(p, *x[edge.T], inside, touches) > 0
         away = np.where(touches[deep], np.inf, to_edges(p[deep], *x[edge.T]))
         return deepest(p[deep], x[edge], away, (i, i))

@@ -322,6 +322,17 @@ def made(scene, folder, *options):
     return deck
 
 
+def coarse_ring():
+    """The ring scene on less than half of its elements, beneath the same surfaces: for tests of contact
+    and of steps, whose cost is that of the elements."""
+    return Deck(generated("make_ring", "--ring", "64x2", "--block", "60x2"), "ring")
+
+
+def coarse_spinning_ring():
+    """The ring in free flight, on less than half of its elements."""
+    return Deck(generated("make_spinning_ring", "--ring", "32x2"), "spinning_ring")
+
+
 def heading(deck):
     """The opening lines of a deck file, up to its first keyword after *HEADING, as running text."""
     lines = []

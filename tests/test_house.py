@@ -34,12 +34,14 @@ REGISTRY = {
     "shape_t": {"emcon_element_kinds"},
     "scheme_t": {"emcon_scheme_kinds"},
     "contact_t": {"emcon_contact_kinds"},
+    "start_gaps_t": {"emcon_contact_kinds"},
+    "overlap_query_t": {"emcon_overlap_query_kinds"},
     "term_t": {"emcon_term_kinds"},
     "constraint_t": {"emcon_constraint_kinds"},
     "host_force_t": {"emcon_stepper_given", "emcon_c_given"},
 }
 #: What is made of another kind of its room: gaps of nodes, interpolated or looked at.
-MADE_OF = {("emcon_segment", "emcon_nts"), ("emcon_start_gaps", "emcon_nts")}
+MADE_OF = {("emcon_segment", "emcon_nts"), ("emcon_start_gaps_plane", "emcon_nts")}
 
 COLUMNS = 100
 #: A procedure fits a screen, and its arguments a line; but what C hands over one by one.
@@ -47,7 +49,7 @@ MOST_LINES, MOST_ARGUMENTS = 60, 7
 FROM_C = {"stepper", "border"}
 #: A type is taken in at a glance; these hold more than one subject and are still to be split.
 MOST_COMPONENTS = 20
-STILL_BIG = {"active_set_t", "march_t", "contact_t", "constraint_set_t"}
+STILL_BIG = {"active_set_t", "contact_t", "constraint_set_t"}
 
 STRING = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'")
 COMMENT = re.compile(r"!.*")
@@ -577,6 +579,17 @@ def test_what_is_counted(tmp_path):
     assert list(house_counts.risen(counts, counts)) == []
     counts["planar literals"]["solid"] -= 1
     assert len(list(house_counts.risen(house_counts.counts(tmp_path), counts))) == 1
+
+
+def test_flags_asked_in_many_files_are_counted(tmp_path):
+    """By the name of the component: not where it is set, nor up to five files."""
+    scene = ("module emcon_a\n   type :: a_t\n      logical :: is_on = .true., has(2), &\n"
+             "         is_off\n   end type a_t\nend module\n")
+    asks = "module emcon_{0}\n   if (a%is_on) b%c = a%is_off\n   a%has(1) = .true.\nend module\n"
+    files = {f"march/emcon_{name}.f90": asks.format(name) for name in "bcdefg"}
+    files["march/emcon_g.f90"] = files["march/emcon_g.f90"].replace("a%is_off", "a%has(2)")
+    build(tmp_path, {"scene/emcon_a.f90": scene, **files})
+    assert house_counts.counts(tmp_path)["flags asked"] == {"is_on": 6}
 
 
 @pytest.mark.parametrize("in_git", [False, True])

@@ -20,13 +20,18 @@ _N_TEXT = 1024
 
 @dataclass(frozen=True)
 class Option:
-    """A value of an option: its word in decks, its name in the C headers, what the log says."""
+    """A value of an option: its word in decks, its name in the C headers, what the log says.
+
+    `models` are those that may have it, of "plane", "axial" and "space"; others use `instead`.
+    """
 
     word: str
     code: int
     is_default: bool
     c_name: str
     text: str
+    models: tuple[str, ...]
+    instead: str
 
 
 @dataclass(frozen=True)
@@ -74,8 +79,9 @@ def _rows(function: Callable[..., Any]) -> Iterator[tuple[list[int], list[str]]]
 
 def _options() -> dict[str, tuple[Option, ...]]:
     found: dict[str, tuple[Option, ...]] = {}
-    for (code, is_default), (kind, word, c_name, text) in _rows(_core.emcon_get_option):
-        row = Option(word, code, bool(is_default), c_name, text)
+    for (code, is_default), (kind, word, c_name, text, models, instead) in _rows(
+            _core.emcon_get_option):
+        row = Option(word, code, bool(is_default), c_name, text, tuple(models.split()), instead)
         found[kind] = (*found.get(kind, ()), row)
     return found
 

@@ -15,12 +15,14 @@ module emcon_active_set
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_softness, only : softness_owes, softness_select, softness_state_t
    use emcon_state, only : state_t
+   use emcon_steps, only : step_is_dynamic, step_t
    use emcon_system, only : system_t
    implicit none
    private
-   public :: active_set_t, active_set_init, active_set_overclosure, active_set_begin, &
-      active_set_restart, active_set_select, active_set_update_gaps, active_set_pass
-   public :: active_set_let_go, active_set_put_off, active_set_drop, touch_tol, most_sets
+   public :: active_set_t, active_set_init, active_set_suit, active_set_overclosure, &
+      active_set_begin, active_set_restart, active_set_select, active_set_update_gaps
+   public :: active_set_pass, active_set_let_go, active_set_put_off, active_set_drop
+   public :: touch_tol, most_sets
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
       step_stands_off, step_not_held, step_overlaps, step_unbalanced, step_rough, step_strikes, &
       step_passes_event, step_loose
@@ -48,7 +50,7 @@ module emcon_active_set
    type :: active_set_t
       logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start,
       logical, allocatable :: closes(:)          !! (n_constraint) but here: its node has no mass
-      logical :: masses_resist = .true.          !! nothing arrives at once
+      logical :: has_impacts = .true.            !! what closes arrives with a velocity
       logical :: pushes_out = .false.            !! also what is closed too far, which makes energy
       logical :: puts_off = .false.              !! what follows from others nearly waits
       logical :: has_rigid = .false.             !! bodies that few contacts hold: what follows from
@@ -92,6 +94,16 @@ module emcon_active_set
    end type active_set_t
 
 contains
+
+   !> What `step` of the deck asks of contact, but for the gaps that it holds.
+   pure subroutine active_set_suit(self, step)
+      type(active_set_t), intent(inout) :: self
+      type(step_t), intent(in) :: step
+
+      self%has_impacts = step_is_dynamic(step)
+      self%pushes_out = .not. self%has_impacts
+      self%gap_tolerance = step%contact%gap_tolerance
+   end subroutine active_set_suit
 
    !> Set up for the constraints of `system`.
    subroutine active_set_init(self, system)
@@ -315,7 +327,7 @@ contains
       end do
       self%set%n_permanent = count(self%set%id(:self%set%n) <= system%first_constraint(1))
       call friction_select(self%friction, self%set, self%n_tried)
-      call softness_select(self%softness, system, self%set, self%masses_resist .and. &
+      call softness_select(self%softness, system, self%set, self%has_impacts .and. &
          .not. motion%evaluation%pushes_at_end)
 
    contains

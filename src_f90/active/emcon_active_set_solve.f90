@@ -58,7 +58,7 @@ contains
          status = step_not_held
          if (allocated(self%support%text)) return
          self%before = motion%du
-         newton%looks_early = (self%masses_resist .or. self%friction%is_on) .and. .not. &
+         newton%looks_early = (self%has_impacts .or. self%friction%is_on) .and. .not. &
             (self%only_adds .or. self%support%is_needed) .and. self%n_early < most_early
          call solve(self, system, newton, motion, status, error)
          if (allocated(error)) return
@@ -177,7 +177,7 @@ contains
       logical, intent(out) :: is_done
       integer :: pair, n_newton
 
-      is_done = self%masses_resist
+      is_done = self%has_impacts
       if (is_done) return
       is_done = .true.
       do pair = 1, size(system%contact)

@@ -294,7 +294,7 @@ contains
       integer, intent(in) :: node                !! of the scene
 
       noise = force_noise*sum(system%response%magnitude(:, node))
-      if (.not. self%masses_resist) noise = noise + force_noise &
+      if (.not. self%has_impacts) noise = noise + force_noise &
          *sum(system%response%rounding(:, node))
    end function noise_at
 
@@ -338,9 +338,9 @@ contains
          else if (gap%is_arriving .and. contact%gives_way) then
             closes = gap%gap1 < allowed(1) &
                .and. gap%gap1 > -contact%max_penetration_at_start*gap%size
-         else if (gap%is_arriving .and. self%masses_resist .and. .not. may_arrive(gap)) then
+         else if (gap%is_arriving .and. self%has_impacts .and. .not. may_arrive(gap)) then
             return
-         else if (gap%is_arriving .and. self%masses_resist .and. self%may_cut) then
+         else if (gap%is_arriving .and. self%has_impacts .and. self%may_cut) then
             status = step_too_far
          else if (self%was_active(id) .or. .not. gap%gap0 - allowed(0) &
             < -contact%max_penetration_at_start*gap%size) then
@@ -370,7 +370,7 @@ contains
 
       associate (gap => contact%state(i))
          begins_unseen = .not. contact%covers(i, motion%x, motion%u0, motion%du) .or. &
-            (self%masses_resist .and. gap%gap0 > contact%max_gap_on_entry)
+            (self%has_impacts .and. gap%gap0 > contact%max_gap_on_entry)
       end associate
    end function begins_unseen
 

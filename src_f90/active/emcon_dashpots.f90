@@ -6,7 +6,7 @@ module emcon_dashpots
    use emcon_dashpot_law, only : dashpot_t
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_steps, only : step_t
+   use emcon_steps, only : step_is_dynamic, step_t
    use emcon_system, only : system_t
    implicit none
    private
@@ -37,7 +37,7 @@ contains
       do k = 1, size(system%contact)
          self%is_on = self%is_on .or. system%contact(k)%contact%damping%coefficient > 0.0_wp
       end do
-      self%is_on = self%is_on .and. step%scheme%masses_resist
+      self%is_on = self%is_on .and. step_is_dynamic(step)
       if (.not. self%is_on) return
       allocate(self%area(system%n_constraint), source=0.0_wp)
       allocate(self%is_near(system%n_constraint), source=.false.)

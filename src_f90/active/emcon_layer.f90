@@ -146,7 +146,7 @@ contains
       end do
       call layer_mark(self, self%system, self%active%closes)
       self%active%holds_gap = .true.
-      self%active%masses_resist = .false.
+      self%active%has_impacts = .false.
       self%active%may_cut = .false.
    end subroutine layer_begin_step
 

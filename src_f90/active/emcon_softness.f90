@@ -7,7 +7,7 @@ module emcon_softness
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t, where_text
    use emcon_soft_law, only : augmented_t, penalty_t
-   use emcon_steps, only : method_augmented_lagrange, method_penalty, step_t
+   use emcon_steps, only : method_augmented_lagrange, method_penalty, step_is_dynamic, step_t
    use emcon_system, only : system_t
    use emcon_term_registry, only : terms_mass_rows
    use emcon_text, only : note_add, to_text
@@ -73,7 +73,7 @@ contains
          call system%term(k)%term%add_stiffness(inner)
       end do
       mass = 0.0_wp
-      if (self%augments .and. step%scheme%masses_resist) call terms_mass_rows(system%term, &
+      if (self%augments .and. step_is_dynamic(step)) call terms_mass_rows(system%term, &
          mass)
       inner = inner + 2.0_wp*mass/step%time%h**2
       do k = 1, size(system%contact)
@@ -117,7 +117,7 @@ contains
                // "pair: give its STIFFNESS, pressure by penetration")
             return
          end if
-         contact%gives_way = .not. self%augments .and. step%scheme%masses_resist
+         contact%gives_way = .not. self%augments .and. step_is_dynamic(step)
          self%area(before + 1:before + size(area)) = area*merge(0.5_wp, 1.0_wp, &
             contact%both_sides)
          self%stiffness(before + 1:before + size(area)) = area*merge(0.5_wp, 1.0_wp, &

@@ -631,8 +631,9 @@ int emcon_overlap(emcon_model *model, int n_node, const double *u0 /* n_node x n
 
 /* Value number `i`, from 0, of all options of decks that are one of a few words: its code, whether
  * it is taken where a deck says nothing, and in `text` the option, the word in decks, the name in
- * these headers and what the log says, with line ends between these four; the last two may be
- * empty. EMCON_ERROR_INPUT behind the last value, and if there is too little room, or NULL. */
+ * these headers, what the log says, the models that may have it (of "plane axial space") and what
+ * others use, with line ends between these six; all but the first two and the models may be empty.
+ * EMCON_ERROR_INPUT behind the last value, and if there is too little room, or NULL. */
 int emcon_get_option(int i, int *code, int *is_default, int n_text, char *text /* n_text */);
 
 /* Law number `i`, from 0: its code, and in `text` its name, its keyword and parameter in decks, and

@@ -24,6 +24,7 @@ contains
       character(len=:), allocatable, intent(out) :: text
       type(error_t), allocatable, intent(out) :: error
       type(option_row_t) :: row
+      character(len=:), allocatable :: models
 
       if (i < 1 .or. i > n_option_row()) then
          call raise(error, err_input, "there is no such option")
@@ -32,8 +33,11 @@ contains
       row = option_row(i)
       code = row%code
       is_default = row%code == option_default(trim(row%kind))
+      models = "plane"
+      if (row%is_axial) models = models // " axial"
+      if (row%n_dim == 0) models = models // " space"
       text = trim(row%kind) // line_end // trim(row%word) // line_end // trim(row%c_name) // &
-         line_end // trim(row%text)
+         line_end // trim(row%text) // line_end // models // line_end // trim(row%instead)
    end subroutine model_option
 
    subroutine model_law(i, code, text, error)

@@ -8,6 +8,7 @@ submodule (emcon_contact_registry) emcon_contact_kinds
    use emcon_nts, only : nts_init, nts_t
    use emcon_scene, only : where_text
    use emcon_segment, only : segment_init, segment_t
+   use emcon_start_gaps_plane, only : start_gaps_plane_init, start_gaps_plane_t
    implicit none
 
 contains
@@ -37,6 +38,14 @@ contains
       if (allocated(error)) return
       call midside_init(contact%midside, scene, [pair%slave, pair%master])
    end procedure new_contact
+
+   module procedure new_start_gaps
+      type(start_gaps_plane_t), allocatable :: plane
+
+      allocate(plane)
+      call start_gaps_plane_init(plane, scene, pair, error, options)
+      call move_alloc(plane, gaps)
+   end procedure new_start_gaps
 
    !> The contact that a program gives for a pair.
    subroutine new_given(scene, pair, contact, error, user)

@@ -5,7 +5,7 @@
 !> into its arc. Corners that are no vertices of a curve stay as they are, since bodies pass close
 !> by them. Source: docs/theory.md, section 4.2, eq. (14s).
 module emcon_corner_tops_plane
-   use emcon_chain, only : chain_shorter, chain_t
+   use emcon_chain_plane, only : chain_shorter, chain_t
    use emcon_kinds, only : wp
    use emcon_nts_stencil, only : polygon_stencil_t
    implicit none
@@ -54,13 +54,13 @@ contains
       if (any(chain%node_edge(:, k) == 0)) return
       do side = 1, 2
          master(:, side) = along(x, corner(side:side + 1))
-         slave(:, side) = along(x, chain%edge(:, chain%node_edge(side, k)))
+         slave(:, side) = along(x, chain%facet(:, chain%node_edge(side, k)))
       end do
       turn = [angle(master(:, 1), master(:, 2)), angle(slave(:, 1), slave(:, 2))]
       if (minval(turn) <= flat .or. maxval(turn) > corner_turn) return
       do side = 1, 2
          master(:, side) = master(:, side) + along(u, corner(side:side + 1))
-         slave(:, side) = -(slave(:, side) + along(u, chain%edge(:, chain%node_edge(side, k))))
+         slave(:, side) = -(slave(:, side) + along(u, chain%facet(:, chain%node_edge(side, k))))
       end do
       turn = [angle(master(:, 1), master(:, 2)), angle(slave(:, 1), slave(:, 2))]
       if (.not. minval(turn) > 0.0_wp) return

@@ -4,7 +4,7 @@
 !> smooth sides are left to these. Where contact gives way corners go in as all other nodes do.
 !> Source: docs/theory.md, section 4.11.
 module emcon_guard_slack_plane
-   use emcon_chain, only : chain_t
+   use emcon_chain_plane, only : chain_t
    use emcon_guards, only : corner_slack
    use emcon_kinds, only : wp
    implicit none
@@ -40,8 +40,8 @@ contains
 
       turn_at = acos(-1.0_wp)
       if (any(chain%node_edge(:, k) == 0)) return
-      associate (before => chain%edge(:, chain%node_edge(1, k)), &
-            here => chain%edge(:, chain%node_edge(2, k)))
+      associate (before => chain%facet(:, chain%node_edge(1, k)), &
+            here => chain%facet(:, chain%node_edge(2, k)))
          a = x(:, before(2)) - x(:, before(1))
          b = x(:, here(2)) - x(:, here(1))
       end associate

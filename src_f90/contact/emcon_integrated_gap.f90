@@ -4,7 +4,7 @@
 !> basis of A, as a mean over the covered part. A formulation gives the integrals of each slave
 !> edge. Source: docs/theory.md, eq. (15).
 module emcon_integrated_gap
-   use emcon_chain, only : chain_init, chain_t, chain_thickness
+   use emcon_chain_plane, only : chain_init, chain_t, chain_thickness
    use emcon_condition_nodes, only : condition_include, condition_resize_slip
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, max_penetration_on_entry
@@ -14,7 +14,7 @@ module emcon_integrated_gap
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_seams, only : chain_join
+   use emcon_seams_plane, only : chain_join
    use emcon_slip_point, only : slip_add, slip_list_t, slip_over, slip_point_t, slip_share
    implicit none
    private
@@ -113,16 +113,16 @@ contains
       self%rebound = pair%interaction%rebound
       self%damping = pair%interaction%damping
       self%node_edge = self%slave%node_edge
-      allocate(self%state(n), self%form(self%slave%n_edge), self%slide(n))
-      allocate(self%is_formed(self%slave%n_edge), source=.false.)
-      call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)
+      allocate(self%state(n), self%form(self%slave%n_facet), self%slide(n))
+      allocate(self%is_formed(self%slave%n_facet), source=.false.)
+      call chain_thickness(self%slave, scene, self%thickness)
       allocate(self%whole(n), self%scale(n), self%cover(n), self%sagitta(n), self%own_slip(n), &
          source=0.0_wp)
       do i = 1, n
          do k = 1, 2
             associate (e => self%node_edge(k, i))
                if (e == 0) cycle
-               self%whole(i) = self%whole(i) + 0.5_wp*self%slave%length(e)
+               self%whole(i) = self%whole(i) + 0.5_wp*self%slave%size(e)
             end associate
          end do
          self%state(i)%size = self%whole(i)

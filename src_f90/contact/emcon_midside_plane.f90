@@ -13,7 +13,7 @@ module emcon_midside_plane
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
    use emcon_sort, only : find_sorted, unique_sorted
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_facets, only : surface_facets
    implicit none
    private
    public :: midside_t, midside_init, midside_points, midside_distribute, midside_stretch
@@ -69,7 +69,7 @@ contains
       integer, allocatable, intent(inout) :: node(:)
       integer, allocatable :: edge(:, :)
 
-      call surface_edges(scene, surface, edge)
+      call surface_facets(scene, surface, edge)
       node = [node, reshape(edge, [size(edge)])]
       if (surface%is_nodal) node = [node, surface%node]
    end subroutine take_nodes

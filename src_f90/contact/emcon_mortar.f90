@@ -5,7 +5,7 @@
 !> paper eqs. (2) and (3).
 module emcon_mortar
    use emcon_arcs_plane, only : arc_rise, arcs_find
-   use emcon_chain, only : chain_corners, chain_distance, chain_shorter
+   use emcon_chain_plane, only : chain_corners, chain_distance, chain_shorter
    use emcon_edge_moments, only : form_begin
    use emcon_errors, only : error_t
    use emcon_gauss, only : gauss_points
@@ -70,10 +70,10 @@ contains
 
       call integrated_gap_init(self, scene, pair, error)
       if (allocated(error)) return
-      call near_list_init(self%near, self%slave%edge, self%master%edge, scene%x, scene%u0, &
-         maxval(self%slave%length) + (self%offset + pair%interaction%damping%clearance))
-      self%max_gap_on_entry = maxval(self%slave%length)
-      allocate(self%start(self%slave%n_edge + 1), source=1)
+      call near_list_init(self%near, self%slave%facet, self%master%facet, scene%x, scene%u0, &
+         maxval(self%slave%size) + (self%offset + pair%interaction%damping%clearance))
+      self%max_gap_on_entry = maxval(self%slave%size)
+      allocate(self%start(self%slave%n_facet + 1), source=1)
       allocate(self%pair(0))
       call self%configure(scene%x, self%options)
    end subroutine mortar_init
@@ -86,8 +86,8 @@ contains
 
       self%options = options
       self%is_dual = options%multiplier == multiplier_dual
-      if (.not. allocated(self%slave_corner)) allocate(self%slave_corner(self%slave%n_edge), &
-         self%master_corner(self%master%n_edge))
+      if (.not. allocated(self%slave_corner)) allocate(self%slave_corner(self%slave%n_facet), &
+         self%master_corner(self%master%n_facet))
       call chain_corners(self%slave, x, options%normal_angle, self%slave_corner)
       call chain_corners(self%master, x, options%smoothing_angle, self%master_corner)
       n = segment_points
@@ -97,7 +97,7 @@ contains
       if (allocated(self%point)) deallocate(self%point, self%weight, self%seen)
       allocate(self%point(n), self%weight(n))
       call gauss_points(self%point, self%weight)
-      allocate(self%seen(2, n, self%slave%n_edge), source=0)
+      allocate(self%seen(2, n, self%slave%n_facet), source=0)
    end subroutine mortar_configure
 
    !> A smoothed master has its own curve in place of arcs.
@@ -110,8 +110,8 @@ contains
       self%sagitta = 0.0_wp
       if (allocated(self%slave_curvature)) deallocate(self%slave_curvature, self%master_curvature)
       if (.not. is_wanted) return
-      allocate(self%slave_curvature(self%slave%n_edge))
-      allocate(self%master_curvature(self%master%n_edge), source=0.0_wp)
+      allocate(self%slave_curvature(self%slave%n_facet))
+      allocate(self%master_curvature(self%master%n_facet), source=0.0_wp)
       call arcs_find(self%slave, x, options%normal_angle, self%slave_curvature)
       if (options%smoothing == smoothing_hermite) return
       call arcs_find(self%master, x, options%smoothing_angle, self%master_curvature)
@@ -126,7 +126,7 @@ contains
       call near_list_update(self%near, x, u0, du, self%reach)
       call self%has_looked(self%near%clearance)
       n = 0
-      do e = 1, self%slave%n_edge
+      do e = 1, self%slave%n_facet
          self%start(e) = n + 1
          call choose_pairs(self, e, x, u0, du, n)
          if (self%options%integration == integration_elements) call pairs_seen( &
@@ -145,7 +145,7 @@ contains
       real(wp), dimension(size(x, 1), n_place) :: local, dlocal
       integer :: e, k, i
 
-      do e = 1, self%slave%n_edge
+      do e = 1, self%slave%n_facet
          associate (value => self%form(e)%value)
             value = 0.0_wp
             do k = self%start(e), self%start(e + 1) - 1
@@ -182,8 +182,8 @@ contains
          call frame_point(frame, self%pair(k), xi, eta, gap)
          call frame_lean(frame, xi, lean, master_lean)
          associate (m => self%pair(k)%edge)
-            rise = arc_rise(self%slave_curvature(e), self%slave%length(e), xi, lean) &
-               + arc_rise(self%master_curvature(m), self%master%length(m), eta, master_lean)
+            rise = arc_rise(self%slave_curvature(e), self%slave%size(e), xi, lean) &
+               + arc_rise(self%master_curvature(m), self%master%size(m), eta, master_lean)
          end associate
          moment = moment + part*frame%length*[rise, rise*xi, 1.0_wp, xi, 1.0_wp/frame%length]
       end do
@@ -245,7 +245,7 @@ contains
       do i = 1, n
          part = merge(1.0_wp - xi(i), xi(i), side == 1) &
             + merge(1.0_wp, -1.0_wp, side == 1)*theta*(1.0_wp - 2.0_wp*xi(i))
-         list(i)%weight = self%slave%length(e)*list(i)%weight*part
+         list(i)%weight = self%slave%size(e)*list(i)%weight*part
       end do
       point = list(:n)
    end function edge_slips
@@ -293,16 +293,16 @@ contains
          is_wide = options%integration == integration_elements
          if (list%start(e + 1) > list%start(e)) call stencil_slave(stencil, self%slave, e, &
             options%normal == normal_nodal, self%slave_corner)
-         call place_edge(self%slave%edge(:, e), self%slave%edge(1, e), 0, corner, motion)
+         call place_edge(self%slave%facet(:, e), self%slave%facet(1, e), 0, corner, motion)
          do k = list%start(e), list%start(e + 1) - 1
-            m = list%edge(k)
+            m = list%facet(k)
             if (self%is_self) then
                if (self%slave%place(m) < self%slave%place(e) &
                   .or. chain_distance(self%slave, e, m) < 2) cycle
             end if
-            call place_edge(self%master%edge(:, m), self%slave%edge(1, e), &
-               size(self%slave%edge, 1), corner, motion)
-            if (.not. pair_comes_near(self%slave%length(e) + self%damping%clearance, corner, &
+            call place_edge(self%master%facet(:, m), self%slave%facet(1, e), &
+               size(self%slave%facet, 1), corner, motion)
+            if (.not. pair_comes_near(self%slave%size(e) + self%damping%clearance, corner, &
                motion)) cycle
             call stencil_master(stencil, self%master, m, options%smoothing == smoothing_hermite, &
                is_wide, self%master_corner)
@@ -345,7 +345,7 @@ contains
       real(wp) :: part(n_moment, 0:1)
       integer :: e, k, i
 
-      do e = 1, self%slave%n_edge
+      do e = 1, self%slave%n_facet
          self%form(e)%ahead = 0.0_wp
          associate (value => self%form(e)%value, ahead => self%form(e)%ahead)
             value = 0.0_wp
@@ -439,7 +439,7 @@ contains
       integer, intent(in) :: e
       integer :: list(n_place*(self%start(e + 1) - self%start(e)) + 2), n, n_slave, k
 
-      list(:2) = self%slave%edge(:, e)
+      list(:2) = self%slave%facet(:, e)
       n = 2
       do k = self%start(e), self%start(e + 1) - 1
          call collect(self%pair(k)%node([place_before, place_after]), list, n)

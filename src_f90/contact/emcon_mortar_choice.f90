@@ -2,7 +2,7 @@
 !>
 !> Source: docs/theory.md, section 4.5, choice of pairs.
 module emcon_mortar_choice
-   use emcon_chain, only : chain_is_seam, chain_t
+   use emcon_chain_plane, only : chain_is_seam, chain_t, next, previous
    use emcon_kinds, only : dp, wp
    use emcon_mortar_frame, only : frame_hit, frame_init, frame_project, frame_t, n_place, &
       pair_stencil_t, local_master
@@ -236,12 +236,12 @@ contains
       integer :: side
 
       width = 0.0_wp
-      associate (beside => [master%previous(e), master%next(e)])
+      associate (beside => [master%neighbour(previous, e), master%neighbour(next, e)])
          do side = 1, 2
             if (beside(side) == 0) cycle
-            associate (a => master%edge(side, e), b => master%edge(3 - side, beside(side)))
+            associate (a => master%facet(side, e), b => master%facet(3 - side, beside(side)))
                if (a /= b) width(side) = norm2((x(:, b) - x(:, a)) + (u0(:, b) - u0(:, a))) &
-                  /master%length(e)
+                  /master%size(e)
             end associate
          end do
       end associate

@@ -1,6 +1,6 @@
 !> Which nodes and constants make up a pair of slave and master edge, and whether they face.
 module emcon_mortar_stencil
-   use emcon_chain, only : chain_t
+   use emcon_chain_plane, only : chain_t, next, previous
    use emcon_kinds, only : wp
    use emcon_mortar_frame, only : frame_t, n_place, pair_stencil_t, place_after, place_before, &
       place_first, place_last, local_master
@@ -22,23 +22,23 @@ contains
       logical, intent(in) :: is_averaged         !! averaged normals
       logical, intent(in) :: is_corner(:)        !! (n_edge) at the first node of each edge
 
-      self%node(place_first) = chain%edge(1, e)
-      self%node(place_last) = chain%edge(2, e)
+      self%node(place_first) = chain%facet(1, e)
+      self%node(place_last) = chain%facet(2, e)
       self%node(place_before) = 0
       self%node(place_after) = 0
       self%tangent(:, 1) = [place_last, place_first]
       self%tangent(:, 2) = [place_last, place_first]
-      self%weight = 1.0_wp/chain%length(e)
+      self%weight = 1.0_wp/chain%size(e)
       if (is_averaged) then
          if (.not. is_corner(e)) then
-            self%node(place_before) = chain%edge(1, chain%previous(e))
+            self%node(place_before) = chain%facet(1, chain%neighbour(previous, e))
             self%tangent(2, 1) = place_before
-            self%weight(1) = 1.0_wp/(chain%length(e) + chain%length(chain%previous(e)))
+            self%weight(1) = 1.0_wp/(chain%size(e) + chain%size(chain%neighbour(previous, e)))
          end if
          if (has_smooth_end(chain, e, is_corner)) then
-            self%node(place_after) = chain%edge(2, chain%next(e))
+            self%node(place_after) = chain%facet(2, chain%neighbour(next, e))
             self%tangent(1, 2) = place_after
-            self%weight(2) = 1.0_wp/(chain%length(e) + chain%length(chain%next(e)))
+            self%weight(2) = 1.0_wp/(chain%size(e) + chain%size(chain%neighbour(next, e)))
          end if
       end if
       self%has_field = any(self%node([place_before, place_after]) > 0)
@@ -51,7 +51,7 @@ contains
       logical, intent(in) :: is_corner(:)
 
       has_smooth_end = .false.
-      if (chain%next(e) > 0) has_smooth_end = .not. is_corner(chain%next(e))
+      if (chain%neighbour(next, e) > 0) has_smooth_end = .not. is_corner(chain%neighbour(next, e))
    end function has_smooth_end
 
    !> The master side: edge `m`; with `is_smooth` or `is_wide` also its neighbours, up to corners of
@@ -66,20 +66,20 @@ contains
       real(wp) :: length(3)
 
       self%edge = m
-      self%node(local_master(:2)) = chain%edge(:, m)
+      self%node(local_master(:2)) = chain%facet(:, m)
       self%node(local_master(3:)) = 0
       self%is_smooth = is_smooth
       self%n_master = merge(4, 2, is_smooth .or. is_wide)
       if (self%n_master == 2) return
-      length = [0.0_wp, chain%length(m), 0.0_wp]
-      associate (before => chain%previous(m), after => chain%next(m))
+      length = [0.0_wp, chain%size(m), 0.0_wp]
+      associate (before => chain%neighbour(previous, m), after => chain%neighbour(next, m))
          if (before > 0 .and. .not. (is_smooth .and. is_corner(m))) then
-            self%node(local_master(3)) = chain%edge(1, before)
-            length(1) = chain%length(before)
+            self%node(local_master(3)) = chain%facet(1, before)
+            length(1) = chain%size(before)
          end if
          if (after > 0 .and. (.not. is_smooth .or. has_smooth_end(chain, m, is_corner))) then
-            self%node(local_master(4)) = chain%edge(2, after)
-            length(3) = chain%length(after)
+            self%node(local_master(4)) = chain%facet(2, after)
+            length(3) = chain%size(after)
          end if
       end associate
       if (is_smooth) self%shape = hermite_shape(length)

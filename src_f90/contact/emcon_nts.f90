@@ -4,7 +4,7 @@
 !> Source: docs/theory.md, section 4.
 module emcon_nts
    use emcon_arcs_plane, only : arc_rise, arcs_find
-   use emcon_chain, only : chain_corners, chain_tributary
+   use emcon_chain_plane, only : chain_corners, chain_tributary
    use emcon_constraint, only : condition_t
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
@@ -97,7 +97,7 @@ contains
       self%may_sharpen = self%smoothing /= smoothing_hermite
       if (self%may_sharpen) return
       if (.not. allocated(self%smooth)) then
-         allocate(self%is_corner(self%master%n_edge), self%smooth(self%n_constraint))
+         allocate(self%is_corner(self%master%n_facet), self%smooth(self%n_constraint))
          allocate(self%is_lost(self%n_constraint), source=.false.)
       end if
       call chain_corners(self%master, x, options%smoothing_angle, self%is_corner)
@@ -114,7 +114,7 @@ contains
       self%sagitta = 0.0_wp
       if (allocated(self%curvature)) deallocate(self%curvature)
       if (.not. is_wanted .or. self%smoothing == smoothing_hermite) return
-      allocate(self%curvature(self%master%n_edge))
+      allocate(self%curvature(self%master%n_facet))
       call arcs_find(self%master, x, options%smoothing_angle, self%curvature)
    end subroutine nts_follow_arcs
 
@@ -151,7 +151,7 @@ contains
       if (self%edge(i) == 0) return
       associate (stencil => self%polygon(1, i), e => self%edge(i))
          call stencil_gather(x, u0, u0, stencil%n, stencil%node, local, dlocal)
-         sagitta = arc_rise(self%curvature(e), self%master%length(e), &
+         sagitta = arc_rise(self%curvature(e), self%master%size(e), &
             part_of_sector(local(:, :stencil%n), stencil%before, stencil%after), 0.0_wp)
       end associate
    end function sagitta_under
@@ -437,7 +437,7 @@ contains
       real(wp) :: at_node(size(self%slave%node))
 
       at_node = 0.0_wp
-      if (self%slave%n_edge > 0) call chain_tributary(self%slave, x, u, at_node)
+      if (self%slave%n_facet > 0) call chain_tributary(self%slave, x, u, at_node)
       length = at_node(self%chain_node)
       area = length*self%thickness
    end subroutine nts_area
@@ -457,7 +457,7 @@ contains
 
       best = huge(best)
       self%edge(i) = 0
-      do e = 1, self%master%n_edge
+      do e = 1, self%master%n_facet
          call choice_take_nearer(self, i, e, x, u, best)
       end do
       call choice_settle(self, i, x, u)

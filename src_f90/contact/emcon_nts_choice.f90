@@ -3,11 +3,12 @@
 !>
 !> Source: docs/theory.md, section 4.
 module emcon_nts_choice
-   use emcon_chain, only : chain_init, chain_shortest, chain_t, chain_thickness
+   use emcon_chain_plane, only : chain_init, chain_shortest, chain_t, chain_thickness, next, &
+      previous
    use emcon_contact, only : contact_t
    use emcon_corner_tops_plane, only : corner_tops
    use emcon_errors, only : error_t
-   use emcon_facing, only : facing_allows
+   use emcon_facing_plane, only : facing_allows
    use emcon_interactions, only : contact_pair_t, smoothing_hermite, smoothing_none
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, &
@@ -15,9 +16,9 @@ module emcon_nts_choice
    use emcon_nts_stencil, only : edge_distance, edge_of_sector, is_outside, polygon_stencil, &
       polygon_stencil_t, smooth_stencil, smooth_stencil_t
    use emcon_scene, only : scene_t
-   use emcon_seams, only : chain_join
-   use emcon_self_contact, only : self_contact_is_apart
-   use emcon_touch_rule, only : touch_rule_allows, touch_rule_init, touch_rule_may, &
+   use emcon_seams_plane, only : chain_join
+   use emcon_self_contact_plane, only : self_contact_is_apart
+   use emcon_touch_rule_plane, only : touch_rule_allows, touch_rule_init, touch_rule_may, &
       touch_rule_sees, touch_rule_t
    implicit none
    private
@@ -84,11 +85,11 @@ contains
       self%offset = pair%interaction%offset
       self%both_sides = pair%both_sides
       self%own_size = [(chain_shortest(self%slave, self%chain_node(i)), i = 1, self%n_constraint)]
-      call chain_thickness(self%slave, scene, scene%surface(pair%slave), self%thickness)
+      call chain_thickness(self%slave, scene, self%thickness)
       self%thickness = self%thickness(self%chain_node)
       associate (n => self%n_constraint/self%rule%n_class)
          self%near_item = [(1 + mod(i, n), i = 0, self%n_constraint - 1)]
-         call near_list_init(self%near, reshape(self%node(:n), [1, n]), self%master%edge, &
+         call near_list_init(self%near, reshape(self%node(:n), [1, n]), self%master%facet, &
             scene%x, scene%u0, self%offset + pair%interaction%damping%clearance)
       end associate
    end subroutine choice_init
@@ -128,8 +129,8 @@ contains
       best = huge(best)
       associate (near => self%near%candidates, item => self%near_item(i))
          do k = near%start(item), near%start(item + 1) - 1
-            if (.not. near_list_within(self%near, item, near%edge(k), x, u0, self%reach)) cycle
-            call choice_take_nearer(self, i, near%edge(k), x, u0, best)
+            if (.not. near_list_within(self%near, item, near%facet(k), x, u0, self%reach)) cycle
+            call choice_take_nearer(self, i, near%facet(k), x, u0, best)
          end do
       end associate
       call choice_settle(self, i, x, u0)
@@ -147,14 +148,14 @@ contains
             near%start(item) = n + 1
             do k = from, near%start(item + 1) - 1
                if (.not. touch_rule_may(self%rule, self%slave, self%chain_node(item), &
-                  near%edge(k))) cycle
+                  near%facet(k))) cycle
                n = n + 1
-               near%edge(n) = near%edge(k)
+               near%facet(n) = near%facet(k)
             end do
          end do
          near%start(size(near%start)) = n + 1
       end associate
-      self%near%candidates%edge = self%near%candidates%edge(:n)
+      self%near%candidates%facet = self%near%candidates%facet(:n)
       if (n == 0) self%near%nearest = self%near%reach
       self%n_sifted = self%near%n_list
    end subroutine sift
@@ -169,7 +170,7 @@ contains
       real(wp) :: distance
 
       if (.not. touch_rule_sees(self%rule, self%class(i), e)) return
-      distance = edge_distance(x, u, self%node(i), self%master%edge(:, e))
+      distance = edge_distance(x, u, self%node(i), self%master%facet(:, e))
       if (.not. distance < best) return
       if (.not. bears(self, i, e, x, u)) return
       if (self%is_self) then
@@ -188,9 +189,9 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
 
       bears = self%every_face .or. self%smoothing == smoothing_hermite
-      if (.not. bears) bears = is_outside(x, u, self%node(i), self%master%edge(:, e))
+      if (.not. bears) bears = is_outside(x, u, self%node(i), self%master%facet(:, e))
       if (.not. bears) bears = facing_allows(self%slave, self%chain_node(i), &
-         self%master%edge(:, e), x, u)
+         self%master%facet(:, e), x, u)
    end function bears
 
    !> Finish the choice for constraint `i`, with the stencils: a node beside its edge, over others
@@ -209,7 +210,7 @@ contains
       if (self%smoothing == smoothing_hermite) then
          call smooth_stencil(self%smooth(i), self%master, self%is_corner, self%node(i), &
             self%edge(i), x, u0)
-         self%smooth(i)%curve%rounding = self%rounding*self%master%length(self%edge(i))
+         self%smooth(i)%curve%rounding = self%rounding*self%master%size(self%edge(i))
       else
          call take_sector(self, i, x, u0)
       end if
@@ -258,13 +259,13 @@ contains
       stencil%goes_around = self%offset > 0.0_wp
       associate (n => stencil%n, before => stencil%before, after => stencil%after)
          if (after > 0) then
-            if (.not. bears(self, i, self%master%next(edge), x, u0)) then
+            if (.not. bears(self, i, self%master%neighbour(next, edge), x, u0)) then
                n = n - 1
                after = 0
             end if
          end if
          if (before == 0) return
-         if (bears(self, i, self%master%previous(edge), x, u0)) return
+         if (bears(self, i, self%master%neighbour(previous, edge), x, u0)) return
          n = n - 1
          before = 0
          if (after == 0) return
@@ -289,7 +290,7 @@ contains
       do side = 1, 2
          e = edge
          do k = 1, 2
-            e = merge(self%master%previous(e), self%master%next(e), side == 1)
+            e = merge(self%master%neighbour(previous, e), self%master%neighbour(next, e), side == 1)
             if (e == 0) exit
             if (k == 1) inside = min(inside, distance_of(e))
             if (k == 1) cycle
@@ -310,10 +311,10 @@ contains
          real(wp) :: u(2, 3), local(2, 3)
 
          if (.not. present(du)) then
-            distance_of = edge_distance(x, u0, self%node(i), self%master%edge(:, e))
+            distance_of = edge_distance(x, u0, self%node(i), self%master%facet(:, e))
             return
          end if
-         associate (node => [self%node(i), self%master%edge(:, e)])
+         associate (node => [self%node(i), self%master%facet(:, e)])
             local = x(:, node)
             u = u0(:, node) + du(:, node)
          end associate

@@ -1,6 +1,6 @@
 !> Which nodes the gap of a slave node over a master edge depends on, and where they are.
 module emcon_nts_stencil
-   use emcon_chain, only : chain_shorter, chain_t, chain_touches
+   use emcon_chain_plane, only : chain_shorter, chain_t, chain_touches, next, previous
    use emcon_hermite, only : hermite_stencil_t
    use emcon_hermite_gap_value, only : hermite_begin
    use emcon_kinds, only : wp
@@ -55,23 +55,23 @@ contains
       integer :: e
 
       self%node(1) = slave
-      self%node(2:3) = master%edge(:, edge)
+      self%node(2:3) = master%facet(:, edge)
       self%n = 3
       self%rounding = spread(rounding, 2, 2)*spread(chain_shorter(master, edge), 1, 2)
-      e = master%previous(edge)
+      e = master%neighbour(previous, edge)
       if (e > 0) then
-         if (is_blunt(x, u0, master%edge(1, e), self%node(2), self%node(3))) then
+         if (is_blunt(x, u0, master%facet(1, e), self%node(2), self%node(3))) then
             self%n = self%n + 1
             self%before = self%n
-            self%node(self%n) = master%edge(1, e)
+            self%node(self%n) = master%facet(1, e)
          end if
       end if
-      e = master%next(edge)
+      e = master%neighbour(next, edge)
       if (e > 0) then
-         if (is_blunt(x, u0, self%node(2), self%node(3), master%edge(2, e))) then
+         if (is_blunt(x, u0, self%node(2), self%node(3), master%facet(2, e))) then
             self%n = self%n + 1
             self%after = self%n
-            self%node(self%n) = master%edge(2, e)
+            self%node(self%n) = master%facet(2, e)
          end if
       end if
    end subroutine polygon_stencil
@@ -88,12 +88,12 @@ contains
       integer :: side, corner, beside(2)
 
       other = 0
-      beside = [master%previous(edge), master%next(edge)]
+      beside = [master%neighbour(previous, edge), master%neighbour(next, edge)]
       do side = 1, 2
          if (beside(side) == 0) cycle
-         corner = master%edge(side, edge)
-         own = way(corner, master%edge(3 - side, edge))
-         arm = way(corner, master%edge(side, beside(side)))
+         corner = master%facet(side, edge)
+         own = way(corner, master%facet(3 - side, edge))
+         arm = way(corner, master%facet(side, beside(side)))
          to_slave = way(corner, slave)
          length = [sqrt(dot_product(own, own)), sqrt(dot_product(arm, arm))]
          if (.not. dot_product(own, arm) < -sharpest_cosine*product(length)) cycle
@@ -145,20 +145,20 @@ contains
 
       near = 0
       near(3) = edge
-      near(2) = beside(master%previous(edge))
-      near(4) = beside(master%next(edge))
-      if (near(2) > 0) near(1) = beside(master%previous(near(2)))
-      if (near(4) > 0) near(5) = beside(master%next(near(4)))
-      self%node(:3) = [slave, master%edge(:, edge)]
+      near(2) = beside(master%neighbour(previous, edge))
+      near(4) = beside(master%neighbour(next, edge))
+      if (near(2) > 0) near(1) = beside(master%neighbour(previous, near(2)))
+      if (near(4) > 0) near(5) = beside(master%neighbour(next, near(4)))
+      self%node(:3) = [slave, master%facet(:, edge)]
       self%n = 3
       self%curve%node(3:4) = [2, 3]
       do k = 1, 5
          if (near(k) == 0) cycle
-         self%curve%length(k) = master%length(near(k))
+         self%curve%length(k) = master%size(near(k))
          self%curve%is_corner(k) = is_corner(near(k))
-         if (k < 3) call add_node(self, master%edge(1, near(k)), number)
+         if (k < 3) call add_node(self, master%facet(1, near(k)), number)
          if (k < 3) self%curve%node(k) = number
-         if (k > 3) call add_node(self, master%edge(2, near(k)), number)
+         if (k > 3) call add_node(self, master%facet(2, near(k)), number)
          if (k > 3) self%curve%node(k + 1) = number
       end do
       call stencil_gather(x, u0, u0, self%n, self%node, local, dlocal)

@@ -53,10 +53,10 @@ contains
       call nts_init(self%nts, scene, pair, error, has_twins=.true.)
       if (allocated(error)) return
       self%nts%offset = 0.0_wp                       ! it is taken off the means
-      allocate(self%end_node(2, self%slave%n_edge))
-      do e = 1, self%slave%n_edge
+      allocate(self%end_node(2, self%slave%n_facet))
+      do e = 1, self%slave%n_facet
          do k = 1, 2
-            self%end_node(k, e) = findloc(self%nts%node, self%slave%edge(k, e), 1)
+            self%end_node(k, e) = findloc(self%nts%node, self%slave%facet(k, e), 1)
          end do
       end do
    end subroutine segment_init
@@ -116,7 +116,7 @@ contains
             if (e == 0) cycle
             own(side) = self%end_node(side, e)
             other(side) = self%end_node(3 - side, e)
-            part = self%slave%length(e)*gap_parts(weights([(self%nts%stands_over( &
+            part = self%slave%size(e)*gap_parts(weights([(self%nts%stands_over( &
                self%end_node(j, e)), j = 1, size(part))]), side, self%is_dual)
             own_part(side) = part(side)
             other_part(side) = part(3 - side)
@@ -212,8 +212,8 @@ contains
       integer :: e, k
 
       call self%nts%measure_points(x, u0, du)
-      do e = 1, self%slave%n_edge
-         associate (value => self%form(e)%value, node => self%slave%edge(:, e), &
+      do e = 1, self%slave%n_facet
+         associate (value => self%form(e)%value, node => self%slave%facet(:, e), &
                i => self%end_node(:, e))
             value = 0.0_wp
             w = weights([is_over(self, i(1)), is_over(self, i(2))])
@@ -272,7 +272,7 @@ contains
       integer, intent(in) :: e
       integer :: list(2 + sum(self%nodal%n_node)), n, i, k
 
-      list(:2) = self%slave%edge(:, e)
+      list(:2) = self%slave%facet(:, e)
       n = 2
       do k = 1, 2
          do i = 2, self%nodal(k)%n_node
@@ -292,7 +292,7 @@ contains
       type(dg_t) :: length
       real(wp) :: local(2, 2)
 
-      associate (node => self%slave%edge(:, e))
+      associate (node => self%slave%facet(:, e))
          local(:, 1) = 0.0_wp
          local(:, 2) = (x(:, node(2)) - x(:, node(1))) + (u0(:, node(2)) - u0(:, node(1)))
          length = dg_sqrt(dg_dot(difference(2, 1, local, du(:, node)), &

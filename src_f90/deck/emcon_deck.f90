@@ -72,6 +72,8 @@ contains
       call read_cards(reader, overrides)
       scene%n_dim = find_dimension(reader)
       scene%is_axial = scene%n_dim == n_plane .and. is_axial_deck(reader)
+      reader%n_dim = scene%n_dim
+      reader%is_axial = scene%is_axial
       if (size(reader%card) > 0) call read_scene(reader, scene)
       diagnostics = reader%log
    end subroutine deck_read

@@ -5,7 +5,7 @@ module emcon_deck_check
    use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_steps, only : load_centrifugal, load_gravity, load_point
+   use emcon_steps, only : load_centrifugal, load_gravity, load_point, step_is_dynamic
    implicit none
    private
    public :: check_materials, check_nodes
@@ -41,7 +41,7 @@ contains
       call mark_rigid_materials(scene, resists, moves)
       needs_mass = .false.
       do i = 1, size(scene%step)
-         needs_mass = needs_mass .or. scene%step(i)%scheme%masses_resist
+         needs_mass = needs_mass .or. step_is_dynamic(scene%step(i))
          do k = 1, size(scene%step(i)%load)
             if (all(scene%step(i)%load(k)%kind /= [load_gravity, load_centrifugal])) cycle
             material = scene%element%section(scene%step(i)%load(k)%target)
@@ -82,7 +82,7 @@ contains
          is_driven(scene%rigid(b)%element) = .true.
          do i = 1, size(scene%step)
             associate (step => scene%step(i))
-               if (step%scheme%masses_resist .and. .not. any(step%turn%is_about .and. &
+               if (step_is_dynamic(step) .and. .not. any(step%turn%is_about .and. &
                   step%turn%rigid == b)) is_driven(scene%rigid(b)%element) = .false.
             end associate
          end do

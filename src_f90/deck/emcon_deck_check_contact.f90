@@ -12,7 +12,7 @@ module emcon_deck_check_contact
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : step_t
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_facets, only : surface_facets
    implicit none
    private
    public :: choose_slaves, check_pairs
@@ -203,7 +203,7 @@ contains
       if (any(is_master .and. own > 0)) then
          n_free = scene%n_dim
       else if (step%contact%options%multiplier == multiplier_standard) then
-         call surface_edges(scene, scene%surface(pair%slave), edge)
+         call surface_facets(scene, scene%surface(pair%slave), edge)
          do k = 1, size(edge, 2)
             associate (node => edge(:, k))
                if (all(node > 0)) n_free(node) = max(n_free(node), own(node(2:1:-1)))

@@ -8,6 +8,7 @@ module emcon_deck_check_linear
    use emcon_materials, only : kinematics_linear
    use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
+   use emcon_steps, only : step_is_dynamic
    use emcon_text, only : to_text
    implicit none
    private
@@ -45,7 +46,7 @@ contains
          i = findloc(is_linear .and. body(scene%element%node(1, :)) == b, .true., 1)
          if (i == 0 .or. any(is_held(node))) cycle
          turned = spin(scene%x(:, node), scene%v0(:, node)) &
-            *sum(scene%step%time%duration, scene%step%scheme%masses_resist)
+            *sum(scene%step%time%duration, step_is_dynamic(scene%step))
          if (turned <= most_turned) cycle
          section = scene%element%section(i)
          call add_error(reader%log, scene%section(section)%origin, "section " // &

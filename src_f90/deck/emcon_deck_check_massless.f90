@@ -5,7 +5,8 @@ module emcon_deck_check_massless
    use emcon_diagnostics, only : add_error, add_warning
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
-   use emcon_steps, only : initiation_massless, initiation_velocity_update
+   use emcon_steps, only : initiation_massless, initiation_velocity_update, step_initiation, &
+      step_is_dynamic
    implicit none
    private
    public :: check_massless_sections
@@ -27,7 +28,7 @@ contains
       if (.not. any(is_massless)) return
       k = scene%element%section(findloc(is_massless, .true., 1))
       origin = scene%section(k)%origin
-      if (.not. any(scene%step%scheme%masses_resist)) then
+      if (.not. any(step_is_dynamic(scene%step))) then
          call add_warning(reader%log, origin, "MASSLESS has no effect: there is no *DYNAMIC step")
          return
       end if
@@ -40,7 +41,7 @@ contains
       end do
       do k = 1, size(scene%step)
          associate (scheme => scene%step(k)%scheme)
-            if (scheme%masses_resist .and. .not. scheme%takes_massless) call add_error(reader%log, &
+            if (.not. scheme%takes_massless) call add_error(reader%log, &
                scene%step(k)%choice%origin, "SCHEME=" // trim(scheme%word) // " does not go " // &
                "with MASSLESS sections; use SCHEME=ENERGY MOMENTUM")
          end associate
@@ -49,7 +50,6 @@ contains
       call mark_contact(scene, meets)
       if (.not. any(meets .and. without_density)) return
       do k = 1, size(scene%step)
-         if (.not. scene%step(k)%scheme%masses_resist) cycle
          call check_step(reader, scene, k, without_density)
       end do
    end subroutine check_massless_sections
@@ -58,15 +58,15 @@ contains
    subroutine check_step(reader, scene, k, without_density)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      integer, intent(in) :: k                   !! of a dynamic step
+      integer, intent(in) :: k                   !! of a step
       logical, intent(in) :: without_density(:)  !! (n_node)
       logical, allocatable :: is_joined(:)
 
       associate (step => scene%step(k))
-         if (step%contact%initiation == initiation_velocity_update) call add_error(reader%log, &
+         if (step_initiation(step) == initiation_velocity_update) call add_error(reader%log, &
             step%origin, "*CONTACT INITIATION, TYPE=VELOCITY UPDATE pushes masses, but a surface " &
             // "in contact is of a MASSLESS section; use PERSISTENT or MASSLESS")
-         if (step%contact%initiation /= initiation_massless) return
+         if (step_initiation(step) /= initiation_massless) return
          call mark_joined(scene, is_joined)
          if (any(is_joined .and. without_density)) call add_error(reader%log, step%origin, &
             "*CONTACT INITIATION, TYPE=MASSLESS balances MASSLESS sections in contact by " // &

@@ -6,7 +6,7 @@ module emcon_deck_check_surfaces
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
    use emcon_sort, only : find_sorted, sort_order, unique_sorted
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_facets, only : surface_facets
    use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
@@ -70,7 +70,7 @@ contains
       character(len=*), intent(in) :: title
       integer, allocatable :: edge(:, :), ends(:), begins(:), branch(:)
 
-      call surface_edges(scene, surface, edge)
+      call surface_facets(scene, surface, edge)
       if (any(edge == 0)) return
       begins = edge(1, sort_order(edge(1, :)))
       ends = edge(2, sort_order(edge(2, :)))
@@ -107,8 +107,8 @@ contains
       integer, allocatable :: edge(:, :), list(:, :), first(:), node(:)
       integer :: i, k
 
-      call surface_edges(scene, surface, edge)
-      call surface_edges(scene, other, list)
+      call surface_facets(scene, surface, edge)
+      call surface_facets(scene, other, list)
       list = list(:, sort_order(list(1, :)))
       first = list(1, :)
       allocate(node(0))

@@ -7,7 +7,7 @@ module emcon_deck_check_ties
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted, unique_sorted
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_facets, only : surface_facets
    use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
@@ -60,7 +60,7 @@ contains
       integer :: i
 
       associate (slave => scene%surface(scene%tie(i_tie)%slave))
-         call surface_edges(scene, slave, edge)
+         call surface_facets(scene, slave, edge)
          allocate(earlier(size(edge, 2)), source=0)
          do i = 1, size(earlier)
             if (all(edge(:, i) > 0)) earlier(i) = &

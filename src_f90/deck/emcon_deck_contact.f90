@@ -5,6 +5,7 @@ module emcon_deck_contact
    use emcon_deck_fields, only : data_error, data_open, data_t, next_line, refuse_lines
    use emcon_deck_friction, only : read_friction
    use emcon_deck_named, only : set_names
+   use emcon_deck_options, only : check_option
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, need_name, &
       option_name, reader_t, refuse_option
    use emcon_deck_surfaces, only : get_surfaces
@@ -162,7 +163,10 @@ contains
       formulation = option_default("formulation")
       if (option_name(card, "TYPE") == "") return
       formulation = option_code("formulation", option_name(card, "TYPE"))
-      if (formulation > 0) return
+      if (formulation > 0) then
+         call check_option(reader, card, "TYPE", "formulation", formulation)
+         return
+      end if
       call option_words("formulation", known)
       if (option_name(card, "TYPE") == "MASSLESS") then
          call refuse_option(reader, card, "TYPE", known, &

@@ -6,7 +6,8 @@ module emcon_deck_contact_damping
    use emcon_diagnostics, only : add_error, add_warning, quoted
    use emcon_interactions, only : contact_damping_t, contact_pair_t
    use emcon_kinds, only : wp
-   use emcon_steps, only : initiation_massless, method_penalty, step_t
+   use emcon_steps, only : initiation_massless, method_penalty, step_initiation, &
+      step_is_dynamic, step_t
    use emcon_text, only : read_real, to_text
    implicit none
    private
@@ -114,19 +115,18 @@ contains
       do i = 1, size(pair)
          if (.not. pair(i)%interaction%damping%coefficient > 0.0_wp .or. pair(i)%is_reverse) cycle
          do k = 1, size(step)
-            if (.not. step(k)%scheme%masses_resist .or. step(k)%scheme%takes_damping) cycle
+            if (step(k)%scheme%takes_damping) cycle
             call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
                // "has *CONTACT DAMPING, which does not go with SCHEME=" // &
                trim(step(k)%scheme%word) // " of step " // to_text(k) // &
                "; use SCHEME=ENERGY MOMENTUM, MIDPOINT or ENERGY DECAYING")
             exit
          end do
-         if (.not. any(step%scheme%masses_resist)) then
+         if (.not. any(step_is_dynamic(step))) then
             call warn(pair(i), "damps nothing: there is no dynamic step")
             cycle
          end if
-         if (any(step%contact%initiation == initiation_massless &
-            .and. step%scheme%masses_resist)) call &
+         if (any(step_initiation(step) == initiation_massless)) call &
             warn(pair(i), "asks for mass: both surfaces keep theirs, and hold gaps as " // &
             "PERSISTENT does")
          if (pair(i)%interaction%damping%clearance > 0.0_wp &

@@ -10,7 +10,8 @@ module emcon_deck_contact_settings
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find
    use emcon_options, only : option_default
-   use emcon_steps, only : initiation_admissible, initiation_massless, initiation_persistent, step_t
+   use emcon_steps, only : initiation_admissible, initiation_massless, initiation_none, &
+      initiation_persistent, step_initiation, step_is_dynamic, step_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -62,18 +63,18 @@ contains
       i = findloc(pair%initiation /= 0, .true., 1)
       if (i == 0) return
       do k = 1, size(step)
-         if (any(step(k)%contact%initiation == [initiation_persistent, initiation_massless]) .or. &
-            .not. step(k)%scheme%masses_resist) cycle
+         if (any(step_initiation(step(k)) == [initiation_none, initiation_persistent, &
+            initiation_massless])) cycle
          call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR, INITIATION=: it goes with " // &
             "*CONTACT INITIATION, TYPE=PERSISTENT or MASSLESS, not with that of step " // &
             to_text(k))
          return
       end do
       if (.not. any(pair%initiation == initiation_massless)) return
-      k = findloc(step%scheme%masses_resist, .true., 1)
+      k = findloc(step_is_dynamic(step), .true., 1)
       if (k == 0) return
       where (pair%initiation == 0) pair%initiation = step(k)%contact%initiation
-      where (step%scheme%masses_resist) step%contact%initiation = initiation_massless
+      where (step_is_dynamic(step)) step%contact%initiation = initiation_massless
    end subroutine pairs_ask
 
    !> *CONTACT INTERFERENCE, SHRINK: for all pairs, in the first step.
@@ -126,7 +127,7 @@ contains
 
       if (step%contact%overclosure_amplitude > 0) call check_left(reader, reader%card(i_first), &
          amplitude(step%contact%overclosure_amplitude), step%time%duration)
-      if (.not. step%scheme%masses_resist) return
+      if (.not. step_is_dynamic(step)) return
       if (step%contact%resolves_overclosure) call card_error(reader, reader%card(i_first), &
          "*CONTACT INTERFERENCE is for *STATIC steps: in dynamics pushing bodies apart would " &
          // "make energy")
@@ -144,9 +145,9 @@ contains
       type(step_t), intent(in) :: step(:)
       integer :: first, k, with
 
-      first = findloc(step%scheme%masses_resist, .true., 1)
+      first = findloc(step_is_dynamic(step), .true., 1)
       do k = first + 1, merge(size(step), 0, first > 0)
-         if (.not. step(k)%scheme%masses_resist) cycle
+         if (.not. step_is_dynamic(step(k))) cycle
          if ((step(k)%contact%initiation == initiation_massless) .eqv. &
             (step(first)%contact%initiation == initiation_massless)) cycle
          with = merge(k, first, step(k)%contact%initiation == initiation_massless)
@@ -166,8 +167,7 @@ contains
 
       i = findloc(pair%interaction%restitution < 1.0_wp, .true., 1)
       if (i == 0) return
-      k = findloc(step%scheme%masses_resist &
-         .and. step%contact%initiation == initiation_admissible, .true., 1)
+      k = findloc(step_initiation(step), initiation_admissible, 1)
       if (k > 0) call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface " // &
          "interaction has RESTITUTION=" // to_text(pair(i)%interaction%restitution) &
          // ", but step " // &

@@ -6,7 +6,7 @@ module emcon_deck_damping
    use emcon_law_registry, only : law_given
    use emcon_materials, only : material_t
    use emcon_scene, only : scene_t
-   use emcon_steps, only : initiation_massless
+   use emcon_steps, only : initiation_massless, step_initiation
    use emcon_text, only : read_real, to_text
    implicit none
    private
@@ -66,8 +66,7 @@ contains
             if (k > 0) call refuse("step " // to_text(k) // " has SCHEME=" // &
                trim(scene%step(k)%scheme%word) // ", which does not go with damped materials; " // &
                "use SCHEME=ENERGY MOMENTUM, MIDPOINT or ENERGY DECAYING")
-            k = findloc(scene%step%scheme%masses_resist .and. scene%step%contact%initiation &
-               == initiation_massless, .true., 1)
+            k = findloc(step_initiation(scene%step), initiation_massless, 1)
             if (k > 0) call refuse("step " // to_text(k) // " has *CONTACT INITIATION, " // &
                "TYPE=MASSLESS: what has no mass would be balanced without what damps it; use " // &
                "PERSISTENT")

@@ -5,9 +5,9 @@ module emcon_deck_dimension
    use emcon_deck_reader, only : card_error, card_t, option_name, reader_t
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
-   use emcon_materials, only : kinematics_corotated, kinematics_linear
    use emcon_requests, only : output_t
    use emcon_scene, only : scene_t
+   use emcon_scheme_registry, only : scheme_given
    implicit none
    private
    public :: n_plane, n_space, type_dimension, other_dimension, find_dimension, is_axial_deck
@@ -161,7 +161,8 @@ contains
       is_given_pair = card%name == "CONTACTPAIR" .and. option_name(card, "TYPE") == "USER"
    end function is_given_pair
 
-   !> Refuse what sections, materials and steps ask for and is of the plane.
+   !> Refuse what materials, schemes of a program and output ask for and is of the plane. Values
+   !> of options are refused where they are read, by their rows.
    subroutine check_dimension(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
@@ -170,14 +171,6 @@ contains
 
       missing = " " // trim(merge(in_space, on_rings // "  ", scene%n_dim == n_space)) &
          // " is not in this version"
-      do i = 1, size(scene%section)
-         associate (section => scene%section(i))
-            if (section%kinematics == kinematics_corotated .or. (scene%n_dim == n_plane &
-               .and. section%kinematics == kinematics_linear)) call add_error(reader%log, &
-               section%origin, "*SOLID SECTION: KINEMATICS=" // trim(merge("COROTATED          ", &
-               "LINEAR or COROTATED", scene%n_dim == n_space)) // missing)
-         end associate
-      end do
       do i = 1, size(scene%material)
          associate (material => scene%material(i))
             if (material%alpha > 0.0_wp .or. material%beta > 0.0_wp) call add_error(reader%log, &
@@ -186,8 +179,9 @@ contains
       end do
       do i = 1, size(scene%step)
          associate (step => scene%step(i))
-            if (step%scheme%dissipates) call add_error(reader%log, step%choice%origin, &
-               "*TIME INTEGRATION: SCHEME=" // trim(step%scheme%word) // missing)
+            if (step%scheme%dissipates .and. step%scheme%code == scheme_given) call add_error( &
+               reader%log, step%choice%origin, "*TIME INTEGRATION: SCHEME=" // &
+               trim(step%scheme%word) // missing)
             do k = 1, size(step%output)
                if (size(scene%rigid) > 0 .and. asks_for_turns(step%output(k))) call add_error( &
                   reader%log, step%origin, "UR, VR, RM: the rotation of rigid bodies" // missing)

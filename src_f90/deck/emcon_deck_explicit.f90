@@ -10,17 +10,30 @@ module emcon_deck_explicit
    use emcon_text, only : to_text
    implicit none
    private
-   public :: check_explicit_cards, suit_explicit
+   public :: choose_implicit, check_explicit_cards, suit_explicit
 
 contains
 
-   !> Refuse cards of the explicit step that begins with card `i_first` that would change nothing.
+   !> The scheme of *TIME INTEGRATION, of steps of its card that are not explicit.
+   subroutine choose_implicit(step)
+      type(step_t), intent(inout) :: step
+
+      if (step%scheme%card == step%choice%row%card .and. .not. step%scheme%is_explicit) then
+         step%scheme = step%choice%row
+      end if
+   end subroutine choose_implicit
+
+   !> Of a step that begins with card `i_first`, if it is explicit: refuse cards that would change
+   !> nothing.
    subroutine check_explicit_cards(reader, i_first, step)
       type(reader_t), intent(inout) :: reader
       integer, intent(in) :: i_first             !! *STEP
       type(step_t), intent(in) :: step
       integer :: i
 
+      if (.not. step%scheme%is_explicit) return
+      if (step%time%event_fraction > 0.0_wp) call card_error(reader, reader%card(i_first), &
+         "*EVENTS are not of explicit steps: *EVENTS, OFF ends them")
       do i = i_first + 1, size(reader%card)
          associate (card => reader%card(i))
             if (card%name == "STEP") exit

@@ -7,8 +7,8 @@ module emcon_deck_friction
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
-   use emcon_steps, only : initiation_admissible, initiation_massless, initiation_persistent, &
-      method_null_space, method_saddle_point, step_t
+   use emcon_steps, only : initiation_massless, initiation_velocity_update, method_null_space, &
+      method_saddle_point, step_initiation, step_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -81,8 +81,7 @@ contains
             .and. on_nodes(pair(i)%slave)) call add_warning(reader%log, &
             pair(i)%origin, "*CONTACT PAIR: its surface interaction has *FRICTION and a PAD " &
             // "THICKNESS: friction acts at the nodes, so that discs slide, but do not roll")
-         if (any(step%contact%initiation == initiation_massless &
-            .and. step%scheme%masses_resist)) then
+         if (any(step_initiation(step) == initiation_massless)) then
             call add_warning(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
                // "has *FRICTION: both surfaces keep their mass, and hold gaps as PERSISTENT does")
          end if
@@ -116,14 +115,13 @@ contains
       type(step_t), intent(in) :: step
       integer, intent(in) :: k                   !! its number
 
-      if (step%scheme%masses_resist .and. .not. step%scheme%takes_damping) then
+      if (.not. step%scheme%takes_damping) then
          call refuse(reader, pair, "SCHEME=" // trim(step%scheme%word) // " of step " // &
             to_text(k) // &
             "; use SCHEME=ENERGY MOMENTUM, MIDPOINT or ENERGY DECAYING")
-         if (step%scheme%is_explicit) return
+         return
       end if
-      if (step%scheme%masses_resist .and. all(step%contact%initiation /= [initiation_persistent, &
-         initiation_admissible, initiation_massless])) then
+      if (step_initiation(step) == initiation_velocity_update) then
          call refuse(reader, pair, "*CONTACT INITIATION, TYPE=VELOCITY UPDATE of step " // &
             to_text(k) // ": jumps of velocities have no friction")
       end if

@@ -5,6 +5,7 @@ module emcon_deck_further
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
+   use emcon_steps, only : step_is_dynamic
    use emcon_text, only : squeezed, string_t, to_text
    implicit none
    private
@@ -81,7 +82,7 @@ contains
       do k = 1, size(until)
          associate (step => scene%step(k))
             if (until(k) > 0.0_wp) then
-               if (.not. step%scheme%masses_resist) then
+               if (.not. step_is_dynamic(step)) then
                   call raise(error, err_input, "--until is for dynamic steps: the loads of step " &
                      // to_text(k) // ", which is static, run over its duration; give a further " &
                      // "step by --steps")

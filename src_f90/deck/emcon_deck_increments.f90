@@ -5,7 +5,7 @@ module emcon_deck_increments
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
    use emcon_options, only : option_default
-   use emcon_steps, only : step_t
+   use emcon_steps, only : step_is_dynamic, step_t
    implicit none
    private
    public :: read_tolerance, read_events, check_increments
@@ -56,17 +56,15 @@ contains
       type(step_t), intent(in) :: step           !! read
       integer :: i
 
-      if (step%scheme%code /= 0 .and. .not. step%scheme%masses_resist) then
+      if (step%scheme%code /= 0 .and. .not. step_is_dynamic(step)) then
          do i = i_first, size(reader%card)
             if (reader%card(i)%step /= reader%card(i_first)%step) cycle
             call refuse_in_statics(reader, reader%card(i))
          end do
          return
       end if
-      if (step%scheme%is_explicit .and. step%time%event_fraction > 0.0_wp) call card_error(reader, &
-         reader%card(i_first), "*EVENTS are not of explicit steps: *EVENTS, OFF ends them")
       if (.not. step%time%tolerance > 0.0_wp) return
-      if (step%time%is_direct .and. step%scheme%masses_resist) call add_error(reader%log, &
+      if (step%time%is_direct .and. step_is_dynamic(step)) call add_error(reader%log, &
          step%time%tolerance_origin, &
          "TOLERANCE asks for increments of its own, DIRECT of *DYNAMIC " // &
          "for those of the deck: leave out one; *TIME INTEGRATION without TOLERANCE ends it")

@@ -1,10 +1,10 @@
 !> Parameters of cards whose values are rows of a table.
 module emcon_deck_options
-   use emcon_deck_reader, only : card_t, option_name, reader_t, refuse_option
-   use emcon_options, only : option_code, option_words
+   use emcon_deck_reader, only : card_error, card_t, option_name, reader_t, refuse_option
+   use emcon_options, only : option_code, option_refusal, option_words
    implicit none
    private
-   public :: choose_option
+   public :: choose_option, check_option
 
 contains
 
@@ -23,12 +23,28 @@ contains
       if (option_name(card, parameter) == "") return
       found = option_code(kind, option_name(card, parameter))
       if (found > 0) then
-         code = found
-         return
+         call check_option(reader, card, parameter, kind, found)
+      else
+         call option_words(kind, known)
+         call refuse_option(reader, card, parameter, known, "")
       end if
-      if (present(is_refused)) is_refused = .true.
-      call option_words(kind, known)
-      call refuse_option(reader, card, parameter, known, "")
+      if (found > 0) code = found
+      if (present(is_refused)) is_refused = found == 0
    end subroutine choose_option
+
+   !> Refuse a value that is not for models of this kind: `code` is 0 then.
+   subroutine check_option(reader, card, parameter, kind, code)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      character(len=*), intent(in) :: parameter
+      character(len=*), intent(in) :: kind         !! of `option_rows`
+      integer, intent(inout) :: code               !! one of that kind
+      character(len=:), allocatable :: why
+
+      call option_refusal(kind, code, reader%n_dim, reader%is_axial, why)
+      if (why == "") return
+      call card_error(reader, card, parameter // "=" // why)
+      code = 0
+   end subroutine check_option
 
 end module emcon_deck_options

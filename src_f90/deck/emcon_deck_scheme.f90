@@ -1,5 +1,6 @@
 !> *TIME INTEGRATION: the scheme of dynamic steps, its number, and what it does not go with.
 module emcon_deck_scheme
+   use emcon_deck_options, only : check_option
    use emcon_deck_reader, only : card_error, card_t, has_option, option_name, reader_t
    use emcon_diagnostics, only : add_error
    use emcon_interactions, only : contact_pair_t
@@ -21,11 +22,17 @@ contains
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(step_t), intent(inout) :: step
+      integer :: code
 
       step%choice%origin = card%origin
       step%choice%name = option_name(card, "SCHEME")
       step%choice%row = scheme_row("DYNAMIC", step%choice%name)
-      if (step%choice%row%code == 0) step%choice%row = scheme_given_row
+      if (step%choice%row%code == 0) then
+         step%choice%row = scheme_given_row
+      else
+         code = step%choice%row%code
+         call check_option(reader, card, "SCHEME", "scheme", code)
+      end if
       call read_setting(reader, card, step%choice%row)
    end subroutine read_scheme
 
@@ -71,7 +78,6 @@ contains
       integer :: k
 
       do k = 1, size(step)
-         if (.not. step(k)%scheme%masses_resist) cycle
          associate (row => step(k)%scheme, initiation => step(k)%contact%initiation)
             if (initiation == initiation_massless .and. .not. row%takes_massless) call refuse( &
                "*CONTACT INITIATION, TYPE=MASSLESS, in step ", "nodes without mass")

@@ -7,7 +7,7 @@ module emcon_deck_softness
    use emcon_kinds, only : wp
    use emcon_options, only : option_default
    use emcon_steps, only : initiation_massless, initiation_velocity_update, &
-      method_augmented_lagrange, method_penalty, softness_t, step_t
+      method_augmented_lagrange, method_penalty, softness_t, step_is_dynamic, step_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -52,7 +52,7 @@ contains
 
       do k = 1, size(step)
          associate (method => step(k)%contact%method, initiation => step(k)%contact%initiation)
-            if (.not. step(k)%scheme%masses_resist) cycle
+            if (.not. step_is_dynamic(step(k))) cycle
             if (.not. any(method == [method_penalty, method_augmented_lagrange])) cycle
             if (initiation == initiation_massless) call refuse( &
                "*CONTACT INITIATION, TYPE=MASSLESS: surfaces without mass hold their gaps exactly")

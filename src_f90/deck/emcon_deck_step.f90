@@ -12,7 +12,7 @@ module emcon_deck_step
       pairs_ask, read_controls, read_initiation, read_interference
    use emcon_deck_damping, only : check_damping
    use emcon_deck_element_loads, only : read_dload, read_dsload
-   use emcon_deck_explicit, only : check_explicit_cards, suit_explicit
+   use emcon_deck_explicit, only : check_explicit_cards, choose_implicit, suit_explicit
    use emcon_deck_friction, only : check_friction
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, is_blank, &
       next_line
@@ -29,7 +29,7 @@ module emcon_deck_step
    use emcon_diagnostics, only : add_error
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
-   use emcon_options, only : option_code, option_default, option_words
+   use emcon_options, only : option_default, option_words
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_row
@@ -165,12 +165,10 @@ contains
             end select
          end associate
       end do
-      if (step%scheme%card == step%choice%row%card .and. .not. step%scheme%is_explicit) then
-         step%scheme = step%choice%row
-      end if
+      call choose_implicit(step)
       call read_step_card(reader, reader%card(i_first), step)
       call check_statics(reader, i_first, amplitude, step)
-      if (step%scheme%is_explicit) call check_explicit_cards(reader, i_first, step)
+      call check_explicit_cards(reader, i_first, step)
       call check_increments(reader, i_first, step)
       if (step%scheme%code /= 0 .or. reader%doubt%names) return
       if (.not. has_refused(reader, i_first)) call card_error(reader, reader%card(i_first), &

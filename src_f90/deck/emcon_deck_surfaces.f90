@@ -1,19 +1,21 @@
 !> *SURFACE, and the faces that elements share.
 module emcon_deck_surfaces
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t, find_face, n_neighbours
-   use emcon_deck_dimension, only : n_plane
    use emcon_deck_element_kinds, only : face_names, face_number
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_integer, get_name, is_blank, next_line
    use emcon_deck_labels, only : find_label
    use emcon_deck_named, only : get_elements, get_lines, get_nodes
+   use emcon_deck_options, only : choose_option
    use emcon_deck_reader, only : card_error, card_t, card_warning, need_name, option_name, &
       reader_t, refuse_option
    use emcon_deck_segments_plane, only : read_segments
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
-   use emcon_mesh, only : surface_t
+   use emcon_mesh, only : surface_of_lines, surface_of_faces, surface_of_nodes, &
+      surface_of_segments, surface_t
    use emcon_name_index, only : name_index_find, name_index_put
+   use emcon_options, only : option_default, option_words
    use emcon_scene, only : scene_t, where_text
    use emcon_text, only : string_t, to_text
    implicit none
@@ -73,30 +75,31 @@ contains
       type(scene_t), intent(inout) :: scene
       type(adjacency_t), intent(in) :: adjacency
       type(surface_t), intent(out) :: surface
-      integer :: n_before, n_item
+      character(len=:), allocatable :: known
+      logical :: is_refused
+      integer :: n_before, n_item, kind
 
       n_before = reader%log%n_errors
       allocate(surface%element(0), surface%face(0), surface%node(0))
-      if (scene%n_dim /= n_plane .and. any(["EDGE    ", "SEGMENTS"] &
+      if (any(["CYLINDER      ", "CUTTINGSURFACE", "REVOLUTION    ", "USER          "] &
          == option_name(card, "TYPE"))) then
-         call refuse_option(reader, card, "TYPE", "ELEMENT, NODE", "the model has three dimensions")
+         call option_words("surface", known)
+         call refuse_option(reader, card, "TYPE", known, "it is not in this version")
          return
       end if
-      select case (option_name(card, "TYPE"))
-      case ("", "ELEMENT")
+      kind = option_default("surface")
+      call choose_option(reader, card, "TYPE", "surface", kind, is_refused)
+      if (is_refused) return
+      select case (kind)
+      case (surface_of_faces)
          call read_faces(reader, card, scene, adjacency, surface)
-      case ("NODE")
+      case (surface_of_nodes)
          surface%is_nodal = .true.
          call read_nodes(reader, card, scene, surface)
-      case ("EDGE")
+      case (surface_of_lines)
          call read_edges(reader, card, scene, surface)
-      case ("SEGMENTS")
+      case (surface_of_segments)
          call read_segments(reader, card, scene, surface)
-      case ("CYLINDER", "CUTTINGSURFACE", "REVOLUTION", "USER")
-         call refuse_option(reader, card, "TYPE", "ELEMENT, NODE, EDGE, SEGMENTS", &
-            "the model is plane")
-      case default
-         call refuse_option(reader, card, "TYPE", "ELEMENT, NODE, EDGE, SEGMENTS", "")
       end select
       n_item = size(surface%element) + size(surface%node)
       if (allocated(surface%edge)) n_item = size(surface%edge, 2)

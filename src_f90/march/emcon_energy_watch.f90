@@ -48,7 +48,7 @@ module emcon_energy_watch
       !> What works are made of, root of the sum of squares of increments.
       real(wp) :: scale = 0.0_wp
       logical :: has_dynamics = .false.          !! a step keeps energy
-      logical :: is_explicit = .false.           !! a step is explicit
+      logical :: has_explicit = .false.          !! a step is explicit
    end type energy_watch_t
 
 contains
@@ -92,10 +92,10 @@ contains
       self%scale = hypot(self%scale, scale + sizes_of(ledger))
       self%largest = max(self%largest, ledger%kinetic + ledger%strain)
       self%largest_error = max(self%largest_error, abs(kept - self%at_start))
-      self%is_explicit = self%is_explicit .or. scheme%row%is_explicit
+      self%has_explicit = self%has_explicit .or. scheme%row%is_explicit
       done = -taken_by(ledger) - self%contact_before
       self%contact_before = -taken_by(ledger)
-      if (scheme%row%masses_resist .and. .not. is_stored) then
+      if (scheme%row%has_inertia .and. .not. is_stored) then
          self%contact_sum = self%contact_sum + done
          self%contact_taken = max(self%contact_taken, -self%contact_sum)
       end if
@@ -111,7 +111,7 @@ contains
          end if
       else
          self%reference = kept
-         if (scheme%row%masses_resist) then
+         if (scheme%row%has_inertia) then
             self%shown_error = max(self%shown_error, abs(kept - self%shown_reference))
             self%contact_made = max(self%contact_made, &
                ledger%contact_work - self%contact_reference)
@@ -194,7 +194,7 @@ contains
             " of the largest, which it should have stored: nodes that were in a surface have " // &
             "lost it at an end or a corner, where TYPE=NODE TO SURFACE of *CONTACT PAIR " // &
             "follows them; TYPE=NULL SPACE of *CONSTRAINT METHOD stores nothing")
-         if (self%is_explicit .and. self%contact_taken > most_loss*largest + rounding) then
+         if (self%has_explicit .and. self%contact_taken > most_loss*largest + rounding) then
             call taken_text(self, text)
             call note_add(reasons, text // " as explicit steps stop what touches: a finer mesh " &
                // "loses less, TYPE=PENALTY of *CONSTRAINT METHOD or an implicit step nothing")
@@ -212,7 +212,7 @@ contains
             most => most_loss*self%largest + energy_rounding(self))
          if (.not. self%contact_taken > least) return
          call taken_text(self, text)
-         if (.not. self%is_explicit) then
+         if (.not. self%has_explicit) then
             call note_add(warnings, text // " which *CONTACT INITIATION, " // &
                "TYPE=PERSISTENT or MASSLESS with SCHEME=ENERGY MOMENTUM keeps")
          else if (.not. self%contact_taken > most) then

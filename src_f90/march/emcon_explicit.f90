@@ -311,7 +311,7 @@ contains
          do k = 1, set%n
             contact = contact + 0.25_wp*(set%lam(k)*(h*way_of(set, k, state%v) &
                + way_of(set, k, motion%du)) + explicit%mu(k)*(condition_rate(set%item(k), &
-               motion%du) + h*condition_rate(set%item(k), self%v1)))
+               motion%du) + h*condition_rate(set%item(k), self%end_state%v)))
             set%lam(k) = 0.5_wp*(set%lam(k) + explicit%mu(k))
          end do
          work = 0.5_wp*sum((explicit%load0 + explicit%load)*motion%du) &
@@ -340,12 +340,12 @@ contains
       type(march_t), intent(inout) :: self
       real(wp), intent(in) :: work               !! of the step, its size [M L^2/T^2]
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: energy, momentum(size(self%v1, 1), size(self%v1, 2))
+      real(wp) :: energy, momentum(size(self%end_state%v, 1), size(self%end_state%v, 2))
       character(len=:), allocatable :: text
 
       associate (budget => self%state%explicit%budget)
-         call mass_times(self%system, self%v1, momentum)
-         energy = 0.5_wp*sum(self%v1*momentum) + abs(sum(self%end_state%energy)) &
+         call mass_times(self%system, self%end_state%v, momentum)
+         energy = 0.5_wp*sum(self%end_state%v*momentum) + abs(sum(self%end_state%energy)) &
             + abs(self%end_state%potential)
          if (.not. budget > 0.0_wp) budget = energy
          budget = budget + work

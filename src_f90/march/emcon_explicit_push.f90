@@ -34,9 +34,9 @@ contains
             self%newton%correction%kept)
          explicit%residual = system%response%residual
          call pick_unknowns(system%space%numbering, explicit%residual, residual)
-         explicit%v1 = self%v1
-         do i = 1, size(self%v1, 2)
-            do a = 1, size(self%v1, 1)
+         explicit%v1 = self%end_state%v
+         do i = 1, size(self%end_state%v, 2)
+            do a = 1, size(self%end_state%v, 1)
                if (system%space%numbering%unknown(a, i) > 0) explicit%v1(a, i) = &
                   evaluation_velocity(self%motion%evaluation, self%motion%v0(a, i), &
                   self%motion%du(a, i))
@@ -140,7 +140,7 @@ contains
    subroutine find_reactions(self, h)
       type(march_t), intent(inout) :: self
       real(wp), intent(in) :: h                  !! > 0 [T]
-      real(wp), dimension(size(self%v1, 1), size(self%v1, 2)) :: change, product
+      real(wp), dimension(size(self%end_state%v, 1), size(self%end_state%v, 2)) :: change, product
       integer :: k, i
 
       associate (explicit => self%explicit, set => self%active%set)

@@ -7,13 +7,14 @@ module emcon_explicit_soft
    use emcon_active_set, only : active_set_update_gaps, active_set_pass
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate, &
       constraints_force, constraints_select
+   use emcon_errors, only : error_t
+   use emcon_facets, only : facets_init, facets_t
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t
    use emcon_motion_bound, only : largest_motion
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_scene, only : scene_t
    use emcon_softness, only : softness_select
-   use emcon_surface_edges, only : surface_edges
    use emcon_term, only : role_internal
    implicit none
    private
@@ -30,7 +31,7 @@ contains
    subroutine explicit_soft_push(self, is_end)
       type(march_t), intent(inout) :: self
       logical, intent(in) :: is_end              !! of the step, else its start
-      real(wp) :: force(size(self%v1, 1), size(self%v1, 2))
+      real(wp) :: force(size(self%end_state%v, 1), size(self%end_state%v, 2))
       integer :: left
 
       if (.not. self%active%softness%is_at_ends) return
@@ -106,7 +107,8 @@ contains
    subroutine explicit_soft_limit(self, scene)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      integer, allocatable :: slave(:, :), master(:, :)
+      type(facets_t) :: slave, master
+      type(error_t), allocatable :: error
       real(wp) :: twice
       integer :: k
 
@@ -121,28 +123,22 @@ contains
                   last => system%first_constraint(k + 1), &
                   pair => scene%pair(abs(system%contact(k)%of_pair)))
                if (contact%slack > 0.0_wp) cycle
-               call surface_edges(scene, scene%surface(pair%slave), slave)
-               call surface_edges(scene, scene%surface(pair%master), master)
-               if (system%contact(k)%of_pair < 0) call exchange(slave, master)
+               associate (is_meant => system%contact(k)%of_pair > 0)
+                  call facets_init(slave, scene, &
+                     scene%surface(merge(pair%slave, pair%master, is_meant)), error)
+                  if (.not. allocated(error)) call facets_init(master, scene, &
+                     scene%surface(merge(pair%master, pair%slave, is_meant)), error)
+               end associate
+               if (allocated(error)) return      ! contact of them would not have been built
                twice = 1.0_wp
-               if (moves(self, contact%node) .and. moves(self, [master])) twice = 2.0_wp
+               if (moves(self, contact%node) .and. moves(self, master%node)) twice = 2.0_wp
                bound(contact%node) = bound(contact%node) + twice*stiffness(first:last)
-               call add_opposite(bound, scene%x, master, twice*sum(stiffness(first:last)) &
-                  /length_of(scene%x, slave))
+               call add_opposite(bound, master, twice*sum(stiffness(first:last))/sum(slave%size))
             end associate
          end do
       end associate
       self%explicit%met = self%explicit%stiffness
    end subroutine explicit_soft_limit
-
-   pure subroutine exchange(one, other)
-      integer, allocatable, intent(inout) :: one(:, :), other(:, :)
-      integer, allocatable :: held(:, :)
-
-      call move_alloc(one, held)
-      call move_alloc(other, one)
-      call move_alloc(held, other)
-   end subroutine exchange
 
    !> Are some of the nodes free to move?
    pure logical function moves(self, node)
@@ -163,16 +159,17 @@ contains
       moves = .false.
    end function moves
 
-   !> Add what master nodes are stiffened by: a pressure by depth over half of their edges.
-   pure subroutine add_opposite(bound, x, edge, by_length)
+   !> Add what master nodes are stiffened by: a pressure by depth over their part of each facet.
+   pure subroutine add_opposite(bound, master, by_size)
       real(wp), intent(inout) :: bound(:)        !! (n_node) [M/T^2]
-      real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) [L]
-      integer, intent(in) :: edge(:, :)          !! (2, n_edge)
-      real(wp), intent(in) :: by_length          !! [M/(L T^2)]
-      integer :: e
+      type(facets_t), intent(in) :: master
+      real(wp), intent(in) :: by_size            !! per length or area [M/(L T^2), M/(L^2 T^2)]
+      integer :: f
 
-      do e = 1, size(edge, 2)
-         bound(edge(:, e)) = bound(edge(:, e)) + 0.5_wp*by_length*length_of(x, edge(:, e:e))
+      do f = 1, master%n_facet
+         associate (node => pack(master%facet(:, f), master%facet(:, f) > 0))
+            bound(node) = bound(node) + by_size*master%size(f)/real(size(node), wp)
+         end associate
       end do
    end subroutine add_opposite
 
@@ -182,7 +179,7 @@ contains
    subroutine explicit_soft_widen(self, has_grown)
       type(march_t), intent(inout) :: self
       logical, intent(out) :: has_grown          !! the critical step is to be found with them
-      real(wp) :: total(size(self%v1, 2)), slope(size(self%explicit%stiffness))
+      real(wp) :: total(size(self%end_state%v, 2)), slope(size(self%explicit%stiffness))
       integer :: k, i
 
       has_grown = .false.
@@ -206,18 +203,5 @@ contains
          if (has_grown) bound = max(bound, room*total)
       end associate
    end subroutine explicit_soft_widen
-
-   pure real(wp) function length_of(x, edge) result(length)
-      real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) [L]
-      integer, intent(in) :: edge(:, :)          !! (2, n_edge)
-      integer :: e
-
-      length = 0.0_wp
-      do e = 1, size(edge, 2)
-         associate (side => x(:, edge(size(edge, 1), e)) - x(:, edge(1, e)))
-            length = length + sqrt(dot_product(side, side))      ! norm2 knows the units
-         end associate
-      end do
-   end function length_of
 
 end module emcon_explicit_soft

@@ -8,6 +8,7 @@ module emcon_explicit_type
    public :: explicit_t
 
    type :: explicit_t
+      logical :: is_on = .false.                 !! the step of the deck is explicit
       !> (n_unknown) what unknowns weigh, where the mass between them is a diagonal [M]
       real(wp), allocatable :: mass(:)
       logical :: is_free = .false.               !! nothing was held in the step

@@ -29,13 +29,13 @@ module emcon_force_scatter
 contains
 
    !> Follow a pair over an increment.
-   elemental subroutine scatter_follow(self, sum, masses_resist)
+   elemental subroutine scatter_follow(self, sum, is_dynamic)
       type(force_scatter_t), intent(inout) :: self
       type(pair_sum_t), intent(in) :: sum        !! what it has transmitted in the increment
-      logical, intent(in) :: masses_resist       !! it is dynamic, else it does not count
+      logical, intent(in) :: is_dynamic          !! else it does not count
       real(wp) :: force
 
-      if (.not. masses_resist .or. .not. sum%span > 0.0_wp) then
+      if (.not. is_dynamic .or. .not. sum%span > 0.0_wp) then
          self%last = 0.0_wp
          self%before = 0.0_wp
          self%is_falling = .false.

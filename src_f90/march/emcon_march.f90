@@ -50,17 +50,19 @@ contains
       call check_schemes(self, scene, error)
       if (.not. allocated(error)) call system_init(self%system, scene, error, given)
       if (allocated(error)) return
-      allocate(self%may_be_massless(size(scene%x, 2)), self%without_density(size(scene%x, 2)))
-      call terms_massless(self%system%term, self%may_be_massless, self%without_density)
-      call layer_init(self%layer, scene, self%may_be_massless, self%system, error, given)
+      allocate(self%massless%may_be(size(scene%x, 2)), &
+         self%massless%without_density(size(scene%x, 2)))
+      call terms_massless(self%system%term, self%massless%may_be, self%massless%without_density)
+      call layer_init(self%layer, scene, self%massless%may_be, self%system, error, given)
       if (allocated(error)) return
-      call host_copy_solvers(given, self%solver)
+      call host_copy_solvers(given, self%host%solver)
       call motion_init(self%motion, scene%x)
-      allocate(self%v1, source=at_rest(scene%x))
+      allocate(self%end_state%v, source=at_rest(scene%x))
       associate (state => self%state)
          allocate(state%u, source=scene%u0)
          allocate(state%v, source=scene%v0)
-         allocate(state%u_start, state%contact, state%reaction, state%internal, source=self%v1)
+         allocate(state%u_start, state%contact, state%reaction, state%internal, &
+            source=self%end_state%v)
          allocate(state%contacts%has_mass(size(scene%x, 2)), source=.false.)
          allocate(state%contacts%is_active(self%system%n_constraint), source=.false.)
          allocate(state%contacts%lam(self%system%n_constraint), source=0.0_wp)
@@ -90,7 +92,7 @@ contains
       do i = 1, size(scene%step)
          associate (choice => scene%step(i)%choice)
             if (scene%step(i)%scheme%code /= scheme_given) cycle
-            if (host_scheme_find(self%given_scheme, choice%name) > 0) cycle
+            if (host_scheme_find(self%host%scheme, choice%name) > 0) cycle
             call option_words("scheme", known)
             call raise(error, err_input, where_text(scene, choice%origin) // ": error: SCHEME=" // &
                choice%name // ": no program has given this scheme, see docs/embedding.md; EMCON " &
@@ -118,7 +120,6 @@ contains
 
       nullify(self%watcher)
       if (present(watcher)) self%watcher => watcher
-      self%is_interrupted => is_interrupted
       self%newton%is_interrupted => is_interrupted
    end subroutine march_watch
 

@@ -25,7 +25,7 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(csr_t) :: between
-      real(wp) :: mass(size(self%v1, 1), size(self%v1, 2))
+      real(wp) :: mass(size(self%end_state%v, 1), size(self%end_state%v, 2))
       integer :: i, k
 
       call terms_mass(self%system%term, between)
@@ -42,10 +42,10 @@ contains
          call gather_dependent(numbering, mass)
          where (numbering%unknown <= 0) mass = 0.0_wp
       end associate
-      self%estimate%mass = mass
-      if (.not. allocated(self%estimate%force)) then
-         allocate(self%estimate%force, source=mass)
-         allocate(self%estimate%push, source=mass)
+      self%step_check%estimate%mass = mass
+      if (.not. allocated(self%step_check%estimate%force)) then
+         allocate(self%step_check%estimate%force, source=mass)
+         allocate(self%step_check%estimate%push, source=mass)
       end if
    end subroutine accuracy_begin
 
@@ -55,13 +55,13 @@ contains
       type(part_t), intent(in) :: part
       real(wp), intent(in) :: tolerance          !! > 0
       integer, intent(inout) :: status           !! one of the `step_` codes
-      real(wp) :: change(size(self%v1, 1), size(self%v1, 2))
+      real(wp) :: change(size(self%end_state%v, 1), size(self%end_state%v, 2))
       real(wp) :: motion, smooth, whole
 
       call find_forces(self)
       if (.not. self%state%control%h_before > 0.0_wp) return
       associate (control => self%state%control, step_check => self%step_check, &
-            force => self%estimate%force, contact => self%estimate%push)
+            force => self%step_check%estimate%force, contact => self%step_check%estimate%push)
          motion = max(control%largest_kinetic, self%ledger%kinetic, kinetic_at_end(self))
          if (.not. motion > 0.0_wp) return
          call find_motion_change(self, part%h, change)
@@ -95,9 +95,9 @@ contains
       real(wp), intent(in) :: h                  !! > 0 [T]
 
       associate (control => self%state%control)
-         control%force = self%estimate%force
-         control%contact = self%estimate%push
-         if (control%n_known > 0) control%rate = self%estimate%rate
+         control%force = self%step_check%estimate%force
+         control%contact = self%step_check%estimate%push
+         if (control%n_known > 0) control%rate = self%step_check%estimate%rate
          control%velocity = self%motion%du/h
          control%n_known = min(2, control%n_known + 1)
          control%span = 0.5_wp*(control%h_before + h)
@@ -112,7 +112,7 @@ contains
       type(march_t), intent(inout) :: self       !! solved, not committed
 
       associate (set => self%active%set, numbering => self%system%space%numbering, &
-            force => self%estimate%force, contact => self%estimate%push)
+            force => self%step_check%estimate%force, contact => self%step_check%estimate%push)
          call constraints_force(set, set%n_permanent + 1, contact)
          force = self%system%response%part(role_inertia)%force - contact
          call gather_dependent(numbering, force)
@@ -123,7 +123,7 @@ contains
    !> Kinetic energy at the end of the solved step, before velocities jump [M L^2/T^2].
    real(wp) function kinetic_at_end(self)
       type(march_t), intent(in) :: self
-      real(wp), dimension(size(self%v1, 1), size(self%v1, 2)) :: v, momentum
+      real(wp), dimension(size(self%end_state%v, 1), size(self%end_state%v, 2)) :: v, momentum
 
       v = evaluation_velocity(self%motion%evaluation, self%motion%v0, self%motion%du &
          + self%motion%offset)
@@ -141,9 +141,9 @@ contains
       change = huge(1.0_wp)
       associate (control => self%state%control)
          span = 0.5_wp*(control%h_before + h)
-         self%estimate%rate = (self%motion%du/h - control%velocity)/span
-         if (control%n_known > 1) change = 2.0_wp*(self%estimate%rate - control%rate)/(span &
-            + control%span)
+         self%step_check%estimate%rate = (self%motion%du/h - control%velocity)/span
+         if (control%n_known > 1) change = 2.0_wp*(self%step_check%estimate%rate - control%rate) &
+            /(span + control%span)
       end associate
    end subroutine find_motion_change
 
@@ -162,7 +162,7 @@ contains
       squared = 0.0_wp
       do i = 1, size(force, 2)
          do a = 1, size(force, 1)
-            associate (m => self%estimate%mass(a, i))
+            associate (m => self%step_check%estimate%mass(a, i))
                if (m > 0.0_wp) squared = squared &
                   + m*(factor*min(abs(force(a, i)/(m*span)), abs(change(a, i))))**2
             end associate

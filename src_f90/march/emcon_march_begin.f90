@@ -1,7 +1,7 @@
 !> The beginning of a step of the deck: unknowns, scheme, solver and contact, and whether all that
 !> moves is held.
 module emcon_march_begin
-   use emcon_active_set, only : active_set_overclosure, active_set_t
+   use emcon_active_set, only : active_set_overclosure, active_set_suit, active_set_t
    use emcon_correction, only : correction_reset
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_explicit, only : explicit_prepare
@@ -17,7 +17,7 @@ module emcon_march_begin
    use emcon_kinds, only : dp, wp
    use emcon_layer, only : layer_begin_step, layer_mark
    use emcon_ledger, only : ledger_measure, ledger_t
-   use emcon_overlap_query_plane, only : overlap_text
+   use emcon_overlap_query, only : overlap_text
    use emcon_march_accuracy, only : accuracy_begin
    use emcon_march_grid, only : march_count_grid, march_grid_time, march_part_time
    use emcon_march_past, only : march_past_forget
@@ -37,7 +37,7 @@ module emcon_march_begin
    use emcon_state, only : state_t
    use emcon_step_control, only : control_begin
    use emcon_steps, only : initiation_massless, initiation_persistent, method_null_space, &
-      method_penalty, method_saddle_point, newton_kept, step_t
+      method_penalty, method_saddle_point, newton_kept, step_initiation, step_is_dynamic, step_t
    use emcon_system, only : system_begin_step, system_check_response, system_find_energy, &
       system_respond
    use emcon_term, only : role_internal
@@ -73,7 +73,7 @@ contains
       self%state%clock%start_time = self%state%clock%time
       self%state%explicit%critical_h = 0.0_wp
       call march_past_forget(self%state)
-      if (.not. scene%step(i_step)%scheme%masses_resist) self%state%v = 0.0_wp
+      if (.not. step_is_dynamic(scene%step(i_step))) self%state%v = 0.0_wp
       call system_begin_step(self%system, scene, i_step, error)
       if (.not. allocated(error)) call report_unresolved(scene, self%system, self%state%u, &
          self%system%notes, error)
@@ -86,7 +86,7 @@ contains
       if (.not. allocated(error)) call quasi_static_begin(self, scene)
    end subroutine march_begin_step
 
-   !> Where masses do not resist no body may be free to move, where they do none without mass.
+   !> In statics no body may be free to move, in dynamics none without mass.
    subroutine check_held(self, scene, error)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
@@ -94,7 +94,7 @@ contains
       character(len=:), allocatable :: text
 
       associate (step => scene%step(self%state%clock%i_step))
-         if (step%scheme%masses_resist) then
+         if (step_is_dynamic(step)) then
             call quasi_static_hold(self, scene, error)
             return
          end if
@@ -186,13 +186,13 @@ contains
          call newton_init(self%newton, self%system%space%numbering%n_unknown, &
             scene%x, step%solution%newton_tolerance, step%solution%newton_maximum)
          self%newton%convergence%polishes = step%solution%polishes
-         self%newton%is_interrupted => self%is_interrupted
          self%newton%deadline = deadline
          call choose_solver(self, step)
          state%base = factor_base_t()
-         self%newton%factor_policy%is_wanted = step%solution%newton == newton_kept
+         self%newton%factor_policy%is_wanted = step%solution%newton == newton_kept .and. &
+            step_is_dynamic(step)
          call begin_active(self%active, step, size(scene%rigid) > 0)
-         if (.not. step%scheme%masses_resist) call contact_support_begin(self%active%support, &
+         if (.not. step_is_dynamic(step)) call contact_support_begin(self%active%support, &
             self%system, scene, state%u)
          call configure_contact(self, scene)
          call softness_begin_step(self%active%softness, self%system, scene, step, error)
@@ -206,7 +206,7 @@ contains
       end associate
       self%system%lagged%is_on = .false.
       call measure_start(self, scene%x, error)
-      if (.not. allocated(error) .and. self%scheme%row%is_explicit) call explicit_prepare(self, &
+      if (.not. allocated(error) .and. self%explicit%is_on) call explicit_prepare(self, &
          scene, error)
       if (allocated(error)) return
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
@@ -228,7 +228,7 @@ contains
             if (scene%pair(i)%has_options) options = scene%pair(i)%options
          end if
          associate (contact => self%system%contact(i)%contact)
-            call contact%suit_steps(any(.not. scene%step%scheme%masses_resist))
+            call contact%suit_steps(any(.not. step_is_dynamic(scene%step)))
             call contact%configure(scene%x, options)
             if (.not. scene%step(1)%contact%resolves_overclosure) cycle
             call overclosure_follow_arcs(contact, scene%x, scene%u0, options, change)
@@ -252,14 +252,14 @@ contains
 
       call active_set_overclosure(self%active, self%system, scene%x, self%state%u_start, &
          step%contact%resolves_overclosure)
-      self%meant_overlap = 0.0_wp
+      self%overlap_check%meant_overlap = 0.0_wp
       call overlap_check_smooth(self%overlap_check, scene, step%contact%options)
       call overlap_check_excuse(self%overlap_check, scene%x, self%state%u_start, overlap)
       if (overlap%depth > touching_bar) call warn_of_overlap(self, scene, overlap)
       if (.not. step%contact%resolves_overclosure) return
       call overlap_check_step(self%overlap_check, scene%x, self%state%u_start, &
          at_rest(self%state%u), overlap)
-      self%meant_overlap = overlap%depth
+      self%overlap_check%meant_overlap = overlap%depth
    end subroutine begin_overclosure
 
    !> Bodies that overlap as a step begins, and no pair brings together: they stay so.
@@ -317,13 +317,10 @@ contains
 
       active%puts_off = .true.
       active%has_rigid = has_rigid
-      active%masses_resist = step%scheme%masses_resist
-      active%pushes_out = .not. active%masses_resist
-      active%holds_gap = any(step%contact%initiation == [initiation_persistent, &
-         initiation_massless]) &
-         .and. active%masses_resist .and. step%contact%method /= method_penalty
+      call active_set_suit(active, step)
+      active%holds_gap = any(step_initiation(step) == [initiation_persistent, &
+         initiation_massless]) .and. step%contact%method /= method_penalty
       active%closes = .false.
-      active%gap_tolerance = step%contact%gap_tolerance
       active%support = contact_support_t()
    end subroutine begin_active
 
@@ -336,8 +333,7 @@ contains
       logical :: is_slave(size(scene%x, 2))
       integer :: i, n
 
-      if (step%contact%initiation /= initiation_massless &
-         .or. .not. step%scheme%masses_resist) return
+      if (step_initiation(step) /= initiation_massless) return
       call warn_of_mass(self, scene)
       if (self%layer%is_on) then
          call layer_mark(self%layer, self%system, self%active%closes)
@@ -363,7 +359,7 @@ contains
       integer :: i
 
       do i = 1, self%system%n_pair
-         sheds(i) = any(self%may_be_massless(self%system%contact(i)%contact%node))
+         sheds(i) = any(self%massless%may_be(self%system%contact(i)%contact%node))
       end do
       do i = 1, self%system%n_pair
          associate (pair => scene%pair(i))
@@ -388,10 +384,11 @@ contains
          call correction_reset(self%newton%correction, method, step%solution%solver)
          call velocity_update_reset(self%velocity_update, step%solution%solver)
       else
-         i = host_find_solver(self%solver, step%solution%solver_name)
+         i = host_find_solver(self%host%solver, step%solution%solver_name)
          call correction_reset(self%newton%correction, method, solver_given + i, &
-            self%solver(i)%solver)
-         call velocity_update_reset(self%velocity_update, solver_given + i, self%solver(i)%solver)
+            self%host%solver(i)%solver)
+         call velocity_update_reset(self%velocity_update, solver_given + i, &
+            self%host%solver(i)%solver)
       end if
    end subroutine choose_solver
 
@@ -402,7 +399,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       associate (step => scene%step(self%state%clock%i_step))
-         if (.not. step%scheme%masses_resist .or. .not. step%time%tolerance > 0.0_wp) return
+         if (.not. step_is_dynamic(step) .or. .not. step%time%tolerance > 0.0_wp) return
          if (self%scheme%error_constant() > 0.0_wp) return
          call raise(error, err_input, where_text(scene, step%time%tolerance_origin) &
             // ": error: " // &
@@ -416,12 +413,13 @@ contains
       type(step_t), intent(in) :: step
       integer :: k
 
-      if (step%scheme%code /= scheme_given) then
+      if (step%scheme%code == scheme_given) then
+         k = host_scheme_find(self%host%scheme, step%choice%name)
+         call scheme_create(step%scheme, self%scheme, self%host%scheme(k)%scheme)
+      else
          call scheme_create(step%scheme, self%scheme)
-         return
       end if
-      k = host_scheme_find(self%given_scheme, step%choice%name)
-      call scheme_create(step%scheme, self%scheme, self%given_scheme(k)%scheme)
+      self%explicit%is_on = self%scheme%row%is_explicit
    end subroutine choose_scheme
 
 end module emcon_march_begin

@@ -20,13 +20,14 @@ module emcon_march_commit
    use emcon_pair_record, only : pair_record_jump, pair_record_measure
    use emcon_pair_sums, only : pair_sums_add, pair_sums_begin, pair_sums_jump
    use emcon_phases, only : phase_enter, phase_leave, phase_restitution
-   use emcon_evaluation, only : evaluation_velocity
+   use emcon_evaluation, only : evaluation_contact_place, evaluation_has_inertia, &
+      evaluation_velocity
    use emcon_quasi_static, only : quasi_static_move
    use emcon_restitution, only : restitution_take
    use emcon_scene, only : scene_t
    use emcon_softness, only : softness_depth, softness_keep, softness_stored
    use emcon_stand_off, only : stand_off_add
-   use emcon_steps, only : initiation_velocity_update
+   use emcon_steps, only : initiation_velocity_update, step_initiation
    use emcon_term, only : role_external, role_inertia, role_internal
    use emcon_term_registry, only : terms_dissipation
    use emcon_text, only : note_add, notes_t, to_text
@@ -58,7 +59,7 @@ contains
          state%reaction = system%response%residual/(1.0_wp + self%motion%evaluation%start_weight)
          if (set%n_permanent > 0) call constraints_force(set, set%n_permanent + 1, &
             self%newton%contact)
-         if (self%scheme%row%is_explicit) then
+         if (self%explicit%is_on) then
             call explicit_commit(self, h, error)
             if (allocated(error)) return
          else
@@ -73,7 +74,7 @@ contains
             ! Else round-off adds up between the nodes of a rigid body.
             call follow_links(system, state%u)
          end if
-         state%v = self%v1
+         state%v = self%end_state%v
          state%contact = self%newton%contact
          call record_pairs(self, scene, h)
          state%internal = self%end_state%force
@@ -90,7 +91,7 @@ contains
       end associate
       call tell_residual(self, increment)
       call keep_constraints(self)
-      if (self%scheme%row%is_explicit .and. self%explicit%is_free) return
+      if (self%explicit%is_on .and. self%explicit%is_free) return
       call factor_policy_commit(self%newton%factor_policy, self%newton%correction, self%motion, &
          self%state%base, is_due)
       if (is_due) self%system%phases%n_factorisation = self%system%phases%n_factorisation + 1
@@ -120,8 +121,7 @@ contains
 
       associate (state => self%state, system => self%system, explicit => self%explicit)
          if (.not. self%active%softness%is_at_ends) then
-            lag = merge(0.5_wp, 0.0_wp, self%scheme%row%masses_resist .and. &
-               .not. self%motion%evaluation%pushes_at_end)
+            lag = 1.0_wp - evaluation_contact_place(self%motion%evaluation)
             if (self%layer%is_settled) then
                ! Forces act where nodes without mass were before their balance.
                call pair_record_measure(state%pairs, system, self%active%set, scene%x, state%u &
@@ -130,16 +130,15 @@ contains
                call pair_record_measure(state%pairs, system, self%active%set, scene%x, state%u, &
                   self%motion%du, lag)
             end if
-            call pair_sums_add(state%sums, system, self%active%set, self%motion, h, &
-               self%scheme%row%masses_resist)
+            call pair_sums_add(state%sums, system, self%active%set, self%motion, h)
             call record_jumps(self, scene, h)
             return
          end if
          call pair_sums_add(state%sums, system, explicit%soft(explicit%i_start), self%motion, &
-            0.5_wp*h, .true.)
+            0.5_wp*h)
          explicit%i_start = 1 - explicit%i_start
          associate (soft => explicit%soft(explicit%i_start))
-            call pair_sums_add(state%sums, system, soft, self%motion, 0.5_wp*h, .true.)
+            call pair_sums_add(state%sums, system, soft, self%motion, 0.5_wp*h)
             call pair_record_measure(state%pairs, system, soft, scene%x, state%u, self%motion%du, &
                0.0_wp)
             self%ledger%contact_energy = softness_stored(self%active%softness, soft)
@@ -154,9 +153,10 @@ contains
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: h                  !! > 0 [T]
 
-      if (size(self%jump) == 0 .and. .not. allocated(self%state%pairs%jump)) return
-      call pair_sums_jump(self%state%sums, self%system, self%jump)
-      call pair_record_jump(self%state%pairs, self%system, self%jump, scene%x + self%state%u, h)
+      if (size(self%end_state%jump) == 0 .and. .not. allocated(self%state%pairs%jump)) return
+      call pair_sums_jump(self%state%sums, self%system, self%end_state%jump)
+      call pair_record_jump(self%state%pairs, self%system, self%end_state%jump, &
+         scene%x + self%state%u, h)
    end subroutine record_jumps
 
    !> What contacts stand off and give way by, how often they were pushed again, how they rub.
@@ -198,17 +198,18 @@ contains
       integer :: i, a
 
       associate (motion => self%motion, system => self%system)
-         do i = 1, size(self%v1, 2)
-            do a = 1, size(self%v1, 1)
+         do i = 1, size(self%end_state%v, 2)
+            do a = 1, size(self%end_state%v, 1)
                if (.not. system%space%numbering%unknown(a, i) > 0) cycle
-               self%v1(a, i) = evaluation_velocity(motion%evaluation, self%state%v(a, i), &
+               self%end_state%v(a, i) = evaluation_velocity(motion%evaluation, self%state%v(a, i), &
                   motion%du(a, i))
-               if (allocated(motion%v_past)) self%v1(a, i) = self%v1(a, i) + motion%v_past(a, i)
+               if (allocated(motion%v_past)) self%end_state%v(a, i) = self%end_state%v(a, i) &
+                  + motion%v_past(a, i)
                system%response%residual(a, i) = 0.0_wp
             end do
          end do
-         call follow_links(system, self%v1)
-         if (self%scheme%row%is_explicit) self%v1 = self%explicit%v1
+         call follow_links(system, self%end_state%v)
+         if (self%explicit%is_on) self%end_state%v = self%explicit%v1
       end associate
    end subroutine find_velocities
 
@@ -219,19 +220,19 @@ contains
       real(wp), intent(in) :: h                  !! > 0 [T]
       type(notes_t), intent(inout) :: notes      !! for the log
       type(error_t), allocatable, intent(out) :: error
+      logical :: has_inertia
       integer :: left
 
       call phase_enter(self%system%phases, phase_restitution, left)
-      call jumps_begin(self%jump)
-      if (self%scheme%row%masses_resist &
-         .and. scene%step(self%state%clock%i_step)%contact%initiation &
-         == initiation_velocity_update) call restore_energy(self, notes, error)
-      if (self%scheme%row%masses_resist .and. self%active%set%n > self%active%set%n_permanent &
+      call jumps_begin(self%end_state%jump)
+      has_inertia = evaluation_has_inertia(self%motion%evaluation)
+      if (step_initiation(scene%step(self%state%clock%i_step)) == initiation_velocity_update) &
+         call restore_energy(self, notes, error)
+      if (has_inertia .and. self%active%set%n > self%active%set%n_permanent &
          .and. .not. allocated(error)) call restitution_take(self, notes, error)
-      call quasi_static_move(self, h)
-      if (self%layer%is_on .and. self%scheme%row%masses_resist .and. .not. allocated(error)) then
-         call end_massless(self, h, notes, error)
-      end if
+      if (has_inertia) call quasi_static_move(self, h)
+      if (has_inertia .and. self%layer%is_on .and. .not. allocated(error)) call end_massless(self, &
+         h, notes, error)
       call phase_leave(self%system%phases, left)
    end subroutine restitute
 
@@ -287,8 +288,8 @@ contains
       integer :: i, k
 
       associate (layer => self%layer, set => self%active%set)
-         do i = 1, size(self%v1, 2)
-            if (layer%is_massless(i)) self%v1(:, i) = self%end_state%du(:, i)/h
+         do i = 1, size(self%end_state%v, 2)
+            if (layer%is_massless(i)) self%end_state%v(:, i) = self%end_state%du(:, i)/h
          end do
          if (.not. layer%is_settled) return
          lost = 0.0_wp
@@ -297,12 +298,12 @@ contains
          end do
          self%ledger%external_work = self%ledger%external_work + layer%work
          call velocity_update_push(self%velocity_update, self%system, set, &
-            push_t(layer%push, lost + layer%released), self%v1, has_root, error)
+            push_t(layer%push, lost + layer%released), self%end_state%v, has_root, error)
          if (allocated(error)) return
          if (has_root) then
             self%ledger%contact_work = self%ledger%contact_work + lost
             call jumps_scale(layer%jump, self%velocity_update%part)
-            call jumps_join(self%jump, layer%jump)
+            call jumps_join(self%end_state%jump, layer%jump)
          else
             call note_add(notes, "the energy " // to_text(lost + layer%released) // &
                " that contacts took as they opened or closed is not restored: there is no root")
@@ -318,13 +319,13 @@ contains
       real(wp) :: restored
       logical :: has_root
 
-      call velocity_update_apply(self%velocity_update, self%system, self%active%set, self%v1, &
-         restored, has_root, error)
+      call velocity_update_apply(self%velocity_update, self%system, self%active%set, &
+         self%end_state%v, restored, has_root, error)
       if (allocated(error)) return
       self%ledger%contact_work = self%ledger%contact_work + restored
       if (restored > 0.0_wp) then
          call note_add(notes, "velocity update restores an energy of " // to_text(restored))
-         call jumps_add(self%jump, self%active%set, &
+         call jumps_add(self%end_state%jump, self%active%set, &
             self%velocity_update%part*push_weights(self%active%set))
       end if
       if (.not. has_root) call note_add(notes, &
@@ -393,7 +394,7 @@ contains
                + 0.5_wp*sum((state%history%load + part(role_external)%force)*motion%du) &
                + sum(state%reaction*motion%du) + sum(part(role_inertia)%force*motion%offset) &
                /(1.0_wp + motion%evaluation%start_weight)
-         else if (self%scheme%row%masses_resist) then
+         else if (evaluation_has_inertia(motion%evaluation)) then
             do k = 1, set%n
                contact_work = contact_work + set%lam(k)*set%item(k)%dgap
             end do

@@ -4,7 +4,7 @@ module emcon_march_grid
    use emcon_march_types, only : grid_corner_t, march_t
    use emcon_scene, only : scene_t
    use emcon_step_control, only : most_power
-   use emcon_steps, only : step_t
+   use emcon_steps, only : step_is_dynamic, step_t
    implicit none
    private
    public :: march_count_grid, march_count_increments, march_grid_time, march_is_done, &
@@ -30,7 +30,7 @@ contains
       call count_points(self, step)
       h_max = step%time%h_max
       if (.not. h_max > 0.0_wp) then
-         h_max = merge(step%time%h, step%time%duration, step%scheme%masses_resist)
+         h_max = merge(step%time%h, step%time%duration, step_is_dynamic(step))
       end if
       self%grid%most_stride = 1
       if (.not. step%time%is_direct) then
@@ -57,7 +57,7 @@ contains
       if (allocated(self%grid%corner)) deallocate(self%grid%corner)
       allocate(self%grid%corner(0))
       if (allocated(step%time%corner) .and. .not. (step%time%is_direct &
-         .or. step%scheme%is_explicit)) then
+         .or. self%explicit%is_on)) then
          do i = 1, size(step%time%corner)
             next = point_at(self, step, step%time%corner(i))
             if (next%n > last_point(self)) self%grid%corner = [self%grid%corner, next]
@@ -128,8 +128,8 @@ contains
       integer :: n, power
 
       self%grid%judges_size = .false.
-      self%grid%is_controlled = step%scheme%masses_resist &
-         .and. .not. step%scheme%is_explicit .and. (step%time%tolerance > 0.0_wp &
+      self%grid%is_controlled = step_is_dynamic(step) &
+         .and. .not. self%explicit%is_on .and. (step%time%tolerance > 0.0_wp &
          .or. step%time%event_fraction > 0.0_wp)
       if (.not. self%grid%is_controlled) return
       self%grid%h_deck = step%time%h

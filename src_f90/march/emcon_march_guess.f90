@@ -1,6 +1,7 @@
 !> The first guess of a step: prescribed motion, and what the velocities lead to.
 module emcon_march_guess
-   use emcon_evaluation, only : instant_later, instant_t, evaluation_displacement
+   use emcon_evaluation, only : evaluation_displacement, evaluation_has_inertia, instant_later, &
+      instant_t
    use emcon_kinds, only : wp
    use emcon_march_past, only : march_past_take
    use emcon_march_types, only : march_t
@@ -24,18 +25,20 @@ contains
       logical, intent(in) :: is_at_rest          !! free nodes do not move in the guess
       type(instant_t) :: begin, finish
       real(wp) :: u, v
+      logical :: has_inertia
       integer :: k
 
       finish = instant_later(start, h)
       begin = start
       begin%h_before = self%state%history%h_before
       self%motion%evaluation = self%scheme%evaluation(begin, h)
+      has_inertia = evaluation_has_inertia(self%motion%evaluation)
       call march_past_take(self)
       self%motion%u0 = self%state%u
       self%motion%v0 = self%state%v
       self%motion%offset = 0.0_wp
       self%motion%du = 0.0_wp
-      if (self%scheme%row%masses_resist .and. .not. is_at_rest) self%motion%du = h*self%state%v
+      if (has_inertia .and. .not. is_at_rest) self%motion%du = h*self%state%v
       where (.not. self%system%space%is_alive) self%motion%du = 0.0_wp
       self%newton%driven = 0.0_wp
       associate (state => self%state, step => scene%step(self%state%clock%i_step))
@@ -44,9 +47,9 @@ contains
                call prescribed_motion(scene, step, step%prescribed(k), finish, &
                   state%u_start, u, v)
                self%motion%du(a, i) = u - state%u(a, i)
-               self%v1(a, i) = v
-               if (self%scheme%row%is_explicit) cycle
-               if (self%scheme%row%masses_resist) then
+               self%end_state%v(a, i) = v
+               if (self%explicit%is_on) cycle
+               if (has_inertia) then
                   if (allocated(self%motion%v_past)) v = v - self%motion%v_past(a, i)
                   self%motion%offset(a, i) = evaluation_displacement(self%motion%evaluation, &
                      state%v(a, i), v) - self%motion%du(a, i)

@@ -4,6 +4,7 @@ module emcon_march_parts
       step_loose, step_overlaps, step_passes_event, step_refused, step_rough, step_singular, &
       step_stands_off, step_strikes, step_too_far, step_unbalanced
    use emcon_errors, only : err_analysis, error_t, raise
+   use emcon_evaluation, only : evaluation_has_inertia
    use emcon_friction, only : friction_holds
    use emcon_kinds, only : wp
    use emcon_locking, only : strainless_element
@@ -196,8 +197,9 @@ contains
       type(march_t), intent(in) :: self
       integer, intent(in) :: status, level
 
-      may_return = any(self%layer%is_massless .and. .not. self%without_density) &
-         .and. self%scheme%row%masses_resist .and. any(status == [step_refused, step_diverged, &
+      may_return = any(self%layer%is_massless .and. .not. self%massless%without_density) &
+         .and. evaluation_has_inertia(self%motion%evaluation) &
+         .and. any(status == [step_refused, step_diverged, &
          step_singular, step_cycling, step_too_far, step_unbalanced]) .and. &
          level >= min(return_level, self%grid%n_level)
    end function may_return
@@ -325,7 +327,8 @@ contains
       character(len=:), allocatable, intent(inout) :: text
       character(len=:), allocatable :: motion, holders
 
-      if (.not. self%scheme%row%masses_resist .and. .not. allocated(self%active%support%text)) then
+      if (.not. (evaluation_has_inertia(self%motion%evaluation) &
+         .or. allocated(self%active%support%text))) then
          call free_motion_text(self%system, scene, &
             scene%step(self%state%clock%i_step)%prescribed, motion, with_contact=.true., &
             u=self%state%u)

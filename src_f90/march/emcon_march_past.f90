@@ -102,7 +102,7 @@ contains
       associate (state => self%state)
          if (.not. state%history%has_past) return
          if (size(state%history%past, 3) > 0) call self%scheme%carry(h, self%motion%du, &
-            self%motion%v0, self%v1, state%history%past)
+            self%motion%v0, self%end_state%v, state%history%past)
          state%history%load = self%system%response%part(role_external)%force
          state%history%h_before = h
       end associate

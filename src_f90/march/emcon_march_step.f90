@@ -13,18 +13,18 @@ module emcon_march_step
    use emcon_factor_policy, only : factor_policy_forget, factor_policy_step
    use emcon_kept_factor, only : kept_factor_renew
    use emcon_kinds, only : wp
-   use emcon_overlap_query_plane, only : overlap_names
+   use emcon_overlap_query, only : overlap_names
    use emcon_march_accuracy, only : accuracy_judge
    use emcon_march_commit, only : march_commit
    use emcon_march_events, only : events_judge, events_look
    use emcon_march_guess, only : march_guess
    use emcon_march_past, only : march_past_begin
-   use emcon_march_types, only : step_check_t, increment_t, march_t, part_t
+   use emcon_march_types, only : step_check_begin, increment_t, march_t, part_t
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_layer, only : layer_settle
    use emcon_phases, only : phase_enter, phase_factorise, phase_judge, phase_leave, &
       phase_restitution
-   use emcon_evaluation, only : instant_later, evaluation_at_end
+   use emcon_evaluation, only : evaluation_at_end, evaluation_has_inertia, instant_later
    use emcon_scene, only : scene_t
    use emcon_state, only : state_t
    use emcon_steps, only : method_null_space
@@ -56,7 +56,7 @@ contains
       integer :: left
 
       self%layer%needs_mass = .false.
-      self%step_check = step_check_t()
+      call step_check_begin(self%step_check)
       self%active%may_cut = part%may_cut
       self%active%gap_tolerance = 0.0_wp
       if (part%may_cut) self%active%gap_tolerance &
@@ -66,7 +66,7 @@ contains
       call solve(self, scene, part, increment, status, error)
       if (status /= step_done .or. allocated(error)) return
       self%layer%is_settled = .false.
-      if (self%layer%is_on .and. self%scheme%row%masses_resist) then
+      if (self%layer%is_on .and. evaluation_has_inertia(self%motion%evaluation)) then
          call phase_enter(self%system%phases, phase_restitution, left)
          call settle(self, scene, part, status, error)
          call phase_leave(self%system%phases, left)
@@ -110,14 +110,14 @@ contains
       integer :: attempt
 
       status = step_refused
-      if (self%scheme%row%is_explicit) call explicit_begin(self, scene, part, error)
+      if (self%explicit%is_on) call explicit_begin(self, scene, part, error)
       if (.not. allocated(error)) call march_past_begin(self, scene, part%start, error)
       if (.not. allocated(error)) call keep_factor(self, part, error)
       if (allocated(error)) return
       do attempt = 1, 2
          call march_guess(self, scene, part%start, part%h, is_at_rest=attempt == 2)
          call active_set_begin(self%active, self%system, self%motion, self%state)
-         if (self%scheme%row%is_explicit) then
+         if (self%explicit%is_on) then
             call explicit_fly(self, part%h, is_done, status)
             if (is_done) return
          end if
@@ -158,7 +158,7 @@ contains
 
       associate (factor_policy => self%newton%factor_policy, correction => self%newton%correction)
          factor_policy%is_allowed = factor_policy%is_wanted &
-            .and. self%scheme%row%masses_resist .and. .not. (self%active%friction%is_on &
+            .and. .not. (self%active%friction%is_on &
             .or. self%active%dashpots%is_on) .and. (correction%method == method_null_space &
             .or. self%system%n_constraint == 0)
          call factor_policy_step(factor_policy, correction, self%state%base, part%start, part%h, &
@@ -204,7 +204,7 @@ contains
       type(motion_t) :: place
       logical :: is_elsewhere
 
-      if (self%scheme%row%is_explicit) then
+      if (self%explicit%is_on) then
          call explicit_end(self, scene, part, is_elsewhere, error)
          if (is_elsewhere) status = step_refused
          return
@@ -254,25 +254,27 @@ contains
       type(overlap_t) :: overlap
       integer :: left
 
-      if (self%overlap_check%look%outline%n_piece == 0) return
+      if (self%overlap_check%n_piece == 0) return
       call phase_enter(self%system%phases, phase_judge, left)
       if (self%active%motion_bound%total &
-         + largest_motion(self%end_state%du) >= self%clear_until) then
+         + largest_motion(self%end_state%du) >= self%overlap_check%clear_until) then
          call overlap_check_step(self%overlap_check, scene%x, self%state%u, self%end_state%du, &
             overlap)
-         self%clear_until = self%active%motion_bound%total + self%overlap_check%clearance
+         self%overlap_check%clear_until = self%active%motion_bound%total &
+            + self%overlap_check%clearance
          if (self%overlap_check%stray%depth > increment%stray%depth) increment%stray &
             = self%overlap_check%stray
       end if
-      overlap%depth = max(0.0_wp, overlap%depth - self%active%left(1)*self%meant_overlap)
+      overlap%depth = max(0.0_wp, overlap%depth &
+         - self%active%left(1)*self%overlap_check%meant_overlap)
       if (part%may_cut .and. part%h > scale(increment%h, -judge_levels)) then
          if (goes_in(self, scene, overlap)) status = step_overlaps
       end if
       call phase_leave(self%system%phases, left)
       if (status /= step_done) return
-      overlap%of_edges = max(overlap%of_edges, increment%overlap%of_edges)
+      overlap%of_facets = max(overlap%of_facets, increment%overlap%of_facets)
       if (overlap%depth > increment%overlap%depth) increment%overlap = overlap
-      increment%overlap%of_edges = overlap%of_edges
+      increment%overlap%of_facets = overlap%of_facets
    end subroutine overlap_check
 
    !> Has the step brought bodies deeper into each other than guards allow, at nodes that contact of

@@ -8,7 +8,7 @@ module emcon_march_types
    use emcon_layer, only : layer_t
    use emcon_ledger, only : ledger_t
    use emcon_motion, only : motion_t
-   use emcon_newton, only : interrupt_interface, newton_t
+   use emcon_newton, only : newton_t
    use emcon_nodal_pull, only : nodal_pull_t
    use emcon_overlap_check, only : overlap_check_t, overlap_t
    use emcon_scheme, only : scheme_t
@@ -21,8 +21,8 @@ module emcon_march_types
    use emcon_velocity_update, only : velocity_update_t
    implicit none
    private
-   public :: march_t, time_grid_t, error_estimate_t, increment_t, part_t, end_state_t, rollback_t, &
-      step_check_t, grid_corner_t, watcher_t
+   public :: march_t, time_grid_t, increment_t, part_t, end_state_t, rollback_t, step_check_t, &
+      step_check_begin, grid_corner_t, watcher_t
 
    !> Somebody who is told how an increment goes that is made in parts.
    type, abstract :: watcher_t
@@ -79,6 +79,8 @@ module emcon_march_types
    !> What a step has come to at its end, and what the elements and the given forces are there.
    type :: end_state_t
       real(wp), allocatable :: du(:, :)          !! (n_dim, n_node) displacement over the step [L]
+      real(wp), allocatable :: v(:, :)           !! (n_dim, n_node) velocity [L/T]
+      type(velocity_jump_t), allocatable :: jump(:)  !! by which velocities have jumped there
       real(wp), allocatable :: force(:, :)       !! (n_dim, n_node) internal forces [M L/T^2]
       real(wp), allocatable :: energy(:)         !! (n_element) [M L^2/T^2]
       real(wp) :: potential = 0.0_wp             !! of the given forces [M L^2/T^2]
@@ -92,8 +94,18 @@ module emcon_march_types
       integer :: level = 0                       !! so often it was made shorter
    end type part_t
 
+   !> What the error of a step is estimated from.
+   type :: error_estimate_t
+      real(wp), allocatable :: mass(:, :)        !! (n_dim, n_node) of each unknown, else 0 [M]
+      !> (n_dim, n_node) mean forces on it over the step: of contact, and all others [M L/T^2]
+      real(wp), allocatable :: push(:, :), force(:, :)
+      !> (n_dim, n_node) change of the mean velocity over the mean of two steps [L/T^2]
+      real(wp), allocatable :: rate(:, :)
+   end type error_estimate_t
+
    !> What was found of the step that was solved last.
    type :: step_check_t
+      type(error_estimate_t) :: estimate
       real(wp) :: ratio = -1.0_wp                !! of its error to the tolerance; < 0: not judged
       logical :: changes_contact = .false.       !! contacts begin or end in it
       real(wp) :: event_at = 0.0_wp              !! part of it before the first event
@@ -120,46 +132,50 @@ module emcon_march_types
       integer :: least_power = 0, largest_power = 0   !! of two, of sizes that the error asks for
    end type time_grid_t
 
-   !> What the error of a step is estimated from.
-   type :: error_estimate_t
-      real(wp), allocatable :: mass(:, :)        !! (n_dim, n_node) of each unknown, else 0 [M]
-      !> (n_dim, n_node) mean forces on it over the step: of contact, and all others [M L/T^2]
-      real(wp), allocatable :: push(:, :), force(:, :)
-      !> (n_dim, n_node) change of the mean velocity over the mean of two steps [L/T^2]
-      real(wp), allocatable :: rate(:, :)
-   end type error_estimate_t
+   !> Which nodes have no mass.
+   type :: massless_t
+      logical, allocatable :: may_be(:)          !! (n_node) of contact surfaces, at first
+      logical, allocatable :: without_density(:) !! (n_node) of sections without inertia
+   end type massless_t
+
+   !> Kinds that the program has given.
+   type :: host_kinds_t
+      type(host_scheme_t), allocatable :: scheme(:)  !! (any)
+      type(solver_box_t), allocatable :: solver(:)   !! (any)
+   end type host_kinds_t
 
    type :: march_t
       type(time_grid_t) :: grid                  !! increments of the step
-      type(error_estimate_t) :: estimate         !! of the error of a step
       type(system_t) :: system
       type(state_t) :: state
       type(ledger_t) :: ledger
       class(scheme_t), allocatable :: scheme
-      type(host_scheme_t), allocatable :: given_scheme(:)   !! (any) by the program
+      type(host_kinds_t) :: host
       type(newton_t) :: newton
       type(active_set_t) :: active
       type(velocity_update_t) :: velocity_update
-      type(velocity_jump_t), allocatable :: jump(:)  !! at the end of the step
       type(layer_t) :: layer                     !! of massless contact surfaces
-      logical, allocatable :: may_be_massless(:) !! (n_node) massless at first
-      logical, allocatable :: without_density(:) !! (n_node) of sections without inertia
-      type(solver_box_t), allocatable :: solver(:)   !! that a program has given
+      type(massless_t) :: massless
       type(notes_t) :: warnings                  !! to be told with the next increment
       type(explicit_t) :: explicit               !! of explicit steps
       type(overlap_check_t) :: overlap_check
-      real(wp) :: clear_until = 0.0_wp           !! nothing for it to see, by `active%travel` [L]
-      !> Overlap per edge with which a step began that resolves it
-      real(wp) :: meant_overlap = 0.0_wp
       type(step_check_t) :: step_check
       integer :: revision = 0                    !! changes with the numbering of the unknowns
       type(motion_t) :: motion                   !! of the step
-      real(wp), allocatable :: v1(:, :)          !! (n_dim, n_node) velocity at its end
       type(end_state_t) :: end_state             !! of the step that was solved last
       type(rollback_t), allocatable :: before    !! of an increment that was cut
-      !> Asked before each iteration, if there is one.
-      procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
       class(watcher_t), pointer :: watcher => null()   !! told of each part, if there is one
    end type march_t
+
+contains
+
+   !> Nothing is found yet of the step that begins.
+   pure subroutine step_check_begin(self)
+      type(step_check_t), intent(inout) :: self
+
+      self%ratio = -1.0_wp
+      self%changes_contact = .false.
+      self%event_at = 0.0_wp
+   end subroutine step_check_begin
 
 end module emcon_march_types

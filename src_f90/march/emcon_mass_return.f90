@@ -28,13 +28,13 @@ contains
       logical, intent(out) :: has_changed        !! these are others
       type(error_t), allocatable, intent(out) :: error
 
-      has_changed = any((self%may_be_massless .and. .not. self%state%contacts%has_mass) &
+      has_changed = any((self%massless%may_be .and. .not. self%state%contacts%has_mass) &
          .neqv. self%layer%is_massless)
       if (.not. has_changed) return
-      call terms_return_mass(self%system%term, self%may_be_massless, self%state%contacts%has_mass, &
+      call terms_return_mass(self%system%term, self%massless%may_be, self%state%contacts%has_mass, &
          error)
       if (.not. allocated(error)) call layer_renew(self%layer, scene, &
-         self%may_be_massless .and. .not. self%state%contacts%has_mass, self%system, error)
+         self%massless%may_be .and. .not. self%state%contacts%has_mass, self%system, error)
    end subroutine mass_match
 
    !> The massless nodes that keep a step from being solved, and those of their elements: where the
@@ -49,7 +49,7 @@ contains
       logical :: may_have_mass(size(needs_mass))
       integer :: i
 
-      may_have_mass = self%layer%is_massless .and. .not. self%without_density
+      may_have_mass = self%layer%is_massless .and. .not. self%massless%without_density
       needs_mass = self%layer%needs_mass
       if (.not. any(needs_mass)) then
          left = 0.0_wp
@@ -106,7 +106,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       logical :: has_changed
 
-      call massless_follow(terms_solid(self%system%term), self%may_be_massless, is_back, &
+      call massless_follow(terms_solid(self%system%term), self%massless%may_be, is_back, &
          self%state%v)
       self%state%contacts%has_mass = self%state%contacts%has_mass .or. is_back
       call mass_match(self, scene, has_changed, error)

@@ -1,4 +1,4 @@
-!> The judge: after each step, is a body inside another, whatever the constraints say?
+!> After each step, is a body inside another, whatever the constraints say?
 !>
 !> All pieces of the mesh are looked at both ways, at the end of the step and, where they move by
 !> much, on the straight way there. Those that no pair brings together may overlap if they do at
@@ -10,10 +10,9 @@ module emcon_overlap_check
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_midside_plane, only : midside_init, midside_points, midside_stretch, midside_t
-   use emcon_outline_curves_plane, only : outline_curves_init
-   use emcon_outline_plane, only : outline_meets
-   use emcon_overlap_query_plane, only : overlap_query_init, overlap_query_longest, &
-      overlap_query_one_way, overlap_query_place, overlap_query_t, overlap_t
+   use emcon_outline, only : outline_meets
+   use emcon_overlap_query, only : overlap_query_t, overlap_t
+   use emcon_overlap_query_registry, only : new_overlap_query
    use emcon_scene, only : scene_t
    implicit none
    private
@@ -34,19 +33,25 @@ module emcon_overlap_check
    end type meeting_t
 
    type :: overlap_check_t
-      type(overlap_query_t) :: look
+      logical :: is_able = .false.               !! overlap can be looked for: not in space
+      integer :: n_piece = 0                     !! 0: nothing can meet
+      integer :: n_facet = 0                     !! of them
+      class(overlap_query_t), allocatable :: query     !! if it is able
       type(midside_t) :: midside                 !! of outlines, by contact points
       ! Where each piece is in a step:
       real(wp), allocatable :: low(:, :), high(:, :)     !! (n_dim, n_piece) box over the step [L]
       real(wp), allocatable :: least(:, :), most(:, :)   !! (n_dim, n_piece) motions of nodes [L]
       real(wp), allocatable :: thinnest(:)       !! (n_piece) element at the outline [L]
-      real(wp), allocatable :: longest(:)        !! (n_piece) edge [L]
+      real(wp), allocatable :: longest(:)        !! (n_piece) facet [L]
       integer, allocatable :: other(:)           !! (n_piece) work space
       type(meeting_t), allocatable :: excused(:) !! of pieces without a pair that may overlap
       type(overlap_t) :: stray                   !! the deepest of others without a pair
       !> As long as no node has moved farther since the start of the step that was last looked at,
       !> there is no overlap [L].
       real(wp) :: clearance = 0.0_wp
+      real(wp) :: clear_until = 0.0_wp           !! the same, as a total by `motion_bound_t` [L]
+      !> Overlap per edge with which a step began that resolves it
+      real(wp) :: meant_overlap = 0.0_wp
    end type overlap_check_t
 
 contains
@@ -57,10 +62,15 @@ contains
       type(scene_t), intent(in) :: scene
       type(surface_t) :: outline
 
-      call overlap_query_init(self%look, scene)
-      outline%edge = self%look%outline%edge
-      call midside_init(self%midside, scene, [integer ::], outline)
-      associate (n => self%look%outline%n_piece)
+      call new_overlap_query(scene, self%query)
+      self%is_able = allocated(self%query)
+      if (self%is_able) then
+         self%n_piece = self%query%outline%n_piece
+         self%n_facet = size(self%query%outline%facet, 2)
+         outline%edge = self%query%outline%facet
+         call midside_init(self%midside, scene, [integer ::], outline)
+      end if
+      associate (n => self%n_piece)
          allocate(self%low(scene%n_dim, n), self%high(scene%n_dim, n), &
             self%least(scene%n_dim, n), self%most(scene%n_dim, n))
          allocate(self%thinnest(n), self%longest(n), self%other(n), self%excused(0))
@@ -68,13 +78,13 @@ contains
       call overlap_check_smooth(self, scene, contact_options_t())
    end subroutine overlap_check_init
 
-   !> Begin a step of `scene` with the options `options` of contact: what edges stand for.
+   !> Begin a step of `scene` with the options `options` of contact: what facets stand for.
    subroutine overlap_check_smooth(self, scene, options)
       type(overlap_check_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(contact_options_t), intent(in) :: options
 
-      call outline_curves_init(self%look%curves, self%look%outline, scene, options)
+      if (self%is_able) call self%query%begin(scene, options)
    end subroutine overlap_check_smooth
 
    !> What overlaps at `u`, and no pair brings together, is left as it is from then on.
@@ -104,11 +114,11 @@ contains
       allocate(meant(0))
       rest = 0.0_wp
       call place(self, x, u, rest, tree)
-      do p = 1, self%look%outline%n_piece
+      do p = 1, self%n_piece
          call find_later(self, tree, p, n)
          do i = 1, n
-            if (self%look%outline%body(p) == self%look%outline%body(self%other(i))) cycle
-            if (outline_meets(self%look%outline, p, self%other(i))) cycle
+            if (self%query%outline%body(p) == self%query%outline%body(self%other(i))) cycle
+            if (outline_meets(self%query%outline, p, self%other(i))) cycle
             overlap = overlap_t()
             call overlap_check_pieces(self, p, self%other(i), x, u, rest, overlap)
             if (overlap%depth > 0.0_wp) meant = [meant, meeting_t(p, self%other(i))]
@@ -125,16 +135,16 @@ contains
       type(overlap_t), intent(out) :: overlap
 
       if (self%midside%n == 0) then
-         call judge_points(self, x, u0, du, overlap)
+         call check_points(self, x, u0, du, overlap)
       else
-         call judge_points(self, x, midside_points(self%midside, u0), &
+         call check_points(self, x, midside_points(self%midside, u0), &
             midside_points(self%midside, du), overlap)
          self%clearance = self%clearance/midside_stretch(self%midside)
       end if
    end subroutine overlap_check_step
 
    !> The same, by the displacements of contact points.
-   subroutine judge_points(self, x, u0, du, overlap)
+   subroutine check_points(self, x, u0, du, overlap)
       type(overlap_check_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)      !! (n_dim, n_node) [L]
       type(overlap_t), intent(out) :: overlap
@@ -143,14 +153,14 @@ contains
       logical :: is_apart
 
       self%stray = overlap_t()
-      if (self%look%outline%n_piece == 0) return
+      if (self%n_piece == 0) return
       is_apart = .true.
       call place(self, x, u0, du, tree)
-      do p = 1, self%look%outline%n_piece
+      do p = 1, self%n_piece
          call find_later(self, tree, p, n)
          do i = 1, n
             if (is_excused(self, p, self%other(i))) cycle
-            if (outline_meets(self%look%outline, p, self%other(i))) then
+            if (outline_meets(self%query%outline, p, self%other(i))) then
                call overlap_check_pieces(self, p, self%other(i), x, u0, du, overlap)
             else
                call overlap_check_pieces(self, p, self%other(i), x, u0, du, self%stray)
@@ -160,7 +170,7 @@ contains
       end do
       self%clearance = 0.0_wp
       if (is_apart) self%clearance = half_way*least_distance(self)
-   end subroutine judge_points
+   end subroutine check_points
 
    !> Measure all pieces over the step, and put their boxes into a tree.
    pure subroutine place(self, x, u0, du, tree)
@@ -169,7 +179,7 @@ contains
       type(box_tree_t), intent(out) :: tree
       integer :: p
 
-      do p = 1, self%look%outline%n_piece
+      do p = 1, self%n_piece
          call measure(self, p, x, u0, du)
       end do
       call box_tree_init(tree, self%low, self%high)
@@ -198,11 +208,11 @@ contains
       type(overlap_check_t), intent(in) :: self
       integer, intent(in) :: p, q                !! p <= q
 
-      associate (body => self%look%outline%body)
+      associate (body => self%query%outline%body)
          is_excused = body(p) == body(q) .or. &
             any(self%excused%first == p .and. self%excused%second == q)
       end associate
-      if (is_excused) is_excused = .not. outline_meets(self%look%outline, p, q)
+      if (is_excused) is_excused = .not. outline_meets(self%query%outline, p, q)
    end function is_excused
 
    !> Smallest distance of the boxes of two pieces that are looked at, by the axis where it is
@@ -212,8 +222,8 @@ contains
       integer :: p, q
 
       least_distance = huge(least_distance)
-      do p = 1, self%look%outline%n_piece
-         do q = p + 1, self%look%outline%n_piece
+      do p = 1, self%n_piece
+         do q = p + 1, self%n_piece
             if (is_excused(self, p, q)) cycle
             least_distance = min(least_distance, maxval(max(self%low(:, p) - self%high(:, q), &
                self%low(:, q) - self%high(:, p))))
@@ -234,32 +244,33 @@ contains
       n = count_looks(self, p, q)
       do k = 1, n
          share = real(k, wp)/real(n, wp)
-         self%look%is_passing = k < n
-         call overlap_query_place(self%look, p, x, u0, du, share)
-         if (q /= p) call overlap_query_place(self%look, q, x, u0, du, share)
-         call overlap_query_one_way(self%look, p, q, x, reach, overlap)
-         if (q /= p) call overlap_query_one_way(self%look, q, p, x, reach, overlap)
+         self%query%is_passing = k < n
+         call self%query%place(p, x, u0, du, share)
+         if (q /= p) call self%query%place(q, x, u0, du, share)
+         call self%query%overlap(p, q, x, reach, overlap)
+         if (q /= p) call self%query%overlap(q, p, x, reach, overlap)
       end do
    end subroutine overlap_check_pieces
 
-   !> Box, motion and edges of piece `p` over the step.
+   !> Box, motion and facets of piece `p` over the step.
    pure subroutine measure(self, p, x, u0, du)
       type(overlap_check_t), intent(inout) :: self
       integer, intent(in) :: p
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       real(wp) :: here(size(x, 1))
-      integer :: e, k
+      integer :: f, k
 
       self%low(:, p) = huge(1.0_wp)
       self%high(:, p) = -huge(1.0_wp)
       self%least(:, p) = huge(1.0_wp)
       self%most(:, p) = -huge(1.0_wp)
-      associate (edge => self%look%outline%edge, first => self%look%outline%start(p), &
-            last => self%look%outline%start(p + 1) - 1)
-         do e = first, last
-            do k = 1, size(edge, 1)
-               associate (move => du(:, edge(k, e)))
-                  here = x(:, edge(k, e)) + u0(:, edge(k, e))
+      associate (facet => self%query%outline%facet, first => self%query%outline%start(p), &
+            last => self%query%outline%start(p + 1) - 1)
+         do f = first, last
+            do k = 1, size(facet, 1)
+               if (facet(k, f) == 0) exit
+               associate (move => du(:, facet(k, f)))
+                  here = x(:, facet(k, f)) + u0(:, facet(k, f))
                   self%low(:, p) = min(self%low(:, p), here, here + move)
                   self%high(:, p) = max(self%high(:, p), here, here + move)
                   self%least(:, p) = min(self%least(:, p), move)
@@ -267,9 +278,9 @@ contains
                end associate
             end do
          end do
-         self%thinnest(p) = minval(self%look%outline%thickness(first:last))
+         self%thinnest(p) = minval(self%query%outline%thickness(first:last))
       end associate
-      self%longest(p) = overlap_query_longest(self%look, p, x, u0)
+      self%longest(p) = self%query%longest(p, x, u0)
    end subroutine measure
 
    !> Looks at the step for two pieces, so that they move by little in between.

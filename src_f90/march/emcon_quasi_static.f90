@@ -12,6 +12,7 @@ module emcon_quasi_static
    use emcon_mechanism_text, only : free_motion_text
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_scene, only : scene_t
+   use emcon_steps, only : step_is_dynamic
    use emcon_system, only : system_loads
    use emcon_text, only : note_add, to_text
    implicit none
@@ -32,7 +33,7 @@ contains
       character(len=:), allocatable :: text
       real(dp), allocatable :: mass(:)
 
-      if (.not. any(self%without_density)) return
+      if (.not. any(self%massless%without_density)) return
       call body_masses(self%system, mass)
       call free_motion_text(self%system, scene, scene%step(self%state%clock%i_step)%prescribed, &
          text, with_contact=.true., is_held=mass > 0.0_dp, u=self%state%u)
@@ -48,7 +49,8 @@ contains
       real(wp), dimension(size(scene%x, 1), size(scene%x, 2)) :: load, left
       real(wp) :: largest
 
-      if (.not. (any(self%without_density) .and. self%scheme%row%masses_resist)) return
+      if (.not. (any(self%massless%without_density) .and. &
+         step_is_dynamic(scene%step(self%state%clock%i_step)))) return
       associate (state => self%state)
          start = motion_of(evaluation_at_end, scene%x, state%u, at_rest(scene%x))
          start%evaluation%load_instant = instant_later(instant_t(0.0_wp, state%clock%start_time), &
@@ -56,7 +58,7 @@ contains
          call system_loads(self%system, start, load)
          left = abs(state%internal - load - state%contact)
          left = merge(left, 0.0_wp, self%system%space%numbering%unknown > 0 &
-            .and. spread(self%without_density, 1, size(left, 1)))
+            .and. spread(self%massless%without_density, 1, size(left, 1)))
          largest = maxval(left)
          if (largest <= out_of_balance*maxval(abs(load) + abs(state%internal))) return
          call note_add(self%warnings, "a force of " // to_text(largest, 3) // " is not balanced " &
@@ -66,15 +68,14 @@ contains
       end associate
    end subroutine quasi_static_begin
 
-   !> What has no mass moves as its displacement says.
+   !> In a dynamic step what has no mass moves as its displacement says.
    pure subroutine quasi_static_move(self, h)
       type(march_t), intent(inout) :: self
       real(wp), intent(in) :: h                  !! of the step, > 0 [T]
       integer :: i
 
-      if (.not. self%scheme%row%masses_resist) return
-      do i = 1, size(self%without_density)
-         if (self%without_density(i)) self%v1(:, i) = self%end_state%du(:, i)/h
+      do i = 1, size(self%massless%without_density)
+         if (self%massless%without_density(i)) self%end_state%v(:, i) = self%end_state%du(:, i)/h
       end do
    end subroutine quasi_static_move
 

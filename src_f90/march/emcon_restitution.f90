@@ -29,7 +29,8 @@ contains
       call find_impacts(self, jump)
       if (.not. any(jump%change < 0.0_wp)) return
       associate (set => self%active%set, ledger => self%ledger)
-         call velocity_update_change(self%velocity_update, self%system, set, jump, self%v1, error)
+         call velocity_update_change(self%velocity_update, self%system, set, jump, &
+            self%end_state%v, error)
          if (allocated(error)) return
          if (.not. jump%is_done) then
             call note_add(notes, "contacts that close in this step rebound fully, whatever their " &
@@ -41,7 +42,7 @@ contains
          ledger%restitution = ledger%restitution + jump%lost
          lam = 0.0_wp
          lam(jump%row) = jump%impulse
-         call jumps_add(self%jump, set, lam)
+         call jumps_add(self%end_state%jump, set, lam)
       end associate
    end subroutine restitution_take
 
@@ -72,13 +73,14 @@ contains
          do k = set%n_linear + 1, set%n
             rate(k) = 0.0_wp
             do i = 1, set%item(k)%n_node
-               rate(k) = rate(k) + dot_product(set%item(k)%c(:, i), self%v1(:, set%item(k)%node(i)))
+               rate(k) = rate(k) + dot_product(set%item(k)%c(:, i), &
+                  self%end_state%v(:, set%item(k)%node(i)))
             end do
             call constraint_index(self%system, set%id(k), pair, i)
             if (pair == 0) cycle
             associate (contact => self%system%contact(pair)%contact, &
                   node => set%item(k)%node(:set%item(k)%n_node))
-               is_row(k) = .not. any(self%without_density(node))
+               is_row(k) = .not. any(self%massless%without_density(node))
                if (self%layer%is_on) then
                   is_row(k) = is_row(k) .and. .not. any(self%layer%is_massless(node))
                end if

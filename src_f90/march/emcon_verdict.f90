@@ -7,13 +7,14 @@ module emcon_verdict
    use emcon_bent_bodies, only : bent_body_find, bent_body_t
    use emcon_energy_watch, only : energy_follow, energy_is_failure, energy_move, energy_reasons, &
       energy_start, energy_warnings, energy_watch_t
+   use emcon_evaluation, only : evaluation_has_inertia
    use emcon_far_nodes, only : far_element_find
    use emcon_force_scatter, only : force_scatter_t, scatter_follow
    use emcon_guards, only : overlap_bar, overlap_told, touching_bar
    use emcon_kinds, only : wp
    use emcon_locking, only : locking_advice, locking_element
    use emcon_ledger, only : ledger_t
-   use emcon_overlap_query_plane, only : overlap_text
+   use emcon_overlap_query, only : overlap_text
    use emcon_march, only : increment_t, march_is_done, march_t
    use emcon_nodal_pull, only : nodal_pull_join, nodal_pull_t
    use emcon_scene, only : scene_t
@@ -54,7 +55,7 @@ module emcon_verdict
       real(wp) :: bar = touching_bar
       real(wp) :: deepest = 0.0_wp               !! penetration per edge
       real(wp) :: time = 0.0_wp                  !! of the deepest one [T]
-      real(wp) :: of_edges = 0.0_wp              !! of edges that stand for curves, per edge
+      real(wp) :: of_facets = 0.0_wp              !! of edges that stand for curves, per edge
       character(len=:), allocatable :: place     !! of the deepest one: bodies and nodes
    end type overlap_found_t
 
@@ -164,7 +165,8 @@ contains
       associate (state => march%state)
          self%law_missed = max(self%law_missed, increment%law_missed)
          self%largest_push = max(self%largest_push, increment%largest_push)
-         call scatter_follow(self%scatter, state%sums%sum, march%scheme%row%masses_resist)
+         call scatter_follow(self%scatter, state%sums%sum, &
+            evaluation_has_inertia(march%motion%evaluation))
          if (increment%give > self%softness%give) then
             self%softness%give = increment%give
             self%softness%time = state%clock%time
@@ -219,7 +221,7 @@ contains
       type(march_t), intent(in) :: march
       type(increment_t), intent(in) :: increment
 
-      self%overlap%of_edges = max(self%overlap%of_edges, increment%overlap%of_edges)
+      self%overlap%of_facets = max(self%overlap%of_facets, increment%overlap%of_facets)
       associate (overlap => increment%overlap, stray => increment%stray)
          if (max(overlap%depth, stray%depth) <= self%overlap%deepest) return
          self%overlap%deepest = max(overlap%depth, stray%depth)

@@ -1,23 +1,20 @@
 !> Contact before the first step: adjustment, orientation, crossing, penetration.
 !>
-!> All formulations are judged by the gaps of nodes over edges.
+!> All formulations are judged by the gaps of nodes over facets.
 module emcon_initial_contact
-   use emcon_chain, only : chain_corners, chain_crossing, chain_t
    use emcon_contact, only : contact_t, gap_state_t
-   use emcon_contact_registry, only : new_contact
+   use emcon_contact_registry, only : new_contact, new_start_gaps
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_facets, only : facets_length, facets_text
    use emcon_guards, only : guard_slack
    use emcon_host, only : host_find_contact, host_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_given, &
       formulation_nts
    use emcon_kinds, only : wp
-   use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t, where_text
-   use emcon_self_contact, only : chain_faces
    use emcon_sort, only : find_sorted
-   use emcon_start_gaps, only : start_gaps_init, start_gaps_measure, start_gaps_nearest, &
-      start_gaps_t, start_gaps_way
-   use emcon_surface_edges, only : faces_of_edges
+   use emcon_start_gaps, only : is_master, is_slave, start_gaps_t
+   use emcon_steps, only : step_is_dynamic
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
    implicit none
    private
@@ -49,7 +46,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(host_t), intent(in), optional :: given    !! contact of pairs, among others
       type(contact_options_t) :: options
-      type(start_gaps_t) :: contact
+      class(start_gaps_t), allocatable :: contact
       logical :: is_checked(size(scene%surface))
       logical :: is_meant                        !! overclosure is
       real(wp) :: noise
@@ -69,12 +66,12 @@ contains
                if (allocated(error)) return
                cycle
             end if
-            call start_gaps_init(contact, scene, pair, error, options)
+            call new_start_gaps(scene, pair, contact, error, options)
             if (allocated(error)) return
             if (.not. contact%is_self) then
-               call check_crossing(scene, pair%slave, contact%slave, is_checked, error)
-               if (.not. allocated(error)) call check_crossing(scene, pair%master, &
-                  contact%master, is_checked, error)
+               call check_crossing(scene, pair%slave, contact, is_slave, is_checked, error)
+               if (.not. allocated(error)) call check_crossing(scene, pair%master, contact, &
+                  is_master, is_checked, error)
                if (.not. allocated(error)) call check_sides(scene, pair, contact, noise, &
                   "master", error)
                if (.not. allocated(error)) call check_slave_sides(scene, pair, noise, error)
@@ -86,7 +83,7 @@ contains
             end if
             ! Bodies of one surface may cross each other where their overlap is to be resolved.
             if (contact%is_self .and. .not. (is_meant .and. pair%both_sides)) then
-              call check_crossing(scene, pair%slave, contact%slave, is_checked, error)
+               call check_crossing(scene, pair%slave, contact, is_slave, is_checked, error)
             end if
             if (is_meant .and. .not. allocated(error)) cycle
             if (allocated(error)) return
@@ -138,12 +135,12 @@ contains
       type(notes_t), intent(inout) :: notes
       type(error_t), allocatable, intent(inout) :: error     !! out: none, or the same
       type(contact_pair_t) :: other
-      type(start_gaps_t) :: contact
+      class(start_gaps_t), allocatable :: contact
       type(error_t), allocatable :: fault
 
       other = reversed(pair)
       other%is_exchanged = .not. pair%is_exchanged
-      call start_gaps_init(contact, scene, other, fault, options)
+      call new_start_gaps(scene, other, contact, fault, options)
       if (.not. allocated(fault)) call check_penetration(scene, other, contact, noise, fault)
       if (allocated(fault)) return
       deallocate(error)
@@ -154,46 +151,27 @@ contains
    end subroutine exchange
 
    !> A surface that crosses itself has no outside. Each surface is looked at once.
-   subroutine check_crossing(scene, number, chain, is_checked, error)
+   subroutine check_crossing(scene, number, contact, which, is_checked, error)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: number              !! of the surface
-      type(chain_t), intent(in) :: chain
+      class(start_gaps_t), intent(in) :: contact
+      integer, intent(in) :: which               !! of its surfaces: `is_slave` or `is_master`
       logical, intent(inout) :: is_checked(:)    !! (n_surface)
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: one, other
       integer :: first, second
 
-      if (is_checked(number) .or. chain%n_edge == 0) return
+      if (is_checked(number) .or. contact%surface(which)%n_facet == 0) return
       is_checked(number) = .true.
-      call chain_crossing(chain, scene%x, scene%u0, first, second)
+      call contact%crossing(which, scene, first, second)
       if (first == 0) return
+      call facets_text(contact%surface(which), scene, first, one)
+      call facets_text(contact%surface(which), scene, second, other)
       associate (surface => scene%surface(number))
-         call face_text(scene, surface, chain, first, one)
-         call face_text(scene, surface, chain, second, other)
          call raise(error, err_input, where_text(scene, surface%origin) // ": error: contact " // &
             "surface " // surface%name // " crosses itself: " // one // " and " // other)
       end associate
    end subroutine check_crossing
-
-   !> "face S1 of element 7 (nodes 1, 2)" for edge `e` of the chain of `surface`, or of a surface of
-   !> edges "the edge (nodes 1, 2)".
-   subroutine face_text(scene, surface, chain, e, text)
-      type(scene_t), intent(in) :: scene
-      type(surface_t), intent(in) :: surface
-      type(chain_t), intent(in) :: chain
-      integer, intent(in) :: e
-      character(len=:), allocatable, intent(out) :: text
-      integer, allocatable :: face(:)
-
-      text = "the edge"
-      if (.not. allocated(surface%edge)) then
-         call faces_of_edges(scene, surface, face)
-         text = "face S" // to_text(surface%face(face(e))) // " of element " &
-            // to_text(scene%element%label(surface%element(face(e))))
-      end if
-      text = text // " (nodes " // to_text(scene%node%label(chain%edge(1, e))) // ", " // &
-         to_text(scene%node%label(chain%edge(2, e))) // ")"
-   end subroutine face_text
 
    !> The same pair with slave and master exchanged.
    pure function reversed(pair) result(other)
@@ -211,10 +189,10 @@ contains
       type(contact_pair_t), intent(in) :: pair
       real(wp), intent(in) :: noise              !! of coordinates [L]
       type(error_t), allocatable, intent(out) :: error
-      type(start_gaps_t) :: contact
+      class(start_gaps_t), allocatable :: contact
 
       if (scene%surface(pair%slave)%is_nodal) return
-      call start_gaps_init(contact, scene, reversed(pair), error)
+      call new_start_gaps(scene, reversed(pair), contact, error)
       if (allocated(error)) return
       call check_sides(scene, reversed(pair), contact, noise, "slave", error)
    end subroutine check_slave_sides
@@ -223,7 +201,7 @@ contains
    subroutine check_sides(scene, pair, contact, noise, title, error)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
-      type(start_gaps_t), intent(inout) :: contact
+      class(start_gaps_t), intent(inout) :: contact
       real(wp), intent(in) :: noise              !! of coordinates [L]
       character(len=*), intent(in) :: title      !! what the deck calls the master of `pair`
       type(error_t), allocatable, intent(out) :: error
@@ -235,7 +213,7 @@ contains
       n_over = 0
       n_behind = 0
       do i = 1, contact%n, stride
-         call start_gaps_nearest(contact, i, scene, gap, is_over)
+         call contact%nearest(i, scene, gap, is_over)
          if (.not. is_over) cycle
          n_over = n_over + 1
          if (is_behind(scene, contact, i, gap, noise)) n_behind = n_behind + 1
@@ -250,16 +228,15 @@ contains
    !> Is slave node `i` on the wrong side of the master, rather than slightly inside the body?
    pure logical function is_behind(scene, contact, i, gap, noise)
       type(scene_t), intent(in) :: scene
-      type(start_gaps_t), intent(in) :: contact
+      class(start_gaps_t), intent(in) :: contact
       integer, intent(in) :: i
-      real(wp), intent(in) :: gap                !! over contact%edge(i) [L]
+      real(wp), intent(in) :: gap                !! over contact%facet(i) [L]
       real(wp), intent(in) :: noise              !! of coordinates [L]
 
-      associate (master => contact%master, e => contact%edge(i))
-         is_behind = gap < -deepest_overlap*master%length(e)
-         if (is_behind .or. gap >= -noise .or. contact%slave%n_edge == 0) return
-         is_behind = .not. chain_faces(contact%slave, i, master%edge(:, e), scene%x, scene%u0)
-      end associate
+      is_behind = gap < -deepest_overlap &
+         *facets_length(contact%surface(is_master), contact%facet(i))
+      if (is_behind .or. gap >= -noise .or. contact%surface(is_slave)%n_facet == 0) return
+      is_behind = .not. contact%faces(i, scene)
    end function is_behind
 
    !> What the coordinates are uncertain by.
@@ -275,18 +252,18 @@ contains
    subroutine adjust_pair(scene, pair, contact, notes)
       type(scene_t), intent(inout) :: scene
       type(contact_pair_t), intent(in) :: pair
-      type(start_gaps_t), intent(inout) :: contact
+      class(start_gaps_t), intent(inout) :: contact
       type(notes_t), intent(inout) :: notes
       type(gap_state_t) :: state
       real(wp) :: way(size(scene%x, 1)), largest
       logical :: is_meant, is_last
       integer :: i, k, n_moved
 
-      call start_gaps_measure(contact, scene)
+      call contact%measure(scene)
       largest = 0.0_wp
       n_moved = 0
       do i = 1, contact%n
-         if (contact%edge(i) == 0) cycle
+         if (contact%facet(i) == 0) cycle
          state = contact%state(i)
          is_meant = state%gap0 <= pair%adjust%distance
          if (pair%adjust%set > 0) is_meant = &
@@ -295,7 +272,7 @@ contains
          largest = max(largest, abs(state%gap0))
          n_moved = n_moved + 1
          do k = 1, most_moves
-            call start_gaps_way(contact, i, scene, way, is_last)
+            call contact%way(i, scene, way, is_last)
             associate (node => contact%node(i), duplicate => contact%duplicate(i))
                scene%x(:, node) = scene%x(:, node) - way
                if (duplicate > 0) scene%x(:, duplicate) = scene%x(:, duplicate) - way
@@ -311,25 +288,24 @@ contains
    subroutine check_penetration(scene, pair, contact, noise, error)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
-      type(start_gaps_t), intent(inout) :: contact
+      class(start_gaps_t), intent(inout) :: contact
       real(wp), intent(in) :: noise              !! of coordinates [L]
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: limit(contact%n)
-      integer :: i, n, own
+      integer :: i, n
       character(len=:), allocatable :: found
 
-      call start_gaps_measure(contact, scene)
-      limit = merge(noise, huge(noise), contact%edge > 0)
+      call contact%measure(scene)
+      limit = merge(noise, huge(noise), contact%facet > 0)
       if (contact%is_self) then
-         associate (chain => contact%slave, state => contact%state)
-            do i = 1, contact%n
-               own = maxval(chain%node_edge(:, contact%chain_node(i)))
-               if (contact%edge(i) == 0) cycle
-               if (chain%part(own) /= chain%part(contact%edge(i))) cycle
-               ! Without a crossing this is the other side of a thin strip.
-               if (state(i)%gap0 < -crossing_depth*state(i)%size) limit(i) = huge(limit)
-            end do
-         end associate
+         do i = 1, contact%n
+            if (contact%facet(i) == 0) cycle
+            if (.not. contact%is_connected(i)) cycle
+            ! Without a crossing this is the other side of a thin strip.
+            associate (state => contact%state(i))
+               if (state%gap0 < -crossing_depth*state%size) limit(i) = huge(limit)
+            end associate
+         end do
       end if
       call find_behind(scene, contact%node, contact%state, limit, n, found)
       if (n == 0) return
@@ -358,7 +334,7 @@ contains
       if (k == 0) return                         ! `system_init` tells that it is missing
       call new_contact(scene, scene%pair(i), contact, error, given%contact(k)%contact)
       if (allocated(error)) return
-      call contact%suit_steps(any(.not. scene%step%scheme%masses_resist))
+      call contact%suit_steps(any(.not. step_is_dynamic(scene%step)))
       call contact%configure(scene%x, options)
       still = 0.0_wp
       call contact%begin_step(scene%x, scene%u0, still)
@@ -381,8 +357,8 @@ contains
       type(contact_options_t), intent(in) :: options
       real(wp), intent(in) :: noise              !! of coordinates [L]
       type(error_t), allocatable, intent(out) :: error
-      type(start_gaps_t) :: contact
-      logical, allocatable :: is_corner(:)
+      class(start_gaps_t), allocatable :: contact
+      logical, allocatable :: sharp(:)
       real(wp), allocatable :: limit(:)
       character(len=:), allocatable :: found
       integer :: k, n
@@ -391,21 +367,16 @@ contains
       if (pair%formulation == formulation_nts) then
          if (.not. (pair%both_sides .and. pair%may_choose)) return
       end if
-      call start_gaps_init(contact, scene, reversed(pair), error)
+      call new_start_gaps(scene, reversed(pair), contact, error)
       if (allocated(error)) return
-      call start_gaps_measure(contact, scene)
-      allocate(is_corner(contact%slave%n_edge))
-      limit = merge(noise, huge(noise), contact%edge > 0)
-      call chain_corners(contact%slave, scene%x, options%smoothing_angle, is_corner)
+      call contact%measure(scene)
+      allocate(sharp(contact%n))
+      limit = merge(noise, huge(noise), contact%facet > 0)
+      call contact%is_sharp(scene, options%smoothing_angle, sharp)
       do k = 1, contact%n
-         if (contact%edge(k) == 0) cycle
-         associate (here => contact%slave%node_edge(2, k))
-            if (here > 0) then
-               if (.not. is_corner(here)) limit(k) = limit(k) + deepest_dip*contact%state(k)%size
-            end if
-            if (.not. chain_faces(contact%slave, k, contact%master%edge(:, contact%edge(k)), &
-               scene%x, scene%u0)) limit(k) = huge(limit)
-         end associate
+         if (contact%facet(k) == 0) cycle
+         if (.not. sharp(k)) limit(k) = limit(k) + deepest_dip*contact%state(k)%size
+         if (.not. contact%faces(k, scene)) limit(k) = huge(limit)
       end do
       call find_behind(scene, contact%node, contact%state, limit, n, found)
       if (n == 0) return

@@ -3,17 +3,18 @@
 !>
 !> Source: docs/theory.md, section 11.
 module emcon_ties
-   use emcon_chain, only : chain_init, chain_t
    use emcon_couplings, only : tie_rows_t, tie_t
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_facets, only : facets_init, facets_length, facets_rim, facets_t
    use emcon_kinds, only : wp
    use emcon_midside_plane, only : midside_distribute_rows, midside_init, midside_places, midside_t
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted
-   use emcon_surface_edges, only : faces_of_edges, surface_edges
+   use emcon_surface_facets, only : faces_of_facets, surface_facets
+   use emcon_surface_nodes, only : surface_nodes
    use emcon_text, only : note_add, notes_t, to_text
-   use emcon_tie, only : tie_measure
-   use emcon_tie_balance, only : tie_balance, tie_balance_report_t, tie_is_balanced
+   use emcon_tie_plane, only : tie_measure
+   use emcon_tie_balance_plane, only : tie_balance, tie_balance_report_t, tie_is_balanced
    use emcon_tie_ends, only : tie_ends_merge, tie_ends_take
    use emcon_tie_moves, only : ties_move_nodes
    use emcon_tied_edges, only : tied_edges_find
@@ -74,14 +75,14 @@ contains
    pure subroutine uncover_exterior(scene)
       type(scene_t), intent(inout) :: scene
       logical, allocatable :: is_tied(:), is_left(:)
-      integer, allocatable :: edge(:, :), face(:)
+      integer, allocatable :: facet(:, :), face(:)
       integer :: s
 
       do s = 1, size(scene%surface)
          if (.not. scene%surface(s)%is_exterior) cycle
-         call surface_edges(scene, scene%surface(s), edge)
-         call tied_edges_find(scene, edge, is_tied)
-         call faces_of_edges(scene, scene%surface(s), face)
+         call surface_facets(scene, scene%surface(s), facet)
+         call tied_edges_find(scene, facet, is_tied)
+         call faces_of_facets(scene, scene%surface(s), face)
          associate (surface => scene%surface(s))
             is_left = spread(.false., 1, size(surface%face))
             is_left(pack(face, .not. is_tied)) = .true.
@@ -125,22 +126,18 @@ contains
    pure subroutine count_ties(scene, n_tie)
       type(scene_t), intent(in) :: scene
       integer, allocatable, intent(out) :: n_tie(:)      !! (n_node)
-      integer, allocatable :: seen(:), edge(:, :)
-      integer :: t, i, k, side
+      integer, allocatable :: seen(:), node(:)
+      integer :: t, k, side
 
       allocate(n_tie(size(scene%x, 2)), seen(size(scene%x, 2)), source=0)
       do t = 1, size(scene%tie)
          do side = 1, 2
-            call surface_edges(scene, &
-               scene%surface(merge(scene%tie(t)%slave, scene%tie(t)%master, side == 1)), edge)
-            do i = 1, size(edge, 2)
-               do k = 1, 2
-                  associate (node => edge(k, i))
-                     if (seen(node) == t) cycle
-                     seen(node) = t
-                     n_tie(node) = n_tie(node) + 1
-                  end associate
-               end do
+            call surface_nodes(scene, &
+               scene%surface(merge(scene%tie(t)%slave, scene%tie(t)%master, side == 1)), node)
+            do k = 1, size(node)
+               if (seen(node(k)) == t) cycle
+               seen(node(k)) = t
+               n_tie(node(k)) = n_tie(node(k)) + 1
             end do
          end do
       end do
@@ -152,23 +149,29 @@ contains
       integer, allocatable, intent(out) :: node(:)
       integer, allocatable, intent(out) :: place(:)      !! (size of `node`) 1..n_place
       integer, intent(out) :: n_place
-      type(chain_t) :: chain
+      type(facets_t) :: facets
       type(error_t), allocatable :: error
+      logical, allocatable :: is_rim(:)
       integer, allocatable :: n_tie(:)
-      real(wp) :: reach(size(scene%x, 2))        !! half of the shortest edge at a chain end; else 0
-      integer :: t, side, k, i, j, surface
+      real(wp) :: reach(size(scene%x, 2))        !! half of the shortest facet at a rim; else 0
+      integer :: t, side, k, i, j, f, surface
 
       call count_ties(scene, n_tie)
       reach = 0.0_wp
       do t = 1, size(scene%tie)
          do side = 1, 2
             surface = merge(scene%tie(t)%slave, scene%tie(t)%master, side == 1)
-            call chain_init(chain, scene, scene%surface(surface), error)
+            call facets_init(facets, scene, scene%surface(surface), error)
             if (allocated(error)) cycle
-            do k = 1, size(chain%node)
-               if (all(chain%node_edge(:, k) > 0) .or. n_tie(chain%node(k)) == 1) cycle
-               reach(chain%node(k)) = 0.5_wp*minval(chain%length(pack(chain%node_edge(:, k), &
-                  chain%node_edge(:, k) > 0)))
+            is_rim = spread(.false., 1, size(facets%node))
+            call facets_rim(facets, is_rim)
+            do k = 1, size(facets%node)
+               if (.not. is_rim(k) .or. n_tie(facets%node(k)) == 1) cycle
+               associate (around => facets%around(facets%around_start(k): &
+                     facets%around_start(k + 1) - 1))
+                  reach(facets%node(k)) = 0.5_wp*minval([(facets_length(facets, around(f)), &
+                     f = 1, size(around))])
+               end associate
             end do
          end do
       end do
@@ -229,59 +232,60 @@ contains
       end do
    end subroutine balance
 
-   !> Balance one tie. On a curved interface the ends of the slave chain need no multiplier and may
-   !> have none; a chain that would keep less than two stays as it is.
+   !> Balance one tie. On a curved interface the rim of the slave needs no multiplier and may have
+   !> none; a surface that would keep less than two stays as it is.
    subroutine balance_tie(scene, tie, was_balanced, error)
       type(scene_t), intent(in) :: scene
       type(tie_t), intent(inout) :: tie
       logical, intent(out) :: was_balanced
       type(error_t), allocatable, intent(out) :: error
-      type(chain_t) :: slave, master
+      type(facets_t) :: slave, master
       type(tie_balance_report_t) :: report
       type(tie_rows_t) :: rows
       logical :: is_end(size(tie%rows%slave))
 
-      call chain_init(slave, scene, scene%surface(tie%slave), error)
-      if (.not. allocated(error)) call chain_init(master, scene, scene%surface(tie%master), error)
-      if (.not. allocated(error)) call tie_is_balanced(tie%rows, scene%x, slave%edge, master%edge, &
-         was_balanced, error)
+      call facets_init(slave, scene, scene%surface(tie%slave), error)
+      if (.not. allocated(error)) call facets_init(master, scene, scene%surface(tie%master), error)
+      if (.not. allocated(error)) call tie_is_balanced(tie%rows, scene%x, slave%facet, &
+         master%facet, was_balanced, error)
       if (allocated(error) .or. was_balanced) return
       rows = tie%rows
-      is_end = any(rows%neighbour == 0, dim=1) .and. is_chain_end(slave, rows%slave)
+      is_end = any(rows%neighbour == 0, dim=1) .and. are_at_rim(slave, rows%slave)
       if (count(.not. is_end) < 2) return
       if (any(is_end)) call tie_ends_take(rows, is_end)
-      call tie_balance(rows, scene%x, slave%edge, master%edge, report, error)
+      call tie_balance(rows, scene%x, slave%facet, master%facet, report, error)
       if (.not. allocated(error) .and. report%is_balanced) tie%rows = rows
    end subroutine balance_tie
 
-   !> Is a node an end of the chain?
-   pure function is_chain_end(chain, node) result(is_end)
-      type(chain_t), intent(in) :: chain
-      integer, intent(in) :: node(:)
-      logical :: is_end(size(node))
+   !> Are nodes of the scene at the rim of a surface?
+   pure function are_at_rim(facets, node) result(at_rim)
+      type(facets_t), intent(in) :: facets
+      integer, intent(in) :: node(:)             !! each one of the surface
+      logical :: at_rim(size(node)), is_rim(size(facets%node))
       integer :: i
 
+      call facets_rim(facets, is_rim)
       do i = 1, size(node)
-         is_end(i) = any(chain%node_edge(:, find_sorted(chain%node, node(i))) == 0)
+         at_rim(i) = is_rim(find_sorted(facets%node, node(i)))
       end do
-   end function is_chain_end
+   end function are_at_rim
 
    !> Tell which ties do not keep the equilibrium of a constant stress.
    subroutine note_unbalanced(scene, notes, error)
       type(scene_t), intent(in) :: scene
       type(notes_t), intent(inout) :: notes
       type(error_t), allocatable, intent(out) :: error
-      type(chain_t) :: slave, master
+      type(facets_t) :: slave, master
       logical :: is_balanced
       integer :: t
 
       do t = 1, size(scene%tie)
          associate (tie => scene%tie(t))
-            call chain_init(slave, scene, scene%surface(tie%slave), error)
-            if (.not. allocated(error)) call chain_init(master, scene, &
+            call facets_init(slave, scene, scene%surface(tie%slave), error)
+            if (.not. allocated(error)) call facets_init(master, scene, &
                scene%surface(tie%master), error)
-            if (.not. allocated(error)) call tie_is_balanced(tie%rows, scene%x, slave%edge, &
-               master%edge, is_balanced, error)
+            if (.not. allocated(error)) call tie_is_balanced(tie%rows, scene%x, slave%facet, &
+               master%facet, is_balanced, error)
             if (allocated(error)) return
             if (.not. is_balanced) call note_add(notes, "*TIE " // tie%name // ": its meshes " // &
                "do not fit so well that a constant stress passes exactly")

@@ -6,7 +6,6 @@ module emcon_unresolved_rows
    use emcon_numbering, only : unresolved_t
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : unique_sorted
-   use emcon_steps, only : prescribed_t
    use emcon_system, only : system_t
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
    implicit none

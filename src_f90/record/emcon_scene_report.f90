@@ -14,9 +14,10 @@ module emcon_scene_report
    use emcon_report_row, only : report_row_t, report_rows_t, row_begin, row_put, rows_add
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
-   use emcon_steps, only : initiation_massless, initiation_persistent, initiation_velocity_update
+   use emcon_steps, only : initiation_massless, initiation_persistent, initiation_velocity_update, &
+      step_initiation, step_is_dynamic
    use emcon_stepper, only : stepper_t
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_facets, only : surface_facets
    use emcon_term_registry, only : terms_solid
    use emcon_text, only : to_text
    implicit none
@@ -121,7 +122,7 @@ contains
 
          associate (surface => scene%surface(number))
             if (scene%n_dim == n_plane) then
-               call surface_edges(scene, surface, edge)
+               call surface_facets(scene, surface, edge)
                call row_put(row, side // "_edges", size(edge, 2), " (# edges)")
             else
                call row_put(row, side // "_faces", size(surface%face), " (# faces)")
@@ -155,14 +156,14 @@ contains
 
       associate (scene => stepper%scene, system => stepper%march%system, &
             layer => stepper%march%layer)
-         is_dynamic = any(scene%step%scheme%masses_resist)
+         is_dynamic = any(step_is_dynamic(scene%step))
          call choose("contact", size(system%contact) > 0, "no *CONTACT PAIR, no *CONTACT")
          call choose("guards", size(system%contact) > system%n_pair, &
             "no pairs, both sides of all pairs are held, or GUARD=NO")
          call choose("massless contact nodes", layer%is_on, "no *CONTACT " // &
             "INITIATION, TYPE=MASSLESS, or all slave nodes need their mass")
-         call choose("velocity update", is_dynamic .and. any(scene%step%contact%initiation == &
-            initiation_velocity_update), "no *CONTACT INITIATION, TYPE=VELOCITY UPDATE")
+         call choose("velocity update", any(step_initiation(scene%step) &
+            == initiation_velocity_update), "no *CONTACT INITIATION, TYPE=VELOCITY UPDATE")
          call choose("ties and equations", system%space%linear%n > 0, &
             "no *TIE, no *EQUATION, no *RIGID BODY")
          call choose("inertia", is_dynamic, "all steps are static")
@@ -228,7 +229,7 @@ contains
       real(wp) :: transit
       integer :: k
 
-      k = findloc(stepper%scene%step%scheme%masses_resist, .true., 1)
+      k = findloc(step_is_dynamic(stepper%scene%step), .true., 1)
       if (k == 0) return
       transit = shortest_transit(body)
       if (.not. transit < huge(transit)) return
@@ -236,7 +237,7 @@ contains
       call row_put(row, "step", k, " #")
       associate (step => stepper%scene%step(k), march => stepper%march)
          call row_put(row, "h", step%time%h, ": h = #")
-         if (step%scheme%is_explicit .and. march%state%clock%i_step == k) call row_put(row, &
+         if (march%explicit%is_on .and. march%state%clock%i_step == k) call row_put(row, &
             "critical_h", march%state%explicit%critical_h, ", critical h = #")
          call row_put(row, "courant_number", step%time%h/transit, &
             ", # wave transit times of the smallest element")
@@ -310,8 +311,7 @@ contains
 
       if (size(scene%pair) == 0 &
          .or. any(scene%step%contact%initiation == initiation_massless)) return
-      k = findloc(scene%step%scheme%masses_resist .and. &
-         scene%step%contact%initiation == initiation_persistent, .true., 1)
+      k = findloc(step_initiation(scene%step), initiation_persistent, 1)
       if (k == 0) return
       transit = shortest_transit(body)
       if (.not. (transit < huge(transit) .and. scene%step(k)%time%h < transit)) return

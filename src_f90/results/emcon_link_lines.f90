@@ -4,7 +4,7 @@ module emcon_link_lines
    use emcon_couplings, only : tie_t
    use emcon_interactions, only : multiplier_dual
    use emcon_scene, only : scene_t
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_facets, only : surface_facets
    use emcon_system, only : system_t
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
    use emcon_ties, only : find_crosspoints
@@ -95,8 +95,8 @@ contains
       character(len=:), allocatable, intent(out) :: text
       integer, allocatable :: slave(:, :), master(:, :)
 
-      call surface_edges(scene, scene%surface(tie%slave), slave)
-      call surface_edges(scene, scene%surface(tie%master), master)
+      call surface_facets(scene, scene%surface(tie%slave), slave)
+      call surface_facets(scene, scene%surface(tie%master), master)
       text = tie%name // ": " // scene%surface(tie%slave)%name // " (slave, " // &
          to_text(size(slave, 2)) // " edges) to " // &
          scene%surface(tie%master)%name // " (" // &

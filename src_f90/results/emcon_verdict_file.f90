@@ -209,7 +209,7 @@ contains
       call restart_exchange(restart, "verdict", energy%stabilization)
       call restart_exchange(restart, "verdict", energy%scale)
       call restart_exchange(restart, "effort", energy%has_dynamics)
-      call restart_exchange(restart, "effort", energy%is_explicit)
+      call restart_exchange(restart, "effort", energy%has_explicit)
    end subroutine exchange_energy
 
    !> How the force of each pair scatters.

@@ -179,23 +179,23 @@ contains
       type(march_t), intent(in) :: march
       type(notes_t), intent(inout) :: lines
 
-      if (.not. march%overlap_check%look%is_able) then
+      if (.not. march%overlap_check%is_able) then
          call note_add(lines, "overlap not looked for: in three dimensions it is not in this " // &
             "version")
          return
       end if
-      associate (outline => march%overlap_check%look%outline)
-         if (outline%n_piece == 0) then
+      associate (check => march%overlap_check)
+         if (check%n_piece == 0) then
             call note_add(lines, "overlap not checked: no *CONTACT PAIR or *CONTACT names " // &
                "a surface")
             return
          end if
-         call note_add(lines, "overlap checked: " // to_text(outline%n_piece) // " bodies, " // &
-            to_text(size(outline%edge, 2)) // " edges; deepest penetration " // &
+         call note_add(lines, "overlap checked: " // to_text(check%n_piece) // " bodies, " // &
+            to_text(check%n_facet) // " edges; deepest penetration " // &
             to_text(self%overlap%deepest, 3) // " of an element")
-         if (self%overlap%of_edges > self%overlap%bar) call note_add(lines, &
+         if (self%overlap%of_facets > self%overlap%bar) call note_add(lines, &
             "edges of curved surfaces " // &
-            "overlap by up to " // to_text(self%overlap%of_edges, 3) // &
+            "overlap by up to " // to_text(self%overlap%of_facets, 3) // &
             " of their length, the curves that they are chords of do not")
       end associate
    end subroutine add_checked

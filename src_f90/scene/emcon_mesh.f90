@@ -4,6 +4,11 @@ module emcon_mesh
    implicit none
    private
    public :: named_set_t, surface_t
+   public :: surface_of_faces, surface_of_nodes, surface_of_lines, surface_of_segments
+
+   !> What a surface is made of.
+   integer, parameter :: surface_of_faces = 1, surface_of_nodes = 2, surface_of_lines = 3, &
+      surface_of_segments = 4
 
    !> A node set or an element set.
    type :: named_set_t

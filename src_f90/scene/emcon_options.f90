@@ -12,6 +12,7 @@ module emcon_options
       smoothing_hermite, smoothing_none
    use emcon_materials, only : kinematics_corotated, kinematics_linear, kinematics_nonlinear, &
       section_t
+   use emcon_mesh, only : surface_of_lines, surface_of_faces, surface_of_nodes, surface_of_segments
    use emcon_scheme, only : scheme_row_t
    use emcon_scheme_registry, only : n_scheme_row, scheme_energy_momentum, scheme_row, &
       scheme_static
@@ -22,8 +23,10 @@ module emcon_options
       newton_full, newton_kept, step_t
    implicit none
    private
-   public :: option_row_t, n_option_row, option_row, option_code, option_default, option_words, &
-      option_text
+   public :: option_row_t, n_option_row, option_row, option_code, option_default, option_refusal, &
+      option_words, option_text
+
+   integer, parameter :: n_plane = 2
 
    !> One value that an option may have.
    type :: option_row_t
@@ -33,6 +36,9 @@ module emcon_options
       character(len=24) :: c_name                !! in the headers; empty: it is not there
       character(len=44) :: text                  !! in the log; empty: nothing is said
       character(len=40) :: also                  !! other words of decks, ",A,B,", without blanks
+      integer :: n_dim = 0                       !! of the models that it is for; 0: of all
+      logical :: is_axial = .true.               !! also for solids of revolution
+      character(len=16) :: instead = ""          !! what other models use
    end type option_row_t
 
    !> Those that no other table has.
@@ -40,14 +46,14 @@ module emcon_options
       option_row_t("formulation", formulation_nts, "NODE TO SURFACE", "EMCON_NODE_TO_SEGMENT", &
          "node to segment", ""), &
       option_row_t("formulation", formulation_segment, "SEGMENT", "EMCON_SEGMENT", &
-         "gaps of nodes integrated over slave edges", ""), &
+         "gaps of nodes integrated over slave edges", "", n_plane, instead="NODE TO SURFACE"), &
       option_row_t("formulation", formulation_mortar, "MORTAR", "EMCON_MORTAR", "mortar", &
          ",LINMORTAR,PGLINMORTAR,SURFACETOSURFACE,"), &
       option_row_t("formulation", formulation_given, "USER", "", "contact of the program", ""), &
       option_row_t("integration", integration_segments, "SEGMENTS", "EMCON_SEGMENTS", &
          "segments", ""), &
       option_row_t("integration", integration_elements, "ELEMENTS", "EMCON_ELEMENTS", &
-         "element-wise integration", ""), &
+         "element-wise integration", "", n_plane, instead="SEGMENTS"), &
       option_row_t("multiplier", multiplier_standard, "STANDARD", "EMCON_STANDARD", &
          "standard multipliers", ""), &
       option_row_t("multiplier", multiplier_dual, "DUAL", "EMCON_DUAL", "dual multipliers", ""), &
@@ -55,11 +61,12 @@ module emcon_options
          "standard multipliers", ""), &
       option_row_t("tie multiplier", multiplier_dual, "DUAL", "EMCON_DUAL", "dual multipliers", &
          ""), &
-      option_row_t("normal", normal_edge, "EDGE", "EMCON_EDGE_NORMAL", "normals of edges", ""), &
+      option_row_t("normal", normal_edge, "EDGE", "EMCON_EDGE_NORMAL", "normals of edges", "", &
+         n_plane, instead="NODAL"), &
       option_row_t("normal", normal_nodal, "NODAL", "EMCON_NODAL_NORMAL", "normals of nodes", ""), &
       option_row_t("smoothing", smoothing_none, "NONE", "EMCON_UNSMOOTHED", "", ""), &
       option_row_t("smoothing", smoothing_hermite, "HERMITE", "EMCON_HERMITE", &
-         "smoothed master surface", ""), &
+         "smoothed master surface", "", n_plane, instead="NONE"), &
       option_row_t("initiation", initiation_persistent, "PERSISTENT", "EMCON_PERSISTENT", "", ""), &
       option_row_t("initiation", initiation_admissible, "ADMISSIBLE", "EMCON_ADMISSIBLE", "", ""), &
       option_row_t("initiation", initiation_velocity_update, "VELOCITY UPDATE", "", "", ""), &
@@ -74,9 +81,15 @@ module emcon_options
       option_row_t("events", events_pairs, "PAIR", "", "of pairs", ""), &
       option_row_t("events", events_nodes, "NODE", "", "of nodes", ""), &
       option_row_t("kinematics", kinematics_nonlinear, "NONLINEAR", "", "", ""), &
-      option_row_t("kinematics", kinematics_linear, "LINEAR", "", "small strains", ""), &
+      option_row_t("kinematics", kinematics_linear, "LINEAR", "", "small strains", "", &
+         is_axial=.false., instead="NONLINEAR"), &
       option_row_t("kinematics", kinematics_corotated, "COROTATED", "", &
-         "small strains in a frame that turns", ""), &
+         "small strains in a frame that turns", "", n_plane, .false., "NONLINEAR"), &
+      option_row_t("surface", surface_of_faces, "ELEMENT", "", "", ""), &
+      option_row_t("surface", surface_of_nodes, "NODE", "", "", ""), &
+      option_row_t("surface", surface_of_lines, "EDGE", "", "", "", n_plane, instead="ELEMENT"), &
+      option_row_t("surface", surface_of_segments, "SEGMENTS", "", "", "", n_plane, &
+         instead="ELEMENT"), &
       option_row_t("procedure", scheme_static, "STATIC", "", "", ""), &
       option_row_t("procedure", scheme_energy_momentum, "DYNAMIC", "", "", "")]
 
@@ -107,7 +120,9 @@ contains
          row = option_row_t("solver", solver%code, solver%word, "", solver%text, "")
       else if (k <= n_solver_row() + n_choice()) then
          scheme = scheme_row(k - n_solver_row() + 1)
-         row = option_row_t("scheme", scheme%code, scheme%word, "", scheme%text, "")
+         row = option_row_t("scheme", scheme%code, scheme%word, "", scheme%text, "", &
+            merge(n_plane, 0, scheme%dissipates), .not. scheme%dissipates, &
+            merge("ENERGY MOMENTUM", repeat(" ", 15), scheme%dissipates))
       else
          k = k - n_solver_row() - n_choice()
          element = element_row(k)
@@ -133,6 +148,29 @@ contains
       end do
    end function option_code
 
+   !> Why a model cannot have a value, and what it can have instead; "": it can.
+   pure subroutine option_refusal(kind, code, n_dim, is_axial, text)
+      character(len=*), intent(in) :: kind
+      integer, intent(in) :: code                !! one of that kind
+      integer, intent(in) :: n_dim               !! of the model
+      logical, intent(in) :: is_axial            !! it is one of solids of revolution
+      character(len=:), allocatable, intent(out) :: text
+      type(option_row_t) :: row
+      integer :: i
+
+      text = ""
+      do i = 1, n_option_row()
+         row = option_row(i)
+         if (row%kind /= kind .or. row%code /= code) cycle
+         if (row%n_dim > 0 .and. row%n_dim /= n_dim) then
+            text = trim(row%word) // " is for plane models, and this one has three dimensions" &
+               // "; use " // trim(row%instead)
+         else if (is_axial .and. .not. row%is_axial) then
+            text = trim(row%word) // " is not for solids of revolution; use " // trim(row%instead)
+         end if
+      end do
+   end subroutine option_refusal
+
    !> Code of an option that a deck does not speak of; < 0: it has to.
    pure integer function option_default(kind) result(code)
       character(len=*), intent(in) :: kind
@@ -155,6 +193,8 @@ contains
          code = contact%normal
       case ("smoothing")
          code = contact%smoothing
+      case ("surface")
+         code = surface_of_faces
       case ("initiation")
          code = step%contact%initiation
       case ("events")

@@ -12,18 +12,18 @@ module emcon_steps
    public :: step_t, step_time_t, step_contact_t, step_solution_t
    public :: load_point, load_pressure, load_gravity, load_moment, load_centrifugal
    public :: by_node, by_element, by_surface
-   public :: initiation_persistent, initiation_admissible, initiation_velocity_update, &
-      initiation_massless
+   public :: initiation_none, initiation_persistent, initiation_admissible, &
+      initiation_velocity_update, initiation_massless
    public :: method_null_space, method_saddle_point, method_penalty, method_augmented_lagrange
    public :: newton_kept, newton_full
    public :: events_pairs, events_nodes
-   public :: prescribed_find
+   public :: prescribed_find, step_is_dynamic, step_initiation
 
    integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3, load_moment = 4, &
       load_centrifugal = 5
    integer, parameter :: by_node = 1, by_element = 2, by_surface = 3
-   integer, parameter :: initiation_persistent = 1, initiation_admissible = 2, &
-      initiation_velocity_update = 3, initiation_massless = 4
+   integer, parameter :: initiation_none = 0, initiation_persistent = 1, &
+      initiation_admissible = 2, initiation_velocity_update = 3, initiation_massless = 4
    integer, parameter :: method_null_space = 1, method_saddle_point = 2, method_penalty = 3, &
       method_augmented_lagrange = 4
    integer, parameter :: newton_kept = 1, newton_full = 2
@@ -138,6 +138,19 @@ module emcon_steps
    end type step_t
 
 contains
+
+   elemental logical function step_is_dynamic(step)
+      type(step_t), intent(in) :: step
+
+      step_is_dynamic = step%scheme%has_inertia
+   end function step_is_dynamic
+
+   !> How contact begins in a step: one of `initiation_`, none in statics.
+   elemental integer function step_initiation(step)
+      type(step_t), intent(in) :: step
+
+      step_initiation = merge(step%contact%initiation, initiation_none, step_is_dynamic(step))
+   end function step_initiation
 
    !> Where a degree of freedom stands in the list; 0: it is not prescribed.
    pure integer function prescribed_find(list, node, dof) result(k)

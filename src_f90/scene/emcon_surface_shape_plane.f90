@@ -3,7 +3,7 @@ module emcon_surface_shape_plane
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_facets, only : surface_facets
    implicit none
    private
    public :: surface_shape_t, surface_shape
@@ -33,7 +33,7 @@ contains
 
       ! Coordinates may be as large or as small as numbers can be.
       power = -exponent(maxval(abs(scene%x)))
-      call surface_edges(scene, surface, edge)
+      call surface_facets(scene, surface, edge)
       allocate(way(2, size(edge, 2)), source=0.0_wp)
       allocate(from(size(scene%x, 2)), source=0)
       n = 0

@@ -2,7 +2,7 @@
 !> surface of a tie ends on one.
 module emcon_tied_edges
    use emcon_scene, only : scene_t
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_facets, only : surface_facets
    implicit none
    private
    public :: tied_edges_find, tied_ends_find
@@ -21,7 +21,7 @@ contains
       do t = 1, size(scene%tie)
          associate (tie => scene%tie(t))
             if (tie%slave == 0) cycle                  ! known by its rows alone
-            call surface_edges(scene, scene%surface(tie%slave), slave)
+            call surface_facets(scene, scene%surface(tie%slave), slave)
             follower(slave(1, :)) = slave(2, :)
             if (allocated(tie%rows%covered)) then
               follower(tie%rows%covered(1, :)) = tie%rows%covered(2, :)

@@ -7,7 +7,7 @@ module emcon_evaluation
    private
    public :: instant_t, evaluation_t, evaluation_at_end, most_past
    public :: evaluation_moving, evaluation_velocity, evaluation_displacement, &
-      evaluation_is_equilibrium, instant_later
+      evaluation_has_inertia, evaluation_is_equilibrium, evaluation_contact_place, instant_later
 
    !> Fields that a scheme keeps of the steps before, at most.
    integer, parameter :: most_past = 2
@@ -25,7 +25,7 @@ module emcon_evaluation
    !> Forces are discrete gradients from the start of the step to a place in it, or gradients there,
    !> to which those at the start may be added.
    type :: evaluation_t
-      real(wp) :: mass_scale = 0.0_wp            !! s [1/T]; 0: masses do not resist
+      real(wp) :: mass_scale = 0.0_wp            !! s [1/T]; 0: no inertia
       real(wp) :: rate = 0.0_wp                  !! b [1/T]
       real(wp) :: lapse = 0.0_wp                 !! 1/b, as the scheme rounds it [T]
       real(wp) :: v_weight = 0.0_wp              !! w
@@ -42,7 +42,7 @@ module emcon_evaluation
       real(wp) :: past_change(most_past) = 0.0_wp    !! and in b du - w v0
    end type evaluation_t
 
-   !> Gradients at the end of the step, where masses do not resist.
+   !> Gradients at the end of the step, where there is no inertia.
    type(evaluation_t), parameter :: evaluation_at_end = evaluation_t(is_gradient=.true., &
       load_place=1.0_wp)
 
@@ -79,12 +79,26 @@ contains
       du = evaluation%lapse*((evaluation%v_weight - 1.0_wp)*v0 + v1)
    end function evaluation_displacement
 
+   elemental logical function evaluation_has_inertia(evaluation) result(has_inertia)
+      type(evaluation_t), intent(in) :: evaluation
+
+      has_inertia = evaluation%mass_scale > 0.0_wp
+   end function evaluation_has_inertia
+
    !> Are forces to balance without inertia, as gradients of their energies?
    elemental logical function evaluation_is_equilibrium(evaluation) result(is_equilibrium)
       type(evaluation_t), intent(in) :: evaluation
 
-      is_equilibrium = evaluation%is_gradient .and. .not. evaluation%mass_scale > 0.0_wp
+      is_equilibrium = evaluation%is_gradient .and. .not. evaluation_has_inertia(evaluation)
    end function evaluation_is_equilibrium
+
+   !> The part of the step after which contact forces act: in the mean at its middle, or its end.
+   elemental real(wp) function evaluation_contact_place(evaluation) result(place)
+      type(evaluation_t), intent(in) :: evaluation
+
+      place = merge(0.5_wp, 1.0_wp, evaluation_has_inertia(evaluation) &
+         .and. .not. evaluation%pushes_at_end)
+   end function evaluation_contact_place
 
    elemental type(instant_t) function instant_later(instant, h) result(later)
       type(instant_t), intent(in) :: instant

@@ -20,7 +20,7 @@ module emcon_scheme
       character(len=8) :: card = ""              !! that asks for it
       character(len=20) :: word = ""             !! SCHEME= in decks; "": the only one of its card
       character(len=24) :: text = ""             !! in the log; "": the name by which it is given
-      logical :: masses_resist = .false.         !! there are velocities, and pushing makes energy
+      logical :: has_inertia = .false.           !! there are velocities, and pushing makes energy
       logical :: loads_ramp = .false.            !! without amplitude they run over the step
       logical :: takes_jumps = .true.            !! velocities may jump where a step ends
       logical :: takes_massless = .true.         !! nodes may be without mass
@@ -31,7 +31,8 @@ module emcon_scheme
       logical :: is_accelerated = .false.        !! the past is the acceleration
       integer :: n_past = 0                      !! fields that are kept of the steps before
       type(setting_t) :: setting
-      logical :: is_explicit = .false.           !! forces are those at the start, mass is diagonal
+      logical :: is_explicit = .false.           !! forces are those at the start
+      logical :: lumps_mass = .false.            !! which is then the matrix of a step, alone
    end type scheme_row_t
 
    type, abstract :: scheme_t

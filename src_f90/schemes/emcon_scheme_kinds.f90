@@ -21,25 +21,25 @@ submodule (emcon_scheme_registry) emcon_scheme_kinds
    type(scheme_row_t), parameter :: rows(*) = [ &
       scheme_row_t(scheme_static, "STATIC", "", "statics", loads_ramp=.true.), &
       scheme_row_t(scheme_energy_momentum, "DYNAMIC", "ENERGY MOMENTUM", &
-         "energy-momentum scheme", masses_resist=.true.), &
+         "energy-momentum scheme", has_inertia=.true.), &
       scheme_row_t(scheme_midpoint, "DYNAMIC", "MIDPOINT", "mid-point rule", &
-         masses_resist=.true., takes_massless=.false.), &
+         has_inertia=.true., takes_massless=.false.), &
       scheme_row_t(scheme_trapezoidal, "DYNAMIC", "TRAPEZOIDAL", "trapezoidal rule", &
-         masses_resist=.true., takes_jumps=.false., takes_massless=.false., &
+         has_inertia=.true., takes_jumps=.false., takes_massless=.false., &
          takes_damping=.false., looks_back=.true.), &
       scheme_row_t(scheme_generalized_alpha, "DYNAMIC", "GENERALIZED ALPHA", &
-         "generalised-alpha method", masses_resist=.true., takes_jumps=.false., &
+         "generalised-alpha method", has_inertia=.true., takes_jumps=.false., &
          takes_massless=.false., takes_damping=.false., looks_back=.true., &
          is_accelerated=.true., n_past=1, &
          setting=setting_t("ALPHA", -0.05_wp)), &
       scheme_row_t(scheme_bdf2, "DYNAMIC", "BDF2", "backward differences", &
-         masses_resist=.true., takes_jumps=.false., takes_massless=.false., &
+         has_inertia=.true., takes_jumps=.false., takes_massless=.false., &
          takes_damping=.false., looks_back=.true., n_past=2), &
       scheme_row_t(scheme_central_difference, "DYNAMIC", "CENTRAL DIFFERENCE", &
-         "central differences", masses_resist=.true., takes_damping=.false., &
-         is_explicit=.true.), &
+         "central differences", has_inertia=.true., takes_damping=.false., &
+         is_explicit=.true., lumps_mass=.true.), &
       scheme_row_t(scheme_energy_decaying, "DYNAMIC", "ENERGY DECAYING", &
-         "energy-decaying scheme", masses_resist=.true., takes_massless=.false., &
+         "energy-decaying scheme", has_inertia=.true., takes_massless=.false., &
          dissipates=.true., looks_back=.true., n_past=1, &
          setting=setting_t("DISSIPATION", 0.125_wp))]
 

@@ -23,7 +23,7 @@ module emcon_scheme_registry
 
    !> Of schemes that a program gives, before it has: then they say themselves what they keep.
    type(scheme_row_t), parameter :: scheme_given_row = &
-      scheme_row_t(scheme_given, "DYNAMIC", masses_resist=.true., looks_back=.true.)
+      scheme_row_t(scheme_given, "DYNAMIC", has_inertia=.true., looks_back=.true.)
 
    !> A row by its number, or by what a deck says.
    interface scheme_row

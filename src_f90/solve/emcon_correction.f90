@@ -24,7 +24,7 @@ module emcon_correction
    private
    public :: correction_t, correction_lay_out, correction_factorise, correction_solve, &
       correction_multipliers, correction_reset, correction_free, correction_reason, &
-      correction_ticks
+      correction_ticks, correction_work
 
    !> Patterns, and the constraint rows that they are for.
    type :: layout_t
@@ -319,6 +319,23 @@ contains
       if (set%n == 0 .or. .not. self%uses_null_space) return
       call null_space_multipliers(self%null_space, set, system%space%numbering, residual, set%lam)
    end subroutine correction_multipliers
+
+   !> c.K c of the correction `dq` = c: the work along it of the forces that the tangent K tells,
+   !> that of the last factorisation with constraints.
+   pure real(wp) function correction_work(self, dq) result(work)
+      type(correction_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: dq(:)            !! (n_unknown) [L]
+      integer :: i, k
+
+      work = 0.0_wp
+      associate (tangent => self%layout%merged)
+         do i = 1, size(dq)
+            do k = tangent%row_start(i) + 1, tangent%row_start(i + 1)
+               work = work + dq(i)*(real(tangent%value(k), wp)*dq(tangent%column(k) + 1))
+            end do
+         end do
+      end associate
+   end function correction_work
 
    !> Time spent on constraints so far, over what the system without them would take [ticks].
    pure integer(int64) function correction_ticks(self)

@@ -1,9 +1,10 @@
 !> How much of a correction to take, from what the residual does along it.
 !>
-!> A correction c from the residual r0 leaves c.r = 0 at its end to first order, c.r0 < 0 being the
-!> work at its start. Where a node passes a kink of a surface on the way, the force turns at once,
-!> and the work at the end is large and of the other sign: the state that is looked for is on the
-!> way, where the work vanishes. Source: docs/theory.md, section 8.
+!> A correction c from the residual r0 leaves c.r = 0 at its end to first order. Its work is c.K c
+!> with the tangent K, -c.r0 where it closes no gaps; where it closes gaps alone, r0 is round-off.
+!> Where a node passes a kink of a surface on the way, the force turns at once, and c.r is large and
+!> > 0 at the end: the state that is looked for is on the way, where it vanishes. Source:
+!> docs/theory.md, section 8.
 module emcon_line_search
    use emcon_kinds, only : wp
    implicit none
@@ -29,7 +30,8 @@ contains
    !> Begin at the end of a correction, if it went too far.
    pure subroutine line_search_begin(self, at_start, at_end)
       type(line_search_t), intent(out) :: self
-      real(wp), intent(in) :: at_start, at_end   !! work c.r there [F L]
+      real(wp), intent(in) :: at_start           !! c.r0 or -c.K c, whichever is less [F L]
+      real(wp), intent(in) :: at_end             !! c.r there [F L]
 
       self%is_on = at_start < 0.0_wp .and. at_end > small*abs(at_start)
       if (.not. self%is_on) return

@@ -12,7 +12,7 @@ module emcon_newton
       convergence_nears_end, convergence_t, most_rounding, next_done, next_give_up, next_tangent, &
       round_off
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
-      correction_solve, correction_t, correction_ticks
+      correction_solve, correction_t, correction_ticks, correction_work
    use emcon_early_set, only : early_enough, predicts_new_set
    use emcon_errors, only : err_interrupt, error_t, raise
    use emcon_evaluation, only : evaluation_is_equilibrium
@@ -74,7 +74,7 @@ module emcon_newton
       procedure(interrupt_interface), pointer, nopass :: is_interrupted => null()
       real(dp) :: deadline = huge(1.0_dp)        !! CPU time of the process at which it gives up [s]
       type(correction_t) :: correction           !! how linear systems are solved
-      real(wp) :: work = 0.0_wp                  !! of the correction at its start; 0: no search
+      real(wp) :: work = 0.0_wp                  !! of the correction as it begins; 0: no search
       type(line_search_t) :: line
       type(factor_policy_t) :: factor_policy     !! of a factor over steps
       logical :: looks_early = .false.           !! in the next solve: may it end as `newton_early`?
@@ -280,7 +280,7 @@ contains
             call factorise(self, system, set, status, error)
             if (allocated(error) .or. status /= newton_converged) return
          end select
-         call correct(self, system, set, motion%du, error)
+         call correct(self, system, set, motion, error)
          if (allocated(error)) return
          if (evaluation_is_equilibrium(motion%evaluation) .and. is_too_far(self, motion%x)) then
             status = newton_singular
@@ -392,12 +392,12 @@ contains
       status = merge(newton_singular, newton_converged, is_singular)
    end subroutine factorise
 
-   !> Correct `du` and the multipliers for the present residual.
-   subroutine correct(self, system, set, du, error)
+   !> Correct the motion and the multipliers for the present residual.
+   subroutine correct(self, system, set, motion, error)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
-      real(wp), intent(inout), contiguous :: du(:, :)
+      type(motion_t), intent(inout) :: motion
       type(error_t), allocatable, intent(out) :: error
       integer :: left
 
@@ -408,11 +408,13 @@ contains
       system%phases%n_solve = system%phases%n_solve + 1
       self%n_solve = self%n_solve + 1
       if (set%n > set%n_linear .and. .not. self%convergence%is_polish) then
+         ! Where gaps are all that is to be closed, c.r0 is round-off.
+         if (evaluation_is_equilibrium(motion%evaluation)) self%work = self%convergence%damping &
+            *min(dot_product(self%dq, self%residual), -correction_work(self%correction, self%dq))
          self%dq = self%convergence%damping*self%dq
          self%dlam = self%convergence%damping*self%dlam
-         self%work = dot_product(self%dq, self%residual)
       end if
-      call add_to_dofs(system%space%numbering, self%dq, 1.0_wp, du)
+      call add_to_dofs(system%space%numbering, self%dq, 1.0_wp, motion%du)
       set%lam = set%lam + self%dlam
    end subroutine correct
 
@@ -436,7 +438,7 @@ contains
       end do
       call factorise(self, system, set, status, error)
       if (allocated(error) .or. status /= newton_converged) return
-      call correct(self, system, set, motion%du, error)
+      call correct(self, system, set, motion, error)
       self%work = 0.0_wp
       motion%du = motion%du + self%driven
    end subroutine start_driven

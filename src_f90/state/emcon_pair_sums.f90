@@ -5,6 +5,7 @@
 module emcon_pair_sums
    use emcon_constraint, only : condition_drag, condition_force, condition_t
    use emcon_constraints, only : constraint_set_t, constraints_dissipated, constraints_lam
+   use emcon_evaluation, only : evaluation_contact_place, evaluation_has_inertia
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
@@ -37,7 +38,7 @@ module emcon_pair_sums
    !> What forces on a slave side are to a pair.
    type :: side_t
       logical :: is_first = .true.               !! they are on the first surface
-      logical :: masses_resist = .true.          !! forces are means over the motion, else its end
+      logical :: is_dynamic = .true.             !! forces are means over the step, else its end
    end type side_t
 
 contains
@@ -81,17 +82,18 @@ contains
    end subroutine pair_sums_begin
 
    !> Add the constraints that acted over `motion`, of the size `h`, and laws.
-   pure subroutine pair_sums_add(self, system, set, motion, h, masses_resist)
+   pure subroutine pair_sums_add(self, system, set, motion, h)
       type(pair_sums_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       type(motion_t), intent(in) :: motion
       real(wp), intent(in) :: h                  !! > 0 [T]
-      logical, intent(in) :: masses_resist       !! forces are means over the motion, else its end
+      logical :: is_dynamic
       integer :: k, contact
 
       if (size(self%sum) == 0) return
-      if (.not. masses_resist) call pair_sums_begin(self%sum)
+      is_dynamic = evaluation_has_inertia(motion%evaluation)
+      if (.not. is_dynamic) call pair_sums_begin(self%sum)
       self%sum%span = self%sum%span + h
       self%sum%is_pressed = .false.
       contact = 1
@@ -102,7 +104,7 @@ contains
          end do
          associate (item => set%item(k), sum => self%sum(abs(self%of_pair(contact))))
             call add_forces(sum, item, constraints_lam(set, k), motion, h, side_t( &
-               self%of_pair(contact) > 0, masses_resist))
+               self%of_pair(contact) > 0, is_dynamic))
             if (k > set%n) then
                sum%damping = sum%damping + constraints_dissipated(set, k)
                cycle
@@ -112,7 +114,7 @@ contains
             sum%is_pressed = sum%is_pressed .or. abs(set%lam(k)) > 0.0_wp
          end associate
       end do
-      if (.not. masses_resist) return
+      if (.not. is_dynamic) return
       where (self%sum%is_pressed) self%sum%duration = self%sum%duration + h
    end subroutine pair_sums_add
 
@@ -128,14 +130,14 @@ contains
       real(wp) :: part
       integer :: i
 
-      part = merge(0.5_wp, 1.0_wp, side%masses_resist .and. .not. motion%evaluation%pushes_at_end)
+      part = evaluation_contact_place(motion%evaluation)
       do i = 1, item%n_slave
          push = h*condition_force(item, lam, i)
          associate (node => item%node(i), n => size(push))
             place = motion%x(:, node) + (motion%u0(:, node) + part*motion%du(:, node))
             signed = merge(push, -push, side%is_first)
             sum%push(:n) = sum%push(:n) + signed
-            if (side%masses_resist) sum%impulse(:n) = sum%impulse(:n) + signed
+            if (side%is_dynamic) sum%impulse(:n) = sum%impulse(:n) + signed
             sum%weight = sum%weight + sqrt(dot_product(push, push))
             sum%moment(:n) = sum%moment(:n) + sqrt(dot_product(push, push))*place
          end associate

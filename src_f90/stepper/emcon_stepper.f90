@@ -140,7 +140,7 @@ contains
       type(stepper_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error
 
-      call take_given_schemes(self%march%given_scheme, self%scene, error)
+      call take_given_schemes(self%march%host%scheme, self%scene, error)
       if (.not. (allocated(error) &
          .or. self%scene%host%is_whole)) call host_check_scene(self%given, self%scene, error)
       if (allocated(error)) return

@@ -12,7 +12,7 @@
 !> sections 4 and 5.
 module emcon_stepper_contact
    use emcon_active_set, only : active_set_begin, active_set_drop, active_set_select, &
-      step_cycling, step_done, step_stands_off, step_too_far
+      active_set_suit, step_cycling, step_done, step_stands_off, step_too_far
    use emcon_active_set_update, only : active_set_advance
    use emcon_constraints, only : constraint_index, constraints_force, constraints_select
    use emcon_contact, only : gap_state_t
@@ -27,7 +27,7 @@ module emcon_stepper_contact
    use emcon_gaps, only : gaps_forget, gaps_measure
    use emcon_stepper_query, only : query_forget, query_place, query_sync, query_t
    use emcon_stepper_report, only : contact_report_t, report_check_list, report_evaluate
-   use emcon_steps, only : initiation_persistent
+   use emcon_steps, only : initiation_persistent, step_initiation, step_is_dynamic
    use emcon_text, only : to_text
    implicit none
    private
@@ -76,14 +76,11 @@ contains
 
       associate (active => self%march%active, &
          step => stepper%scene%step(self%march%state%clock%i_step))
-         active%masses_resist = step%scheme%masses_resist
-         active%pushes_out = .not. active%masses_resist
-         active%holds_gap = step%contact%initiation == initiation_persistent &
-            .and. active%masses_resist
-         active%gap_tolerance = step%contact%gap_tolerance
+         call active_set_suit(active, step)
+         active%holds_gap = step_initiation(step) == initiation_persistent
          active%may_cut = stepper%may_cut
-         self%march%motion%evaluation = evaluation_t()
-         if (.not. active%masses_resist) self%march%motion%evaluation = evaluation_at_end
+         self%march%motion%evaluation = merge(evaluation_t(), evaluation_at_end, &
+            step_is_dynamic(step))
       end associate
    end subroutine take_options
 
@@ -290,8 +287,8 @@ contains
 
       call query_sync(self, stepper, error)
       call query_place(self, stepper, u0, du, error)
-      call check_that(self%march%overlap_check%look%is_able, &
-         "overlap in three dimensions is not in this " // "version", error)
+      call check_that(self%march%overlap_check%is_able, &
+         "overlap in three dimensions is not in this version", error)
       if (.not. allocated(error)) call overlap_check_step(self%march%overlap_check, &
          stepper%scene%x, u0, du, overlap)
    end subroutine query_overlap

@@ -5,9 +5,10 @@ module emcon_stepper_file
    use emcon_deck_further, only : further_append, further_t, further_until
    use emcon_deck_source, only : deck_source_t
    use emcon_diagnostics, only : diagnostics_t
+   use emcon_element_kind, only : element_kind_t, find_element_kind
    use emcon_errors, only : err_input, error_t, raise
    use emcon_factor_base, only : factor_base_t
-   use emcon_host, only : host_count, host_count_conditions
+   use emcon_host, only : host_count, n_counted
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : march_free, march_resume, march_t, march_watch
@@ -31,11 +32,11 @@ contains
    subroutine stepper_save(self, restart)
       type(stepper_t), intent(inout) :: self         !! as it was
       type(restart_t), intent(out) :: restart
-      integer :: n(3)
+      integer :: n(n_counted)
 
       call exchange_source(self, restart)
       call exchange_state(self, restart)
-      n = given_counts(self)
+      n = host_count(self%given)
       call exchange_given(restart, n)
    end subroutine stepper_save
 
@@ -76,7 +77,7 @@ contains
       type(march_t), intent(inout) :: march
       procedure(interrupt_interface), pointer :: is_interrupted
 
-      is_interrupted => march%is_interrupted
+      is_interrupted => march%newton%is_interrupted
       call clear(march)
       if (associated(is_interrupted)) call march_watch(march, is_interrupted)
 
@@ -96,6 +97,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(further_t), intent(in), optional :: further
       type(diagnostics_t) :: diagnostics
+      type(element_kind_t), allocatable :: given(:)
 
       call restart_rewind(restart)
       call check_given(self, restart, error)
@@ -109,7 +111,10 @@ contains
          if (allocated(error)) return
       end if
       diagnostics%file_name = self%source%file_name
+      if (self%is_read) given = self%scene%element%kinds
       call stepper_read_source(self, diagnostics, error)
+      if (allocated(given) &
+         .and. .not. allocated(error)) call keep_shapes(self%scene%element%kinds, given)
       if (present(further) .and. .not. allocated(error)) then
          if (further%until > 0.0_wp) call take_until(self, further%until, error)
       end if
@@ -430,23 +435,18 @@ contains
       end do
    end subroutine exchange_sums
 
-   !> How many forces, masses and conditions a model was given; the file says what is not 0.
+   !> How many of each kind a model was given; the file says what is not 0.
    subroutine exchange_given(restart, n)
       type(restart_t), intent(inout) :: restart
-      integer, intent(inout) :: n(3)
+      integer, intent(inout) :: n(n_counted)     !! as of `host_count`
 
       if (restart_offers(restart, "given", any(n(:2) > 0))) call restart_exchange(restart, &
          "given", n(:2))
       if (restart_offers(restart, "given_conditions", n(3) > 0)) call restart_exchange(restart, &
          "given_conditions", n(3))
+      if (restart_offers(restart, "given_contact_law", n(4) > 0)) call restart_exchange(restart, &
+         "given_contact_law", n(4))
    end subroutine exchange_given
-
-   pure function given_counts(self) result(n)
-      type(stepper_t), intent(in) :: self
-      integer :: n(3)
-
-      n = [host_count(self%given), host_count_conditions(self%given)]
-   end function given_counts
 
    !> What the model of the file was given, `self` has been given too.
    subroutine check_given(self, restart, error)
@@ -454,25 +454,39 @@ contains
       type(restart_t), intent(inout) :: restart
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: stored, own
-      integer :: n(3)
+      integer :: n(n_counted)
 
       n = 0
       call exchange_given(restart, n)
       call restart_check(restart, error)
-      if (allocated(error) .or. all(n == given_counts(self))) return
+      if (allocated(error) .or. all(n == host_count(self%given))) return
       call count_text(n, stored)
-      call count_text(given_counts(self), own)
+      call count_text(host_count(self%given), own)
       call raise(error, err_input, "the restart file is of a model with " // stored // &
          ", not with " // own // ": they are not in the file, read the deck " // &
          "and give them again before the restart file is loaded")
    end subroutine check_given
 
    pure subroutine count_text(n, text)
-      integer, intent(in) :: n(3)                !! forces, masses, conditions
+      integer, intent(in) :: n(n_counted)        !! as of `host_count`
       character(len=:), allocatable, intent(out) :: text
 
       text = to_text(n(1)) // " given forces and " // to_text(n(2)) // " masses"
       if (n(3) > 0) text = text // " and " // to_text(n(3)) // " given conditions"
+      if (n(4) > 0) text = text // " and a given law of contact"
    end subroutine count_text
+
+   !> Shapes that were given for elements of the deck hold for the deck of the file as well.
+   subroutine keep_shapes(kind, given)
+      type(element_kind_t), intent(inout) :: kind(:)   !! of the deck of the file
+      type(element_kind_t), intent(in) :: given(:)     !! of the deck that was read before
+      integer :: i, k
+
+      do i = 1, size(kind)
+         k = find_element_kind(given, kind(i)%name)
+         if (k == 0 .or. allocated(kind(i)%shape)) cycle
+         if (allocated(given(k)%shape)) allocate(kind(i)%shape, source=given(k)%shape)
+      end do
+   end subroutine keep_shapes
 
 end module emcon_stepper_file

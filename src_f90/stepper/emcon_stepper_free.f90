@@ -22,6 +22,7 @@ module emcon_stepper_free
    use emcon_stepper, only : stepper_check_solids, stepper_t
    use emcon_stepper_check, only : check_field, check_list, check_number, check_size, &
       check_that, stepper_check_open
+   use emcon_steps, only : step_is_dynamic
    use emcon_system, only : system_check_response, system_find_energy, system_respond
    use emcon_term, only : role_internal
    use emcon_text, only : to_text
@@ -180,7 +181,7 @@ contains
 
       if (allocated(error)) return
       associate (state => self%march%state, step => self%scene%step(self%march%state%clock%i_step))
-         call check_that(step%scheme%masses_resist .or. .not. any(abs(v) > 0.0_wp), "step " // &
+         call check_that(step_is_dynamic(step) .or. .not. any(abs(v) > 0.0_wp), "step " // &
             to_text(state%clock%i_step) // " of the deck is static: there are no velocities", error)
          if (.not. present(time)) return
          call check_number("the time", time, error)

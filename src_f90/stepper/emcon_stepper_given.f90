@@ -138,9 +138,9 @@ contains
       own = scheme_row("DYNAMIC", squeezed(name))
       call check_that(own%code == 0, "a scheme cannot be given as " // trim(own%word) // &
          ": EMCON has its own", error)
-      call check_that(host_scheme_find(self%march%given_scheme, squeezed(name)) == 0, &
+      call check_that(host_scheme_find(self%march%host%scheme, squeezed(name)) == 0, &
          "the scheme " // squeezed(name) // " is given already", error)
-      if (.not. allocated(error)) call host_scheme_add(self%march%given_scheme, squeezed(name), &
+      if (.not. allocated(error)) call host_scheme_add(self%march%host%scheme, squeezed(name), &
          scheme)
    end subroutine stepper_give_scheme
 

@@ -6,11 +6,11 @@
 !> edge turned by -90 degrees. The plane has thickness 1. Rigid obstacles: surfaces of held nodes.
 !> Source: docs/theory.md, sections 4, 5 and 11.
 module emcon_stepper_host
-   use emcon_chain, only : chain_init, chain_t
    use emcon_couplings, only : tie_t
    use emcon_csr, only : csr_from_values, csr_t
    use emcon_element_registry, only : element_kinds_create
    use emcon_errors, only : error_t
+   use emcon_facets, only : facets_init, facets_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
       formulation_nts, integration_elements, integration_segments, multiplier_dual, &
       multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none
@@ -23,6 +23,7 @@ module emcon_stepper_host
    use emcon_stepper_check, only : check_choice, check_field, check_number, check_that, &
       stepper_check_open
    use emcon_steps, only : initiation_admissible, initiation_persistent, prescribed_t
+   use emcon_surface_nodes, only : surface_nodes
    use emcon_text, only : to_text
    implicit none
    private
@@ -60,7 +61,7 @@ contains
       integer, intent(out) :: surface                      !! its number, from 1
       type(error_t), allocatable, intent(out) :: error
       type(surface_t) :: new
-      type(chain_t) :: chain
+      type(facets_t) :: facets
 
       surface = 0
       call check_stage(self, error)
@@ -70,7 +71,7 @@ contains
       if (name == "") new%name = to_text(size(self%scene%surface) + 1)
       allocate(new%element(0), new%face(0))
       allocate(new%edge, source=edge)
-      call chain_init(chain, self%scene, new, error)
+      call facets_init(facets, self%scene, new, error)
       if (allocated(error)) return
       self%scene%surface = [self%scene%surface, new]
       surface = size(self%scene%surface)
@@ -86,6 +87,8 @@ contains
       call check_that(size(edge, 1) == 2 .and. size(edge, 2) > 0, "edge has the shape (" // &
          to_text(size(edge, 1)) // ", " // to_text(size(edge, 2)) // &
          "), not (2, n_edge) with n_edge > 0", error)
+      call check_that(size(edge, 1) == size(x, 1), "surfaces of edges are of the plane, and " // &
+         "nodes have " // to_text(size(x, 1)) // " coordinates", error)
       do i = 1, size(edge, 2)
          call check_choice("edge(1, " // to_text(i) // ")", edge(1, i), 1, size(x, 2), error)
          call check_choice("edge(2, " // to_text(i) // ")", edge(2, i), 1, size(x, 2), error)
@@ -242,8 +245,7 @@ contains
       integer, intent(in) :: tie                           !! from 1, in the order of the model
       type(csr_t), intent(out) :: d, m                     !! (n_row x n_node) [L]
       type(error_t), allocatable, intent(out) :: error
-      type(chain_t) :: slave
-      integer, allocatable :: row(:), column(:)
+      integer, allocatable :: row(:), column(:), slave(:)
       logical, allocatable :: is_slave(:)
       integer :: k, s
 
@@ -251,15 +253,14 @@ contains
       if (allocated(error)) return
       call check_choice("tie", tie, 1, size(self%scene%tie), error)
       if (allocated(error)) return
-      call chain_init(slave, self%scene, self%scene%surface(self%scene%tie(tie)%slave), error)
-      if (allocated(error)) return
+      call surface_nodes(self%scene, self%scene%surface(self%scene%tie(tie)%slave), slave)
       associate (rows => self%scene%tie(tie)%rows, n_node => size(self%scene%x, 2))
          allocate(row(size(rows%node)), is_slave(size(rows%node)))
          do k = 1, size(rows%slave)
             row(rows%start(k) + 1:rows%start(k + 1)) = k
          end do
          do s = 1, size(rows%node)
-            is_slave(s) = find_sorted(slave%node, rows%node(s)) > 0
+            is_slave(s) = find_sorted(slave, rows%node(s)) > 0
          end do
          column = merge(rows%node, 0, is_slave)
          call csr_from_values(d, size(rows%slave), n_node, row, column, rows%weight)

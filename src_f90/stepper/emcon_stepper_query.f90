@@ -21,7 +21,7 @@ module emcon_stepper_query
    use emcon_march_past, only : march_past_begin
    use emcon_null_space, only : null_space_free, null_space_t
    use emcon_numbering, only : pick_unknowns
-   use emcon_evaluation, only : instant_t
+   use emcon_evaluation, only : evaluation_has_inertia, instant_t
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_field, check_list, check_size, check_that, &
       stepper_check_open, stepper_check_smooth
@@ -218,7 +218,7 @@ contains
             do k = 1, size(list)
                associate (a => list(k)%dof, i => list(k)%node)
                   du = u1(a, i) - march%state%u(a, i)
-                  if (march%scheme%row%masses_resist) march%motion%offset(a, i) = &
+                  if (evaluation_has_inertia(march%motion%evaluation)) march%motion%offset(a, i) = &
                      march%motion%offset(a, i) + (march%motion%du(a, i) - du)
                end associate
             end do

@@ -4,7 +4,7 @@
 !> the harmonic mean of those at its ends, none where one of them is straight or they bend to
 !> different sides. Source: docs/theory.md, section 6.
 module emcon_arcs_plane
-   use emcon_chain, only : chain_corners, chain_t
+   use emcon_chain_plane, only : chain_corners, chain_t, next, previous
    use emcon_kinds, only : wp
    implicit none
    private
@@ -73,12 +73,12 @@ contains
       real(wp), intent(in) :: x(:, :)            !! (2, n_node of the scene) [L]
       real(wp), intent(in) :: angle              !! sharper turns are corners [degrees]
       real(wp), intent(out) :: curvature(:)      !! (n_edge) [1/L]
-      logical :: is_corner(chain%n_edge)
+      logical :: is_corner(chain%n_facet)
       real(wp) :: way(2, -2:2)
       integer :: beside(-2:2), e, i
 
       call chain_corners(chain, x, angle, is_corner)
-      do e = 1, chain%n_edge
+      do e = 1, chain%n_facet
          beside = 0
          beside(0) = e
          do i = 1, 2
@@ -87,8 +87,8 @@ contains
          end do
          way = 0.0_wp
          do i = -2, 2
-            if (beside(i) > 0) way(:, i) = x(:, chain%edge(2, beside(i))) &
-               - x(:, chain%edge(1, beside(i)))
+            if (beside(i) > 0) way(:, i) = x(:, chain%facet(2, beside(i))) &
+               - x(:, chain%facet(1, beside(i)))
          end do
          curvature(e) = arc_curvature(way)
       end do
@@ -101,7 +101,7 @@ contains
 
          before = 0
          if (k == 0) return
-         if (.not. is_corner(k)) before = chain%previous(k)
+         if (.not. is_corner(k)) before = chain%neighbour(previous, k)
       end function before
 
       !> The edge after edge `k` around no corner.
@@ -109,7 +109,7 @@ contains
          integer, intent(in) :: k
 
          after = 0
-         if (k > 0) after = chain%next(k)
+         if (k > 0) after = chain%neighbour(next, k)
          if (after == 0) return
          if (is_corner(after)) after = 0
       end function after

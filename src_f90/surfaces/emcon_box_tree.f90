@@ -1,6 +1,6 @@
-!> A balanced tree of boxes in the plane: which boxes are near a given one.
+!> A balanced tree of boxes, of the plane or of space: which boxes are near a given one.
 !>
-!> Built by splitting at the median of the centres, along the axis where they spread more, in
+!> Built by splitting at the median of the centres, along the axis where they spread most, in
 !> O(n log n) whatever the boxes are; equal centres keep the order of their indices. Only
 !> comparisons, differences and halves are formed: boxes scaled by a power of two give the same
 !> tree and the same answers.
@@ -23,8 +23,8 @@ module emcon_box_tree
       integer :: n_leaf = 0                      !! a power of two; 0: no boxes
       integer, allocatable :: start(:)           !! (n_leaf + 1) first box of each leaf
       integer, allocatable :: box(:)             !! (n_box) index of each box, leaf by leaf
-      real(wp), allocatable :: bounds(:, :)      !! (4, n_box) low x, y, high x, y of each box
-      real(wp), allocatable :: around(:, :)      !! (4, 2 n_leaf - 1) the same of each node
+      real(wp), allocatable :: bounds(:, :)      !! (2 n_dim, n_box) low corner, then high one
+      real(wp), allocatable :: around(:, :)      !! (2 n_dim, 2 n_leaf - 1) the same of each node
    end type box_tree_t
 
 contains
@@ -32,9 +32,10 @@ contains
    !> The tree of the boxes from `low` to `high`. Boxes that are not finite are left out.
    pure subroutine box_tree_init(self, low, high)
       type(box_tree_t), intent(out) :: self
-      real(wp), intent(in) :: low(:, :), high(:, :)   !! (2, n_box) [L]
-      integer :: i, k, n
+      real(wp), intent(in) :: low(:, :), high(:, :)   !! (n_dim, n_box) [L]
+      integer :: i, k, n, n_dim
 
+      n_dim = size(low, 1)
       allocate(self%box(size(low, 2)))
       n = 0
       do i = 1, size(low, 2)
@@ -49,35 +50,37 @@ contains
          self%n_leaf = 2*self%n_leaf
       end do
       call sort_into_leaves(self, low, high)
-      allocate(self%bounds(4, n), self%around(4, 2*self%n_leaf - 1))
+      allocate(self%bounds(2*n_dim, n), self%around(2*n_dim, 2*self%n_leaf - 1))
       do i = 1, n
          self%bounds(:, i) = [low(:, self%box(i)), high(:, self%box(i))]
       end do
       do i = 1, self%n_leaf
          associate (here => self%bounds(:, self%start(i):self%start(i + 1) - 1))
             self%around(:, self%n_leaf + i - 1) = &
-               [minval(here(:2, :), dim=2), maxval(here(3:, :), dim=2)]
+               [minval(here(:n_dim, :), dim=2), maxval(here(n_dim + 1:, :), dim=2)]
          end associate
       end do
       do k = self%n_leaf - 1, 1, -1
-         self%around(:2, k) = min(self%around(:2, 2*k), self%around(:2, 2*k + 1))
-         self%around(3:, k) = max(self%around(3:, 2*k), self%around(3:, 2*k + 1))
+         self%around(:n_dim, k) = min(self%around(:n_dim, 2*k), self%around(:n_dim, 2*k + 1))
+         self%around(n_dim + 1:, k) = max(self%around(n_dim + 1:, 2*k), &
+            self%around(n_dim + 1:, 2*k + 1))
       end do
    end subroutine box_tree_init
 
-   !> Halve the boxes again and again. Both orders of the centres are kept through each split, so
-   !> that none is sorted twice.
+   !> Halve the boxes again and again. The orders of the centres along all axes are kept through
+   !> each split, so that none is sorted twice.
    pure subroutine sort_into_leaves(self, low, high)
       type(box_tree_t), intent(inout) :: self
       real(wp), intent(in) :: low(:, :), high(:, :)
       real(dp), allocatable :: centre(:, :)
       integer, allocatable :: order(:, :), spare(:)
       logical, allocatable :: is_left(:)
-      integer :: n, a, stride, k, middle
+      integer :: n, n_dim, a, stride, k, middle
 
       n = size(self%box)
-      allocate(centre(n, 2), order(n, 2), spare(n), is_left(n))
-      do a = 1, 2
+      n_dim = size(low, 1)
+      allocate(centre(n, n_dim), order(n, n_dim), spare(n), is_left(n))
+      do a = 1, n_dim
          centre(:, a) = real(0.5_wp*low(a, self%box) + 0.5_wp*high(a, self%box), dp)
          order(:, a) = sort_order(centre(:, a))
       end do
@@ -99,41 +102,43 @@ contains
 
    !> Move what lies left of `middle` along the axis of the larger spread to the left.
    pure subroutine split(centre, first, middle, last, order, is_left, spare)
-      real(dp), intent(in), contiguous :: centre(:, :)      !! (n_box, 2)
+      real(dp), intent(in), contiguous :: centre(:, :)      !! (n_box, n_dim)
       integer, intent(in) :: first, middle, last            !! first..last is split
-      integer, intent(inout), contiguous :: order(:, :)     !! (n_box, 2) ascending along each axis
+      integer, intent(inout), contiguous :: order(:, :)     !! (n_box, n_dim) ascending on each axis
       logical, intent(inout), contiguous :: is_left(:)      !! (n_box) work space
       integer, intent(inout), contiguous :: spare(:)        !! (n_box) work space
       integer :: axis, i, n_left, n_right, other
-      real(dp) :: spread(2)
+      real(dp) :: spread(size(centre, 2))
 
-      do axis = 1, 2
+      do axis = 1, size(spread)
          spread(axis) = centre(order(last, axis), axis) - centre(order(first, axis), axis)
       end do
-      axis = merge(1, 2, spread(1) >= spread(2))
-      other = 3 - axis
+      axis = maxloc(spread, dim=1)
       do i = first, last
          is_left(order(i, axis)) = i < middle
       end do
-      n_left = 0
-      n_right = 0
-      do i = first, last
-         if (is_left(order(i, other))) then
-            order(first + n_left, other) = order(i, other)
-            n_left = n_left + 1
-         else
-            n_right = n_right + 1
-            spare(n_right) = order(i, other)
-         end if
+      do other = 1, size(spread)
+         if (other == axis) cycle
+         n_left = 0
+         n_right = 0
+         do i = first, last
+            if (is_left(order(i, other))) then
+               order(first + n_left, other) = order(i, other)
+               n_left = n_left + 1
+            else
+               n_right = n_right + 1
+               spare(n_right) = order(i, other)
+            end if
+         end do
+         order(middle:last, other) = spare(:n_right)
       end do
-      order(middle:last, other) = spare(:n_right)
    end subroutine split
 
    !> Append to found(:n), ascending, the boxes no farther than `reach` from that of `low`, `high`,
    !> along each axis. Nothing is near a box that is not finite.
    pure subroutine box_tree_find(self, low, high, reach, found, n)
       type(box_tree_t), intent(in) :: self
-      real(wp), intent(in) :: low(2), high(2)    !! [L]
+      real(wp), intent(in), contiguous :: low(:), high(:)    !! (n_dim) [L]
       real(wp), intent(in) :: reach              !! >= 0 [L]
       integer, allocatable, intent(inout) :: found(:)   !! made longer where needed
       integer, intent(inout) :: n                !! number in `found`, >= 0
@@ -176,14 +181,22 @@ contains
    !> Differences, as in the distance of two boxes: they are monotone when rounded, so what is near
    !> a box is near each node above it.
    pure logical function is_near(bounds, low, high, reach)
-      real(wp), intent(in) :: bounds(4), low(2), high(2), reach
+      real(wp), intent(in), contiguous :: bounds(:), low(:), high(:)
+      real(wp), intent(in) :: reach
+      integer :: a
 
-      is_near = low(1) - bounds(3) <= reach .and. bounds(1) - high(1) <= reach &
-         .and. low(2) - bounds(4) <= reach .and. bounds(2) - high(2) <= reach
+      is_near = .false.
+      associate (n_dim => size(low))
+         do a = 1, n_dim
+            if (.not. (low(a) - bounds(n_dim + a) <= reach)) return
+            if (.not. (bounds(a) - high(a) <= reach)) return
+         end do
+      end associate
+      is_near = .true.
    end function is_near
 
    pure logical function is_finite_box(low, high)
-      real(wp), intent(in) :: low(2), high(2)
+      real(wp), intent(in) :: low(:), high(:)
 
       is_finite_box = all(ieee_is_finite(low)) .and. all(ieee_is_finite(high))
    end function is_finite_box

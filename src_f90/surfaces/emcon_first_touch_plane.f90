@@ -4,7 +4,7 @@ module emcon_first_touch_plane
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_facets, only : surface_facets
    implicit none
    private
    public :: touch_time
@@ -28,8 +28,8 @@ contains
       do i = 1, size(scene%pair)
          if (scene%pair(i)%formulation == formulation_given) cycle   ! it sees all gaps itself
          associate (pair => scene%pair(i))
-            call surface_edges(scene, scene%surface(pair%slave), slave)
-            call surface_edges(scene, scene%surface(pair%master), master)
+            call surface_facets(scene, scene%surface(pair%slave), slave)
+            call surface_facets(scene, scene%surface(pair%master), master)
             if (scene%surface(pair%slave)%is_nodal) then
                node = scene%surface(pair%slave)%node
             else

@@ -5,15 +5,16 @@
 !> Source: docs/theory.md, sections 4.3 and 4.11.
 module emcon_outline_curves_plane
    use emcon_arcs_plane, only : arc_curvature, arc_rise
-   use emcon_chain, only : chain_corners, chain_init, chain_t
+   use emcon_chain_plane, only : chain_corners, chain_init, chain_t, next, previous
    use emcon_errors, only : error_t
    use emcon_hermite, only : hermite_curve, hermite_point, hermite_point_t, hermite_stencil_t, &
       joined_pieces
    use emcon_interactions, only : contact_options_t, formulation_segment, smoothing_hermite
    use emcon_kinds, only : wp
-   use emcon_outline_plane, only : outline_t
+   use emcon_outline, only : outline_t
+   use emcon_outline_plane, only : outline_links_t
    use emcon_scene, only : scene_t
-   use emcon_seams, only : chain_join
+   use emcon_seams_plane, only : chain_join
    implicit none
    private
    public :: outline_curves_t, outline_curves_init, outline_curves_overlap
@@ -35,15 +36,16 @@ contains
 
    !> The curves of `outline` in a step with the options `options`, where pairs have none of their
    !> own.
-   subroutine outline_curves_init(self, outline, scene, options)
+   subroutine outline_curves_init(self, outline, links, scene, options)
       type(outline_curves_t), intent(out) :: self
       type(outline_t), intent(in) :: outline
+      type(outline_links_t), intent(in) :: links     !! of it
       type(scene_t), intent(in) :: scene
       type(contact_options_t), intent(in) :: options
       type(contact_options_t) :: chosen
       integer :: i
 
-      allocate(self%number(size(outline%edge, 2)), source=0)
+      allocate(self%number(size(outline%facet, 2)), source=0)
       allocate(self%piece(0))
       do i = 1, merge(size(scene%pair), 0, outline%n_piece > 0)
          associate (pair => scene%pair(i))
@@ -54,33 +56,34 @@ contains
                pair%master, chosen%smoothing_angle)
          end associate
       end do
-      call find_rows(self, outline, scene, options%smoothing_angle)
+      call find_rows(self, outline, links, scene, options%smoothing_angle)
    end subroutine outline_curves_init
 
    !> The nodes that tell the arcs.
-   subroutine find_rows(self, outline, scene, angle)
+   subroutine find_rows(self, outline, links, scene, angle)
       type(outline_curves_t), intent(inout) :: self
       type(outline_t), intent(in) :: outline
+      type(outline_links_t), intent(in) :: links
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: angle              !! sharper turns are corners [degrees]
       integer :: beside(-2:2), e, i
 
-      allocate(self%row(-1:4, size(outline%edge, 2)), source=0)
-      do e = 1, size(outline%edge, 2)
+      allocate(self%row(-1:4, size(outline%facet, 2)), source=0)
+      do e = 1, size(outline%facet, 2)
          beside = 0
          beside(0) = e
          do i = 1, 2
             if (beside(1 - i) > 0) then
-               beside(-i) = outline%link(1, beside(1 - i))
+               beside(-i) = links%link(1, beside(1 - i))
                if (turns(beside(-i), beside(1 - i))) beside(-i) = 0
             end if
             if (beside(i - 1) > 0) then
-               beside(i) = outline%link(2, beside(i - 1))
+               beside(i) = links%link(2, beside(i - 1))
                if (turns(beside(i - 1), beside(i))) beside(i) = 0
             end if
          end do
          do i = -2, 2
-            if (beside(i) > 0) self%row(i + 1:i + 2, e) = outline%edge(:, beside(i))
+            if (beside(i) > 0) self%row(i + 1:i + 2, e) = outline%facet(:, beside(i))
          end do
       end do
 
@@ -93,8 +96,8 @@ contains
 
          turns = .true.
          if (a == 0 .or. b == 0) return
-         one = scene%x(:, outline%edge(2, a)) - scene%x(:, outline%edge(1, a))
-         other = scene%x(:, outline%edge(2, b)) - scene%x(:, outline%edge(1, b))
+         one = scene%x(:, outline%facet(2, a)) - scene%x(:, outline%facet(1, a))
+         other = scene%x(:, outline%facet(2, b)) - scene%x(:, outline%facet(1, b))
          turns = atan2(abs(one(1)*other(2) - one(2)*other(1)), dot_product(one, other)) &
             > angle*acos(-1.0_wp)/180.0_wp
       end function turns
@@ -116,14 +119,14 @@ contains
       call chain_init(chain, scene, scene%surface(number), error)
       if (allocated(error)) return
       call chain_join(chain, scene)
-      allocate(is_corner(chain%n_edge))
+      allocate(is_corner(chain%n_facet))
       call chain_corners(chain, scene%x, angle, is_corner)
       begins = 0
-      begins(chain%edge(1, :)) = [(k, k = 1, chain%n_edge)]
-      do e = 1, size(outline%edge, 2)
-         k = begins(outline%edge(1, e))
+      begins(chain%facet(1, :)) = [(k, k = 1, chain%n_facet)]
+      do e = 1, size(outline%facet, 2)
+         k = begins(outline%facet(1, e))
          if (k == 0 .or. self%number(e) > 0) cycle
-         if (chain%edge(2, k) /= outline%edge(2, e)) cycle
+         if (chain%facet(2, k) /= outline%facet(2, e)) cycle
          self%piece = [self%piece, piece_of(chain, is_corner, k)]
          self%number(e) = size(self%piece)
       end do
@@ -136,17 +139,17 @@ contains
       integer, intent(in) :: k
 
       call take(k, 0)
-      if (.not. is_corner(k)) call take(chain%previous(k), -1)
-      if (chain%next(k) == 0) return
-      if (.not. is_corner(chain%next(k))) call take(chain%next(k), 1)
+      if (.not. is_corner(k)) call take(chain%neighbour(previous, k), -1)
+      if (chain%neighbour(next, k) == 0) return
+      if (.not. is_corner(chain%neighbour(next, k))) call take(chain%neighbour(next, k), 1)
 
    contains
 
       pure subroutine take(edge, i)
          integer, intent(in) :: edge, i
 
-         piece%node(:, i) = chain%edge(:, edge)
-         piece%length(i) = chain%length(edge)
+         piece%node(:, i) = chain%facet(:, edge)
+         piece%length(i) = chain%size(edge)
       end subroutine take
 
    end function piece_of

@@ -6,46 +6,37 @@
 !> place, as neighbours do. Surfaces of edges without elements stand for themselves.
 module emcon_outline_plane
    use emcon_bodies, only : bodies_find, bodies_find_tied
-   use emcon_chain, only : chain_init, chain_t
+   use emcon_chain_plane, only : chain_init, chain_t
    use emcon_errors, only : error_t
-   use emcon_seams, only : chain_join
-   use emcon_face_edges_plane, only : face_edges, n_face_edge
+   use emcon_seams_plane, only : chain_join
+   use emcon_face_facets, only : face_facets, n_face_facet
    use emcon_kinds, only : dp, wp
    use emcon_mesh, only : surface_t
+   use emcon_outline, only : outline_t
    use emcon_scene, only : scene_t
    use emcon_sort, only : find_sorted, sort_order, unique_sorted
    use emcon_surface_nodes, only : surface_nodes
    use emcon_tied_edges, only : tied_edges_find, tied_ends_find
    implicit none
    private
-   public :: outline_t, outline_init, outline_meets
+   public :: outline_init, outline_links_t
 
-   type :: pieces_t
-      integer, allocatable :: piece(:)           !! ascending
-   end type pieces_t
-
-   type :: outline_t
-      integer :: n_piece = 0                     !! 0: nothing can meet
-      integer, allocatable :: body(:)            !! (n_piece) number of what ties hold together
-      integer, allocatable :: start(:)           !! (n_piece + 1) first edge of each piece
-      integer, allocatable :: edge(:, :)         !! (2, n_edge) first and last node, piece by piece
+   !> How the edges of outlines hang together, from their first to their last node.
+   type :: outline_links_t
       !> (2, n_edge) the ends by their places: nodes, but one number for both nodes of a joint
       integer, allocatable :: place(:, :)
       !> (2, n_edge) the edges before and after; 0: the outline ends there, or branches
       integer, allocatable :: link(:, :)
       integer, allocatable :: host(:)            !! (n_node) edge that a tied end stands on; 0: none
       logical, allocatable :: is_buried(:)       !! (n_node) under a tied piece
-      !> (n_edge) shortest side of the element behind it, of an edge without one its length [L]
-      real(wp), allocatable :: thickness(:)
       logical, allocatable :: is_profile(:)      !! (n_edge) a part of a line or arc of a profile
-      type(pieces_t), allocatable :: on(:)       !! (n_surface) pieces that it is on
-      integer, allocatable :: pair(:, :)         !! (2, n_pair) surfaces that meet
-   end type outline_t
+   end type outline_links_t
 
 contains
 
-   subroutine outline_init(self, scene)
+   subroutine outline_init(self, links, scene)
       type(outline_t), intent(out) :: self
+      type(outline_links_t), intent(out) :: links
       type(scene_t), intent(in) :: scene
       integer, allocatable :: connected(:, :), piece(:), number(:), edge(:, :), order(:)
       real(wp), allocatable :: thickness(:)
@@ -64,20 +55,21 @@ contains
       edge = edge(:, pack([(p, p = 1, size(edge, 2))], is_meant))
       thickness = pack(thickness, is_meant)
       order = sort_order(piece(edge(1, :)))
-      self%edge = edge(:, order)
+      self%facet = edge(:, order)
       self%thickness = thickness(order)
       do p = 1, self%n_piece
          self%start(p + 1) = self%start(p) + count(piece(edge(1, :)) == p)
       end do
-      call link_edges(self, size(scene%x, 2))
-      call find_places(self, scene)
-      call tied_ends_find(scene, self%edge, self%host, self%is_buried)
-      call find_profiles(self, scene)
+      call link_edges(links, self%facet, size(scene%x, 2))
+      call find_places(links, self%facet, scene)
+      call tied_ends_find(scene, self%facet, links%host, links%is_buried)
+      call find_profiles(links, self%facet, scene)
    end subroutine outline_init
 
    !> Nodes of profiles are of nothing else.
-   pure subroutine find_profiles(self, scene)
-      type(outline_t), intent(inout) :: self
+   pure subroutine find_profiles(self, edge, scene)
+      type(outline_links_t), intent(inout) :: self
+      integer, intent(in) :: edge(:, :)          !! (2, n_edge)
       type(scene_t), intent(in) :: scene
       logical :: is_of(size(scene%x, 2))
       integer :: s
@@ -86,7 +78,7 @@ contains
       do s = 1, size(scene%surface)
          if (scene%surface(s)%is_profile) is_of(scene%surface(s)%edge(1, :)) = .true.
       end do
-      self%is_profile = is_of(self%edge(1, :))
+      self%is_profile = is_of(edge(1, :))
    end subroutine find_profiles
 
    !> Elements, and after them surfaces of edges, by their nodes.
@@ -155,23 +147,6 @@ contains
       end do
    end subroutine find_bodies
 
-   !> Does a contact pair bring pieces `p` and `q` together?
-   pure logical function outline_meets(self, p, q) result(meets)
-      type(outline_t), intent(in) :: self
-      integer, intent(in) :: p, q                !! 1..n_piece
-      integer :: k
-
-      meets = .true.
-      do k = 1, size(self%pair, 2)
-         associate (slave => self%on(self%pair(1, k))%piece, &
-               master => self%on(self%pair(2, k))%piece)
-            if (find_sorted(slave, p) > 0 .and. find_sorted(master, q) > 0) return
-            if (find_sorted(slave, q) > 0 .and. find_sorted(master, p) > 0) return
-         end associate
-      end do
-      meets = .false.
-   end function outline_meets
-
    !> The pieces that `surface` is on.
    pure subroutine pieces_of(scene, surface, piece, found)
       type(scene_t), intent(in) :: scene
@@ -215,7 +190,7 @@ contains
       n = 0
       do e = 1, size(scene%element%kind)
          associate (kind => scene%element%kinds(scene%element%kind(e)))
-            n = n + kind%n_face*n_face_edge(kind)
+            n = n + kind%n_face*n_face_facet(kind)
          end associate
       end do
       allocate(edge(2, n))
@@ -224,13 +199,13 @@ contains
       do e = 1, size(scene%element%kind)
          associate (kind => scene%element%kinds(scene%element%kind(e)))
             do f = 1, kind%n_face
-               associate (new => face_edges(kind, f), before => n + (f - 1)*n_face_edge(kind))
+               associate (new => face_facets(kind, f), before => n + (f - 1)*n_face_facet(kind))
                   do k = 1, size(new, 2)
                      edge(:, before + k) = scene%element%node(new(:, k), e)
                   end do
                end associate
             end do
-            k = n + kind%n_face*n_face_edge(kind)
+            k = n + kind%n_face*n_face_facet(kind)
             thickness(n + 1:k) = minval(lengths(scene, edge(:, n + 1:k)))
             n = k
          end associate
@@ -277,22 +252,23 @@ contains
    end function lengths
 
    !> Find the neighbours of each edge. Where two outlines meet in a node, neither goes on.
-   pure subroutine link_edges(self, n_node)
-      type(outline_t), intent(inout) :: self
+   pure subroutine link_edges(self, edge, n_node)
+      type(outline_links_t), intent(inout) :: self
+      integer, intent(in) :: edge(:, :)          !! (2, n_edge)
       integer, intent(in) :: n_node
       integer :: ends(n_node), begins(n_node), i
 
       ends = 0
       begins = 0
-      do i = 1, size(self%edge, 2)
-         associate (a => self%edge(1, i), b => self%edge(2, i))
+      do i = 1, size(edge, 2)
+         associate (a => edge(1, i), b => edge(2, i))
             begins(a) = merge(i, -1, begins(a) == 0)
             ends(b) = merge(i, -1, ends(b) == 0)
          end associate
       end do
-      allocate(self%link(2, size(self%edge, 2)))
-      do i = 1, size(self%edge, 2)
-         associate (a => self%edge(1, i), b => self%edge(2, i))
+      allocate(self%link(2, size(edge, 2)))
+      do i = 1, size(edge, 2)
+         associate (a => edge(1, i), b => edge(2, i))
             self%link(1, i) = merge(max(0, ends(a)), 0, begins(a) > 0)
             self%link(2, i) = merge(max(0, begins(b)), 0, ends(b) > 0)
          end associate
@@ -300,24 +276,25 @@ contains
    end subroutine link_edges
 
    !> The places of the ends: pieces tied to each other have joints where their outlines go on.
-   subroutine find_places(self, scene)
-      type(outline_t), intent(inout) :: self
+   subroutine find_places(self, edge, scene)
+      type(outline_links_t), intent(inout) :: self
+      integer, intent(in) :: edge(:, :)          !! (2, n_edge)
       type(scene_t), intent(in) :: scene
       type(surface_t) :: surface
       type(chain_t) :: chain
       type(error_t), allocatable :: error
       integer :: place(size(scene%x, 2)), begins(size(scene%x, 2)), ends(size(scene%x, 2)), i, k
 
-      self%place = self%edge
+      self%place = edge
       if (size(scene%tie) == 0) return
       if (any(scene%tie%slave == 0)) return            ! known by its rows alone
       begins = 0
       ends = 0
-      do i = 1, size(self%edge, 2)
-         begins(self%edge(1, i)) = begins(self%edge(1, i)) + 1
-         ends(self%edge(2, i)) = ends(self%edge(2, i)) + 1
+      do i = 1, size(edge, 2)
+         begins(edge(1, i)) = begins(edge(1, i)) + 1
+         ends(edge(2, i)) = ends(edge(2, i)) + 1
       end do
-      associate (edge => self%edge, most => max(begins, ends))
+      associate (most => max(begins, ends))
          surface%name = ""
          surface%edge = edge(:, pack([(i, i = 1, size(edge, 2))], &
             most(edge(1, :)) == 1 .and. most(edge(2, :)) == 1))
@@ -329,8 +306,8 @@ contains
       do k = 1, size(chain%node)
          if (chain%duplicate(k) > 0) place(chain%duplicate(k)) = chain%node(k)
       end do
-      do i = 1, size(self%edge, 2)
-         self%place(:, i) = place(self%edge(:, i))
+      do i = 1, size(edge, 2)
+         self%place(:, i) = place(edge(:, i))
       end do
    end subroutine find_places
 

@@ -1,22 +1,23 @@
-!> Do pieces of a mesh overlap where they are? Nodes of either against the outline of the other, and
-!> what lies of edges between their crossings with the other, also of a piece with itself.
+!> Do pieces of a mesh in the plane overlap where they are? Nodes of either against the outline of
+!> the other, and what lies of edges between their crossings with the other, also of a piece with
+!> itself.
 !>
 !> A look places the outlines; what they look at is placed before. Source: docs/theory.md,
 !> section 4.11.
 module emcon_overlap_query_plane
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
+   use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
-   use emcon_outline_curves_plane, only : outline_curves_overlap, outline_curves_t
-   use emcon_outline_plane, only : outline_init, outline_t
+   use emcon_outline_curves_plane, only : outline_curves_init, outline_curves_overlap, &
+      outline_curves_t
+   use emcon_outline_plane, only : outline_init, outline_links_t
    use emcon_overlap_plane, only : crossing_find, length_of, nearest_depth, nearest_t, &
       nearest_update
+   use emcon_overlap_query, only : overlap_query_t, overlap_t
    use emcon_scene, only : scene_t
-   use emcon_text, only : to_text
    implicit none
    private
-   public :: overlap_query_t, overlap_query_init, overlap_query_longest, overlap_query_place, &
-      overlap_query_one_way
-   public :: overlap_t, overlap_names, overlap_text
+   public :: overlap_query_plane_t, overlap_query_plane_init
 
    !> On the way, overlap below the smaller of these, by the edge and by the thickness of the
    !> element behind it, is the straight way past a corner.
@@ -27,16 +28,6 @@ module emcon_overlap_query_plane
    !> Crossings of one edge that are told apart.
    integer, parameter :: most_crossings = 8
 
-   !> The deepest overlap that was found.
-   type :: overlap_t
-      real(wp) :: depth = 0.0_wp                 !! per length of the edge; 0: none
-      real(wp) :: length = 0.0_wp                !! of the edge [L]
-      integer :: node = 0                        !! that is behind, or the nearest on its edge
-      integer :: edge(2) = 0                     !! the nodes of the edge that it is behind
-      !> The deepest one of edges as they are, where they stand for curves.
-      real(wp) :: of_edges = 0.0_wp
-   end type overlap_t
-
    !> Where an edge crosses others, in order: at parts `share` of it, from 0 before the first to 1
    !> after the last.
    type :: crossings_t
@@ -46,35 +37,45 @@ module emcon_overlap_query_plane
       integer :: edge(most_crossings) = 0        !! that is crossed
    end type crossings_t
 
-   type :: overlap_query_t
-      logical :: is_able = .true.                !! there are outlines: not in three dimensions
-      type(outline_t) :: outline
+   type, extends(overlap_query_t) :: overlap_query_plane_t
+      type(outline_links_t) :: links             !! of the outline
       type(outline_curves_t) :: curves           !! that edges stand for
       real(wp), allocatable :: u(:, :)           !! (2, n_node) displacement at the look [L]
       real(wp), allocatable :: low(:, :), high(:, :)   !! (2, n_edge) boxes of edges there [L]
-      logical :: is_passing = .false.            !! it is on the way, not at the end of a step
       integer, allocatable, private :: near(:), found(:), around(:)   !! work space: lists of edges
-   end type overlap_query_t
+   contains
+      procedure :: begin => overlap_query_begin
+      procedure :: longest => overlap_query_longest
+      procedure :: place => overlap_query_place
+      procedure :: overlap => overlap_query_one_way
+   end type overlap_query_plane_t
 
 contains
 
    !> Set up for the outlines of `scene`.
-   subroutine overlap_query_init(self, scene)
-      type(overlap_query_t), intent(out) :: self
+   subroutine overlap_query_plane_init(self, scene)
+      type(overlap_query_plane_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       integer :: n
 
-      self%is_able = size(scene%x, 1) == 2
-      call outline_init(self%outline, scene)
-      n = size(self%outline%edge, 2)
+      call outline_init(self%outline, self%links, scene)
+      n = size(self%outline%facet, 2)
       allocate(self%near(n), self%found(n), self%around(n))
       allocate(self%low(2, n), self%high(2, n), source=0.0_wp)
       allocate(self%u(2, size(scene%x, 2)), source=0.0_wp)
-   end subroutine overlap_query_init
+   end subroutine overlap_query_plane_init
+
+   subroutine overlap_query_begin(self, scene, options)
+      class(overlap_query_plane_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(contact_options_t), intent(in) :: options
+
+      call outline_curves_init(self%curves, self%outline, self%links, scene, options)
+   end subroutine overlap_query_begin
 
    !> The longest edge of piece `p` at x + u.
    pure real(wp) function overlap_query_longest(self, p, x, u) result(longest)
-      type(overlap_query_t), intent(in) :: self
+      class(overlap_query_plane_t), intent(in) :: self
       integer, intent(in) :: p                   !! from 1
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)     !! (2, n_node) [L]
       real(wp) :: way(2)
@@ -82,38 +83,15 @@ contains
 
       longest = 0.0_wp
       do e = self%outline%start(p), self%outline%start(p + 1) - 1
-         way = between(x, u, self%outline%edge(1, e), self%outline%edge(2, e))
+         way = between(x, u, self%outline%facet(1, e), self%outline%facet(2, e))
          longest = max(longest, dot_product(way, way))
       end do
       longest = sqrt(longest)
    end function overlap_query_longest
 
-   !> Does the overlap stand on `node`?
-   elemental logical function overlap_names(self, node)
-      type(overlap_t), intent(in) :: self
-      integer, intent(in) :: node                !! of the scene
-
-      overlap_names = node == self%node .or. any(node == self%edge)
-   end function overlap_names
-
-   !> The bodies and nodes of an overlap, and how deep it is as a length.
-   subroutine overlap_text(self, label, body, text)
-      type(overlap_t), intent(in) :: self
-      integer, intent(in) :: label(:), body(:)   !! (n_node) the user's numbers, bodies from 1
-      character(len=:), allocatable, intent(out) :: text   !! one line
-
-      associate (edge => self%edge)
-         text = "node " // to_text(label(self%node)) // " of body " // &
-            to_text(body(self%node)) // " is " // to_text(self%depth*self%length, 3) // &
-            " behind the edge from node " // &
-            to_text(label(edge(1))) // " to " // to_text(label(edge(2))) // " of body " // &
-            to_text(body(edge(1)))
-      end associate
-   end subroutine overlap_text
-
    !> Place piece `p`: displacements of its nodes, boxes of its edges.
    pure subroutine overlap_query_place(self, p, x, u0, du, share)
-      type(overlap_query_t), intent(inout) :: self
+      class(overlap_query_plane_t), intent(inout) :: self
       integer, intent(in) :: p                   !! from 1
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       real(wp), intent(in) :: share              !! of the step that lies behind, 0 to 1
@@ -121,7 +99,7 @@ contains
       integer :: e
 
       do e = self%outline%start(p), self%outline%start(p + 1) - 1
-         associate (i => self%outline%edge(1, e), j => self%outline%edge(2, e))
+         associate (i => self%outline%facet(1, e), j => self%outline%facet(2, e))
             self%u(:, i) = u0(:, i) + share*du(:, i)
             self%u(:, j) = u0(:, j) + share*du(:, j)
             a = x(:, i) + self%u(:, i)
@@ -134,7 +112,7 @@ contains
 
    !> Nodes and parts of edges of piece `p` in piece `q`, both placed; the same one: in itself.
    subroutine overlap_query_one_way(self, p, q, x, reach, overlap)
-      type(overlap_query_t), intent(inout) :: self
+      class(overlap_query_plane_t), intent(inout) :: self
       integer, intent(in) :: p, q                !! from 1
       real(wp), intent(in), contiguous :: x(:, :)  !! (2, n_node) [L]
       real(wp), intent(in) :: reach              !! length of the longest edge of both [L]
@@ -162,7 +140,7 @@ contains
          if (n_found == 0) cycle
          if (p /= q) then
             call try_node(self, x, e, 1, self%near(self%found(:n_found)), reach, overlap)
-            if (self%outline%link(2, e) == 0) call try_node(self, x, e, 2, &
+            if (self%links%link(2, e) == 0) call try_node(self, x, e, 2, &
                self%near(self%found(:n_found)), reach, overlap)
          end if
          call try_edge(self, x, e, self%near(self%found(:n_found)), p == q, reach, &
@@ -172,7 +150,7 @@ contains
 
    !> The box of piece `p` at the present look.
    pure subroutine box_of(self, p, low, high)
-      type(overlap_query_t), intent(in) :: self
+      class(overlap_query_plane_t), intent(in) :: self
       integer, intent(in) :: p
       real(wp), intent(out) :: low(2), high(2)
 
@@ -185,7 +163,7 @@ contains
    !> Is the node at an end of edge `e` behind the outline of which `other` are the edges within
    !> `reach`?
    pure subroutine try_node(self, x, e, side, other, reach, overlap)
-      type(overlap_query_t), intent(in) :: self
+      class(overlap_query_plane_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e, side             !! 1: first node, 2: last one
       integer, intent(in) :: other(:)
@@ -194,9 +172,9 @@ contains
       type(nearest_t) :: nearest
       integer :: k
 
-      associate (edge => self%outline%edge, node => self%outline%edge(side, e))
-         if (any(self%outline%place(:, other) == self%outline%place(side, e))) return
-         if (self%outline%is_buried(node) .or. any(other == self%outline%host(node))) return
+      associate (edge => self%outline%facet, node => self%outline%facet(side, e))
+         if (any(self%links%place(:, other) == self%links%place(side, e))) return
+         if (self%links%is_buried(node) .or. any(other == self%links%host(node))) return
          do k = 1, size(other)
             call nearest_update(nearest, other(k), between(x, self%u, edge(1, other(k)), node), &
                between(x, self%u, edge(1, other(k)), edge(2, other(k))))
@@ -211,7 +189,7 @@ contains
    !> outline from the crossings, past what lies behind the piece's own surface. Neighbours do not
    !> cross.
    pure subroutine try_edge(self, x, e, other, is_own, reach, overlap)
-      type(overlap_query_t), intent(inout) :: self
+      class(overlap_query_plane_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e
       integer, intent(in) :: other(:)
@@ -256,7 +234,7 @@ contains
    !> An edge that crosses nothing lies in the other piece all the same where its ends stand exactly
    !> on the sides of that.
    pure subroutine try_middle(self, x, e, other, reach, overlap)
-      type(overlap_query_t), intent(in) :: self
+      class(overlap_query_plane_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e
       integer, intent(in) :: other(:)
@@ -266,7 +244,7 @@ contains
       integer :: side
 
       do side = 1, 2
-         if (.not. stands_on(self, x, self%outline%edge(side, e), other)) return
+         if (.not. stands_on(self, x, self%outline%facet(side, e), other)) return
       end do
       found = overlap
       found%depth = max(aligned, overlap%depth)
@@ -276,7 +254,7 @@ contains
 
    !> Is a node on one of these edges, to round-off?
    pure logical function stands_on(self, x, node, other) result(stands)
-      type(overlap_query_t), intent(in) :: self
+      class(overlap_query_plane_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: node
       integer, intent(in) :: other(:)
@@ -284,7 +262,7 @@ contains
       integer :: k
 
       do k = 1, size(other)
-         associate (b => self%outline%edge(:, other(k)))
+         associate (b => self%outline%facet(:, other(k)))
             call nearest_update(nearest, other(k), between(x, self%u, b(1), node), &
                between(x, self%u, b(1), b(2)))
          end associate
@@ -296,7 +274,7 @@ contains
    !> The edges `crossed`, and those along the outline on either side of them within `reach` of edge
    !> `e`: `self%around`.
    pure subroutine find_around(self, e, crossed, reach, n)
-      type(overlap_query_t), intent(inout) :: self
+      class(overlap_query_plane_t), intent(inout) :: self
       integer, intent(in) :: e, crossed(:)
       real(wp), intent(in) :: reach              !! [L]
       integer, intent(out) :: n
@@ -306,14 +284,14 @@ contains
       do k = 1, size(crossed)
          do side = 1, 2
             f = crossed(k)
-            if (side == 2) f = self%outline%link(side, f)
+            if (side == 2) f = self%links%link(side, f)
             do while (f > 0)
                if (any(self%around(:n) == f) .or. are_neighbours(self, e, f)) exit
                if (any(self%low(:, f) > self%high(:, e) + reach) &
                   .or. any(self%high(:, f) < self%low(:, e) - reach)) exit
                n = n + 1
                self%around(n) = f
-               f = self%outline%link(side, f)
+               f = self%links%link(side, f)
             end do
          end do
       end do
@@ -321,7 +299,7 @@ contains
 
    !> Where edge `e` crosses `other` edges.
    pure subroutine find_crossings(self, x, e, other, crossings)
-      type(overlap_query_t), intent(in) :: self
+      class(overlap_query_plane_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e
       integer, intent(in) :: other(:)
@@ -332,7 +310,7 @@ contains
 
       do k = 1, size(other)
          if (are_neighbours(self, e, other(k))) cycle
-         associate (a => self%outline%edge(:, e), b => self%outline%edge(:, other(k)))
+         associate (a => self%outline%facet(:, e), b => self%outline%facet(:, other(k)))
             call crossing_find(between(x, self%u, a(1), a(2)), reshape([ &
                between(x, self%u, a(1), b(1)), between(x, self%u, a(1), b(2))], [2, 2]), &
                crosses, new, enters)
@@ -355,13 +333,13 @@ contains
 
    !> Do edges `e` and `f` meet in a node, at a joint, or where a tied piece ends on one of them?
    pure logical function are_neighbours(self, e, f)
-      type(overlap_query_t), intent(in) :: self
+      class(overlap_query_plane_t), intent(in) :: self
       integer, intent(in) :: e, f
 
-      associate (a => self%outline%place(:, e), b => self%outline%place(:, f))
+      associate (a => self%links%place(:, e), b => self%links%place(:, f))
          are_neighbours = any(a == b(1)) .or. any(a == b(2))
       end associate
-      associate (edge => self%outline%edge, host => self%outline%host)
+      associate (edge => self%outline%facet, host => self%links%host)
          are_neighbours = are_neighbours .or. any(host(edge(:, e)) == f) &
             .or. any(host(edge(:, f)) == e)
       end associate
@@ -369,7 +347,7 @@ contains
 
    !> How deep is the place `share` along edge `e` in `other` edges, that are not its neighbours?
    pure subroutine try_place(self, x, e, share, other, overlap, reach)
-      type(overlap_query_t), intent(in) :: self
+      class(overlap_query_plane_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       integer, intent(in) :: e
       real(wp), intent(in) :: share
@@ -379,10 +357,10 @@ contains
       type(nearest_t) :: nearest
       integer :: k
 
-      associate (a => self%outline%edge(:, e))
+      associate (a => self%outline%facet(:, e))
          do k = 1, size(other)
             if (are_neighbours(self, e, other(k))) cycle
-            associate (b => self%outline%edge(:, other(k)))
+            associate (b => self%outline%facet(:, other(k)))
                call nearest_update(nearest, other(k), between(x, self%u, b(1), a(1)) &
                   + share*between(x, self%u, a(1), a(2)), between(x, self%u, b(1), b(2)))
             end associate
@@ -399,7 +377,7 @@ contains
    !> off. An edge of a profile is a small part of a line or an arc: it counts as no shorter than
    !> the edge that is in it.
    pure subroutine take_deeper(self, x, nearest, e, share, overlap)
-      type(overlap_query_t), intent(in) :: self
+      class(overlap_query_plane_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
       type(nearest_t), intent(in) :: nearest
       integer, intent(in) :: e                   !! the edge that is judged
@@ -409,21 +387,21 @@ contains
       integer :: next
 
       if (nearest%edge == 0) return
-      associate (edge => self%outline%edge)
+      associate (edge => self%outline%facet)
          next_along = nearest%along
          if (nearest%side > 0) then
-            next = self%outline%link(nearest%side, nearest%edge)
+            next = self%links%link(nearest%side, nearest%edge)
             if (next == 0) return
             next_along = between(x, self%u, edge(1, next), edge(2, next))
          end if
          depth = nearest_depth(nearest, next_along)
          length = length_of(nearest%along)
-         if (self%outline%is_profile(nearest%edge)) length = max(length, &
+         if (self%links%is_profile(nearest%edge)) length = max(length, &
             length_of(between(x, self%u, edge(1, e), edge(2, e))))
          if (.not. depth > overlap%depth*length) return
          taken_off = outline_curves_overlap(self%curves, e, nearest%edge, &
             [share, nearest%share], x, self%u)
-         if (taken_off > 0.0_wp) overlap%of_edges = max(overlap%of_edges, depth/length)
+         if (taken_off > 0.0_wp) overlap%of_facets = max(overlap%of_facets, depth/length)
          depth = depth - taken_off
          if (.not. depth > overlap%depth*length) return
          if (self%is_passing .and. depth < min(passing*length, &
@@ -431,7 +409,7 @@ contains
          overlap%depth = depth/length
          overlap%node = edge(merge(1, 2, share < 0.5_wp), e)
          overlap%length = length
-         overlap%edge = edge(:, nearest%edge)
+         overlap%facet(:size(edge, 1)) = edge(:, nearest%edge)
       end associate
    end subroutine take_deeper
 

@@ -21,7 +21,7 @@ module emcon_system
    use emcon_reduction, only : reduction_add
    use emcon_scene, only : scene_t
    use emcon_space, only : lists_alone, lists_begin, lists_t, space_begin_step, space_init, space_t
-   use emcon_steps, only : method_saddle_point
+   use emcon_steps, only : method_saddle_point, step_is_dynamic
    use emcon_stiffening, only : stiffening_add, stiffening_set, stiffening_t
    use emcon_term, only : response_begin, response_init, response_t, role_external, &
       role_inertia, role_internal, term_box_t
@@ -160,10 +160,10 @@ contains
       self%stiffening = stiffening_t()
       call lay_out(self, scene, lists, first)
       self%lagged%is_known = .false.
-      if (scene%step(i_step)%scheme%is_explicit) call lists_alone(lists)
+      if (scene%step(i_step)%scheme%lumps_mass) call lists_alone(lists)
       call space_begin_step(self%space, scene, i_step, lists, self%matrix, slot, error)
       if (allocated(error)) return
-      if (scene%step(i_step)%scheme%is_explicit) then
+      if (scene%step(i_step)%scheme%lumps_mass) then
          deallocate(slot)
          allocate(slot(first(size(first))), source=0)
       end if
@@ -176,7 +176,7 @@ contains
             slot(first(k) + 1:first(k + 1)))
       end do
       call find_acting(self)
-      if (scene%step(i_step)%scheme%masses_resist) call check_mass(self, scene, error)
+      if (step_is_dynamic(scene%step(i_step))) call check_mass(self, scene, error)
    end subroutine system_begin_step
 
    !> Which of the conditions of `held` act: linear ones that are not eliminated, and others that

@@ -12,8 +12,7 @@ module emcon_host
    implicit none
    private
    public :: host_t, host_add_constraint, host_add_contact, host_add_force, host_add_law, &
-      host_add_solver, host_copy_solvers, host_count, host_count_conditions, host_find_contact, &
-      host_find_solver
+      host_add_solver, host_copy_solvers, host_count, host_find_contact, host_find_solver, n_counted
 
    !> Laws by the names of materials, forces between nodes, mass beside that of elements, solvers
    !> by what decks call them, constraints that always hold, contact of pairs, a law of contact that
@@ -28,8 +27,8 @@ module emcon_host
       class(contact_law_t), allocatable :: contact_law
    end type host_t
 
-   !> What `host_count` counts: forces and masses.
-   integer, parameter :: n_counted = 2
+   !> What `host_count` counts.
+   integer, parameter :: n_counted = 4
 
 contains
 
@@ -96,26 +95,20 @@ contains
       if (allocated(self%contact)) k = findloc(self%contact%pair, pair, 1)
    end function host_find_contact
 
-   !> Number of forces, and of masses.
+   !> Numbers of forces, of masses, of conditions of all constraints, of laws of contact: what a run
+   !> without them would go on without a word.
    pure function host_count(self) result(n)
       type(host_t), intent(in) :: self
       integer :: n(n_counted)
-
-      n = [0, merge(1, 0, self%mass%n_row > 0)]
-      if (allocated(self%force)) n(1) = size(self%force)
-   end function host_count
-
-   !> Number of conditions of all constraints.
-   pure integer function host_count_conditions(self) result(n)
-      type(host_t), intent(in) :: self
       integer :: i
 
-      n = 0
+      n = [0, merge(1, 0, self%mass%n_row > 0), 0, merge(1, 0, allocated(self%contact_law))]
+      if (allocated(self%force)) n(1) = size(self%force)
       if (.not. allocated(self%constraint)) return
       do i = 1, size(self%constraint)
-         n = n + self%constraint(i)%constraint%n_constraint
+         n(3) = n(3) + self%constraint(i)%constraint%n_constraint
       end do
-   end function host_count_conditions
+   end function host_count
 
    !> Append a copy of the strain energy, or of the law, of the material `name`.
    subroutine host_add_law(self, name, energy, law)

@@ -3,7 +3,7 @@ module emcon_host_check
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_host, only : host_copy_solvers, host_count, host_find_solver, host_t
+   use emcon_host, only : host_copy_solvers, host_count, host_find_solver, host_t, n_counted
    use emcon_host_force, only : host_force_t
    use emcon_kinds, only : dp, wp
    use emcon_scene, only : scene_t, where_text
@@ -157,11 +157,12 @@ contains
       type(host_t), intent(in) :: given
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      integer :: i, n
+      integer :: i, n, counts(n_counted)
 
       call check_solvers(given, scene, error)
       if (allocated(error)) return
-      if (all(host_count(given) == 0)) then
+      counts = host_count(given)
+      if (all(counts(:2) == 0)) then
          if (allocated(scene%host%node)) then
             call raise(error, err_input, where_text(scene, scene%host%origin) // ": error: " // &
                "*GIVEN FORCES: no forces were given; they come from a program that calls the " // &

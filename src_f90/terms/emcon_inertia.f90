@@ -211,7 +211,7 @@ contains
       integer, allocatable :: number(:)
       integer :: i, k, a, place, n_dim
 
-      if (scene%step(i_step)%scheme%is_explicit) then
+      if (scene%step(i_step)%scheme%lumps_mass) then
          self%mass = self%lumped
          self%mass_value = self%lumped_value
       else

@@ -12,7 +12,8 @@ module emcon_massless
    use emcon_kinds, only : dp, wp
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
-   use emcon_steps, only : initiation_massless, initiation_persistent
+   use emcon_steps, only : initiation_massless, initiation_persistent, step_initiation, &
+      step_is_dynamic
    use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
@@ -82,8 +83,7 @@ contains
       integer :: i
 
       is_massless = .false.
-      if (.not. any(scene%step%contact%initiation == initiation_massless .and. &
-         scene%step%scheme%masses_resist)) return
+      if (.not. any(step_initiation(scene%step) == initiation_massless)) return
       do i = 1, size(scene%pair)
          if (scene%pair(i)%initiation == initiation_persistent) cycle
          call mark_surface(scene, scene%pair(i)%slave, .true., is_massless)
@@ -97,7 +97,7 @@ contains
          call mark_surface(scene, scene%pair(i)%master, .false., is_massless)
       end do
       do i = 1, size(scene%step)
-         if (.not. scene%step(i)%scheme%masses_resist) cycle
+         if (.not. step_is_dynamic(scene%step(i))) cycle
          is_massless(scene%step(i)%prescribed%node) = .false.
       end do
       call leave_joined(scene, is_given, is_massless)

@@ -4,7 +4,7 @@
 !> them covered in part. Orientation: a smoothed segment takes some 20 times as long as a node.
 program bench_pair
    use, intrinsic :: iso_fortran_env, only : output_unit
-   use emcon_chain, only : chain_t
+   use emcon_chain_plane, only : chain_t
    use emcon_dgrad8, only : dg8_t => dg_t
    use emcon_dgrad8_first, only : dg8_first_t => dg_t
    use emcon_dgrad11, only : dg11_t => dg_t
@@ -103,10 +103,9 @@ contains
       integer, intent(in) :: node(4)
       type(chain_t), intent(out) :: chain
 
-      allocate(chain%edge, source=reshape(node([1, 2, 2, 3, 3, 4]), [2, 3]))
-      allocate(chain%previous, source=[0, 1, 2])
-      allocate(chain%next, source=[2, 3, 0])
-      allocate(chain%length, source=abs(pair_x(1, node(2:)) - pair_x(1, node(:3))))
+      allocate(chain%facet, source=reshape(node([1, 2, 2, 3, 3, 4]), [2, 3]))
+      allocate(chain%neighbour, source=reshape([0, 2, 1, 3, 2, 0], [2, 3]))
+      allocate(chain%size, source=abs(pair_x(1, node(2:)) - pair_x(1, node(:3))))
    end subroutine make_chain
 
    subroutine evaluate(kind, is_first, stencil, x0, dx, total)

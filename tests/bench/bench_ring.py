@@ -13,7 +13,6 @@ import h5py
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 
-from book.common import FORMULATIONS  # noqa: E402
 from scene_tools import DECKS, PROGRAM, Deck, Run, number, overrides  # noqa: E402
 from timing import usage  # noqa: E402
 
@@ -65,6 +64,8 @@ def bench_ring(folder):
 
 
 def bench_formulations(folder):
+    from book.common import FORMULATIONS     # with what draws: no other process needs that
+
     print("\nRing scene, formulations of contact; contact: search, gaps, null space; judge: overlap")
     row = table("formulation                              ", "h", "CPU [s]", "contact [s]",
                 "share [%]", "judge [%]", "Newton", "cuts", "MB")  # fmt: skip

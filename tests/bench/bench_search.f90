@@ -66,7 +66,7 @@ contains
          call system_clock(end)
          seconds = min(seconds, real(end - begin, dp)/real(rate, dp)/real(n_pair, dp))
       end do
-      n_candidate = size(list%edge)
+      n_candidate = size(list%facet)
    end subroutine measure
 
    !> Boxes of edges about one unit long along ten waves, moved by `offset` along x, y.

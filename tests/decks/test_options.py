@@ -25,6 +25,7 @@ CARD = {
     "method": "*CONSTRAINT METHOD",
     "newton": "*NEWTON",
     "scheme": "*TIME INTEGRATION",
+    "surface": "*SURFACE",
     "events": "*EVENTS",
     "solver": "*STATIC",
 }
@@ -74,6 +75,18 @@ def test_a_row_that_is_not_named_is_found(word):
 ])
 def test_a_wrong_default_is_found(option, right, wrong):
     assert list(wrong_defaults(DECK.replace(right, wrong))) == [option]
+
+
+def test_the_reference_tells_which_models_a_value_is_for():
+    """The table of values for some models is the rows that are not for all."""
+    table = DECK.split("\n### Values for some models only\n")[1].split("\n#")[0]
+    told = re.findall(r"^\| `([^`]+)` \| `([^`]+)` \| ([^|]+) \| `([^`]+)` \|$", table, re.M)
+    assert told == [(CARD[option], row.word, ", ".join(row.models), row.instead)
+                    for option, rows in OPTIONS.items() for row in rows if row.instead]
+    for rows in OPTIONS.values():
+        for row in rows:
+            assert (row.models == ("plane", "axial", "space")) == (row.instead == "")
+            assert row.instead in ("", *(other.word for other in rows if other.is_default))
 
 
 @pytest.mark.parametrize("option", OPTIONS)

@@ -179,7 +179,8 @@ static void kernels(void)
    REFUSED(emcon_get_law(1000, &law, n_text, text));
    REFUSED(emcon_get_law(-1, &law, n_text, text));
    free(text);
-   const char *nts = "formulation\nNODE TO SURFACE\nEMCON_NODE_TO_SEGMENT\nnode to segment";
+   const char *nts = "formulation\nNODE TO SURFACE\nEMCON_NODE_TO_SEGMENT\nnode to segment"
+                     "\nplane axial space\n";
    const int n_nts = (int)strlen(nts) + 1;
    text = malloc((size_t)n_nts);
    int code = 0, is_default = 0;

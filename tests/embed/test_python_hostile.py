@@ -406,7 +406,7 @@ def test_interface_takes_no_hidden_values_and_no_contacts() -> None:
 def test_tangent_is_continuous_where_ends_of_surfaces_coincide() -> None:
     """Mortar integrals have no kink where the end of one surface lies on that of the other.
 
-    Ends are rounded over 1e-4 of an edge, so the tangent changes by at most the way over that; to
+    Ends are rounded over 1e-2 of an edge, so the tangent changes by at most the way over that; to
     either side it is the derivative of the residual.
     """
     with Stepper(PATCH) as patch:
@@ -438,6 +438,6 @@ def test_tangent_is_continuous_where_ends_of_surfaces_coincide() -> None:
                 for move in (column.reshape(-1, 2) for column in links.T)])
             assert abs(differences - tangent(beside)).max() < 100*step**2*size
             jump = abs(tangent(moved(1e-9*a, 1e-9*b)) - here).max()/size
-            assert jump < 1e-9/1e-4
+            assert jump < 1e-9/1e-2
         # continuous: what is left of a change of 2e-9 is that of the tangent
         assert abs(residual(moved(1e-9, -1e-9)) - residual(moved(-1e-9, 1e-9))).max() < 8e-9*size

@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import concurrent.futures
+import contextlib
 import csv
+import io
 import json
 import os
 import re
@@ -19,6 +21,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 import pytest
+from emcon.__main__ import main
 from emcon.study.deck import DeckFile, read_deck
 from emcon.study.execution import RECORD, Task, call, record_of, run_member
 from emcon.study.plan import Member
@@ -34,13 +37,24 @@ EPSILON = np.finfo(float).eps
 LONGEST = 300
 
 
-def study(folder: Path, *options: object, deck: Path = BAR,
-          code: int = 0) -> subprocess.CompletedProcess[str]:
+def study(folder: Path, *options: object, deck: Path = BAR, code: int = 0,
+          is_apart: bool = False) -> subprocess.CompletedProcess[str]:
+    """The command, within this process; with `is_apart` in one of its own, as from a shell."""
     if "--figures" not in options:
         options = (*options, "--no-figures")
-    arguments = [option for option in options if option != "--figures"]
-    done = subprocess.run(command(deck, *arguments), cwd=folder, env=ENVIRONMENT, text=True,
-                          capture_output=True, timeout=LONGEST)
+    line = command(deck, *(option for option in options if option != "--figures"))
+    if is_apart:
+        done = subprocess.run(line, cwd=folder, env=ENVIRONMENT, text=True, capture_output=True,
+                              timeout=LONGEST)
+    else:
+        out, err = io.StringIO(), io.StringIO()
+        with contextlib.chdir(folder), contextlib.redirect_stdout(out), \
+                contextlib.redirect_stderr(err):
+            try:
+                found = main(line[3:])
+            except SystemExit as end:                    # of the parser
+                found = end.code
+        done = subprocess.CompletedProcess(line, found, out.getvalue(), err.getvalue())
     assert done.returncode == code, done.stdout + done.stderr
     assert "Traceback" not in done.stderr, done.stderr
     return done
@@ -407,7 +421,8 @@ def test_rows_of_the_manifest_one_by_one(tmp_path: Path) -> None:
         assert [row["h"] for row in csv.DictReader(file)] == ["0.1", "0.05"]
     assert not stamps(tmp_path)
     with concurrent.futures.ThreadPoolExecutor(4) as pool:
-        jobs = [pool.submit(study, tmp_path, *FREE, "--run-member", k) for k in (0, 1, 0, 1)]
+        jobs = [pool.submit(study, tmp_path, *FREE, "--run-member", k, is_apart=True)
+                for k in (0, 1, 0, 1)]
         texts = [job.result().stdout for job in jobs]
     assert texts == ["0: h=0.1: done\n", "1: h=0.05: done\n"]*2
     before = stamps(tmp_path)
@@ -416,7 +431,8 @@ def test_rows_of_the_manifest_one_by_one(tmp_path: Path) -> None:
     study(tmp_path, *FREE, "--run-member", 2, code=2)
 
 
-def test_any_executor(tmp_path: Path) -> None:
+def test_any_executor(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.delitem(sys.modules, "mine", raising=False)
     (tmp_path/"mine.py").write_text(textwrap.dedent("""\
         import concurrent.futures
 
@@ -440,7 +456,7 @@ def test_any_executor(tmp_path: Path) -> None:
         """))
     done = study(tmp_path, *FREE, "--executor", "mine:lossy")
     assert "1 failed" in done.stdout and "ZeroDivisionError" in done.stdout
-    done = study(tmp_path, *FREE, "--executor", "mine:processes")
+    done = study(tmp_path, *FREE, "--executor", "mine:processes", is_apart=True)
     assert "2 members, 2 done; 1 of them were there" in done.stdout
     other = ("--vary", "h=0.25", *FREE[2:], "--reference", "file:study/none")
     assert "no result" in study(tmp_path, *other, code=2).stderr
@@ -454,7 +470,7 @@ def test_a_local_dask_cluster(tmp_path: Path) -> None:
     (example,) = [found for chapter in examples(PAGES[0].read_text(encoding="utf-8")).values()
                   for found in chapter if found.file == "cluster.py"]
     (tmp_path/"cluster.py").write_text(example.code.text)
-    done = study(tmp_path, *FREE, "--executor", "cluster:dask")
+    done = study(tmp_path, *FREE, "--executor", "cluster:dask", is_apart=True)
     assert "2 members, 2 done" in done.stdout
     assert [row["status"] for row in table(tmp_path)] == ["done", "done"]
 

@@ -1,6 +1,6 @@
 !> Contact from outside: nodes of one surface against the faces of another in three dimensions.
 !>
-!> Each face of four nodes is two triangles. A gap is the height of a node over the plane of the
+!> Each face is a fan of triangles. A gap is the height of a node over the plane of the
 !> triangle that it is nearest to at the start of a step. By the arithmetic of discrete gradients
 !> its forces do the work that they should; made of differences of positions they have no
 !> resultant, and their moments vanish with the square of the step.
@@ -10,13 +10,14 @@ module nodes_on_faces
    use emcon_dgrad11, only : dg_sqrt, dg_t, dg_variable, operator(*), operator(+), operator(-), &
       operator(/)
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
+   use emcon_facets, only : facets_init, facets_normal, facets_t
    implicit none
    private
    public :: nodes_on_faces_t
 
    type, extends(host_contact_t) :: nodes_on_faces_t
-      integer, allocatable :: slave(:, :)        !! (4, n) faces
-      integer, allocatable :: corner(:, :)       !! (3, n) triangles, outside in front
+      type(facets_t) :: slave
+      integer, allocatable :: corner(:, :)       !! (3, n) triangles of the master, outside in front
       integer, allocatable :: chosen(:)          !! (n_constraint) triangle in this step
    contains
       procedure :: set_up
@@ -34,49 +35,24 @@ contains
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       type(error_t), allocatable, intent(out) :: error
-      integer, allocatable :: face(:, :)
-      integer :: i
+      type(facets_t) :: master
+      integer :: i, k
 
-      call faces_of(scene, pair%slave, self%slave, error)
-      if (.not. allocated(error)) call faces_of(scene, pair%master, face, error)
+      call facets_init(self%slave, scene, scene%surface(pair%slave), error)
+      if (.not. allocated(error)) call facets_init(master, scene, scene%surface(pair%master), error)
       if (allocated(error)) return
-      allocate(self%corner(3, 2*size(face, 2)))
-      do i = 1, size(face, 2)                    ! faces run the other way, seen from outside
-         self%corner(:, 2*i - 1) = face([1, 3, 2], i)
-         self%corner(:, 2*i) = face([1, 4, 3], i)
+      allocate(self%corner(3, 0))
+      do i = 1, master%n_facet
+         do k = 3, count(master%facet(:, i) > 0)
+            self%corner = reshape([self%corner, master%facet([1, k - 1, k], i)], &
+               [3, size(self%corner, 2) + 1])
+         end do
       end do
-      allocate(self%node(0))
-      do i = 1, size(scene%x, 2)
-         if (any(self%slave == i)) self%node = [self%node, i]
-      end do
+      self%node = self%slave%node
       self%n_constraint = size(self%node)
       allocate(self%chosen(self%n_constraint), source=0)
       allocate(self%state(self%n_constraint))
    end subroutine set_up
-
-   !> The faces of a surface, which have four nodes each.
-   subroutine faces_of(scene, number, face, error)
-      type(scene_t), intent(in) :: scene
-      integer, intent(in) :: number              !! of the surface
-      integer, allocatable, intent(out) :: face(:, :)    !! (4, n)
-      type(error_t), allocatable, intent(out) :: error
-      integer :: i
-
-      associate (surface => scene%surface(number))
-         allocate(face(4, size(surface%element)))
-         do i = 1, size(surface%element)
-            associate (e => surface%element(i))
-               if (scene%element%kinds(scene%element%kind(e))%n_face_node /= size(face, 1)) then
-                  allocate(error)
-                  error%message = "faces have to have four nodes"
-                  return
-               end if
-               face(:, i) = scene%element%node(scene%element%kinds(scene%element%kind(e)) &
-                  %face(surface%face(i)), e)
-            end associate
-         end do
-      end associate
-   end subroutine faces_of
 
    pure subroutine configure(self, x, options)
       class(nodes_on_faces_t), intent(inout) :: self
@@ -227,21 +203,18 @@ contains
       gap = (-1.0_wp)*((v(1, 1)*n(1) + v(2, 1)*n(2) + v(3, 1)*n(3))/dg_sqrt(square))
    end subroutine gap_of
 
-   !> A quarter of each slave face around a node.
+   !> An equal part of each slave face for each of its nodes.
    pure subroutine area_points(self, x, u, area, length)
       class(nodes_on_faces_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       real(wp), intent(out) :: area(:), length(:)
-      real(wp) :: p(3, 4)
-      integer :: i, f
+      integer :: f
 
       area = 0.0_wp
-      do f = 1, size(self%slave, 2)
-         p = x(:, self%slave(:, f)) + u(:, self%slave(:, f))
-         do i = 1, self%n_constraint
-            if (any(self%slave(:, f) == self%node(i))) area(i) = area(i) &
-               + 0.125_wp*norm2(cross(p(:, 3) - p(:, 1), p(:, 4) - p(:, 2)))
-         end do
+      do f = 1, self%slave%n_facet
+         associate (node => pack(self%slave%corner(:, f), self%slave%corner(:, f) > 0))
+            area(node) = area(node) + norm2(facets_normal(self%slave, f, x, u))/size(node)
+         end associate
       end do
       length = area
    end subroutine area_points

@@ -1,11 +1,12 @@
 !> A program that gives the shape of elements of nine nodes to EMCON and runs a deck with them.
 !> Arguments: the deck, the type by which the shape is given, the base of the field file. It prints
 !> the total energy, its largest change, the largest number of active contacts; position and
-!> displacement of each node; the momentum; the stress of each element; and what the log says of
-!> elements.
+!> displacement of each node; the momentum; the stress of each element; what the log says of
+!> elements; and how far a run that goes on from a restart after the first increment ends elsewhere.
 program shaped
    use emcon_api, only : element_quantity, error_t, increment_t, stepper_advance, stepper_build, &
-      stepper_close, stepper_give_element, stepper_is_done, stepper_read, stepper_t, string_t, wp
+      restart_t, stepper_close, stepper_give_element, stepper_is_done, stepper_load, &
+      stepper_read, stepper_save, stepper_t, string_t, wp
    use emcon_recorder, only : recorder_close, recorder_open, recorder_t, recorder_write
    use emcon_run_log, only : model_lines
    use nine_node_shape, only : nine_node_shape_t
@@ -13,10 +14,12 @@ program shaped
    type(stepper_t) :: stepper
    type(increment_t) :: increment
    type(recorder_t) :: recorder
+   type(restart_t) :: restart
    type(error_t), allocatable :: error
    character(len=4096) :: deck, name, base
    real(wp) :: total, drift
    integer :: n_active
+   logical :: is_saved
 
    call get_command_argument(1, deck)
    call get_command_argument(2, name)
@@ -30,6 +33,7 @@ program shaped
    total = stepper%march%ledger%total
    drift = 0.0_wp
    n_active = 0
+   is_saved = .false.
    do while (.not. stepper_is_done(stepper))
       call stepper_advance(stepper, increment, error)
       call check()
@@ -37,14 +41,35 @@ program shaped
       n_active = max(n_active, increment%n_active)
       call recorder_write(recorder, stepper, increment, 0.0_wp, error)
       call check()
+      if (.not. is_saved) call stepper_save(stepper, restart)
+      is_saved = .true.
    end do
    call recorder_close(recorder, error)
    call check()
    write (*, "(2es24.16, i4)") total, drift, n_active
    call show()
+   call go_on_from_restart()
    call stepper_close(stepper)
 
 contains
+
+   subroutine go_on_from_restart()
+      type(stepper_t) :: again
+
+      call stepper_read(again, trim(deck), [string_t ::], .false., error)
+      call check()
+      call stepper_give_element(again, trim(name), nine_node_shape_t(), error)
+      call check()
+      call stepper_load(again, restart, error)
+      call check()
+      do while (.not. stepper_is_done(again))
+         call stepper_advance(again, increment, error)
+         call check()
+      end do
+      write (*, "(a, es24.16)") "restart", maxval(abs(again%march%state%u &
+         - stepper%march%state%u))
+      call stepper_close(again)
+   end subroutine go_on_from_restart
 
    subroutine show()
       type(string_t), allocatable :: line(:)

@@ -137,6 +137,7 @@ def test_contact_keeps_energy(program: tuple[Path, dict[str, str]], tmp_path: Pa
     total, drift, n_active = map(float, out.split("\n")[0].split())
     assert n_active >= 3
     assert drift <= 1e-12*total
+    assert table(out, "restart")[0] == 0.0
     with h5py.File(tmp_path/"meeting.vtkhdf") as file:
         assert set(file["VTKHDF/Types"][:]) == {7}
         assert np.all(np.diff(file["VTKHDF/Offsets"][:]) == 8)

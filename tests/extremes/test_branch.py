@@ -2,14 +2,14 @@
 
 import numpy as np
 import pytest
-from scene_tools import DECKS, Deck, Run, emcon, run_deck
+from scene_tools import DECKS, Deck, Run, coarse_ring, emcon, run_deck
 
 SHORT = {"h": 0.02, "frame": 0.2}
 STATES = ["kinetic", "strain", "total", "px", "py", "lz", "active"]
 
 
 def ring(**parameters):
-    deck = Deck.read(DECKS/"ring.inp")
+    deck = coarse_ring()
     deck.replace("*RESTART, WRITE, FREQUENCY=50", "*RESTART, WRITE, FREQUENCY=5")
     for name, value in {**SHORT, **parameters}.items():
         deck.set_parameter(name, value)

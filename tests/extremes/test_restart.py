@@ -11,7 +11,16 @@ import time
 import h5py
 import numpy as np
 import pytest
-from scene_tools import DECKS, Deck, Run, assert_no_crash, emcon, run_deck, start, wait_for
+from scene_tools import (
+    DECKS,
+    Run,
+    assert_no_crash,
+    coarse_ring,
+    emcon,
+    run_deck,
+    start,
+    wait_for,
+)
 
 PARAMETERS = {"h": 0.02, "t_end": 2, "frame": 0.1}
 
@@ -19,7 +28,7 @@ PARAMETERS = {"h": 0.02, "t_end": 2, "frame": 0.1}
 @pytest.fixture(scope="module")
 def deck(tmp_path_factory):
     """The ring with a restart file every 5 increments."""
-    deck = Deck.read(DECKS / "ring.inp")
+    deck = coarse_ring()
     deck.replace("*RESTART, WRITE, FREQUENCY=50", "*RESTART, WRITE, FREQUENCY=5")
     for name, value in PARAMETERS.items():
         deck.set_parameter(name, value)

@@ -2,15 +2,14 @@
 
 import numpy as np
 import pytest
-from scene_tools import DECKS, Deck, run_deck
+from scene_tools import coarse_ring, run_deck
 
-DECK = DECKS / "ring.inp"
 ELEMENT = 1.0
 
 
 @pytest.fixture(scope="module")
 def near(tmp_path_factory):
-    return run_deck(DECK, tmp_path_factory.mktemp("near"), h=0.05, t_end=5, frame=1).history
+    return run_deck(coarse_ring(), tmp_path_factory.mktemp("near"), h=0.05, t_end=5, frame=1).history
 
 
 @pytest.mark.parametrize(
@@ -19,7 +18,7 @@ def near(tmp_path_factory):
 def test_energy_is_held(tmp_path, near, distance, direction):
     """At 1e8 element sizes the mesh itself is rounded to 1e-8 of an element."""
     dx, dy = distance*ELEMENT*direction[0], distance*ELEMENT*direction[1]
-    deck = Deck.read(DECK)
+    deck = coarse_ring()
     deck.move_nodes(lambda _, x, y: (x + dx, y + dy))
     run = run_deck(deck, tmp_path, h=0.05, t_end=5, frame=1)
     history = run.history

@@ -5,9 +5,7 @@ Units scaled by powers of two change exponents only: all figures must be the sam
 
 import numpy as np
 import pytest
-from scene_tools import DECKS, Deck, number, run_deck
-
-DECK = DECKS / "ring.inp"
+from scene_tools import DECKS, Deck, coarse_ring, number, run_deck
 
 # Powers of length, mass and time in the columns of the history.
 DIMENSION = {
@@ -58,7 +56,7 @@ def in_units(length, mass, time, **parameters):
     def scale(exponent):
         return lambda text: number(np.ldexp(float(text), exponent))
 
-    deck = Deck.read(DECK)
+    deck = coarse_ring()
     x, v, t = scale(length), scale(length - time), scale(time)
     density, stress = scale(mass - 3*length), scale(dimension_of_stress(length, mass, time))
     deck.map_numbers("*NODE", lambda w: [w[0], x(w[1]), x(w[2])])

@@ -9,7 +9,7 @@ module given_scenes
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_is_done, stepper_t
    use emcon_stepper_given, only : stepper_give_force, stepper_give_mass
-   use emcon_surface_edges, only : surface_edges
+   use emcon_surface_facets, only : surface_facets
    use emcon_system, only : system_init, system_t
    use emcon_term_registry, only : terms_mass
    use emcon_text, only : to_text
@@ -39,7 +39,7 @@ contains
          if (all(is_kept(scene%surface(i)%element))) then
             scene%surface(i)%element = number(scene%surface(i)%element)
          else
-            call surface_edges(scene, scene%surface(i), edge)
+            call surface_facets(scene, scene%surface(i), edge)
             scene%surface(i)%edge = edge
             scene%surface(i)%element = [integer ::]
             scene%surface(i)%face = [integer ::]

@@ -43,7 +43,9 @@ program main
    use test_corner_tops, only : collect_corner_tops
    use test_blocked_contact, only : collect_blocked_contact
    use test_explicit, only : collect_explicit
+   use test_facets, only : collect_facets
    use test_friction, only : collect_friction
+   use test_friction_referee, only : collect_friction_referee
    use test_gauss, only : collect_gauss
    use test_holding, only : collect_holding
    use test_host_check, only : collect_host_check
@@ -70,6 +72,7 @@ program main
    use test_loads, only : collect_loads
    use test_march, only : collect_march
    use test_march_contact, only : collect_march_contact
+   use test_march_grid, only : collect_march_grid
    use test_march_kinds, only : collect_march_kinds
    use test_midside, only : collect_midside
    use test_mortar, only : collect_mortar
@@ -97,6 +100,7 @@ program main
    use test_scheme, only : collect_scheme
    use test_search, only : collect_search
    use test_shape, only : collect_shape
+   use test_single_elements, only : collect_single_elements
    use test_soft_law, only : collect_soft_law
    use test_solid, only : collect_solid
    use test_solvers, only : collect_solvers
@@ -157,6 +161,7 @@ program main
    call run("initial_contact", collect_initial_contact)
    call run("lapack", collect_lapack)
    call run("friction", collect_friction)
+   call run("friction_referee", collect_friction_referee)
    call run("dashpot_law", collect_dashpot_law)
    call run("gauss", collect_gauss)
    call run("band_blocks", collect_band_blocks)
@@ -177,8 +182,10 @@ program main
    call run("element_axial", collect_element_axial)
    call run("element_space", collect_element_space)
    call run("corotated", collect_corotated)
+   call run("single_elements", collect_single_elements)
    call run("soft_law", collect_soft_law)
    call run("solid", collect_solid)
+   call run("facets", collect_facets)
    call run("chain", collect_chain)
    call run("search", collect_search)
    call run("nts_gap", collect_nts_gap)
@@ -233,6 +240,7 @@ program main
    call run("holding", collect_holding)
    call run("march", collect_march)
    call run("march_contact", collect_march_contact)
+   call run("march_grid", collect_march_grid)
    call run("march_kinds", collect_march_kinds)
    call run("ties", collect_ties)
    call run("links", collect_links)

@@ -2,7 +2,7 @@
 module test_arcs
    use check, only : check_near, check_true, test_case_t
    use emcon_arcs_plane, only : arc_rise, arcs_find
-   use emcon_chain, only : chain_init, chain_t
+   use emcon_chain_plane, only : chain_init, chain_t
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t
    use emcon_contact_registry, only : new_contact
@@ -51,17 +51,17 @@ contains
       do s = 1, 2
          call chain_init(chain, scene, scene%surface(s), error)
          if (allocated(error)) return
-         allocate(curvature(chain%n_edge))
+         allocate(curvature(chain%n_facet))
          call arcs_find(chain, scene%x, 60.0_wp, curvature)
          ! Three nodes on an arc tell its curvature to round-off by the square of its angle.
          call check_near(error, curvature, spread(merge(0.5_wp, -0.5_wp, s == 1), 1, &
-            chain%n_edge), 16.0_wp*tol/turn**2, 1.0_wp, "curvature")
-         do e = 1, chain%n_edge
-            a = scene%x(:, chain%edge(2, e)) - scene%x(:, chain%edge(1, e))
+            chain%n_facet), 16.0_wp*tol/turn**2, 1.0_wp, "curvature")
+         do e = 1, chain%n_facet
+            a = scene%x(:, chain%facet(2, e)) - scene%x(:, chain%facet(1, e))
             do k = 0, 4
                share = 0.25_wp*k
-               place = scene%x(:, chain%edge(1, e)) + share*a + [a(2), -a(1)]/norm2(a) &
-                  *arc_rise(curvature(e), chain%length(e), share, 0.0_wp)
+               place = scene%x(:, chain%facet(1, e)) + share*a + [a(2), -a(1)]/norm2(a) &
+                  *arc_rise(curvature(e), chain%size(e), share, 0.0_wp)
                call check_near(error, norm2(place), 2.0_wp, tol, 1.0_wp, "radius")
             end do
          end do

@@ -1,8 +1,8 @@
 !> Contact surfaces as chains of edges.
 module test_chain
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
-   use emcon_chain, only : chain_corners, chain_crossing, chain_distance, chain_init, chain_t, &
-      chain_tributary
+   use emcon_chain_plane, only : chain_corners, chain_crossing, chain_distance, chain_init, &
+      chain_t, chain_tributary
    use emcon_contact, only : contact_t
    use emcon_contact_registry, only : new_contact
    use emcon_element_registry, only : find_element_row
@@ -89,9 +89,9 @@ contains
          call add_surface(scene, "TOP", block, [top])
          call chain_init(chain, scene, scene%surface(1), error)
          if (allocated(error)) return
-         call check_equal(error, reshape(chain%edge, [6]), [8, 7, 7, 6, 6, 5], name(k) // " edges")
-         call check_equal(error, chain%previous, [0, 1, 2], "previous")
-         call check_equal(error, chain%next, [2, 3, 0], "next")
+         call check_equal(error, reshape(chain%facet, [6]), [8, 7, 7, 6, 6, 5], name(k) // " edges")
+         call check_equal(error, chain%neighbour(1, :), [0, 1, 2], "previous")
+         call check_equal(error, chain%neighbour(2, :), [2, 3, 0], "next")
          call check_equal(error, chain%node, [5, 6, 7, 8], "nodes")
          if (allocated(error)) return
       end do
@@ -108,8 +108,8 @@ contains
       scene%surface(1)%element = scene%surface(1)%element([2, 1, 3])
       call chain_init(chain, scene, scene%surface(1), error)
       if (allocated(error)) return
-      call check_equal(error, chain%previous, [2, 0, 1], "previous")
-      call check_equal(error, chain%next, [3, 1, 0], "next")
+      call check_equal(error, chain%neighbour(1, :), [2, 0, 1], "previous")
+      call check_equal(error, chain%neighbour(2, :), [3, 1, 0], "next")
    end subroutine test_order
 
    subroutine test_closed(error)
@@ -124,12 +124,13 @@ contains
       call add_surface(scene, "ALL", block, [left, top, bottom, right])
       call chain_init(chain, scene, scene%surface(1), error)
       if (allocated(error)) return
-      call check_equal(error, chain%n_edge, 10, "edges")
-      call check_equal(error, chain%next(chain%previous), [(i, i = 1, 10)], "next of the previous")
+      call check_equal(error, chain%n_facet, 10, "edges")
+      call check_equal(error, chain%neighbour(2, chain%neighbour(1, :)), [(i, i = 1, 10)], &
+         "next of the previous")
       area = 0.0_wp
       do i = 1, 10
-         area = area + 0.5_wp*(scene%x(1, chain%edge(1, i))*scene%x(2, chain%edge(2, i)) &
-            - scene%x(2, chain%edge(1, i))*scene%x(1, chain%edge(2, i)))
+         area = area + 0.5_wp*(scene%x(1, chain%facet(1, i))*scene%x(2, chain%facet(2, i)) &
+            - scene%x(2, chain%facet(1, i))*scene%x(1, chain%facet(2, i)))
       end do
       call check_near(error, area, 6.0_wp, tol, 6.0_wp, "enclosed area, counter-clockwise")
    end subroutine test_closed
@@ -149,7 +150,7 @@ contains
       scene%surface(1)%face = [scene%surface(1)%face, scene%surface(2)%face]
       call chain_init(chain, scene, scene%surface(1), error)
       if (allocated(error)) return
-      call check_equal(error, chain%previous, [0, 0], "edges at the same place, other nodes")
+      call check_equal(error, chain%neighbour(1, :), [0, 0], "edges at the same place, other nodes")
       call check_equal(error, chain%node, [3, 4, 7, 8], "nodes")
    end subroutine test_two_bodies
 
@@ -168,7 +169,7 @@ contains
       call chain_init(chain, scene, surface, error)
       if (allocated(error)) return
       call check_equal(error, chain%node, [1, 2, 4], "nodes")
-      call check_equal(error, chain%n_edge, 0, "edges")
+      call check_equal(error, chain%n_facet, 0, "edges")
       call chain_tributary(chain, scene%x, scene%u0, length)
       call check_near(error, length, [0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "lengths")
    end subroutine test_nodal
@@ -272,7 +273,7 @@ contains
          [0, huge(1), huge(1), 2, huge(1), 1, huge(1), 1], "distance, closed part")
       call check_equal(error, [(chain_distance(chain, i, 7), i = 1, 8)], &
          [huge(1), 1, huge(1), huge(1), 2, huge(1), 0, huge(1)], "distance, open part")
-      call check_near(error, chain%length([3, 6]), [sqrt(1453.0_wp), sqrt(6165.0_wp)], tol, &
+      call check_near(error, chain%size([3, 6]), [sqrt(1453.0_wp), sqrt(6165.0_wp)], tol, &
          100.0_wp, "lengths")
    end subroutine test_parts
 
@@ -479,7 +480,7 @@ contains
          end if
          do i = 1, n - 1
             do j = i + 1, n - 1
-               if (any(chain%next([i, j]) == [j, i])) cycle
+               if (any(chain%neighbour(2, [i, j]) == [j, i])) cycle
                if (i > pair(1) .or. (i == pair(1) .and. j >= pair(2))) cycle
                call check_true(error, .not. crosses(i, j, margin), "no pair crosses before, case " &
                   // to_text(case))

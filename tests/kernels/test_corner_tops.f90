@@ -1,7 +1,7 @@
 !> Round tops of corners that face a corner, by how much their fans of normals have in common.
 module test_corner_tops
    use check, only : check_near, check_true, test_case_t
-   use emcon_chain, only : chain_t
+   use emcon_chain_plane, only : chain_t
    use emcon_corner_tops_plane, only : top_width
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
@@ -35,7 +35,7 @@ contains
       x(:, 5) = [0.1_wp, -0.2_wp]
       x(:, 4) = x(:, 5) + 0.9_wp*way(phi - 0.5_wp*b)
       x(:, 6) = x(:, 5) - 1.1_wp*way(phi + 0.5_wp*b)
-      chain%edge = reshape([4, 5, 5, 6], [2, 2])
+      chain%facet = reshape([4, 5, 5, 6], [2, 2])
       chain%node = [4, 5, 6]
       chain%node_edge = reshape([0, 1, 1, 2, 2, 0], [2, 3])
    end subroutine place

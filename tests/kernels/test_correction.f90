@@ -3,7 +3,8 @@ module test_correction
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_constraints, only : constraints_select
    use emcon_correction, only : correction_factorise, correction_free, correction_lay_out, &
-      correction_multipliers, correction_reason, correction_reset, correction_solve, correction_t
+      correction_multipliers, correction_reason, correction_reset, correction_solve, correction_t, &
+      correction_work
    use emcon_csr, only : csr_multiply, csr_multiply_transposed
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
@@ -26,6 +27,7 @@ contains
          test_case_t("no common pivot: saddle point, as long as it lasts", test_pivot), &
          test_case_t("too many coupled: saddle point", test_fill), &
          test_case_t("contact of dependent freedoms", test_dependent), &
+         test_case_t("what a correction works that closes gaps alone", test_work), &
          test_case_t("symmetric matrices, definite and not", test_symmetric), &
          test_case_t("redundant constraints are named, by either method", test_redundant)]
    end subroutine collect_correction
@@ -144,6 +146,39 @@ contains
       call check_near(error, problem%set%lam, expected, tol_dp, 1.0_wp, "multipliers")
       call correction_free(correction)
    end subroutine test_dependent
+
+   !> A correction that closes gaps from a state of rest works c.N c, by either method, though there
+   !> is no residual.
+   subroutine test_work(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(correction_t) :: correction
+      real(wp), allocatable :: dq(:), image(:)
+      real(wp) :: work(2)
+      logical :: is_singular
+      integer :: i, k
+
+      call make_problem(problem)
+      do k = 1, problem%set%n
+         problem%set%item(k)%h = 0.0_wp
+      end do
+      problem%residual = 0.0_wp
+      do i = 1, 2
+         call correction_reset(correction, merge(method_null_space, method_saddle_point, i == 1), &
+            solver_default)
+         call correct(correction, problem, dq, is_singular, error)
+         if (allocated(error)) return
+         allocate(image(size(dq)))
+         call csr_multiply(problem%base, dq, image)
+         work(i) = correction_work(correction, dq)
+         call check_near(error, work(i), dot_product(dq, image), tol_dp, &
+            dot_product(abs(dq), abs(image)), "c.N c")
+         deallocate(image)
+         call correction_free(correction)
+      end do
+      call check_near(error, work(1), work(2), tol_dp, abs(work(2)), "by either method")
+      call check_true(error, abs(work(1)) > sqrt(epsilon(1.0_wp)), "it works")
+   end subroutine test_work
 
    !> Without constraints: N dq = -r, also where a symmetric matrix is not definite.
    subroutine test_symmetric(error)

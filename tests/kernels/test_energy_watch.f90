@@ -75,7 +75,7 @@ contains
       call check_near(error, [watch%largest_error, watch%dynamic_error, watch%shown_reference, &
          watch%largest, watch%contact_reference, watch%contact_taken], [0.75_wp, 0.75_wp, 9.25_wp, &
          11.0_wp, -0.5_wp, 0.375_wp], tol, 10.0_wp, "figures")
-      call check_true(error, watch%has_dynamics .and. .not. watch%is_explicit, "of dynamics")
+      call check_true(error, watch%has_dynamics .and. .not. watch%has_explicit, "of dynamics")
       ! What is given back counts, and no increment forgets the most that was taken.
       ledger%contact_work = -0.25_wp
       call follow(watch, ledger, "", .false.)
@@ -103,10 +103,10 @@ contains
       call follow(watch, ledger_of(12.5_wp, -1.5_wp), "TRAPEZOIDAL", .false.)
       call check_near(error, [watch%shown_error, watch%contact_made, watch%contact_taken], &
          [0.25_wp, 0.75_wp, 0.5_wp], tol, 10.0_wp, "the most")
-      call check_true(error, .not. watch%is_explicit, "implicit")
+      call check_true(error, .not. watch%has_explicit, "implicit")
       call follow(watch, ledger_of(12.5_wp, -1.5_wp), "CENTRALDIFFERENCE", .false.)
       call follow(watch, ledger_of(12.5_wp, -1.5_wp), "", .false.)
-      call check_true(error, watch%is_explicit .and. watch%has_dynamics, "explicit once")
+      call check_true(error, watch%has_explicit .and. watch%has_dynamics, "explicit once")
    end subroutine test_shown
 
    !> Work of penalties from where they began; it is none that impacts take.
@@ -190,11 +190,11 @@ contains
                watch%contact_kept = x*energy_bar
             case (6)
                watch%contact_taken = 0.05_wp*x
-               watch%is_explicit = .true.
+               watch%has_explicit = .true.
             case (7)
                watch%contact_taken = x
                if (over == 1) watch%scale = x/eps
-               watch%is_explicit = over == 1
+               watch%has_explicit = over == 1
             end select
             reasons = notes_t()
             call energy_reasons(watch, reasons)
@@ -223,7 +223,7 @@ contains
          warnings = notes_t()
          call energy_warnings(watch, warnings)
          n(k, 1) = warnings%n
-         watch%is_explicit = .true.
+         watch%has_explicit = .true.
          warnings = notes_t()
          call energy_warnings(watch, warnings)
          n(k, 2) = warnings%n

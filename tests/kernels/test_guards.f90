@@ -1,7 +1,7 @@
 !> Guards: one for each direction in which no pair holds the nodes.
 module test_guards
    use check, only : check_equal, check_true, test_case_t
-   use emcon_chain, only : chain_init, chain_t
+   use emcon_chain_plane, only : chain_init, chain_t
    use emcon_errors, only : error_t
    use emcon_guard_slack_plane, only : guard_slack_find
    use emcon_guards, only : corner_slack, guard_slack, guards_find

@@ -10,7 +10,8 @@ module test_host_contact
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_given
    use emcon_kinds, only : wp
-   use emcon_overlap_query_plane, only : overlap_query_init, overlap_query_t
+   use emcon_overlap_query, only : overlap_query_t
+   use emcon_overlap_query_registry, only : new_overlap_query
    use emcon_scene, only : scene_t
    use emcon_surface_nodes, only : surface_nodes
    use emcon_text, only : notes_t
@@ -187,15 +188,15 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(block_t) :: lower, upper
-      type(overlap_query_t) :: look
+      class(overlap_query_t), allocatable :: query
 
       call make_two_blocks(scene, 0.0_wp, lower, upper)
-      call overlap_query_init(look, scene)
-      call check_true(error, look%is_able .and. look%outline%n_piece == 2, "two pieces")
+      call new_overlap_query(scene, query)
+      call check_equal(error, query%outline%n_piece, 2, "two pieces")
       scene%n_dim = 3
       scene%x = reshape([scene%x, scene%x(:1, :)], [3, size(scene%x, 2)])
-      call overlap_query_init(look, scene)
-      call check_true(error, look%outline%n_piece == 0 .and. .not. look%is_able, "none in space")
+      call new_overlap_query(scene, query)
+      call check_true(error, .not. allocated(query), "none in space")
    end subroutine test_outlines
 
 end module test_host_contact

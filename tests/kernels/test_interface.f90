@@ -2,7 +2,6 @@
 module test_interface
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
-   use emcon_chain, only : surface_edges
    use emcon_constraint, only : condition_t
    use emcon_contact, only : gap_state_t
    use emcon_csr, only : csr_t
@@ -22,6 +21,7 @@ module test_interface
       query_particular
    use emcon_stepper_report, only : contact_report_t, query_curvature, query_curvature_times
    use emcon_steps, only : initiation_persistent
+   use emcon_surface_facets, only : surface_facets
    use emcon_system, only : system_init, system_t
    use emcon_text, only : notes_t, to_text
    use emcon_ties, only : ties_prepare
@@ -75,7 +75,7 @@ contains
       call face_new(face, scene%x, error)
       do i = 1, size(scene%surface)
          if (allocated(error)) return
-         call surface_edges(scene, scene%surface(i), edge)
+         call surface_facets(scene, scene%surface(i), edge)
          call stepper_add_surface(face%stepper, scene%surface(i)%name, edge, number, error)
       end do
       do i = 1, size(scene%pair)

@@ -2,7 +2,7 @@
 module test_joints
    use check, only : check_equal, check_near, check_true, test_case_t
    use cut_scenes, only : add_tie, make_cut_blocks, make_cut_strip, merge_surfaces, same_node
-   use emcon_chain, only : chain_corners, chain_crossing, chain_distance, chain_init, &
+   use emcon_chain_plane, only : chain_corners, chain_crossing, chain_distance, chain_init, &
       chain_is_seam, chain_t, chain_touches, chain_tributary
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t
@@ -15,7 +15,7 @@ module test_joints
    use emcon_mortar, only : mortar_init, mortar_t
    use emcon_mortar_frame, only : moment_cover
    use emcon_scene, only : scene_t
-   use emcon_seams, only : chain_join
+   use emcon_seams_plane, only : chain_join
    use emcon_text, only : notes_t, to_text
    use emcon_ties, only : ties_prepare
    use small_scenes, only : add_block, add_surface, bend_scene, block_t, bottom, left, &
@@ -68,12 +68,12 @@ contains
       if (allocated(error)) return
       call check_equal(error, chain%node, [4, 5, 6, 9, 10], "nodes before")
       call chain_join(chain, scene)
-      call check_equal(error, reshape(chain%edge, [6]), [6, 5, 5, 4, 10, 9], "edges")
-      call check_equal(error, chain%previous, [3, 1, 0], "previous")
-      call check_equal(error, chain%next, [2, 0, 1], "next")
+      call check_equal(error, reshape(chain%facet, [6]), [6, 5, 5, 4, 10, 9], "edges")
+      call check_equal(error, chain%neighbour(1, :), [3, 1, 0], "previous")
+      call check_equal(error, chain%neighbour(2, :), [2, 0, 1], "next")
       call check_equal(error, chain%node, [4, 5, 9, 10], "nodes")
       call check_equal(error, chain%duplicate, [0, 0, 6, 0], "twins")
-      call check_equal(error, reshape(chain%end_node, [6]), [3, 2, 2, 1, 4, 3], "ends")
+      call check_equal(error, reshape(chain%corner, [6]), [3, 2, 2, 1, 4, 3], "ends")
       call check_equal(error, reshape(chain%node_edge, [8]), [2, 0, 1, 2, 3, 1, 0, 3], &
          "edges of the nodes")
       call check_equal(error, [chain%part, chain%place], [1, 1, 1, 2, 3, 1], "part and places")
@@ -148,8 +148,8 @@ contains
       if (allocated(error)) return
       call check_equal(error, size(chain%is_closed), 4, "parts before")
       call chain_join(chain, scene)
-      call check_equal(error, chain%next, [2, 3, 4, 5, 6, 7, 8, 1], "next")
-      call check_equal(error, chain%previous, [8, 1, 2, 3, 4, 5, 6, 7], "previous")
+      call check_equal(error, chain%neighbour(2, :), [2, 3, 4, 5, 6, 7, 8, 1], "next")
+      call check_equal(error, chain%neighbour(1, :), [8, 1, 2, 3, 4, 5, 6, 7], "previous")
       call check_equal(error, chain%place, [(k, k = 1, 8)], "places")
       call check_true(error, size(chain%is_closed) == 1 .and. all(chain%is_closed), "closed")
       call check_equal(error, [size(chain%node), count(chain%duplicate > 0)], [8, 4], &

@@ -114,7 +114,7 @@ contains
          call judged(scene, overlap)
          call check_near(error, overlap%depth, 0.25_wp, 8.0_wp*eps, 1.0_wp, "depth")
          call check_true(error, any(overlap%node == [7, 8]), "node")
-         call check_equal(error, overlap%edge, [11, 12], "edge")
+         call check_equal(error, overlap%facet(:2), [11, 12], "edge")
       end do
    end subroutine test_corner
 
@@ -274,20 +274,20 @@ contains
       logical, parameter :: is_reversed(4) = [.false., .false., .true., .false.]
       type(scene_t) :: scene
       type(overlap_t) :: overlap
-      real(wp) :: share, of_edges, of_curve, of_arc
+      real(wp) :: share, of_facets, of_curve, of_arc
       integer :: k
 
       do k = 1, size(bend)
          call make_hollow(scene, bend(k), depth(k), is_reversed(k))
          associate (square => 1.0_wp + bend(k)**2)
             share = 0.5_wp + depth(k)*bend(k)/square
-            of_edges = depth(k)/square
-            of_curve = of_edges - max(0.0_wp, bend(k))*share*(1.0_wp - share)/square
+            of_facets = depth(k)/square
+            of_curve = of_facets - max(0.0_wp, bend(k))*share*(1.0_wp - share)/square
          end associate
-         of_arc = of_edges - max(0.0_wp, arc(bend(k), share))
+         of_arc = of_facets - max(0.0_wp, arc(bend(k), share))
          if (is_reversed(k)) of_curve = of_arc
          call judged_smoothly(scene, overlap)
-         call check_near(error, overlap%of_edges, merge(of_edges, 0.0_wp, bend(k) > 0.0_wp), &
+         call check_near(error, overlap%of_facets, merge(of_facets, 0.0_wp, bend(k) > 0.0_wp), &
             16.0_wp*eps, 1.0_wp, "of edges")
          call check_near(error, overlap%depth, max(0.0_wp, of_curve), 16.0_wp*eps, 1.0_wp, "curve")
          scene%pair%formulation = formulation_segment
@@ -328,7 +328,7 @@ contains
          call make_rings(scene, [8, 11], 0.0_wp, k == 2)
          call judged(scene, overlap)
          call check_true(error, overlap%depth <= 16.0_wp*eps, "chords of one circle")
-         call check_true(error, overlap%of_edges > 0.01_wp, "edges overlap as they are")
+         call check_true(error, overlap%of_facets > 0.01_wp, "edges overlap as they are")
          call make_rings(scene, [8, 11], more, k == 2)
          call judged(scene, overlap)
          length = norm2(scene%x(:, 20:30) - scene%x(:, 19:29), 1)

@@ -545,7 +545,7 @@ contains
             "velocity at the start") > 0 .and. index(march%system%notes%item(1)%text, &
             "at node 8") > 0, "note: " // march%system%notes%item(1)%text)
          call march_free(march)
-         deallocate(march%v1)
+         deallocate(march%end_state%v)
          call reset(march)
       end do
 

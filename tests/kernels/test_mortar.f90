@@ -166,7 +166,7 @@ contains
             call shake(du, 0.05_wp)
             call mortar%begin_step(scene%x, u, du)
             call mortar%measure(scene%x, u, du)
-            do e = 1, mortar%slave%n_edge
+            do e = 1, mortar%slave%n_facet
                total = 0.0_wp
                sum_area = 0.0_wp
                do side = 1, 2
@@ -206,14 +206,14 @@ contains
          call shake(u, 0.04_wp)
          call mortar%begin_step(scene%x, u, 0.0_wp*u)
          call mortar%measure(scene%x, u, 0.0_wp*u)
-         do e = 1, mortar%slave%n_edge
-            associate (first => mortar%slave%edge(1, e), last => mortar%slave%edge(2, e))
+         do e = 1, mortar%slave%n_facet
+            associate (first => mortar%slave%facet(1, e), last => mortar%slave%facet(2, e))
                a = scene%x(:, last) + u(:, last) - scene%x(:, first) - u(:, first)
                normal = [a(2), -a(1)]/norm2(a)
                expected = 0.0_wp
                do n = 1, n_ray
                   point = scene%x(:, first) + u(:, first) + a*(real(n, wp) - 0.5_wp)/n_ray
-                  call ray(mortar%master%edge, scene%x + u, point, normal, gap)
+                  call ray(mortar%master%facet, scene%x + u, point, normal, gap)
                   if (gap < huge(gap)) expected = expected + gap*norm2(a)/n_ray
                end do
             end associate
@@ -666,7 +666,7 @@ contains
             call shake(du, 0.04_wp)
             call mortar%begin_step(scene%x, u, du)
             call mortar%measure(scene%x, u, du)
-            n_pair = n_pair + mortar%start(mortar%slave%n_edge + 1) - 1
+            n_pair = n_pair + mortar%start(mortar%slave%n_facet + 1) - 1
             call mortar%evaluate(wanted, scene%x, u, du, target, item)
             do j = 1, size(item)
                associate (g => item(j)%g(:, :item(j)%n_node), node => item(j)%node(:item(j)%n_node))

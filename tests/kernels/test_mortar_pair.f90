@@ -1,7 +1,7 @@
 !> Integrals over a pair of edges: values, identity, momenta, derivatives, closed forms.
 module test_mortar_pair
    use check, only : check_near, check_true, test_case_t
-   use emcon_chain, only : chain_t
+   use emcon_chain_plane, only : chain_t
    use emcon_dgrad11, only : dg11_t => dg_t
    use emcon_dgrad15, only : dg15_t => dg_t
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
@@ -85,9 +85,9 @@ contains
       if (kind == 4 .or. kind == 8) is_corner(2) = .true.
       call stencil_slave(stencil, slave, 2, all(kind /= [1, 5, 9]), is_corner)
       is_corner = [.true., kind == 8, kind == 8]
-      if (kind == 7) master%previous(2) = 0
+      if (kind == 7) master%neighbour(1, 2) = 0
       if (kind == 7) is_corner(2) = .true.
-      if (kind == 11) master%next(2) = 0
+      if (kind == 11) master%neighbour(2, 2) = 0
       call stencil_master(stencil, master, 2, (kind > last_polygon .and. kind <= last_segment) &
          .or. kind == 12, kind > last_segment, is_corner)
    end function stencil_of
@@ -96,11 +96,10 @@ contains
       integer, intent(in) :: node(4)
       type(chain_t) :: chain
 
-      chain%n_edge = 3
-      allocate(chain%edge, source=reshape(node([1, 2, 2, 3, 3, 4]), [2, 3]))
-      allocate(chain%previous, source=[0, 1, 2])
-      allocate(chain%next, source=[2, 3, 0])
-      allocate(chain%length, source=abs(flat(1, node(2:)) - flat(1, node(:3))))
+      chain%n_facet = 3
+      allocate(chain%facet, source=reshape(node([1, 2, 2, 3, 3, 4]), [2, 3]))
+      allocate(chain%neighbour, source=reshape([0, 2, 1, 3, 2, 0], [2, 3]))
+      allocate(chain%size, source=abs(flat(1, node(2:)) - flat(1, node(:3))))
    end function chain_of
 
    !> Moments of a segment, or gap at a point and length of the edge, in the arithmetic.

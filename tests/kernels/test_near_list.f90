@@ -51,7 +51,7 @@ contains
 
       distance = 0.0_wp
       do k = 1, 2
-         associate (at => x(k, list%item(1, i)), side => x(k, list%edge(:, e)))
+         associate (at => x(k, list%item(1, i)), side => x(k, list%facet(:, e)))
             distance = max(distance, minval(side) - at, at - maxval(side))
          end associate
       end do
@@ -62,7 +62,7 @@ contains
       integer, intent(in) :: i, e
 
       associate (c => list%candidates)
-         is_listed = any(c%edge(c%start(i):c%start(i + 1) - 1) == e)
+         is_listed = any(c%facet(c%start(i):c%start(i + 1) - 1) == e)
       end associate
    end function is_listed
 

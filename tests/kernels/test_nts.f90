@@ -10,7 +10,7 @@ module test_nts
    use emcon_nts_stencil, only : part_of_sector, smooth_stencil, smooth_stencil_t
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
-   use emcon_touch_rule, only : touch_rule_may
+   use emcon_touch_rule_plane, only : touch_rule_may
    use small_scenes, only : add_block, add_surface, block_node, block_t, bottom, left, &
       make_two_blocks, right, scene_begin, shake, top
    implicit none
@@ -346,11 +346,12 @@ contains
          call nts%begin_step(scene%x, u, du)
          do i = 1, nts%n_constraint
             call nts_nearest(all, i, scene%x, u, 0.0_wp*u, gap, is_over)
-            if (distance(all%node(i), all%master%edge(:, all%edge(i))) > 2.0_wp*length_of(du)) cycle
+            if (distance(all%node(i), all%master%facet(:, all%edge(i))) > 2.0_wp*length_of(du)) &
+               cycle
             n_near = n_near + 1
             if (nts%edge(i) /= all%edge(i)) call check_near(error, &
-               distance(nts%node(i), nts%master%edge(:, max(1, nts%edge(i)))), &
-               distance(all%node(i), all%master%edge(:, all%edge(i))), tol, 1.0_wp, &
+               distance(nts%node(i), nts%master%facet(:, max(1, nts%edge(i)))), &
+               distance(all%node(i), all%master%facet(:, all%edge(i))), tol, 1.0_wp, &
                "distance of the nearest edge in step " // to_text(step))
          end do
          apart = axis_distance(scene%x + u)
@@ -373,8 +374,8 @@ contains
 
          least = huge(1.0_wp)
          do k = 1, size(nts%node)
-            do e = 1, nts%master%n_edge
-               associate (a => at(:, nts%master%edge(1, e)), b => at(:, nts%master%edge(2, e)))
+            do e = 1, nts%master%n_facet
+               associate (a => at(:, nts%master%facet(1, e)), b => at(:, nts%master%facet(2, e)))
                   least = min(least, max(0.0_wp, maxval(max(min(a, b) - at(:, nts%node(k)), &
                      at(:, nts%node(k)) - max(a, b)))))
                end associate
@@ -416,7 +417,7 @@ contains
       du(2, 11:) = -0.1_wp
       do step = 1, 450
          call nts%begin_step(scene%x, u, du)
-         call check_equal(error, size(nts%near%candidates%edge), 0, "candidates in step " &
+         call check_equal(error, size(nts%near%candidates%facet), 0, "candidates in step " &
             // to_text(step))
          u = u + du
       end do
@@ -672,11 +673,11 @@ contains
       du(1, :) = 1.6_wp                          ! the search reaches from leg to leg
       call nts%begin_step(scene%x, u, du)
       associate (near => nts%near%candidates)
-         call check_true(error, size(near%edge) > 0, "candidates")
+         call check_true(error, size(near%facet) > 0, "candidates")
          do i = 1, nts%n_constraint
             do k = near%start(i), near%start(i + 1) - 1
                call check_true(error, touch_rule_may(nts%rule, nts%slave, nts%chain_node(i), &
-                  near%edge(k)), "nothing that is never touched, node " // to_text(nts%node(i)))
+                  near%facet(k)), "nothing that is never touched, node " // to_text(nts%node(i)))
             end do
          end do
       end associate

@@ -89,14 +89,14 @@ contains
 
       do i = 1, n_scheme_row()
          row = scheme_row(i)
-         if (row%is_explicit .or. .not. row%masses_resist) cycle
+         if (row%is_explicit .or. .not. row%has_inertia) cycle
          call scheme_create(row, scheme)
          given = host_scheme_row("X", scheme)
          call check_true(error, (given%takes_jumps .eqv. row%takes_jumps) .and. &
             (given%takes_massless .eqv. row%takes_massless) .and. &
             (given%takes_damping .eqv. row%takes_damping), trim(row%word) // " goes with the same")
          call check_true(error, (given%dissipates .eqv. row%dissipates) .and. given%n_past == &
-            row%n_past .and. given%masses_resist .and. given%looks_back, trim(row%word) // &
+            row%n_past .and. given%has_inertia .and. given%looks_back, trim(row%word) // &
             " is the same")
          call host_scheme_check("X", scheme, error)
          if (allocated(error)) return
@@ -171,11 +171,11 @@ contains
          call scheme_create(row, scheme)
          evaluation = scheme%evaluation(instant_t(), 0.5_wp)
          call check_true(error, scheme%row%code == row%code, "the row is kept")
-         call check_true(error, evaluation%mass_scale > 0.0_wp .eqv. row%masses_resist, &
-            "masses resist")
-         call check_true(error, evaluation_is_equilibrium(evaluation) .neqv. row%masses_resist, &
+         call check_true(error, evaluation%mass_scale > 0.0_wp .eqv. row%has_inertia, &
+            "inertia")
+         call check_true(error, evaluation_is_equilibrium(evaluation) .neqv. row%has_inertia, &
             "equilibrium")
-         if (.not. row%masses_resist) cycle
+         if (.not. row%has_inertia) cycle
          call check_near(error, evaluation_velocity(evaluation, 3.0_wp, &
             evaluation_displacement(evaluation, 3.0_wp, 7.0_wp)), 7.0_wp, 8.0_wp*eps, 1.0_wp, &
             "the velocity that a way ends with")

@@ -55,7 +55,7 @@ contains
       call search_candidates(item_low, item_high, low, high, reach, list)
       call check_equal(error, size(list%start), size(item_low, 2) + 1, what // ", items")
       call check_equal(error, list%start(1), 1, what // ", begin")
-      call check_equal(error, size(list%edge), list%start(size(item_low, 2) + 1) - 1, &
+      call check_equal(error, size(list%facet), list%start(size(item_low, 2) + 1) - 1, &
          what // ", end")
       if (allocated(error)) return
       do i = 1, size(item_low, 2)
@@ -65,7 +65,7 @@ contains
             n = n + 1
             near(n) = e
          end do
-         call check_equal(error, list%edge(list%start(i):list%start(i + 1) - 1), near(:n), &
+         call check_equal(error, list%facet(list%start(i):list%start(i + 1) - 1), near(:n), &
             what // ", list of item " // to_text(i))
          if (allocated(error)) return
       end do
@@ -75,12 +75,14 @@ contains
    subroutine random_boxes(low, high)
       real(wp), intent(out) :: low(:, :), high(:, :)
       real(wp) :: u(size(low, 2))
+      integer :: a
 
       call draw_random(low)
       call draw_random(high)
       call draw_random(u)
-      high(1, :) = low(1, :) + 10.0_wp**(-3.0_wp*u)*high(1, :)
-      high(2, :) = low(2, :) + 10.0_wp**(-3.0_wp*u)*high(2, :)
+      do a = 1, size(low, 1)
+         high(a, :) = low(a, :) + 10.0_wp**(-3.0_wp*u)*high(a, :)
+      end do
    end subroutine random_boxes
 
    !> Numbers of boxes around the sizes of leaves and powers of two, and several hundreds.
@@ -88,18 +90,21 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: n_box(14) = [1, 2, 3, 7, 8, 9, 15, 16, 17, 33, 64, 65, 300, 777]
       real(wp), allocatable :: item_low(:, :), item_high(:, :), low(:, :), high(:, :)
-      integer :: k, seed
+      integer :: k, n_dim, seed
 
-      do k = 1, size(n_box)
-         allocate(item_low(2, 50), item_high(2, 50), low(2, n_box(k)), high(2, n_box(k)))
-         do seed = 1, 5
-            call random_boxes(item_low, item_high)
-            call random_boxes(low, high)
-            call check_boxes(error, item_low, item_high, low, high, 0.5_wp**seed, &
-               to_text(n_box(k)) // " boxes")
-            if (allocated(error)) return
+      do n_dim = 2, 3
+         do k = 1, size(n_box)
+            allocate(item_low(n_dim, 50), item_high(n_dim, 50), low(n_dim, n_box(k)), &
+               high(n_dim, n_box(k)))
+            do seed = 1, 5
+               call random_boxes(item_low, item_high)
+               call random_boxes(low, high)
+               call check_boxes(error, item_low, item_high, low, high, 0.5_wp**seed, &
+                  to_text(n_box(k)) // " boxes, dimension " // to_text(n_dim))
+               if (allocated(error)) return
+            end do
+            deallocate(item_low, item_high, low, high)
          end do
-         deallocate(item_low, item_high, low, high)
       end do
    end subroutine test_boxes
 
@@ -134,12 +139,13 @@ contains
       call check_boxes(error, point, point, low, high, 0.1_wp, "boxes")
    end subroutine test_equal_boxes
 
-   !> Many equal centres along each axis, boxes that just touch.
+   !> Many equal centres along each axis, boxes that just touch; in space a third axis is like the
+   !> second one.
    subroutine test_lattice(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: n = 20
       real(wp) :: low(2, n*n), high(2, n*n)
-      integer :: i
+      integer :: i, like(3)
 
       do i = 1, n*n
          low(:, i) = [real(mod(7*i, n), wp), real(i/n, wp)]
@@ -147,6 +153,13 @@ contains
       end do
       call check_boxes(error, low, high, low, high, 1.0_wp, "reach of one cell")
       call check_boxes(error, low, high, low, high, 0.5_wp, "reach of half a cell")
+      like = [1, 2, 2]
+      call check_boxes(error, low(like, :), high(like, :), low(like, :), high(like, :), 1.0_wp, &
+         "in space")
+      low(2, :) = 0.0_wp
+      high(2, :) = 0.0_wp
+      call check_boxes(error, low(like, :), high(like, :), low(like, :), high(like, :), 1.0_wp, &
+         "on a line in space")
    end subroutine test_lattice
 
    !> The same lists whatever the unit of length is, as far as it is a power of two.
@@ -162,7 +175,7 @@ contains
          call search_candidates(scale(low, k), scale(high, k), scale(low, k), scale(high, k), &
             scale(0.1_wp, k), scaled)
          call check_equal(error, scaled%start, list%start, "starts, power " // to_text(k))
-         call check_equal(error, scaled%edge, list%edge, "edges, power " // to_text(k))
+         call check_equal(error, scaled%facet, list%facet, "edges, power " // to_text(k))
       end do
    end subroutine test_scaled
 
@@ -188,13 +201,13 @@ contains
          end do
          call search_candidates(low(:, 2:n:3), high(:, 2:n:3), low, high, 0.1_wp, expected)
          call search_candidates(low(:, 2:n:3), high(:, 2:n:3), bad_low, bad_high, 0.1_wp, list)
-         call check_true(error, size(list%edge) > 0, "there is something to find")
+         call check_true(error, size(list%facet) > 0, "there is something to find")
          call check_equal(error, list%start, expected%start, "starts, kind " // to_text(k))
-         call check_equal(error, list%edge, expected%edge, "edges, kind " // to_text(k))
+         call check_equal(error, list%facet, expected%facet, "edges, kind " // to_text(k))
          call search_candidates(bad_low(:, 1:n:3), bad_high(:, 1:n:3), low, high, 0.1_wp, list)
-         call check_equal(error, size(list%edge), 0, "near an item, kind " // to_text(k))
+         call check_equal(error, size(list%facet), 0, "near an item, kind " // to_text(k))
          call search_candidates(low, high, bad_low(:, 1:n:3), bad_high(:, 1:n:3), 0.1_wp, list)
-         call check_equal(error, size(list%edge), 0, "nothing else, kind " // to_text(k))
+         call check_equal(error, size(list%facet), 0, "nothing else, kind " // to_text(k))
       end do
    end subroutine test_not_finite
 
@@ -298,7 +311,7 @@ contains
             high(:, i) = [real(i, wp) + 0.5_wp, 0.0_wp]
          end do
          call search_candidates(point, point, low, high, 0.6_wp, list)
-         call check_equal(error, size(list%edge), 3*n - 2, "candidates of " // to_text(n))
+         call check_equal(error, size(list%facet), 3*n - 2, "candidates of " // to_text(n))
          deallocate(point, low, high)
          n = 8*n
       end do

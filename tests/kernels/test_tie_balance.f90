@@ -5,7 +5,7 @@ module test_tie_balance
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
-   use emcon_tie_balance, only : tie_balance, tie_balance_report_t
+   use emcon_tie_balance_plane, only : tie_balance, tie_balance_report_t
    implicit none
    private
    public :: collect_tie_balance

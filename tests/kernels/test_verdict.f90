@@ -172,7 +172,7 @@ contains
          call verdict_end(verdict)
          call check_true(error, verdict_is_good(verdict), "asked for")
          call check_equal(error, verdict%n_warning, merge(0, 1, k == 1), "told")
-         verdict%energy%is_explicit = .true.
+         verdict%energy%has_explicit = .true.
          verdict%n_warning = 0
          call verdict_end(verdict)
          call check_true(error, verdict_is_good(verdict) .neqv. k == 3, "explicit")

@@ -9,7 +9,7 @@ module tie_scenes
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
-   use emcon_tie, only : tie_measure
+   use emcon_tie_plane, only : tie_measure
    use random_draws, only : draw_random
    use small_scenes, only : scene_begin
    implicit none

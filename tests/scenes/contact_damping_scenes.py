@@ -43,9 +43,9 @@ def block_over_floor(h, t_end, *, height=0.0, velocity=(0.0, 0.0), gravity=0.0, 
     return scene.deck(sides)
 
 
-def ring(coefficient, clearance, flat=0.0, tangent=0.0):
-    """That of the paper against its block, which is free."""
-    deck = damped(Deck.read(DECKS / "ring.inp"), coefficient, clearance, flat, tangent,
+def ring(coefficient, clearance, flat=0.0, tangent=0.0, scene=None):
+    """That of the paper, or another `scene` of it, against its block, which is free."""
+    deck = damped(scene or Deck.read(DECKS / "ring.inp"), coefficient, clearance, flat, tangent,
                   "FRICTIONLESS")
     deck.remove("*BOUNDARY")
     return deck

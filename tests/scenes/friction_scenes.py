@@ -249,9 +249,9 @@ def belt_way(time, mu, k, v):
                      end + v/w*np.sin(w*(time - t2)))
 
 
-def ring(mu):
-    """That of the paper against its block, which is free."""
-    deck = rubbing(Deck.read(DECKS / "ring.inp"), mu, "FRICTIONLESS")
+def ring(mu, scene=None):
+    """That of the paper, or another `scene` of it, against its block, which is free."""
+    deck = rubbing(scene or Deck.read(DECKS / "ring.inp"), mu, "FRICTIONLESS")
     deck.remove("*BOUNDARY")
     return deck
 
@@ -300,7 +300,7 @@ def pressed_sideways(n):
     return deck, np.array([node[label] for label in sorted(node)])
 
 
-def pressed_round(n, radius=50.0, mu=0.3, back=0.0):
+def pressed_round(n, radius=50.0, mu=0.3, back=0.0, layers=20):
     """Two bodies of one material, the upper one round, pressed together and then moved sideways in
     twelve static increments; meshes are finest in the middle. With `back` only by this part, and then
     to the other side in another twelve. Also the places of its nodes."""
@@ -313,8 +313,8 @@ def pressed_round(n, radius=50.0, mu=0.3, back=0.0):
         return grade(x), grade(y) + grade(x)**2/(2*radius)*(1 - y)
 
     scene = Scene(0.05, 1.6 if back else 1.0)
-    scene.block("UPPER", (-1, 0), (2, 1), (n, 20), stiffness=100.0, shape=upper)
-    scene.block("LOWER", (-1, -1), (2, 1), (n + 6, 20), stiffness=100.0,
+    scene.block("UPPER", (-1, 0), (2, 1), (n, layers), stiffness=100.0, shape=upper)
+    scene.block("LOWER", (-1, -1), (2, 1), (n + 6, layers), stiffness=100.0,
                 shape=lambda x, y: (grade(x), grade(y)))
     scene.hold("LOWER", lambda x, y: y < -0.99*width)
     scene.hold("UPPER", lambda x, y: y > 0.99*width, "2, 2", -0.12)

@@ -36,6 +36,16 @@ def test_bench(name, least):
     assert len([line for line in lines if line]) >= least
 
 
+@pytest.mark.parametrize("program", sorted(BENCH.glob("*.f90")), ids=lambda path: path.stem)
+def test_programs_compile(program, tmp_path):
+    """Against the modules of the library as they are; to link and run them is for `make bench`."""
+    config = (ROOT / "build" / "config.mk").read_text()
+    compiler = re.search(r"^COMPILER := \S+ (\S+)", config, re.M)[1]
+    done = subprocess.run([compiler, "-std=f2018", "-fsyntax-only", "-J", tmp_path, "-I",
+                           ROOT / "build" / "release" / "mod", program], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+
+
 def test_counts_that_rise_are_told():
     """By more than three per cent, of those that are stored; new ones are none."""
     stored = {"ring": {"newton": 100, "tangents": 100, "cuts": 0}}

@@ -2,12 +2,13 @@
 
 import math
 
+import contact_damping_scenes
 import numpy as np
 import pytest
-from contact_damping_scenes import MASS, balance, block_over_floor, damped, ring
+from contact_damping_scenes import MASS, balance, block_over_floor, damped
 from friction_scenes import NODES, make_rigid, rubbing
 from plain_scenes import BOTH, ONE, Scene
-from scene_tools import DECKS, Deck, run_deck, run_one_sided
+from scene_tools import DECKS, Deck, coarse_ring, run_deck, run_one_sided
 from test_contact_output import restart
 from test_segments import with_profile
 
@@ -173,17 +174,24 @@ def test_an_oscillator_on_a_penalty(more, tmp_path):
 # ---- the ring -----------------------------------------------------------------------------------
 
 
+def ring(*damping):
+    """On fewer elements than in the book."""
+    return contact_damping_scenes.ring(*damping, scene=coarse_ring())
+
+
 @pytest.mark.parametrize("more", [*KINDS, {"formulation": "NODE TO SURFACE", "sides": "BOTH"}])
 def test_a_ring_keeps_momenta_and_pays_for_damping(more, tmp_path):
-    runs = [run_deck(ring(0.5, 0.1, 0.3, 0.7), tmp_path/method, h=0.02, t_end=0.6, method=method,
-                     **more) for method in ("NULL SPACE", "SADDLE POINT")]
+    runs = [run_deck(ring(0.5, 0.1, 0.3, 0.7), tmp_path/method, h=0.02, t_end=t_end, method=method,
+                     **more) for method, t_end in (("NULL SPACE", 0.6), ("SADDLE POINT", 0.3))]
     for run in runs:
         obeys(run)
         keeps_momenta(run)
-        assert run.history["contact_damping_loss"][-1] > 0.1*run.history["kinetic"][0]
         assert run.history["cuts"].sum() == 0
+    whole, part = (run.history for run in runs)
+    assert whole["contact_damping_loss"][-1] > 0.1*whole["kinetic"][0]
+    assert part["contact_damping_loss"][-1] > 0.01*part["kinetic"][0]
     for name in ("kinetic", "contact_damping_loss", "strain"):
-        assert np.allclose(runs[0].history[name], runs[1].history[name], rtol=1e-9, atol=1e-11)
+        assert np.allclose(whole[name][:len(part)], part[name], rtol=1e-9, atol=1e-11)
 
 
 @pytest.mark.parametrize("more", [{"method": "PENALTY"}, {"method": "AUGMENTED LAGRANGE"},

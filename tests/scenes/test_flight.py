@@ -2,16 +2,15 @@
 
 import numpy as np
 import pytest
-from scene_tools import DECKS, run_deck
+from scene_tools import coarse_spinning_ring, run_deck
 
-DECK = DECKS / "spinning_ring.inp"
 
 
 @pytest.mark.parametrize(("h", "n"), [(0.001, 1000), (0.01, 300), (0.05, 1000), (0.2, 300), (0.5, 100)])
 def test_momenta_and_energy_stay(tmp_path, h, n):
     """`n` increments, from 5000 per turn down to 12, where elements would invert without cuts."""
     t_end = n*h
-    history = run_deck(DECK, tmp_path, h=h, t_end=t_end, frame=t_end).history
+    history = run_deck(coarse_spinning_ring(), tmp_path, h=h, t_end=t_end, frame=t_end).history
     assert len(history) == n + 1
     for name in ("px", "py", "lz", "total"):
         drift = np.abs(history[name] - history[name][0]).max()
@@ -25,7 +24,7 @@ def test_momenta_and_energy_stay(tmp_path, h, n):
 
 def test_centre_of_mass_flies_straight(tmp_path):
     """Moment about the origin of a moving body: the centre of mass must move by p t / m."""
-    run = run_deck(DECK, tmp_path, h=0.02, t_end=2, frame=0.5)
+    run = run_deck(coarse_spinning_ring(), tmp_path, h=0.02, t_end=2, frame=0.5)
     fields = run.fields()
     mass = run.series("BODIES", "MASS")[1][0, 0]
     p = np.array([run.history["px"][0], run.history["py"][0]])

@@ -159,7 +159,7 @@ def test_friction_without_a_push_holds_nothing(tmp_path):
 def test_partial_slip_to_and_fro(tmp_path):
     """Mindlin and Deresiewicz: on the way back from Q* what slides anew leaves a strip of
     sqrt(1 - (Q* - Q)/(2 mu P)) stuck, with what the way there has locked in."""
-    deck, place = pressed_round(64, back=0.546)
+    deck, place = pressed_round(64, back=0.546, layers=10)
     run = run_deck(deck, tmp_path, **NODES)
     assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] <= 1e-9
     assert run.history["cuts"].sum() == 0 and (np.diff(run.history["friction_loss"]) >= -1e-18).all()

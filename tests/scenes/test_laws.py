@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scene_tools import DECKS, Deck, run_deck
+from scene_tools import coarse_spinning_ring, run_deck
 
 LAWS = {
     "neo hooke": ["*HYPERELASTIC, NEO HOOKE", "50., 0.004"],
@@ -15,7 +15,7 @@ LAWS = {
 
 def ring(law, folder, h, t_end):
     """A ring that spins and vibrates, made of `law`."""
-    deck = Deck.read(DECKS / "spinning_ring.inp")
+    deck = coarse_spinning_ring()
     deck.remove("*HYPERELASTIC")
     deck.insert("\n".join(LAWS[law]), before="*DENSITY")
     return run_deck(deck, folder, h=h, t_end=t_end, frame=t_end)

@@ -7,7 +7,15 @@ import numpy as np
 import pytest
 import scipy.linalg
 from plain_scenes import AUTO, Scene
-from scene_tools import DECKS, Deck, emcon, number, run_deck
+from scene_tools import (
+    DECKS,
+    Deck,
+    coarse_ring,
+    coarse_spinning_ring,
+    emcon,
+    number,
+    run_deck,
+)
 
 from emcon import Stepper
 
@@ -189,8 +197,8 @@ def rings(tmp_path_factory):
     folder = tmp_path_factory.mktemp("rings")
     parameters = {"h": 0.02, "t_end": 0.8, "frame": 0.1}
     return [run_deck(deck, folder/name, **parameters) for name, deck in (
-        ("linear", linear(Deck.read(DECKS/"ring.inp"), "BLOCK")),
-        ("full", Deck.read(DECKS/"ring.inp")))]
+        ("linear", linear(coarse_ring(), "BLOCK")),
+        ("full", coarse_ring()))]
 
 
 def test_ring_on_a_linear_foundation(rings):
@@ -216,7 +224,7 @@ def test_the_foundation_deforms_as_with_large_kinematics(rings):
 def test_initiations_and_formulations(tmp_path):
     for choice in ({"initiation": "MASSLESS", "formulation": "MORTAR"},
                    {"initiation": "MASSLESS"}, {"method": "SADDLE POINT"}):
-        deck = linear(Deck.read(DECKS/"ring.inp"), "BLOCK")
+        deck = linear(coarse_ring(), "BLOCK")
         run = run_deck(deck, tmp_path, h=0.02, t_end=0.4, frame=1, **choice)
         assert run.history["active"].max() >= 2
         assert balance(run.history) < 1e-12
@@ -249,7 +257,7 @@ def test_tied_and_loaded(tmp_path):
 
 
 def test_restart_goes_on_with_the_same_bits(tmp_path):
-    deck = linear(Deck.read(DECKS/"ring.inp"), "BLOCK")
+    deck = linear(coarse_ring(), "BLOCK")
     deck.set_parameter("h", 0.02)
     path = deck.write(tmp_path/"deck.inp")
     with Stepper(path) as whole:
@@ -303,10 +311,8 @@ def test_a_linear_body_must_not_spin(tmp_path):
 
 def test_a_corotated_ring_spins_and_vibrates(tmp_path):
     """All momenta and the energy to round-off, over a turn and a half; close to large strains."""
-    deck = Deck.read(DECKS/"spinning_ring.inp")
-    deck.set_parameter("t_end", 2.0)
-    runs = [run_deck(d, tmp_path/str(k)) for k, d in enumerate(
-        (linear(deck, "RING", "COROTATED"), Deck.read(DECKS/"spinning_ring.inp")))]
+    runs = [run_deck(deck, tmp_path/str(k), t_end=2.0) for k, deck in enumerate(
+        (linear(coarse_spinning_ring(), "RING", "COROTATED"), coarse_spinning_ring()))]
     history = runs[0].history
     assert history["strain"].max() > 0.01*history["kinetic"].max()
     assert balance(history) < 1e-12
@@ -314,7 +320,7 @@ def test_a_corotated_ring_spins_and_vibrates(tmp_path):
         change = np.abs(history[column] - history[column][0]).max()
         assert change < 1e-12*np.abs(history["lz"][0]), column
     strain = runs[0].verdict["linear_strain"]
-    other = runs[1].history["strain"][:len(history)]
+    other = runs[1].history["strain"]
     assert np.abs(history["strain"] - other).max() < 3*strain*other.max()
 
 

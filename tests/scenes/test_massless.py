@@ -8,7 +8,7 @@ import pytest
 import scipy.linalg
 from overlap import worst
 from plain_scenes import AUTO, SCENES, Outcome, Scene, corners, crossing
-from scene_tools import DECKS, ROOT, Deck, run_deck
+from scene_tools import DECKS, ROOT, Deck, coarse_ring, run_deck
 
 from emcon import Stepper
 
@@ -105,7 +105,7 @@ def test_an_elastic_disc_slides_in_a_ring(tmp_path):
 
 
 def test_a_ring_in_mortar_contact(tmp_path):
-    history = run_deck(DECKS/"ring.inp", tmp_path, h=0.02, t_end=2, frame=1, **MASSLESS,
+    history = run_deck(coarse_ring(), tmp_path, h=0.02, t_end=2, frame=1, **MASSLESS,
                        **MORTAR).history
     assert (history["active"] > 0).any()
     assert balances(history) < 1e-12

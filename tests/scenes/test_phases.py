@@ -3,7 +3,7 @@
 import resource
 
 import pytest
-from scene_tools import DECKS, run_deck
+from scene_tools import DECKS, Deck, run_deck
 
 PHASES = ["read", "search", "gaps", "residual", "assemble", "eliminate", "factorise", "solve",
           "restitution", "judge", "vectors", "output"]
@@ -36,12 +36,14 @@ def test_phases_are_all_of_the_time(ring):
     assert sum(run.verdict["seconds"].values()) == pytest.approx(rows["all"][0], abs=0.001)
 
 
-def test_elements_and_factors_take_most_of_it(ring):
-    """None of the phases that do hard work is charged to the rest."""
-    rows = table(ring[0])
-    march = sum(rows[name][0] for name in PHASES if name not in ("read", "output"))
-    assert sum(rows[name][0] for name in ("residual", "assemble", "factorise", "solve")) > 0.5*march
-    assert rows["vectors"][0] < 0.5*march
+def test_elements_and_factors_take_most_of_it(tmp_path):
+    """None of the phases that do hard work is charged to the rest: with a factor for each correction
+    they take some fifteen times as much as what is left, which no load of the machine turns round."""
+    deck = Deck.read(DECKS/"ring.inp")
+    deck.replace("*NEWTON,", "*NEWTON, TYPE=FULL,")
+    rows = table(run_deck(deck, tmp_path, h=0.05, t_end=1, frame=1))
+    hard = [rows[name][0] for name in ("assemble", "factorise")]
+    assert min(hard) > 0.25*rows["vectors"][0] and sum(hard) > 3*rows["vectors"][0]
 
 
 def test_counts_are_those_of_newtons_method(tmp_path):

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import scipy.linalg
 from plain_scenes import AUTO, Scene
-from scene_tools import DECKS, Deck, run_deck
+from scene_tools import Deck, coarse_ring, run_deck
 from test_linear import balance
 
 from emcon import Stepper
@@ -81,7 +81,7 @@ def test_a_mode_on_a_massless_column(tmp_path):
     {"initiation": "MASSLESS", "formulation": "MORTAR"},
     {"initiation": "ADMISSIBLE", "formulation": "MORTAR"}], ids=lambda c: " ".join(c.values()))
 def test_ring_on_a_quasi_static_foundation(choice, tmp_path):
-    deck = massless(Deck.read(DECKS/"ring.inp"), "BLOCK")
+    deck = massless(coarse_ring(), "BLOCK")
     deck.replace("*DENSITY\n0.01\n*SOLID SECTION", "*SOLID SECTION")     # STIFF needs none
     assert deck.text().count("*DENSITY") == 1
     history = run_deck(deck, tmp_path, h=0.02, t_end=0.8, frame=1, **choice).history
@@ -211,7 +211,7 @@ def test_what_is_massless_must_be_held(tmp_path):
 
 
 def test_contact_that_pushes_masses_is_refused(tmp_path):
-    deck = massless(Deck.read(DECKS/"ring.inp"), "BLOCK")
+    deck = massless(coarse_ring(), "BLOCK")
     run = run_deck(deck, tmp_path, code=2, initiation="VELOCITY UPDATE")
     assert "TYPE=VELOCITY UPDATE pushes masses, but a surface in contact is of a MASSLESS" \
         in run.errors

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from scene_tools import DECKS, EPSILON, Deck, figures, run_deck
+from scene_tools import DECKS, EPSILON, Deck, coarse_ring, figures, run_deck
 
 DECK = DECKS / "ring.inp"
 DURATION = 8.0
@@ -114,7 +114,7 @@ def test_figures_of_the_heading(ring, initiation, h):
 @pytest.mark.parametrize("method", ["NULL SPACE", "SADDLE POINT"])
 def test_momentum_changes_by_the_impulse_of_the_support(tmp_path, initiation, method):
     """Ring and block together: contact is inner, only the clamped bottom acts from outside."""
-    deck = Deck.read(DECK)
+    deck = coarse_ring()
     deck.insert("*NODE PRINT, NSET=BOTTOM, TOTALS=ONLY\nRF", before="*CONTACT PRINT")
     run = run_deck(deck, tmp_path, h=0.02, t_end=1.5, initiation=initiation, method=method)
     history = run.history

@@ -112,7 +112,7 @@ def test_orders_of_one_piece(matching):
     np.testing.assert_allclose(order, [2, 1], rtol=0, atol=0.05)
 
 
-LEVELS = {1: (8, 16), 1.5: (8, 16), 10: (4, 8)}
+LEVELS = {1: (8, 16), 1.5: (8, 16), 10: (3, 6)}
 SMOOTH_INTERFACES = ["STRAIGHT", "CURVED", "FOUR", "FOUR CURVED"]
 
 
@@ -133,11 +133,15 @@ def test_orders(tmp_path, matching, interface, ratio, multiplier):
     assert (last <= 1.25*matching(LEVELS[ratio][-1])).all()
 
 
+#: Of the beam, on whose orders the clamped end has more of a say.
+BEAM_LEVELS = LEVELS | {10: (4, 8)}
+
+
 @pytest.mark.parametrize("multiplier", MULTIPLIERS)
-@pytest.mark.parametrize("ratio", LEVELS)
+@pytest.mark.parametrize("ratio", BEAM_LEVELS)
 def test_cantilever(tmp_path, ratio, multiplier):
     norms = []
-    for level in LEVELS[ratio]:
+    for level in BEAM_LEVELS[ratio]:
         folder = tmp_path / str(level)
         folder.mkdir()
         deck = made("cantilever", folder, "--ratio", ratio, "--level", level)
@@ -146,7 +150,7 @@ def test_cantilever(tmp_path, ratio, multiplier):
         norms.append(error_norms(fields, BEAM))
         reaction = fields["reaction_force"][-1].sum(axis=0)
         np.testing.assert_allclose(reaction, [0, -BEAM.force], rtol=0, atol=1e-9)
-    _, order = errors_and_orders(norms, LEVELS[ratio])
+    _, order = errors_and_orders(norms, BEAM_LEVELS[ratio])
     np.testing.assert_allclose(order, [2, 1], rtol=0, atol=0.1)
 
 

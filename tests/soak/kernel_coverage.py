@@ -9,13 +9,10 @@ variable EMCON, and prints for each folder of `src_f90` the part of its lines th
 
 import argparse
 import collections
-import dataclasses
 import gzip
 import json
 import os
 import pathlib
-import re
-import resource
 import subprocess
 import sys
 import tempfile
@@ -23,35 +20,11 @@ import tempfile
 ROOT = pathlib.Path(__file__).resolve().parents[2]
 BUILD = ROOT / "build" / "coverage"
 SOURCES = ROOT / "src_f90"
-#: What stands before the counters of a function in a file of gcov.
-COUNTERS = (0x01a10000).to_bytes(4, "little")
 
 
-@dataclasses.dataclass(frozen=True)
-class Suite:
-    """One suite of the kernel tests."""
-
-    name: str
-    seconds: float
-    lines: dict  # file -> numbers of the lines that it runs
-
-
-def has_run(path):
-    """Has anything of a file been run? Counters that are all zero are left out, which their length
-    tells: it is negative."""
-    data, place = path.read_bytes(), -1
-    while (place := data.find(COUNTERS, place + 1)) >= 0:
-        if int.from_bytes(data[place + 4:place + 8], "little", signed=True) > 0:
-            return True
-    return False
-
-
-def lines_run(objects, folders=()):
-    """File -> {line: how often it ran}, of the files of `folders` of `src_f90`; of all if none is
-    named."""
-    names = {path.stem for folder in folders for path in (SOURCES / folder).iterdir()}
-    counters = [path for path in sorted(objects.glob("*.gcda"))
-                if not names or path.stem in names and has_run(path)]
+def lines_run(objects):
+    """File -> {line: how often it ran}, of the files of `src_f90`."""
+    counters = sorted(objects.glob("*.gcda"))
     found = collections.defaultdict(collections.Counter)
     if not counters:
         return found
@@ -70,35 +43,14 @@ def lines_run(objects, folders=()):
     return found
 
 
-def count_lines(command, **options):
-    """Run `command` with counters at zero; CPU time that it took [s]."""
+def count_lines(command):
+    """Run `command` with counters at zero."""
     for path in (BUILD / "obj").glob("*.gcda"):
         path.unlink()
-    before = resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime
     done = subprocess.run(command, cwd=ROOT, env=os.environ | {"EMCON": str(BUILD / "emcon")},
-                          **options)
+                          check=False)
     if done.returncode != 0:
         sys.exit(f"{command[0]} ended with code {done.returncode}")
-    return resource.getrusage(resource.RUSAGE_CHILDREN).ru_utime - before
-
-
-def lines_of_suites(folders):
-    """The suites of the kernel tests with the lines of `folders` that each runs, measured once for
-    each program of MODE=coverage."""
-    program = BUILD / "kernels"
-    kept = BUILD / "suites"
-    kept.mkdir(exist_ok=True)
-    suites = []
-    main = (ROOT / "tests/kernels/main.F90").read_text()
-    for name in re.findall(r'call run\("(\w+)"', main):
-        path = kept / f"{name}_{'_'.join(folders)}.json"
-        if not path.exists() or path.stat().st_mtime < program.stat().st_mtime:
-            seconds = count_lines([str(program), name], stdout=subprocess.DEVNULL)
-            lines = {f"src_f90/{file}": sorted(k for k, n in counts.items() if n > 0)
-                     for file, counts in lines_run(BUILD / "obj", folders).items()}
-            path.write_text(json.dumps({"seconds": seconds, "lines": lines}))
-        suites.append(Suite(name, **json.loads(path.read_text())))
-    return suites
 
 
 def ranges(numbers):

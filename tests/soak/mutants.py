@@ -8,14 +8,15 @@ factor halved, a condition left out, an assignment not made. Lines are drawn by 
 `contact`, `march`, `terms` and `solid` that have changed since the last version; with `--since=`
 and nothing behind it from all. `--try` puts a text of one's own into a line.
 
-The kernel suites that run this line (by the counters of MODE=coverage) come first, the quickest at
-their head; then the runs of tests/scenes file by file, until one fails. What compiles to the same
-object means nothing and is not counted. Mutants that nobody notices are printed with their line;
-the exit code is 1 where more than a twentieth are. Nothing but the changed file is compiled, beside
-build/release, which stays as it is.
+The kernel suites that run this line (`traced_lines.py` knows) come first, the quickest at their
+head; then the tests of whole runs that do, until one fails. What compiles to the same object means
+nothing and is not counted. Mutants that nobody notices are printed with their line; the exit code
+is 1 where more than a twentieth are. Nothing but the changed file is compiled, beside build/release,
+which stays as it is.
 """
 
 import argparse
+import collections
 import concurrent.futures
 import dataclasses
 import os
@@ -27,20 +28,18 @@ import shlex
 import shutil
 import subprocess
 import sys
-import time
 
-from kernel_coverage import lines_of_suites
+from traced_lines import RELEASE, ROOT, Code, lines_of_runs, lines_of_suites
 
-ROOT = pathlib.Path(__file__).resolve().parents[2]
-RELEASE = pathlib.Path("build/release")
 FOLDERS = ["surfaces", "touch", "contact", "terms", "solid", "state", "active", "march"]
 GOAL = 0.95
-#: A mutant may never end: CPU time of a kernel suite, in times of what it takes and more [s].
-SLOWER, GRACE = 5, 2
-#: CPU time of one run of a scene [s], and memory of any program [bytes].
-PATIENCE, ROOM = 60, 4 << 30
-#: CPU time that tests of runs may take before a mutant counts as not noticed [s].
-LONGEST = 240
+#: A mutant may never end: CPU time of a program, in times of what it takes and more [s]; of tests of
+#: runs more, as Python counts too.
+SLOWER, GRACE, GRACE_OF_RUNS = 5, 2, 8
+#: Memory of any program [bytes].
+ROOM = 4 << 30
+#: CPU time that kernel suites and tests of runs may take before a mutant counts as not noticed [s].
+LONGEST = 30
 
 #: Mistakes: what to look for in the code of a line, and what stands there instead.
 MISTAKES = [
@@ -188,14 +187,16 @@ class Build:
 class Trial:
     """Mutants tried one at a time, in a folder below build/mutants."""
 
-    def __init__(self, build, suites):
+    def __init__(self, build, code, suites, runs):
         self.folder = ROOT / "build" / "mutants" / str(os.getpid())
         shutil.rmtree(self.folder, ignore_errors=True)
         self.folder.mkdir(parents=True)
         self.build = build
+        self.code = code
         self.suites = suites
+        self.runs = runs
         self.sound = {}
-        self.passes = {}
+        self.unsound = set()
 
     def noticed_by(self, mutant):
         """Name of the test that notices; "" if none, None if it is no mutant."""
@@ -207,91 +208,98 @@ class Trial:
         made = self.build.compile(mutant.file, "".join(lines), self.folder)
         if made is None or made.read_bytes() == self.sound[mutant.file]:
             return None
-        return self.failing_suite(mutant, made) or self.failing_run(made)
+        numbers = statement(text.splitlines(), mutant.line)
+        return (self.failing_suite(made, self.code.passing(self.suites, mutant.file, numbers))
+                or self.failing_run(made, self.code.passing(self.runs, mutant.file, numbers)))
 
-    def failing_suite(self, mutant, made):
-        lines = statement((ROOT / mutant.file).read_text().splitlines(), mutant.line)
-        seen = [s for s in self.suites
-                if any(line in s.lines.get(mutant.file, ()) for line in lines)]
-        if not seen:
-            return ""
-        program = self.build.link("kernels", made, self.folder)
-        for suite in sorted(seen, key=lambda s: s.seconds):
+    def failing_suite(self, made, suites):
+        """Name of the first of these suites that fails, the quickest at their head."""
+        chosen = within(sorted(suites, key=lambda s: s.seconds), LONGEST)
+        program = self.build.link("kernels", made, self.folder) if chosen else None
+        for suite in chosen:
             limit = GRACE + SLOWER*suite.seconds
-            if call([program, suite.name], self.folder, limit, 20*limit)[0] != 0:
+            if call([program, suite.name], self.folder, limit).returncode != 0:
                 return suite.name
         return ""
 
-    def failing_run(self, made):
-        program = self.build.link("emcon", made, self.folder)
-        library = next(name for name in self.build.call if ".so." in name)
-        self.build.link(pathlib.Path(library).name, made, self.folder)
-        place = {"EMCON": str(program), "LD_LIBRARY_PATH": str(self.folder)}
-        rest = LONGEST
-        for test in tests_of_runs():
-            code, seconds = run_tests(test, place)
-            if code != 0 and self.passes_when_sound(test):
-                return test
-            rest -= seconds
-            if rest <= 0:
+    def failing_run(self, made, runs):
+        """Name of the first of these tests that fails; one that fails anyway has noticed nothing."""
+        program = self.build.link("emcon", made, self.folder) if runs else None
+        while chosen := within(by_turns([r for r in runs if r.name not in self.unsound]), LONGEST):
+            failed = failing_test(chosen, {"EMCON": str(program)})
+            if not failed:
                 break
+            if not failing_test([r for r in chosen if r.name == failed], {}):
+                return failed
+            self.unsound.add(failed)
         return ""
 
-    def passes_when_sound(self, test):
-        """A test that fails anyway, or for want of time, has noticed nothing."""
-        if test not in self.passes:
-            self.passes[test] = run_tests(test, {})[0] == 0
-        return self.passes[test]
+
+def within(tests, seconds):
+    """The first of `tests`, as many as take so long together; one in any case."""
+    chosen = []
+    for test in tests:
+        if chosen and test.seconds > seconds:
+            break
+        seconds -= test.seconds
+        chosen.append(test)
+    return chosen
 
 
-def run_tests(test, place):
-    """Exit code and CPU time of a file of tests; the program of `place` runs them."""
-    return call([sys.executable, "-m", "pytest", "-q", "-x", "-p", "no:cacheprovider",
-                 f"tests/{test}"], ROOT, PATIENCE, 20*LONGEST, {"EMCON_PATIENCE": "20"} | place)
+def by_turns(tests):
+    """The quickest test of each file, quickest first, then the next one of each."""
+    turns = collections.Counter()
+    order = {}
+    for test in sorted(tests, key=lambda t: t.seconds):
+        file = test.name.split("::")[0]
+        order[test.name] = (turns[file], test.seconds)
+        turns[file] += 1
+    return sorted(tests, key=lambda t: order[t.name])
 
 
-def call(command, folder, seconds, wall, place=None):
-    """Exit code, not 0 where each of its programs takes more than `seconds`; CPU time [s]."""
+def failing_test(tests, place):
+    """The first of these tests that fails; the program of `place` runs them."""
+    limit = GRACE_OF_RUNS + SLOWER*max(test.seconds for test in tests)
+    done = call([sys.executable, "-m", "pytest", "-q", "-x", "--tb=no", "-p", "no:cacheprovider",
+                 *(f"tests/{test.name}" for test in tests)], ROOT, limit,
+                {"EMCON_PATIENCE": "20"} | place)
+    if done.returncode == 0:
+        return ""
+    told = [test.name for test in tests if re.search(
+        rf"^(?:FAILED|ERROR) {re.escape(test.name)}(?: |$|::)", done.stdout, re.M)]
+    return told[0] if told else tests[0].name
+
+
+def call(command, folder, seconds, place=None):
+    """What a command gives; its code is not 0 where one of its programs takes more than `seconds`."""
 
     def limit():
         resource.setrlimit(resource.RLIMIT_CPU, (int(seconds) + 1, int(seconds) + 2))
         resource.setrlimit(resource.RLIMIT_AS, (ROOM, ROOM))
 
-    before = resource.getrusage(resource.RUSAGE_CHILDREN)
     try:
-        code = subprocess.run(command, cwd=folder, stdout=subprocess.DEVNULL, timeout=wall,
-                              stderr=subprocess.DEVNULL, preexec_fn=limit,
-                              env=os.environ | (place or {}), check=False).returncode
+        return subprocess.run(command, cwd=folder, stdout=subprocess.PIPE, timeout=40*(seconds + 30),
+                              stderr=subprocess.DEVNULL, text=True, errors="replace",
+                              preexec_fn=limit, env=os.environ | (place or {}), check=False)
     except subprocess.TimeoutExpired:
-        code = 1
-    after = resource.getrusage(resource.RUSAGE_CHILDREN)
-    return code, after.ru_utime - before.ru_utime + after.ru_stime - before.ru_stime
-
-
-def tests_of_runs():
-    """Tests of whole runs, those first that see much for their time."""
-    first = [f"scenes/test_{name}.py" for name in (
-        "schemes", "contact_output", "ring", "scene_report", "input_decks", "contact_scenes",
-        "friction", "soft_contact", "explicit", "massless", "rigid")]
-    others = sorted(p.relative_to(ROOT / "tests").as_posix()
-                    for p in (ROOT / "tests" / "scenes").glob("test_*.py"))
-    return first + [name for name in others if name not in first]
+        return subprocess.CompletedProcess(command, 1, "")
 
 
 def main():
     options = read_options()
     since = last_version() if options.since is None else options.since
     if options.put:
-        waiting = [Mutant.of(*options.put)]
+        waiting = [Mutant.of(*put) for put in options.put]
     else:
         waiting = draw(options.folders, since, options.seed)
         print(f"{len(waiting)} mutants of lines "
               + (f"changed since {since[:12]}" if since else "of " + " ".join(options.folders)))
     build = Build(sorted({mutant.file for mutant in waiting}))
-    suites = lines_of_suites(options.folders)
+    told = (Code(options.folders), lines_of_suites(options.folders),
+            [] if options.kernels else lines_of_runs(options.folders))
     noticed, missed = 0, []
     with concurrent.futures.ProcessPoolExecutor(options.jobs, initializer=begin,
-                                                initargs=(build, suites)) as pool:
+                                                initargs=(build, *told)) as pool:
         waiting, running = iter(waiting), {}
         while True:
             while len(running) < options.jobs and (
@@ -323,15 +331,16 @@ def read_options():
     parser.add_argument("--since", metavar="COMMIT", help="lines changed since then; empty: all")
     parser.add_argument("--folders", nargs="+", default=FOLDERS)
     parser.add_argument("--jobs", type=int, default=os.cpu_count())
+    parser.add_argument("--kernels", action="store_true", help="ask the kernel tests alone")
     parser.add_argument("--all", action="store_true", help="print what is noticed too, and by what")
-    parser.add_argument("--try", dest="put", nargs=2, metavar=("FILE:LINE", "TEXT"))
+    parser.add_argument("--try", dest="put", nargs=2, action="append", metavar=("FILE:LINE", "TEXT"))
     return parser.parse_args()
 
 
-def begin(build, suites):
+def begin(*told):
     """Of each process that tries mutants."""
     global trial
-    trial = Trial(build, suites)
+    trial = Trial(*told)
 
 
 def attempt(mutant):

@@ -1,8 +1,12 @@
 """Mutants of the numerics and coverage: what they do to a line, which lines they name."""
 
+import platform
+import subprocess
+
 import pytest
 from kernel_coverage import ranges
-from mutants import MISTAKES, code_of, last_version, mistakes, statement
+from mutants import MISTAKES, by_turns, code_of, last_version, mistakes, statement, within
+from traced_lines import Passed, Tracer
 
 
 @pytest.mark.parametrize(
@@ -43,6 +47,44 @@ def test_a_line_of_a_longer_statement():
 
 def test_the_last_version_is_a_commit():
     assert len(last_version()) in (0, 40)
+
+
+SOURCE = """program traced
+   implicit none
+   character(len=8) :: word
+   call get_command_argument(1, word)
+   if (word == "left") then
+      print '(a)', "left"
+   else
+      print '(a)', "right"
+      stop 3
+   end if
+end program traced
+"""
+
+
+@pytest.mark.skipif(platform.machine() != "x86_64", reason="breakpoints of x86-64")
+def test_lines_that_a_program_passes(tmp_path):
+    """One way through a branch, and the other; the exit code is that of the program."""
+    source, program = tmp_path / "traced.f90", tmp_path / "traced"
+    source.write_text(SOURCE)
+    subprocess.run(["gfortran", "-O0", "-g1", source, "-o", program], check=True)
+    tracer = Tracer(program, {"traced.f90": "traced.f90"}, tmp_path)
+    for word, code, passed, other in (("left", 0, 6, 8), ("right", 3, 8, 6)):
+        done = subprocess.run([tracer.script(), word], capture_output=True, text=True, check=False)
+        assert (done.returncode, done.stdout.split()) == (code, [word])
+        [(_, seconds, lines)] = tracer.told()
+        assert passed in lines["traced.f90"] and other not in lines["traced.f90"]
+        assert 0 <= seconds < 10
+
+
+def test_tests_that_are_asked():
+    """Each file has its turn, and no more is asked than there is time for, but one."""
+    tests = [Passed(name, seconds, {}) for name, seconds in (
+        ("a::1", 3), ("a::2", 1), ("b::1", 2), ("a::3", 9))]
+    assert [t.name for t in by_turns(tests)] == ["a::2", "b::1", "a::1", "a::3"]
+    assert [t.name for t in within(by_turns(tests), 5)] == ["a::2", "b::1"]
+    assert len(within(tests, 0)) == 1
 
 
 def test_ranges():

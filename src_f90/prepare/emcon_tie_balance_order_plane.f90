@@ -1,6 +1,6 @@
 !> The order in which the unknowns and conditions of a balanced tie make a narrow band.
-module emcon_tie_balance_order
-   use emcon_tie_balance_data, only : tie_balance_t
+module emcon_tie_balance_order_plane
+   use emcon_tie_balance_data_plane, only : tie_balance_t
    implicit none
    private
    public :: balance_order
@@ -78,4 +78,4 @@ contains
       end do
    end subroutine number_rows
 
-end module emcon_tie_balance_order
+end module emcon_tie_balance_order_plane

@@ -5,12 +5,12 @@
 !> may touch several of them at once, it has a constraint for each class of bodies. Pieces that are
 !> tied to each other are one body: they meet in the tie, and contact there would bear nothing.
 !> Source: docs/theory.md, section 4.
-module emcon_touch_rule
+module emcon_touch_rule_plane
    use emcon_bodies, only : bodies_find_tied
-   use emcon_chain, only : chain_t
+   use emcon_chain_plane, only : chain_t
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_self_contact, only : self_contact_is_meant, self_contact_may_touch
+   use emcon_self_contact_plane, only : self_contact_is_meant, self_contact_may_touch
    use emcon_tied_edges, only : tied_ends_find
    implicit none
    private
@@ -41,12 +41,12 @@ contains
       integer :: n_body
 
       self%both_sides = both_sides
-      call tied_ends_find(scene, chain%edge, host, is_buried)
+      call tied_ends_find(scene, chain%facet, host, is_buried)
       self%host = host(chain%node)
       self%is_buried = is_buried(chain%node)
       if (.not. both_sides) return
-      call bodies_find_tied(scene, chain%edge, body, n_body)
-      self%body = body(chain%edge(1, :))
+      call bodies_find_tied(scene, chain%facet, body, n_body)
+      self%body = body(chain%facet(1, :))
       self%n_class = max(1, min(n_body, most_classes))
    end subroutine touch_rule_init
 
@@ -98,4 +98,4 @@ contains
       allows = self_contact_may_touch(chain, k, e, x, u)
    end function touch_rule_allows
 
-end module emcon_touch_rule
+end module emcon_touch_rule_plane

@@ -1,13 +1,13 @@
 !> What is wrong with the surfaces of a tie, in words.
-module emcon_tie_check
-   use emcon_chain, only : chain_t
+module emcon_tie_check_plane
+   use emcon_chain_plane, only : chain_t
    use emcon_couplings, only : tie_t
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted
    use emcon_text, only : joined, string_t, to_text
-   use emcon_tie_partner, only : default_tolerance, tie_partners_t
+   use emcon_tie_partner_plane, only : default_tolerance, tie_partners_t
    implicit none
    private
    public :: tie_check_surfaces, tie_check_partners
@@ -32,8 +32,8 @@ contains
       integer :: i, n, empty
 
       empty = 0
-      if (partners%master%n_edge == 0) empty = tie%master
-      if (partners%slave%n_edge == 0) empty = tie%slave
+      if (partners%master%n_facet == 0) empty = tie%master
+      if (partners%slave%n_facet == 0) empty = tie%slave
       if (empty > 0) then
          call raise(error, err_input, tie_text(scene, tie) // "surface " // &
             scene%surface(empty)%name // " has no element faces; both surfaces of a tie need them")
@@ -116,11 +116,11 @@ contains
 
       any_near = .false.
       do i = 1, size(node)
-         longer = partners%master%length(edge(i))
+         longer = partners%master%size(edge(i))
          associate (slave => partners%slave)
             associate (beside => slave%node_edge(:, find_sorted(slave%node, node(i))))
                do side = 1, 2
-                  if (beside(side) > 0) longer = max(longer, slave%length(beside(side)))
+                  if (beside(side) > 0) longer = max(longer, slave%size(beside(side)))
                end do
             end associate
          end associate
@@ -166,11 +166,11 @@ contains
 
       n = 0
       associate (slave => partners%slave)
-         do e = 1, slave%n_edge
+         do e = 1, slave%n_facet
             if (.not. partners%hole(e) > 0.0_wp) cycle
             n = n + 1
-            found(n)%text = to_text(scene%node%label(slave%edge(1, e))) // "-" // &
-               to_text(scene%node%label(slave%edge(2, e))) // " (" // &
+            found(n)%text = to_text(scene%node%label(slave%facet(1, e))) // "-" // &
+               to_text(scene%node%label(slave%facet(2, e))) // " (" // &
                to_text(partners%hole(e)) // ")"
          end do
       end associate
@@ -238,23 +238,23 @@ contains
       integer, intent(in) :: node(:)
       real(wp), intent(out) :: distance(:)           !! (size of `node`) [L]
       integer, intent(out) :: edge(:)                !! (size of `node`)
-      integer :: edge_at(chain%n_edge), n_block, i, k
+      integer :: edge_at(chain%n_facet), n_block, i, k
       integer, allocatable :: start(:)
       real(wp), allocatable :: low(:, :), high(:, :), bound(:)
 
-      do i = 1, chain%n_edge
+      do i = 1, chain%n_facet
          edge_at(chain%place(i)) = i
       end do
-      n_block = ceiling(sqrt(real(chain%n_edge, wp)))
+      n_block = ceiling(sqrt(real(chain%n_facet, wp)))
       allocate(start(n_block + 1), low(2, n_block), high(2, n_block), bound(n_block))
       do k = 1, n_block + 1
-         start(k) = 1 + nint(real(k - 1, wp)*real(chain%n_edge, wp)/real(n_block, wp))
+         start(k) = 1 + nint(real(k - 1, wp)*real(chain%n_facet, wp)/real(n_block, wp))
       end do
       do k = 1, n_block
          low(:, k) = huge(low)
          high(:, k) = -huge(high)
          do i = start(k), start(k + 1) - 1
-            associate (ends => x(:, chain%edge(:, edge_at(i))))
+            associate (ends => x(:, chain%facet(:, edge_at(i))))
                low(:, k) = min(low(:, k), minval(ends, 2))
                high(:, k) = max(high(:, k), maxval(ends, 2))
             end associate
@@ -289,7 +289,7 @@ contains
       integer :: i
 
       do i = 1, size(candidates)
-         associate (ends => chain%edge(:, candidates(i)))
+         associate (ends => chain%facet(:, candidates(i)))
             a = x(:, ends(2)) - x(:, ends(1))
             b = y - x(:, ends(1))
          end associate
@@ -301,4 +301,4 @@ contains
       end do
    end subroutine come_nearer
 
-end module emcon_tie_check
+end module emcon_tie_check_plane

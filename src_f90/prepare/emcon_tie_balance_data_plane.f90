@@ -7,7 +7,7 @@
 !>    D^T L = s_s,  M^T L = s_g,
 !> where s_g is -s of the part of the master chain that is covered (the chains run against each
 !> other), and -s of the slave chain at its ends. `tie_balance_residual` tells the second equation.
-module emcon_tie_balance_data
+module emcon_tie_balance_data_plane
    use emcon_couplings, only : tie_rows_t
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_errors, only : err_internal, error_t, raise
@@ -282,4 +282,4 @@ contains
       end do
    end subroutine solve
 
-end module emcon_tie_balance_data
+end module emcon_tie_balance_data_plane

@@ -2,33 +2,30 @@
 !>
 !> Edges run as in their elements, the body to the left, so the outward normal of an edge from a
 !> to b is (b - a) turned by -90 degrees. A surface may consist of several connected parts.
-module emcon_chain
+module emcon_chain_plane
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_facets, only : facets_init, facets_join_nodes, facets_number, facets_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
-   use emcon_scene, only : scene_t, where_text
-   use emcon_sort, only : find_sorted, unique_sorted
-   use emcon_surface_edges, only : faces_of_edges, surface_edges
+   use emcon_scene, only : scene_t
+   use emcon_search, only : search_boxes
    use emcon_text, only : to_text
    implicit none
    private
    public :: chain_t, chain_init, chain_number, chain_shorter, chain_shortest, chain_thickness, &
       chain_tributary, chain_distance, chain_is_seam, chain_touches, chain_corners, &
-      chain_crossing, surface_edges
+      chain_crossing, previous, next
 
-   type :: chain_t
-      integer :: n_edge = 0
-      integer, allocatable :: edge(:, :)         !! (2, n_edge) first and last node
-      integer, allocatable :: previous(:)        !! (n_edge) edge before; 0: an end
-      integer, allocatable :: next(:)            !! (n_edge) edge after
-      real(wp), allocatable :: length(:)         !! (n_edge) in the reference configuration [L]
-      integer, allocatable :: node(:)            !! (n_node) ascending; of a joint one node only
+   !> The sides of an edge, for `neighbour`.
+   integer, parameter :: previous = 1, next = 2
+
+   !> Facets are edges from their first to their last node; beyond their sides are the edges before
+   !> and after. Of a joint one node stands for both, and `corner` has it for either.
+   type, extends(facets_t) :: chain_t
       integer, allocatable :: duplicate(:)       !! (n_node) the other node of a joint; 0: none
-      integer, allocatable :: end_node(:, :)     !! (2, n_edge) the ends as indices into `node`
       integer, allocatable :: node_edge(:, :)    !! (2, n_node) edges that end and begin there or 0
-      integer, allocatable :: part(:)            !! (n_edge) connected part the edge belongs to
-      integer, allocatable :: place(:)           !! (n_edge) 1..n_edge along each part in turn
+      integer, allocatable :: place(:)           !! (n_facet) 1..n_facet along each part in turn
       integer, allocatable :: start(:)           !! (n_part + 1) place where each part begins
       logical, allocatable :: is_closed(:)       !! (n_part) a closed one begins at its lowest edge
    end type chain_t
@@ -48,28 +45,15 @@ contains
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
       type(error_t), allocatable, intent(out) :: error
-      integer :: i
 
       if (size(scene%x, 1) /= 2) then
          call raise(error, err_input, "surface " // surface%name // ": chains of edges are of " // &
             "the plane, and nodes have " // to_text(size(scene%x, 1)) // " coordinates")
          return
       end if
-      call surface_edges(scene, surface, self%edge)
-      self%n_edge = size(self%edge, 2)
-      if (surface%is_nodal) then
-         self%node = unique_sorted(surface%node)
-      else
-         self%node = unique_sorted(reshape(self%edge, [2*self%n_edge]))
-      end if
-      allocate(self%length(self%n_edge))
-      do i = 1, self%n_edge
-         associate (a => scene%x(:, self%edge(2, i)) - scene%x(:, self%edge(1, i)))
-            self%length(i) = sqrt(dot_product(a, a))   ! not norm2: its bits depend on the units
-         end associate
-      end do
-      call link_edges(self, scene, surface, error)
+      call facets_init(self%facets_t, scene, surface, error)
       if (allocated(error)) return
+      allocate(self%duplicate(size(self%node)), source=0)
       call chain_number(self)
    end subroutine chain_init
 
@@ -80,91 +64,62 @@ contains
       integer :: k
 
       shortest = huge(shortest)
-      if (self%n_edge == 0) return
+      if (self%n_facet == 0) return
       do k = 1, 2
          associate (e => self%node_edge(k, i))
-            if (e > 0) shortest = min(shortest, self%length(e))
+            if (e > 0) shortest = min(shortest, self%size(e))
          end associate
       end do
    end function chain_shortest
 
-   !> Find the neighbours of each edge.
-   subroutine link_edges(self, scene, surface, error)
-      type(chain_t), intent(inout) :: self
-      type(scene_t), intent(in) :: scene
-      type(surface_t), intent(in) :: surface
-      type(error_t), allocatable, intent(out) :: error
-      integer :: i, k, end_node
-
-      allocate(self%previous(self%n_edge), source=0)
-      allocate(self%next(self%n_edge), source=0)
-      allocate(self%node_edge(2, size(self%node)), source=0)
-      allocate(self%duplicate(size(self%node)), source=0)
-      allocate(self%end_node(2, self%n_edge))
-      do i = 1, self%n_edge
-         k = find_sorted(self%node, self%edge(1, i))
-         end_node = find_sorted(self%node, self%edge(2, i))
-         self%end_node(:, i) = [k, end_node]
-         if (self%node_edge(2, k) > 0 .or. self%node_edge(1, end_node) > 0) then
-            if (self%node_edge(2, k) == 0) k = end_node
-            call raise(error, err_input, where_text(scene, surface%origin) // ": surface " // &
-               surface%name // " is not a chain: it branches at node " // &
-               to_text(scene%node%label(self%node(k))))
-            return
-         end if
-         self%node_edge(2, k) = i
-         self%node_edge(1, end_node) = i
-      end do
-      do k = 1, size(self%node)
-         if (any(self%node_edge(:, k) == 0)) cycle
-         self%next(self%node_edge(1, k)) = self%node_edge(2, k)
-         self%previous(self%node_edge(2, k)) = self%node_edge(1, k)
-      end do
-   end subroutine link_edges
-
-   !> Number the parts, in the order of their lowest edges, and the places along them.
+   !> Number the parts, in the order of their lowest edges, and the places along them; the edges at
+   !> each node. After the edges at joints have become neighbours once more.
    pure subroutine chain_number(self)
       type(chain_t), intent(inout) :: self
-      integer :: i, e, first, n_part, n
-      integer :: start(self%n_edge + 1)
-      logical :: is_closed(self%n_edge)
+      integer :: i, e, first, p, n
 
-      if (allocated(self%part)) deallocate(self%part, self%place, self%start, self%is_closed)
-      allocate(self%part(self%n_edge), source=0)
-      allocate(self%place(self%n_edge), source=0)
-      start(1) = 1
-      n_part = 0
+      call facets_join_nodes(self)
+      call facets_number(self)
+      if (allocated(self%place)) deallocate(self%node_edge, self%place, self%start, self%is_closed)
+      allocate(self%node_edge(2, size(self%node)), source=0)
+      allocate(self%place(self%n_facet), source=0)
+      do e = 1, self%n_facet
+         self%node_edge(2, self%corner(1, e)) = e
+         self%node_edge(1, self%corner(2, e)) = e
+      end do
+      associate (n_part => maxval([0, self%part]))
+         allocate(self%start(n_part + 1), source=1)
+         allocate(self%is_closed(n_part), source=.false.)
+      end associate
+      p = 0
       n = 0
-      do i = 1, self%n_edge
-         if (self%part(i) > 0) cycle
-         n_part = n_part + 1
+      do i = 1, self%n_facet
+         if (self%part(i) <= p) cycle
+         p = p + 1
          first = i
-         e = self%previous(i)
+         e = self%neighbour(previous, i)
          do while (e /= 0 .and. e /= i)
             first = e
-            e = self%previous(e)
+            e = self%neighbour(previous, e)
          end do
-         is_closed(n_part) = e == i
-         if (is_closed(n_part)) first = i
+         self%is_closed(p) = e == i
+         if (self%is_closed(p)) first = i
          e = first
          do
             n = n + 1
-            self%part(e) = n_part
             self%place(e) = n
-            e = self%next(e)
+            e = self%neighbour(next, e)
             if (e == 0 .or. e == first) exit
          end do
-         start(n_part + 1) = n + 1
+         self%start(p + 1) = n + 1
       end do
-      allocate(self%start(n_part + 1), source=start(:n_part + 1))
-      allocate(self%is_closed(n_part), source=is_closed(:n_part))
    end subroutine chain_number
 
    !> Steps along the chain from edge `a` to edge `b`, the shorter way around a closed part;
    !> huge(1) if they are in different parts.
    pure integer function chain_distance(self, a, b)
       type(chain_t), intent(in) :: self
-      integer, intent(in) :: a, b                !! edges, 1 to n_edge
+      integer, intent(in) :: a, b                !! edges, 1 to n_facet
 
       chain_distance = huge(1)
       associate (p => self%part(a))
@@ -180,42 +135,39 @@ contains
    !> Do edges `a` and `b` follow each other over a joint, whose nodes may be a little apart?
    pure logical function chain_is_seam(self, a, b) result(is_seam)
       type(chain_t), intent(in) :: self
-      integer, intent(in) :: a, b                !! edges, 1 to n_edge
+      integer, intent(in) :: a, b                !! edges, 1 to n_facet
 
       is_seam = .false.
-      if (self%next(a) == b) is_seam = self%edge(2, a) /= self%edge(1, b)
-      if (self%next(b) == a .and. .not. is_seam) is_seam = self%edge(2, b) /= self%edge(1, a)
+      if (self%neighbour(next, a) == b) is_seam = self%facet(2, a) /= self%facet(1, b)
+      if (self%neighbour(next, b) == a .and. .not. is_seam) is_seam &
+         = self%facet(2, b) /= self%facet(1, a)
    end function chain_is_seam
 
    !> Does edge `e` end or begin at `node`, or at a joint with it?
    pure logical function chain_touches(self, e, node) result(touches)
       type(chain_t), intent(in) :: self
-      integer, intent(in) :: e                   !! edge, 1 to n_edge
+      integer, intent(in) :: e                   !! edge, 1 to n_facet
       integer, intent(in) :: node                !! of the scene
 
-      touches = any(self%node(self%end_node(:, e)) == node) &
-         .or. any(self%duplicate(self%end_node(:, e)) == node)
+      touches = any(self%node(self%corner(:, e)) == node) &
+         .or. any(self%duplicate(self%corner(:, e)) == node)
    end function chain_touches
 
-   !> Thickness of the section at each node of the chain of `surface`, 1 where there is none or no
-   !> element. Between two sections that of the edge that begins at the node.
-   pure subroutine chain_thickness(self, scene, surface, thickness)
+   !> Thickness of the section at each node of the chain, 1 where there is none or no element.
+   !> Between two sections that of the edge that begins at the node.
+   pure subroutine chain_thickness(self, scene, thickness)
       type(chain_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
-      type(surface_t), intent(in) :: surface
       real(wp), allocatable, intent(out) :: thickness(:)   !! (size of `node`) [L]
-      integer, allocatable :: face(:)
       integer :: i, side
 
       allocate(thickness(size(self%node)), source=1.0_wp)
-      if (allocated(surface%edge) .or. surface%is_nodal) return
-      call faces_of_edges(scene, surface, face)
       do i = 1, size(self%node)
          do side = 1, 2
             associate (e => self%node_edge(side, i))
                if (e == 0) cycle
-               thickness(i) = scene%section(scene%element%section( &
-                  surface%element(face(e))))%thickness
+               if (self%element(e) == 0) cycle
+               thickness(i) = scene%section(scene%element%section(self%element(e)))%thickness
             end associate
          end do
       end do
@@ -234,7 +186,7 @@ contains
          do j = 1, 2
             e = self%node_edge(j, k)
             if (e == 0) cycle
-            a = from_to(x, u, self%edge(1, e), self%edge(2, e))
+            a = from_to(x, u, self%facet(1, e), self%facet(2, e))
             length(k) = length(k) + 0.5_wp*sqrt(dot_product(a, a))
          end do
       end do
@@ -243,14 +195,14 @@ contains
    !> At either end of edge `e` the shorter one of the two edges there, in the reference.
    pure function chain_shorter(self, e) result(length)
       type(chain_t), intent(in) :: self
-      integer, intent(in) :: e                   !! edge, 1 to n_edge
+      integer, intent(in) :: e                   !! edge, 1 to n_facet
       real(wp) :: length(2)
       integer :: side
 
-      length = self%length(e)
-      associate (beside => [self%previous(e), self%next(e)])
+      length = self%size(e)
+      associate (beside => self%neighbour(:, e))
          do side = 1, 2
-            if (beside(side) > 0) length(side) = min(length(side), self%length(beside(side)))
+            if (beside(side) > 0) length(side) = min(length(side), self%size(beside(side)))
          end do
       end associate
    end function chain_shorter
@@ -261,14 +213,14 @@ contains
       type(chain_t), intent(in) :: self
       real(wp), intent(in) :: x(:, :)            !! (2, n_node of the scene)
       real(wp), intent(in) :: angle              !! [degrees], 0..180
-      logical, intent(out) :: is_corner(:)       !! (n_edge)
+      logical, intent(out) :: is_corner(:)       !! (n_facet)
       real(wp) :: a(2), b(2), turn
       integer :: i
 
-      do i = 1, self%n_edge
-         is_corner(i) = self%previous(i) == 0
+      do i = 1, self%n_facet
+         is_corner(i) = self%neighbour(previous, i) == 0
          if (is_corner(i)) cycle
-         associate (before => self%edge(:, self%previous(i)), here => self%edge(:, i))
+         associate (before => self%facet(:, self%neighbour(previous, i)), here => self%facet(:, i))
             a = x(:, before(2)) - x(:, before(1))
             b = x(:, here(2)) - x(:, here(1))
          end associate
@@ -284,29 +236,30 @@ contains
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene)
       integer, intent(out) :: first, second      !! first < second
       type(box_tree_t) :: tree
-      real(wp), allocatable :: low(:, :), high(:, :), length(:)
+      real(wp), allocatable :: box(:, :, :)
+      real(wp) :: length(0:self%n_facet), reach
       integer, allocatable :: found(:)
-      real(wp) :: ends(2, 2), reach
       integer :: i, k, n
 
-      allocate(low(2, self%n_edge), high(2, self%n_edge), length(0:self%n_edge), found(0))
+      call search_boxes(x, u, self%facet, box)
+      allocate(found(0))
       length(0) = 0.0_wp
-      do i = 1, self%n_edge
-         ends = x(:, self%edge(:, i)) + u(:, self%edge(:, i))
-         low(:, i) = minval(ends, dim=2)
-         high(:, i) = maxval(ends, dim=2)
-         length(i) = norm2(ends(:, 2) - ends(:, 1))
+      do i = 1, self%n_facet
+         associate (way => (x(:, self%facet(2, i)) + u(:, self%facet(2, i))) &
+               - (x(:, self%facet(1, i)) + u(:, self%facet(1, i))))
+            length(i) = norm2(way)
+         end associate
       end do
-      call box_tree_init(tree, low, high)
-      do first = 1, self%n_edge
-         reach = touch_tol*max(length(first), length(self%previous(first)), &
-            length(self%next(first)))
+      call box_tree_init(tree, box(:, :, 1), box(:, :, 2))
+      do first = 1, self%n_facet
+         reach = touch_tol*max(length(first), length(self%neighbour(previous, first)), &
+            length(self%neighbour(next, first)))
          n = 0
-         call box_tree_find(tree, low(:, first), high(:, first), reach, found, n)
+         call box_tree_find(tree, box(:, first, 1), box(:, first, 2), reach, found, n)
          do k = 1, n
             second = found(k)
             if (second <= first) cycle
-            if (second == self%previous(first) .or. second == self%next(first)) cycle
+            if (any(self%neighbour(:, first) == second)) cycle
             if (is_crossing(self, x, u, first, second)) return
          end do
       end do
@@ -321,7 +274,7 @@ contains
       integer, intent(in) :: i, j
       real(wp) :: a(2), b(2), length_a, length_b, side(4)
 
-      associate (p => self%edge(:, i), q => self%edge(:, j))
+      associate (p => self%facet(:, i), q => self%facet(:, j))
          a = from_to(x, u, p(1), p(2))
          b = from_to(x, u, q(1), q(2))
          length_a = norm2(a)
@@ -350,25 +303,25 @@ contains
       integer :: q
 
       passes_at_node = .false.
-      if (self%next(e) == 0) return
-      q = self%edge(2, e)
-      e_arm(:, 1) = from_to(x, u, q, self%edge(1, e))
-      e_arm(:, 2) = from_to(x, u, q, self%edge(2, self%next(e)))
-      f_arm(:, 1) = from_to(x, u, q, self%edge(1, f))
-      f_arm(:, 2) = from_to(x, u, q, self%edge(2, f))
-      b = from_to(x, u, self%edge(1, f), self%edge(2, f))
+      if (self%neighbour(next, e) == 0) return
+      q = self%facet(2, e)
+      e_arm(:, 1) = from_to(x, u, q, self%facet(1, e))
+      e_arm(:, 2) = from_to(x, u, q, self%facet(2, self%neighbour(next, e)))
+      f_arm(:, 1) = from_to(x, u, q, self%facet(1, f))
+      f_arm(:, 2) = from_to(x, u, q, self%facet(2, f))
+      b = from_to(x, u, self%facet(1, f), self%facet(2, f))
       length = norm2(b)
       near = touch_tol*min(length, max(norm2(e_arm(:, 1)), norm2(e_arm(:, 2))))
       along = -dot_product(b, f_arm(:, 1))/length
       if (abs(cross(b, f_arm(:, 1)))/length > near) return
       if (along < -near .or. along > length + near) return
       if (along <= near) then
-         if (self%previous(f) == 0) return
-         f_arm(:, 1) = from_to(x, u, q, self%edge(1, self%previous(f)))
+         if (self%neighbour(previous, f) == 0) return
+         f_arm(:, 1) = from_to(x, u, q, self%facet(1, self%neighbour(previous, f)))
       end if
       if (along >= length - near) then
-         if (self%next(f) == 0) return
-         f_arm(:, 2) = from_to(x, u, q, self%edge(2, self%next(f)))
+         if (self%neighbour(next, f) == 0) return
+         f_arm(:, 2) = from_to(x, u, q, self%facet(2, self%neighbour(next, f)))
       end if
       passes_at_node = is_between(f_arm(:, 1), e_arm) .neqv. is_between(f_arm(:, 2), e_arm)
       if (runs_along(e_arm(:, 1), f_arm) .or. runs_along(e_arm(:, 2), f_arm)) then
@@ -418,4 +371,4 @@ contains
       cross = a(1)*b(2) - a(2)*b(1)
    end function cross
 
-end module emcon_chain
+end module emcon_chain_plane

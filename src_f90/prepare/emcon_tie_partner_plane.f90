@@ -3,9 +3,9 @@
 !>
 !> Slave points look along the averaged normals of mortar contact (docs/theory.md, section 4.5). A
 !> slave edge is cut where master nodes project to it, so that each of its points has one partner.
-module emcon_tie_partner
+module emcon_tie_partner_plane
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
-   use emcon_chain, only : chain_corners, chain_t
+   use emcon_chain_plane, only : chain_corners, chain_t
    use emcon_kinds, only : dp, wp
    use emcon_mortar_frame, only : frame_hit, frame_init, frame_project, frame_t, n_place, &
       pair_stencil_t
@@ -65,10 +65,10 @@ contains
       integer :: e, n_found, n_front, n
 
       associate (slave => self%slave, master => self%master)
-         allocate(self%is_corner(slave%n_edge), self%start(slave%n_edge + 1), found(0), front(0))
+         allocate(self%is_corner(slave%n_facet), self%start(slave%n_facet + 1), found(0), front(0))
          allocate(self%has_partner(size(slave%node)), source=.false.)
-         allocate(self%hole(slave%n_edge), source=0.0_wp)
-         allocate(self%edge(2*(slave%n_edge + master%n_edge)))
+         allocate(self%hole(slave%n_facet), source=0.0_wp)
+         allocate(self%edge(2*(slave%n_facet + master%n_facet)))
          allocate(self%ends(2, size(self%edge)))
          allocate(still(size(x, 1), size(x, 2)), source=0.0_wp)
          call chain_corners(slave, x, corner_angle, self%is_corner)
@@ -78,18 +78,18 @@ contains
          if (self%tolerance < 0.0_wp) share = sagitta + default_tolerance
          call master_tree(master, x, share, tree)
          n = 0
-         do e = 1, slave%n_edge
+         do e = 1, slave%n_facet
             self%start(e) = n + 1
-            reach = max(0.0_wp, self%tolerance) + share*slave%length(e) + self%noise
+            reach = max(0.0_wp, self%tolerance) + share*slave%size(e) + self%noise
             n_found = 0
-            associate (ends => x(:, slave%edge(:, e)))
+            associate (ends => x(:, slave%facet(:, e)))
                call box_tree_find(tree, minval(ends, 2), maxval(ends, 2), reach, found, n_found)
             end associate
             call face_edges(self, e, found(:n_found), x, still, front, n_front)
             call cut_edge(self, e, front(:n_front), n)
             if (n < self%start(e)) cycle
-            call see_node(self, front(:n_front), slave%edge(1, e), self%start(e), 0.0_wp, x)
-            call see_node(self, front(:n_front), slave%edge(2, e), n, 1.0_wp, x)
+            call see_node(self, front(:n_front), slave%facet(1, e), self%start(e), 0.0_wp, x)
+            call see_node(self, front(:n_front), slave%facet(2, e), n, 1.0_wp, x)
             self%edge(self%start(e):n) = front(self%edge(self%start(e):n))%edge
          end do
          self%start(e) = n + 1
@@ -103,13 +103,13 @@ contains
       real(wp), intent(in), contiguous :: x(:, :)
       real(wp), intent(in) :: share
       type(box_tree_t), intent(out) :: tree
-      real(wp) :: low(2, master%n_edge), high(2, master%n_edge)
+      real(wp) :: low(2, master%n_facet), high(2, master%n_facet)
       integer :: m
 
-      do m = 1, master%n_edge
-         associate (ends => x(:, master%edge(:, m)))
-            low(:, m) = minval(ends, 2) - share*master%length(m)
-            high(:, m) = maxval(ends, 2) + share*master%length(m)
+      do m = 1, master%n_facet
+         associate (ends => x(:, master%facet(:, m)))
+            low(:, m) = minval(ends, 2) - share*master%size(m)
+            high(:, m) = maxval(ends, 2) + share*master%size(m)
          end associate
       end do
       call box_tree_init(tree, low, high)
@@ -155,7 +155,7 @@ contains
             this%high = min(1.0_wp, frame_project(this%frame, 1))
             if (.not. this%high > this%low) cycle
             this%edge = m
-            longer = max(self%slave%length(e), self%master%length(m))
+            longer = max(self%slave%size(e), self%master%size(m))
             this%tolerance = self%noise &
                + merge(default_tolerance*longer, self%tolerance, self%tolerance < 0.0_wp)
             this%reach = this%tolerance + sagitta*longer
@@ -242,7 +242,7 @@ contains
 
       before = 0
       if (n_segment >= self%start(e)) before = self%edge(n_segment)
-      length = (high - low)*self%slave%length(e)
+      length = (high - low)*self%slave%size(e)
       tolerance = 0.0_wp
       if (before > 0) tolerance = front(before)%tolerance
       if (after > 0) tolerance = max(tolerance, front(after)%tolerance)
@@ -288,7 +288,7 @@ contains
       associate (this => front(self%edge(segment)))
          call frame_hit(this%frame, polygon, xi, eta, gap)
          eta = max(0.0_wp, min(1.0_wp, eta))
-         associate (ends => self%master%edge(:, this%edge))
+         associate (ends => self%master%facet(:, this%edge))
             way = (x(:, ends(1)) - x(:, node)) + eta*(x(:, ends(2)) - x(:, ends(1)))
          end associate
          if (dot_product(way, way) > this%tolerance**2) return
@@ -297,4 +297,4 @@ contains
       self%has_partner(k) = .true.
    end subroutine see_node
 
-end module emcon_tie_partner
+end module emcon_tie_partner_plane

@@ -4,20 +4,20 @@
 !> not the equilibrium of a constant stress: the multipliers that balance the slave side leave a
 !> residual at the master nodes. `tie_balance` changes the integrals M, D stands, by the least
 !> that removes it: row sums stay, slave nodes follow from D X_s = M X_m, and D^T L = s_s,
-!> M^T L = s_g hold to round-off (emcon_tie_balance_data). Newton's method on M, X_s and L; where
-!> the residual is round-off from the start, as on straight interfaces, nothing is touched. All of
-!> it in double precision at least; the rows are rounded at the end.
+!> M^T L = s_g hold to round-off (emcon_tie_balance_data_plane). Newton's method on M, X_s and L;
+!> where the residual is round-off from the start, as on straight interfaces, nothing is touched.
+!> All of it in double precision at least; the rows are rounded at the end.
 !>
 !> The ends of an open slave chain should have no row, and lie on the master chain: the multipliers
 !> of the chain end belong to their neighbours then. An end with a row keeps equilibrium only by
 !> large entries. At a corner of several ties each tie is in equilibrium by itself.
-module emcon_tie_balance
+module emcon_tie_balance_plane
    use emcon_couplings, only : tie_rows_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, hp, wp
-   use emcon_tie_balance_data, only : tie_balance_free, tie_balance_init, tie_balance_residual, &
-      tie_balance_t
-   use emcon_tie_balance_step, only : balance_step_do, balance_step_init, balance_step_t
+   use emcon_tie_balance_data_plane, only : tie_balance_free, tie_balance_init, &
+      tie_balance_residual, tie_balance_t
+   use emcon_tie_balance_step_plane, only : balance_step_do, balance_step_init, balance_step_t
    implicit none
    private
    public :: tie_balance_report_t, tie_balance, tie_is_balanced
@@ -232,4 +232,4 @@ contains
       rows%weight = weight(:n)
    end subroutine rebuild_rows
 
-end module emcon_tie_balance
+end module emcon_tie_balance_plane

@@ -5,13 +5,14 @@
 !> with one constraint: two would nearly depend on each other, as the one node follows the other.
 !> Edges keep their own nodes: what acts on an edge acts on its element.
 !> Source: docs/theory.md, section 4.
-module emcon_seams
-   use emcon_chain, only : chain_number, chain_t, surface_edges
+module emcon_seams_plane
+   use emcon_chain_plane, only : chain_number, chain_t, next, previous
    use emcon_couplings, only : tie_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
-   use emcon_sort, only : find_sorted, unique_sorted
+   use emcon_sort, only : find_sorted
+   use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
    public :: chain_join
@@ -112,15 +113,9 @@ contains
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
       integer, allocatable, intent(out) :: node(:)
-      integer, allocatable :: edge(:, :)
       integer :: i, k, n
 
-      if (surface%is_nodal) then
-         node = unique_sorted(surface%node)
-      else
-         call surface_edges(scene, surface, edge)
-         node = unique_sorted(reshape(edge, [size(edge)]))
-      end if
+      call surface_nodes(scene, surface, node)
       n = 0
       do i = 1, size(node)
          k = find_sorted(chain%node, node(i))
@@ -141,7 +136,7 @@ contains
       real(wp) :: way(2), edge, most
 
       associate (before => chain%node_edge(1, last), after => chain%node_edge(2, first))
-         edge = max(chain%length(before), chain%length(after))
+         edge = max(chain%size(before), chain%size(after))
          most = near*edge
          if (tolerance >= 0.0_wp) most = min(tolerance, farthest*edge)
          way = x(:, chain%node(first)) - x(:, chain%node(last))
@@ -161,8 +156,8 @@ contains
       do k = 1, size(seam, 2)
          associate (at => chain%node_edge(:, seam(1, k)))
             at = max(at, chain%node_edge(:, seam(2, k)))
-            chain%next(at(1)) = at(2)
-            chain%previous(at(2)) = at(1)
+            chain%neighbour(next, at(1)) = at(2)
+            chain%neighbour(previous, at(2)) = at(1)
          end associate
          chain%duplicate(seam(1, k)) = chain%node(seam(2, k))
       end do
@@ -171,12 +166,11 @@ contains
          number(k) = number(k - 1) + merge(1, 0, stays(k))
       end do
       number(seam(2, :)) = number(seam(1, :))
-      do e = 1, chain%n_edge
-         chain%end_node(:, e) = number(chain%end_node(:, e))
+      do e = 1, chain%n_facet
+         chain%corner(:, e) = number(chain%corner(:, e))
       end do
-      chain%node_edge = chain%node_edge(:, pack([(k, k = 1, size(number))], stays))
       chain%duplicate = pack(chain%duplicate, stays)
       chain%node = pack(chain%node, stays)
    end subroutine merge_nodes
 
-end module emcon_seams
+end module emcon_seams_plane

@@ -8,13 +8,13 @@
 !> per master node where the chains are straight, as then nothing acts across them. Forces are taken
 !> along and across the chain, conditions without effect are left out, and a small negative
 !> diagonal at the forces stands for the rest.
-module emcon_tie_balance_step
+module emcon_tie_balance_step_plane
    use emcon_band_blocks, only : band_blocks_factorise, band_blocks_init, band_blocks_place, &
       band_blocks_solve, band_blocks_t
    use emcon_kinds, only : dp, hp, wp
    use emcon_power_scaling, only : power_of_two
-   use emcon_tie_balance_data, only : tie_balance_t
-   use emcon_tie_balance_order, only : balance_order
+   use emcon_tie_balance_data_plane, only : tie_balance_t
+   use emcon_tie_balance_order_plane, only : balance_order
    implicit none
    private
    public :: balance_step_t, balance_step_init, balance_step_do
@@ -358,4 +358,4 @@ contains
       call band_blocks_init(self%band, [0, size(self%rank)], [width], [width])
    end subroutine find_order
 
-end module emcon_tie_balance_step
+end module emcon_tie_balance_step_plane

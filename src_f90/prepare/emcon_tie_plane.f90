@@ -4,8 +4,8 @@
 !> D_AB = int psi_A N_B dA over slave nodes, M_AC = int psi_A N_C dA over master nodes, with the
 !> standard (psi = N) or the dual multiplier basis of each slave node. Source: docs/theory.md,
 !> eqs. (15b) and (27).
-module emcon_tie
-   use emcon_chain, only : chain_init, chain_t
+module emcon_tie_plane
+   use emcon_chain_plane, only : chain_init, chain_t
    use emcon_couplings, only : tie_rows_t, tie_t
    use emcon_errors, only : error_t
    use emcon_gauss, only : gauss_points
@@ -14,9 +14,10 @@ module emcon_tie
    use emcon_mortar_frame, only : frame_hit, frame_t
    use emcon_scene, only : scene_t
    use emcon_sort, only : find_sorted, sort_order
-   use emcon_tie_check, only : tie_check_partners, tie_check_surfaces
-   use emcon_tie_cover, only : tie_cover_find
-   use emcon_tie_partner, only : polygon, tie_partners_find, tie_partners_frame, tie_partners_t
+   use emcon_tie_check_plane, only : tie_check_partners, tie_check_surfaces
+   use emcon_tie_cover_plane, only : tie_cover_find
+   use emcon_tie_partner_plane, only : polygon, tie_partners_find, tie_partners_frame, &
+      tie_partners_t
    implicit none
    private
    public :: tie_measure
@@ -72,7 +73,7 @@ contains
       call gauss_points(point, weight)
       allocate(still(size(x, 1), size(x, 2)), source=0.0_wp)
       allocate(moment(2, 2, partners%start(size(partners%start)) - 1), source=0.0_wp)
-      do e = 1, partners%slave%n_edge
+      do e = 1, partners%slave%n_facet
          do k = partners%start(e), partners%start(e + 1) - 1
             call tie_partners_frame(partners, e, partners%edge(k), x, still, frame)
             associate (low => partners%ends(1, k), high => partners%ends(2, k))
@@ -95,9 +96,9 @@ contains
    pure subroutine order_rows(slave, rows)
       type(chain_t), intent(in) :: slave
       type(tie_rows_t), intent(inout) :: rows
-      integer :: edge_at(slave%n_edge), p, i, first, n
+      integer :: edge_at(slave%n_facet), p, i, first, n
 
-      do i = 1, slave%n_edge
+      do i = 1, slave%n_facet
          edge_at(slave%place(i)) = i
       end do
       allocate(rows%slave(size(slave%node)))
@@ -107,11 +108,11 @@ contains
          first = n + 1
          do i = slave%start(p), slave%start(p + 1) - 1
             n = n + 1
-            rows%slave(n) = slave%edge(1, edge_at(i))
+            rows%slave(n) = slave%facet(1, edge_at(i))
          end do
          if (.not. slave%is_closed(p)) then
             n = n + 1
-            rows%slave(n) = slave%edge(2, edge_at(slave%start(p + 1) - 1))
+            rows%slave(n) = slave%facet(2, edge_at(slave%start(p + 1) - 1))
          end if
          do i = first, n
             if (i > first) rows%neighbour(1, i) = i - 1
@@ -167,11 +168,11 @@ contains
          do side = 1, 2
             e = beside(side)
             if (e == 0) cycle
-            rows%size(k) = rows%size(k) + 0.5_wp*slave%length(e)
+            rows%size(k) = rows%size(k) + 0.5_wp*slave%size(e)
             if (is_dual) cycle
             n = n + 1
-            rows%node(n) = slave%edge(side, e)
-            rows%weight(n) = slave%length(e)/6.0_wp
+            rows%node(n) = slave%facet(side, e)
+            rows%weight(n) = slave%size(e)/6.0_wp
          end do
       end associate
       call add_masters(partners, moment, beside, rounding*rows%size(k), rows, n)
@@ -204,7 +205,7 @@ contains
       do side = 1, 2
          if (beside(side) == 0) cycle
          do s = partners%start(beside(side)), partners%start(beside(side) + 1) - 1
-            node(m + 1:m + 2) = partners%master%edge(:, partners%edge(s))
+            node(m + 1:m + 2) = partners%master%facet(:, partners%edge(s))
             weight(m + 1:m + 2) = moment(:, 3 - side, s)
             m = m + 2
          end do
@@ -225,4 +226,4 @@ contains
       end do
    end subroutine add_masters
 
-end module emcon_tie
+end module emcon_tie_plane

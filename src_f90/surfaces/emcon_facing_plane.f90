@@ -3,8 +3,8 @@
 !> A node rests on an edge where the edge's normal is opposite to one between the normals of the two
 !> edges at the node. At a corner that meets a corner this tells the faces that bear from those
 !> that slide past each other. Source: docs/theory.md, section 4.2.
-module emcon_facing
-   use emcon_chain, only : chain_t
+module emcon_facing_plane
+   use emcon_chain_plane, only : chain_t
    use emcon_kinds, only : wp
    implicit none
    private
@@ -29,8 +29,8 @@ contains
       allows = .true.
       if (any(chain%node_edge(:, k) == 0)) return
       along = -direction(x, u, edge)
-      before = direction(x, u, chain%edge(:, chain%node_edge(1, k)))
-      after = direction(x, u, chain%edge(:, chain%node_edge(2, k)))
+      before = direction(x, u, chain%facet(:, chain%node_edge(1, k)))
+      after = direction(x, u, chain%facet(:, chain%node_edge(2, k)))
       allows = dot_product(along, before) >= least_cosine .or. &
          dot_product(along, after) >= least_cosine
       if (allows) return
@@ -55,4 +55,4 @@ contains
       cross = a(1)*b(2) - a(2)*b(1)
    end function cross
 
-end module emcon_facing
+end module emcon_facing_plane

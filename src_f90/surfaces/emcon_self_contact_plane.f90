@@ -2,8 +2,8 @@
 !>
 !> Of two edges that meet, the one that comes first along the surface is the slave, or both are.
 !> Source: docs/theory.md, section 4.
-module emcon_self_contact
-   use emcon_chain, only : chain_distance, chain_t
+module emcon_self_contact_plane
+   use emcon_chain_plane, only : chain_distance, chain_t
    use emcon_kinds, only : wp
    implicit none
    private
@@ -49,7 +49,7 @@ contains
       integer :: n, side
 
       mean = mean_along(chain, k, x, u)
-      a = way(x, u, chain%edge(:, e))
+      a = way(x, u, chain%facet(:, e))
       may_touch = faces(mean, a)
       if (.not. may_touch) return
       length = 0.0_wp
@@ -57,11 +57,11 @@ contains
       do side = 1, 2
          associate (own => chain%node_edge(side, k))
             if (own == 0) cycle
-            length = length + norm2(way(x, u, chain%edge(:, own)))
+            length = length + norm2(way(x, u, chain%facet(:, own)))
             n = n + 1
          end associate
       end do
-      b = way(x, u, [chain%edge(1, e), chain%node(k)])
+      b = way(x, u, [chain%facet(1, e), chain%node(k)])
       b = b - max(0.0_wp, min(1.0_wp, dot_product(b, a)/dot_product(a, a)))*a
       distance = norm2(b)
       if (distance*real(n, wp) <= deepest*length) return
@@ -113,7 +113,7 @@ contains
       do side = 1, 2
          associate (own => chain%node_edge(side, k))
             if (own == 0) cycle
-            a = way(x, u, chain%edge(:, own))
+            a = way(x, u, chain%facet(:, own))
             mean = mean + a/norm2(a)
          end associate
       end do
@@ -134,4 +134,4 @@ contains
       way = (x(:, node(2)) - x(:, node(1))) + (u(:, node(2)) - u(:, node(1)))
    end function way
 
-end module emcon_self_contact
+end module emcon_self_contact_plane

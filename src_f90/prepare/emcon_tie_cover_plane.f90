@@ -2,18 +2,18 @@
 !>
 !> Master edges that are covered as a whole touch nothing any more; where the slave surface ends on
 !> an edge the rest of that is free. Source: docs/theory.md, section 11.1.
-module emcon_tie_cover
+module emcon_tie_cover_plane
    use emcon_couplings, only : tie_rows_t
    use emcon_kinds, only : wp
    use emcon_mortar_frame, only : frame_hit, frame_t
-   use emcon_tie_partner, only : polygon, tie_partners_frame, tie_partners_t
+   use emcon_tie_partner_plane, only : polygon, tie_partners_frame, tie_partners_t
    implicit none
    private
    public :: tie_cover_find
 
    !> A free part at the end of an edge is bridged by a joint of the outlines up to this fraction
-   !> of it, or up to the position tolerance (`emcon_seams`); a slave that reaches less far over a
-   !> node ends there.
+   !> of it, or up to the position tolerance (`emcon_seams_plane`); a slave that reaches less far
+   !> over a node ends there.
    real(wp), parameter :: near = 0.1_wp
    !> Nothing is left free within this fraction of an edge: far above the rounding of coordinates.
    real(wp), parameter :: rounding = 1.0e-3_wp
@@ -30,14 +30,14 @@ contains
       integer :: m
 
       call measure(partners, x, share, reach)
-      associate (n => partners%master%n_edge)
+      associate (n => partners%master%n_facet)
          allocate(is_covered(n))
          do m = 1, n
             is_covered(m) = leaves_nothing(partners, m, share(m), reach(:, m))
          end do
          if (allocated(rows%covered)) deallocate(rows%covered)
-         allocate(rows%covered(size(partners%master%edge, 1), count(is_covered)))
-         rows%covered = partners%master%edge(:, pack([(m, m = 1, n)], is_covered))
+         allocate(rows%covered(size(partners%master%facet, 1), count(is_covered)))
+         rows%covered = partners%master%facet(:, pack([(m, m = 1, n)], is_covered))
       end associate
       call find_buried(partners, share, reach, rows%buried)
       call find_ends(partners, rows%ending)
@@ -55,11 +55,11 @@ contains
       integer :: e, k, i
 
       still = 0.0_wp
-      allocate(share(partners%master%n_edge), source=0.0_wp)
+      allocate(share(partners%master%n_facet), source=0.0_wp)
       allocate(reach(2, size(share)))
       reach(1, :) = 1.0_wp
       reach(2, :) = 0.0_wp
-      do e = 1, partners%slave%n_edge
+      do e = 1, partners%slave%n_facet
          do k = partners%start(e), partners%start(e + 1) - 1
             call tie_partners_frame(partners, e, partners%edge(k), x, still, frame)
             do i = 1, 2
@@ -83,7 +83,7 @@ contains
       real(wp) :: bridged
 
       bridged = near
-      associate (length => partners%master%length(m))
+      associate (length => partners%master%size(m))
          if (partners%tolerance >= 0.0_wp) bridged = max(rounding, &
             min(near, partners%tolerance/length))
       end associate
@@ -119,17 +119,17 @@ contains
       integer :: e, n, side, segment
 
       associate (slave => partners%slave, master => partners%master)
-         allocate(ending(3, count(slave%previous == 0) + count(slave%next == 0)))
+         allocate(ending(3, count(slave%neighbour == 0)))
          n = 0
-         do e = 1, slave%n_edge
+         do e = 1, slave%n_facet
             do side = 1, 2
-               if (merge(slave%previous(e), slave%next(e), side == 1) > 0) cycle
+               if (slave%neighbour(side, e) > 0) cycle
                segment = merge(partners%start(e), partners%start(e + 1) - 1, side == 1)
                n = n + 1
-               ending(:, n) = [slave%edge(side, e), master%edge(:, partners%edge(segment))]
+               ending(:, n) = [slave%facet(side, e), master%facet(:, partners%edge(segment))]
             end do
          end do
       end associate
    end subroutine find_ends
 
-end module emcon_tie_cover
+end module emcon_tie_cover_plane

@@ -1,0 +1,98 @@
+!> Do pieces of a mesh overlap where they are? What is asked, whatever the dimension is.
+!>
+!> Pieces are placed, then looked at one way: what of one is inside the other. Source:
+!> docs/theory.md, section 4.11.
+module emcon_overlap_query
+   use emcon_element_kind, only : max_face_nodes
+   use emcon_interactions, only : contact_options_t
+   use emcon_kinds, only : wp
+   use emcon_outline, only : outline_t
+   use emcon_scene, only : scene_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: overlap_t, overlap_names, overlap_query_t, overlap_text
+
+   !> The deepest overlap that was found.
+   type :: overlap_t
+      real(wp) :: depth = 0.0_wp                 !! per length of the facet; 0: none
+      real(wp) :: length = 0.0_wp                !! of the facet [L]
+      integer :: node = 0                        !! that is behind, or the nearest on its facet
+      integer :: facet(max_face_nodes) = 0       !! nodes of the facet that it is behind; 0: no more
+      !> The deepest one of facets as they are, where they stand for curves.
+      real(wp) :: of_facets = 0.0_wp
+   end type overlap_t
+
+   type, abstract :: overlap_query_t
+      type(outline_t) :: outline
+      logical :: is_passing = .false.            !! it is on the way, not at the end of a step
+   contains
+      procedure(begin_interface), deferred :: begin
+      procedure(longest_interface), deferred :: longest
+      procedure(place_interface), deferred :: place
+      procedure(overlap_interface), deferred :: overlap
+   end type overlap_query_t
+
+   abstract interface
+      !> Begin a step with the options `options` of contact: what facets stand for.
+      subroutine begin_interface(self, scene, options)
+         import :: contact_options_t, overlap_query_t, scene_t
+         class(overlap_query_t), intent(inout) :: self
+         type(scene_t), intent(in) :: scene
+         type(contact_options_t), intent(in) :: options
+      end subroutine begin_interface
+
+      !> The longest facet of piece `p` at x + u [L].
+      pure real(wp) function longest_interface(self, p, x, u)
+         import :: overlap_query_t, wp
+         class(overlap_query_t), intent(in) :: self
+         integer, intent(in) :: p                !! 1..n_piece
+         real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+      end function longest_interface
+
+      !> Place piece `p`.
+      pure subroutine place_interface(self, p, x, u0, du, share)
+         import :: overlap_query_t, wp
+         class(overlap_query_t), intent(inout) :: self
+         integer, intent(in) :: p                !! 1..n_piece
+         real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+         real(wp), intent(in) :: share           !! of the step that lies behind, 0 to 1
+      end subroutine place_interface
+
+      !> What of piece `p` is inside piece `q`, both placed; the same one: in itself.
+      subroutine overlap_interface(self, p, q, x, reach, overlap)
+         import :: overlap_query_t, overlap_t, wp
+         class(overlap_query_t), intent(inout) :: self
+         integer, intent(in) :: p, q             !! 1..n_piece
+         real(wp), intent(in), contiguous :: x(:, :)      !! (n_dim, n_node) [L]
+         real(wp), intent(in) :: reach           !! length of the longest facet of both [L]
+         type(overlap_t), intent(inout) :: overlap        !! the deepest so far
+      end subroutine overlap_interface
+   end interface
+
+contains
+
+   !> Does the overlap stand on `node`?
+   elemental logical function overlap_names(self, node)
+      type(overlap_t), intent(in) :: self
+      integer, intent(in) :: node                !! of the scene
+
+      overlap_names = node == self%node .or. any(node == self%facet)
+   end function overlap_names
+
+   !> The bodies and nodes of an overlap, and how deep it is as a length.
+   subroutine overlap_text(self, label, body, text)
+      type(overlap_t), intent(in) :: self
+      integer, intent(in) :: label(:), body(:)   !! (n_node) the user's numbers, bodies from 1
+      character(len=:), allocatable, intent(out) :: text   !! one line
+
+      associate (facet => self%facet)
+         text = "node " // to_text(label(self%node)) // " of body " // &
+            to_text(body(self%node)) // " is " // to_text(self%depth*self%length, 3) // &
+            " behind the edge from node " // &
+            to_text(label(facet(1))) // " to " // to_text(label(facet(2))) // " of body " // &
+            to_text(body(facet(1)))
+      end associate
+   end subroutine overlap_text
+
+end module emcon_overlap_query
