@@ -47,6 +47,9 @@ COLUMNS = 100
 #: A procedure fits a screen, and its arguments a line; but what C hands over one by one.
 MOST_LINES, MOST_ARGUMENTS = 60, 7
 FROM_C = {"stepper", "border"}
+#: A type is taken in at a glance; these hold more than one subject and are still to be split.
+MOST_COMPONENTS = 20
+STILL_BIG = {"active_set_t", "contact_t", "constraint_set_t"}
 
 STRING = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'")
 COMMENT = re.compile(r"!.*")
@@ -229,6 +232,29 @@ def long_procedures(root):
                 yield f"{path.relative_to(root)}:{start}: {name}, {lines} lines, {count} arguments"
 
 
+def components(path):
+    """(first line, name, components) of each type, its parents' own aside."""
+    start, name, count = 0, "", 0
+    for number, code, _ in house_counts.statements(path):
+        low = code.lower()
+        if head := re.match(r"type\b(?!\s*\(|\s+is\b)[^:]*(?:::)?\s*\b(\w+)$", low):
+            start, name, count = number, head[1], 0
+        elif name and re.match(r"contains$|end\s*type\b", low):
+            yield start, name, count
+            name = ""
+        elif name and "::" in low:
+            declared = house_counts.without_brackets(low.split("::", 1)[1])
+            count += len([part for part in declared.split(",") if part.strip()])
+
+
+def big_types(root):
+    """Types of more components than a reader keeps in mind."""
+    for path in sources(root):
+        for number, name, count in components(path):
+            if count > MOST_COMPONENTS and name not in STILL_BIG:
+                yield f"{path.relative_to(root)}:{number}: {name}, {count} components"
+
+
 def top_level(root):
     """Entries at the top that the house does not know; ignored files do not count."""
     listed = subprocess.run(
@@ -316,6 +342,7 @@ CHECKS = {
     "simd": plain_simd,
     "long lines": long_lines,
     "long procedures": long_procedures,
+    "big types": big_types,
     "top level": top_level,
     "hidden": hidden,
 }
@@ -468,6 +495,10 @@ BAD = {
     "long procedures, arguments": {
         "base/emcon_a.f90": "module emcon_a\ncontains\n   pure subroutine f(a, b, c, d, &\n"
         "         e, f, g, h)\n   end subroutine f\nend module\n"
+    },
+    "big types": {
+        "base/emcon_a.f90": "module emcon_a\n   type, public :: a_t\n" + "      real :: a(2), b = f(1, 2)\n"*10
+        + "      type(a_t), pointer :: next => null()\n   end type a_t\nend module\n"
     },
     "stop": {"march/emcon_a.f90": "module emcon_a\n   if (x > 0) error stop 'no'\nend module\n"},
     "stop, exit": {"stepper/emcon_a.f90": "module emcon_a\n   call exit(1)\nend module emcon_a\n"},

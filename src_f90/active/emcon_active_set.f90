@@ -102,7 +102,7 @@ contains
 
       self%has_impacts = step_is_dynamic(step)
       self%pushes_out = .not. self%has_impacts
-      self%gap_tolerance = step%gap_tolerance
+      self%gap_tolerance = step%contact%gap_tolerance
    end subroutine active_set_suit
 
    !> Set up for the constraints of `system`.

@@ -112,7 +112,7 @@ contains
       logical, intent(out) :: has_narrowed       !! less is active
       real(wp) :: depth(self%set%n)              ! of contacts that have closed, by the edge
       integer, dimension(self%set%n) :: low, high   ! bodies; 0: not rigid, or it acted before
-      integer :: body(size(scene%node_label)), i, k, pair
+      integer :: body(size(scene%node%label)), i, k, pair
       logical :: is_like(self%set%n)
 
       has_narrowed = .false.

@@ -32,7 +32,7 @@ contains
                if (.not. contact%state(i)%gap1 < -touch_tol*contact%state(i)%size) cycle
                if (.not. is_bound(system%space%numbering, contact%node(i))) cycle
                if (.not. surface_is_bound(system, scene, pair%master)) cycle
-               text = "slave node " // to_text(scene%node_label(contact%node(i))) // &
+               text = "slave node " // to_text(scene%node%label(contact%node(i))) // &
                   " of surface " // scene%surface(pair%slave)%name // " is " // &
                   to_text(-contact%state(i)%gap1, 3) // " behind surface " // &
                   scene%surface(pair%master)%name // &

@@ -75,7 +75,7 @@ contains
       type(free_t), allocatable :: free(:)
 
       associate (step => scene%step(system%i_step))
-         self%tolerance = step%newton_tolerance
+         self%tolerance = step%solution%newton_tolerance
          self%stabilizes = step%stabilizes
          call mechanism_rows_find(system, step%prescribed, self%supports)
       end associate

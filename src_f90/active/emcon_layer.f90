@@ -92,26 +92,26 @@ contains
       type(layer_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       integer, allocatable :: e(:)
-      logical :: is_in(size(scene%element_kind))
+      logical :: is_in(size(scene%element%kind))
       integer :: i
 
       do i = 1, size(is_in)
-         associate (node => scene%element_node(:, i))
+         associate (node => scene%element%node(:, i))
             is_in(i) = any(self%is_massless(pack(node, node > 0)))
          end associate
       end do
       e = pack([(i, i = 1, size(is_in))], is_in)
       self%scene = scene
-      self%scene%element_label = scene%element_label(e)
-      self%scene%element_origin = scene%element_origin(e)
-      self%scene%element_kind = scene%element_kind(e)
-      self%scene%element_node = scene%element_node(:, e)
-      self%scene%element_section = scene%element_section(e)
+      self%scene%element%label = scene%element%label(e)
+      self%scene%element%origin = scene%element%origin(e)
+      self%scene%element%kind = scene%element%kind(e)
+      self%scene%element%node = scene%element%node(:, e)
+      self%scene%element%section = scene%element%section(e)
       associate (own => self%scene)
-         deallocate(own%tie, own%equation, own%rigid, own%pair, own%surface, own%element_set, &
+         deallocate(own%tie, own%equation, own%rigid, own%pair, own%surface, own%set%element, &
             own%step)
          allocate(own%tie(0), own%equation(0), own%rigid(0), own%pair(0), own%surface(0), &
-            own%element_set(0), own%step(1))
+            own%set%element(0), own%step(1))
          allocate(own%step(1)%load(0))
          if (allocated(own%guard)) deallocate(own%guard)
       end associate
@@ -128,9 +128,9 @@ contains
       associate (own => self%scene%step(1))
          own = step
          own%scheme = scheme_row("STATIC", "")
-         own%initiation = initiation_admissible
-         own%constraint_method = method_saddle_point
-         own%resolves_overclosure = .false.
+         own%contact%initiation = initiation_admissible
+         own%contact%method = method_saddle_point
+         own%contact%resolves_overclosure = .false.
          own%stabilizes = .false.
          call hold_massive(self, model%space%numbering%unknown, own%prescribed)
          own%load = loads_of(self)
@@ -138,8 +138,8 @@ contains
       call system_begin_step(self%system, self%scene, 1, error)
       if (allocated(error)) return
       call newton_init(self%newton, self%system%space%numbering%n_unknown, self%scene%x, &
-         step%newton_tolerance, step%newton_maximum)
-      call correction_reset(self%newton%correction, method_saddle_point, step%solver)
+         step%solution%newton_tolerance, step%solution%newton_maximum)
+      call correction_reset(self%newton%correction, method_saddle_point, step%solution%solver)
       do i = 1, size(self%system%contact)
          if (allocated(self%system%contact(i)%contact)) deallocate(self%system%contact(i)%contact)
          allocate(self%system%contact(i)%contact, source=model%contact(i)%contact)

@@ -48,8 +48,8 @@ contains
       real(wp) :: inner(size(scene%x, 2)), mass(size(scene%x, 2))
       integer :: k
 
-      self%augments = step%constraint_method == method_augmented_lagrange
-      self%is_on = (self%augments .or. step%constraint_method == method_penalty) .and. &
+      self%augments = step%contact%method == method_augmented_lagrange
+      self%is_on = (self%augments .or. step%contact%method == method_penalty) .and. &
          size(system%contact) > 0
       self%is_at_ends = self%is_on .and. step%scheme%is_explicit
       do k = 1, size(system%contact)
@@ -57,11 +57,11 @@ contains
          system%contact(k)%contact%step%gives_way = .false.
       end do
       if (.not. self%is_on) return
-      self%tolerance = step%softness%tolerance
+      self%tolerance = step%contact%softness%tolerance
       if (allocated(system%contact_law) .and. .not. self%augments) then
          allocate(self%law, source=system%contact_law)
       else
-         call contact_law_of_method(step%constraint_method, self%law)
+         call contact_law_of_method(step%contact%method, self%law)
       end if
       allocate(self%closure(system%n_constraint), source=1.0_wp)
       allocate(self%stiffness(system%n_constraint), self%area(system%n_constraint), &
@@ -73,7 +73,7 @@ contains
       mass = 0.0_wp
       if (self%augments .and. step_is_dynamic(step)) call terms_mass_rows(system%term, &
          mass)
-      inner = inner + 2.0_wp*mass/step%h**2
+      inner = inner + 2.0_wp*mass/step%time%h**2
       do k = 1, size(system%contact)
          call set_contact(self, system, scene, step, k, inner, error)
          if (allocated(error)) return
@@ -93,13 +93,14 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: area(system%contact(k)%contact%n_constraint), by_area, factor
 
-      factor = step%softness%factor
+      factor = step%contact%softness%factor
       if (self%augments) factor = augmented_factor*factor
       associate (contact => system%contact(k)%contact, before => system%first_constraint(k), &
-            given => step%softness%stiffness)
+            given => step%contact%softness%stiffness)
          call contact%own_area(scene%x, area)
          if (.not. sum(area) > 0.0_wp) then
-            call raise(error, err_input, where_text(scene, step%softness%origin) // ": error: " &
+            call raise(error, err_input, where_text(scene, step%contact%softness%origin) &
+               // ": error: " &
                // "*CONSTRAINT METHOD: a slave surface made of nodes has no area to give way " // &
                "by; name its elements and faces, or use TYPE=NULL SPACE")
             return
@@ -108,7 +109,8 @@ contains
          if (.not. given > 0.0_wp) by_area = factor*sum(inner(contact%node))/sum(area)
          if (.not. by_area > 0.0_wp) by_area = factor*of_opposite(system, k, inner)/sum(area)
          if (.not. by_area > 0.0_wp) then
-            call raise(error, err_input, where_text(scene, step%softness%origin) // ": error: " &
+            call raise(error, err_input, where_text(scene, step%contact%softness%origin) &
+               // ": error: " &
                // "*CONSTRAINT METHOD: no elastic element stands on either surface of a contact " &
                // "pair: give its STIFFNESS, pressure by penetration")
             return

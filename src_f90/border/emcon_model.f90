@@ -135,7 +135,7 @@ contains
 
       associate (scene => model%stepper%scene)
          sizes%n_node = size(scene%x, 2)
-         sizes%n_element = size(scene%element_label)
+         sizes%n_element = size(scene%element%label)
          sizes%n_step = size(scene%step)
          sizes%n_surface = size(scene%surface)
          sizes%n_tie = size(scene%tie)

@@ -21,14 +21,14 @@ contains
       integer :: e, n
 
       associate (scene => model%stepper%scene)
-         allocate(label, source=scene%element_label)
+         allocate(label, source=scene%element%label)
          allocate(kind(size(label)), node(most_nodes, size(label)))
          node = 0
          do e = 1, size(label)
-            associate (of => scene%kind(scene%element_kind(e)))
+            associate (of => scene%element%kinds(scene%element%kind(e)))
                kind(e) = of%vtk_type
                n = min(of%n_vtk, most_nodes)
-               node(:n, e) = scene%element_node(:n, e)
+               node(:n, e) = scene%element%node(:n, e)
             end associate
          end do
       end associate
@@ -42,14 +42,14 @@ contains
       integer :: k
 
       associate (scene => model%stepper%scene)
-         allocate(is_in(size(scene%element_label)), source=.false.)
-         do k = 1, size(scene%element_set)
-            if (scene%element_set(k)%name == to_upper(name)) exit
+         allocate(is_in(size(scene%element%label)), source=.false.)
+         do k = 1, size(scene%set%element)
+            if (scene%set%element(k)%name == to_upper(name)) exit
          end do
-         if (k > size(scene%element_set)) then
+         if (k > size(scene%set%element)) then
             call raise(error, err_input, "there is no element set " // name)
          else
-            is_in(scene%element_set(k)%item) = .true.
+            is_in(scene%set%element(k)%item) = .true.
          end if
       end associate
    end subroutine model_find_elements
@@ -62,7 +62,7 @@ contains
       integer :: i, k
 
       associate (scene => model%stepper%scene)
-         allocate(is_in(most_faces, size(scene%element_label)), source=.false.)
+         allocate(is_in(most_faces, size(scene%element%label)), source=.false.)
          do k = 1, size(scene%surface)
             if (to_upper(scene%surface(k)%name) == to_upper(name)) exit
          end do
@@ -85,8 +85,8 @@ contains
 
       text = ""
       associate (scene => model%stepper%scene)
-         call add_sets("node set ", scene%node_set, text)
-         call add_sets("element set ", scene%element_set, text)
+         call add_sets("node set ", scene%set%node, text)
+         call add_sets("element set ", scene%set%element, text)
          do k = 1, size(scene%surface)
             text = text // "surface " // scene%surface(k)%name // new_line("a")
          end do

@@ -33,7 +33,7 @@ contains
 
       fraction = 1.0_wp
       if (.not. stepper_is_done(model%stepper)) fraction = stepper_fraction(model%stepper)
-      t_end = sum(model%stepper%scene%step%duration)
+      t_end = sum(model%stepper%scene%step%time%duration)
    end subroutine model_progress
 
    pure subroutine model_ledger(model, ledger)
@@ -109,13 +109,13 @@ contains
 
       associate (scene => model%stepper%scene)
          allocate(is_in(size(scene%x, 2)), source=.false.)
-         do k = 1, size(scene%node_set)
-            if (scene%node_set(k)%name == to_upper(name)) exit
+         do k = 1, size(scene%set%node)
+            if (scene%set%node(k)%name == to_upper(name)) exit
          end do
-         if (k > size(scene%node_set)) then
+         if (k > size(scene%set%node)) then
             call raise(error, err_input, "there is no node set " // name)
          else
-            is_in(scene%node_set(k)%item) = .true.
+            is_in(scene%set%node(k)%item) = .true.
          end if
       end associate
    end subroutine model_find_nodes
@@ -124,7 +124,7 @@ contains
       type(model_t), intent(in) :: model
       integer, allocatable, intent(out) :: label(:)          !! (n_node)
 
-      allocate(label, source=model%stepper%scene%node_label)
+      allocate(label, source=model%stepper%scene%node%label)
    end subroutine model_labels
 
    pure subroutine model_positions(model, x)
@@ -164,7 +164,7 @@ contains
          allocate(label(0), pair(0))
          do i = 1, size(system%contact)
             associate (node => system%contact(i)%contact%node)
-               label = [label, model%stepper%scene%node_label(node)]
+               label = [label, model%stepper%scene%node%label(node)]
                pair = [pair, spread(abs(system%contact(i)%of_pair), 1, size(node))]
             end associate
          end do

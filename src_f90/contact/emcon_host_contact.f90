@@ -56,7 +56,7 @@ contains
       end associate
       if (.not. self%max_penetration_at_start > 0.0_wp) self%max_penetration_at_start &
          = max_penetration_on_entry
-      call contact_laws_of_surface(pair%laws, self%laws)
+      call contact_laws_of_surface(pair%interaction, self%laws)
    end subroutine host_contact_set_up
 
    !> Does each constraint have what belongs to it?

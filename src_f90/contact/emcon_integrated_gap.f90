@@ -109,8 +109,8 @@ contains
       n = size(self%node)
       self%n_constraint = n
       self%max_penetration_at_start = max_penetration_mean
-      self%offset = pair%offset
-      call contact_laws_of_surface(pair%laws, self%laws)
+      self%offset = pair%interaction%offset
+      call contact_laws_of_surface(pair%interaction, self%laws)
       self%node_edge = self%slave%node_edge
       allocate(self%state(n), self%form(self%slave%n_facet), self%slide(n))
       allocate(self%is_formed(self%slave%n_facet), source=.false.)

@@ -85,8 +85,8 @@ contains
 
       if (size(node) == 0) return
       if (surface%is_nodal .or. allocated(surface%edge)) then
-         do e = 1, size(scene%element_kind)
-            do f = 1, scene%kind(scene%element_kind(e))%n_face
+         do e = 1, size(scene%element%kind)
+            do f = 1, scene%element%kinds(scene%element%kind(e))%n_face
                call take_side(scene, e, f, node, list)
             end do
          end do
@@ -105,9 +105,9 @@ contains
       type(side_t), intent(inout) :: list(:)     !! (size of `node`)
       integer :: at(3), i
 
-      associate (kind => scene%kind(scene%element_kind(e)))
+      associate (kind => scene%element%kinds(scene%element%kind(e)))
          if (kind%n_face_node /= size(at)) return
-         at = scene%element_node(kind%face(f), e)
+         at = scene%element%node(kind%face(f), e)
       end associate
       i = find_sorted(node, at(3))
       if (any(at == 0) .or. i == 0) return

@@ -72,7 +72,7 @@ contains
       call integrated_gap_init(self, scene, pair, error)
       if (allocated(error)) return
       call near_list_init(self%near, self%slave%facet, self%master%facet, scene%x, scene%u0, &
-         maxval(self%slave%size) + (self%offset + pair%laws%damping%clearance))
+         maxval(self%slave%size) + (self%offset + pair%interaction%damping%clearance))
       self%max_gap_on_entry = maxval(self%slave%size)
       allocate(self%start(self%slave%n_facet + 1), source=1)
       allocate(self%pair(0))

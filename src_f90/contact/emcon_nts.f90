@@ -12,7 +12,7 @@ module emcon_nts
    use emcon_guard_slack_plane, only : guard_slack_find
    use emcon_hermite_gap_value, only : hermite_gap_value, hermite_slip_value
    use emcon_interactions, only : contact_damping_t, contact_options_t, contact_pair_t, &
-      smoothing_hermite, smoothing_none, surface_laws_t
+      smoothing_hermite, smoothing_none, interaction_t
    use emcon_kinds, only : wp
    use emcon_nts_choice, only : choice_covers, choice_init, update_candidates, choice_make, &
       choice_settle, choice_take_nearer, nts_choice_t
@@ -72,7 +72,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       logical, intent(in), optional :: has_twins !! both nodes of a joint have a gap: as parts of
                                                  !! other constraints
-      type(surface_laws_t) :: surface
+      type(interaction_t) :: surface
 
       call choice_init(self, scene, pair, error, has_twins)
       if (allocated(error)) return
@@ -82,7 +82,7 @@ contains
       self%slack = pair%slack
       if (pair%slack > 0.0_wp) call guard_slack_find(self%slave, scene%x, pair%slack, &
          self%own_slack)
-      surface = pair%laws
+      surface = pair%interaction
       if (pair%slack > 0.0_wp) surface%damping = contact_damping_t()
       call contact_laws_of_surface(surface, self%laws)
    end subroutine nts_init

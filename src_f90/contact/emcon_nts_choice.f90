@@ -82,7 +82,7 @@ contains
       self%n_constraint = size(self%node)
       allocate(self%edge(self%n_constraint), self%other(self%n_constraint), source=0)
       allocate(self%polygon(2, self%n_constraint))
-      self%offset = pair%offset
+      self%offset = pair%interaction%offset
       self%both_sides = pair%both_sides
       self%own_size = [(chain_shortest(self%slave, self%chain_node(i)), i = 1, self%n_constraint)]
       call chain_thickness(self%slave, scene, self%thickness)
@@ -90,7 +90,7 @@ contains
       associate (n => self%n_constraint/self%rule%n_class)
          self%near_item = [(1 + mod(i, n), i = 0, self%n_constraint - 1)]
          call near_list_init(self%near, reshape(self%node(:n), [1, n]), self%master%facet, &
-            scene%x, scene%u0, self%offset + pair%laws%damping%clearance)
+            scene%x, scene%u0, self%offset + pair%interaction%damping%clearance)
       end associate
    end subroutine choice_init
 

@@ -25,7 +25,7 @@ module emcon_nts_gap_value
    !> round-off.
    real(wp), parameter :: right_angle = -1.0e-6_wp
 
-   include "../dgrad/emcon_dgrad0.inc"
+   include "../dgrad/emcon_dgrad0_plane.inc"
 
    !> The gap for one configuration, and the projection `xi` on the edge (0..1 inside).
    pure subroutine nts_gap_value(x, before, after, rounding, gap, xi, goes_around)
@@ -35,19 +35,19 @@ module emcon_nts_gap_value
       real(wp), intent(out) :: gap               !! [L]
       real(wp), intent(out) :: xi                !! on the line of the edge, 0 to 1 within it
       logical, intent(in), optional :: goes_around   !! as in `nts_gap`
-      type(difference_t) :: edge(3), node(2)
+      type(difference_t) :: edge(-1:1), node(0:1)
       type(dg_t) :: value
       logical :: is_round
 
       is_round = .false.
       if (present(goes_around)) is_round = goes_around
-      if (before > 0) edge(1) = difference(first, before, x)
-      edge(2) = difference(last, first, x)
-      if (after > 0) edge(3) = difference(after, last, x)
+      if (before > 0) edge(-1) = difference(first, before, x)
+      edge(0) = difference(last, first, x)
+      if (after > 0) edge(1) = difference(after, last, x)
       node = [difference(slave, first, x), difference(slave, last, x)]
       value = bent_gap(edge, node, [before, after] > 0, rounding, is_round)
       gap = value%f
-      value = dg_dot(node(1), edge(2))/dg_dot(edge(2), edge(2))
+      value = dg_dot(node(0), edge(0))/dg_dot(edge(0), edge(0))
       xi = value%f
    end subroutine nts_gap_value
 

@@ -65,10 +65,10 @@ contains
       reader%log = diagnostics
       reader%log%file_name = source%file_name
       reader%is_lenient = is_lenient
-      reader%doubt_nodes = .not. source%is_whole
-      reader%doubt_elements = .not. source%is_whole
-      reader%doubt_names = .not. source%is_whole
-      scene%file = source%file_name
+      reader%doubt%nodes = .not. source%is_whole
+      reader%doubt%elements = .not. source%is_whole
+      reader%doubt%names = .not. source%is_whole
+      scene%deck%file = source%file_name
       call read_cards(reader, overrides)
       scene%n_dim = find_dimension(reader)
       scene%is_axial = scene%n_dim == n_plane .and. is_axial_deck(reader)
@@ -153,13 +153,13 @@ contains
       type(data_t) :: data
       integer :: i
 
-      scene%heading = ""
+      scene%deck%heading = ""
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= "HEADING") cycle
          call data_open(data, reader%card(i))
          do while (next_line(reader, data))
-            if (scene%heading /= "") scene%heading = scene%heading // new_line("a")
-            scene%heading = scene%heading // trim(data%text)
+            if (scene%deck%heading /= "") scene%deck%heading = scene%deck%heading // new_line("a")
+            scene%deck%heading = scene%deck%heading // trim(data%text)
          end do
       end do
    end subroutine read_heading

@@ -20,11 +20,11 @@ contains
       integer, allocatable :: next(:)
       integer :: e, k, node, n_node
 
-      n_node = size(scene%node_label)
+      n_node = size(scene%node%label)
       allocate(self%first(n_node + 1), source=0)
-      do e = 1, size(scene%element_label)
-         do k = 1, scene%kind(scene%element_kind(e))%n_node
-            node = scene%element_node(k, e)
+      do e = 1, size(scene%element%label)
+         do k = 1, scene%element%kinds(scene%element%kind(e))%n_node
+            node = scene%element%node(k, e)
             if (node > 0) self%first(node) = self%first(node) + 1
          end do
       end do
@@ -36,9 +36,9 @@ contains
       end do
       next = self%first
       allocate(self%element(k - 1))
-      do e = 1, size(scene%element_label)
-         do k = 1, scene%kind(scene%element_kind(e))%n_node
-            node = scene%element_node(k, e)
+      do e = 1, size(scene%element%label)
+         do k = 1, scene%element%kinds(scene%element%kind(e))%n_node
+            node = scene%element%node(k, e)
             if (node == 0) cycle
             self%element(next(node)) = e
             next(node) = next(node) + 1
@@ -55,15 +55,15 @@ contains
       logical :: has_all
 
       n_neighbours = 0
-      associate (kind => scene%kind(scene%element_kind(element)))
-         associate (node => scene%element_node(kind%face(face), element))
+      associate (kind => scene%element%kinds(scene%element%kind(element)))
+         associate (node => scene%element%node(kind%face(face), element))
             if (node(1) == 0) return
             do i = adjacency%first(node(1)), adjacency%first(node(1) + 1) - 1
                other = adjacency%element(i)
                if (other == element) cycle
                has_all = .true.
                do k = 2, size(node)
-                  has_all = has_all .and. any(scene%element_node(:, other) == node(k))
+                  has_all = has_all .and. any(scene%element%node(:, other) == node(k))
                end do
                if (has_all) n_neighbours = n_neighbours + 1
             end do
@@ -84,8 +84,9 @@ contains
       face = 0
       do i = adjacency%first(node(1)), adjacency%first(node(1) + 1) - 1
          associate (e => adjacency%element(i))
-            do k = 1, scene%kind(scene%element_kind(e))%n_face
-               associate (own => scene%element_node(scene%kind(scene%element_kind(e))%face(k), e))
+            do k = 1, scene%element%kinds(scene%element%kind(e))%n_face
+               associate (own => &
+                  scene%element%node(scene%element%kinds(scene%element%kind(e))%face(k), e))
                   if (any(own(:2) /= node) .and. any(own(2:1:-1) /= node)) cycle
                end associate
                n_element = n_element + 1

@@ -24,7 +24,7 @@ contains
          if (option_name(reader%card(i), "TYPE") == "ROTATINGVELOCITY") call card_error(reader, &
             reader%card(i), "a section of a solid of revolution (CAX) cannot turn in its plane")
       end do
-      if (reader%doubt_elements .or. reader%doubt_nodes .or. reader%doubt_positions) return
+      if (reader%doubt%elements .or. reader%doubt%nodes .or. reader%doubt%positions) return
       call check_kinds(reader, scene)
       call check_side(reader, scene)
       call check_gravity(reader, scene)
@@ -36,11 +36,11 @@ contains
       type(scene_t), intent(in) :: scene
       integer :: i
 
-      do i = 1, size(scene%element_kind)
-         associate (kind => scene%kind(scene%element_kind(i)))
+      do i = 1, size(scene%element%kind)
+         associate (kind => scene%element%kinds(scene%element%kind(i)))
             if (kind%is_axial) cycle
-            call add_error(reader%log, scene%element_origin(i), "element " &
-               // to_text(scene%element_label(i)) // " is of type " // trim(kind%name) &
+            call add_error(reader%log, scene%element%origin(i), "element " &
+               // to_text(scene%element%label(i)) // " is of type " // trim(kind%name) &
                // ", beside solids of revolution (CAX): a deck has elements of one or the other")
             return
          end associate
@@ -51,20 +51,21 @@ contains
    subroutine check_side(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      logical, dimension(size(scene%node_label)) :: is_used, is_left, is_loose
+      logical, dimension(size(scene%node%label)) :: is_used, is_left, is_loose
       integer :: e, i
 
       is_used = .false.
-      do e = 1, size(scene%element_kind)
-         associate (node => scene%element_node(:scene%kind(scene%element_kind(e))%n_node, e))
+      do e = 1, size(scene%element%kind)
+         associate (node => &
+            scene%element%node(:scene%element%kinds(scene%element%kind(e))%n_node, e))
             if (all(node > 0)) is_used(node) = .true.
          end associate
       end do
       is_left = is_used .and. scene%x(1, :) < 0.0_wp
       if (any(is_left)) then
          i = findloc(is_left, .true., 1)
-         call add_error(reader%log, scene%node_origin(i), "node " &
-            // label_list(pack(scene%node_label, is_left)) // " lies left of the axis, at x = " &
+         call add_error(reader%log, scene%node%origin(i), "node " &
+            // label_list(pack(scene%node%label, is_left)) // " lies left of the axis, at x = " &
             // to_text(scene%x(1, i)) // ": x is the radius of a solid of revolution (CAX)")
       end if
       is_loose = .false.
@@ -74,8 +75,8 @@ contains
       end do
       if (.not. any(is_loose)) return
       i = findloc(is_loose, .true., 1)
-      call add_warning(reader%log, scene%node_origin(i), "node " &
-         // label_list(pack(scene%node_label, is_loose)) // " lies on the axis and may leave it; " &
+      call add_warning(reader%log, scene%node%origin(i), "node " &
+         // label_list(pack(scene%node%label, is_loose)) // " lies on the axis and may leave it; " &
          // "hold its degree of freedom 1 by *BOUNDARY")
    end subroutine check_side
 

@@ -101,7 +101,7 @@ contains
          is_parametric = index(text, "<") > 0
          call put_parameters(reader, parameters, i_first, text, is_resolved)
          place%n_card = place%n_card + 1
-         reader%doubt_names = reader%doubt_names .or. .not. is_resolved
+         reader%doubt%names = reader%doubt%names .or. .not. is_resolved
          call read_card(reader, place, text, i_first, reader%card(place%n_card))
          reader%card(place%n_card)%is_unresolved = .not. is_resolved
          reader%card(place%n_card)%is_parametric = is_parametric
@@ -224,9 +224,9 @@ contains
 
       call add_error(reader%log, card%origin, "unknown keyword " // quoted(card%title) &
          // suggestion("*" // card%name, keyword_names()))
-      reader%doubt_nodes = .true.
-      reader%doubt_elements = .true.
-      reader%doubt_names = .true.
+      reader%doubt%nodes = .true.
+      reader%doubt%elements = .true.
+      reader%doubt%names = .true.
       card%name = ""
    end subroutine refuse_keyword
 
@@ -243,9 +243,9 @@ contains
       select case (card%name)
       case ("NGEN", "NCOPY", "NFILL", "ELGEN", "ELCOPY", "PART", "ASSEMBLY", "INSTANCE", &
          "SYSTEM")
-         reader%doubt_nodes = .true.
-         reader%doubt_elements = .true.
-         reader%doubt_names = .true.
+         reader%doubt%nodes = .true.
+         reader%doubt%elements = .true.
+         reader%doubt%names = .true.
       end select
       card%name = ""
    end subroutine refuse_unsupported
@@ -302,13 +302,13 @@ contains
             if (mark == mark_none) then
                fault = "unknown parameter " // quoted(option%name) &
                   // suggestion(option%name, parameter_names(parameters))
-               reader%doubt_names = .true.
+               reader%doubt%names = .true.
             else if (mark == mark_unsupported) then
                call parameter_reason(option%name, reason)
                fault = "parameter " // option%name // " is known but not supported" // reason
             else if (mark == mark_value .and. option%value == "") then
                fault = "parameter " // option%name // " needs a value"
-               reader%doubt_names = .true.
+               reader%doubt%names = .true.
             else if (mark == mark_flag .and. option%has_value) then
                fault = "parameter " // option%name // " takes no value"
             else if (mark == mark_without_effect) then
@@ -356,13 +356,13 @@ contains
          fault = "may stand only inside a step"
       else if (keyword%place == in_model .and. place%n_step > 0) then
          fault = "must stand before the first *STEP"
-         reader%doubt_nodes = .true.
-         reader%doubt_elements = .true.
-         reader%doubt_names = .true.
+         reader%doubt%nodes = .true.
+         reader%doubt%elements = .true.
+         reader%doubt%names = .true.
       else if (place%n_step > 0 .and. .not. place%in_step) then
          if (card%name /= "PARAMETER" .and. card%name /= "HEADING") then
             fault = "between *END STEP and the next *STEP nothing may stand"
-            reader%doubt_names = .true.
+            reader%doubt%names = .true.
          end if
       end if
       if (fault == "") return

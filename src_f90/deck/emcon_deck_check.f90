@@ -21,12 +21,12 @@ contains
       integer :: i, k, material
       logical :: needs_mass
 
-      if (reader%doubt_names .or. reader%doubt_elements .or. reader%doubt_rigid) return
-      without_density = scene%element_section == 0
+      if (reader%doubt%names .or. reader%doubt%elements .or. reader%doubt%rigid) return
+      without_density = scene%element%section == 0
       if (any(without_density)) then
          i = first_true(without_density)
-         call add_error(reader%log, scene%element_origin(i), "element " &
-            // label_list(pack(scene%element_label, without_density)) &
+         call add_error(reader%log, scene%element%origin(i), "element " &
+            // label_list(pack(scene%element%label, without_density)) &
             // " has no section; give one by *SOLID SECTION")
       end if
       allocate(is_used(size(scene%material)), has_weight(size(scene%material)), &
@@ -44,7 +44,7 @@ contains
          needs_mass = needs_mass .or. step_is_dynamic(scene%step(i))
          do k = 1, size(scene%step(i)%load)
             if (all(scene%step(i)%load(k)%kind /= [load_gravity, load_centrifugal])) cycle
-            material = scene%element_section(scene%step(i)%load(k)%target)
+            material = scene%element%section(scene%step(i)%load(k)%target)
             if (material > 0) material = scene%section(material)%material
             if (material > 0) has_weight(material) = .true.
          end do
@@ -72,8 +72,8 @@ contains
    pure subroutine mark_rigid_materials(scene, resists, moves)
       type(scene_t), intent(in) :: scene
       logical, allocatable, intent(out) :: resists(:), moves(:)      !! (n_material)
-      logical, dimension(size(scene%element_label)) :: is_rigid, is_driven
-      integer :: material(size(scene%element_label)), b, i
+      logical, dimension(size(scene%element%label)) :: is_rigid, is_driven
+      integer :: material(size(scene%element%label)), b, i
 
       is_rigid = .false.
       is_driven = .false.
@@ -89,8 +89,8 @@ contains
       end do
       material = 0
       do i = 1, size(material)
-         if (scene%element_section(i) > 0) material(i) = &
-            scene%section(scene%element_section(i))%material
+         if (scene%element%section(i) > 0) material(i) = &
+            scene%section(scene%element%section(i))%material
       end do
       allocate(resists(size(scene%material)), moves(size(scene%material)))
       do i = 1, size(resists)
@@ -116,16 +116,16 @@ contains
       logical, allocatable :: without_density(:), is_idle(:), is_loaded(:), is_coupled(:, :)
       integer :: i, k
 
-      if (reader%doubt_nodes .or. reader%doubt_elements .or. reader%doubt_positions &
-         .or. reader%doubt_equations .or. reader%doubt_rigid) return
-      if (any(scene%element_node(1, :) == 0)) return
-      allocate(without_density(size(scene%node_label)), source=.true.)
-      do i = 1, size(scene%element_label)
-         do k = 1, scene%kind(scene%element_kind(i))%n_node
-            without_density(scene%element_node(k, i)) = .false.
+      if (reader%doubt%nodes .or. reader%doubt%elements .or. reader%doubt%positions &
+         .or. reader%doubt%equations .or. reader%doubt%rigid) return
+      if (any(scene%element%node(1, :) == 0)) return
+      allocate(without_density(size(scene%node%label)), source=.true.)
+      do i = 1, size(scene%element%label)
+         do k = 1, scene%element%kinds(scene%element%kind(i))%n_node
+            without_density(scene%element%node(k, i)) = .false.
          end do
       end do
-      if (allocated(scene%given_node)) without_density(scene%given_node) = .false.
+      if (allocated(scene%host%node)) without_density(scene%host%node) = .false.
       do i = 1, size(scene%rigid)
          without_density(scene%rigid(i)%node) = .false.
          if (allocated(scene%rigid(i)%arm)) without_density(scene%rigid(i)%arm) = .false.
@@ -139,8 +139,8 @@ contains
       if (.not. any(without_density) .or. all(without_density)) return
       call mark_coupled(scene, is_coupled)
       is_idle = without_density .and. .not. any(is_coupled, 1)
-      if (any(is_idle)) call add_warning(reader%log, scene%node_origin(first_true(is_idle)), &
-         "node " // label_list(pack(scene%node_label, is_idle)) &
+      if (any(is_idle)) call add_warning(reader%log, scene%node%origin(first_true(is_idle)), &
+         "node " // label_list(pack(scene%node%label, is_idle)) &
          // " belongs to no element; it is left out")
       call mark_loaded(scene, is_coupled, is_loaded)
       call tell_bare(is_loaded .and. is_idle, "but *CLOAD acts on it")
@@ -163,8 +163,8 @@ contains
          logical, intent(in) :: is_wrong(:)
          character(len=*), intent(in) :: text
 
-         if (any(is_wrong)) call add_error(reader%log, scene%node_origin(first_true(is_wrong)), &
-            "node " // label_list(pack(scene%node_label, is_wrong)) // " belongs to no element, " &
+         if (any(is_wrong)) call add_error(reader%log, scene%node%origin(first_true(is_wrong)), &
+            "node " // label_list(pack(scene%node%label, is_wrong)) // " belongs to no element, " &
             // text)
       end subroutine tell_bare
 
@@ -195,7 +195,7 @@ contains
       logical, allocatable, intent(out) :: is_loaded(:)          !! (n_node)
       integer :: i, k
 
-      allocate(is_loaded(size(scene%node_label)), source=.false.)
+      allocate(is_loaded(size(scene%node%label)), source=.false.)
       do i = 1, size(scene%step)
          associate (load => scene%step(i)%load)
             do k = 1, size(load)
@@ -214,7 +214,7 @@ contains
       logical, allocatable, intent(out) :: is_coupled(:, :)      !! (n_dim, n_node)
       integer :: i, k
 
-      allocate(is_coupled(scene%n_dim, size(scene%node_label)), source=.false.)
+      allocate(is_coupled(scene%n_dim, size(scene%node%label)), source=.false.)
       do i = 1, size(scene%equation)
          associate (equation => scene%equation(i))
             do k = 1, size(equation%node)

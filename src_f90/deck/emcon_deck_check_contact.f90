@@ -29,12 +29,12 @@ contains
       logical :: has_reverse(size(scene%pair)), is_bent
       integer :: i
 
-      if (reader%doubt_shapes .or. reader%log%n_errors > 0) return
+      if (reader%doubt%shapes .or. reader%log%n_errors > 0) return
       call find_reverses(scene%pair, has_reverse)
       do i = 1, size(scene%pair)
          associate (pair => scene%pair(i))
             if (.not. pair%may_choose .or. pair%slave == 0 .or. pair%master == 0) cycle
-            if (pair%both_sides .or. pair%adjust_distance >= 0.0_wp .or. pair%adjust_set > 0) cycle
+            if (pair%both_sides .or. pair%adjust%distance >= 0.0_wp .or. pair%adjust%set > 0) cycle
             if (pair%slave == pair%master .or. has_reverse(i)) cycle
             call find_advice(scene, pair, advice, is_bent)
             if (.not. is_bent) cycle
@@ -62,7 +62,7 @@ contains
    pure integer function n_stuck(scene, pair)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
-      logical :: is_slave(size(scene%node_label)), is_stuck(size(scene%node_label))
+      logical :: is_slave(size(scene%node%label)), is_stuck(size(scene%node%label))
       integer :: i
 
       is_slave = .false.
@@ -81,7 +81,7 @@ contains
       logical :: has_reverse(size(scene%pair)), has_common
       integer :: i
 
-      if (reader%doubt_shapes) return
+      if (reader%doubt%shapes) return
       call find_reverses(scene%pair, has_reverse)
       do i = 1, size(scene%pair)
          if (scene%pair(i)%slave == 0 .or. scene%pair(i)%master == 0) cycle
@@ -126,7 +126,7 @@ contains
 
       has_common = .false.
       if (pair%slave == pair%master) return
-      allocate(is_slave(size(scene%node_label)), is_master(size(scene%node_label)), &
+      allocate(is_slave(size(scene%node%label)), is_master(size(scene%node%label)), &
          source=.false.)
       associate (slave => scene%surface(pair%slave), master => scene%surface(pair%master))
          call mark_nodes(scene, slave, is_slave)
@@ -143,7 +143,7 @@ contains
             // whole // ", " // whole
          call add_error(reader%log, pair%origin, "*CONTACT PAIR: slave surface " // slave%name &
             // " and master surface " // master%name // " share node " &
-            // label_list(pack(scene%node_label, is_slave .and. is_master)) // whole)
+            // label_list(pack(scene%node%label, is_slave .and. is_master)) // whole)
       end associate
    end subroutine check_common_nodes
 
@@ -159,8 +159,8 @@ contains
       integer :: i
 
       if (any(pair%formulation == [0, formulation_given]) .or. pair%both_sides) return
-      allocate(is_slave(size(scene%node_label)), is_held(size(scene%node_label)), &
-         is_guided(size(scene%node_label)), source=.false.)
+      allocate(is_slave(size(scene%node%label)), is_held(size(scene%node%label)), &
+         is_guided(size(scene%node%label)), source=.false.)
       call mark_nodes(scene, scene%surface(pair%slave), is_slave)
       do i = 1, size(scene%step)
          n_free = constraint_freedom(scene, scene%step(i), pair)
@@ -169,7 +169,7 @@ contains
       end do
       is_guided = is_guided .and. .not. is_held
       if (any(is_guided)) call add_warning(reader%log, pair%origin, "*CONTACT PAIR: slave node " &
-         // label_list(pack(scene%node_label, is_guided)) // " of surface " &
+         // label_list(pack(scene%node%label, is_guided)) // " of surface " &
          // scene%surface(pair%slave)%name // " is prescribed in one direction: contact moves it " &
          // "in the other one only, and is singular where the master faces along the first")
    end subroutine check_freedom
@@ -183,9 +183,9 @@ contains
       type(scene_t), intent(in) :: scene
       type(step_t), intent(in) :: step
       type(contact_pair_t), intent(in) :: pair
-      integer :: n_free(size(scene%node_label))
-      integer :: own(size(scene%node_label))
-      logical :: is_master(size(scene%node_label))
+      integer :: n_free(size(scene%node%label))
+      integer :: own(size(scene%node%label))
+      logical :: is_master(size(scene%node%label))
       integer, allocatable :: edge(:, :)
       integer :: k
 
@@ -202,7 +202,7 @@ contains
       call mark_nodes(scene, scene%surface(pair%master), is_master)
       if (any(is_master .and. own > 0)) then
          n_free = scene%n_dim
-      else if (step%contact%multiplier == multiplier_standard) then
+      else if (step%contact%options%multiplier == multiplier_standard) then
          call surface_facets(scene, scene%surface(pair%slave), edge)
          do k = 1, size(edge, 2)
             associate (node => edge(:, k))

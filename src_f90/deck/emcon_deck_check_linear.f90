@@ -30,28 +30,28 @@ contains
       integer :: b, i, n_body, section
       real(wp) :: turned
 
-      if (reader%doubt_nodes .or. reader%doubt_elements) return
-      if (reader%doubt_names .or. reader%doubt_rigid) return
-      if (any(scene%element_section == 0) .or. .not. allocated(scene%v0)) return
-      if (any(scene%element_node(1, :) == 0)) return           ! an element had errors
-      is_linear = scene%section(scene%element_section)%kinematics == kinematics_linear
+      if (reader%doubt%nodes .or. reader%doubt%elements) return
+      if (reader%doubt%names .or. reader%doubt%rigid) return
+      if (any(scene%element%section == 0) .or. .not. allocated(scene%v0)) return
+      if (any(scene%element%node(1, :) == 0)) return           ! an element had errors
+      is_linear = scene%section(scene%element%section)%kinematics == kinematics_linear
       do b = 1, size(scene%rigid)
          is_linear(scene%rigid(b)%element) = .false.
       end do
       if (.not. any(is_linear)) return
-      call bodies_find(scene%element_node, size(scene%x, 2), body, n_body)
+      call bodies_find(scene%element%node, size(scene%x, 2), body, n_body)
       call mark_held(scene, is_held)
       do b = 1, n_body
          node = pack([(i, i = 1, size(body))], body == b)
-         i = findloc(is_linear .and. body(scene%element_node(1, :)) == b, .true., 1)
+         i = findloc(is_linear .and. body(scene%element%node(1, :)) == b, .true., 1)
          if (i == 0 .or. any(is_held(node))) cycle
          turned = spin(scene%x(:, node), scene%v0(:, node)) &
-            *sum(scene%step%duration, step_is_dynamic(scene%step))
+            *sum(scene%step%time%duration, step_is_dynamic(scene%step))
          if (turned <= most_turned) cycle
-         section = scene%element_section(i)
+         section = scene%element%section(i)
          call add_error(reader%log, scene%section(section)%origin, "section " // &
             scene%section(section)%set // " is linear, but its initial velocities turn the body " &
-            // "of element " // to_text(scene%element_label(i)) // " by " // to_text(turned, 3) // &
+            // "of element " // to_text(scene%element%label(i)) // " by " // to_text(turned, 3) // &
             " rad within the steps: small kinematics follow no more than " // &
             to_text(most_turned) // "; use KINEMATICS=NONLINEAR")
       end do

@@ -21,18 +21,18 @@ contains
       type(origin_t) :: origin
       integer :: k
 
-      if (reader%doubt_nodes .or. reader%doubt_elements) return
-      if (reader%doubt_names .or. reader%doubt_rigid) return
-      if (any(scene%element_section == 0) .or. .not. allocated(scene%step)) return
-      is_massless = scene%section(scene%element_section)%is_massless
+      if (reader%doubt%nodes .or. reader%doubt%elements) return
+      if (reader%doubt%names .or. reader%doubt%rigid) return
+      if (any(scene%element%section == 0) .or. .not. allocated(scene%step)) return
+      is_massless = scene%section(scene%element%section)%is_massless
       if (.not. any(is_massless)) return
-      k = scene%element_section(findloc(is_massless, .true., 1))
+      k = scene%element%section(findloc(is_massless, .true., 1))
       origin = scene%section(k)%origin
       if (.not. any(step_is_dynamic(scene%step))) then
          call add_warning(reader%log, origin, "MASSLESS has no effect: there is no *DYNAMIC step")
          return
       end if
-      if (all(is_massless) .and. .not. allocated(scene%given_node)) call add_error(reader%log, &
+      if (all(is_massless) .and. .not. allocated(scene%host%node)) call add_error(reader%log, &
          origin, "all sections are MASSLESS: nothing has inertia; use *STATIC")
       do k = 1, size(scene%rigid)
          if (any(is_massless(scene%rigid(k)%element))) call add_error(reader%log, &
@@ -85,7 +85,7 @@ contains
       do pass = 1, 2
          do e = 1, size(is_massless)
             if (is_massless(e) .neqv. pass == 1) cycle
-            without_density(pack(scene%element_node(:, e), scene%element_node(:, e) > 0)) = pass &
+            without_density(pack(scene%element%node(:, e), scene%element%node(:, e) > 0)) = pass &
                == 1
          end do
       end do

@@ -18,7 +18,7 @@ contains
    subroutine check_rigid(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      integer :: body(size(scene%node_label)), i, k
+      integer :: body(size(scene%node%label)), i, k
       logical, allocatable :: is_slave(:)
 
       call mark_rigid(scene, body)
@@ -31,7 +31,7 @@ contains
          call mark_nodes(scene, scene%surface(scene%tie(i)%slave), is_slave)
          is_slave = is_slave .and. body > 0
          if (any(is_slave)) call add_error(reader%log, scene%tie(i)%origin, "*TIE " // &
-            scene%tie(i)%name // ": slave node " // label_list(pack(scene%node_label, is_slave)) &
+            scene%tie(i)%name // ": slave node " // label_list(pack(scene%node%label, is_slave)) &
             // " belongs to rigid body " // scene%rigid(maxval(body, is_slave))%name // &
             ", which it follows already; let the surface of the rigid body be the master")
       end do
@@ -42,9 +42,9 @@ contains
                associate (rigid => scene%rigid(body(equation%node(k))))
                   if (rigid%reference == equation%node(k)) cycle
                   call add_error(reader%log, equation%origin, "*EQUATION: node " // &
-                     to_text(scene%node_label(equation%node(k))) // " belongs to rigid body " // &
+                     to_text(scene%node%label(equation%node(k))) // " belongs to rigid body " // &
                      rigid%name // "; name its reference node " // &
-                     to_text(scene%node_label(rigid%reference)))
+                     to_text(scene%node%label(rigid%reference)))
                   exit
                end associate
             end do
@@ -61,7 +61,7 @@ contains
       integer :: i, k, a
 
       do i = 1, size(scene%surface)
-         if (.not. scene%surface(i)%is_profile .or. reader%doubt_rigid) cycle
+         if (.not. scene%surface(i)%is_profile .or. reader%doubt%rigid) cycle
          if (any(body([scene%surface(i)%edge]) == 0)) call add_error(reader%log, &
             scene%surface(i)%origin, "surface " // scene%surface(i)%name // " of TYPE=SEGMENTS " &
             // "is that of no *RIGID BODY, ANALYTICAL SURFACE=")
@@ -74,7 +74,7 @@ contains
                   scene%step(k)%prescribed, rigid%reference, a), a = 1, scene%n_dim)] > 0)) cycle
                call add_error(reader%log, rigid%origin, "rigid body " // rigid%name // " has no " &
                   // "elements, and so no mass: in step " // to_text(k) // " its reference node " &
-                  // to_text(scene%node_label(rigid%reference)) // " is not prescribed in all " &
+                  // to_text(scene%node%label(rigid%reference)) // " is not prescribed in all " &
                   // "degrees of freedom, 1, 2 and 6")
                exit
             end do

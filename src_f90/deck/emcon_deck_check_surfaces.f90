@@ -23,7 +23,7 @@ contains
       character(len=:), allocatable :: title
       integer :: i
 
-      if (size(scene%pair) + size(scene%tie) == 0 .or. reader%doubt_shapes) return
+      if (size(scene%pair) + size(scene%tie) == 0 .or. reader%doubt%shapes) return
       call adjacency_init(adjacency, scene)
       in_contact = .false.
       do i = 1, size(scene%pair)
@@ -59,7 +59,7 @@ contains
       end do
       if (any(is_inside)) call add_error(reader%log, surface%origin, title &
          // " has faces inside the body, of element " &
-         // label_list(pack(scene%element_label(surface%element), is_inside)))
+         // label_list(pack(scene%element%label(surface%element), is_inside)))
    end subroutine check_free
 
    !> At each node one face may end and one may begin.
@@ -77,7 +77,7 @@ contains
       branch = unique_sorted([repeated(begins), repeated(ends)])
       if (size(branch) > 0) call add_error(reader%log, surface%origin, title &
          // " is no chain of faces: more than two of them meet at node " &
-         // label_list(scene%node_label(branch)))
+         // label_list(scene%node%label(branch)))
    end subroutine check_chain
 
    !> What stands in the ascending `list` more than once.

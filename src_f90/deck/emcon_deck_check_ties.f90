@@ -23,7 +23,7 @@ contains
       type(name_index_t) :: tied
       integer :: i
 
-      if (size(scene%tie) == 0 .or. reader%doubt_shapes) return
+      if (size(scene%tie) == 0 .or. reader%doubt%shapes) return
       do i = 1, size(scene%tie)
          if (scene%tie(i)%slave == 0) cycle
          call check_common_nodes(reader, scene, scene%tie(i))
@@ -45,7 +45,7 @@ contains
       call surface_nodes(scene, scene%surface(tie%master), master)
       is_common = [(find_sorted(master, slave(i)) > 0, i = 1, size(slave))]
       if (any(is_common)) call add_error(reader%log, tie%origin, title(scene, tie) &
-         // " share node " // label_list(scene%node_label(pack(slave, is_common))) &
+         // " share node " // label_list(scene%node%label(pack(slave, is_common))) &
          // "; what is tied must not be connected already: take its faces off the surfaces")
    end subroutine check_common_nodes
 
@@ -71,10 +71,10 @@ contains
          end do
          if (all(earlier == 0)) return
          if (allocated(slave%edge)) then
-            text = ": edges from node " // label_list(scene%node_label(pack(edge(1, :), &
+            text = ": edges from node " // label_list(scene%node%label(pack(edge(1, :), &
                earlier > 0)))
          else
-            text = ": faces of element " // label_list(scene%element_label(pack(slave%element, &
+            text = ": faces of element " // label_list(scene%element%label(pack(slave%element, &
                earlier > 0)))
          end if
          call add_error(reader%log, scene%tie(i_tie)%origin, title(scene, scene%tie(i_tie)) &
@@ -120,7 +120,7 @@ contains
       integer, allocatable, intent(out) :: start(:)      !! (n_node + 1) before those of each node
       integer, allocatable, intent(out) :: surface(:)
       integer, allocatable :: used(:), node(:)
-      integer :: n(0:size(scene%node_label)), i, pass
+      integer :: n(0:size(scene%node%label)), i, pass
 
       allocate(used, source=unique_sorted([scene%pair%slave, scene%pair%master]))
       n = 0

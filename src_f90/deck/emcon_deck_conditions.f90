@@ -43,12 +43,12 @@ contains
 
       allocate(self%prescribed(16), self%prescribed_step(16), self%prescribed_dropped(16))
       allocate(self%load(16), self%load_step(16), self%load_dropped(16), self%load_next(16))
-      associate (n_dim => scene%n_dim, n_node => size(scene%node_label))
+      associate (n_dim => scene%n_dim, n_node => size(scene%node%label))
          allocate(self%prescribed_slot(sum([(k, k = 1, n_dim)]), n_node), source=0)
          allocate(self%point_slot(sum([(k, k = 1, n_dim)]), n_node), source=0)
       end associate
-      allocate(self%element_slot(-1:maxval(scene%kind%n_face), size(scene%element_label)), &
-         source=0)
+      allocate(self%element_slot(-1:maxval(scene%element%kinds%n_face), &
+         size(scene%element%label)), source=0)
    end subroutine conditions_init
 
    !> Go to the next step: drop what was dropped, keep the last values of `last`.
@@ -71,7 +71,7 @@ contains
          associate (entry_n => self%prescribed(n))
             self%prescribed_slot(entry_n%dof, entry_n%node) = n
             ! What stands before the first step has not begun.
-            if (self%step > 1) call end_amplitude(amplitude, last%duration, time, &
+            if (self%step > 1) call end_amplitude(amplitude, last%time%duration, time, &
                entry_n%amplitude, entry_n%value, entry_n%before)
          end associate
       end do
@@ -88,7 +88,7 @@ contains
          associate (load => self%load(n))
             self%load_next(n) = load_slot(self, load)
             call set_load_slot(self, load, n)
-            call end_amplitude(amplitude, last%duration, time, load%amplitude, load%value, &
+            call end_amplitude(amplitude, last%time%duration, time, load%amplitude, load%value, &
                load%value_start)
          end associate
       end do

@@ -31,9 +31,7 @@ contains
       character(len=:), allocatable :: name
       integer :: i, n, rubs
 
-      allocate(reader%interaction(size(reader%card)))
-      allocate(reader%pad(size(reader%card)), source=0.0_wp)
-      allocate(reader%laws(size(reader%card)))
+      allocate(reader%interaction(size(reader%card)), reader%interaction_name(size(reader%card)))
       n = 0
       rubs = 0                                   ! the last interaction with *FRICTION
       do i = 1, size(reader%card)
@@ -42,27 +40,28 @@ contains
             case ("SURFACEINTERACTION")
                call need_name(reader, card, "NAME", name)
                n = n + 1
-               reader%interaction(n)%text = name
-               if (name /= "") call name_index_put(reader%interactions, name, n)
+               reader%interaction_name(n)%text = name
+               if (name /= "") call name_index_put(reader%names%interactions, name, n)
                call read_number(reader, card, "PAD THICKNESS", "a length of 0 or more: it keeps " &
                   // "surfaces apart; overlap at the start is resolved by *CONTACT INTERFERENCE", &
-                  reader%pad(n))
+                  reader%interaction(n)%offset)
                call read_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is left " &
-                  // "of the velocity at which bodies meet", reader%laws(n)%restitution)
+                  // "of the velocity at which bodies meet", &
+                  reader%interaction(n)%restitution)
             case ("SURFACEBEHAVIOR", "FRICTION", "CONTACTDAMPING")
-               if (n == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
+               if (n == 0 .and. .not. reader%doubt%names) call card_error(reader, card, &
                   "there is no *SURFACE INTERACTION before")
                if (card%name == "CONTACTDAMPING") then
-                  call read_contact_damping(reader, card, reader%laws(max(1, n))%damping)
-                  if (n == 0) reader%laws(1)%damping = contact_damping_t()
+                  call read_contact_damping(reader, card, reader%interaction(max(1, n))%damping)
+                  if (n == 0) reader%interaction(1)%damping = contact_damping_t()
                else if (card%name == "FRICTION") then
                   if (n > 0 .and. n == rubs) call card_error(reader, card, &
                      "the surface interaction has *FRICTION already")
                   rubs = n
-                  call read_friction(reader, card, reader%laws(max(1, n))%friction)
+                  call read_friction(reader, card, reader%interaction(max(1, n))%friction)
                   call read_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
                      // "left of the velocity along the surface of what sticks", &
-                     reader%laws(max(1, n))%rebound)
+                     reader%interaction(max(1, n))%rebound)
                else
                   call check_behavior(reader, card)
                end if
@@ -70,8 +69,7 @@ contains
          end associate
       end do
       reader%interaction = reader%interaction(:n)
-      reader%pad = reader%pad(:n)
-      reader%laws = reader%laws(:n)
+      reader%interaction_name = reader%interaction_name(:n)
    end subroutine read_interactions
 
    !> The value of a parameter, 0 or more; of RESTITUTION up to 1.
@@ -262,8 +260,8 @@ contains
       other%master = pair%slave
       other%is_reverse = .true.
       if (.not. pair%may_choose) return
-      other%adjust_distance = -1.0_wp                ! it speaks of the slave
-      other%adjust_set = 0
+      other%adjust%distance = -1.0_wp                ! it speaks of the slave
+      other%adjust%set = 0
    end function reversed
 
    !> A surface of nodes has no edges: it may only be the slave of another one, node to surface.
@@ -341,11 +339,14 @@ contains
       call read_pair_initiation(reader, card, of_card%initiation)
       if (any(pair%formulation == formulation_given)) call suit_given(reader, card, of_card)
       do i = 1, size(pair)
-         pair(i)%adjust_distance = of_card%adjust_distance
-         pair(i)%adjust_set = of_card%adjust_set
+         pair(i)%adjust%distance = of_card%adjust%distance
+         pair(i)%adjust%set = of_card%adjust%set
          pair(i)%is_guarded = of_card%is_guarded
-         pair(i)%offset = of_card%offset
-         pair(i)%laws = of_card%laws
+         pair(i)%interaction%offset = of_card%interaction%offset
+         pair(i)%interaction%restitution = of_card%interaction%restitution
+         pair(i)%interaction%friction = of_card%interaction%friction
+         pair(i)%interaction%rebound = of_card%interaction%rebound
+         pair(i)%interaction%damping = of_card%interaction%damping
          pair(i)%initiation = of_card%initiation
       end do
    end subroutine read_pair_options
@@ -359,9 +360,10 @@ contains
       if (has_option(card, "GUARD") .and. of_card%is_guarded) call refuse("GUARD=YES")
       of_card%is_guarded = .false.
       if (has_option(card, "ADJUST")) call refuse("ADJUST")
-      if (of_card%offset > 0.0_wp) call refuse("PAD THICKNESS of its surface interaction")
-      if (of_card%laws%friction > 0.0_wp) call refuse("*FRICTION of its surface interaction")
-      if (of_card%laws%damping%coefficient > 0.0_wp) call refuse( &
+      if (of_card%interaction%offset > 0.0_wp) call refuse( &
+         "PAD THICKNESS of its surface interaction")
+      if (of_card%interaction%friction > 0.0_wp) call refuse("*FRICTION of its surface interaction")
+      if (of_card%interaction%damping%coefficient > 0.0_wp) call refuse( &
          "*CONTACT DAMPING of its surface interaction")
 
    contains
@@ -385,15 +387,12 @@ contains
       integer :: i
 
       call need_name(reader, card, "INTERACTION", name)
-      i = name_index_find(reader%interactions, name)
-      if (i > 0) then
-         of_card%offset = reader%pad(i)
-         of_card%laws = reader%laws(i)
-      end if
-      if (.not. (i > 0 .or. name == "" .or. reader%doubt_names)) call card_error( &
+      i = name_index_find(reader%names%interactions, name)
+      if (i > 0) of_card%interaction = reader%interaction(i)
+      if (.not. (i > 0 .or. name == "" .or. reader%doubt%names)) call card_error( &
          reader, card, "unknown surface interaction " &
-         // quoted(name) // suggestion(name, reader%interaction))
-      if (.not. of_card%offset > 0.0_wp) return
+         // quoted(name) // suggestion(name, reader%interaction_name))
+      if (.not. of_card%interaction%offset > 0.0_wp) return
       if (any(pair%slave == pair%master .and. pair%slave > 0)) call card_error(reader, card, &
          "the surface interaction " // quoted(name) // " has a PAD THICKNESS, which has no " // &
          "meaning for a surface in contact with itself: neighbours on it are nearer than that")
@@ -434,12 +433,12 @@ contains
       if (is_number .and. distance < 0.0_wp) then
          call card_error(reader, card, "the distance ADJUST=" // value // " is negative")
       else if (is_number) then
-         of_card%adjust_distance = distance
+         of_card%adjust%distance = distance
       else
-         of_card%adjust_set = name_index_find(reader%node_sets, value)
-         if (of_card%adjust_set == 0 .and. .not. reader%doubt_names) then
+         of_card%adjust%set = name_index_find(reader%names%node_sets, value)
+         if (of_card%adjust%set == 0 .and. .not. reader%doubt%names) then
             call card_error(reader, card, "ADJUST=" // quoted(value) // " is neither a number " &
-               // "nor a node set" // suggestion(value, set_names(scene%node_set)))
+               // "nor a node set" // suggestion(value, set_names(scene%set%node)))
          end if
       end if
    end subroutine read_adjust

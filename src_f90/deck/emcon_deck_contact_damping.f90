@@ -113,7 +113,7 @@ contains
       integer :: i, k
 
       do i = 1, size(pair)
-         if (.not. pair(i)%laws%damping%coefficient > 0.0_wp .or. pair(i)%is_reverse) cycle
+         if (.not. pair(i)%interaction%damping%coefficient > 0.0_wp .or. pair(i)%is_reverse) cycle
          do k = 1, size(step)
             if (step(k)%scheme%takes_damping) cycle
             call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
@@ -129,9 +129,9 @@ contains
          if (any(step_initiation(step) == initiation_massless)) call &
             warn(pair(i), "asks for mass: both surfaces keep theirs, and hold gaps as " // &
             "PERSISTENT does")
-         if (pair(i)%laws%damping%clearance > 0.0_wp) cycle
-         if (pair(i)%laws%damping%tangent > 0.0_wp) cycle
-         if (.not. any(step%constraint_method == method_penalty)) call warn(pair(i), &
+         if (pair(i)%interaction%damping%clearance > 0.0_wp &
+            .or. pair(i)%interaction%damping%tangent > 0.0_wp) cycle
+         if (.not. any(step%contact%method == method_penalty)) call warn(pair(i), &
             "damps nothing: what contact holds exactly does not move along its normal; give a " // &
             "clearance or a TANGENT FRACTION")
       end do

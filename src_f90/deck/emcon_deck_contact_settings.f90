@@ -26,10 +26,11 @@ contains
       type(card_t), intent(in) :: card
       type(step_t), intent(inout) :: step
 
-      if (option_name(card, "TYPE") == "") step%initiation = option_default("initiation")
-      call choose_option(reader, card, "TYPE", "initiation", step%initiation)
-      call option_real(reader, card, "GAP TOLERANCE", step%gap_tolerance)
-      if (has_option(card, "GAPTOLERANCE") .and. step%initiation /= initiation_persistent) then
+      if (option_name(card, "TYPE") == "") step%contact%initiation = option_default("initiation")
+      call choose_option(reader, card, "TYPE", "initiation", step%contact%initiation)
+      call option_real(reader, card, "GAP TOLERANCE", step%contact%gap_tolerance)
+      if (has_option(card, "GAPTOLERANCE") &
+         .and. step%contact%initiation /= initiation_persistent) then
         call card_warning(reader, card, "GAP TOLERANCE has an effect with TYPE=PERSISTENT only")
       end if
    end subroutine read_initiation
@@ -72,8 +73,8 @@ contains
       if (.not. any(pair%initiation == initiation_massless)) return
       k = findloc(step_is_dynamic(step), .true., 1)
       if (k == 0) return
-      where (pair%initiation == 0) pair%initiation = step(k)%initiation
-      where (step_is_dynamic(step)) step%initiation = initiation_massless
+      where (pair%initiation == 0) pair%initiation = step(k)%contact%initiation
+      where (step_is_dynamic(step)) step%contact%initiation = initiation_massless
    end subroutine pairs_ask
 
    !> *CONTACT INTERFERENCE, SHRINK: for all pairs, in the first step.
@@ -89,13 +90,14 @@ contains
          // "only the overclosure that is there at the start can be resolved")
       if (card%step > 1) call card_error(reader, card, "it belongs into the first step: later " &
          // "ones begin without overclosure")
-      if (size(pair) == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
+      if (size(pair) == 0 .and. .not. reader%doubt%names) call card_error(reader, card, &
          "there is no *CONTACT PAIR")
-      step%resolves_overclosure = .true.
+      step%contact%resolves_overclosure = .true.
       name = option_name(card, "AMPLITUDE")
       if (name == "") return
-      step%overclosure_amplitude = name_index_find(reader%amplitudes, name)
-      if (step%overclosure_amplitude == 0 .and. .not. reader%doubt_names) call card_error(reader, &
+      step%contact%overclosure_amplitude = name_index_find(reader%names%amplitudes, name)
+      if (step%contact%overclosure_amplitude == 0 &
+         .and. .not. reader%doubt%names) call card_error(reader, &
          card, "unknown amplitude " // quoted(name) // suggestion(name, table_names(amplitude)))
    end subroutine read_interference
 
@@ -110,7 +112,7 @@ contains
          "no value", "the motion is the smallest one, whatever the stiffness")
       if (has_option(card, "STABILIZE") .eqv. has_option(card, "RESET")) call card_error(reader, &
          card, "either STABILIZE or RESET is to be given")
-      if (size(pair) == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
+      if (size(pair) == 0 .and. .not. reader%doubt%names) call card_error(reader, card, &
          "there is no *CONTACT PAIR")
       step%stabilizes = has_option(card, "STABILIZE")
    end subroutine read_controls
@@ -123,10 +125,10 @@ contains
       type(step_t), intent(in) :: step
       integer :: i
 
-      if (step%overclosure_amplitude > 0) call check_left(reader, reader%card(i_first), &
-         amplitude(step%overclosure_amplitude), step%duration)
+      if (step%contact%overclosure_amplitude > 0) call check_left(reader, reader%card(i_first), &
+         amplitude(step%contact%overclosure_amplitude), step%time%duration)
       if (.not. step_is_dynamic(step)) return
-      if (step%resolves_overclosure) call card_error(reader, reader%card(i_first), &
+      if (step%contact%resolves_overclosure) call card_error(reader, reader%card(i_first), &
          "*CONTACT INTERFERENCE is for *STATIC steps: in dynamics pushing bodies apart would " &
          // "make energy")
       do i = i_first + 1, size(reader%card)
@@ -146,9 +148,9 @@ contains
       first = findloc(step_is_dynamic(step), .true., 1)
       do k = first + 1, merge(size(step), 0, first > 0)
          if (.not. step_is_dynamic(step(k))) cycle
-         if ((step(k)%initiation == initiation_massless) .eqv. &
-            (step(first)%initiation == initiation_massless)) cycle
-         with = merge(k, first, step(k)%initiation == initiation_massless)
+         if ((step(k)%contact%initiation == initiation_massless) .eqv. &
+            (step(first)%contact%initiation == initiation_massless)) cycle
+         with = merge(k, first, step(k)%contact%initiation == initiation_massless)
          call add_error(reader%log, step(k)%origin, "step " // to_text(with) // " has *CONTACT " &
             // "INITIATION, TYPE=MASSLESS, step " // to_text(first + k - with) // " another one: " &
             // "surfaces are massless in all dynamic steps or in none: mass does not come and go")
@@ -163,11 +165,12 @@ contains
       type(step_t), intent(in) :: step(:)
       integer :: i, k
 
-      i = findloc(pair%laws%restitution < 1.0_wp, .true., 1)
+      i = findloc(pair%interaction%restitution < 1.0_wp, .true., 1)
       if (i == 0) return
       k = findloc(step_initiation(step), initiation_admissible, 1)
       if (k > 0) call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface " // &
-         "interaction has RESTITUTION=" // to_text(pair(i)%laws%restitution) // ", but step " // &
+         "interaction has RESTITUTION=" // to_text(pair(i)%interaction%restitution) &
+         // ", but step " // &
          to_text(k) // " has *CONTACT INITIATION, TYPE=ADMISSIBLE, which loses energy by " // &
          "itself; use PERSISTENT")
    end subroutine check_restitution

@@ -150,8 +150,8 @@ contains
          kept(k) = reader%card(i)
       end do
       call move_alloc(kept, reader%card)
-      reader%doubt_names = .true.
-      reader%doubt_rigid = .true.
+      reader%doubt%names = .true.
+      reader%doubt%rigid = .true.
    end subroutine refuse_plane_cards
 
    !> A contact pair whose contact a program gives?

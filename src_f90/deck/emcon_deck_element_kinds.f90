@@ -25,10 +25,10 @@ contains
       type(scene_t), intent(inout) :: scene
       integer :: i
 
-      call element_kinds_create(scene%n_dim, scene%kind)
+      call element_kinds_create(scene%n_dim, scene%element%kinds)
       do i = 1, size(reader%card)
          if (reader%card(i)%name == "USERELEMENT") call read_kind(reader, reader%card(i), &
-            scene%n_dim, scene%kind)
+            scene%n_dim, scene%element%kinds)
       end do
    end subroutine read_element_kinds
 

@@ -128,23 +128,23 @@ contains
       allocate(item(0), face(0))
       if (is_label(data, 1)) then
          call data_error(reader, data, "P acts on the faces of a surface; on faces of " // &
-            "elements act " // face_names("P", maxval(scene%kind%n_face)) // " of *DLOAD")
+            "elements act " // face_names("P", maxval(scene%element%kinds%n_face)) // " of *DLOAD")
          return
       end if
       call get_name(reader, data, 1, "surface", name)
       if (.not. data%ok) return
-      k = name_index_find(reader%surfaces, name)
+      k = name_index_find(reader%names%surfaces, name)
       if (k > 0) then
          item = scene%surface(k)%element
          face = scene%surface(k)%face
-         if (size(item) == 0 .and. .not. reader%doubt_elements) call data_error(reader, data, &
+         if (size(item) == 0 .and. .not. reader%doubt%elements) call data_error(reader, data, &
             "surface " // name // " has no faces of elements, on which a pressure could act")
-      else if (reader%doubt_names) then
+      else if (reader%doubt%names) then
          data%ok = .false.
-      else if (name_index_find(reader%element_sets, name) > 0) then
+      else if (name_index_find(reader%names%element_sets, name) > 0) then
          call data_error(reader, data, "P acts on the faces of a surface, and " // name // &
             " is an element set: name a *SURFACE, or faces by " // &
-            face_names("P", maxval(scene%kind%n_face)) // " of *DLOAD")
+            face_names("P", maxval(scene%element%kinds%n_face)) // " of *DLOAD")
       else
          call data_error(reader, data, "unknown surface " // quoted(name) // &
             suggestion(name, surface_names(scene%surface)))
@@ -161,8 +161,8 @@ contains
       if (is_label(data, 1)) return
       call get_name(reader, data, 1, "element label or set", name)
       if (.not. data%ok) return
-      if (name_index_find(reader%element_sets, name) > 0) return
-      if (name_index_find(reader%surfaces, name) > 0) call data_error(reader, data, name // &
+      if (name_index_find(reader%names%element_sets, name) > 0) return
+      if (name_index_find(reader%names%surfaces, name) > 0) call data_error(reader, data, name // &
          " is a surface: a pressure on all of its faces is " // name // ", P, pressure")
    end subroutine refuse_surface
 
@@ -174,9 +174,9 @@ contains
       integer, intent(in) :: face
       logical :: has_not(size(item))
 
-      has_not = scene%kind(scene%element_kind(item))%n_face < face
+      has_not = scene%element%kinds(scene%element%kind(item))%n_face < face
       if (any(has_not)) call data_error(reader, data, "element " &
-         // label_list(pack(scene%element_label(item), has_not)) // " has no face " &
+         // label_list(pack(scene%element%label(item), has_not)) // " has no face " &
          // to_text(face))
    end subroutine check_faces
 
@@ -189,7 +189,7 @@ contains
       character(len=:), allocatable :: name
       integer :: n_face
 
-      n_face = maxval(scene%kind%n_face)
+      n_face = maxval(scene%element%kinds%n_face)
       call get_name(reader, data, 2, "load type", name)
       new%value = 0.0_wp
       new%direction = 0.0_wp

@@ -63,7 +63,7 @@ contains
          end associate
       end do
       scene%equation = list%item(:list%n)
-      reader%doubt_equations = reader%doubt_equations .or. reader%log%n_errors > n_before
+      reader%doubt%equations = reader%doubt%equations .or. reader%log%n_errors > n_before
    end subroutine read_equations
 
    !> The equations of one card: each a line with the number of terms, then lines of terms.
@@ -85,10 +85,10 @@ contains
             if (draft%n_wanted > 0) call tell_missing(reader, draft)
             if (draft%is_lost .and. data%n /= 1) cycle
             call read_count(reader, data, draft)
-            reader%doubt_equations = reader%doubt_equations .or. draft%is_lost
+            reader%doubt%equations = reader%doubt%equations .or. draft%is_lost
          else
             call read_terms(reader, data, scene, draft)
-            reader%doubt_equations = reader%doubt_equations .or. draft%is_refused
+            reader%doubt%equations = reader%doubt%equations .or. draft%is_refused
             if (draft%n < draft%n_wanted) cycle
             if (.not. draft%is_refused) call store_equation(reader, scene, draft, list)
             draft%n_wanted = 0
@@ -179,7 +179,7 @@ contains
       term%set = ""
       if (data%ok .and. .not. is_label(data, k)) then
          call get_name(reader, data, k, "node set", term%set)
-         term%item = term%item(sort_order(scene%node_label(term%item)))
+         term%item = term%item(sort_order(scene%node%label(term%item)))
          if (size(term%item) == 0) call data_error(reader, data, "node set " // quoted(term%set) &
             // " is empty")
       end if
@@ -284,7 +284,7 @@ contains
       do i = 2, size(order)
          if (freedom(order(i)) /= freedom(order(i - 1))) cycle
          fault = "degree of freedom " // to_text(equation%dof(order(i))) // " of node " &
-            // to_text(scene%node_label(equation%node(order(i)))) // " stands in it twice"
+            // to_text(scene%node%label(equation%node(order(i)))) // " stands in it twice"
          return
       end do
    end subroutine repeated_fault

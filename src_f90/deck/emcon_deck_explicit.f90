@@ -32,21 +32,21 @@ contains
       integer :: i
 
       if (.not. step%scheme%is_explicit) return
-      if (step%event_fraction > 0.0_wp) call card_error(reader, reader%card(i_first), &
+      if (step%time%event_fraction > 0.0_wp) call card_error(reader, reader%card(i_first), &
          "*EVENTS are not of explicit steps: *EVENTS, OFF ends them")
       do i = i_first + 1, size(reader%card)
          associate (card => reader%card(i))
             if (card%name == "STEP") exit
             select case (card%name)
             case ("CONSTRAINTMETHOD")
-               if (step%constraint_method /= method_penalty) call card_error(reader, card, "an " &
+               if (step%contact%method /= method_penalty) call card_error(reader, card, "an " &
                   // "explicit step has no system to solve: leave the card to other steps, " // &
                   "but for TYPE=PENALTY")
             case ("NEWTON")
                call card_error(reader, card, "an explicit step has no system to solve: leave " // &
                   "the card to other steps")
             case ("CONTACTINITIATION")
-               if (step%initiation /= initiation_admissible .or. has_option(card, &
+               if (step%contact%initiation /= initiation_admissible .or. has_option(card, &
                   "GAPTOLERANCE")) call card_error(reader, card, "in an explicit step gaps " // &
                   "close to zero, never before: leave the card to other steps")
             case ("TIMEINTEGRATION")
@@ -70,23 +70,24 @@ contains
 
       do k = 1, size(step)
          if (.not. step(k)%scheme%is_explicit) cycle
-         if (step(k)%initiation == initiation_massless) then
+         if (step(k)%contact%initiation == initiation_massless) then
             call add_error(reader%log, step(k)%origin, "step " // to_text(k) // " is explicit, " &
                // "but slave nodes are to be MASSLESS: what has no mass has no acceleration")
             cycle
          end if
-         i = findloc(pair%laws%restitution < 1.0_wp, .true., 1)
+         i = findloc(pair%interaction%restitution < 1.0_wp, .true., 1)
          if (i > 0) then
             call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
-               // "has RESTITUTION=" // to_text(pair(i)%laws%restitution) // ", but step " // &
+               // "has RESTITUTION=" // to_text(pair(i)%interaction%restitution) &
+               // ", but step " // &
                to_text(k) // " is explicit: what rebounds there is the bodies alone")
             cycle
          end if
-         step(k)%initiation = initiation_admissible
-         if (step(k)%constraint_method /= method_penalty) step(k)%constraint_method = &
+         step(k)%contact%initiation = initiation_admissible
+         if (step(k)%contact%method /= method_penalty) step(k)%contact%method = &
             method_null_space
-         step(k)%newton = newton_kept
-         step(k)%solver = solver_default
+         step(k)%solution%newton = newton_kept
+         step(k)%solution%solver = solver_default
       end do
    end subroutine suit_explicit
 

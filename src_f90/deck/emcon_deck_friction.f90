@@ -70,14 +70,15 @@ contains
       do i = 1, size(pair)
          if (pair(i)%slave == 0 .or. pair(i)%master == 0) cycle   ! its surface is unknown, and told
          call check_other_way(reader, pair(:i), given)
-         if (.not. pair(i)%laws%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
-         if (pair(i)%laws%restitution < 1.0_wp) call refuse(reader, pair(i), &
+         if (.not. pair(i)%interaction%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
+         if (pair(i)%interaction%restitution < 1.0_wp) call refuse(reader, pair(i), &
             "RESTITUTION below 1: velocities would " &
             // "jump along the surface too; use RESTITUTION=1")
          do k = 1, size(step)
             call check_step(reader, pair(i), step(k), k)
          end do
-         if (pair(i)%offset > 0.0_wp .and. on_nodes(pair(i)%slave)) call add_warning(reader%log, &
+         if (pair(i)%interaction%offset > 0.0_wp &
+            .and. on_nodes(pair(i)%slave)) call add_warning(reader%log, &
             pair(i)%origin, "*CONTACT PAIR: its surface interaction has *FRICTION and a PAD " &
             // "THICKNESS: friction acts at the nodes, so that discs slide, but do not roll")
          if (any(step_initiation(step) == initiation_massless)) then
@@ -100,8 +101,8 @@ contains
             call name_index_put(given, name_index_pair(new%slave, new%master), size(pair))
          end if
          if (j == 0) return
-         if (abs(pair(j)%laws%friction - new%laws%friction) <= 0.0_wp .and. &
-            abs(pair(j)%laws%rebound - new%laws%rebound) <= 0.0_wp) return
+         if (abs(pair(j)%interaction%friction - new%interaction%friction) <= 0.0_wp .and. &
+            abs(pair(j)%interaction%rebound - new%interaction%rebound) <= 0.0_wp) return
          call add_error(reader%log, new%origin, "*CONTACT PAIR: the surfaces are a pair in the " &
             // "other order too, with another *FRICTION: give both the same interaction")
       end associate
@@ -124,7 +125,7 @@ contains
          call refuse(reader, pair, "*CONTACT INITIATION, TYPE=VELOCITY UPDATE of step " // &
             to_text(k) // ": jumps of velocities have no friction")
       end if
-      if (.not. any(step%constraint_method == [method_null_space, method_saddle_point])) then
+      if (.not. any(step%contact%method == [method_null_space, method_saddle_point])) then
          call refuse(reader, pair, "contact that gives way, in step " // to_text(k) // "; use " // &
             "*CONSTRAINT METHOD, TYPE=NULL SPACE")
       end if

@@ -91,9 +91,9 @@ contains
                      // "than " // to_text(start) // ", when the last step begins")
                end if
                if (allocated(error)) return
-               step%duration = until(k) - start
+               step%time%duration = until(k) - start
             end if
-            start = start + step%duration
+            start = start + step%time%duration
          end associate
       end do
    end subroutine further_until

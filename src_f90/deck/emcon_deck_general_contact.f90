@@ -101,9 +101,9 @@ contains
       data%ok = .true.
       call get_name(reader, data, side, "surface", name)
       if (.not. data%ok) return
-      surface = name_index_find(reader%surfaces, name)
+      surface = name_index_find(reader%names%surfaces, name)
       if (surface == 0) then
-         if (.not. reader%doubt_names) call data_error(reader, data, "unknown surface " &
+         if (.not. reader%doubt%names) call data_error(reader, data, "unknown surface " &
             // quoted(name) // suggestion(name, surface_names(scene%surface)))
       else if (scene%surface(surface)%is_nodal) then
          call data_error(reader, data, "the surface " // quoted(name) // " has TYPE=NODE, but " &
@@ -158,13 +158,13 @@ contains
       type(scene_t), intent(inout) :: scene
       type(surface_t) :: surface
 
-      if (reader%doubt_elements .or. reader%doubt_names) return
+      if (reader%doubt%elements .or. reader%doubt%names) return
       if (size(scene%pair) > 0) then
          call card_error(reader, card, "ALL EXTERIOR includes every surface, but there is " &
             // "contact already at " // where_text(scene, scene%pair(1)%origin) // "; take it out")
          return
       end if
-      if (name_index_find(reader%surfaces, exterior_name) > 0) then
+      if (name_index_find(reader%names%surfaces, exterior_name) > 0) then
          call card_error(reader, card, "ALL EXTERIOR defines a surface " // exterior_name &
             // "; give yours another name")
          return
@@ -177,7 +177,7 @@ contains
          return
       end if
       scene%surface = [scene%surface, surface]
-      call name_index_put(reader%surfaces, exterior_name, size(scene%surface))
+      call name_index_put(reader%names%surfaces, exterior_name, size(scene%surface))
       call append_pair(scene, card, size(scene%surface), size(scene%surface), is_reverse=.false.)
    end subroutine include_exterior
 
@@ -190,10 +190,10 @@ contains
       integer :: e, f, i
 
       call adjacency_init(adjacency, scene)
-      allocate(is_in(maxval(scene%kind%n_face), size(scene%element_label)), source=.false.)
+      allocate(is_in(maxval(scene%element%kinds%n_face), size(scene%element%label)), source=.false.)
       do e = 1, size(is_in, 2)
-         if (scene%element_node(1, e) == 0) cycle
-         do f = 1, scene%kind(scene%element_kind(e))%n_face
+         if (scene%element%node(1, e) == 0) cycle
+         do f = 1, scene%element%kinds(scene%element%kind(e))%n_face
             is_in(f, e) = n_neighbours(scene, adjacency, e, f) == 0
          end do
       end do
@@ -223,30 +223,34 @@ contains
          do side = 1, 2
             if (is_blank(data, side)) cycle
             call get_name(reader, data, side, "surface", name)
-            if (.not. data%ok .or. reader%doubt_names .or. name == "GLOBAL") cycle
-            if (name_index_find(reader%surfaces, name) == 0) call data_error(reader, data, &
+            if (.not. data%ok .or. reader%doubt%names .or. name == "GLOBAL") cycle
+            if (name_index_find(reader%names%surfaces, name) == 0) call data_error(reader, data, &
                "unknown surface " // quoted(name) // suggestion(name, surface_names(scene%surface)))
          end do
          call get_name(reader, data, 3, "surface interaction", name)
          if (.not. data%ok) cycle
-         i = name_index_find(reader%interactions, name)
-         is_known = i > 0 .or. reader%doubt_names
+         i = name_index_find(reader%names%interactions, name)
+         is_known = i > 0 .or. reader%doubt%names
          if (i > 0) then
-            if (reader%laws(i)%restitution < 1.0_wp) call data_error(reader, data, "the " // &
-               "surface interaction " // quoted(name) // " has a RESTITUTION, which is of pairs " // &
-               "only; name what it is of by *CONTACT PAIR")
-            if (reader%laws(i)%friction > 0.0_wp) call data_error(reader, data, "the surface " // &
+            if (reader%interaction(i)%restitution < 1.0_wp) call data_error(reader, data, &
+               "the surface " // &
+               "interaction " // quoted(name) // " has a RESTITUTION, which is of pairs only; " // &
+               "name what it is of by *CONTACT PAIR")
+            if (reader%interaction(i)%friction > 0.0_wp) call data_error(reader, data, &
+               "the surface " // &
                "interaction " // quoted(name) // " has *FRICTION, which is of pairs only; " // &
                "name what it is of by *CONTACT PAIR")
-            if (reader%laws(i)%damping%coefficient > 0.0_wp) call data_error(reader, data, &
-               "the surface interaction " // quoted(name) // " has *CONTACT DAMPING, which is " // &
-               "of pairs only; name what it is of by *CONTACT PAIR")
-            if (reader%pad(i) > 0.0_wp) call data_error(reader, data, "the surface interaction " &
+            if (reader%interaction(i)%damping%coefficient > 0.0_wp) call data_error(reader, data, &
+               "the " // &
+               "surface interaction " // quoted(name) // " has *CONTACT DAMPING, which is of " // &
+               "pairs only; name what it is of by *CONTACT PAIR")
+            if (reader%interaction(i)%offset > 0.0_wp) call data_error(reader, data, &
+               "the surface interaction " &
                // quoted(name) // " has a PAD THICKNESS, which has no meaning where surfaces may " &
                // "be in contact with themselves; name what it keeps apart by *CONTACT PAIR")
          end if
          if (.not. is_known) call data_error(reader, data, "unknown surface interaction " &
-            // quoted(name) // suggestion(name, reader%interaction))
+            // quoted(name) // suggestion(name, reader%interaction_name))
       end do
    end subroutine check_properties
 

@@ -25,8 +25,8 @@ contains
       integer, allocatable :: fault(:)
       integer :: i
 
-      if (reader%doubt_positions) return
-      allocate(fault(size(scene%element_label)))
+      if (reader%doubt%positions) return
+      allocate(fault(size(scene%element%label)))
       do i = 1, size(fault)
          fault(i) = element_shape(scene, i)
       end do
@@ -46,9 +46,9 @@ contains
             if (fault(k) == kind) exit
          end do
          if (k > size(fault)) return
-         reader%doubt_shapes = .true.
-         call add_error(reader%log, scene%element_origin(k), "element " &
-            // label_list(pack(scene%element_label, fault == kind)) // text)
+         reader%doubt%shapes = .true.
+         call add_error(reader%log, scene%element%origin(k), "element " &
+            // label_list(pack(scene%element%label, fault == kind)) // text)
       end subroutine tell
 
    end subroutine check_shapes
@@ -57,15 +57,15 @@ contains
    pure integer function element_shape(scene, element)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: element
-      real(wp) :: x(2, size(scene%element_node, 1)), edge(2, size(scene%element_node, 1))
-      real(wp) :: corner(size(scene%element_node, 1)), longest
+      real(wp) :: x(2, size(scene%element%node, 1)), edge(2, size(scene%element%node, 1))
+      real(wp) :: corner(size(scene%element%node, 1)), longest
       integer :: k, n, before
 
       element_shape = shape_good
-      n = scene%kind(scene%element_kind(element))%n_corner
+      n = scene%element%kinds(scene%element%kind(element))%n_corner
       if (n == 0) return
-      if (any(scene%element_node(:n, element) == 0)) return
-      x(:, :n) = scene%x(:, scene%element_node(:n, element))
+      if (any(scene%element%node(:n, element) == 0)) return
+      x(:, :n) = scene%x(:, scene%element%node(:n, element))
       ! Scaled by a power of two: coordinates may be as large or as small as numbers can be.
       x(:, :n) = scale(x(:, :n), -exponent(maxval(abs(x(:, :n)))))
       do k = 1, n
@@ -85,7 +85,7 @@ contains
          element_shape = shape_clockwise
       else if (any(corner(:n) <= least_corner)) then
          element_shape = shape_folded
-         associate (kind => scene%kind(scene%element_kind(element)))
+         associate (kind => scene%element%kinds(scene%element%kind(element)))
             if (.not. allocated(kind%shape)) return
             if (kind%n_face_node > 2) then       ! judged with the nodes of its sides
                element_shape = shape_good

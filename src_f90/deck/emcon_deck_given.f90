@@ -21,13 +21,13 @@ contains
 
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= "GIVENFORCES") cycle
-         if (.not. allocated(scene%given_node)) then
-            allocate(scene%given_node(0))
-            scene%given_origin = reader%card(i)%origin
+         if (.not. allocated(scene%host%node)) then
+            allocate(scene%host%node(0))
+            scene%host%origin = reader%card(i)%origin
          end if
          call find_nodes(reader, reader%card(i), scene, list)
-         list = [scene%given_node, list]
-         scene%given_node = unique_sorted(list)
+         list = [scene%host%node, list]
+         scene%host%node = unique_sorted(list)
       end do
    end subroutine read_given
 
@@ -39,28 +39,28 @@ contains
       type(scene_t), intent(in) :: scene
       integer, allocatable, intent(out) :: list(:)
       character(len=:), allocatable :: name
-      logical :: without_density(0:size(scene%node_label))
+      logical :: without_density(0:size(scene%node%label))
       integer :: e, i, k
 
       if (has_option(card, "NSET")) then
          call need_name(reader, card, "NSET", name)
-         k = name_index_find(reader%node_sets, name)
+         k = name_index_find(reader%names%node_sets, name)
          if (k > 0) then
-            list = scene%node_set(k)%item
+            list = scene%set%node(k)%item
             return
          end if
-         if (name /= "" .and. .not. reader%doubt_names) call card_error(reader, card, &
-            "unknown node set " // quoted(name) // suggestion(name, set_names(scene%node_set)))
+         if (name /= "" .and. .not. reader%doubt%names) call card_error(reader, card, &
+            "unknown node set " // quoted(name) // suggestion(name, set_names(scene%set%node)))
       end if
       without_density = .true.
-      do e = 1, size(scene%element_label)
-         do k = 1, scene%kind(scene%element_kind(e))%n_node
-            without_density(scene%element_node(k, e)) = .false.
+      do e = 1, size(scene%element%label)
+         do k = 1, scene%element%kinds(scene%element%kind(e))%n_node
+            without_density(scene%element%node(k, e)) = .false.
          end do
       end do
-      list = pack([(i, i = 1, size(scene%node_label))], without_density(1:))
-      if (size(list) == 0 .and. .not. (has_option(card, "NSET") .or. reader%doubt_nodes &
-         .or. reader%doubt_elements)) call card_error(reader, card, &
+      list = pack([(i, i = 1, size(scene%node%label))], without_density(1:))
+      if (size(list) == 0 .and. .not. (has_option(card, "NSET") .or. reader%doubt%nodes &
+         .or. reader%doubt%elements)) call card_error(reader, card, &
          "all nodes belong to elements; name those that are given forces by NSET=")
    end subroutine find_nodes
 

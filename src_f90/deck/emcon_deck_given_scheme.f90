@@ -46,7 +46,7 @@ contains
       type(string_t), allocatable :: text(:)
       integer :: i
 
-      reader%log%file_name = scene%file
+      reader%log%file_name = scene%deck%file
       call check_schemes(reader, scene%pair, scene%step)
       call check_damping(reader, scene)
       call check_friction(reader, scene%pair, scene%step, scene%surface%is_nodal)

@@ -21,10 +21,10 @@ contains
       type(card_t), intent(in) :: card
       type(step_t), intent(inout) :: step
 
-      step%tolerance = 0.0_wp
-      step%tolerance_origin = card%origin
-      call option_real(reader, card, "TOLERANCE", step%tolerance)
-      if (step%tolerance >= 1.0_wp) call card_error(reader, card, &
+      step%time%tolerance = 0.0_wp
+      step%time%tolerance_origin = card%origin
+      call option_real(reader, card, "TOLERANCE", step%time%tolerance)
+      if (step%time%tolerance >= 1.0_wp) call card_error(reader, card, &
          "TOLERANCE is relative and must be below 1")
    end subroutine read_tolerance
 
@@ -34,17 +34,18 @@ contains
       type(card_t), intent(in) :: card
       type(step_t), intent(inout) :: step
 
-      step%event_fraction = 0.0_wp
+      step%time%event_fraction = 0.0_wp
       if (has_option(card, "OFF")) then
          if (has_option(card, "TYPE") .or. has_option(card, "FRACTION")) call card_error(reader, &
             card, "OFF stands alone")
          return
       end if
-      step%events = option_default("events")
-      call choose_option(reader, card, "TYPE", "events", step%events)
-      step%event_fraction = default_fraction
-      call option_real(reader, card, "FRACTION", step%event_fraction)
-      if (step%event_fraction < least_fraction .or. step%event_fraction > 1.0_wp) call card_error( &
+      step%time%events = option_default("events")
+      call choose_option(reader, card, "TYPE", "events", step%time%events)
+      step%time%event_fraction = default_fraction
+      call option_real(reader, card, "FRACTION", step%time%event_fraction)
+      if (step%time%event_fraction < least_fraction &
+         .or. step%time%event_fraction > 1.0_wp) call card_error( &
          reader, card, "FRACTION is a part of the increment, from 1e-6 to 1")
    end subroutine read_events
 
@@ -62,9 +63,10 @@ contains
          end do
          return
       end if
-      if (.not. step%tolerance > 0.0_wp) return
-      if (step%is_direct .and. step_is_dynamic(step)) call add_error(reader%log, &
-         step%tolerance_origin, "TOLERANCE asks for increments of its own, DIRECT of *DYNAMIC " // &
+      if (.not. step%time%tolerance > 0.0_wp) return
+      if (step%time%is_direct .and. step_is_dynamic(step)) call add_error(reader%log, &
+         step%time%tolerance_origin, &
+         "TOLERANCE asks for increments of its own, DIRECT of *DYNAMIC " // &
          "for those of the deck: leave out one; *TIME INTEGRATION without TOLERANCE ends it")
    end subroutine check_increments
 

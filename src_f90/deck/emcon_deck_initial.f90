@@ -72,8 +72,8 @@ contains
       type(field_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
 
-      allocate(self%value(scene%n_dim, size(scene%node_label)), source=0.0_wp)
-      allocate(self%is_given(size(scene%node_label)), source=.false.)
+      allocate(self%value(scene%n_dim, size(scene%node%label)), source=0.0_wp)
+      allocate(self%is_given(size(scene%node%label)), source=.false.)
       allocate(self%spin(n_turn(scene%n_dim), size(scene%rigid)), source=0.0_wp)
    end subroutine begin
 
@@ -131,8 +131,8 @@ contains
          if (b > 0) then
             field%spin(dof + size(field%spin, 1) - last_freedom, b) = value
             field%is_given(item(i)) = .true.
-         else if (abs(value) > 0.0_wp .and. .not. reader%doubt_rigid) then
-            call data_error(reader, data, "node " // to_text(scene%node_label(item(i))) // &
+         else if (abs(value) > 0.0_wp .and. .not. reader%doubt%rigid) then
+            call data_error(reader, data, "node " // to_text(scene%node%label(item(i))) // &
                " cannot turn: degree of freedom " // to_text(dof) // " is that of the reference " &
                // "node of a *RIGID BODY")
             return
@@ -264,10 +264,10 @@ contains
                if (field%is_given(body%node(i)) .and. any(abs(field%value(:, body%node(i)) &
                   - start) > rounding*largest)) then
                   call add_error(reader%log, field%origin, "*INITIAL CONDITIONS: the " // name &
-                     // " of node " // to_text(scene%node_label(body%node(i))) // &
+                     // " of node " // to_text(scene%node%label(body%node(i))) // &
                      " does not fit the motion of rigid body " // body%name // &
                      "; give it at the reference node " // &
-                     to_text(scene%node_label(body%reference)) // ", degrees of freedom " &
+                     to_text(scene%node%label(body%reference)) // ", degrees of freedom " &
                      // trim(merge("1, 2, 6", "1 to 6 ", scene%n_dim == n_plane)))
                   exit
                end if

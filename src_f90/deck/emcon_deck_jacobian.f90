@@ -68,8 +68,8 @@ contains
       logical, intent(in) :: is_bad(:)           !! (n_element) has a corner without area or volume
 
       if (.not. any(is_bad)) return
-      call add_warning(reader%log, scene%element_origin(findloc(is_bad, .true., 1)), "element " &
-         // label_list(pack(scene%element_label, is_bad)) // " is folded at a corner: the " &
+      call add_warning(reader%log, scene%element%origin(findloc(is_bad, .true., 1)), "element " &
+         // label_list(pack(scene%element%label, is_bad)) // " is folded at a corner: the " &
          // "Jacobian is not positive there, but at all points of integration; stresses near " &
          // "that corner are not reliable")
    end subroutine warn_of_corners

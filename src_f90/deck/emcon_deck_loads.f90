@@ -51,9 +51,9 @@ contains
       call card_table_name(card, name)
       card_amplitude = 0
       if (name == "") return
-      card_amplitude = name_index_find(reader%amplitudes, name)
+      card_amplitude = name_index_find(reader%names%amplitudes, name)
       name = option_name(card, "AMPLITUDE")
-      if (card_amplitude == 0 .and. .not. reader%doubt_names) call card_error(reader, card, &
+      if (card_amplitude == 0 .and. .not. reader%doubt%names) call card_error(reader, card, &
          "unknown amplitude " // quoted(name) // suggestion(name, table_names(scene%amplitude)))
    end function card_amplitude
 
@@ -108,7 +108,7 @@ contains
             end if
          end do
          if (any(is_other)) call data_warning(reader, data, "node " // &
-            label_list(pack(scene%node_label(item), is_other)) // " was prescribed otherwise " &
+            label_list(pack(scene%node%label(item), is_other)) // " was prescribed otherwise " &
             // "before, in this step too; the last one holds")
          deallocate(is_other)
       end do
@@ -132,7 +132,7 @@ contains
       type(scene_t), intent(in) :: scene
       logical, intent(in) :: is_held(:)            !! (last_freedom)
       integer, intent(in) :: item(:)               !! nodes
-      integer :: body(size(scene%node_label)), i
+      integer :: body(size(scene%node%label)), i
 
       if (.not. any(is_held(:scene%n_dim))) return
       call mark_rigid(scene, body)
@@ -140,9 +140,9 @@ contains
          if (body(item(i)) == 0) cycle
          associate (rigid => scene%rigid(body(item(i))))
             if (rigid%reference == item(i)) cycle
-            call data_error(reader, data, "node " // to_text(scene%node_label(item(i))) // &
+            call data_error(reader, data, "node " // to_text(scene%node%label(item(i))) // &
                " belongs to rigid body " // rigid%name // ", which moves as its reference node " &
-               // to_text(scene%node_label(rigid%reference)) // " does; prescribe that node")
+               // to_text(scene%node%label(rigid%reference)) // " does; prescribe that node")
             return
          end associate
       end do
@@ -162,7 +162,7 @@ contains
       if (all(is_held(scene%n_dim + 1:)) .and. .not. abs(value) > 0.0_wp) return
       do i = 1, size(item)
          if (.not. any(scene%rigid%reference == item(i))) cycle
-         call data_error(reader, data, "reference node " // to_text(scene%node_label(item(i))) &
+         call data_error(reader, data, "reference node " // to_text(scene%node%label(item(i))) &
             // ": a rigid body of three dimensions turns freely, or degrees of freedom 4 to 6 " &
             // "are all held at 0 by one line; single axes and driven rotations are not in " &
             // "this version")
@@ -268,10 +268,10 @@ contains
             // "of freedom 3 to 5 are 0, not " // to_text(new%value))
          if (scene%n_dim /= n_plane) call data_error(reader, data, "nodes do not turn: degrees " &
             // "of freedom 4 and 5 are 0, not " // to_text(new%value))
-      else if (is_held(last_freedom) .and. .not. reader%doubt_rigid) then
+      else if (is_held(last_freedom) .and. .not. reader%doubt%rigid) then
          do i = 1, size(item)
             if (any(scene%rigid%reference == item(i))) cycle
-            call data_error(reader, data, "node " // to_text(scene%node_label(item(i))) // &
+            call data_error(reader, data, "node " // to_text(scene%node%label(item(i))) // &
                " cannot turn by " // to_text(new%value) // ": degree of freedom 6 is that of the " &
                // "reference node of a *RIGID BODY")
             return
@@ -332,9 +332,9 @@ contains
       if (new%value == 0.0_wp .and. new%place <= last_freedom) return
       if (new%place == last_freedom .and. scene%n_dim == n_plane) then
          do i = 1, size(item)
-            if (reader%doubt_rigid .or. any(scene%rigid%reference == item(i))) cycle
+            if (reader%doubt%rigid .or. any(scene%rigid%reference == item(i))) cycle
             call data_error(reader, data, "no moment can act on node " // &
-               to_text(scene%node_label(item(i))) // ": degree of freedom 6 is that of the " // &
+               to_text(scene%node%label(item(i))) // ": degree of freedom 6 is that of the " // &
                "reference node of a *RIGID BODY")
             return
          end do

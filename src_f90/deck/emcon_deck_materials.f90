@@ -45,7 +45,7 @@ contains
                call start_material(reader, card, scene, n)
             case ("DENSITY", "DAMPING", "ELASTIC", "HYPERELASTIC", "USERMATERIAL")
                if (n == 0) then
-                  if (.not. reader%doubt_names) call card_error(reader, card, &
+                  if (.not. reader%doubt%names) call card_error(reader, card, &
                      "there is no *MATERIAL before")
                else if (card%name == "DENSITY") then
                   call read_density(reader, card, scene%material(n))
@@ -74,14 +74,14 @@ contains
       integer :: i_same
 
       call need_name(reader, card, "NAME", name)
-      i_same = name_index_find(reader%materials, name)
+      i_same = name_index_find(reader%names%materials, name)
       if (i_same > 0 .and. name /= "") then
          call card_error(reader, card, "material " // name // " is defined twice; first at " &
             // where_text(scene, scene%material(i_same)%origin))
       end if
       n = n + 1
       scene%material(n)%name = name
-      call name_index_put(reader%materials, name, n)
+      call name_index_put(reader%names%materials, name, n)
       scene%material(n)%origin = card%origin
       allocate(scene%material(n)%constant(0))
    end subroutine start_material
@@ -326,8 +326,8 @@ contains
          call need_name(reader, card, "ELSET", set_name)
          section%set = set_name
          call need_name(reader, card, "MATERIAL", name)
-         section%material = name_index_find(reader%materials, name)
-         if (section%material == 0 .and. name /= "" .and. .not. reader%doubt_names) then
+         section%material = name_index_find(reader%names%materials, name)
+         if (section%material == 0 .and. name /= "" .and. .not. reader%doubt%names) then
             allocate(known(size(scene%material)))
             do i = 1, size(known)
                known(i)%text = scene%material(i)%name
@@ -353,15 +353,15 @@ contains
             if (next_line(reader, data)) call data_error(reader, data, "only one data line is read")
          end if
       end associate
-      i = name_index_find(reader%element_sets, set_name)
+      i = name_index_find(reader%names%element_sets, set_name)
       if (i > 0) then
-         call assign_section(reader, card, scene, scene%element_set(i)%item, i_section)
-      else if (set_name /= "" .and. .not. reader%doubt_names) then
-         call hint_at_set(reader, "element set", set_name, set_names(scene%element_set), hint)
+         call assign_section(reader, card, scene, scene%set%element(i)%item, i_section)
+      else if (set_name /= "" .and. .not. reader%doubt%names) then
+         call hint_at_set(reader, "element set", set_name, set_names(scene%set%element), hint)
          call card_error(reader, card, "unknown element set " // quoted(set_name) // hint)
-         reader%doubt_names = .true.
+         reader%doubt%names = .true.
       end if
-      if (i > 0 .and. name_index_find(reader%line_sets, set_name) > 0) call card_error( &
+      if (i > 0 .and. name_index_find(reader%names%line_sets, set_name) > 0) call card_error( &
          reader, card, &
          "element set " // quoted(set_name) // " holds lines too, which have no stiffness; give " &
          // "the section a set without them")
@@ -392,10 +392,10 @@ contains
       integer, intent(in) :: i_section
       logical :: has_one(size(item))
 
-      has_one = scene%element_section(item) > 0
+      has_one = scene%element%section(item) > 0
       if (any(has_one)) call card_error(reader, card, "element " &
-         // label_list(scene%element_label(pack(item, has_one))) // " has a section already")
-      scene%element_section(item) = i_section
+         // label_list(scene%element%label(pack(item, has_one))) // " has a section already")
+      scene%element%section(item) = i_section
    end subroutine assign_section
 
 end module emcon_deck_materials

@@ -59,7 +59,7 @@ contains
       integer :: i, n, most
 
       most = count_lines(reader, "NODE")
-      allocate(scene%node_label(most), scene%node_origin(most), scene%x(scene%n_dim, most))
+      allocate(scene%node%label(most), scene%node%origin(most), scene%x(scene%n_dim, most))
       n = 0
       is_solid_told = .false.
       do i = 1, size(reader%card)
@@ -68,17 +68,17 @@ contains
          call read_node_card(reader, reader%card(i), scene, n, is_solid_told)
          reader%card(i)%last_item = n
       end do
-      scene%node_label = scene%node_label(:n)
-      scene%node_origin = scene%node_origin(:n)
+      scene%node%label = scene%node%label(:n)
+      scene%node%origin = scene%node%origin(:n)
       scene%x = scene%x(:, :n)
-      call label_map_init(reader%node_map, scene%node_label, repeated)
-      reader%doubt_positions = reader%doubt_positions .or. size(repeated) > 0
+      call label_map_init(reader%node_map, scene%node%label, repeated)
+      reader%doubt%positions = reader%doubt%positions .or. size(repeated) > 0
       do i = 1, size(repeated)
-         call tell_repeated(reader, scene, "node", scene%node_label(repeated(i)), &
-            scene%node_origin(repeated(i)), scene%node_origin( &
-            find_label(reader%node_map, scene%node_label(repeated(i)))))
+         call tell_repeated(reader, scene, "node", scene%node%label(repeated(i)), &
+            scene%node%origin(repeated(i)), scene%node%origin( &
+            find_label(reader%node_map, scene%node%label(repeated(i)))))
       end do
-      if (n == 0 .and. .not. reader%doubt_nodes) then
+      if (n == 0 .and. .not. reader%doubt%nodes) then
          call add_error(reader%log, origin_t(1, 0), "the deck has no node")
       end if
    end subroutine read_nodes
@@ -98,7 +98,7 @@ contains
       do while (next_line(reader, data))
          call get_integer(reader, data, 1, "node label", label)
          if (.not. data%ok) then
-            reader%doubt_nodes = .true.
+            reader%doubt%nodes = .true.
             cycle
          end if
          call check_count(reader, data, 1, 4, "label, x, y, z")
@@ -110,11 +110,11 @@ contains
             call data_error(reader, data, "node " // to_text(label) // " has no z: the elements " &
                // "have three dimensions")
          end if
-         reader%doubt_positions = reader%doubt_positions .or. .not. data%ok
+         reader%doubt%positions = reader%doubt%positions .or. .not. data%ok
          ! A node with a bad coordinate stays, so that what names it is not an error too.
          n = n + 1
-         scene%node_label(n) = label
-         scene%node_origin(n) = line_origin(reader, data%i_line)
+         scene%node%label(n) = label
+         scene%node%origin(n) = line_origin(reader, data%i_line)
          scene%x(:, n) = position(:scene%n_dim)
          if (any(abs(position(scene%n_dim + 1:)) > 0.0_wp) .and. .not. is_solid_told) then
             call data_warning(reader, data, "z of node " // to_text(label) &
@@ -143,8 +143,8 @@ contains
       integer :: i, k, n, n_line, most
 
       most = count_lines(reader, "ELEMENT")
-      allocate(scene%element_label(most), scene%element_origin(most), scene%element_kind(most), &
-         scene%element_node(max_element_nodes, most))
+      allocate(scene%element%label(most), scene%element%origin(most), scene%element%kind(most), &
+         scene%element%node(max_element_nodes, most))
       allocate(reader%line_label(most), reader%line_node(2, most), line_origin_of(most))
       n = 0
       n_line = 0
@@ -152,20 +152,20 @@ contains
          if (reader%card(i)%name /= "ELEMENT") cycle
          call read_element_card(reader, i, scene, line_origin_of, n, n_line)
       end do
-      scene%element_label = scene%element_label(:n)
-      scene%element_origin = scene%element_origin(:n)
-      scene%element_kind = scene%element_kind(:n)
+      scene%element%label = scene%element%label(:n)
+      scene%element%origin = scene%element%origin(:n)
+      scene%element%kind = scene%element%kind(:n)
       k = 2                                        ! room for an edge
       do i = 1, n
-         k = max(k, scene%kind(scene%element_kind(i))%n_node)
+         k = max(k, scene%element%kinds(scene%element%kind(i))%n_node)
       end do
-      scene%element_node = scene%element_node(:k, :n)
-      allocate(scene%element_section(n), source=0)
+      scene%element%node = scene%element%node(:k, :n)
+      allocate(scene%element%section(n), source=0)
       reader%line_label = reader%line_label(:n_line)
       reader%line_node = reader%line_node(:, :n_line)
       call map_elements(reader, scene, line_origin_of(:n_line))
-      reader%doubt_shapes = reader%doubt_shapes .or. reader%doubt_elements
-      if (n == 0 .and. .not. (reader%doubt_elements .or. is_given(reader))) then
+      reader%doubt%shapes = reader%doubt%shapes .or. reader%doubt%elements
+      if (n == 0 .and. .not. (reader%doubt%elements .or. is_given(reader))) then
          call add_error(reader%log, origin_t(1, 0), "the deck has no element")
       end if
    end subroutine read_elements
@@ -179,15 +179,15 @@ contains
       type(origin_t), allocatable :: origin(:)
       integer :: i
 
-      allocate(label, source=[scene%element_label, reader%line_label])
-      allocate(origin, source=[scene%element_origin, line_origin_of])
+      allocate(label, source=[scene%element%label, reader%line_label])
+      allocate(origin, source=[scene%element%origin, line_origin_of])
       call label_map_init(reader%element_map, label, repeated)
-      reader%doubt_shapes = size(repeated) > 0
+      reader%doubt%shapes = size(repeated) > 0
       do i = 1, size(repeated)
          call tell_repeated(reader, scene, "element", label(repeated(i)), origin(repeated(i)), &
             origin(find_label(reader%element_map, label(repeated(i)))))
       end do
-      associate (n => size(scene%element_label), index => reader%element_map%index)
+      associate (n => size(scene%element%label), index => reader%element_map%index)
          where (index > n) index = n - index
       end associate
    end subroutine map_elements
@@ -218,13 +218,13 @@ contains
       call find_type(reader, i_card, scene, n, kind)
       if (kind == 0) return
       n_node = 2
-      if (kind > 0) n_node = scene%kind(kind)%n_node
+      if (kind > 0) n_node = scene%element%kinds(kind)%n_node
       before = [n, n_line]
       call data_open(data, card)
       do while (next_line(reader, data))
          call get_integer(reader, data, 1, "element label", label)
          if (.not. data%ok) then
-            reader%doubt_elements = .true.
+            reader%doubt%elements = .true.
             cycle
          end if
          call read_connectivity(reader, data, label, n_node, node)
@@ -235,10 +235,10 @@ contains
             line_origin_of(n_line) = line_origin(reader, data%i_line)
          else
             n = n + 1
-            scene%element_label(n) = label
-            scene%element_origin(n) = line_origin(reader, data%i_line)
-            scene%element_kind(n) = kind
-            scene%element_node(:, n) = node
+            scene%element%label(n) = label
+            scene%element%origin(n) = line_origin(reader, data%i_line)
+            scene%element%kind(n) = kind
+            scene%element%node(:, n) = node
          end if
       end do
       reader%card(i_card)%first_item = merge(-n_line, before(1) + 1, kind == kind_line)
@@ -258,7 +258,7 @@ contains
       logical :: is_first
 
       kind = 0
-      associate (card => reader%card(i_card), kinds => scene%kind)
+      associate (card => reader%card(i_card), kinds => scene%element%kinds)
          call need_name(reader, card, "TYPE", type_name)
          if (type_name /= "") kind = find_element_kind(kinds, type_name)
          if (kind > 0) return
@@ -269,8 +269,8 @@ contains
          end do
          if (type_dimension(type_name) == other_dimension(scene%n_dim)) then
             if (is_first) call tell_mixed(reader, card, scene, n, type_name)
-            reader%doubt_elements = .true.
-            reader%doubt_names = .true.
+            reader%doubt%elements = .true.
+            reader%doubt%names = .true.
             return
          end if
          if (any(line_types == type_name) .and. scene%n_dim /= n_space) then
@@ -282,8 +282,8 @@ contains
          if (has_user_card(reader, type_name)) is_first = .false.
          if (type_name /= "" .and. is_first) call refuse_type(reader, card, kinds, type_name)
       end associate
-      reader%doubt_elements = .true.
-      reader%doubt_names = .true.
+      reader%doubt%elements = .true.
+      reader%doubt%names = .true.
    end subroutine find_type
 
    !> An element of the plane in a scene of three dimensions, or one of these in the plane.
@@ -304,8 +304,8 @@ contains
          if (data%ok) own = "element " // to_text(label)
       end if
       first = "others"
-      if (n > 0) first = "element " // to_text(scene%element_label(1)) // ", " &
-         // trim(scene%kind(scene%element_kind(1))%name) // ","
+      if (n > 0) first = "element " // to_text(scene%element%label(1)) // ", " &
+         // trim(scene%element%kinds(scene%element%kind(1))%name) // ","
       call card_error(reader, card, "element type " // type_name // " of " // own // " beside " &
          // first // " of " // to_text(scene%n_dim) // " dimensions: a deck has elements of the " &
          // "plane or of space, not of both (told once). What Gmsh writes as faces of solids " &
@@ -393,7 +393,7 @@ contains
       integer :: k
 
       if (any(node == 0)) then
-         if (.not. reader%doubt_nodes) call data_error(reader, data, "element " &
+         if (.not. reader%doubt%nodes) call data_error(reader, data, "element " &
             // to_text(element) // " names node " // label_list(pack(label, node == 0)) &
             // ", which does not exist")
          node = 0

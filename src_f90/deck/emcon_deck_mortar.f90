@@ -50,7 +50,7 @@ contains
       type(reader_t), intent(in) :: reader
       type(contact_pair_t), intent(in) :: pair(:)
 
-      in_doubt = reader%doubt_names .or. any(pair%formulation == 0)
+      in_doubt = reader%doubt%names .or. any(pair%formulation == 0)
    end function in_doubt
 
    subroutine warn_of_mortar(reader, card, pair, options)

@@ -35,7 +35,7 @@ contains
 
       hint = suggestion(name, known)
       if (what /= "element set") return
-      if (name_index_find(reader%line_sets, name) > 0) hint = &
+      if (name_index_find(reader%names%line_sets, name) > 0) hint = &
          ": it holds lines, which have no stiffness; only *SURFACE and *NSET may name it"
    end subroutine hint_at_set
 
@@ -46,7 +46,7 @@ contains
       type(string_t), intent(in) :: known(:)
       character(len=:), allocatable :: hint
 
-      if (reader%doubt_names) then
+      if (reader%doubt%names) then
          data%ok = .false.
       else
          call hint_at_set(reader, what, name, known, hint)
@@ -62,7 +62,7 @@ contains
       type(scene_t), intent(in) :: scene
       integer, allocatable, intent(out) :: item(:)
 
-      call get_items(reader, data, k, "node", scene%node_set, item)
+      call get_items(reader, data, k, "node", scene%set%node, item)
    end subroutine get_nodes
 
    !> The elements that field `k` names by label or set.
@@ -73,7 +73,7 @@ contains
       type(scene_t), intent(in) :: scene
       integer, allocatable, intent(out) :: item(:)
 
-      call get_items(reader, data, k, "element", scene%element_set, item)
+      call get_items(reader, data, k, "element", scene%set%element, item)
    end subroutine get_elements
 
    !> The lines that field `k` names by label or set; none if it names none.
@@ -92,7 +92,7 @@ contains
          if (i < 0) line = [-i]
       else
          call get_name(reader, data, k, "element label or set", name)
-         i = name_index_find(reader%line_sets, name)
+         i = name_index_find(reader%names%line_sets, name)
          if (i > 0) line = reader%line_set(i)%item
       end if
    end subroutine get_lines
@@ -114,10 +114,10 @@ contains
          if (.not. data%ok) return
          if (what == "node") then
             i = find_label(reader%node_map, label)
-            is_doubted = reader%doubt_nodes
+            is_doubted = reader%doubt%nodes
          else
             i = find_label(reader%element_map, label)
-            is_doubted = reader%doubt_elements
+            is_doubted = reader%doubt%elements
          end if
          if (i > 0) then
             item = [i]
@@ -133,9 +133,9 @@ contains
          call get_name(reader, data, k, what // " label or set", name)
          if (.not. data%ok) return
          if (what == "node") then
-            i = name_index_find(reader%node_sets, name)
+            i = name_index_find(reader%names%node_sets, name)
          else
-            i = name_index_find(reader%element_sets, name)
+            i = name_index_find(reader%names%element_sets, name)
          end if
          if (i > 0) then
             item = set(i)%item

@@ -111,7 +111,7 @@ contains
       integer :: i
 
       if (all(new%kind /= [output_contact_file, output_contact_print])) return
-      if (size(scene%pair) == 0 .and. .not. reader%doubt_names) then
+      if (size(scene%pair) == 0 .and. .not. reader%doubt%names) then
          call card_warning(reader, card, "there is no *CONTACT PAIR: nothing will be written")
       else if (new%totals .and. all([(new%variable(i)%text /= "CF", &
          i = 1, size(new%variable))])) then
@@ -197,9 +197,9 @@ contains
 
       select case (new%kind)
       case (output_node_file, output_node_print)
-         call overlap_query_up("NSET", "node set", scene%node_set, reader%node_sets)
+         call overlap_query_up("NSET", "node set", scene%set%node, reader%names%node_sets)
       case (output_element_file, output_element_print)
-         call overlap_query_up("ELSET", "element set", scene%element_set, reader%element_sets)
+         call overlap_query_up("ELSET", "element set", scene%set%element, reader%names%element_sets)
       end select
 
    contains
@@ -213,7 +213,7 @@ contains
          name = option_name(card, option)
          if (name == "") return
          new%set = name_index_find(index_of, name)
-         if (new%set == 0 .and. .not. reader%doubt_names) then
+         if (new%set == 0 .and. .not. reader%doubt%names) then
             call hint_at_set(reader, what, name, set_names(set), hint)
             call card_error(reader, card, "unknown set " // option // "=" // quoted(name) // hint)
          end if
@@ -237,10 +237,10 @@ contains
       if (has_option(card, "FREQUENCY")) then
          call card_error(reader, card, "FREQUENCY and TIME POINTS exclude each other")
       end if
-      i = name_index_find(reader%times, name)
+      i = name_index_find(reader%names%times, name)
       if (i > 0) then
          new%time = reader%time_points(i)%time
-      else if (.not. reader%doubt_names) then
+      else if (.not. reader%doubt%names) then
          call card_error(reader, card, "unknown time points " // quoted(name) &
             // suggestion(name, table_names(reader%time_points)))
       end if

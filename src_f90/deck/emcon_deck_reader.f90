@@ -3,7 +3,7 @@ module emcon_deck_reader
    use emcon_amplitudes, only : amplitude_t
    use emcon_deck_labels, only : label_map_t
    use emcon_diagnostics, only : add_error, add_warning, diagnostics_t, quoted, suggestion
-   use emcon_interactions, only : surface_laws_t
+   use emcon_interactions, only : interaction_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : named_set_t
    use emcon_name_index, only : name_index_t
@@ -11,7 +11,7 @@ module emcon_deck_reader
    use emcon_text, only : read_integer, read_real, squeezed, string_t, to_text
    implicit none
    private
-   public :: reader_t, card_t, option_t, max_name
+   public :: reader_t, doubts_t, names_t, card_t, option_t, max_name
    public :: line_origin, source_line, card_error, card_warning, bare_name
    public :: has_option, option_name, option_count, option_real, option_angle, need_name
    public :: refuse_option
@@ -38,8 +38,25 @@ module emcon_deck_reader
       logical :: is_parametric = .false.           !! it names parameters: may serve several scenes
    end type card_t
 
-   !> The state of a reading. The doubts tell which unknown names may be consequences of errors
-   !> that have been told already, and are not told again.
+   !> Which unknown names may be consequences of errors that have been told already, and are not
+   !> told again.
+   type :: doubts_t
+      logical :: nodes = .false.
+      logical :: elements = .false.
+      logical :: names = .false.
+      logical :: positions = .false.                     !! some node is not where it should be
+      logical :: shapes = .false.                        !! some element is not what it should be
+      logical :: equations = .false.                     !! some equation is missing after an error
+      logical :: rigid = .false.                         !! so is some rigid body
+   end type doubts_t
+
+   !> Where things stand in their lists, by name.
+   type :: names_t
+      type(name_index_t) :: node_sets, element_sets, line_sets
+      type(name_index_t) :: surfaces, materials, amplitudes, interactions, times
+   end type names_t
+
+   !> The state of a reading.
    type :: reader_t
       type(string_t), pointer :: line(:) => null()       !! view of the source
       integer, pointer :: file(:) => null(), number(:) => null()
@@ -50,21 +67,15 @@ module emcon_deck_reader
       logical :: is_lenient = .false.
       integer :: n_dim = 0                               !! of the model
       logical :: is_axial = .false.                      !! it is one of solids of revolution
-      logical :: doubt_nodes = .false., doubt_elements = .false., doubt_names = .false.
-      logical :: doubt_positions = .false.               !! some node is not where it should be
-      logical :: doubt_shapes = .false.                  !! some element is not what it should be
-      logical :: doubt_equations = .false.               !! some equation is missing after an error
-      logical :: doubt_rigid = .false.                   !! so is some rigid body
+      type(doubts_t) :: doubt
       type(label_map_t) :: node_map
       type(label_map_t) :: element_map                   !! also of lines, these below 0
       integer, allocatable :: line_label(:)              !! (n_line) elements that are edges only
       integer, allocatable :: line_node(:, :)            !! (2, n_line), 0: it had errors
       type(named_set_t), allocatable :: line_set(:)      !! the lines of element sets that have some
-      type(name_index_t) :: node_sets, element_sets, line_sets   !! where the sets are, by name
-      type(name_index_t) :: surfaces, materials, amplitudes, interactions, times
-      type(string_t), allocatable :: interaction(:)      !! names of surface interactions
-      real(wp), allocatable :: pad(:)                    !! PAD THICKNESS of each [L]
-      type(surface_laws_t), allocatable :: laws(:)       !! of each
+      type(names_t) :: names
+      type(string_t), allocatable :: interaction_name(:)
+      type(interaction_t), allocatable :: interaction(:)
       type(amplitude_t), allocatable :: time_points(:)   !! only names and times
    end type reader_t
 
@@ -158,13 +169,13 @@ contains
 
       name = option_name(card, option)
       if (name == "") then
-         reader%doubt_names = .true.
+         reader%doubt%names = .true.
          call card_error(reader, card, option // "= is missing")
       else if (len(name) > max_name) then
          call card_error(reader, card, option // "=" // quoted(name) // " is longer than " &
             // to_text(max_name) // " characters")
          name = ""
-         reader%doubt_names = .true.
+         reader%doubt%names = .true.
       end if
    end subroutine need_name
 

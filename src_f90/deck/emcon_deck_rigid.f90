@@ -33,7 +33,7 @@ contains
          if (reader%card(i)%name /= "RIGIDBODY") cycle
          n_before = reader%log%n_errors
          call read_card(reader, reader%card(i), scene, new)
-         reader%doubt_rigid = reader%doubt_rigid .or. reader%log%n_errors > n_before
+         reader%doubt%rigid = reader%doubt%rigid .or. reader%log%n_errors > n_before
          if (reader%log%n_errors > n_before .or. .not. allocated(new%frame)) cycle
          n = size(scene%rigid)
          allocate(all(n + 1))
@@ -60,14 +60,14 @@ contains
       call find_profile(reader, card, scene, new, node)
       call find_reference(reader, card, scene, new%reference)
       if (.not. (allocated(new%element) .and. allocated(node)) .or. new%reference == 0) return
-      if (reader%doubt_elements .or. reader%doubt_positions) return
-      associate (of_element => scene%element_node(:, new%element))
+      if (reader%doubt%elements .or. reader%doubt%positions) return
+      associate (of_element => scene%element%node(:, new%element))
          new%node = unique_sorted([pack(of_element, of_element > 0), node, new%reference])
       end associate
       call check_alone(reader, card, scene, new)
       call rigid_frame_choose(scene%x, new%node, new%reference, new%frame)
       if (.not. allocated(new%frame)) call card_error(reader, card, "the nodes of " &
-         // new%name // " and the reference node " // to_text(scene%node_label(new%reference)) &
+         // new%name // " and the reference node " // to_text(scene%node%label(new%reference)) &
          // " lie " // trim(merge("on one line ", "in one plane", scene%n_dim == n_plane)) &
          // ", which tells no rotation; put the reference node beside it")
    end subroutine read_card
@@ -82,15 +82,15 @@ contains
 
       call need_name(reader, card, "ELSET", new%name)
       if (new%name == "") return
-      i = name_index_find(reader%element_sets, new%name)
+      i = name_index_find(reader%names%element_sets, new%name)
       if (i == 0) then
-         call hint_at_set(reader, "element set", new%name, set_names(scene%element_set), hint)
-         if (.not. reader%doubt_names) call card_error(reader, card, "unknown element set " // &
+         call hint_at_set(reader, "element set", new%name, set_names(scene%set%element), hint)
+         if (.not. reader%doubt%names) call card_error(reader, card, "unknown element set " // &
             quoted(new%name) // hint)
-      else if (size(scene%element_set(i)%item) == 0) then
+      else if (size(scene%set%element(i)%item) == 0) then
          call card_error(reader, card, "element set " // new%name // " is empty")
       else
-         new%element = scene%element_set(i)%item
+         new%element = scene%set%element(i)%item
       end if
    end subroutine find_elements
 
@@ -111,9 +111,9 @@ contains
       call need_name(reader, card, "ANALYTICALSURFACE", name)
       if (name == "") return
       if (.not. allocated(new%name)) new%name = name
-      i = name_index_find(reader%surfaces, name)
+      i = name_index_find(reader%names%surfaces, name)
       if (i == 0) then
-         if (.not. reader%doubt_names) call card_error(reader, card, "unknown surface " // &
+         if (.not. reader%doubt%names) call card_error(reader, card, "unknown surface " // &
             quoted(name) // suggestion(name, surface_names(scene%surface)))
       else if (.not. scene%surface(i)%is_profile) then
          call card_error(reader, card, "surface " // name // " is not of TYPE=SEGMENTS; a " // &
@@ -142,18 +142,18 @@ contains
       call read_integer(name, label, is_number)
       if (is_number) then
          node = find_label(reader%node_map, label)
-         if (node == 0 .and. .not. reader%doubt_nodes) call card_error(reader, card, &
+         if (node == 0 .and. .not. reader%doubt%nodes) call card_error(reader, card, &
             "the reference node " // name // " does not exist")
       else
-         i = name_index_find(reader%node_sets, name)
+         i = name_index_find(reader%names%node_sets, name)
          if (i == 0) then
-            if (.not. reader%doubt_names) call card_error(reader, card, "unknown node set " // &
-               quoted(name) // suggestion(name, set_names(scene%node_set)))
-         else if (size(scene%node_set(i)%item) /= 1) then
+            if (.not. reader%doubt%names) call card_error(reader, card, "unknown node set " // &
+               quoted(name) // suggestion(name, set_names(scene%set%node)))
+         else if (size(scene%set%node(i)%item) /= 1) then
             call card_error(reader, card, "the reference node is one node, but node set " // name &
-               // " has " // to_text(size(scene%node_set(i)%item)))
+               // " has " // to_text(size(scene%set%node(i)%item)))
          else
-            node = scene%node_set(i)%item(1)
+            node = scene%set%node(i)%item(1)
          end if
       end if
    end subroutine find_reference
@@ -164,7 +164,7 @@ contains
       type(card_t), intent(in) :: card
       type(scene_t), intent(in) :: scene
       type(rigid_body_t), intent(in) :: new
-      logical :: is_in(size(scene%node_label)), is_there(size(scene%node_label))
+      logical :: is_in(size(scene%node%label)), is_there(size(scene%node%label))
       integer :: b
 
       is_in = .false.
@@ -172,14 +172,14 @@ contains
       do b = 1, size(scene%rigid)
          associate (other => scene%rigid(b))
             if (other%reference == new%reference) then
-               call card_error(reader, card, "the reference node " // to_text(scene%node_label( &
+               call card_error(reader, card, "the reference node " // to_text(scene%node%label( &
                   new%reference)) // " is that of rigid body " // other%name // " already")
                cycle
             end if
             is_there = .false.
             is_there(other%node) = .true.
             if (any(is_in .and. is_there)) call card_error(reader, card, "node " // &
-               label_list(pack(scene%node_label, is_in .and. is_there)) // &
+               label_list(pack(scene%node%label, is_in .and. is_there)) // &
                " belongs to rigid body " // other%name // " already; make both one body, or " // &
                "give each its own nodes")
          end associate
@@ -251,11 +251,11 @@ contains
 
       if (allocated(scene%rigid(b)%arm)) return
       n_dim = scene%n_dim
-      n = size(scene%node_label)
-      associate (rigid => scene%rigid(b), last => maxval([0, scene%node_label]))
+      n = size(scene%node%label)
+      associate (rigid => scene%rigid(b), last => maxval([0, scene%node%label]))
          rigid%arm = [(n + k, k = 1, n_dim)]
-         scene%node_label = [scene%node_label, [(last + k, k = 1, n_dim)]]
-         scene%node_origin = [scene%node_origin, [(origin, k = 1, n_dim)]]
+         scene%node%label = [scene%node%label, [(last + k, k = 1, n_dim)]]
+         scene%node%origin = [scene%node%origin, [(origin, k = 1, n_dim)]]
          scene%x = reshape([scene%x, scene%x(:, rigid%frame(2:))], [n_dim, n + n_dim])
          call lengthen(scene%u0)
          call lengthen(scene%v0)

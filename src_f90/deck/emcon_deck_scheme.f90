@@ -78,14 +78,14 @@ contains
       integer :: k
 
       do k = 1, size(step)
-         associate (row => step(k)%scheme, initiation => step(k)%initiation)
+         associate (row => step(k)%scheme, initiation => step(k)%contact%initiation)
             if (initiation == initiation_massless .and. .not. row%takes_massless) call refuse( &
                "*CONTACT INITIATION, TYPE=MASSLESS, in step ", "nodes without mass")
             if (row%takes_jumps) cycle
             if (initiation == initiation_velocity_update) call refuse( &
                "*CONTACT INITIATION, TYPE=VELOCITY UPDATE, in step ", "velocities that jump")
-            if (any(pair%laws%restitution < 1.0_wp)) call refuse("RESTITUTION below 1, in step ", &
-               "velocities that jump")
+            if (any(pair%interaction%restitution < 1.0_wp)) call refuse( &
+               "RESTITUTION below 1, in step ", "velocities that jump")
          end associate
       end do
 

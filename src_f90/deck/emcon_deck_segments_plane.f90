@@ -44,7 +44,7 @@ contains
       if (is_well .and. size(place, 2) < 2) call card_error(reader, card, &
          "a profile begins with START, x, y and goes on with LINE, x, y or CIRCL, x, y, xc, yc")
       if (is_well .and. size(place, 2) >= 2) call add_nodes(scene, card%origin, place, surface)
-      reader%doubt_names = reader%doubt_names .or. .not. is_well
+      reader%doubt%names = reader%doubt%names .or. .not. is_well
    end subroutine read_segments
 
    !> The points of a data line behind those of `place`.
@@ -131,8 +131,8 @@ contains
       n = size(place, 2)
       if (norm2(place(:, n) - place(:, 1)) <= rounding*norm2(maxval(place, 2) &
          - minval(place, 2))) n = n - 1
-      n_before = size(scene%node_label)
-      last = maxval([0, scene%node_label])
+      n_before = size(scene%node%label)
+      last = maxval([0, scene%node%label])
       allocate(node, source=[(n_before + i, i = 1, n)])
       if (n < size(place, 2)) node = [node, n_before + 1]
       surface%edge = reshape([(node(i + 1), node(i), i = 1, size(node) - 1)], &
@@ -143,8 +143,8 @@ contains
          surface%inner_node = n_before + n
          scene%x = reshape([scene%x, inner_place(place)], [2, n_before + n])
       end if
-      scene%node_label = [scene%node_label, [(last + i, i = 1, n)]]
-      scene%node_origin = [scene%node_origin, [(origin, i = 1, n)]]
+      scene%node%label = [scene%node%label, [(last + i, i = 1, n)]]
+      scene%node%origin = [scene%node%origin, [(origin, i = 1, n)]]
    end subroutine add_nodes
 
    !> Do all points lie on one line? Then they do not tell how the body is turned.

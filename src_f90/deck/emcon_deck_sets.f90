@@ -43,16 +43,16 @@ contains
       allocate(reader%line_set(0))
       elements%what = "element"
       elements%keyword = "ELSET"
-      call build_sets(reader, elements, "ELEMENT", reader%element_map, reader%doubt_elements, scene)
+      call build_sets(reader, elements, "ELEMENT", reader%element_map, reader%doubt%elements, scene)
       call finish(elements, set)
-      call part_lines(set, scene%element_set, reader%line_set)
-      call index_sets(scene%element_set, reader%element_sets)
-      call index_sets(reader%line_set, reader%line_sets)
+      call part_lines(set, scene%set%element, reader%line_set)
+      call index_sets(scene%set%element, reader%names%element_sets)
+      call index_sets(reader%line_set, reader%names%line_sets)
       nodes%what = "node"
       nodes%keyword = "NSET"
-      call build_sets(reader, nodes, "NODE", reader%node_map, reader%doubt_nodes, scene)
-      call finish(nodes, scene%node_set)
-      call index_sets(scene%node_set, reader%node_sets)
+      call build_sets(reader, nodes, "NODE", reader%node_map, reader%doubt%nodes, scene)
+      call finish(nodes, scene%set%node)
+      call index_sets(scene%set%node, reader%names%node_sets)
    end subroutine read_sets
 
    pure subroutine index_sets(set, index_of)
@@ -138,19 +138,19 @@ contains
       call need_name(reader, card, "ELSET", name)
       if (has_option(card, "GENERATE")) call card_error(reader, card, &
          "ELSET and GENERATE exclude each other")
-      i_set = name_index_find(reader%element_sets, name)
+      i_set = name_index_find(reader%names%element_sets, name)
       if (i_set > 0) then
-         associate (item => scene%element_set(i_set)%item)
+         associate (item => scene%set%element(i_set)%item)
             do i = 1, size(item)
-               do k = 1, scene%kind(scene%element_kind(item(i)))%n_node
-                  if (scene%element_node(k, item(i)) > 0) then
-                     call append(list, scene%element_node(k, item(i)))
+               do k = 1, scene%element%kinds(scene%element%kind(item(i)))%n_node
+                  if (scene%element%node(k, item(i)) > 0) then
+                     call append(list, scene%element%node(k, item(i)))
                   end if
                end do
             end do
          end associate
       end if
-      i_lines = name_index_find(reader%line_sets, name)
+      i_lines = name_index_find(reader%names%line_sets, name)
       if (i_lines > 0) then
          associate (item => reader%line_set(i_lines)%item)
             do i = 1, size(item)
@@ -161,9 +161,9 @@ contains
             end do
          end associate
       end if
-      if (i_set + i_lines > 0 .or. name == "" .or. reader%doubt_names) return
+      if (i_set + i_lines > 0 .or. name == "" .or. reader%doubt%names) return
       call card_error(reader, card, "unknown element set " // quoted(name) &
-         // suggestion(name, set_names(scene%element_set)))
+         // suggestion(name, set_names(scene%set%element)))
    end subroutine append_nodes_of
 
    subroutine find_or_add(builder, name, card, i_set)
@@ -304,7 +304,7 @@ contains
             call append(builder%list(i_set), map%index(i))
             n_found = n_found + 1
          end do
-         if (n_found == n_expected .or. reader%doubt_nodes .or. reader%doubt_elements) cycle
+         if (n_found == n_expected .or. reader%doubt%nodes .or. reader%doubt%elements) cycle
          if (n_found == 0) then
             call data_error(reader, data, "no " // trim(builder%what) // " has any of these labels")
          else

@@ -31,9 +31,9 @@ contains
    subroutine check_shapes_space(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      integer :: fault(size(scene%element_label)), e
+      integer :: fault(size(scene%element%label)), e
 
-      if (reader%doubt_positions) return
+      if (reader%doubt%positions) return
       do e = 1, size(fault)
          fault(e) = fault_of(scene, e)
       end do
@@ -45,8 +45,8 @@ contains
       call tell(is_off, " has a node outside the middle half of its edge, where the element " &
          // "folds; put it into the middle")
       if (any(fault == is_doubtful)) call add_warning(reader%log, &
-         scene%element_origin(findloc(fault, is_doubtful, 1)), "element " &
-         // label_list(pack(scene%element_label, fault == is_doubtful)) // " has a node far off " &
+         scene%element%origin(findloc(fault, is_doubtful, 1)), "element " &
+         // label_list(pack(scene%element%label, fault == is_doubtful)) // " has a node far off " &
          // "the middle of its edge: strains are less exact, and infinite at a corner if it " &
          // "stands at a quarter")
 
@@ -57,9 +57,9 @@ contains
          character(len=*), intent(in) :: text
 
          if (.not. any(fault == kind)) return
-         reader%doubt_shapes = .true.
-         call add_error(reader%log, scene%element_origin(findloc(fault, kind, 1)), "element " &
-            // label_list(pack(scene%element_label, fault == kind)) // text)
+         reader%doubt%shapes = .true.
+         call add_error(reader%log, scene%element%origin(findloc(fault, kind, 1)), "element " &
+            // label_list(pack(scene%element%label, fault == kind)) // text)
       end subroutine tell
 
    end subroutine check_shapes_space
@@ -68,16 +68,16 @@ contains
    pure integer function fault_of(scene, e) result(fault)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: e                   !! 1..n_element
-      real(wp) :: x(n_dim, size(scene%element_node, 1)), det(size(scene%element_node, 1))
+      real(wp) :: x(n_dim, size(scene%element%node, 1)), det(size(scene%element%node, 1))
       real(wp) :: along, beside
       integer :: i, n
 
       fault = 0
-      associate (kind => scene%kind(scene%element_kind(e)))
+      associate (kind => scene%element%kinds(scene%element%kind(e)))
          n = kind%n_node
          if (.not. allocated(kind%shape)) return
-         if (any(scene%element_node(:n, e) == 0)) return
-         x(:, :n) = scene%x(:, scene%element_node(:n, e))
+         if (any(scene%element%node(:n, e) == 0)) return
+         x(:, :n) = scene%x(:, scene%element%node(:n, e))
          ! Scaled by a power of two: coordinates may be as large or as small as numbers can be.
          x(:, :n) = scale(x(:, :n), -exponent(maxval(abs(x(:, :n)))))
          do i = n, 1, -1

@@ -26,19 +26,19 @@ contains
    subroutine check_sides(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      logical, dimension(size(scene%element_label)) :: is_bent, is_off, is_folded, is_corner
+      logical, dimension(size(scene%element%label)) :: is_bent, is_off, is_folded, is_corner
       real(wp) :: along, beside
       integer :: e
 
       if (.not. has_middles(scene)) return
-      if (reader%doubt_positions) return
+      if (reader%doubt%positions) return
       is_folded = .false.
       is_bent = .false.
       is_off = .false.
       is_corner = .false.
       do e = 1, size(is_bent)
-         if (scene%kind(scene%element_kind(e))%n_face_node < 3) cycle
-         if (scene%element_node(1, e) == 0) cycle
+         if (scene%element%kinds(scene%element%kind(e))%n_face_node < 3) cycle
+         if (scene%element%node(1, e) == 0) cycle
          call find_furthest(scene, e, along, beside)
          is_bent(e) = along > 0.5_wp - quarter + rounded
          if (.not. is_bent(e)) call look_for_folds(scene, e, is_folded(e), is_corner(e))
@@ -50,11 +50,11 @@ contains
       if (any(is_folded)) call tell(is_folded, " is folded by the nodes of its sides: " &
          // "its area is not positive everywhere")
       call warn_of_corners(reader, scene, is_corner)
-      if (any(is_off)) call add_warning(reader%log, scene%element_origin(findloc(is_off, .true., &
-         1)), "element " // label_list(pack(scene%element_label, is_off)) // " has a node " &
+      if (any(is_off)) call add_warning(reader%log, scene%element%origin(findloc(is_off, .true., &
+         1)), "element " // label_list(pack(scene%element%label, is_off)) // " has a node " &
          // "far off the middle of its side: strains are less exact, and infinite at a corner " &
          // "if it stands at a quarter")
-      if (.not. (reader%doubt_elements .or. reader%doubt_shapes)) call check_neighbours(reader, &
+      if (.not. (reader%doubt%elements .or. reader%doubt%shapes)) call check_neighbours(reader, &
          scene)
 
    contains
@@ -63,9 +63,9 @@ contains
          logical, intent(in) :: is_wrong(:)
          character(len=*), intent(in) :: text
 
-         reader%doubt_shapes = .true.
-         call add_error(reader%log, scene%element_origin(findloc(is_wrong, .true., 1)), &
-            "element " // label_list(pack(scene%element_label, is_wrong)) // text)
+         reader%doubt%shapes = .true.
+         call add_error(reader%log, scene%element%origin(findloc(is_wrong, .true., 1)), &
+            "element " // label_list(pack(scene%element%label, is_wrong)) // text)
       end subroutine tell
 
    end subroutine check_sides
@@ -76,8 +76,8 @@ contains
       integer :: e
 
       has_middles = .true.
-      do e = 1, size(scene%element_kind)
-         if (scene%kind(scene%element_kind(e))%n_face_node > 2) return
+      do e = 1, size(scene%element%kind)
+         if (scene%element%kinds(scene%element%kind(e))%n_face_node > 2) return
       end do
       has_middles = .false.
    end function has_middles
@@ -93,9 +93,9 @@ contains
 
       along = 0.0_wp
       beside = 0.0_wp
-      associate (kind => scene%kind(scene%element_kind(e)))
+      associate (kind => scene%element%kinds(scene%element%kind(e)))
          do f = 1, kind%n_face
-            associate (node => scene%element_node(kind%face(f), e))
+            associate (node => scene%element%node(kind%face(f), e))
                way = scene%x(:, node(2)) - scene%x(:, node(1))
                arm = scene%x(:, node(3)) - scene%x(:, node(1))
             end associate
@@ -114,12 +114,12 @@ contains
       integer, intent(in) :: e
       logical, intent(out) :: is_folded, is_corner   !! at a point; at a node only
       real(wp), allocatable :: place(:, :)
-      real(wp) :: x(2, scene%kind(scene%element_kind(e))%n_node), value(size(x, 2))
+      real(wp) :: x(2, scene%element%kinds(scene%element%kind(e))%n_node), value(size(x, 2))
       real(wp) :: slope(2, size(x, 2)), area(size(x, 2)), jacobian(2, 2)
       integer :: i
 
-      associate (kind => scene%kind(scene%element_kind(e)))
-         x = scene%x(:, scene%element_node(:kind%n_node, e))
+      associate (kind => scene%element%kinds(scene%element%kind(e)))
+         x = scene%x(:, scene%element%node(:kind%n_node, e))
          x = x - spread(x(:, 1), 2, size(x, 2))
          x = x/maxval(abs(x))
          is_folded = .not. is_integrable(kind%shape, x)
@@ -141,20 +141,20 @@ contains
       integer :: e, f, g, i, other
 
       call adjacency_init(adjacency, scene)
-      do e = 1, size(scene%element_kind)
-         associate (kind => scene%kind(scene%element_kind(e)))
+      do e = 1, size(scene%element%kind)
+         associate (kind => scene%element%kinds(scene%element%kind(e)))
             if (kind%n_face_node /= 2) cycle
             do f = 1, kind%n_face
-               associate (side => scene%element_node(kind%face(f), e))
+               associate (side => scene%element%node(kind%face(f), e))
                   if (any(side == 0)) exit         ! the element had errors
                   do i = adjacency%first(side(1)), adjacency%first(side(1) + 1) - 1
                      other = adjacency%element(i)
                      g = bent_side(scene, other, side)
                      if (g == 0) cycle
-                     call add_error(reader%log, scene%element_origin(e), "element " // &
-                        to_text(scene%element_label(e)) // " has a straight side where " // &
-                        "element " // to_text(scene%element_label(other)) // " has node " // &
-                        to_text(scene%node_label(g)) // " between the corners: they come " // &
+                     call add_error(reader%log, scene%element%origin(e), "element " // &
+                        to_text(scene%element%label(e)) // " has a straight side where " // &
+                        "element " // to_text(scene%element%label(other)) // " has node " // &
+                        to_text(scene%node%label(g)) // " between the corners: they come " // &
                         "apart there; take one order of elements, or nodes of their own and *TIE")
                      return
                   end do
@@ -172,10 +172,10 @@ contains
       integer :: f
 
       bent_side = 0
-      associate (kind => scene%kind(scene%element_kind(e)))
+      associate (kind => scene%element%kinds(scene%element%kind(e)))
          if (kind%n_face_node < 3) return
          do f = 1, kind%n_face
-            associate (own => scene%element_node(kind%face(f), e))
+            associate (own => scene%element%node(kind%face(f), e))
                if (all(own(:2) == side) .or. all(own(2:1:-1) == side)) bent_side = own(3)
             end associate
          end do

@@ -21,23 +21,23 @@ contains
       type(card_t), intent(in) :: card
       type(step_t), intent(inout) :: step
 
-      if (option_name(card, "TYPE") == "") step%constraint_method = option_default("method")
-      call choose_option(reader, card, "TYPE", "method", step%constraint_method)
-      step%softness = softness_t(card%origin)
-      call option_real(reader, card, "STIFFNESS", step%softness%stiffness)
-      call option_real(reader, card, "FACTOR", step%softness%factor)
-      call option_real(reader, card, "TOLERANCE", step%softness%tolerance)
+      if (option_name(card, "TYPE") == "") step%contact%method = option_default("method")
+      call choose_option(reader, card, "TYPE", "method", step%contact%method)
+      step%contact%softness = softness_t(card%origin)
+      call option_real(reader, card, "STIFFNESS", step%contact%softness%stiffness)
+      call option_real(reader, card, "FACTOR", step%contact%softness%factor)
+      call option_real(reader, card, "TOLERANCE", step%contact%softness%tolerance)
       if (has_option(card, "STIFFNESS") .and. has_option(card, "FACTOR")) call card_error(reader, &
          card, "either STIFFNESS or FACTOR is to be given")
       if ((has_option(card, "STIFFNESS") .or. has_option(card, "FACTOR")) .and. .not. &
-         any(step%constraint_method == [method_penalty, method_augmented_lagrange])) then
+         any(step%contact%method == [method_penalty, method_augmented_lagrange])) then
          call card_error(reader, card, "STIFFNESS and FACTOR are of TYPE=PENALTY and " // &
             "AUGMENTED LAGRANGE: with the others contact does not give way")
       end if
       if (.not. has_option(card, "TOLERANCE")) return
-      if (step%constraint_method /= method_augmented_lagrange) then
+      if (step%contact%method /= method_augmented_lagrange) then
          call card_error(reader, card, "TOLERANCE is of TYPE=AUGMENTED LAGRANGE")
-      else if (step%softness%tolerance >= 1.0_wp) then
+      else if (step%contact%softness%tolerance >= 1.0_wp) then
          call card_error(reader, card, "TOLERANCE is relative to an edge and must be below 1")
       end if
    end subroutine read_constraint_method
@@ -51,7 +51,7 @@ contains
       integer :: k
 
       do k = 1, size(step)
-         associate (method => step(k)%constraint_method, initiation => step(k)%initiation)
+         associate (method => step(k)%contact%method, initiation => step(k)%contact%initiation)
             if (.not. step_is_dynamic(step(k))) cycle
             if (.not. any(method == [method_penalty, method_augmented_lagrange])) cycle
             if (initiation == initiation_massless) call refuse( &
@@ -59,8 +59,8 @@ contains
             if (initiation == initiation_velocity_update) call refuse("*CONTACT INITIATION, " // &
                "TYPE=VELOCITY UPDATE: what is left of gaps would count as energy that impacts took")
             if (method /= method_penalty) cycle
-            if (any(pair%laws%restitution < 1.0_wp)) call refuse( &
-               "RESTITUTION below 1: a penalty has no instant at which velocities jump")
+            if (any(pair%interaction%restitution < 1.0_wp)) call refuse( &
+               "RESTITUTION below 1: a penalty has " // "no instant at which velocities jump")
          end associate
       end do
 
@@ -69,7 +69,8 @@ contains
       subroutine refuse(what)
          character(len=*), intent(in) :: what
 
-         call add_error(reader%log, step(k)%softness%origin, "*CONSTRAINT METHOD of step " // &
+         call add_error(reader%log, step(k)%contact%softness%origin, &
+            "*CONSTRAINT METHOD of step " // &
             to_text(k) // " does not go with " // what // "; use TYPE=NULL SPACE")
       end subroutine refuse
 

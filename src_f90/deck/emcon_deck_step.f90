@@ -77,7 +77,7 @@ contains
          scene%step(k)%origin = reader%card(i)%origin
          call read_settings(reader, i, scene%pair, scene%amplitude, scene%step(k))
          call conditions_carry(conditions, scene%amplitude, last, time)
-         if (k > 1) time = time + last%duration
+         if (k > 1) time = time + last%time%duration
          call read_conditions(reader, i, scene, conditions, requests)
          call conditions_store(conditions, scene%n_dim, scene%step(k))
          scene%step(k)%output = requests%output
@@ -94,7 +94,7 @@ contains
       call check_friction(reader, scene%pair, scene%step, scene%surface%is_nodal)
       call check_contact_damping(reader, scene%pair, scene%step)
       call corners_find(scene)
-      if (n_step == 0 .and. .not. reader%doubt_names) then
+      if (n_step == 0 .and. .not. reader%doubt%names) then
          call add_error(reader%log, origin_t(1, 0), "the deck has no *STEP: nothing is to be done")
       end if
    end subroutine read_steps
@@ -105,22 +105,22 @@ contains
       type(step_t), intent(out) :: step
 
       step%nlgeom = last%nlgeom
-      step%constraint_method = last%constraint_method
-      step%softness = last%softness
-      step%initiation = last%initiation
-      step%gap_tolerance = last%gap_tolerance
-      step%contact = last%contact
+      step%contact%method = last%contact%method
+      step%contact%softness = last%contact%softness
+      step%contact%initiation = last%contact%initiation
+      step%contact%gap_tolerance = last%contact%gap_tolerance
+      step%contact%options = last%contact%options
       step%stabilizes = last%stabilizes
-      step%newton = last%newton
-      step%newton_tolerance = last%newton_tolerance
-      step%newton_maximum = last%newton_maximum
-      step%polishes = last%polishes
+      step%solution%newton = last%solution%newton
+      step%solution%newton_tolerance = last%solution%newton_tolerance
+      step%solution%newton_maximum = last%solution%newton_maximum
+      step%solution%polishes = last%solution%polishes
       step%restart_frequency = last%restart_frequency
       step%choice = last%choice
-      step%tolerance = last%tolerance
-      step%tolerance_origin = last%tolerance_origin
-      step%event_fraction = last%event_fraction
-      step%events = last%events
+      step%time%tolerance = last%time%tolerance
+      step%time%tolerance_origin = last%time%tolerance_origin
+      step%time%event_fraction = last%time%event_fraction
+      step%time%events = last%time%events
    end subroutine inherit
 
    !> Procedure and settings of the step whose first card is `i_first`.
@@ -150,9 +150,9 @@ contains
             case ("CONTACTCONTROLS")
                call read_controls(reader, card, pair, step)
             case ("MORTAR")
-               call read_mortar(reader, card, pair, step%contact)
+               call read_mortar(reader, card, pair, step%contact%options)
             case ("SURFACESMOOTHING")
-               call read_smoothing(reader, card, pair, step%contact)
+               call read_smoothing(reader, card, pair, step%contact%options)
             case ("NEWTON")
                call read_newton(reader, card, step)
             case ("TIMEINTEGRATION")
@@ -170,7 +170,7 @@ contains
       call check_statics(reader, i_first, amplitude, step)
       call check_explicit_cards(reader, i_first, step)
       call check_increments(reader, i_first, step)
-      if (step%scheme%code /= 0 .or. reader%doubt_names) return
+      if (step%scheme%code /= 0 .or. reader%doubt%names) return
       if (.not. has_refused(reader, i_first)) call card_error(reader, reader%card(i_first), &
          "the step has no procedure: *STATIC or *DYNAMIC")
    end subroutine read_settings
@@ -193,7 +193,7 @@ contains
       type(card_t), intent(in) :: card
       type(step_t), intent(inout) :: step
 
-      call option_count(reader, card, "INC", 1, step%max_increments)
+      call option_count(reader, card, "INC", 1, step%time%max_increments)
       if (has_option(card, "NLGEOM")) then
          select case (option_name(card, "NLGEOM"))
          case ("", "YES")
@@ -236,7 +236,7 @@ contains
       end if
       step%scheme = scheme_row(card%name, "")
       if (has_option(card, "EXPLICIT")) step%scheme = scheme_row(card%name, "CENTRALDIFFERENCE")
-      step%is_direct = has_option(card, "DIRECT")
+      step%time%is_direct = has_option(card, "DIRECT")
       call read_solver(reader, card, step)
       value = [1.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]
       call data_open(data, card)
@@ -248,10 +248,10 @@ contains
       if (is_blank(data, 1)) value(1) = value(2)
       if (data%ok) call check_times(reader, data, value)
       if (data%ok) then
-         step%h = value(1)
-         step%duration = value(2)
-         step%h_min = value(3)
-         step%h_max = value(4)
+         step%time%h = value(1)
+         step%time%duration = value(2)
+         step%time%h_min = value(3)
+         step%time%h_max = value(4)
       end if
       if (next_line(reader, data)) call data_error(reader, data, "only one data line is read")
    end subroutine read_procedure
@@ -274,14 +274,14 @@ contains
          call card_warning(reader, card, "SOLVER=" // option_name(card, "SOLVER") // &
             " has no effect: solvers here are " // known)
       else if (i == 0) then
-         step%solver = solver_given
-         step%solver_name = option_name(card, "SOLVER")
-         step%solver_origin = card%origin
+         step%solution%solver = solver_given
+         step%solution%solver_name = option_name(card, "SOLVER")
+         step%solution%solver_origin = card%origin
       else if (.not. row%is_built) then
          call card_error(reader, card, "SOLVER=" // option_name(card, "SOLVER") // &
             ": this program was built without it; leave SOLVER out")
       else
-         step%solver = row%code
+         step%solution%solver = row%code
       end if
    end subroutine read_solver
 
@@ -314,23 +314,23 @@ contains
 
       select case (option_name(card, "TYPE"))
       case ("")
-         step%newton = option_default("newton")
+         step%solution%newton = option_default("newton")
       case ("MODIFIED", "INEXACT")
          call option_words("newton", known)
          call refuse_option(reader, card, "TYPE", known, "not in this version")
       case default
-         call choose_option(reader, card, "TYPE", "newton", step%newton)
+         call choose_option(reader, card, "TYPE", "newton", step%solution%newton)
       end select
-      call option_real(reader, card, "TOLERANCE", step%newton_tolerance)
-      if (step%newton_tolerance >= 1.0_wp) then
+      call option_real(reader, card, "TOLERANCE", step%solution%newton_tolerance)
+      if (step%solution%newton_tolerance >= 1.0_wp) then
          call card_error(reader, card, "TOLERANCE is relative and must be below 1")
       end if
-      call option_count(reader, card, "MAXIMUM", 1, step%newton_maximum)
+      call option_count(reader, card, "MAXIMUM", 1, step%solution%newton_maximum)
       select case (option_name(card, "POLISH"))
       case ("", "YES")
-         step%polishes = .true.
+         step%solution%polishes = .true.
       case ("NO")
-         step%polishes = .false.
+         step%solution%polishes = .false.
       case default
          call refuse_option(reader, card, "POLISH", "YES, NO", "")
       end select

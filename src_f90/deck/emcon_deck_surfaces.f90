@@ -53,7 +53,7 @@ contains
          if (reader%card(i)%name /= "SURFACE") cycle
          call need_name(reader, reader%card(i), "NAME", name)
          if (name == "") cycle
-         i_same = name_index_find(reader%surfaces, name)
+         i_same = name_index_find(reader%names%surfaces, name)
          if (i_same > 0) then
             call card_error(reader, reader%card(i), "surface " // name &
                // " is defined twice; first at " // where_text(scene, scene%surface(i_same)%origin))
@@ -64,7 +64,7 @@ contains
          surface%origin = reader%card(i)%origin
          n = n + 1
          scene%surface(n) = surface
-         call name_index_put(reader%surfaces, name, n)
+         call name_index_put(reader%names%surfaces, name, n)
       end do
       scene%surface = scene%surface(:n)
    end subroutine read_surfaces
@@ -103,8 +103,8 @@ contains
       end select
       n_item = size(surface%element) + size(surface%node)
       if (allocated(surface%edge)) n_item = size(surface%edge, 2)
-      if (n_item == 0 .and. reader%log%n_errors == n_before .and. .not. reader%doubt_names &
-         .and. .not. reader%doubt_elements) then
+      if (n_item == 0 .and. reader%log%n_errors == n_before .and. .not. reader%doubt%names &
+         .and. .not. reader%doubt%elements) then
          if (surface%is_nodal) then
             call card_error(reader, card, "the surface has no node")
          else if (allocated(surface%edge)) then
@@ -165,14 +165,14 @@ contains
          if (.not. data%ok) return
          node(k) = find_label(reader%node_map, label(k))
          if (node(k) > 0) cycle
-         if (.not. reader%doubt_nodes) call data_error(reader, data, "node " &
+         if (.not. reader%doubt%nodes) call data_error(reader, data, "node " &
             // to_text(label(k)) // " does not exist")
          data%ok = .false.
          return
       end do
       edge = reshape(node, [2, 1])
       if (all(abs(scene%x(:, node(1)) - scene%x(:, node(2))) <= 0.0_wp) .and. &
-         .not. reader%doubt_positions) call data_error(reader, data, "the edge from node " &
+         .not. reader%doubt%positions) call data_error(reader, data, "the edge from node " &
          // to_text(label(1)) // " to node " // to_text(label(2)) // " has no length")
    end subroutine get_edges
 
@@ -189,8 +189,8 @@ contains
       integer :: i, n
 
       is_area_told = .false.
-      allocate(is_in(size(scene%node_label)), source=.false.)
-      allocate(list(size(scene%node_label)))
+      allocate(is_in(size(scene%node%label)), source=.false.)
+      allocate(list(size(scene%node%label)))
       n = 0
       call data_open(data, card)
       do while (next_line(reader, data))
@@ -276,7 +276,7 @@ contains
          call find_face(scene, adjacency, reader%line_node(:, line(i)), n_element(i), element, face)
          if (n_element(i) == 1) call append_face(faces, element, face)
       end do
-      if (reader%doubt_elements) return
+      if (reader%doubt%elements) return
       if (any(n_element == 0)) call data_error(reader, data, "line " &
          // label_list(pack(reader%line_label(line), n_element == 0)) &
          // " is no edge of an element")
@@ -296,15 +296,15 @@ contains
       logical :: has_not(size(item))
 
       call get_name(reader, data, 2, "face", name)
-      face = face_number(name, "S", maxval(scene%kind%n_face))
+      face = face_number(name, "S", maxval(scene%element%kinds%n_face))
       if (face == 0) then
          call data_error(reader, data, "unknown face " // quoted(name) // "; known: " &
-            // face_names("S", maxval(scene%kind%n_face)))
+            // face_names("S", maxval(scene%element%kinds%n_face)))
          return
       end if
-      has_not = scene%kind(scene%element_kind(item))%n_face < face
+      has_not = scene%element%kinds(scene%element%kind(item))%n_face < face
       if (any(has_not)) call data_error(reader, data, "element " &
-         // label_list(pack(scene%element_label(item), has_not)) // " has no face " // name)
+         // label_list(pack(scene%element%label(item), has_not)) // " has no face " // name)
    end subroutine get_face
 
    pure subroutine append_free_faces(scene, adjacency, element, faces)
@@ -314,8 +314,8 @@ contains
       type(faces_t), intent(inout) :: faces
       integer :: face
 
-      if (scene%element_node(1, element) == 0) return
-      do face = 1, scene%kind(scene%element_kind(element))%n_face
+      if (scene%element%node(1, element) == 0) return
+      do face = 1, scene%element%kinds(scene%element%kind(element))%n_face
          if (n_neighbours(scene, adjacency, element, face) == 0) then
             call append_face(faces, element, face)
          end if
@@ -383,8 +383,8 @@ contains
          data%ok = .true.
          call get_name(reader, data, side, trim(role(side)) // " surface", name)
          if (.not. data%ok) cycle
-         i_surface(side) = name_index_find(reader%surfaces, name)
-         if (i_surface(side) == 0 .and. .not. reader%doubt_names) then
+         i_surface(side) = name_index_find(reader%names%surfaces, name)
+         if (i_surface(side) == 0 .and. .not. reader%doubt%names) then
             call data_error(reader, data, "unknown " // trim(role(side)) // " surface " &
                // quoted(name) // suggestion(name, surface_names(scene%surface)))
          end if

@@ -25,7 +25,7 @@ contains
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(inout) :: scene
 
-      call read_tables(reader, scene, "AMPLITUDE", scene%amplitude, reader%amplitudes)
+      call read_tables(reader, scene, "AMPLITUDE", scene%amplitude, reader%names%amplitudes)
       call delay_tables(reader, scene%amplitude)
    end subroutine read_amplitudes
 
@@ -58,14 +58,14 @@ contains
                   // "amplitude; name one by AMPLITUDE=")
                cycle
             end if
-            k = name_index_find(reader%amplitudes, option_name(card, "AMPLITUDE"))
+            k = name_index_find(reader%names%amplitudes, option_name(card, "AMPLITUDE"))
             call card_table_name(card, name)
-            if (k == 0 .or. name_index_find(reader%amplitudes, name) > 0) cycle
+            if (k == 0 .or. name_index_find(reader%names%amplitudes, name) > 0) cycle
             n = n + 1
             all(n) = all(k)
             all(n)%name = name
             all(n)%time = all(n)%time + delay
-            call name_index_put(reader%amplitudes, name, n)
+            call name_index_put(reader%names%amplitudes, name, n)
          end associate
       end do
       table = all(:n)
@@ -95,7 +95,7 @@ contains
       type(scene_t), intent(in) :: scene
       type(amplitude_t), allocatable :: table(:)
 
-      call read_tables(reader, scene, "TIMEPOINTS", table, reader%times)
+      call read_tables(reader, scene, "TIMEPOINTS", table, reader%names%times)
       call move_alloc(table, reader%time_points)
    end subroutine read_time_points
 

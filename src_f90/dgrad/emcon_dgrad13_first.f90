@@ -14,6 +14,6 @@ module emcon_dgrad13_first
 
    integer, parameter :: n_var = 13, n_second = 0
 
-   include "emcon_dgrad.inc"
+   include "emcon_dgrad_plane.inc"
 
 end module emcon_dgrad13_first

@@ -15,6 +15,6 @@ module emcon_dgrad15
 
    integer, parameter :: n_var = 15, n_second = n_var
 
-   include "emcon_dgrad.inc"
+   include "emcon_dgrad_plane.inc"
 
 end module emcon_dgrad15

@@ -14,6 +14,6 @@ module emcon_dgrad8
 
    integer, parameter :: n_var = 8, n_second = n_var
 
-   include "emcon_dgrad.inc"
+   include "emcon_dgrad_plane.inc"
 
 end module emcon_dgrad8

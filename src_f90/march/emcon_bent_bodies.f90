@@ -38,14 +38,14 @@ contains
 
       found%advice = ""
       solid => terms_solid(march%system%term)
-      if (.not. any(solid%is_stiff_bent) .or. march%state%clock%i_step == 0) return
+      if (.not. any(solid%trait%is_stiff_bent) .or. march%state%clock%i_step == 0) return
       call bending_measure(bending, solid, march%system%space%body, scene%x, march%state%u, &
          scene%step(march%state%clock%i_step)%nlgeom)
       do b = 1, size(bending%strain)
          if (.not. bending%strain(b) > rounding*largest_energy) cycle
          if (.not. bending%missed(b) > told_part*bending%strain(b)) cycle
          found%body = b
-         found%label = solid%label(bending%element(b))
+         found%label = solid%deck%label(bending%element(b))
          found%percent = 100.0_wp*bending%missed(b)/bending%strain(b)
          found%advice = trim(bending_advice(solid))
          return

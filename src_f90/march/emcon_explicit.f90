@@ -64,19 +64,20 @@ contains
             self%state%explicit%budget = 0.0_wp
             call critical_bound(self%system, place, self%explicit%stiffness, limit, &
                self%state%explicit%critical_element, is_bounded)
-            if (step%h > limit .or. .not. is_bounded) call critical_sharp(self%system, place, &
+            if (step%time%h > limit .or. .not. is_bounded) call critical_sharp(self%system, place, &
                self%explicit%stiffness, limit, error)
             if (allocated(error)) return
          end if
          if (.not. limit < huge(limit)) return
          call limit_text(self, scene, text)
-         if (step%h > limit .and. .not. is_known) then
+         if (step%time%h > limit .and. .not. is_known) then
             call raise(error, err_input, where_text(scene, step%origin) // ": error: the " // &
-               "increment " // to_text(step%h) // " is larger than " // text // ": an " // &
+               "increment " // to_text(step%time%h) // " is larger than " // text // ": an " // &
                "explicit step grows without bound; give a smaller increment, or an implicit step")
             return
          end if
-         call note_add(self%system%notes, text // "; h is " // to_text(step%h/limit, 3) // " of it")
+         call note_add(self%system%notes, text // "; h is " // to_text(step%time%h/limit, 3) &
+            // " of it")
       end associate
    end subroutine explicit_prepare
 
@@ -89,7 +90,7 @@ contains
       text = "the critical step " // to_text(self%state%explicit%critical_h)
       if (self%active%softness%is_at_ends) text = text // " with closed contacts"
       if (self%state%explicit%critical_element > 0) text = text // " (the fastest element is " // &
-         to_text(scene%element_label(self%state%explicit%critical_element)) // ")"
+         to_text(scene%element%label(self%state%explicit%critical_element)) // ")"
    end subroutine limit_text
 
    !> Each unknown has mass: it is kept where that is a diagonal.
@@ -107,7 +108,7 @@ contains
             if (value(csr_find(matrix, k, k)) > 0.0_dp) cycle
             call raise(error, err_input, where_text(scene, &
                scene%step(self%state%clock%i_step)%origin) // ": error: node " // &
-               to_text(scene%node_label((numbering%dof(k) - 1)/size(scene%x, 1) + 1)) // &
+               to_text(scene%node%label((numbering%dof(k) - 1)/size(scene%x, 1) + 1)) // &
                " has no mass: in an explicit step all that moves freely needs some")
             return
          end do

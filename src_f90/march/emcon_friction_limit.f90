@@ -52,8 +52,9 @@ contains
          if (.not. law(id(worst))%mu > limit(worst)) return
          call constraint_index(march%system, id(worst), pair, i)
          call note_add(increment%notes, "the coefficient of friction " &
-            // to_text(law(id(worst))%mu) // " is above " // to_text(limit(worst), 4) // ", up to which the contact of slave " &
-            // "node " // to_text(scene%node_label(march%system%contact(pair)%contact%node(i))) &
+            // to_text(law(id(worst))%mu) // " is above " // to_text(limit(worst), 4) &
+            // ", up to which the contact of slave node " &
+            // to_text(scene%node%label(march%system%contact(pair)%contact%node(i))) &
             // " by itself has one solution in an increment: there may be several")
       end associate
    end subroutine friction_limit_tell

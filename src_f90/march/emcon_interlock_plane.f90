@@ -32,7 +32,7 @@ contains
 
       if (.not. march%active%friction%is_on) return
       do pair = 1, min(size(march%system%contact), size(scene%pair))
-         associate (mu => scene%pair(pair)%laws%friction, &
+         associate (mu => scene%pair(pair)%interaction%friction, &
                knows => march%active%friction%knows_corners(pair))
             if (knows .or. .not. mu > 0.0_wp) cycle
             spread = spread_of(march, pair)
@@ -85,7 +85,7 @@ contains
       type(surface_shape_t) :: slave, master
 
       turn = 0.0_wp
-      options = scene%step(march%state%clock%i_step)%contact
+      options = scene%step(march%state%clock%i_step)%contact%options
       if (scene%pair(pair)%has_options) options = scene%pair(pair)%options
       if (options%smoothing /= smoothing_none) return
       slave = surface_shape(scene, scene%surface(scene%pair(pair)%slave))

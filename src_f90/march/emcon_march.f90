@@ -67,7 +67,7 @@ contains
          allocate(state%contacts%is_active(self%system%n_constraint), source=.false.)
          allocate(state%contacts%lam(self%system%n_constraint), source=0.0_wp)
          allocate(state%contacts%closure, source=state%contacts%lam)
-         allocate(state%energy(size(scene%element_kind)), source=0.0_wp)
+         allocate(state%energy(size(scene%element%kind)), source=0.0_wp)
       end associate
       call pair_record_init(self%state%pairs, self%system)
       call rigid_rotation_init(self%state%turns, scene%rigid, scene%x, self%state%u)
@@ -133,9 +133,9 @@ contains
       integer :: stride
 
       associate (state => self%state, step => scene%step(self%state%clock%i_step))
-         if (step%max_increments > 0 .and. &
-            state%clock%increment - state%clock%n_before >= step%max_increments) then
-            call raise(error, err_analysis, "the " // to_text(step%max_increments) // &
+         if (step%time%max_increments > 0 .and. &
+            state%clock%increment - state%clock%n_before >= step%time%max_increments) then
+            call raise(error, err_analysis, "the " // to_text(step%time%max_increments) // &
                " increments of *STEP, INC= are used up at time " // to_text(state%clock%time))
             return
          end if

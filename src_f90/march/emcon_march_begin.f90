@@ -129,7 +129,7 @@ contains
          if (change(i) > deck_rounding*largest) call note_add(self%system%notes, "the " // name // &
             " at the start does not fit the ties and equations: dependent nodes follow the " // &
             "others, largest change " // to_text(change(i)) // " at node " // &
-            to_text(scene%node_label(i)))
+            to_text(scene%node%label(i)))
       end subroutine follow
 
    end subroutine follow_links
@@ -184,12 +184,12 @@ contains
          if (allocated(error)) return
          deadline = self%newton%deadline
          call newton_init(self%newton, self%system%space%numbering%n_unknown, &
-            scene%x, step%newton_tolerance, step%newton_maximum)
-         self%newton%convergence%polishes = step%polishes
+            scene%x, step%solution%newton_tolerance, step%solution%newton_maximum)
+         self%newton%convergence%polishes = step%solution%polishes
          self%newton%deadline = deadline
          call choose_solver(self, step)
          state%base = factor_base_t()
-         self%newton%factor_policy%is_wanted = step%newton == newton_kept .and. &
+         self%newton%factor_policy%is_wanted = step%solution%newton == newton_kept .and. &
             step_is_dynamic(step)
          call begin_active(self%active, step, size(scene%rigid) > 0)
          if (.not. step_is_dynamic(step)) call contact_support_begin(self%active%support, &
@@ -223,14 +223,14 @@ contains
       integer :: i
 
       do i = 1, size(self%system%contact)
-         options = scene%step(self%state%clock%i_step)%contact
+         options = scene%step(self%state%clock%i_step)%contact%options
          if (i <= size(scene%pair)) then
             if (scene%pair(i)%has_options) options = scene%pair(i)%options
          end if
          associate (contact => self%system%contact(i)%contact)
             call contact%suit_steps(any(.not. step_is_dynamic(scene%step)))
             call contact%configure(scene%x, options)
-            if (.not. scene%step(1)%resolves_overclosure) cycle
+            if (.not. scene%step(1)%contact%resolves_overclosure) cycle
             call overclosure_follow_arcs(contact, scene%x, scene%u0, options, change)
          end associate
          if (i > size(scene%pair) .or. .not. change > 0.0_wp .or. self%state%clock%i_step > 1) cycle
@@ -251,12 +251,12 @@ contains
       type(overlap_t) :: overlap
 
       call active_set_overclosure(self%active, self%system, scene%x, self%state%u_start, &
-         step%resolves_overclosure)
+         step%contact%resolves_overclosure)
       self%overlap_check%meant_overlap = 0.0_wp
-      call overlap_check_smooth(self%overlap_check, scene, step%contact)
+      call overlap_check_smooth(self%overlap_check, scene, step%contact%options)
       call overlap_check_excuse(self%overlap_check, scene%x, self%state%u_start, overlap)
       if (overlap%depth > touching_bar) call warn_of_overlap(self, scene, overlap)
-      if (.not. step%resolves_overclosure) return
+      if (.not. step%contact%resolves_overclosure) return
       call overlap_check_step(self%overlap_check, scene%x, self%state%u_start, &
          at_rest(self%state%u), overlap)
       self%overlap_check%meant_overlap = overlap%depth
@@ -269,7 +269,7 @@ contains
       type(overlap_t), intent(in) :: overlap
       character(len=:), allocatable :: text
 
-      call overlap_text(overlap, scene%node_label, self%system%space%body, text)
+      call overlap_text(overlap, scene%node%label, self%system%space%body, text)
       call note_add(self%warnings, overlap_at_start // ", by " // to_text(overlap%depth, 3) // &
          " of an edge, " // text // ": no contact pair brings the two together, and their " // &
          "overlap is not looked at further")
@@ -282,7 +282,8 @@ contains
       type(step_t), intent(in) :: step
 
       call march_count_grid(self, step)
-      if (self%grid%is_controlled .and. step%tolerance > 0.0_wp) call accuracy_begin(self, scene)
+      if (self%grid%is_controlled .and. step%time%tolerance > 0.0_wp) call accuracy_begin(self, &
+         scene)
       associate (state => self%state)
          if (.not. state%clock%is_off_grid) state%clock%step_time &
             = march_grid_time(self, step, state%clock%n_grid)
@@ -318,7 +319,7 @@ contains
       active%has_rigid = has_rigid
       call active_set_suit(active, step)
       active%holds_gap = any(step_initiation(step) == [initiation_persistent, &
-         initiation_massless]) .and. step%constraint_method /= method_penalty
+         initiation_massless]) .and. step%contact%method /= method_penalty
       active%closes = .false.
       active%support = contact_support_t()
    end subroutine begin_active
@@ -379,11 +380,11 @@ contains
       integer :: i, method
 
       method = merge(method_null_space, method_saddle_point, self%system%space%is_reduced)
-      if (step%solver /= solver_given) then
-         call correction_reset(self%newton%correction, method, step%solver)
-         call velocity_update_reset(self%velocity_update, step%solver)
+      if (step%solution%solver /= solver_given) then
+         call correction_reset(self%newton%correction, method, step%solution%solver)
+         call velocity_update_reset(self%velocity_update, step%solution%solver)
       else
-         i = host_find_solver(self%host%solver, step%solver_name)
+         i = host_find_solver(self%host%solver, step%solution%solver_name)
          call correction_reset(self%newton%correction, method, solver_given + i, &
             self%host%solver(i)%solver)
          call velocity_update_reset(self%velocity_update, solver_given + i, &
@@ -398,9 +399,10 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       associate (step => scene%step(self%state%clock%i_step))
-         if (.not. step_is_dynamic(step) .or. .not. step%tolerance > 0.0_wp) return
+         if (.not. step_is_dynamic(step) .or. .not. step%time%tolerance > 0.0_wp) return
          if (self%scheme%error_constant() > 0.0_wp) return
-         call raise(error, err_input, where_text(scene, step%tolerance_origin) // ": error: " // &
+         call raise(error, err_input, where_text(scene, step%time%tolerance_origin) &
+            // ": error: " // &
             "TOLERANCE= needs a scheme that tells its error, and this one does not")
       end associate
    end subroutine check_tolerance

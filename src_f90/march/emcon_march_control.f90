@@ -42,8 +42,8 @@ contains
       if (allocated(error)) return
       associate (state => self%state)
          from = place_of(self)
-         if (state%control%h_before > 0.0_wp .or. .not. scene%step(state%clock%i_step)%tolerance &
-            > 0.0_wp) then
+         if (state%control%h_before > 0.0_wp &
+            .or. .not. scene%step(state%clock%i_step)%time%tolerance > 0.0_wp) then
             n = next_units(self, scene, from)
             call go(self, scene, from, n, increment, error)
          else
@@ -144,16 +144,16 @@ contains
 
       increment%done = increment%done + part%h
       associate (step => scene%step(self%state%clock%i_step), control => self%state%control)
-         if (step%event_fraction > 0.0_wp) call events_tell(self, scene, step, part, increment)
+         if (step%time%event_fraction > 0.0_wp) call events_tell(self, scene, step, part, increment)
          is_slow = 2*self%newton%convergence%n_iteration > self%newton%convergence%maximum
-         if (step%tolerance > 0.0_wp) then
+         if (step%time%tolerance > 0.0_wp) then
             if (self%step_check%ratio > 1.0_wp) call note_add(increment%notes, "the error is " // &
                to_text(self%step_check%ratio, 3) // " times TOLERANCE with the smallest increment")
             call accuracy_keep(self, part%h)
          end if
          call control_accept(control, real(n, wp)/real(self%grid%n_unit, wp), &
-            self%step_check%ratio, is_slow .and. step%tolerance > 0.0_wp, self%grid%least_power, &
-            self%grid%largest_power)
+            self%step_check%ratio, is_slow .and. step%time%tolerance > 0.0_wp, &
+            self%grid%least_power, self%grid%largest_power)
       end associate
    end subroutine take_over
 
@@ -168,7 +168,8 @@ contains
       power = self%state%control%power
       if (power > 0) then
          do while (power > 0)
-            if (keeps_apart(self, scene, scale(scene%step(self%state%clock%i_step)%h, power))) exit
+            if (keeps_apart(self, scene, scale(scene%step(self%state%clock%i_step)%time%h, &
+               power))) exit
             power = power - 1
          end do
       end if
@@ -247,7 +248,7 @@ contains
          end do
          if (n >= before) n = max(self%grid%n_least, before/2)
          ! What is no matter of accuracy is over with the increment.
-         if (.not. scene%step(self%state%clock%i_step)%tolerance > 0.0_wp) control%power = &
+         if (.not. scene%step(self%state%clock%i_step)%time%tolerance > 0.0_wp) control%power = &
             max(0, power - 1)
       end associate
    end subroutine shorten

@@ -62,7 +62,7 @@ contains
       do pair = 1, self%system%n_pair
          associate (first => self%system%first_constraint(pair) + 1, &
                last => self%system%first_constraint(pair + 1))
-            if (step%events /= events_nodes .and. (any(before(first:last)) .eqv. &
+            if (step%time%events /= events_nodes .and. (any(before(first:last)) .eqv. &
                any(after(first:last)))) cycle
             is_event(first:last) = before(first:last) .neqv. after(first:last)
          end associate
@@ -120,7 +120,7 @@ contains
             self%state%control%n_event = self%state%control%n_event + 1
             call note_add(increment%notes, "event: contact " // what // " in pair " // &
                to_text(pair) // " at slave node " // &
-               to_text(scene%node_label(self%system%contact(pair)%contact%node(i))) // &
+               to_text(scene%node%label(self%system%contact(pair)%contact%node(i))) // &
                ", time " // to_text(part%start%total_time, 12) // " to " // &
                to_text(part%start%total_time + part%h, 12))
          end do

@@ -28,20 +28,20 @@ contains
       real(wp) :: h_max
 
       call count_points(self, step)
-      h_max = step%h_max
+      h_max = step%time%h_max
       if (.not. h_max > 0.0_wp) then
-         h_max = merge(step%h, step%duration, step_is_dynamic(step))
+         h_max = merge(step%time%h, step%time%duration, step_is_dynamic(step))
       end if
       self%grid%most_stride = 1
-      if (.not. step%is_direct) then
-         do while (2*self%grid%most_stride*step%h <= h_max &
+      if (.not. step%time%is_direct) then
+         do while (2*self%grid%most_stride*step%time%h <= h_max &
             .and. self%grid%most_stride < self%grid%n_grid)
             self%grid%most_stride = 2*self%grid%most_stride
          end do
       end if
       self%grid%n_level = default_levels
-      if (step%h_min > 0.0_wp) then
-         self%grid%n_level = max(0, min(most_levels, exponent(step%h/step%h_min) - 1))
+      if (step%time%h_min > 0.0_wp) then
+         self%grid%n_level = max(0, min(most_levels, exponent(step%time%h/step%time%h_min) - 1))
       end if
       call count_units(self, step)
    end subroutine march_count_grid
@@ -56,13 +56,14 @@ contains
 
       if (allocated(self%grid%corner)) deallocate(self%grid%corner)
       allocate(self%grid%corner(0))
-      if (allocated(step%corner) .and. .not. (step%is_direct .or. self%explicit%is_on)) then
-         do i = 1, size(step%corner)
-            next = point_at(self, step, step%corner(i))
+      if (allocated(step%time%corner) .and. .not. (step%time%is_direct &
+         .or. self%explicit%is_on)) then
+         do i = 1, size(step%time%corner)
+            next = point_at(self, step, step%time%corner(i))
             if (next%n > last_point(self)) self%grid%corner = [self%grid%corner, next]
          end do
       end if
-      next = point_at(self, step, step%duration)
+      next = point_at(self, step, step%time%duration)
       self%grid%n_grid = max(1, next%n)
       self%grid%corner = pack(self%grid%corner, self%grid%corner%n < self%grid%n_grid)
    end subroutine count_points
@@ -77,9 +78,9 @@ contains
       integer :: n
 
       base = base_of(self, huge(n))
-      ratio = (time - base%time)/step%h
+      ratio = (time - base%time)/step%time%h
       n = nint(ratio)
-      point%is_between = abs(ratio - real(n, wp)) > grid_whole*(time/step%h)
+      point%is_between = abs(ratio - real(n, wp)) > grid_whole*(time/step%time%h)
       if (point%is_between) n = ceiling(ratio)
       point%n = base%n + n
       point%time = time
@@ -128,24 +129,25 @@ contains
 
       self%grid%judges_size = .false.
       self%grid%is_controlled = step_is_dynamic(step) &
-         .and. .not. self%explicit%is_on .and. (step%tolerance > 0.0_wp &
-         .or. step%event_fraction > 0.0_wp)
+         .and. .not. self%explicit%is_on .and. (step%time%tolerance > 0.0_wp &
+         .or. step%time%event_fraction > 0.0_wp)
       if (.not. self%grid%is_controlled) return
-      self%grid%h_deck = step%h
+      self%grid%h_deck = step%time%h
       n = self%grid%n_level
-      if (step%event_fraction > 0.0_wp) n = max(n, min(most_levels, &
-         1 - exponent(step%event_fraction)))
+      if (step%time%event_fraction > 0.0_wp) n = max(n, min(most_levels, &
+         1 - exponent(step%time%event_fraction)))
       self%grid%n_unit = 2_int64**n
       self%grid%n_least = 2_int64**(n - self%grid%n_level)
       self%grid%n_window = 0
-      if (step%event_fraction > 0.0_wp) self%grid%n_window = max(1_int64, &
-         int(step%event_fraction*real(self%grid%n_unit, wp), int64))
+      if (step%time%event_fraction > 0.0_wp) self%grid%n_window = max(1_int64, &
+         int(step%time%event_fraction*real(self%grid%n_unit, wp), int64))
       power = exponent(real(self%grid%most_stride, wp)) - 1
-      if (step%tolerance > 0.0_wp .and. .not. step%h_max > 0.0_wp) power = &
+      if (step%time%tolerance > 0.0_wp .and. .not. step%time%h_max > 0.0_wp) power = &
          exponent(real(self%grid%n_grid, wp)) - 1
       self%grid%largest_power = min(power, most_power)
       self%grid%least_power = -self%grid%n_level
-      if (.not. step%h_min > 0.0_wp) self%grid%least_power = -min(self%grid%n_level, error_levels)
+      if (.not. step%time%h_min > 0.0_wp) self%grid%least_power = -min(self%grid%n_level, &
+         error_levels)
    end subroutine count_units
 
    !> Increments of a step in which none is cut.
@@ -181,8 +183,8 @@ contains
       type(grid_corner_t) :: base
 
       base = base_of(self, n)
-      march_grid_time = base%time + real(n - base%n, wp)*step%h
-      if (n >= self%grid%n_grid) march_grid_time = step%duration
+      march_grid_time = base%time + real(n - base%n, wp)*step%time%h
+      if (n >= self%grid%n_grid) march_grid_time = step%time%duration
    end function march_grid_time
 
    !> Time since the start of the step after `n` units.
@@ -209,10 +211,10 @@ contains
 
       real(wp) :: start, finish
 
-      interval = step%h
+      interval = step%time%h
       start = march_grid_time(self, step, n)
       finish = march_grid_time(self, step, n + 1)
-      if (finish - start < step%h - grid_whole*finish) interval = finish - start
+      if (finish - start < step%time%h - grid_whole*finish) interval = finish - start
    end function interval
 
    !> Size of an increment from grid point `n` to `n_end`, with no corner between [T]: where it can
@@ -222,8 +224,8 @@ contains
       type(step_t), intent(in) :: step
       integer, intent(in) :: n, n_end            !! >= 0, > n
 
-      h = real(n_end - n, wp)*step%h
-      if (interval(self, step, n_end - 1) < step%h) h = march_grid_time(self, step, n_end) &
+      h = real(n_end - n, wp)*step%time%h
+      if (interval(self, step, n_end - 1) < step%time%h) h = march_grid_time(self, step, n_end) &
          - march_grid_time(self, step, n)
    end function march_span
 
@@ -239,7 +241,7 @@ contains
       last = int((from + n - 1)/self%grid%n_unit)
       h = real(n, wp)/real(self%grid%n_unit, wp)*interval(self, step, last)
       if (last == first) return
-      if (interval(self, step, last) < step%h) h = march_part_time(self, step, from + n) &
+      if (interval(self, step, last) < step%time%h) h = march_part_time(self, step, from + n) &
          - march_part_time(self, step, from)
    end function march_size
 
@@ -255,8 +257,8 @@ contains
       associate (state => self%state, step => scene%step(self%state%clock%i_step))
          n = self%grid%n_grid
          base = base_before(time)
-         if (time < step%duration) n = min(n, base%n + nint((time - base%time)/step%h))
-         if (n == self%grid%n_grid - 1 .and. is_same(time, step%duration)) n = self%grid%n_grid
+         if (time < step%time%duration) n = min(n, base%n + nint((time - base%time)/step%time%h))
+         if (n == self%grid%n_grid - 1 .and. is_same(time, step%time%duration)) n = self%grid%n_grid
          state%clock%is_off_grid = .not. is_same(time, march_grid_time(self, step, n))
          state%clock%step_time = time
          if (.not. state%clock%is_off_grid) state%clock%step_time = march_grid_time(self, step, n)

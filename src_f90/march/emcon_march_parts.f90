@@ -221,7 +221,7 @@ contains
       do i = 1, size(is_back)
          if (.not. is_back(i)) cycle
          n = n + 1
-         label(n)%text = to_text(scene%node_label(i))
+         label(n)%text = to_text(scene%node%label(i))
       end do
       call note_add(increment%notes, reason // ": contact nodes take their mass back: " // &
          joined(label(:n), ", ", most_named))
@@ -259,8 +259,9 @@ contains
       text = "the system is singular"
       e = strainless_element(solid)
       if (e == 0) return
-      associate (name => scene%kind(solid%kind(e))%name)
-         text = text // "; elements of type " // trim(name) // ", as " // to_text(solid%label(e)) &
+      associate (name => scene%element%kinds(solid%kind(e))%name)
+         text = text // "; elements of type " // trim(name) // ", as " &
+            // to_text(solid%deck%label(e)) &
             // ", have motions without strain, which a single one or a single row of them keeps: " &
             // "take two across"
          if (name(len_trim(name):len_trim(name)) == "R") text = text // ", or " &

@@ -60,7 +60,7 @@ contains
       self%active%may_cut = part%may_cut
       self%active%gap_tolerance = 0.0_wp
       if (part%may_cut) self%active%gap_tolerance &
-         = scene%step(self%state%clock%i_step)%gap_tolerance
+         = scene%step(self%state%clock%i_step)%contact%gap_tolerance
       self%active%left = [overclosure_left(scene, self%state, part%start%step_time), &
          overclosure_left(scene, self%state, part%start%step_time + part%h)]
       call solve(self, scene, part, increment, status, error)
@@ -139,10 +139,10 @@ contains
 
       associate (step => scene%step(self%state%clock%i_step))
          call events_look(self)
-         window = real(self%grid%n_window, wp)/real(self%grid%n_unit, wp)*step%h
+         window = real(self%grid%n_window, wp)/real(self%grid%n_unit, wp)*step%time%h
          if (window > 0.0_wp) call events_judge(self, step, part, window, status)
-         if (step%tolerance > 0.0_wp .and. status == step_done) call accuracy_judge(self, &
-            part, step%tolerance, status)
+         if (step%time%tolerance > 0.0_wp .and. status == step_done) call accuracy_judge(self, &
+            part, step%time%tolerance, status)
       end associate
    end subroutine judge_size
 
@@ -236,9 +236,9 @@ contains
       real(wp) :: slope
 
       associate (step => scene%step(state%clock%i_step))
-         overclosure_left = 1.0_wp - step_time/step%duration
-         if (step%overclosure_amplitude == 0) return
-         associate (amplitude => scene%amplitude(step%overclosure_amplitude))
+         overclosure_left = 1.0_wp - step_time/step%time%duration
+         if (step%contact%overclosure_amplitude == 0) return
+         associate (amplitude => scene%amplitude(step%contact%overclosure_amplitude))
             call find_amplitude_value(amplitude, step_time, overclosure_left, slope)
          end associate
       end associate
@@ -345,7 +345,7 @@ contains
          call constraint_index(self%system, id, pair, i)
          if (pair == 0) cycle
          n = n + 1
-         found(n)%text = to_text(scene%node_label(self%system%contact(pair)%contact%node(i)))
+         found(n)%text = to_text(scene%node%label(self%system%contact(pair)%contact%node(i)))
       end do
       text = joined(found(:n), ", ", most_named)
    end subroutine nodes_text

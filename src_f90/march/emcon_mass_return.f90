@@ -90,8 +90,8 @@ contains
       logical, intent(inout) :: is_marked(:)     !! (n_node)
       integer :: e
 
-      do e = 1, size(scene%element_kind)
-         associate (node => pack(scene%element_node(:, e), scene%element_node(:, e) > 0))
+      do e = 1, size(scene%element%kind)
+         associate (node => pack(scene%element%node(:, e), scene%element%node(:, e) > 0))
             if (any(of(node))) is_marked(node) = .true.
          end associate
       end do

@@ -62,7 +62,7 @@ contains
          largest = maxval(left)
          if (largest <= out_of_balance*maxval(abs(load) + abs(state%internal))) return
          call note_add(self%warnings, "a force of " // to_text(largest, 3) // " is not balanced " &
-            // "at node " // to_text(scene%node_label(maxloc(maxval(left, 1), 1))) // " of a " // &
+            // "at node " // to_text(scene%node%label(maxloc(maxval(left, 1), 1))) // " of a " // &
             "MASSLESS section as the step begins: it swings from increment to increment; let " // &
             "loads there rise from 0 by an *AMPLITUDE, or begin with a *STATIC step")
       end associate

@@ -48,16 +48,36 @@ module emcon_verdict
    !> Different warnings that are kept; others are counted only.
    integer, parameter :: most_warnings = 20
 
-   !> Running figures, and how the run ended.
-   type :: verdict_t
-      type(energy_watch_t) :: energy
+   !> How far bodies were in each other.
+   type :: overlap_found_t
       !> So far, per edge, bodies may be in each other: corners of master surfaces are rounded over
       !> a tenth of that, coordinates of decks by less.
       real(wp) :: bar = touching_bar
       real(wp) :: deepest = 0.0_wp               !! penetration per edge
-      real(wp) :: deepest_time = 0.0_wp          !! [T]
+      real(wp) :: time = 0.0_wp                  !! of the deepest one [T]
       real(wp) :: of_facets = 0.0_wp              !! of edges that stand for curves, per edge
       character(len=:), allocatable :: place     !! of the deepest one: bodies and nodes
+   end type overlap_found_t
+
+   !> How contact that gives way has done so.
+   type :: softness_found_t
+      real(wp) :: give = 0.0_wp                  !! how deep contact has given way, per edge
+      real(wp) :: time = 0.0_wp                  !! of that [T]
+      integer :: most_augmentations = 0          !! of an augmented Lagrangian in an increment
+   end type softness_found_t
+
+   type :: verdict_counts_t
+      integer :: newton = 0
+      integer :: cut = 0
+      integer :: guarded = 0                     !! increments in which guards act
+      integer :: held = 0                        !! increments in which contacts that come and go
+      integer :: most_held = 0                   !! are held closed, and the most of these in one
+   end type verdict_counts_t
+
+   !> Running figures, and how the run ended.
+   type :: verdict_t
+      type(energy_watch_t) :: energy
+      type(overlap_found_t) :: overlap
       real(wp) :: unconverged = 0.0_wp           !! largest residual accepted above the tolerance
       real(wp) :: unconverged_time = 0.0_wp      !! [T]
       type(stand_off_t) :: stand_off
@@ -65,14 +85,8 @@ module emcon_verdict
       type(small_range_t) :: small               !! what linear sections have met
       real(wp) :: law_missed = 0.0_wp            !! of contact and friction, at most [M L/T^2]
       real(wp) :: largest_push = 0.0_wp          !! of contacts where there is friction [M L/T^2]
-      real(wp) :: give = 0.0_wp                  !! how deep contact has given way, per edge
-      real(wp) :: give_time = 0.0_wp             !! [T]
-      integer :: most_augmentations = 0          !! of an augmented Lagrangian in an increment
-      integer :: n_newton = 0
-      integer :: n_cut = 0
-      integer :: n_guarded = 0                   !! increments in which guards act
-      integer :: n_held = 0                      !! increments in which contacts that come and go
-      integer :: most_held = 0                   !! are held closed, and the most of these in one
+      type(softness_found_t) :: softness
+      type(verdict_counts_t) :: count
       real(wp), allocatable :: largest_force(:)  !! (n_pair) on the slave side
       type(force_scatter_t), allocatable :: scatter(:)   !! (pairs) of forces from increment to next
       integer :: n_warning = 0
@@ -90,8 +104,8 @@ contains
       type(march_t), intent(in) :: march
 
       call energy_start(self%energy, march%ledger)
-      if (size(march%system%contact) > march%system%n_pair) self%bar = overlap_bar
-      self%place = ""
+      if (size(march%system%contact) > march%system%n_pair) self%overlap%bar = overlap_bar
+      self%overlap%place = ""
       self%message = ""
       call small_range_init(self%small, terms_solid(march%system%term))
       allocate(self%largest_force(size(march%state%pairs%total)), source=0.0_wp)
@@ -108,7 +122,7 @@ contains
       integer :: e
 
       call locking_element(solid, e, ratio)
-      if (e > 0) call add_warning(self, "element " // to_text(solid%label(e)) // " at nu = " &
+      if (e > 0) call add_warning(self, "element " // to_text(solid%deck%label(e)) // " at nu = " &
          // to_text(ratio) // " locks: " // trim(locking_advice(solid)))
    end subroutine warn_of_locking
 
@@ -122,7 +136,7 @@ contains
 
       if (has_warning(self, text)) return
       call far_element_find(march%motion%x, march%state%u, solid%node, e, digits)
-      if (e > 0) call add_warning(self, text // to_text(solid%label(e)) // " keep " // &
+      if (e > 0) call add_warning(self, text // to_text(solid%deck%label(e)) // " keep " // &
          to_text(digits) // " digits: move the model to the origin")
    end subroutine warn_of_distance
 
@@ -143,21 +157,22 @@ contains
       type(increment_t), intent(in) :: increment
       integer :: i
 
-      self%n_newton = self%n_newton + increment%n_newton
-      self%n_cut = self%n_cut + increment%n_cut
-      if (increment%is_guarded) self%n_guarded = self%n_guarded + 1
-      if (increment%n_held > 0) self%n_held = self%n_held + 1
-      self%most_held = max(self%most_held, increment%n_held)
+      self%count%newton = self%count%newton + increment%n_newton
+      self%count%cut = self%count%cut + increment%n_cut
+      if (increment%is_guarded) self%count%guarded = self%count%guarded + 1
+      if (increment%n_held > 0) self%count%held = self%count%held + 1
+      self%count%most_held = max(self%count%most_held, increment%n_held)
       associate (state => march%state)
          self%law_missed = max(self%law_missed, increment%law_missed)
          self%largest_push = max(self%largest_push, increment%largest_push)
          call scatter_follow(self%scatter, state%sums%sum, &
             evaluation_has_inertia(march%motion%evaluation))
-         if (increment%give > self%give) then
-            self%give = increment%give
-            self%give_time = state%clock%time
+         if (increment%give > self%softness%give) then
+            self%softness%give = increment%give
+            self%softness%time = state%clock%time
          end if
-         self%most_augmentations = max(self%most_augmentations, increment%n_augmentation)
+         self%softness%most_augmentations = max(self%softness%most_augmentations, &
+            increment%n_augmentation)
          if (increment%unconverged > self%unconverged) then
             self%unconverged = increment%unconverged
             self%unconverged_time = state%clock%time
@@ -206,16 +221,17 @@ contains
       type(march_t), intent(in) :: march
       type(increment_t), intent(in) :: increment
 
-      self%of_facets = max(self%of_facets, increment%overlap%of_facets)
+      self%overlap%of_facets = max(self%overlap%of_facets, increment%overlap%of_facets)
       associate (overlap => increment%overlap, stray => increment%stray)
-         if (max(overlap%depth, stray%depth) <= self%deepest) return
-         self%deepest = max(overlap%depth, stray%depth)
-         self%deepest_time = march%state%clock%time
+         if (max(overlap%depth, stray%depth) <= self%overlap%deepest) return
+         self%overlap%deepest = max(overlap%depth, stray%depth)
+         self%overlap%time = march%state%clock%time
          if (overlap%depth >= stray%depth) then
-            call overlap_text(overlap, scene%node_label, march%system%space%body, self%place)
+            call overlap_text(overlap, scene%node%label, march%system%space%body, &
+               self%overlap%place)
          else
-            call overlap_text(stray, scene%node_label, march%system%space%body, self%place)
-            self%place = self%place // unpaired
+            call overlap_text(stray, scene%node%label, march%system%space%body, self%overlap%place)
+            self%overlap%place = self%overlap%place // unpaired
          end if
       end associate
    end subroutine follow_overlaps
@@ -301,9 +317,11 @@ contains
             call note_add(found, text)
          end if
       end associate
-      if (self%deepest > overlap_told .and. self%deepest <= most_overlap(self)) call note_add( &
-         found, "bodies overlap by " // to_text(self%deepest, 3) // " of an edge at time " // &
-         to_text(self%deepest_time, 9) // ", as guards allow: SIDES=BOTH of NODE TO SURFACE " // &
+      if (self%overlap%deepest > overlap_told &
+         .and. self%overlap%deepest <= most_overlap(self)) call note_add( &
+         found, "bodies overlap by " // to_text(self%overlap%deepest, 3) &
+         // " of an edge at time " // &
+         to_text(self%overlap%time, 9) // ", as guards allow: SIDES=BOTH of NODE TO SURFACE " // &
          "holds all nodes, smaller edges let less in")
       do i = 1, found%n
          call add_warning(self, found%item(i)%text)
@@ -326,12 +344,14 @@ contains
       character(len=:), allocatable :: text
       integer :: i
 
-      if (self%deepest > most_overlap(self)) call note_add(self%reasons, "bodies overlap by " // &
-         to_text(self%deepest, 3) // " of an edge at time " // to_text(self%deepest_time, 9) // &
-         ", " // self%place)
-      if (self%give > far_behind) call note_add(self%reasons, "contact gives way by up to " // &
-         to_text(self%give, 3) // " of an edge: STIFFNESS or FACTOR of *CONSTRAINT METHOD is too " &
-         // "small")
+      if (self%overlap%deepest > most_overlap(self)) call note_add(self%reasons, &
+         "bodies overlap by " // &
+         to_text(self%overlap%deepest, 3) // " of an edge at time " // to_text(self%overlap%time, &
+         9) // ", " // self%overlap%place)
+      if (self%softness%give > far_behind) call note_add(self%reasons, &
+         "contact gives way by up to " // &
+         to_text(self%softness%give, 3) &
+         // " of an edge: STIFFNESS or FACTOR of *CONSTRAINT METHOD is too " // "small")
       if (stand_off_mean(self%stand_off) > most_stand_off) then
          call stand_off_text(self, text)
          call note_add(self%reasons, text)
@@ -348,8 +368,8 @@ contains
    pure real(wp) function most_overlap(self)
       type(verdict_t), intent(in) :: self
 
-      most_overlap = self%bar + most_give*self%give
-      if (self%give <= far_behind) most_overlap = min(most_overlap, far_behind)
+      most_overlap = self%overlap%bar + most_give*self%softness%give
+      if (self%softness%give <= far_behind) most_overlap = min(most_overlap, far_behind)
    end function most_overlap
 
    !> Has the run come to its end with nothing found wrong?
@@ -364,7 +384,7 @@ contains
       type(verdict_t), intent(in) :: self
       logical, intent(in) :: is_strict           !! whatever is bad is a failure
 
-      verdict_is_failure = max(self%deepest, self%give) > far_behind .or. &
+      verdict_is_failure = max(self%overlap%deepest, self%softness%give) > far_behind .or. &
          energy_is_failure(self%energy) .or. (is_strict .and. self%reasons%n > 0)
    end function verdict_is_failure
 

@@ -55,8 +55,8 @@ contains
       is_meant = .false.
       noise = coordinate_noise(scene)
       if (size(scene%step) > 0) then
-         options = scene%step(1)%contact
-         is_meant = scene%step(1)%resolves_overclosure
+         options = scene%step(1)%contact%options
+         is_meant = scene%step(1)%contact%resolves_overclosure
       end if
       is_checked = .false.
       do i = 1, size(scene%pair)
@@ -77,7 +77,7 @@ contains
                if (.not. allocated(error)) call check_slave_sides(scene, pair, noise, error)
                if (allocated(error)) return
             end if
-            if (pair%adjust_distance >= 0.0_wp .or. pair%adjust_set > 0) then
+            if (pair%adjust%distance >= 0.0_wp .or. pair%adjust%set > 0) then
                call adjust_pair(scene, pair, contact, notes)
                noise = coordinate_noise(scene)
             end if
@@ -120,7 +120,7 @@ contains
       type(contact_pair_t), intent(in) :: pair
 
       may_exchange = pair%may_choose .and. .not. (pair%both_sides .or. pair%slave == pair%master &
-         .or. pair%adjust_distance >= 0.0_wp .or. pair%adjust_set > 0)
+         .or. pair%adjust%distance >= 0.0_wp .or. pair%adjust%set > 0)
       may_exchange = may_exchange .and. .not. any(scene%pair%slave == pair%master .and. &
          scene%pair%master == pair%slave)
    end function may_exchange
@@ -265,9 +265,9 @@ contains
       do i = 1, contact%n
          if (contact%facet(i) == 0) cycle
          state = contact%state(i)
-         is_meant = state%gap0 <= pair%adjust_distance
-         if (pair%adjust_set > 0) is_meant = &
-            find_sorted(scene%node_set(pair%adjust_set)%item, contact%node(i)) > 0
+         is_meant = state%gap0 <= pair%adjust%distance
+         if (pair%adjust%set > 0) is_meant = &
+            find_sorted(scene%set%node(pair%adjust%set)%item, contact%node(i)) > 0
          if (.not. (state%is_over .and. is_meant)) cycle
          largest = max(largest, abs(state%gap0))
          n_moved = n_moved + 1
@@ -405,7 +405,7 @@ contains
          if (.not. state(i)%is_over .or. state(i)%gap0 >= -limit(i)) cycle
          n = n + 1
          deepest = max(deepest, -state(i)%gap0)
-         found(n)%text = to_text(scene%node_label(node(i))) // " (" // &
+         found(n)%text = to_text(scene%node%label(node(i))) // " (" // &
             to_text(-state(i)%gap0) // ")"
       end do
       text = ", by " // to_text(deepest) // " at most; node (depth): " // &

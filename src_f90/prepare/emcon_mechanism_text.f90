@@ -142,11 +142,11 @@ contains
 
       has_element = .false.
       do i = size(bodies%of_node), 1, -1
-         if (bodies%of_node(i) > 0) label(bodies%of_node(i)) = scene%node_label(i)
+         if (bodies%of_node(i) > 0) label(bodies%of_node(i)) = scene%node%label(i)
       end do
-      do i = size(scene%element_label), 1, -1
-         associate (b => system%space%body(scene%element_node(1, i)))
-            label(b) = scene%element_label(i)
+      do i = size(scene%element%label), 1, -1
+         associate (b => system%space%body(scene%element%node(1, i)))
+            label(b) = scene%element%label(i)
             has_element(b) = .true.
          end associate
       end do

@@ -43,7 +43,7 @@ contains
       do i = 1, size(partners%slave%node)
          if (find_sorted(partners%master%node, partners%slave%node(i)) == 0) cycle
          n = n + 1
-         shared(n)%text = to_text(scene%node_label(partners%slave%node(i)))
+         shared(n)%text = to_text(scene%node%label(partners%slave%node(i)))
       end do
       if (n == 0) return
       call raise(error, err_input, tie_text(scene, tie) // "slave surface " // &
@@ -89,7 +89,7 @@ contains
             return
          end if
          do i = 1, min(n, most_named)
-            found(i)%text = to_text(scene%node_label(lonely(i))) // " (" // &
+            found(i)%text = to_text(scene%node%label(lonely(i))) // " (" // &
                to_text(distance(i)) // ")"
          end do
          text = tie_text(scene, tie) // to_text(size(lonely)) // " of " // to_text(size(node)) // &
@@ -150,7 +150,7 @@ contains
       call raise(error, err_input, tie_text(scene, tie) // "slave surface " // &
          scene%surface(tie%slave)%name // " and master surface " // &
          scene%surface(tie%master)%name // ": the surfaces do not meet: the nearest points " // &
-         "are " // to_text(least) // " apart (node " // to_text(scene%node_label(nearest)) // &
+         "are " // to_text(least) // " apart (node " // to_text(scene%node%label(nearest)) // &
          "), the position tolerance is " // tolerance_text(tie) // "; move a body, or raise " // &
          "POSITION TOLERANCE")
    end subroutine raise_apart
@@ -169,8 +169,8 @@ contains
          do e = 1, slave%n_facet
             if (.not. partners%hole(e) > 0.0_wp) cycle
             n = n + 1
-            found(n)%text = to_text(scene%node_label(slave%facet(1, e))) // "-" // &
-               to_text(scene%node_label(slave%facet(2, e))) // " (" // &
+            found(n)%text = to_text(scene%node%label(slave%facet(1, e))) // "-" // &
+               to_text(scene%node%label(slave%facet(2, e))) // " (" // &
                to_text(partners%hole(e)) // ")"
          end do
       end associate

@@ -78,7 +78,7 @@ contains
             if (distance(k) > 0.0_wp) call note_add(notes, "*TIE " // scene%tie(t)%name // &
                ": " // to_text(count(distance > 0.0_wp)) // " of " // to_text(size(slave)) // &
                " slave nodes moved onto the master surface, at most by " // &
-               to_text(distance(k)) // " (node " // to_text(scene%node_label(slave(k))) // ")")
+               to_text(distance(k)) // " (node " // to_text(scene%node%label(slave(k))) // ")")
             deallocate(distance)
          end associate
       end do
@@ -93,9 +93,9 @@ contains
       real(wp) :: before, after
       integer :: e, i, n, k
 
-      do e = 1, size(scene%element_kind)
-         n = scene%kind(scene%element_kind(e))%n_corner
-         associate (node => scene%element_node(:n, e))
+      do e = 1, size(scene%element%kind)
+         n = scene%element%kinds(scene%element%kind(e))%n_corner
+         associate (node => scene%element%node(:n, e))
             if (all(abs(move(:, node)) <= 0.0_wp)) cycle
             do i = 1, n
                before = corner_area(scene%x(:, node), i)
@@ -104,8 +104,8 @@ contains
                k = maxloc(sum(abs(move(:, node)), 1), 1)
                call tie_text(scene, node(k), tie)
                call raise(error, err_input, tie // "element " // &
-                  to_text(scene%element_label(e)) // " would be spoilt: the tie moves its " // &
-                  "node " // to_text(scene%node_label(node(k))) // " by " // &
+                  to_text(scene%element%label(e)) // " would be spoilt: the tie moves its " // &
+                  "node " // to_text(scene%node%label(node(k))) // " by " // &
                   to_text(norm2(move(:, node(k)))) // " onto the master surface; let the " // &
                   "surfaces meet, or refine the coarser one")
                return

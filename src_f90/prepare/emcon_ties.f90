@@ -109,7 +109,7 @@ contains
                   if (owner(node) > 0 .and. (is_inner(node) .or. is_inner_here)) then
                      call raise(error, err_input, where_text(scene, scene%tie(t)%origin) // &
                         ": *TIE " // scene%tie(t)%name // " over-constrains the model: slave " // &
-                        "node " // to_text(scene%node_label(node)) // " is a slave node of *TIE " &
+                        "node " // to_text(scene%node%label(node)) // " is a slave node of *TIE " &
                         // scene%tie(owner(node))%name // " already; let the surface be the " // &
                         "master of one of them")
                      return

@@ -100,13 +100,13 @@ contains
          if (t < 0) then
             text = where_text(scene, scene%rigid(-t)%origin) // ": *RIGID BODY " // &
                scene%rigid(-t)%name // " in " // direction(scene, linear%own(row)) &
-               // " at node " // to_text(scene%node_label(k))
+               // " at node " // to_text(scene%node%label(k))
          else if (t == 0) then
             text = where_text(scene, scene%equation(k)%origin) // ": *EQUATION " // to_text(k)
          else
             text = where_text(scene, scene%tie(t)%origin) // ": *TIE " // scene%tie(t)%name // &
                " in " // direction(scene, linear%own(row)) // " at slave node " // &
-               to_text(scene%node_label(scene%tie(t)%rows%slave(k)))
+               to_text(scene%node%label(scene%tie(t)%rows%slave(k)))
          end if
       end associate
    end subroutine row_text
@@ -142,7 +142,7 @@ contains
       allocate(distinct, source=unique_sorted(node))
       allocate(label(size(distinct)))
       do i = 1, size(distinct)
-         label(i)%text = to_text(scene%node_label(distinct(i)))
+         label(i)%text = to_text(scene%node%label(distinct(i)))
       end do
       text = "node" // trim(merge("s", " ", size(distinct) /= 1)) // " " // &
          joined(label, ", ", most_named)

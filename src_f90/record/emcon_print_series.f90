@@ -152,16 +152,16 @@ contains
       associate (scene => stepper%scene, system => stepper%march%system)
          select case (place)
          case (at_nodes)
-            call find_members("ALL_NODES", scene%node_set, scene%node_label)
+            call find_members("ALL_NODES", scene%set%node, scene%node%label)
          case (at_elements)
-            call find_members("ALL_ELEMENTS", scene%element_set, scene%element_label)
+            call find_members("ALL_ELEMENTS", scene%set%element, scene%element%label)
          case (at_contacts)
             set = "CONTACT"
             item = [(i, i = system%first_constraint(1) + 1, &
                system%first_constraint(system%n_pair + 1))]
             allocate(label(0))
             do i = 1, system%n_pair
-               label = [label, scene%node_label(system%contact(i)%contact%node)]
+               label = [label, scene%node%label(system%contact(i)%contact%node)]
             end do
          case default
             set = "PAIRS"
@@ -223,7 +223,8 @@ contains
 
       associate (state => stepper%march%state)
          if (allocated(output%time)) then
-            slack = 0.5_wp*sqrt(epsilon(1.0_wp))*stepper%scene%step(state%clock%i_step)%duration
+            slack = 0.5_wp*sqrt(epsilon(1.0_wp)) &
+               *stepper%scene%step(state%clock%i_step)%time%duration
             before = last_time - state%clock%start_time
             now = state%clock%time - state%clock%start_time
             is_due = any(output%time > before + slack .and. output%time <= now + slack)

@@ -214,7 +214,7 @@ contains
 
       solid => terms_solid(stepper%march%system%term)
       associate (state => stepper%march%state)
-         n = size(stepper%scene%element_kind)
+         n = size(stepper%scene%element%kind)
          select case (variable)
          case ("ENER", "ELSE")
             values = reshape(real(state%energy, dp), [1, n])

@@ -119,12 +119,12 @@ contains
       integer :: e, n_element
 
       call profile_lines(scene, line)
-      n_element = size(scene%element_node, 2)
-      allocate(node(max(n_end, size(scene%element_node, 1)), n_element + size(line, 2)), source=0)
+      n_element = size(scene%element%node, 2)
+      allocate(node(max(n_end, size(scene%element%node, 1)), n_element + size(line, 2)), source=0)
       allocate(vtk_type(size(node, 2)), source=vtk_line)
       do e = 1, n_element
-         associate (kind => scene%kind(scene%element_kind(e)))
-            node(:kind%n_vtk, e) = scene%element_node(:kind%n_vtk, e)
+         associate (kind => scene%element%kinds(scene%element%kind(e)))
+            node(:kind%n_vtk, e) = scene%element%node(:kind%n_vtk, e)
             vtk_type(e) = kind%vtk_type
          end associate
       end do
@@ -313,7 +313,7 @@ contains
       integer, allocatable :: line(:, :)
 
       call profile_lines(stepper%scene, line)
-      associate (first => [stepper%scene%element_node(1, :), line(1, :)])
+      associate (first => [stepper%scene%element%node(1, :), line(1, :)])
          allocate(body(1, size(first)))
          body(1, :) = real(stepper%march%system%space%body(first), dp)
       end associate
@@ -328,7 +328,7 @@ contains
       associate (state => stepper%march%state)
          default_frame = 0
          if (time <= state%clock%start_time) return
-         part = (time - state%clock%start_time)/stepper%scene%step(state%clock%i_step)%duration
+         part = (time - state%clock%start_time)/stepper%scene%step(state%clock%i_step)%time%duration
          default_frame = floor(real(default_frames, wp)*part + sqrt(epsilon(1.0_wp)))
       end associate
    end function default_frame

@@ -49,8 +49,8 @@ contains
       solid => terms_solid(stepper%march%system%term)
       associate (scene => stepper%scene, space => stepper%march%system%space)
          allocate(body(space%n_body))
-         do e = 1, size(scene%element_kind)
-            i = space%body(scene%element_node(1, e))
+         do e = 1, size(scene%element%kind)
+            i = space%body(scene%element%node(1, e))
             if (i > 0) call add_element(body(i), scene, solid, e)
          end do
          do i = 1, size(scene%x, 2)
@@ -74,13 +74,13 @@ contains
       real(wp), parameter :: rest(3) = 0.0_wp
 
       body%n_element = body%n_element + 1
-      if (solid%is_rigid(e)) body%n_rigid = body%n_rigid + 1
-      if (solid%is_linear(e)) body%n_linear = body%n_linear + 1
-      if (solid%is_corotated(e)) body%n_corotated = body%n_corotated + 1
-      if (.not. solid%has_inertia(e)) body%n_static = body%n_static + 1
+      if (solid%trait%is_rigid(e)) body%n_rigid = body%n_rigid + 1
+      if (solid%trait%is_linear(e)) body%n_linear = body%n_linear + 1
+      if (solid%trait%is_corotated(e)) body%n_corotated = body%n_corotated + 1
+      if (.not. solid%trait%has_inertia(e)) body%n_static = body%n_static + 1
       call add_place(body, scene, e)
-      call unite(body%kind, scene%element_kind(e))
-      associate (material => scene%material(scene%section(scene%element_section(e))%material))
+      call unite(body%kind, scene%element%kind(e))
+      associate (material => scene%material(scene%section(scene%element%section(e))%material))
          call unite(body%law, material%law)
          if (.not. allocated(solid%law(solid%law_of(e))%law)) return
          associate (law => solid%law(solid%law_of(e))%law)
@@ -103,7 +103,7 @@ contains
       integer, intent(in) :: e
       integer :: i
 
-      associate (node => scene%element_node(:, e))
+      associate (node => scene%element%node(:, e))
          if (.not. allocated(body%low)) then
             body%low = scene%x(:, node(1))
             body%high = body%low
@@ -132,7 +132,7 @@ contains
       integer :: i, j
 
       shortest = huge(1.0_wp)
-      associate (node => scene%element_node(:, e))
+      associate (node => scene%element%node(:, e))
          do i = 1, count(node > 0)
             do j = 1, i - 1
                shortest = min(shortest, norm2(scene%x(:, node(i)) - scene%x(:, node(j))))
@@ -269,7 +269,7 @@ contains
       character(len=:), allocatable, intent(out) :: name
 
       name = "elements of several kinds"
-      if (body%kind > 0) name = trim(scene%kind(body%kind)%name)
+      if (body%kind > 0) name = trim(scene%element%kinds(body%kind)%name)
       if (body%kind == 0) name = "elements"
    end subroutine name_kind
 

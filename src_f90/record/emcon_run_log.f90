@@ -65,17 +65,18 @@ contains
       integer :: k
 
       associate (scene => stepper%scene, system => stepper%march%system)
-         if (len_trim(scene%heading) > 0) call note_add(notes, trim(scene%heading))
+         if (len_trim(scene%deck%heading) > 0) call note_add(notes, trim(scene%deck%heading))
          call note_add(notes, to_text(size(scene%x, 2)) // " nodes, " // &
             to_text(system%space%numbering%n_unknown) // " unknowns in step 1, " // &
             to_text(system%space%n_body) // " bodies")
-         do k = 1, size(scene%kind)
-            if (any(scene%element_kind == k)) call note_add(notes, &
-               to_text(count(scene%element_kind == k)) // " elements " // trim(scene%kind(k)%name))
+         do k = 1, size(scene%element%kinds)
+            if (any(scene%element%kind == k)) call note_add(notes, &
+               to_text(count(scene%element%kind == k)) // " elements " &
+               // trim(scene%element%kinds(k)%name))
          end do
          call add_link_lines(scene, system, notes)
          do k = 1, size(scene%pair)
-            call formulation_text(scene%pair(k)%formulation, scene%step(1)%contact, how)
+            call formulation_text(scene%pair(k)%formulation, scene%step(1)%contact%options, how)
             call note_add(notes, "contact: " // scene%surface(scene%pair(k)%slave)%name // &
                " (slave, " // to_text(system%contact(k)%contact%n_constraint) // " nodes" // &
                trim(merge(", named second", "              ", &
@@ -101,25 +102,28 @@ contains
       integer :: i
 
       associate (step => scene%step(k))
-         call option_text("solver", step%solver, solver)
-         if (step%solver == solver_given) solver = step%solver_name
+         call option_text("solver", step%solution%solver, solver)
+         if (step%solution%solver == solver_given) solver = step%solution%solver_name
          scheme = trim(step%scheme%text)
          if (step%scheme%code == scheme_given) scheme = "scheme " // step%choice%name
          associate (setting => step%scheme%setting)
             if (setting%word /= "") scheme = scheme // " (" // trim(setting%word) // "=" // &
                to_text(setting%value) // ")"
          end associate
-         call note_add(notes, "step " // to_text(k) // ": duration " // to_text(step%duration) // &
-            ", h = " // to_text(step%h) // trim(merge(", NLGEOM", "        ", step%nlgeom)) // &
-            ", " // scheme // ", solver " // solver)
-         if (.not. step%polishes) call note_add(notes, "corrections end where the residual is " // &
-            "within " // to_text(step%newton_tolerance) // ": the energy is kept no better")
+         call note_add(notes, "step " // to_text(k) // ": duration " &
+            // to_text(step%time%duration) // &
+            ", h = " // to_text(step%time%h) // trim(merge(", NLGEOM", "        ", &
+            step%nlgeom)) // ", " // scheme // ", solver " // solver)
+         if (.not. step%solution%polishes) call note_add(notes, &
+            "corrections end where the residual is " // &
+            "within " // to_text(step%solution%newton_tolerance) &
+            // ": the energy is kept no better")
       end associate
       if (k == 1) return
       do i = 1, size(scene%pair)
          associate (pair => scene%pair(i))
-            call formulation_text(pair%formulation, scene%step(k - 1)%contact, before)
-            call formulation_text(pair%formulation, scene%step(k)%contact, how)
+            call formulation_text(pair%formulation, scene%step(k - 1)%contact%options, before)
+            call formulation_text(pair%formulation, scene%step(k)%contact%options, how)
             if (how /= before) call note_add(notes, "   contact " // &
                scene%surface(pair%slave)%name // " on " // scene%surface(pair%master)%name // &
                ": " // how)

@@ -102,9 +102,9 @@ contains
       how = "both"
       if (.not. pair%both_sides) how = "one"
       call row_put(row, "sides", how, "")
-      if (pair%laws%friction > 0.0_wp) call row_put(row, "friction", &
-         pair%laws%friction, ", friction #")
-      associate (damping => pair%laws%damping)
+      if (pair%interaction%friction > 0.0_wp) call row_put(row, "friction", &
+         pair%interaction%friction, ", friction #")
+      associate (damping => pair%interaction%damping)
          if (.not. damping%coefficient > 0.0_wp) return
          call row_put(row, "damping", damping%coefficient, ", damping #")
          call row_put(row, "damping_clearance", damping%clearance, " up to a clearance of #")
@@ -236,13 +236,13 @@ contains
       call row_begin(row, "increments", "step")
       call row_put(row, "step", k, " #")
       associate (step => stepper%scene%step(k), march => stepper%march)
-         call row_put(row, "h", step%h, ": h = #")
+         call row_put(row, "h", step%time%h, ": h = #")
          if (march%explicit%is_on .and. march%state%clock%i_step == k) call row_put(row, &
             "critical_h", march%state%explicit%critical_h, ", critical h = #")
-         call row_put(row, "courant_number", step%h/transit, &
+         call row_put(row, "courant_number", step%time%h/transit, &
             ", # wave transit times of the smallest element")
          call row_put(row, "recommended_h", transit, "; to resolve waves: h = #")
-         if (step%h > many_transits*transit) call row_put(row, "remark", &
+         if (step%time%h > many_transits*transit) call row_put(row, "remark", &
             "waves are not resolved, rigid motion and bending are", "; #")
       end associate
       call rows_add(rows, row)
@@ -309,13 +309,15 @@ contains
       real(wp) :: transit
       integer :: k
 
-      if (size(scene%pair) == 0 .or. any(scene%step%initiation == initiation_massless)) return
+      if (size(scene%pair) == 0 &
+         .or. any(scene%step%contact%initiation == initiation_massless)) return
       k = findloc(step_initiation(scene%step), initiation_persistent, 1)
       if (k == 0) return
       transit = shortest_transit(body)
-      if (.not. (transit < huge(transit) .and. scene%step(k)%h < transit)) return
+      if (.not. (transit < huge(transit) .and. scene%step(k)%time%h < transit)) return
       call row_begin(row, "advice", "h is")
-      call row_put(row, "courant_number", scene%step(k)%h/transit, " # of the wave transit time " &
+      call row_put(row, "courant_number", scene%step(k)%time%h/transit, &
+         " # of the wave transit time " &
          // "of the smallest element: contact forces of nodes with mass jump up and down; " // &
          "*CONTACT INITIATION, TYPE=MASSLESS makes them smooth on bodies at least two " // &
          "elements thick")

@@ -75,10 +75,10 @@ contains
          b = system%space%body(i)
          if (b > 0) n_node(b) = n_node(b) + 1
       end do
-      do i = size(scene%element_kind), 1, -1
-         b = system%space%body(scene%element_node(1, i))
+      do i = size(scene%element%kind), 1, -1
+         b = system%space%body(scene%element%node(1, i))
          n_element(b) = n_element(b) + 1
-         first(b) = scene%element_label(i)
+         first(b) = scene%element%label(i)
       end do
       do b = 1, min(system%space%n_body, most_subdomains)
          text = "subdomain " // to_text(b) // ": "
@@ -113,7 +113,7 @@ contains
       integer :: i
 
       do i = 1, size(node)
-         label(i)%text = to_text(scene%node_label(node(i)))
+         label(i)%text = to_text(scene%node%label(node(i)))
       end do
       text = joined(label, ", ", most_nodes)
    end subroutine labels_text

@@ -74,11 +74,11 @@ contains
       associate (state => march%state, ledger => march%ledger)
          call json_number(line, "increments", real(state%clock%increment, wp))
          call json_number(line, "time", state%clock%time)
-         call json_number(line, "newton", real(self%n_newton, wp))
-         call json_number(line, "cuts", real(self%n_cut, wp))
-         call json_number(line, "guarded_increments", real(self%n_guarded, wp))
-         call json_number(line, "held_increments", real(self%n_held, wp))
-         call json_number(line, "held_contacts", real(self%most_held, wp))
+         call json_number(line, "newton", real(self%count%newton, wp))
+         call json_number(line, "cuts", real(self%count%cut, wp))
+         call json_number(line, "guarded_increments", real(self%count%guarded, wp))
+         call json_number(line, "held_increments", real(self%count%held, wp))
+         call json_number(line, "held_contacts", real(self%count%most_held, wp))
          call json_number(line, "kinetic", ledger%kinetic)
          call json_number(line, "strain", ledger%strain)
          call json_number(line, "external_work", ledger%external_work)
@@ -95,17 +95,17 @@ contains
       call json_number(line, "total_at_start", self%energy%at_start)
       call json_number(line, "largest_energy", self%energy%largest)
       call json_number(line, "largest_energy_error", self%energy%largest_error)
-      call json_number(line, "penetration", self%deepest)
-      call json_number(line, "penetration_time", self%deepest_time)
-      call json_text(line, "penetration_place", self%place)
-      if (self%give > 0.0_wp) then
-         call json_number(line, "give", self%give)
-         call json_number(line, "give_time", self%give_time)
+      call json_number(line, "penetration", self%overlap%deepest)
+      call json_number(line, "penetration_time", self%overlap%time)
+      call json_text(line, "penetration_place", self%overlap%place)
+      if (self%softness%give > 0.0_wp) then
+         call json_number(line, "give", self%softness%give)
+         call json_number(line, "give_time", self%softness%time)
       end if
       if (march%active%friction%is_on) call json_number(line, "law_violation", &
          verdict_law_violation(self))
-      if (self%most_augmentations > 0) call json_number(line, "augmentations", &
-         real(self%most_augmentations, wp))
+      if (self%softness%most_augmentations > 0) call json_number(line, "augmentations", &
+         real(self%softness%most_augmentations, wp))
       call add_forces(self, line)
       call json_number(line, "unconverged", self%unconverged)
       if (size(self%small%section) > 0) then
@@ -152,28 +152,29 @@ contains
       type(restart_t), intent(inout) :: restart
 
       call exchange_energy(self%energy, restart)
-      call restart_exchange(restart, "verdict", self%deepest)
-      call restart_exchange(restart, "verdict", self%deepest_time)
+      call restart_exchange(restart, "verdict", self%overlap%deepest)
+      call restart_exchange(restart, "verdict", self%overlap%time)
       call restart_exchange(restart, "verdict", self%unconverged)
       call restart_exchange(restart, "verdict", self%unconverged_time)
       call restart_exchange(restart, "verdict", self%stand_off%largest)
       call restart_exchange(restart, "verdict", self%stand_off%impulse)
       call restart_exchange(restart, "verdict", self%stand_off%impulse_gap)
-      call restart_exchange(restart, "effort", self%n_newton)
-      call restart_exchange(restart, "effort", self%n_cut)
+      call restart_exchange(restart, "effort", self%count%newton)
+      call restart_exchange(restart, "effort", self%count%cut)
       call restart_exchange(restart, "effort", self%n_warning)
-      call restart_exchange(restart, "effort", self%n_guarded)
-      call restart_exchange(restart, "effort", self%n_held)
-      call restart_exchange(restart, "effort", self%most_held)
+      call restart_exchange(restart, "effort", self%count%guarded)
+      call restart_exchange(restart, "effort", self%count%held)
+      call restart_exchange(restart, "effort", self%count%most_held)
       call restart_exchange(restart, "pair_largest", self%largest_force)
       if (restart_offers(restart, "linear_range", size(self%small%section) > 0)) then
          call restart_exchange(restart, "linear_range", self%small%rotation)
          call restart_exchange(restart, "linear_strain", self%small%strain)
       end if
-      if (restart_offers(restart, "give", self%give > 0.0_wp .or. self%most_augmentations > 0)) then
-         call restart_exchange(restart, "give", self%give)
-         call restart_exchange(restart, "give", self%give_time)
-         call restart_exchange(restart, "augmentations", self%most_augmentations)
+      if (restart_offers(restart, "give", self%softness%give > 0.0_wp &
+         .or. self%softness%most_augmentations > 0)) then
+         call restart_exchange(restart, "give", self%softness%give)
+         call restart_exchange(restart, "give", self%softness%time)
+         call restart_exchange(restart, "augmentations", self%softness%most_augmentations)
       end if
       if (restart_offers(restart, "law_missed", self%largest_push > 0.0_wp)) then
          call restart_exchange(restart, "law_missed", self%law_missed)
@@ -235,11 +236,11 @@ contains
       type(restart_t), intent(inout) :: restart
       type(string_t), allocatable :: place(:), warning(:)
 
-      allocate(place(merge(1, 0, allocated(self%place))))
-      if (size(place) > 0) place(1)%text = self%place
+      allocate(place(merge(1, 0, allocated(self%overlap%place))))
+      if (size(place) > 0) place(1)%text = self%overlap%place
       if (restart_offers(restart, "deepest_place", size(place) > 0)) then
          call restart_list(restart, "deepest_place", place)
-         self%place = place(1)%text
+         self%overlap%place = place(1)%text
       end if
       allocate(warning(self%warnings%n))
       if (size(warning) > 0) warning = self%warnings%item(:size(warning))

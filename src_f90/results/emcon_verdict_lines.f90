@@ -61,10 +61,10 @@ contains
             "not judged), "
       end associate
       if (allocated(self%largest_force)) then
-         if (self%give > 0.0_wp) then
-            line = line // "contact gives way by up to " // to_text(self%give, 3) // &
+         if (self%softness%give > 0.0_wp) then
+            line = line // "contact gives way by up to " // to_text(self%softness%give, 3) // &
                " of an edge and no more penetrates, "
-         else if (self%deepest > overlap_told) then
+         else if (self%overlap%deepest > overlap_told) then
             line = line // "nothing penetrates by more than guards allow, "
          else if (size(self%largest_force) > 0) then
             line = line // "nothing " // trim(merge("else penetrates,", "penetrates,     ", &
@@ -96,17 +96,18 @@ contains
       if (march%state%clock%increment > 0) then
          call note_add(lines, "increments " // to_text(march%state%clock%increment) &
             // ", time " // to_text(march%state%clock%time, 9) // ", Newton iterations " &
-            // to_text(self%n_newton) // ", cuts " // to_text(self%n_cut))
+            // to_text(self%count%newton) // ", cuts " // to_text(self%count%cut))
          call add_energies(self, march%ledger, lines)
          call add_checked(self, march, lines)
-         if (self%n_guarded > 0) then
+         if (self%count%guarded > 0) then
             call guard_advice(scene%pair, text)
-            call note_add(lines, "guards hold nodes in " // to_text(self%n_guarded) // &
+            call note_add(lines, "guards hold nodes in " // to_text(self%count%guarded) // &
                " increments; to need none: " // text)
          end if
-         if (self%n_held > 0) call note_add(lines, "contacts that kept opening and closing " // &
-            "were held closed in " // to_text(self%n_held) // " increments, at most " // &
-            to_text(self%most_held) // " of them in one")
+         if (self%count%held > 0) call note_add(lines, &
+            "contacts that kept opening and closing " // &
+            "were held closed in " // to_text(self%count%held) // " increments, at most " // &
+            to_text(self%count%most_held) // " of them in one")
          if (self%stand_off%largest > rounding) call note_add(lines, &
             "largest stand-off (gap across which contact forces act) " // &
             to_text(self%stand_off%largest, 3) // " of an element, mean over the impulse " // &
@@ -165,11 +166,11 @@ contains
          to_text(verdict_law_violation(self), 2) // " of the largest force")
       if (abs(ledger%contact_damping) > 0.0_wp) call note_add(lines, "contact damping took " // &
          to_text(ledger%contact_damping, 9))
-      if (self%give > 0.0_wp) call note_add(lines, "contact gave way by at most " // &
-         to_text(self%give, 3) // " of an edge, at time " // to_text(self%give_time, 9) // &
-         "; stored at the end " // to_text(ledger%contact_energy, 9))
-      if (self%most_augmentations > 0) call note_add(lines, "augmentations " // &
-         to_text(self%most_augmentations) // " at most in a solve")
+      if (self%softness%give > 0.0_wp) call note_add(lines, "contact gave way by at most " // &
+         to_text(self%softness%give, 3) // " of an edge, at time " // to_text(self%softness%time, &
+         9) // "; stored at the end " // to_text(ledger%contact_energy, 9))
+      if (self%softness%most_augmentations > 0) call note_add(lines, "augmentations " // &
+         to_text(self%softness%most_augmentations) // " at most in a solve")
    end subroutine add_losses
 
    !> Whether overlap was looked for, and the deepest.
@@ -191,9 +192,10 @@ contains
          end if
          call note_add(lines, "overlap checked: " // to_text(check%n_piece) // " bodies, " // &
             to_text(check%n_facet) // " edges; deepest penetration " // &
-            to_text(self%deepest, 3) // " of an element")
-         if (self%of_facets > self%bar) call note_add(lines, "edges of curved surfaces " // &
-            "overlap by up to " // to_text(self%of_facets, 3) // &
+            to_text(self%overlap%deepest, 3) // " of an element")
+         if (self%overlap%of_facets > self%overlap%bar) call note_add(lines, &
+            "edges of curved surfaces " // &
+            "overlap by up to " // to_text(self%overlap%of_facets, 3) // &
             " of their length, the curves that they are chords of do not")
       end associate
    end subroutine add_checked
@@ -249,7 +251,7 @@ contains
          call note_add(lines, text // ": " // to_text(march%state%pairs%total(k)%n_active) // &
             " active at end, largest force " // to_text(self%largest_force(k), 9))
       end do
-      if (any(scene%step%contact%multiplier == multiplier_dual)) then
+      if (any(scene%step%contact%options%multiplier == multiplier_dual)) then
          call nodal_pull_text(self%nodal_pull, text)
          if (len(text) > 0) call note_add(lines, text)
       end if

@@ -17,13 +17,13 @@ contains
       integer, allocatable :: connected(:, :)
       integer :: k, n, s, t
 
-      n = size(scene%element_node, 2) + size(edge, 2)
+      n = size(scene%element%node, 2) + size(edge, 2)
       do t = 1, size(scene%tie)
          if (allocated(scene%tie(t)%rows%slave)) n = n + size(scene%tie(t)%rows%node)
       end do
-      allocate(connected(max(2, size(scene%element_node, 1)), n), source=0)
-      n = size(scene%element_node, 2)
-      connected(:size(scene%element_node, 1), :n) = scene%element_node
+      allocate(connected(max(2, size(scene%element%node, 1)), n), source=0)
+      n = size(scene%element%node, 2)
+      connected(:size(scene%element%node, 1), :n) = scene%element%node
       connected(:2, n + 1:n + size(edge, 2)) = edge
       n = n + size(edge, 2)
       do t = 1, size(scene%tie)

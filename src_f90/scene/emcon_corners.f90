@@ -19,7 +19,7 @@ contains
       start = 0.0_wp
       do k = 1, size(scene%step)
          call find_in_step(scene, k, start)
-         start = start + scene%step(k)%duration
+         start = start + scene%step(k)%time%duration
       end do
    end subroutine corners_find
 
@@ -36,7 +36,7 @@ contains
          allocate(used, source=[step%load%amplitude, &
             pack(step%prescribed%amplitude, .not. step%prescribed%is_frozen), &
             pack(step%turn%angle%amplitude, .not. step%turn%angle%is_frozen), &
-            merge(step%overclosure_amplitude, 0, step%resolves_overclosure)])
+            merge(step%contact%overclosure_amplitude, 0, step%contact%resolves_overclosure)])
          allocate(time(0))
          do i = 1, size(scene%amplitude)
             if (.not. any(used == i)) cycle
@@ -45,8 +45,8 @@ contains
                   table%is_total_time)]
             end associate
          end do
-         time = pack(time, time > 0.0_wp .and. time < step%duration)
-         step%corner = time(sort_order(real(time, dp)))
+         time = pack(time, time > 0.0_wp .and. time < step%time%duration)
+         step%time%corner = time(sort_order(real(time, dp)))
       end associate
    end subroutine find_in_step
 

@@ -4,7 +4,7 @@ module emcon_interactions
    use emcon_origin, only : origin_t
    implicit none
    private
-   public :: contact_pair_t, contact_options_t, contact_damping_t, surface_laws_t
+   public :: contact_pair_t, contact_options_t, contact_damping_t, interaction_t, adjustment_t
    public :: formulation_nts, formulation_segment, formulation_mortar, formulation_given
    public :: integration_segments, integration_elements
    public :: multiplier_standard, multiplier_dual
@@ -38,13 +38,20 @@ module emcon_interactions
       real(wp) :: tangent = 0.0_wp                   !! part of it along the surface, >= 0
    end type contact_damping_t
 
-   !> *SURFACE INTERACTION: the laws of contact between two surfaces.
-   type :: surface_laws_t
+   !> *SURFACE INTERACTION: how surfaces act on each other.
+   type :: interaction_t
+      real(wp) :: offset = 0.0_wp                    !! of the gap: a layer in between, >= 0 [L]
+      real(wp) :: restitution = 1.0_wp               !! of impacts, 0 to 1
       real(wp) :: friction = 0.0_wp                  !! mu of Coulomb's law, >= 0
       real(wp) :: rebound = 0.0_wp                   !! along the surface, of what sticks, 0 to 1
-      real(wp) :: restitution = 1.0_wp               !! of impacts, 0 to 1
       type(contact_damping_t) :: damping
-   end type surface_laws_t
+   end type interaction_t
+
+   !> Nodes of a slave surface that are moved onto the master before the first step.
+   type :: adjustment_t
+      real(wp) :: distance = -1.0_wp                 !! ADJUST=distance [L]; < 0: not given
+      integer :: set = 0                             !! ADJUST=node set; 0: not given
+   end type adjustment_t
 
    type :: contact_pair_t
       type(origin_t) :: origin
@@ -59,11 +66,9 @@ module emcon_interactions
       logical :: is_guarded = .true.                 !! nodes that no pair holds get guards
       integer :: initiation = 0                      !! one of `initiation_`, 0: as the step
       real(wp) :: slack = 0.0_wp                     !! so far nodes may go in, by the edge: a guard
-      real(wp) :: offset = 0.0_wp                    !! of the gap: a layer in between, >= 0 [L]
-      type(surface_laws_t) :: laws
+      type(interaction_t) :: interaction
       integer :: of_pair = 0                         !! of a guard: the pair that it watches
-      real(wp) :: adjust_distance = -1.0_wp          !! ADJUST=distance [L]; < 0: not given
-      integer :: adjust_set = 0                      !! ADJUST=node set; 0: not given
+      type(adjustment_t) :: adjust
       logical :: has_options = .false.               !! of its own, in place of the step's
       type(contact_options_t) :: options
    end type contact_pair_t

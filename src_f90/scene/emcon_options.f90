@@ -196,19 +196,19 @@ contains
       case ("surface")
          code = surface_of_faces
       case ("initiation")
-         code = step%initiation
+         code = step%contact%initiation
       case ("events")
-         code = step%events
+         code = step%time%events
       case ("kinematics")
          code = section%kinematics
       case ("method")
-         code = step%constraint_method
+         code = step%contact%method
       case ("newton")
-         code = step%newton
+         code = step%solution%newton
       case ("scheme")
          code = scheme_energy_momentum
       case ("solver")
-         code = step%solver
+         code = step%solution%solver
       case default
          code = -1
       end select

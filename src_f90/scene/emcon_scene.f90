@@ -16,26 +16,51 @@ module emcon_scene
    use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: scene_t, scene_of_nodes, where_text
+   public :: scene_t, scene_nodes_t, scene_elements_t, scene_sets_t, scene_host_t, scene_deck_t
+   public :: scene_of_nodes, where_text
 
-   type :: scene_t
-      logical :: is_hosted = .false.                 !! a host code's nodes: it computes its solids
+   !> The text that the scene was read from.
+   type :: scene_deck_t
       type(string_t), allocatable :: file(:)         !! names of the deck files
       character(len=:), allocatable :: heading
+   end type scene_deck_t
+
+   !> What the deck calls its nodes.
+   type :: scene_nodes_t
+      integer, allocatable :: label(:)               !! (n_node)
+      type(origin_t), allocatable :: origin(:)       !! (n_node)
+   end type scene_nodes_t
+
+   type :: scene_elements_t
+      integer, allocatable :: label(:)               !! (n_element)
+      type(origin_t), allocatable :: origin(:)       !! (n_element)
+      type(element_kind_t), allocatable :: kinds(:)  !! known to the deck
+      integer, allocatable :: kind(:)                !! (n_element) index into `kinds`
+      integer, allocatable :: node(:, :)             !! (n_most, n_element) behind the last one, or
+                                                     !! where it is wrong, 0
+      integer, allocatable :: section(:)             !! (n_element)
+   end type scene_elements_t
+
+   type :: scene_sets_t
+      type(named_set_t), allocatable :: node(:)
+      type(named_set_t), allocatable :: element(:)
+   end type scene_sets_t
+
+   !> What a host code computes.
+   type :: scene_host_t
+      logical :: is_whole = .false.                  !! all nodes are its: it computes the solids
+      type(origin_t) :: origin
+      integer, allocatable :: node(:)                !! ascending: what these do comes from outside
+   end type scene_host_t
+
+   type :: scene_t
+      type(scene_deck_t) :: deck
       integer :: n_dim = 2
       logical :: is_axial = .false.                  !! solids of revolution: x is the radius
-      integer, allocatable :: node_label(:)          !! (n_node)
-      type(origin_t), allocatable :: node_origin(:)  !! (n_node)
+      type(scene_nodes_t) :: node
       real(wp), allocatable :: x(:, :)               !! (n_dim, n_node) reference positions [L]
-      integer, allocatable :: element_label(:)       !! (n_element)
-      type(origin_t), allocatable :: element_origin(:)
-      type(element_kind_t), allocatable :: kind(:)   !! known to the deck
-      integer, allocatable :: element_kind(:)        !! (n_element) index into `kind`
-      integer, allocatable :: element_node(:, :)     !! (n_most, n_element) behind the last one, or
-                                                     !! where it is wrong, 0
-      integer, allocatable :: element_section(:)     !! (n_element)
-      type(named_set_t), allocatable :: node_set(:)
-      type(named_set_t), allocatable :: element_set(:)
+      type(scene_elements_t) :: element
+      type(scene_sets_t) :: set
       type(surface_t), allocatable :: surface(:)
       type(material_t), allocatable :: material(:)
       type(section_t), allocatable :: section(:)
@@ -45,8 +70,7 @@ module emcon_scene
       type(tie_t), allocatable :: tie(:)
       type(equation_t), allocatable :: equation(:)
       type(rigid_body_t), allocatable :: rigid(:)
-      type(origin_t) :: given_origin
-      integer, allocatable :: given_node(:)          !! ascending: what these do comes from outside
+      type(scene_host_t) :: host
       real(wp), allocatable :: u0(:, :)              !! (n_dim, n_node) initial displacement [L]
       real(wp), allocatable :: v0(:, :)              !! (n_dim, n_node) initial velocity [L/T]
       type(step_t), allocatable :: step(:)
@@ -60,14 +84,14 @@ contains
       real(wp), intent(in) :: x(:, :)                !! (n_dim, n_node) reference positions [L]
       integer :: i
 
-      scene%heading = ""
+      scene%deck%heading = ""
       allocate(scene%x, source=x)
       allocate(scene%u0(size(x, 1), size(x, 2)), scene%v0(size(x, 1), size(x, 2)), source=0.0_wp)
-      allocate(scene%node_label, source=[(i, i = 1, size(x, 2))])
-      allocate(scene%file(0), scene%node_origin(size(x, 2)), scene%element_origin(0))
-      allocate(scene%element_label(0), scene%element_kind(0), scene%element_section(0))
-      allocate(scene%element_node(size(x, 1), 0), scene%kind(0))     ! room for a facet
-      allocate(scene%node_set(0), scene%element_set(0), scene%surface(0), scene%amplitude(0))
+      allocate(scene%node%label, source=[(i, i = 1, size(x, 2))])
+      allocate(scene%deck%file(0), scene%node%origin(size(x, 2)), scene%element%origin(0))
+      allocate(scene%element%label(0), scene%element%kind(0), scene%element%section(0))
+      allocate(scene%element%node(size(x, 1), 0), scene%element%kinds(0))     ! room for a facet
+      allocate(scene%set%node(0), scene%set%element(0), scene%surface(0), scene%amplitude(0))
       allocate(scene%material(0), scene%section(0), scene%pair(0), scene%tie(0))
       allocate(scene%equation(0), scene%rigid(0), scene%step(1))
       allocate(scene%step(1)%prescribed(0), scene%step(1)%turn(0), scene%step(1)%load(0), &
@@ -81,7 +105,7 @@ contains
       character(len=where_length(scene, origin)) :: text
 
       text = "(no deck)"
-      if (origin%file > 0) text = scene%file(origin%file)%text // ":" // to_text(origin%line)
+      if (origin%file > 0) text = scene%deck%file(origin%file)%text // ":" // to_text(origin%line)
    end function where_text
 
    pure integer function where_length(scene, origin)
@@ -89,7 +113,7 @@ contains
       type(origin_t), intent(in) :: origin
 
       where_length = len("(no deck)")
-      if (origin%file > 0) where_length = len(scene%file(origin%file)%text) + 1 &
+      if (origin%file > 0) where_length = len(scene%deck%file(origin%file)%text) + 1 &
          + len(to_text(origin%line))
    end function where_length
 

@@ -8,7 +8,8 @@ module emcon_steps
    use emcon_solver_registry, only : solver_default
    implicit none
    private
-   public :: prescribed_t, turn_t, load_t, scheme_choice_t, softness_t, step_t
+   public :: prescribed_t, turn_t, load_t, scheme_choice_t, softness_t
+   public :: step_t, step_time_t, step_contact_t, step_solution_t
    public :: load_point, load_pressure, load_gravity, load_moment, load_centrifugal
    public :: by_node, by_element, by_surface
    public :: initiation_none, initiation_persistent, initiation_admissible, &
@@ -81,11 +82,8 @@ module emcon_steps
       real(wp) :: tolerance = 1.0e-8_wp              !! of gaps, by the edge: AUGMENTED LAGRANGE
    end type softness_t
 
-   type :: step_t
-      type(origin_t) :: origin
-      type(scheme_row_t) :: scheme                   !! code 0: no procedure was read
-      type(scheme_choice_t) :: choice                !! by *TIME INTEGRATION
-      logical :: nlgeom = .false.
+   !> How a step is divided into increments.
+   type :: step_time_t
       integer :: max_increments = 0                  !! INC; 0: not limited
       logical :: is_direct = .false.                 !! increments as given
       real(wp) :: h = 1.0_wp                         !! first, or fixed, increment [T]
@@ -99,21 +97,39 @@ module emcon_steps
       type(origin_t) :: tolerance_origin
       real(wp) :: event_fraction = 0.0_wp            !! of h, in which events lie; 0: anywhere
       integer :: events = events_pairs               !! one of `events_`
-      integer :: constraint_method = method_null_space
-      type(softness_t) :: softness
+   end type step_time_t
+
+   !> How its equations are solved.
+   type :: step_solution_t
       integer :: solver = solver_default             !! one of `solver_`
       character(len=:), allocatable :: solver_name   !! of `solver_given`, upper case, no blanks
       type(origin_t) :: solver_origin
-      integer :: initiation = initiation_persistent  !! of dynamic steps: `step_initiation`
-      real(wp) :: gap_tolerance = 0.0_wp             !! fraction of element size; 0: no limit
-      type(contact_options_t) :: contact
-      logical :: resolves_overclosure = .false.      !! what is closed at the start opens to 0
-      integer :: overclosure_amplitude = 0           !! part that is left over time; 0: linear to 0
-      logical :: stabilizes = .false.                !! statics: what no load works on may be free
       integer :: newton = newton_kept                !! one of `newton_`
       real(wp) :: newton_tolerance = 1.0e-10_wp      !! relative
       integer :: newton_maximum = 20
       logical :: polishes = .true.                   !! within it, corrections go on to round-off
+   end type step_solution_t
+
+   !> What holds for all contact in it.
+   type :: step_contact_t
+      integer :: method = method_null_space          !! one of `method_`
+      type(softness_t) :: softness
+      integer :: initiation = initiation_persistent
+      real(wp) :: gap_tolerance = 0.0_wp             !! fraction of element size; 0: no limit
+      type(contact_options_t) :: options
+      logical :: resolves_overclosure = .false.      !! what is closed at the start opens to 0
+      integer :: overclosure_amplitude = 0           !! part that is left over time; 0: linear to 0
+   end type step_contact_t
+
+   type :: step_t
+      type(origin_t) :: origin
+      type(scheme_row_t) :: scheme                   !! code 0: no procedure was read
+      type(scheme_choice_t) :: choice                !! by *TIME INTEGRATION
+      logical :: nlgeom = .false.
+      logical :: stabilizes = .false.                !! statics: what no load works on may be free
+      type(step_time_t) :: time
+      type(step_solution_t) :: solution
+      type(step_contact_t) :: contact
       integer :: restart_frequency = 0               !! 0: no restart file
       type(prescribed_t), allocatable :: prescribed(:)   !! all that hold in this step
       type(turn_t), allocatable :: turn(:)               !! of rigid bodies, in this step
@@ -133,7 +149,7 @@ contains
    elemental integer function step_initiation(step)
       type(step_t), intent(in) :: step
 
-      step_initiation = merge(step%initiation, initiation_none, step_is_dynamic(step))
+      step_initiation = merge(step%contact%initiation, initiation_none, step_is_dynamic(step))
    end function step_initiation
 
    !> Where a degree of freedom stands in the list; 0: it is not prescribed.

@@ -25,17 +25,17 @@ contains
          allocate(facet(scene%n_dim, 0))
          return
       end if
-      associate (kind => scene%element_kind(surface%element))
-         allocate(facet(maxval([scene%n_dim, n_facet_node(scene%kind(kind))]), &
-            sum(n_face_facet(scene%kind(kind)))), source=0)
+      associate (kind => scene%element%kind(surface%element))
+         allocate(facet(maxval([scene%n_dim, n_facet_node(scene%element%kinds(kind))]), &
+            sum(n_face_facet(scene%element%kinds(kind)))), source=0)
       end associate
       n = 0
       do i = 1, size(surface%element)
-         associate (e => surface%element(i), kind => scene%kind(scene%element_kind( &
+         associate (e => surface%element(i), kind => scene%element%kinds(scene%element%kind( &
                surface%element(i))))
             associate (new => face_facets(kind, surface%face(i)))
                do k = 1, size(new, 2)
-                  facet(:size(new, 1), n + k) = scene%element_node(new(:, k), e)
+                  facet(:size(new, 1), n + k) = scene%element%node(new(:, k), e)
                end do
             end associate
             n = n + n_face_facet(kind)
@@ -50,10 +50,11 @@ contains
       integer, allocatable, intent(out) :: face(:)         !! (n_facet) 1 to n_face
       integer :: i, n
 
-      allocate(face(sum(n_face_facet(scene%kind(scene%element_kind(surface%element))))))
+      allocate(face(sum(n_face_facet(scene%element%kinds(scene%element%kind(surface%element))))))
       n = 0
       do i = 1, size(surface%element)
-         associate (more => n_face_facet(scene%kind(scene%element_kind(surface%element(i)))))
+         associate (more => &
+            n_face_facet(scene%element%kinds(scene%element%kind(surface%element(i)))))
             face(n + 1:n + more) = i
             n = n + more
          end associate

@@ -24,15 +24,15 @@ contains
       else
          n = 0
          do i = 1, size(surface%element)
-            n = n + scene%kind(scene%element_kind(surface%element(i)))%n_face_node
+            n = n + scene%element%kinds(scene%element%kind(surface%element(i)))%n_face_node
          end do
          allocate(all_nodes(n))
          n = 0
          do i = 1, size(surface%element)
-            associate (e => surface%element(i), kind => scene%kind(scene%element_kind( &
+            associate (e => surface%element(i), kind => scene%element%kinds(scene%element%kind( &
                   surface%element(i))))
                all_nodes(n + 1:n + kind%n_face_node) = &
-                  scene%element_node(kind%face(surface%face(i)), e)
+                  scene%element%node(kind%face(surface%face(i)), e)
                n = n + kind%n_face_node
             end associate
          end do

@@ -69,12 +69,12 @@ contains
       call find_moduli(solid, moduli)
       do e = 1, solid%n_element
          b = body(solid%node(1, e))
-         if (b == 0 .or. solid%is_rigid(e)) cycle
+         if (b == 0 .or. solid%trait%is_rigid(e)) cycle
          if (.not. allocated(solid%law(solid%law_of(e))%law)) cycle
          if (self%element(b) == 0) self%element(b) = e
          associate (own => moduli(solid%law_of(e)))
             self%strain(b) = self%strain(b) + strain_energy(solid, e, u, nlgeom, own)
-            if (.not. solid%is_stiff_bent(e)) cycle
+            if (.not. solid%trait%is_stiff_bent(e)) cycle
             call find_curvature(self, solid, e, nlgeom, curve)
             call take_plate(curve, plate)
             if (maxval(abs(plate%bend)) > 0.0_wp) call add_missed(self, solid, e, x, plate, own, &
@@ -208,17 +208,17 @@ contains
          volume = sum(geometry%weight)
          do k = 1, geometry%n_gp
             call gradient_at(solid, e, k, u(:, solid%node(:geometry%n_node, e)), slope)
-            if (nlgeom .and. .not. solid%is_linear(e)) slope = slope &
+            if (nlgeom .and. .not. solid%trait%is_linear(e)) slope = slope &
                + 0.5_wp*matmul(transpose(slope), slope)
             strain = components(slope)
             mean = mean + (geometry%weight(k)/volume)*strain
-            if (solid%has_mean(e)) then
+            if (solid%trait%has_mean(e)) then
                energy = energy + geometry%weight(k)*work(moduli%rest, strain)
             else
                energy = energy + geometry%weight(k)*work(moduli%whole, strain)
             end if
          end do
-         if (solid%has_mean(e)) energy = energy + volume*(work(moduli%whole, mean) &
+         if (solid%trait%has_mean(e)) energy = energy + volume*(work(moduli%whole, mean) &
             - work(moduli%rest, mean))
       end associate
    end function strain_energy
@@ -259,7 +259,7 @@ contains
             do k = self%start(node) + 1, self%start(node + 1)
                way = self%center(:, self%beside(k)) - self%center(:, e)
                turn = turn_between(self%slope(:, :, e), self%slope(:, :, self%beside(k)), &
-                  nlgeom .and. .not. solid%is_linear(e))
+                  nlgeom .and. .not. solid%trait%is_linear(e))
                do b = 1, n_axis
                   curve(:, b) = curve(:, b) + turn*way(b)
                   spread(:, b) = spread(:, b) + way*way(b)
@@ -361,7 +361,7 @@ contains
             level = matmul(onto, matmul(slope, onto))
             level = level - across*(product_of(moduli%whole, along, components(level)) &
                /product_of(moduli%whole, along, along))
-            if (solid%has_mean(e)) then
+            if (solid%trait%has_mean(e)) then
                missed = missed + geometry%weight(k)*(work(moduli%rest, components(slope)) &
                   - work(moduli%whole, components(level)))
             else

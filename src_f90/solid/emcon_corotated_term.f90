@@ -48,9 +48,9 @@ contains
       integer :: k, m
 
       self%role = role_internal
-      call stiff_elements_init(self%own, solid, n_dim, solid%is_corotated)
+      call stiff_elements_init(self%own, solid, n_dim, solid%trait%is_corotated)
       call stiff_elements_fastest(self%own, solid, self%fastest)
-      self%label = solid%label(self%own%element)
+      self%label = solid%deck%label(self%own%element)
       allocate(self%frame(size(self%own%element)))
       do k = 1, size(self%frame)
          m = n_dim*self%own%n_node(k)

@@ -59,18 +59,18 @@ contains
       self%solid = solid
       allocate(self%moduli(n_strain, n_strain, 2*size(solid%law)), source=0.0_wp)
       allocate(self%deforms(solid%n_element), source=.false.)
-      self%moduli_of = solid%law_of + merge(size(solid%law), 0, solid%has_mean)
+      self%moduli_of = solid%law_of + merge(size(solid%law), 0, solid%trait%has_mean)
       do k = 1, size(solid%law)
          if (.not. allocated(solid%law(k)%law)) cycle
          call law_response_plane(solid%law(k)%law, rest, rest, state)
          ! By the end of a step of no size.
          self%moduli(:, :, k) = 2.0_wp*state%tangent
-         self%deforms = self%deforms .or. (solid%law_of == k .and. .not. solid%is_rigid)
+         self%deforms = self%deforms .or. (solid%law_of == k .and. .not. solid%trait%is_rigid)
          if (.not. allocated(solid%rest(k)%law)) cycle
          call law_response_plane(solid%rest(k)%law, rest, rest, state)
          self%moduli(:, :, size(solid%law) + k) = 2.0_wp*state%tangent
       end do
-      associate (material => scene%section(scene%element_section)%material)
+      associate (material => scene%section(scene%element%section)%material)
          self%alpha = scene%material(material)%alpha
          self%beta = merge(scene%material(material)%beta, 0.0_wp, self%deforms)
       end associate
@@ -131,7 +131,8 @@ contains
       type(element_motion_t), intent(out) :: now, before
       integer :: i
 
-      now%nlgeom = (self%nlgeom .or. self%solid%is_corotated(e)) .and. .not. self%solid%is_linear(e)
+      now%nlgeom = (self%nlgeom .or. self%solid%trait%is_corotated(e)) &
+         .and. .not. self%solid%trait%is_linear(e)
       before%nlgeom = now%nlgeom
       do i = 1, self%solid%geometry(e)%n_node
          associate (node => self%solid%node(i, e), u0 => motion%u0)
@@ -220,7 +221,7 @@ contains
             total => response%part(self%role))
          do j = 1, n
             do i = 1, n
-               part = self%alpha(e)*motion%evaluation%mass_scale*self%solid%mass(i, j, e)
+               part = self%alpha(e)*motion%evaluation%mass_scale*self%solid%mass%consistent(i, j, e)
                f = part*motion%du(:, node(j))
                self%damping = self%damping + dot_product(f, motion%du(:, node(i)))
                total%force(:, node(i)) = total%force(:, node(i)) + f
@@ -297,7 +298,7 @@ contains
       type(motion_t), intent(in) :: motion       !! placed
 
       is_symmetric = .not. (motion%evaluation%mass_scale > 0.0_wp .and. (self%nlgeom .or. &
-         any(self%solid%is_corotated)))
+         any(self%solid%trait%is_corotated)))
    end function is_symmetric
 
 end module emcon_dissipation_plane

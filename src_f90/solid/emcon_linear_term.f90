@@ -48,9 +48,9 @@ contains
       integer :: i, k
 
       self%role = role_internal
-      call stiff_elements_init(self%own, solid, n_dim, solid%is_linear)
+      call stiff_elements_init(self%own, solid, n_dim, solid%trait%is_linear)
       call stiff_elements_fastest(self%own, solid, self%fastest)
-      call element_lists(solid, 1, start, node, solid%is_linear)
+      call element_lists(solid, 1, start, node, solid%trait%is_linear)
       call stiff_product_init(self%product, n_dim, solid%n_node, start, node, self%own%stiffness, &
          error)
       allocate(self%rounding(solid%n_node), source=0.0_wp)

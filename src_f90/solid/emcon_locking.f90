@@ -39,7 +39,7 @@ contains
       character(len=len(bent_in_space)) :: text
 
       text = bent_in_plane
-      if (all(solid%is_thin)) text = bent_thin
+      if (all(solid%trait%is_thin)) text = bent_thin
       if (solid%is_single) text = bent_in_space
       if (solid%is_axial) text = bent_of_rings
    end function bending_advice
@@ -51,7 +51,7 @@ contains
       real(wp) :: limit
 
       ratio = 0.0_wp
-      if (.not. solid%may_lock(e) .or. solid%is_rigid(e)) return
+      if (.not. solid%trait%may_lock(e) .or. solid%trait%is_rigid(e)) return
       if (.not. allocated(solid%law(solid%law_of(e))%law)) return
       ratio = poisson_ratio(solid%law(solid%law_of(e))%law)
       limit = merge(modes_limit, locking_limit, allocated(solid%geometry(e)%mode))
@@ -97,7 +97,7 @@ contains
 
       n_component = sum([(a, a = 1, solid%n_dim)])
       do e = solid%n_element, 1, -1
-         if (solid%is_axial .or. solid%is_rigid(e)) cycle
+         if (solid%is_axial .or. solid%trait%is_rigid(e)) cycle
          if (n_component*(solid%geometry(e)%n_gp + 1) < solid%n_dim*solid%geometry(e)%n_node) return
       end do
    end function strainless_element

@@ -63,7 +63,7 @@ contains
             e = first + k
             if (.not. is_here(solid, e)) cycle
             if (part(k)%is_inverted) then
-               response%refusal = "element " // to_text(solid%label(e)) // " is inverted"
+               response%refusal = "element " // to_text(solid%deck%label(e)) // " is inverted"
                return
             end if
             response%energy(e) = part(k)%energy
@@ -79,7 +79,7 @@ contains
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e                   !! 1..n_element
 
-      is_here = .not. (solid%is_rigid(e) .or. solid%is_small(e))
+      is_here = .not. (solid%trait%is_rigid(e) .or. solid%trait%is_small(e))
    end function is_here
 
    !> The tangent of element `e` where it has not moved, of small strains.
@@ -134,12 +134,12 @@ contains
       type(space_part_t), intent(inout) :: part
 
       associate (law => solid%law(solid%law_of(e)), rest => solid%rest(solid%law_of(e)))
-         if (solid%first_point(e) > 0) then
-            call given_space_respond(solid%geometry(e), solid%first_point(e), &
+         if (solid%host%first_point(e) > 0) then
+            call given_space_respond(solid%geometry(e), solid%host%first_point(e), &
                given%points(solid%law_of(e)), local, with_tangent, part)
          else if (solid%is_axial) then
             call axial_element_respond(solid%geometry(e), law%law, local, with_tangent, part)
-         else if (solid%has_mean(e)) then
+         else if (solid%trait%has_mean(e)) then
             call mean_volume_space_respond(solid%geometry(e), law%law, rest%law, local, &
                with_tangent, part)
          else if (allocated(solid%geometry(e)%mode)) then
@@ -273,7 +273,7 @@ contains
       integer :: m
 
       m = size(tangent, 1)*size(tangent, 2)
-      call lumped_mass(solid%mass(:size(mass), :size(mass), e), mass)
+      call lumped_mass(solid%mass%consistent(:size(mass), :size(mass), e), mass)
       square = element_frequency(factor*reshape(tangent, [m, m]), mass)
       if (square > fastest%square) fastest = fastest_t(e, square)
    end subroutine compare_frequency

@@ -32,14 +32,14 @@ contains
       type(solid_t), intent(in) :: solid
       integer :: i, most
 
-      most = maxval(solid%section)
-      self%section = pack([(i, i = 1, most)], [(any(solid%section == i .and. solid%is_small), &
-         i = 1, most)])
+      most = maxval(solid%deck%section)
+      self%section = pack([(i, i = 1, most)], [(any(solid%deck%section == i &
+         .and. solid%trait%is_small), i = 1, most)])
       allocate(self%rotation(size(self%section)), self%strain(size(self%section)), source=0.0_wp)
-      if (.not. any(solid%is_corotated)) return
+      if (.not. any(solid%trait%is_corotated)) return
       allocate(self%frame(solid%n_element))
       do i = 1, solid%n_element
-         if (.not. solid%is_corotated(i)) cycle
+         if (.not. solid%trait%is_corotated(i)) cycle
          associate (geometry => solid%geometry(i))
             call corotated_init(self%frame(i), geometry, &
                solid%x(:, solid%node(:geometry%n_node, i)))
@@ -60,13 +60,13 @@ contains
       rotation = 0.0_wp
       strain = 0.0_wp
       do e = 1, solid%n_element
-         if (.not. solid%is_small(e)) cycle
-         s = findloc(self%section, solid%section(e), 1)
+         if (.not. solid%trait%is_small(e)) cycle
+         s = findloc(self%section, solid%deck%section(e), 1)
          associate (geometry => solid%geometry(e), node => solid%node(:, e))
             do i = 1, geometry%n_node
                own(:, i) = u(:, node(i)) - u(:, node(1))
             end do
-            if (solid%is_corotated(e)) then
+            if (solid%trait%is_corotated(e)) then
                left = own
                call corotated_strip(self%frame(e), left, own, turn)
             end if

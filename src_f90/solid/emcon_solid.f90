@@ -24,41 +24,60 @@ module emcon_solid
       real(wp), allocatable :: weight(:, :)              !! (n_gp, n_node) part of point in node
    end type to_nodes_t
 
+   !> What the deck has of each element.
+   type :: solid_deck_t
+      integer, allocatable :: label(:)                   !! (n_element)
+      type(string_t), allocatable :: material(:)         !! names of the materials
+      integer, allocatable :: section(:)                 !! (n_element)
+   end type solid_deck_t
+
+   !> How each element responds, (n_element).
+   type :: element_traits_t
+      logical, allocatable :: is_linear(:)               !! small strains in all steps
+      logical, allocatable :: is_corotated(:)            !! in a frame that turns
+      logical, allocatable :: is_small(:)                !! one of these two
+      logical, allocatable :: is_rigid(:)                !! mass alone, no forces
+      logical, allocatable :: is_thin(:)                 !! plane stress
+      logical, allocatable :: may_lock(:)                !! at small changes of volume
+      logical, allocatable :: is_stiff_bent(:)           !! where it bends
+      logical, allocatable :: has_mean(:)                !! volume resists in the mean
+      logical, allocatable :: has_inertia(:)
+   end type element_traits_t
+
+   !> Laws that a program gives.
+   type :: solid_host_t
+      logical :: is_used = .false.                       !! some law is one of these
+      type(host_law_t), allocatable :: law(:)            !! like `law` of solid_t
+      integer, allocatable :: n_point(:)                 !! quadrature points, of each
+      integer, allocatable :: first_point(:)             !! (n_element) among these; 0: law of ours
+   end type solid_host_t
+
+   type :: solid_mass_t
+      real(wp), allocatable :: consistent(:, :, :)       !! (n_most, n_most, n_element) [M]
+      real(wp), allocatable :: of_volume(:, :)           !! int rho N_i: (n_most, n_element) [M]
+   end type solid_mass_t
+
    type :: solid_t
       integer :: n_dim = 0
       logical :: is_axial = .false.                      !! solids of revolution
       logical :: is_single = .false.                     !! elements respond one by one
       integer :: n_element = 0
       integer :: n_node = 0
-      integer, allocatable :: label(:)                   !! (n_element)
-      type(string_t), allocatable :: material(:)         !! names of the materials
+      type(solid_deck_t) :: deck
       integer, allocatable :: kind(:)                    !! (n_element) index into `to_nodes`
       type(to_nodes_t), allocatable :: to_nodes(:)       !! one per kind of the scene
       integer, allocatable :: node(:, :)                 !! (n_most, n_element) as in scene_t
       integer, allocatable :: law_of(:)                  !! (n_element) index into `law`
-      integer, allocatable :: section(:)                 !! (n_element) of the scene
-      logical, allocatable :: is_linear(:)               !! (n_element) small strains in all steps
-      logical, allocatable :: is_corotated(:)            !! (n_element) in a frame that turns
-      logical, allocatable :: is_small(:)                !! (n_element) one of these two
+      type(element_traits_t) :: trait
       real(wp), allocatable :: x(:, :)                   !! (n_dim, n_node) [L], for corotated ones
-      logical, allocatable :: is_rigid(:)                !! (n_element) mass alone, no forces
-      logical, allocatable :: is_thin(:)                 !! (n_element) plane stress
       type(element_geometry_t), allocatable :: geometry(:)   !! (n_element)
       type(element_pack_t), allocatable :: pack(:)         !! all but small and rigid ones
       !> One per material; behind them, if there are linear elements, those for these; behind all
       !> these, if there are thin ones, the same in plane stress
       type(law_box_t), allocatable :: law(:)
-      logical, allocatable :: may_lock(:)                !! (n_element) at small changes of volume
-      logical, allocatable :: is_stiff_bent(:)           !! (n_element) where it bends
-      logical, allocatable :: has_mean(:)                !! (n_element) volume resists in the mean
-      type(law_box_t), allocatable :: rest(:)            !! like `law`, without U, for these
-      type(host_law_t), allocatable :: given(:)         !! like `law`, or one in its place
-      logical :: has_given = .false.                     !! some law is a given one
-      integer, allocatable :: n_point(:)                 !! quadrature points, of each given law
-      integer, allocatable :: first_point(:)             !! (n_element) among these; 0: law of ours
-      logical, allocatable :: has_inertia(:)             !! (n_element)
-      real(wp), allocatable :: mass(:, :, :)             !! (n_most, n_most, n_element) [M]
-      real(wp), allocatable :: volume_mass(:, :)         !! int rho N_i: (n_most, n_element) [M]
+      type(law_box_t), allocatable :: rest(:)            !! like `law`, without U: `has_mean`
+      type(solid_host_t) :: host
+      type(solid_mass_t) :: mass
       real(wp), allocatable :: thickness(:)              !! (n_element) [L]
       !> (n_most, n_element) force that a displacement of one causes before anything cancels [M/T^2]
       real(wp), allocatable :: stiffness(:, :)
@@ -74,50 +93,50 @@ contains
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(host_law_t), intent(in), optional :: given(:)   !! one for each such material
-      type(shape_table_t) :: stiffness(size(scene%kind)), mass(size(scene%kind))
+      type(shape_table_t) :: stiffness(size(scene%element%kinds)), mass(size(scene%element%kinds))
       real(wp), allocatable :: at_rest(:)
       integer :: e, k, n, n_most
 
-      n = size(scene%element_kind)
+      n = size(scene%element%kind)
       self%n_dim = size(scene%x, 1)
       self%is_axial = scene%is_axial
       self%is_single = self%n_dim == n_space .or. self%is_axial
       self%n_element = n
       self%n_node = size(scene%x, 2)
-      self%label = scene%element_label
-      allocate(self%material(size(scene%material)))
+      self%deck%label = scene%element%label
+      allocate(self%deck%material(size(scene%material)))
       do k = 1, size(scene%material)
-         self%material(k)%text = ""
-         if (allocated(scene%material(k)%name)) self%material(k)%text = scene%material(k)%name
+         self%deck%material(k)%text = ""
+         if (allocated(scene%material(k)%name)) self%deck%material(k)%text = scene%material(k)%name
       end do
-      self%kind = scene%element_kind
-      self%node = scene%element_node
+      self%kind = scene%element%kind
+      self%node = scene%element%node
       allocate(self%law_of(n), self%geometry(n), self%thickness(n))
       n_most = size(self%node, 1)
-      allocate(self%mass(n_most, n_most, n), source=0.0_wp)
-      allocate(self%volume_mass(n_most, n), self%stiffness(n_most, n), source=0.0_wp)
-      self%section = scene%element_section
+      allocate(self%mass%consistent(n_most, n_most, n), source=0.0_wp)
+      allocate(self%mass%of_volume(n_most, n), self%stiffness(n_most, n), source=0.0_wp)
+      self%deck%section = scene%element%section
       call tell_apart(self, scene)
-      if (any(self%is_corotated)) allocate(self%x, source=scene%x)
+      if (any(self%trait%is_corotated)) allocate(self%x, source=scene%x)
       call init_laws(self, scene, at_rest, error, given)
       if (allocated(error)) return
       call init_kinds(self, scene, stiffness, mass, error)
       if (allocated(error)) return
       do e = 1, n
-         k = scene%section(scene%element_section(e))%material
-         self%law_of(e) = k + merge(size(self%law)/2, 0, self%is_thin(e))
-         self%thickness(e) = scene%section(scene%element_section(e))%thickness
+         k = scene%section(scene%element%section(e))%material
+         self%law_of(e) = k + merge(size(self%law)/2, 0, self%trait%is_thin(e))
+         self%thickness(e) = scene%section(scene%element%section(e))%thickness
          call init_element(self, scene%x, scene%material(k)%density, e, &
             stiffness(self%kind(e)), mass(self%kind(e)))
-         if (.not. self%is_rigid(e)) call estimate_stiffness(self, at_rest(self%law_of(e)), e)
-         if (self%is_small(e)) self%law_of(e) = size(scene%material) + self%law_of(e)
+         if (.not. self%trait%is_rigid(e)) call estimate_stiffness(self, at_rest(self%law_of(e)), e)
+         if (self%trait%is_small(e)) self%law_of(e) = size(scene%material) + self%law_of(e)
          call check_law(self, scene, e, error)
          if (allocated(error)) return
-         if (scene%kind(self%kind(e))%has_modes) call make_modes(self, e, stiffness(self%kind(e)), &
-            error)
+         if (scene%element%kinds(self%kind(e))%has_modes) call make_modes(self, e, &
+            stiffness(self%kind(e)), error)
          if (allocated(error)) return
          if (any(self%geometry(e)%weight <= 0.0_wp)) then
-            call raise(error, err_input, "element " // to_text(scene%element_label(e)) // &
+            call raise(error, err_input, "element " // to_text(scene%element%label(e)) // &
                " is inverted or has no " // trim(merge("volume", "area  ", size(scene%x, 1) &
                == n_space)) // "; check the order of its nodes")
             return
@@ -137,8 +156,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: where_it_is
 
-      if (self%is_rigid(e)) return
-      if (self%is_thin(e)) then
+      if (self%trait%is_rigid(e)) return
+      if (self%trait%is_thin(e)) then
          if (allocated(self%law(self%law_of(e))%law)) return
          where_it_is = "plane stress"
       else if (self%is_single) then
@@ -147,10 +166,12 @@ contains
       else
          return
       end if
-      call raise(error, err_input, where_text(scene, scene%element_origin(e)) // ": error: " &
-         // "element " // to_text(self%label(e)) // " is of type " &
-         // trim(scene%kind(self%kind(e))%name) // ", " // where_it_is // ", in which the law of " &
-         // "material " // self%material(scene%section(scene%element_section(e))%material)%text &
+      call raise(error, err_input, where_text(scene, scene%element%origin(e)) // ": error: " &
+         // "element " // to_text(self%deck%label(e)) // " is of type " &
+         // trim(scene%element%kinds(self%kind(e))%name) // ", " // where_it_is &
+         // ", in which the law of " &
+         // "material " &
+         // self%deck%material(scene%section(scene%element%section(e))%material)%text &
          // " is not known: it gives no stress normal to the plane; take ELASTIC, NEO HOOKE, " &
          // "MOONEY-RIVLIN or YEOH, or plane strain, CPE")
    end subroutine check_law
@@ -165,12 +186,12 @@ contains
       type(law_response_t) :: plane
       type(space_response_t) :: space
 
-      if (self%is_rigid(e)) return
+      if (self%trait%is_rigid(e)) return
       associate (law => self%law(self%law_of(e)))
          if (.not. allocated(law%law)) then
-            call raise(error, err_input, "element " // to_text(self%label(e)) // " has " &
+            call raise(error, err_input, "element " // to_text(self%deck%label(e)) // " has " &
                // "incompatible modes, for which the law given for material " &
-               // self%material(1 + mod(self%law_of(e) - 1, size(self%material)))%text &
+               // self%deck%material(1 + mod(self%law_of(e) - 1, size(self%deck%material)))%text &
                // " tells no moduli; take " // trim(merge("C3D8 or C3D20", "CPE4 or CPE8 ", &
                self%n_dim == n_space)))
          else if (self%n_dim == n_space) then
@@ -192,11 +213,14 @@ contains
       allocate(self%rest(size(self%law)))
       do e = 1, self%n_element
          k = self%law_of(e)
-         if (.not. self%has_mean(e) .or. self%is_rigid(e) .or. allocated(self%rest(k)%law)) cycle
+         if (.not. self%trait%has_mean(e) .or. self%trait%is_rigid(e) &
+            .or. allocated(self%rest(k)%law)) cycle
          if (allocated(self%law(k)%law)) call self%law(k)%law%divide(self%rest(k)%law)
          if (allocated(self%rest(k)%law)) cycle
-         call raise(error, err_input, "element " // to_text(self%label(e)) // " takes the mean " &
-            // "change of volume, which the law given for material " // self%material(k)%text // &
+         call raise(error, err_input, "element " // to_text(self%deck%label(e)) &
+            // " takes the mean " &
+            // "change of volume, which the law given for material " &
+            // self%deck%material(k)%text // &
             " does not tell apart; take " // trim(merge("C3D8 or C3D20", "CPE4 or CPE8 ", &
             self%n_dim == n_space)))
          return
@@ -209,29 +233,30 @@ contains
       type(scene_t), intent(in) :: scene
       integer :: e, k
 
-      allocate(self%is_rigid(self%n_element), source=.false.)
+      allocate(self%trait%is_rigid(self%n_element), source=.false.)
       do k = 1, size(scene%rigid)
-         self%is_rigid(scene%rigid(k)%element) = .true.
+         self%trait%is_rigid(scene%rigid(k)%element) = .true.
       end do
-      allocate(self%is_thin(self%n_element), self%has_mean(self%n_element), &
-         self%may_lock(self%n_element), self%is_stiff_bent(self%n_element), &
-         self%has_inertia(self%n_element), self%is_linear(self%n_element), &
-         self%is_corotated(self%n_element))
+      allocate(self%trait%is_thin(self%n_element), self%trait%has_mean(self%n_element), &
+         self%trait%may_lock(self%n_element), self%trait%is_stiff_bent(self%n_element), &
+         self%trait%has_inertia(self%n_element), self%trait%is_linear(self%n_element), &
+         self%trait%is_corotated(self%n_element))
       do e = 1, self%n_element
-         associate (kind => scene%kind(scene%element_kind(e)), &
-               section => scene%section(scene%element_section(e)), &
-               is_free => .not. self%is_rigid(e))
-            self%is_thin(e) = kind%is_thin
-            self%has_mean(e) = kind%has_mean_volume
+         associate (kind => scene%element%kinds(scene%element%kind(e)), &
+               section => scene%section(scene%element%section(e)), &
+               is_free => .not. self%trait%is_rigid(e))
+            self%trait%is_thin(e) = kind%is_thin
+            self%trait%has_mean(e) = kind%has_mean_volume
             ! Modes give way to a change of volume that is linear in the displacements.
-            self%may_lock(e) = kind%may_lock() .or. (kind%has_modes .and. any(scene%step%nlgeom))
-            self%is_stiff_bent(e) = kind%is_stiff_bent() .and. is_free
-            self%has_inertia(e) = .not. section%is_massless
-            self%is_linear(e) = section%kinematics == kinematics_linear .and. is_free
-            self%is_corotated(e) = section%kinematics == kinematics_corotated .and. is_free
+            self%trait%may_lock(e) = kind%may_lock() .or. (kind%has_modes &
+               .and. any(scene%step%nlgeom))
+            self%trait%is_stiff_bent(e) = kind%is_stiff_bent() .and. is_free
+            self%trait%has_inertia(e) = .not. section%is_massless
+            self%trait%is_linear(e) = section%kinematics == kinematics_linear .and. is_free
+            self%trait%is_corotated(e) = section%kinematics == kinematics_corotated .and. is_free
          end associate
       end do
-      self%is_small = self%is_linear .or. self%is_corotated
+      self%trait%is_small = self%trait%is_linear .or. self%trait%is_corotated
    end subroutine tell_apart
 
    !> Pack the elements of each kind and law, as they come in the scene.
@@ -249,7 +274,7 @@ contains
             do law = 1, size(self%law)
                n = 0
                do e = 1, self%n_element
-                  if (self%is_small(e) .or. self%is_rigid(e)) cycle
+                  if (self%trait%is_small(e) .or. self%trait%is_rigid(e)) cycle
                   if (self%kind(e) /= k .or. self%law_of(e) /= law) cycle
                   n = n + 1
                   list(n) = e
@@ -273,14 +298,14 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: k, e
 
-      allocate(self%to_nodes(size(scene%kind)))
-      do k = 1, size(scene%kind)
+      allocate(self%to_nodes(size(scene%element%kinds)))
+      do k = 1, size(scene%element%kinds)
          e = findloc(self%kind, k, 1)
          if (e == 0) cycle
-         associate (kind => scene%kind(k))
+         associate (kind => scene%element%kinds(k))
             if (.not. allocated(kind%shape)) then
-               call raise(error, err_input, where_text(scene, scene%element_origin(e)) &
-                  // ": error: element " // to_text(self%label(e)) // " is of type " &
+               call raise(error, err_input, where_text(scene, scene%element%origin(e)) &
+                  // ": error: element " // to_text(self%deck%label(e)) // " is of type " &
                   // trim(kind%name) // ", a *USER ELEMENT: a program has to give its shape, " &
                   // "after the deck is read and before the model is built")
                return
@@ -302,20 +327,20 @@ contains
       integer :: k, n, n_law
 
       n_law = size(scene%material)
-      if (any(self%is_small)) n_law = n_law + size(scene%material)
+      if (any(self%trait%is_small)) n_law = n_law + size(scene%material)
       n = n_law
-      if (any(self%is_thin)) n = n + n_law
-      allocate(self%law(n), self%given(n))
+      if (any(self%trait%is_thin)) n = n + n_law
+      allocate(self%law(n), self%host%law(n))
       allocate(at_rest(n), source=0.0_wp)
       do k = 1, size(scene%material)
          select case (scene%material(k)%law)
          case (0)
             cycle
          case (law_given)
-            call host_law_take(scene, scene%material(k), self%given(k), error, given)
+            call host_law_take(scene, scene%material(k), self%host%law(k), error, given)
             if (allocated(error)) return
-            call move_alloc(self%given(k)%law, self%law(k)%law)
-            if (allocated(self%given(k)%energy)) call host_rest_stiffness(self%given(k), &
+            call move_alloc(self%host%law(k)%law, self%law(k)%law)
+            if (allocated(self%host%law(k)%energy)) call host_rest_stiffness(self%host%law(k), &
                at_rest(k), error)
          case default
             call law_create(scene%material(k)%law, scene%material(k)%constant, self%law(k)%law, &
@@ -329,10 +354,10 @@ contains
          if (allocated(error)) return
          if (.not. allocated(self%law(k)%law)) cycle
          at_rest(k) = rest_stiffness(self%law(k)%law)
-         if (any(self%is_small)) call law_linearise(self%law(k)%law, &
+         if (any(self%trait%is_small)) call law_linearise(self%law(k)%law, &
             self%law(size(scene%material) + k)%law)
       end do
-      if (.not. any(self%is_thin)) return
+      if (.not. any(self%trait%is_thin)) return
       do k = 1, n_law
          if (.not. allocated(self%law(k)%law)) cycle
          call law_make_thin(self%law(k)%law, self%law(n_law + k)%law)
@@ -356,15 +381,16 @@ contains
       type(solid_t), intent(inout) :: self
       integer :: e
 
-      allocate(self%n_point(size(self%given)), self%first_point(self%n_element), source=0)
+      allocate(self%host%n_point(size(self%host%law)), self%host%first_point(self%n_element), &
+         source=0)
       do e = 1, self%n_element
          associate (k => self%law_of(e))
-            if (self%is_rigid(e) .or. .not. allocated(self%given(k)%energy)) cycle
-            self%first_point(e) = self%n_point(k) + 1
-            self%n_point(k) = self%n_point(k) + self%geometry(e)%n_gp
+            if (self%trait%is_rigid(e) .or. .not. allocated(self%host%law(k)%energy)) cycle
+            self%host%first_point(e) = self%host%n_point(k) + 1
+            self%host%n_point(k) = self%host%n_point(k) + self%geometry(e)%n_gp
          end associate
       end do
-      self%has_given = any(self%n_point > 0)
+      self%host%is_used = any(self%host%n_point > 0)
    end subroutine number_points
 
    pure subroutine init_element(self, x, density, e, stiffness, mass)
@@ -382,8 +408,8 @@ contains
       end do
       if (size(x, 1) == n_space) then
          call space_element_place(self%geometry(e), stiffness, local)
-         call space_element_add_mass(mass, local, density, consistent, self%volume_mass(:n, e))
-         if (self%has_inertia(e)) self%mass(:n, :n, e) = consistent
+         call space_element_add_mass(mass, local, density, consistent, self%mass%of_volume(:n, e))
+         if (self%trait%has_inertia(e)) self%mass%consistent(:n, :n, e) = consistent
          return
       end if
       self%geometry(e)%n_node = n
@@ -402,10 +428,10 @@ contains
          call reference_gradient(n, local, mass%slope(:, :, k), gradient, det)
          call find_depth(self, e, x, mass%value(:, k), depth)
          rho_dv = density*mass%weight(k)*det*depth
-         self%volume_mass(:n, e) = self%volume_mass(:n, e) + rho_dv*mass%value(:, k)
-         if (.not. self%has_inertia(e)) cycle
+         self%mass%of_volume(:n, e) = self%mass%of_volume(:n, e) + rho_dv*mass%value(:, k)
+         if (.not. self%trait%has_inertia(e)) cycle
          do i = 1, n
-            self%mass(:n, i, e) = self%mass(:n, i, e) &
+            self%mass%consistent(:n, i, e) = self%mass%consistent(:n, i, e) &
                + rho_dv*mass%value(i, k)*mass%value(:, k)
          end do
       end do

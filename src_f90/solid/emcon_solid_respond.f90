@@ -36,7 +36,7 @@ contains
       if (allocated(pack%mode)) then
          call incompatible_respond(pack, self%law(pack%law)%law, motion, with_tangent, part)
          return
-      else if (self%has_mean(pack%element(1))) then
+      else if (self%trait%has_mean(pack%element(1))) then
          call mean_volume_respond(pack, self%law(pack%law)%law, self%rest(pack%law)%law, motion, &
             with_tangent, part)
          return
@@ -44,8 +44,8 @@ contains
       call pack_clear(pack%n_node, part, with_tangent)
       do k = 1, pack%n_gp
          call pack_point(pack, k, motion, point)
-         if (self%first_point(pack%element(1)) > 0) then
-            call host_answer(given%points(pack%law), self%first_point(pack%element) - 1 + k, &
+         if (self%host%first_point(pack%element(1)) > 0) then
+            call host_answer(given%points(pack%law), self%host%first_point(pack%element) - 1 + k, &
                point%law)
          else
             associate (law => self%law(pack%law)%law)
@@ -106,10 +106,10 @@ contains
          call gather_strains(self, u0, du, nlgeom, given)
       end if
       if (given%inverted_element > 0) return
-      do k = 1, size(self%given)
-         if (self%n_point(k) == 0) cycle
+      do k = 1, size(self%host%law)
+         if (self%host%n_point(k) == 0) cycle
          associate (points => given%points(k))
-            call point_gradient(self%given(k)%energy, points%strain, points%dstrain, &
+            call point_gradient(self%host%law(k)%energy, points%strain, points%dstrain, &
                with_tangent, points%response, given%status)
          end associate
          if (given%status == point_ok) cycle
@@ -124,10 +124,10 @@ contains
       type(host_response_t), intent(inout) :: given
       integer :: k
 
-      if (.not. allocated(given%points)) allocate(given%points(size(self%given)))
-      do k = 1, size(self%given)
-         if (self%n_point(k) > 0) call host_points_make_room(given%points(k), &
-            self%given(k)%energy%n_variable, self%n_point(k))
+      if (.not. allocated(given%points)) allocate(given%points(size(self%host%law)))
+      do k = 1, size(self%host%law)
+         if (self%host%n_point(k) > 0) call host_points_make_room(given%points(k), &
+            self%host%law(k)%energy%n_variable, self%host%n_point(k))
       end do
    end subroutine make_room
 
@@ -144,10 +144,10 @@ contains
       given%inverted_element = 0
       local%nlgeom = nlgeom
       do e = 1, self%n_element
-         if (self%first_point(e) == 0) cycle
+         if (self%host%first_point(e) == 0) cycle
          call solid_gather(self%node(:self%geometry(e)%n_node, e), u0, du, local)
          do k = 1, self%geometry(e)%n_gp
-            i = self%first_point(e) - 1 + k
+            i = self%host%first_point(e) - 1 + k
             call element_point(self%geometry(e), k, local, point)
             associate (points => given%points(self%law_of(e)))
                points%strain(:, i) = point%strain
@@ -173,14 +173,14 @@ contains
       given%inverted_element = 0
       local%nlgeom = given%nlgeom
       do e = 1, self%n_element
-         if (self%first_point(e) == 0) cycle
+         if (self%host%first_point(e) == 0) cycle
          associate (node => self%node(:self%geometry(e)%n_node, e))
             do i = 1, size(node)
                local%from(:, i) = u0(:, node(i)) - u0(:, node(1))
                local%by(:, i) = du(:, node(i)) - du(:, node(1))
             end do
          end associate
-         call given_space_strain(self%geometry(e), self%first_point(e), local, &
+         call given_space_strain(self%geometry(e), self%host%first_point(e), local, &
             given%points(self%law_of(e)), is_inverted)
          if (.not. is_inverted) cycle
          given%inverted_element = e

@@ -57,14 +57,14 @@ contains
       self%role = role_internal
       call solid_init(self%solid, scene, error, given)
       is_here = .true.
-      if (any(self%solid%is_small)) then
+      if (any(self%solid%trait%is_small)) then
          is_here = .false.
-         is_here(pack(1 + mod(self%solid%law_of - 1, size(is_here)), .not. self%solid%is_small)) &
-            = .true.
+         is_here(pack(1 + mod(self%solid%law_of - 1, size(is_here)), &
+            .not. self%solid%trait%is_small)) = .true.
       end if
       self%has_linear_laws = all(scene%material%law == 0 .or. scene%material%law == law_linear &
          .or. .not. is_here)
-      self%is_empty = all(self%solid%is_small) .and. self%solid%n_element > 0
+      self%is_empty = all(self%solid%trait%is_small) .and. self%solid%n_element > 0
    end subroutine solid_term_init
 
    !> The freedoms of each element.
@@ -73,7 +73,7 @@ contains
       type(lists_t), intent(inout) :: lists
       integer, allocatable :: start(:), freedom(:)
 
-      call element_lists(self%solid, lists%n_dim, start, freedom, .not. self%solid%is_small)
+      call element_lists(self%solid, lists%n_dim, start, freedom, .not. self%solid%trait%is_small)
       call lists_append(lists, start(2:) - start(:size(start) - 1), freedom)
    end subroutine lay_out
 
@@ -94,7 +94,7 @@ contains
       allocate(self%to%first(self%solid%n_element), source=0)
       next = 1
       do e = 1, self%solid%n_element
-         if (self%solid%is_small(e)) cycle
+         if (self%solid%trait%is_small(e)) cycle
          self%to%first(e) = next
          next = next + (size(scene%x, 1)*self%solid%geometry(e)%n_node)**2
       end do
@@ -108,7 +108,7 @@ contains
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
       integer :: t
 
-      if (self%solid%has_given) then
+      if (self%solid%host%is_used) then
          call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, &
             present(value), self%given)
          if (self%given%inverted_element > 0) call refuse(self, self%given%inverted_element, &
@@ -292,11 +292,11 @@ contains
       type(response_t), intent(inout) :: response
 
       if (self%given%material == 0) then
-         response%refusal = "element " // to_text(self%solid%label(e)) // " is inverted"
+         response%refusal = "element " // to_text(self%solid%deck%label(e)) // " is inverted"
          return
       end if
       response%refusal = "the law given for material " // &
-         self%solid%material(self%given%material)%text
+         self%solid%deck%material(self%given%material)%text
       if (self%given%status == point_failed) then
          response%refusal = response%refusal // " has failed"
          call raise(response%failure, err_analysis, response%refusal)
@@ -317,7 +317,7 @@ contains
       type(pack_motion_t) :: local
       integer :: k
 
-      if (self%solid%has_given) then
+      if (self%solid%host%is_used) then
          call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, .true., &
             self%given)
          if (self%given%inverted_element > 0) return
@@ -414,7 +414,7 @@ contains
       type(pack_motion_t) :: local
       integer :: k, l
 
-      if (self%solid%has_given) then
+      if (self%solid%host%is_used) then
          call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, .true., &
             self%given)
          if (self%given%inverted_element > 0) return

@@ -67,7 +67,7 @@ contains
       do k = 1, size(self%element)
          associate (n => self%n_node(k), e => self%element(k))
             m = self%start(k + 1) - self%start(k)
-            call lumped_mass(solid%mass(:n, :n, e), mass(:n))
+            call lumped_mass(solid%mass%consistent(:n, :n, e), mass(:n))
             square = element_frequency(self%stiffness(:m, :m, k), mass(:n))
             if (square > fastest%square) fastest = fastest_t(e, square)
          end associate

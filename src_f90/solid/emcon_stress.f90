@@ -41,7 +41,7 @@ contains
       stress = 0.0_wp
       count_at = 0
       do e = 1, solid%n_element
-         if (solid%is_rigid(e)) cycle
+         if (solid%trait%is_rigid(e)) cycle
          call state_of(solid, e, u, nlgeom, given, at_gp, strain)
          do k = 1, solid%geometry(e)%n_gp
             do i = 1, solid%geometry(e)%n_node
@@ -76,10 +76,10 @@ contains
          call state_of_single(solid, e, u, nlgeom, given, stress, strain)
          return
       end if
-      motion%nlgeom = nlgeom .and. .not. solid%is_small(e)
+      motion%nlgeom = nlgeom .and. .not. solid%trait%is_small(e)
       call place(solid, e, u, motion, turn)
       call element_state(solid, e, motion, given, points, stress, strain)
-      if (.not. solid%is_corotated(e)) return
+      if (.not. solid%trait%is_corotated(e)) return
       do k = 1, solid%geometry(e)%n_gp
          call corotated_turn_stress(turn, stress(:, k))
       end do
@@ -95,7 +95,7 @@ contains
       type(space_motion_t) :: motion
       integer :: i
 
-      motion%nlgeom = nlgeom .and. .not. solid%is_small(e)
+      motion%nlgeom = nlgeom .and. .not. solid%trait%is_small(e)
       associate (node => solid%node(:solid%geometry(e)%n_node, e))
          if (solid%is_axial) then
             motion%from(:size(u, 1), :size(node)) = u(:, node)
@@ -108,10 +108,10 @@ contains
          end do
       end associate
       associate (law => solid%law(solid%law_of(e)), rest => solid%rest(solid%law_of(e)))
-         if (solid%first_point(e) > 0) then
-            call given_space_hold(solid%geometry(e), merge(solid%first_point(e), 0, &
+         if (solid%host%first_point(e) > 0) then
+            call given_space_hold(solid%geometry(e), merge(solid%host%first_point(e), 0, &
                given%inverted_element == 0), given%points(solid%law_of(e)), motion, stress, strain)
-         else if (solid%has_mean(e)) then
+         else if (solid%trait%has_mean(e)) then
             call mean_volume_space_hold(solid%geometry(e), law%law, rest%law, motion, stress, &
                strain)
          else
@@ -128,7 +128,7 @@ contains
       type(host_response_t), intent(inout) :: given
       real(wp), allocatable :: zero(:, :)
 
-      if (.not. solid%has_given) return
+      if (.not. solid%host%is_used) return
       allocate(zero, mold=u)
       zero = 0.0_wp
       call solid_evaluate_given(solid, u, zero, nlgeom, .false., given)
@@ -147,7 +147,7 @@ contains
       do i = 1, solid%geometry(e)%n_node
          motion%from(:, i) = u(:, solid%node(i, e))
       end do
-      if (solid%is_corotated(e)) call place_in_frame(solid, e, u, motion, turn)
+      if (solid%trait%is_corotated(e)) call place_in_frame(solid, e, u, motion, turn)
    end subroutine place
 
    pure subroutine place_in_frame(solid, e, u, motion, turn)
@@ -191,18 +191,18 @@ contains
          end do
          if (allocated(solid%geometry(e)%mode)) call modes_relax(solid%geometry(e), strain(:3, :n))
          points%strain(:n, :) = transpose(strain(:3, before + 1:before + n))
-         if (solid%has_mean(e)) then
+         if (solid%trait%has_mean(e)) then
             call mean_volume_hold(solid%law(solid%law_of(e))%law, solid%rest(solid%law_of(e))%law, &
                solid%geometry(e)%weight, points)
-         else if (solid%first_point(e) == 0) then
+         else if (solid%host%first_point(e) == 0) then
             call solid%law(solid%law_of(e))%law%hold(points)
          else
-            call hold_given(given, solid%law_of(e), solid%first_point(e) + before, n, points)
+            call hold_given(given, solid%law_of(e), solid%host%first_point(e) + before, n, points)
          end if
          do l = 1, n
             call push_forward(f(:, :, l), points%stress(l, :), points%stress_33(l), &
                stress(:, before + l))
-            if (motion%nlgeom .and. solid%is_thin(e)) stress(:, before + l) &
+            if (motion%nlgeom .and. solid%trait%is_thin(e)) stress(:, before + l) &
                = stress(:, before + l)/points%stretch_33(l)
          end do
       end do
@@ -244,7 +244,7 @@ contains
       strain = 0.0_wp
       do e = 1, solid%n_element
          volume(e) = sum(solid%geometry(e)%weight)
-         if (solid%is_rigid(e)) cycle
+         if (solid%trait%is_rigid(e)) cycle
          call state_of(solid, e, u, nlgeom, given, stress_k, strain_k)
          do k = 1, solid%geometry(e)%n_gp
             weight = solid%geometry(e)%weight(k)/volume(e)
@@ -265,7 +265,7 @@ contains
       do e = 1, solid%n_element
          do j = 1, solid%geometry(e)%n_node
             do i = 1, solid%geometry(e)%n_node
-               energy(e) = energy(e) + 0.5_wp*solid%mass(i, j, e) &
+               energy(e) = energy(e) + 0.5_wp*solid%mass%consistent(i, j, e) &
                   *dot_product(v(:, solid%node(i, e)), v(:, solid%node(j, e)))
             end do
          end do

@@ -26,6 +26,16 @@ module emcon_correction
       correction_multipliers, correction_reset, correction_free, correction_reason, &
       correction_ticks, correction_work
 
+   !> Patterns, and the constraint rows that they are for.
+   type :: layout_t
+      type(csr_t) :: merged                      !! N with constraints
+      integer, allocatable :: slot(:)            !! entries of the system's matrix in `merged`
+      integer, allocatable :: row_start(:), column(:)   !! constraint rows that the layout is for
+      integer, allocatable :: law_start(:), law_column(:)   !! and those of laws alone
+      logical :: is_merged = .false.             !! `merged` is laid out for these rows
+      logical :: has_saddle_point = .false.      !! it is laid out for these rows
+   end type layout_t
+
    type :: correction_t
       integer :: method = method_null_space      !! as the deck asks
       integer :: n_redundant = 0                 !! constraints that depend on earlier ones
@@ -41,16 +51,11 @@ module emcon_correction
       class(sparse_solver_t), allocatable :: solver            !! no active constraint
       class(sparse_solver_t), allocatable :: definite_solver   !! the same, positive definite
       logical, private :: is_definite = .false.  !! last factorisation: by that one
-      type(csr_t) :: merged                      !! N with constraints
-      integer, allocatable :: slot(:)            !! entries of the system's matrix in `merged`
-      integer, allocatable :: row_start(:), column(:)   !! constraint rows that the layout is for
-      integer, allocatable :: law_start(:), law_column(:)   !! and those of laws alone
+      type(layout_t), private :: layout
       type(null_space_t) :: null_space
       type(kept_factor_t) :: kept                !! over increments
       type(saddle_point_t) :: saddle_point
       type(stopwatch_t), private :: clock        !! layouts and curvature of the constraints
-      logical, private :: is_merged = .false.    !! `merged` is laid out for these rows
-      logical, private :: has_saddle_point = .false.    !! it is laid out for these rows
       logical, private :: is_reduced = .false.   !! last factorisation: by null space
    end type correction_t
 
@@ -68,7 +73,7 @@ contains
       if (allocated(self%given)) deallocate(self%given)
       if (present(given)) allocate(self%given, source=given)
       call make_solvers(self)
-      if (allocated(self%row_start)) deallocate(self%row_start, self%column)
+      if (allocated(self%layout%row_start)) deallocate(self%layout%row_start, self%layout%column)
    end subroutine correction_reset
 
    subroutine make_solvers(self)
@@ -163,10 +168,10 @@ contains
       type(correction_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
 
-      has_pattern = allocated(self%row_start)
-      if (has_pattern) has_pattern = is_pattern(self%row_start, self%column, set%n_row, &
-         set%force_rows)
-      if (has_pattern) has_pattern = is_pattern(self%law_start, self%law_column, &
+      has_pattern = allocated(self%layout%row_start)
+      if (has_pattern) has_pattern = is_pattern(self%layout%row_start, self%layout%column, &
+         set%n_row, set%force_rows)
+      if (has_pattern) has_pattern = is_pattern(self%layout%law_start, self%layout%law_column, &
          set%n_condition - set%n, set%law_rows)
    end function has_pattern
 
@@ -203,17 +208,18 @@ contains
       type(correction_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
 
-      self%row_start = set%force_rows%row_start
-      self%column = set%force_rows%column(:set%force_rows%row_start(set%n_row + 1))
+      self%layout%row_start = set%force_rows%row_start
+      self%layout%column = set%force_rows%column(:set%force_rows%row_start(set%n_row + 1))
       if (set%n_condition > set%n) then
-         self%law_start = set%law_rows%row_start
-         self%law_column = set%law_rows%column(:self%law_start(size(self%law_start)))
+         self%layout%law_start = set%law_rows%row_start
+         self%layout%law_column = &
+            set%law_rows%column(:self%layout%law_start(size(self%layout%law_start)))
       else
-         self%law_start = [0]
-         self%law_column = [integer ::]
+         self%layout%law_start = [0]
+         self%layout%law_column = [integer ::]
       end if
-      self%is_merged = .false.
-      self%has_saddle_point = .false.
+      self%layout%is_merged = .false.
+      self%layout%has_saddle_point = .false.
    end subroutine take_pattern
 
    !> Factorise for the present tangent, gradients and multipliers. Where the null space turns out
@@ -235,25 +241,25 @@ contains
       if (self%n_redundant > 0) return
       call merge_all(self, system, set)
       if (set%n == 0) then
-         call factorise_free(self, system, self%merged, .false., is_singular, error)
+         call factorise_free(self, system, self%layout%merged, .false., is_singular, error)
          return
       end if
       self%is_reduced = self%method == method_null_space .and. .not. set%soft%is_on
       self%obstacle = obstacle_none
       if (self%is_reduced) then
-         call null_space_factorise(self%null_space, set, self%merged, is_singular, error)
+         call null_space_factorise(self%null_space, set, self%layout%merged, is_singular, error)
          if (allocated(error)) return
          self%obstacle = self%null_space%obstacle
          self%is_reduced = self%obstacle == obstacle_none
       end if
       self%fell_back = self%obstacle /= obstacle_none
       if (self%is_reduced) return
-      if (.not. self%has_saddle_point) then
-         call saddle_point_init(self%saddle_point, set, self%merged, error)
+      if (.not. self%layout%has_saddle_point) then
+         call saddle_point_init(self%saddle_point, set, self%layout%merged, error)
          if (allocated(error)) return
-         self%has_saddle_point = .true.
+         self%layout%has_saddle_point = .true.
       end if
-      call saddle_point_factorise(self%saddle_point, set, self%merged, is_singular, error)
+      call saddle_point_factorise(self%saddle_point, set, self%layout%merged, is_singular, error)
    end subroutine correction_factorise
 
    !> The tangent of the system with what constraints and laws of contact add to it.
@@ -264,14 +270,14 @@ contains
       integer :: k
 
       call stopwatch_start(self%clock)
-      if (.not. self%is_merged) call constraints_merge_pattern(set, system%matrix, self%merged, &
-         self%slot)
-      self%is_merged = .true.
-      self%merged%value = 0.0_dp
-      do k = 1, size(self%slot)
-         self%merged%value(self%slot(k)) = system%matrix%value(k)
+      if (.not. self%layout%is_merged) call constraints_merge_pattern(set, system%matrix, &
+         self%layout%merged, self%layout%slot)
+      self%layout%is_merged = .true.
+      self%layout%merged%value = 0.0_dp
+      do k = 1, size(self%layout%slot)
+         self%layout%merged%value(self%layout%slot(k)) = system%matrix%value(k)
       end do
-      call constraints_add_curvature(set, system%space%numbering, self%merged)
+      call constraints_add_curvature(set, system%space%numbering, self%layout%merged)
       call stopwatch_stop(self%clock)
    end subroutine merge_all
 
@@ -322,7 +328,7 @@ contains
       integer :: i, k
 
       work = 0.0_wp
-      associate (tangent => self%merged)
+      associate (tangent => self%layout%merged)
          do i = 1, size(dq)
             do k = tangent%row_start(i) + 1, tangent%row_start(i + 1)
                work = work + dq(i)*(real(tangent%value(k), wp)*dq(tangent%column(k) + 1))
@@ -371,7 +377,7 @@ contains
          end if
          dq = -dq
       else if (self%is_reduced) then
-         call null_space_solve(self%null_space, set, self%merged, residual, dq, error)
+         call null_space_solve(self%null_space, set, self%layout%merged, residual, dq, error)
       else
          call saddle_point_solve(self%saddle_point, set, residual, dq, dlam, error)
       end if

@@ -98,7 +98,7 @@ contains
       real(wp), intent(in) :: step_time              !! since the start of the step [T]
       real(wp), intent(in) :: start, last
 
-      ramp_at = start + (last - start)*min(1.0_wp, step_time/step%duration)
+      ramp_at = start + (last - start)*min(1.0_wp, step_time/step%time%duration)
    end function ramp_at
 
    !> Where the run has to start to be at `now`, and end at `last`. It stays after the step, and
@@ -110,7 +110,7 @@ contains
       real(wp), intent(inout) :: start
       real(wp) :: part
 
-      part = min(1.0_wp, step_time/step%duration)
+      part = min(1.0_wp, step_time/step%time%duration)
       if (.not. step%scheme%loads_ramp .or. part >= 1.0_wp) return
       start = now
       if (part > 0.0_wp) start = (now - last*part)/(1.0_wp - part)

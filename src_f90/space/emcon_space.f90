@@ -125,7 +125,7 @@ contains
                self%unresolved)
             self%linear%is_used(self%unresolved%row) = .false.
          end if
-         self%is_reduced = step%constraint_method /= method_saddle_point
+         self%is_reduced = step%contact%method /= method_saddle_point
       end associate
       if (self%is_reduced .and. self%linear%n > 0) then
          self%numbering = self%linked

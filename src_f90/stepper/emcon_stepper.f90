@@ -141,11 +141,11 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call take_given_schemes(self%march%host%scheme, self%scene, error)
-      if (.not. (allocated(error) .or. self%scene%is_hosted)) call host_check_scene(self%given, &
-         self%scene, error)
+      if (.not. (allocated(error) &
+         .or. self%scene%host%is_whole)) call host_check_scene(self%given, self%scene, error)
       if (allocated(error)) return
       call ties_prepare(self%scene, self%notes, error)
-      if (.not. (allocated(error) .or. self%scene%is_hosted)) call prepare_contact(self, error)
+      if (.not. (allocated(error) .or. self%scene%host%is_whole)) call prepare_contact(self, error)
       if (allocated(error)) return
       call march_init(self%march, self%scene, error, self%given)
       if (allocated(error)) return
@@ -220,7 +220,7 @@ contains
       type(stepper_t), intent(in) :: self
       type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
 
-      if (self%scene%is_hosted .and. .not. allocated(error)) call raise(error, err_input, &
+      if (self%scene%host%is_whole .and. .not. allocated(error)) call raise(error, err_input, &
          "the model has no solids and no deck: its host makes the steps")
    end subroutine stepper_check_solids
 
@@ -228,7 +228,7 @@ contains
    pure real(wp) function stepper_fraction(self)
       type(stepper_t), intent(in) :: self
 
-      stepper_fraction = min(1.0_wp, self%march%state%clock%time/sum(self%scene%step%duration))
+      stepper_fraction = min(1.0_wp, self%march%state%clock%time/sum(self%scene%step%time%duration))
    end function stepper_fraction
 
 end module emcon_stepper

@@ -27,11 +27,12 @@ contains
       type(stepper_t), intent(in) :: self
       type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
 
-      call check_that(.not. any(self%scene%pair%laws%friction > 0.0_wp), "contact with " // &
-         "*FRICTION is not evaluated from outside: advance the model by increments", error)
-      call check_that(.not. any(self%scene%pair%laws%damping%coefficient > 0.0_wp), &
-         "contact with *CONTACT DAMPING is not evaluated from outside: advance the model by " // &
-         "increments", error)
+      call check_that(.not. any(self%scene%pair%interaction%friction > 0.0_wp), &
+         "contact with *FRICTION " // &
+         "is not evaluated from outside: advance the model by increments", error)
+      call check_that(.not. any(self%scene%pair%interaction%damping%coefficient > 0.0_wp), &
+         "contact with " // &
+         "*CONTACT DAMPING is not evaluated from outside: advance the model by increments", error)
    end subroutine stepper_check_smooth
 
    !> An input error of this text, unless something holds.
@@ -61,7 +62,7 @@ contains
       do i = 1, size(field, 2)
          if (all(ieee_is_finite(field(:, i)))) cycle
          call raise(error, err_input, name // " is not finite at node " // &
-            to_text(scene%node_label(i)))
+            to_text(scene%node%label(i)))
          return
       end do
    end subroutine check_field

@@ -192,7 +192,7 @@ contains
       k = 0
       node = 0
       call stepper_check_open(self, error)
-      if (.not. allocated(error)) node = findloc(self%scene%node_label, label, 1)
+      if (.not. allocated(error)) node = findloc(self%scene%node%label, label, 1)
       call check_that(node > 0, "there is no node " // to_text(label), error)
       call check_that(dof >= 1 .and. dof <= self%scene%n_dim, "a node has the degrees of " // &
          "freedom 1 to " // to_text(self%scene%n_dim) // ", not " // to_text(dof), error)

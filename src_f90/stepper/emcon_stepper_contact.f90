@@ -172,7 +172,7 @@ contains
          if (pair == 0 .or. gap(id(k))%is_near) cycle
          associate (contact => self%march%system%contact(pair))
             call check_that(.false., "constraint " // to_text(id(k)) // " (slave node " // &
-               to_text(stepper%scene%node_label(contact%contact%node(i))) // " of pair " // &
+               to_text(stepper%scene%node%label(contact%contact%node(i))) // " of pair " // &
                to_text(abs(contact%of_pair)) // ") has no surface within reach", error)
          end associate
       end do

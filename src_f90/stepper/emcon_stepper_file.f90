@@ -111,9 +111,10 @@ contains
          if (allocated(error)) return
       end if
       diagnostics%file_name = self%source%file_name
-      if (self%is_read) given = self%scene%kind
+      if (self%is_read) given = self%scene%element%kinds
       call stepper_read_source(self, diagnostics, error)
-      if (allocated(given) .and. .not. allocated(error)) call keep_shapes(self%scene%kind, given)
+      if (allocated(given) &
+         .and. .not. allocated(error)) call keep_shapes(self%scene%element%kinds, given)
       if (present(further) .and. .not. allocated(error)) then
          if (further%until > 0.0_wp) call take_until(self, further%until, error)
       end if

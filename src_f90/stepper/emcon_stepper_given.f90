@@ -108,13 +108,13 @@ contains
 
       call check_stage(self, error)
       if (allocated(error)) return
-      k = find_element_kind(self%scene%kind, plain(name))
+      k = find_element_kind(self%scene%element%kinds, plain(name))
       call check_that(k > 0, "there is no element type " // plain(name) // " in the deck: to " // &
          "give its shape, it has to be the TYPE of a *USER ELEMENT", error)
       call check_that(find_element_row(plain(name)) == 0, "a shape cannot be given for " &
          // plain(name) // ": EMCON has its own", error)
       if (allocated(error)) return
-      associate (kind => self%scene%kind(k))
+      associate (kind => self%scene%element%kinds(k))
          call check_that(.not. allocated(kind%shape), "the shape of " // plain(name) // &
             " is given already", error)
          call shape_fault(shape, kind%n_node, fault)
@@ -258,7 +258,7 @@ contains
       if (allocated(error)) return
       call check_that(.not. allocated(self%given%contact_law), "a law of contact is given " // &
          "already", error)
-      call check_that(any(self%scene%step%constraint_method == method_penalty), "a law of " // &
+      call check_that(any(self%scene%step%contact%method == method_penalty), "a law of " // &
          "contact is given, but no step has a *CONSTRAINT METHOD, TYPE=PENALTY, in whose place " &
          // "it acts", error)
       if (.not. allocated(error)) allocate(self%given%contact_law, source=law)

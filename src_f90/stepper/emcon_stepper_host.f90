@@ -46,9 +46,9 @@ contains
       call scene_of_nodes(self%scene, x)
       call check_field("x", x, self%scene, error)
       if (allocated(error)) return
-      self%scene%is_hosted = .true.
+      self%scene%host%is_whole = .true.
       self%scene%step(1)%scheme = scheme_row("DYNAMIC", "")
-      call element_kinds_create(self%scene%n_dim, self%scene%kind)
+      call element_kinds_create(self%scene%n_dim, self%scene%element%kinds)
       allocate(self%diagnostic(0))
       self%is_read = .true.
    end subroutine stepper_new
@@ -233,8 +233,8 @@ contains
       call check_number("gap_tolerance", gap_tolerance, error, least=0.0_wp)
       if (allocated(error)) return
       self%may_cut = may_cut
-      self%scene%step(1)%initiation = initiation
-      self%scene%step(1)%gap_tolerance = gap_tolerance
+      self%scene%step(1)%contact%initiation = initiation
+      self%scene%step(1)%contact%gap_tolerance = gap_tolerance
       self%scene%step(1)%scheme = scheme_row("DYNAMIC", "")
       if (is_end) self%scene%step(1)%scheme = scheme_row("STATIC", "")
    end subroutine stepper_set_contact
@@ -285,7 +285,7 @@ contains
 
       call check_that(self%is_read, &
          "there are no nodes: making the model, or building it, failed", error)
-      call check_that(self%scene%is_hosted, &
+      call check_that(self%scene%host%is_whole, &
          "a deck says this itself: it is for models of a host's nodes", error)
    end subroutine check_hosted
 

@@ -137,9 +137,9 @@ contains
       integer, intent(in) :: label
 
       if (kind == load_point) then
-         find_target = findloc(scene%node_label, label, 1)
+         find_target = findloc(scene%node%label, label, 1)
       else
-         find_target = findloc(scene%element_label, label, 1)
+         find_target = findloc(scene%element%label, label, 1)
       end if
    end function find_target
 
@@ -202,9 +202,9 @@ contains
             // " belongs to no element and no " // "equation", error)
       case (load_pressure)
          call check_choice("the face", load%place, 1, &
-            self%scene%kind(self%scene%element_kind(load%target))%n_face, error)
+            self%scene%element%kinds(self%scene%element%kind(load%target))%n_face, error)
       case (load_gravity)
-         section = self%scene%element_section(load%target)
+         section = self%scene%element%section(load%target)
          call check_that(self%scene%material(self%scene%section(section)%material)%density &
             > 0.0_wp, "element " // to_text(label) // " has no mass: its material has no " // &
             "*DENSITY", error)
@@ -251,8 +251,8 @@ contains
       type(load_t), intent(in) :: load
       integer :: n_target
 
-      n_target = size(scene%element_label)
-      if (any(load%kind == [load_point, load_moment])) n_target = size(scene%node_label)
+      n_target = size(scene%element%label)
+      if (any(load%kind == [load_point, load_moment])) n_target = size(scene%node%label)
       is_possible = load%kind >= load_point .and. load%kind <= load_centrifugal &
          .and. load%target >= 1 .and. load%target <= n_target &
          .and. load%amplitude >= 0 .and. load%amplitude <= size(scene%amplitude)
@@ -262,7 +262,7 @@ contains
          is_possible = load%place >= 1 .and. load%place <= scene%n_dim
       case (load_pressure)
          is_possible = load%place >= 1 .and. load%place &
-            <= scene%kind(scene%element_kind(load%target))%n_face
+            <= scene%element%kinds(scene%element%kind(load%target))%n_face
       case (load_moment)
          is_possible = any(scene%rigid%reference == load%target)
       end select

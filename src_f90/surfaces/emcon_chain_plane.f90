@@ -167,7 +167,7 @@ contains
             associate (e => self%node_edge(side, i))
                if (e == 0) cycle
                if (self%element(e) == 0) cycle
-               thickness(i) = scene%section(scene%element_section(self%element(e)))%thickness
+               thickness(i) = scene%section(scene%element%section(self%element(e)))%thickness
             end associate
          end do
       end do

@@ -141,7 +141,7 @@ contains
             call find_beyond(self, f, k, self%neighbour(k, f), n_same)
             if (n_same == 0) cycle
             call raise(error, err_input, where_text(scene, surface%origin) // ": surface " // &
-               surface%name // " branches at node " // to_text(scene%node_label(self%facet(k, f))))
+               surface%name // " branches at node " // to_text(scene%node%label(self%facet(k, f))))
             return
          end do
       end do
@@ -291,11 +291,11 @@ contains
 
       text = "the edge"
       if (self%element(f) > 0) text = "face S" // to_text(self%face(f)) // " of element " &
-         // to_text(scene%element_label(self%element(f)))
+         // to_text(scene%element%label(self%element(f)))
       text = text // " (nodes "
       do k = 1, count(self%facet(:, f) > 0)
          if (k > 1) text = text // ", "
-         text = text // to_text(scene%node_label(self%facet(k, f)))
+         text = text // to_text(scene%node%label(self%facet(k, f)))
       end do
       text = text // ")"
    end subroutine facets_text

@@ -36,9 +36,11 @@ contains
                node = unique_sorted(reshape(slave, [size(slave)]))
             end if
          end associate
-         touch_time = min(touch_time, nodes_time(node, master, scene%pair(i)%offset, x, way))
+         touch_time = min(touch_time, nodes_time(node, master, scene%pair(i)%interaction%offset, &
+            x, way))
          node = unique_sorted(reshape(master, [size(master)]))
-         touch_time = min(touch_time, nodes_time(node, slave, scene%pair(i)%offset, x, way))
+         touch_time = min(touch_time, nodes_time(node, slave, scene%pair(i)%interaction%offset, &
+            x, way))
       end do
    end function touch_time
 

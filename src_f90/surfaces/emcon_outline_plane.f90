@@ -47,7 +47,7 @@ contains
       call bodies_find(connected, size(scene%x, 2), piece, n_body)
       call find_free_edges(scene, edge, thickness)
       call find_meetings(self, scene, piece, edge, number)
-      call find_bodies(self, scene, connected(:, size(scene%element_node, 2) + 1:), piece, number)
+      call find_bodies(self, scene, connected(:, size(scene%element%node, 2) + 1:), piece, number)
       allocate(self%start(self%n_piece + 1), source=1)
       ! From here on the piece of a node is its place among those that meet; 0: none of them.
       piece = [(find_sorted(number, piece(p)), p = 1, size(piece))]
@@ -88,7 +88,7 @@ contains
       integer, allocatable :: edge(:, :), spread(:, :)
       integer :: s
 
-      connected = scene%element_node
+      connected = scene%element%node
       do s = 1, size(scene%surface)
          if (.not. allocated(scene%surface(s)%edge)) cycle
          edge = scene%surface(s)%edge
@@ -188,20 +188,20 @@ contains
       integer :: e, f, k, n
 
       n = 0
-      do e = 1, size(scene%element_kind)
-         associate (kind => scene%kind(scene%element_kind(e)))
+      do e = 1, size(scene%element%kind)
+         associate (kind => scene%element%kinds(scene%element%kind(e)))
             n = n + kind%n_face*n_face_facet(kind)
          end associate
       end do
       allocate(edge(2, n))
       n = 0
       allocate(thickness(size(edge, 2)))
-      do e = 1, size(scene%element_kind)
-         associate (kind => scene%kind(scene%element_kind(e)))
+      do e = 1, size(scene%element%kind)
+         associate (kind => scene%element%kinds(scene%element%kind(e)))
             do f = 1, kind%n_face
                associate (new => face_facets(kind, f), before => n + (f - 1)*n_face_facet(kind))
                   do k = 1, size(new, 2)
-                     edge(:, before + k) = scene%element_node(new(:, k), e)
+                     edge(:, before + k) = scene%element%node(new(:, k), e)
                   end do
                end associate
             end do

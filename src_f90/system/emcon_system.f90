@@ -70,7 +70,7 @@ contains
       if (allocated(error)) return
       call lay_out(self, scene, lists)
       call space_init(self%space, scene, lists)
-      if (scene%is_hosted) self%space%is_alive = .true.
+      if (scene%host%is_whole) self%space%is_alive = .true.
       call constraints_create(scene, self%space%linear, self%permanent, given)
       if (present(given)) then
          if (allocated(given%contact_law)) allocate(self%contact_law, source=given%contact_law)
@@ -78,7 +78,7 @@ contains
       call init_contact(self, scene, error, given)
       if (allocated(error)) return
       call response_init(self%response, size(scene%x, 1), size(scene%x, 2), &
-         size(scene%element_kind))
+         size(scene%element%kind))
    end subroutine system_init
 
    !> The contact of pairs and guards, and the numbers of conditions: those of `held`, then theirs.
@@ -167,7 +167,7 @@ contains
          deallocate(slot)
          allocate(slot(first(size(first))), source=0)
       end if
-      if (scene%step(i_step)%constraint_method /= method_saddle_point &
+      if (scene%step(i_step)%contact%method /= method_saddle_point &
          .and. .not. self%space%is_reduced) call note_add(self%notes, &
          "ties or equations with long rows: solved with their multipliers, as a saddle point; " &
          // "dual multipliers keep rows short")
@@ -219,7 +219,7 @@ contains
          if (k > 0) then
             if (mass%value(k) > 0.0_dp) cycle
          end if
-         call raise(error, err_input, "node " // to_text(scene%node_label(i)) // &
+         call raise(error, err_input, "node " // to_text(scene%node%label(i)) // &
             " has given forces but no mass: a dynamic step needs it")
          return
       end do

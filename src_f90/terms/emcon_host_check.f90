@@ -102,7 +102,7 @@ contains
          character(len=*), intent(in) :: text
 
          call raise(error, err_input, "the given mass between nodes " // &
-            to_text(scene%node_label(i)) // " and " // to_text(scene%node_label(j)) // " " // text)
+            to_text(scene%node%label(i)) // " and " // to_text(scene%node%label(j)) // " " // text)
       end subroutine refuse
 
    end subroutine host_check_mass
@@ -163,21 +163,21 @@ contains
       if (allocated(error)) return
       counts = host_count(given)
       if (all(counts(:2) == 0)) then
-         if (allocated(scene%given_node)) then
-            call raise(error, err_input, where_text(scene, scene%given_origin) // ": error: " // &
+         if (allocated(scene%host%node)) then
+            call raise(error, err_input, where_text(scene, scene%host%origin) // ": error: " // &
                "*GIVEN FORCES: no forces were given; they come from a program that calls the " // &
                "library, see docs/embedding.md")
-         else if (size(scene%element_kind) == 0) then
+         else if (size(scene%element%kind) == 0) then
             call raise(error, err_input, "there are no elements, and no forces were given")
          end if
       end if
-      if (allocated(error) .or. .not. allocated(scene%given_node)) return
-      do i = 1, size(scene%given_node)
-         n = scene%given_node(i)
+      if (allocated(error) .or. .not. allocated(scene%host%node)) return
+      do i = 1, size(scene%host%node)
+         n = scene%host%node(i)
          if (has_row(given%mass, n)) cycle
          if (has_force(n)) cycle
-         call raise(error, err_input, where_text(scene, scene%given_origin) // ": error: *GIVEN " &
-            // "FORCES names node " // to_text(scene%node_label(n)) // &
+         call raise(error, err_input, where_text(scene, scene%host%origin) // ": error: *GIVEN " &
+            // "FORCES names node " // to_text(scene%node%label(n)) // &
             ", which has neither forces nor mass in what was given")
          return
       end do
@@ -213,11 +213,13 @@ contains
       call host_copy_solvers(given, solver)
       do i = 1, size(scene%step)
          associate (step => scene%step(i))
-            if (step%solver /= solver_given) cycle
-            if (host_find_solver(solver, step%solver_name) > 0) cycle
+            if (step%solution%solver /= solver_given) cycle
+            if (host_find_solver(solver, step%solution%solver_name) > 0) cycle
             call solver_names(known)
-            call raise(error, err_input, where_text(scene, step%solver_origin) // ": error: " // &
-               "SOLVER=" // step%solver_name // ": no program has given this solver, see " // &
+            call raise(error, err_input, where_text(scene, step%solution%solver_origin) &
+               // ": error: " // &
+               "SOLVER=" // step%solution%solver_name &
+               // ": no program has given this solver, see " // &
                "docs/embedding.md; those of EMCON are " // known)
             return
          end associate

@@ -52,7 +52,7 @@ contains
       if (allocated(error)) return
       allocate(self%force, source=force)
       call self%force%place(scene%x)
-      self%label = scene%node_label
+      self%label = scene%node%label
       allocate(self%may_hold(n), source=.false.)
       associate (pattern => self%force%pattern)
          do i = 1, pattern%n_row

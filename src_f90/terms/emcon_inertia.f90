@@ -96,7 +96,7 @@ contains
          do j = 1, n
             do i = 1, n
                k = k + 1
-               value(slot(k)) = value(slot(k)) + real(solid%mass(i, j, e), hp)
+               value(slot(k)) = value(slot(k)) + real(solid%mass%consistent(i, j, e), hp)
             end do
          end do
       end do
@@ -125,7 +125,7 @@ contains
          value = 0.0_hp
          do e = 1, solid%n_element
             associate (n => solid%geometry(e)%n_node)
-               call lumped_mass(solid%mass(:n, :n, e), share(:n))
+               call lumped_mass(solid%mass%consistent(:n, :n, e), share(:n))
                do i = 1, n
                   associate (to => value(solid%node(i, e)))
                      to = to + real(share(i), hp)

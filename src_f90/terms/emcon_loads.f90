@@ -68,10 +68,10 @@ contains
       self%role = role_external
       self%amplitude = scene%amplitude
       self%node = solid%node
-      self%volume_mass = solid%volume_mass
+      self%volume_mass = solid%mass%of_volume
       self%thickness = solid%thickness
       self%is_axial = solid%is_axial
-      self%is_linear = solid%is_linear
+      self%is_linear = solid%trait%is_linear
       allocate(self%load(0))
       allocate(self%frame(size(scene%x, 1) + 1, size(scene%rigid)))
       do b = 1, size(scene%rigid)
@@ -93,13 +93,13 @@ contains
       type(solid_t), intent(in) :: solid
       integer :: e
 
-      allocate(self%own_mass, mold=solid%volume_mass)
+      allocate(self%own_mass, mold=solid%mass%of_volume)
       allocate(self%first_moment(size(x, 1), size(solid%node, 1), solid%n_element))
       self%own_mass = 0.0_wp
       self%first_moment = 0.0_wp
       do e = 1, solid%n_element
          associate (n => solid%geometry(e)%n_node)
-            associate (mass => solid%mass(:n, :n, e), node => solid%node(:n, e))
+            associate (mass => solid%mass%consistent(:n, :n, e), node => solid%node(:n, e))
                self%own_mass(:n, e) = sum(mass, 2)
                self%first_moment(:, :n, e) = matmul(x(:, node), mass)
             end associate
@@ -114,8 +114,8 @@ contains
       class(shape_t), allocatable :: shape
       integer :: k
 
-      do k = 1, size(scene%kind)
-         associate (n => scene%kind(k)%n_face_node)
+      do k = 1, size(scene%element%kinds)
+         associate (n => scene%element%kinds(k)%n_face_node)
             call face_shape_create(n, shape)
             if (allocated(shape)) call shape_tabulate(shape, .true., self%on_face(n))
          end associate
@@ -144,7 +144,8 @@ contains
       type(csr_t), intent(in) :: matrix
       integer, intent(in) :: slot(:)             !! not needed: they are found again
       integer, allocatable :: number(:)
-      integer :: dof(scene%n_dim, maxval([moment_nodes, scene%kind%n_face_node])), i, e, j, k, a
+      integer :: dof(scene%n_dim, maxval([moment_nodes, scene%element%kinds%n_face_node])), i, e, &
+         j, k, a
 
       call self%renew(scene, i_step)
       associate (step => scene%step(i_step))
@@ -153,7 +154,7 @@ contains
          do i = 1, size(self%load)
             if (self%follows(i)) self%follows(i) = .not. self%is_linear(self%load(i)%target)
          end do
-         self%duration = step%duration
+         self%duration = step%time%duration
       end associate
       if (allocated(self%face)) deallocate(self%face, self%n_on, self%slot)
       allocate(self%face(size(dof, 2), size(self%load)), self%n_on(size(self%load)), source=0)
@@ -163,9 +164,9 @@ contains
          select case (self%load(i)%kind)
          case (load_pressure)
             e = self%load(i)%target
-            associate (kind => scene%kind(scene%element_kind(e)))
+            associate (kind => scene%element%kinds(scene%element%kind(e)))
                self%n_on(i) = kind%n_face_node
-               self%face(:self%n_on(i), i) = scene%element_node(kind%face(self%load(i)%place), e)
+               self%face(:self%n_on(i), i) = scene%element%node(kind%face(self%load(i)%place), e)
             end associate
          case (load_moment)
             self%n_on(i) = moment_nodes

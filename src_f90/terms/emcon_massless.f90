@@ -39,13 +39,13 @@ contains
       integer :: e
 
       without_density = .false.
-      if (all(solid%has_inertia)) return
+      if (all(solid%trait%has_inertia)) return
       do e = 1, solid%n_element
-         if (.not. solid%has_inertia(e)) without_density(solid%node(:solid%geometry(e)%n_node, &
-            e)) = .true.
+         if (.not. solid%trait%has_inertia(e)) without_density(solid%node(:solid%geometry( &
+            e)%n_node, e)) = .true.
       end do
       do e = 1, solid%n_element
-         if (solid%has_inertia(e)) without_density(solid%node(:solid%geometry(e)%n_node, e)) &
+         if (solid%trait%has_inertia(e)) without_density(solid%node(:solid%geometry(e)%n_node, e)) &
             = .false.
       end do
       call leave_joined(scene, is_given, without_density)
@@ -91,8 +91,8 @@ contains
       ! With friction what has no mass would balance without a minimum principle, with damping it
       ! would jump to where it rests.
       do i = 1, size(scene%pair)
-         if (.not. (scene%pair(i)%laws%friction > 0.0_wp &
-            .or. scene%pair(i)%laws%damping%coefficient > 0.0_wp)) cycle
+         if (.not. (scene%pair(i)%interaction%friction > 0.0_wp &
+            .or. scene%pair(i)%interaction%damping%coefficient > 0.0_wp)) cycle
          call mark_surface(scene, scene%pair(i)%slave, .false., is_massless)
          call mark_surface(scene, scene%pair(i)%master, .false., is_massless)
       end do
@@ -129,7 +129,7 @@ contains
       keeps = .false.
       do e = 1, solid%n_element
          associate (node => solid%node(:solid%geometry(e)%n_node, e))
-            if (solid%has_inertia(e) .and. all(is_massless(node))) keeps(node) = .true.
+            if (solid%trait%has_inertia(e) .and. all(is_massless(node))) keeps(node) = .true.
          end associate
       end do
       is_massless = is_massless .and. .not. keeps
@@ -176,11 +176,11 @@ contains
       integer :: e, i
 
       do e = 1, solid%n_element
-         if (.not. solid%has_inertia(e)) cycle
+         if (.not. solid%trait%has_inertia(e)) cycle
          associate (n => solid%geometry(e)%n_node)
-            call shed(is_massless(solid%node(:n, e)), solid%mass(:n, :n, e))
+            call shed(is_massless(solid%node(:n, e)), solid%mass%consistent(:n, :n, e))
             do i = 1, n
-               solid%volume_mass(i, e) = sum(solid%mass(:n, i, e))
+               solid%mass%of_volume(i, e) = sum(solid%mass%consistent(:n, i, e))
             end do
          end associate
       end do
@@ -273,7 +273,7 @@ contains
       do e = 1, solid%n_element
          associate (own => solid%node(:solid%geometry(e)%n_node, e))
             if (.not. any(own == node)) cycle
-            share = sum(solid%mass(:size(own), :size(own), e))/size(own)
+            share = sum(solid%mass%consistent(:size(own), :size(own), e))/size(own)
             stencil%mass = stencil%mass + share
             associate (kept => pack(own, .not. may_be_massless(own)))
                weight(kept) = weight(kept) + share/size(kept)

@@ -26,8 +26,8 @@ contains
       if (present(given)) then
          if (allocated(given%force)) n = size(given%force)
       end if
-      has_linear = any(scene%section(scene%element_section)%kinematics == kinematics_linear)
-      turns = any(scene%section(scene%element_section)%kinematics == kinematics_corotated)
+      has_linear = any(scene%section(scene%element%section)%kinematics == kinematics_linear)
+      turns = any(scene%section(scene%element%section)%kinematics == kinematics_corotated)
       decays = any(scene%step%scheme%dissipates) .or. any(scene%material%alpha > 0.0_wp .or. &
          scene%material%beta > 0.0_wp)
       first = n_own + count([has_linear, turns, decays])

@@ -6,7 +6,7 @@
 !> to (14r), (20a) to (20f), (22e).
 module emcon_contact_law
    use emcon_constraint, only : contact_response_t, most_slips
-   use emcon_interactions, only : surface_laws_t
+   use emcon_interactions, only : interaction_t
    use emcon_kinds, only : wp
    implicit none
    private
@@ -94,7 +94,7 @@ contains
    !> cannot ask for leave it.
    pure subroutine take(self, surface, method, acts)
       class(contact_law_t), intent(inout) :: self
-      type(surface_laws_t), intent(in) :: surface
+      type(interaction_t), intent(in) :: surface
       integer, intent(in) :: method              !! of `emcon_steps`; 0: of no step
       logical, intent(out) :: acts               !! the deck asks for this law
 

@@ -2,7 +2,7 @@
 !> `emcon_contact_law_kinds` alone.
 module emcon_contact_law_registry
    use emcon_contact_law, only : contact_law_t, contact_laws_add, contact_laws_t
-   use emcon_interactions, only : surface_laws_t
+   use emcon_interactions, only : interaction_t
    implicit none
    private
    public :: contact_laws_of_surface, contact_law_of_method
@@ -23,7 +23,7 @@ contains
 
    !> The laws that act beside the rows of a pair whose surfaces are `surface`.
    subroutine contact_laws_of_surface(surface, laws)
-      type(surface_laws_t), intent(in) :: surface
+      type(interaction_t), intent(in) :: surface
       type(contact_laws_t), intent(out) :: laws
       class(contact_law_t), allocatable :: law
       logical :: acts
@@ -45,7 +45,7 @@ contains
 
       do kind = 1, n_kind()
          call allocate_law(kind, law)
-         call law%take(surface_laws_t(), method, acts)
+         call law%take(interaction_t(), method, acts)
          if (acts) return
       end do
       deallocate(law)

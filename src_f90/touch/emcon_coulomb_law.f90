@@ -9,7 +9,7 @@
 module emcon_coulomb_law
    use emcon_constraint, only : contact_response_t, most_slips
    use emcon_contact_law, only : contact_law_t, contact_values_t, loss_friction
-   use emcon_interactions, only : surface_laws_t
+   use emcon_interactions, only : interaction_t
    use emcon_kinds, only : wp
    implicit none
    private
@@ -70,7 +70,7 @@ contains
 
    pure subroutine coulomb_take(self, surface, method, acts)
       class(coulomb_t), intent(inout) :: self
-      type(surface_laws_t), intent(in) :: surface
+      type(interaction_t), intent(in) :: surface
       integer, intent(in) :: method              !! of the step, or 0
       logical, intent(out) :: acts               !! the deck asks for it
 

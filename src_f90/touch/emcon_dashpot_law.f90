@@ -8,7 +8,7 @@
 module emcon_dashpot_law
    use emcon_constraint, only : contact_response_t
    use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
-   use emcon_interactions, only : contact_damping_t, surface_laws_t
+   use emcon_interactions, only : contact_damping_t, interaction_t
    use emcon_kinds, only : wp
    implicit none
    private
@@ -34,7 +34,7 @@ contains
 
    pure subroutine dashpot_take(self, surface, method, acts)
       class(dashpot_t), intent(inout) :: self
-      type(surface_laws_t), intent(in) :: surface
+      type(interaction_t), intent(in) :: surface
       integer, intent(in) :: method              !! of the step, or 0
       logical, intent(out) :: acts               !! the deck asks for it
 

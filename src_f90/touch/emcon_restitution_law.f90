@@ -3,7 +3,7 @@
 module emcon_restitution_law
    use emcon_constraint, only : contact_response_t
    use emcon_contact_law, only : contact_law_t, contact_values_t
-   use emcon_interactions, only : surface_laws_t
+   use emcon_interactions, only : interaction_t
    use emcon_kinds, only : wp
    implicit none
    private
@@ -21,7 +21,7 @@ contains
 
    pure subroutine take(self, surface, method, acts)
       class(restitution_t), intent(inout) :: self
-      type(surface_laws_t), intent(in) :: surface
+      type(interaction_t), intent(in) :: surface
       integer, intent(in) :: method              !! of the step, or 0
       logical, intent(out) :: acts               !! the deck asks for it
 

@@ -7,7 +7,7 @@
 module emcon_soft_law
    use emcon_constraint, only : contact_response_t
    use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
-   use emcon_interactions, only : surface_laws_t
+   use emcon_interactions, only : interaction_t
    use emcon_kinds, only : wp
    use emcon_steps, only : method_augmented_lagrange, method_penalty
    implicit none
@@ -44,7 +44,7 @@ contains
 
    pure subroutine penalty_take(self, surface, method, acts)
       class(penalty_t), intent(inout) :: self
-      type(surface_laws_t), intent(in) :: surface
+      type(interaction_t), intent(in) :: surface
       integer, intent(in) :: method              !! of the step, or 0
       logical, intent(out) :: acts               !! the deck asks for it
 
@@ -53,7 +53,7 @@ contains
 
    pure subroutine augmented_take(self, surface, method, acts)
       class(augmented_t), intent(inout) :: self
-      type(surface_laws_t), intent(in) :: surface
+      type(interaction_t), intent(in) :: surface
       integer, intent(in) :: method              !! of the step, or 0
       logical, intent(out) :: acts               !! the deck asks for it
 

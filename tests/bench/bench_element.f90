@@ -57,11 +57,11 @@ contains
          write(output_unit, "(a)") error%message
          return
       end if
-      n = 4*sum(count(scene%element_node > 0, 1)**2)
+      n = 4*sum(count(scene%element%node > 0, 1)**2)
       allocate(slot(n), source=[(i, i = 1, n)])
       allocate(value(n), source=0.0_dp)
       call term%begin_step(scene, 1, space, matrix, slot)
-      call response_init(response, size(scene%x, 1), size(scene%x, 2), size(scene%element_kind))
+      call response_init(response, size(scene%x, 1), size(scene%x, 2), size(scene%element%kind))
       call motion_init(motion, scene%x)
       motion%evaluation%at = 1.0_wp
       motion%evaluation%is_gradient = .false.
@@ -77,7 +77,7 @@ contains
       end do
       row = law_row(i_law)
       write(output_unit, "(a6, 1x, a18, 2f18.3)") kind, row%name, &
-         1.0e6_dp*seconds/real(size(scene%element_kind), dp)
+         1.0e6_dp*seconds/real(size(scene%element%kind), dp)
    end subroutine bench
 
    subroutine time_of(term, motion, response, least, value, side)
@@ -104,14 +104,14 @@ contains
       type(law_row_t) :: row
       integer :: i, j, e, corner(4), n
 
-      call element_kinds_create(2, scene%kind)
+      call element_kinds_create(2, scene%element%kinds)
       n = n_side**2*merge(1, 2, kind == "CPE4")
-      allocate(scene%x(2, (n_side + 1)**2), scene%element_node(4, n), scene%rigid(0))
-      allocate(scene%element_label(n), source=[(i, i = 1, n)])
-      allocate(scene%element_kind(n), source=find_element_row(kind))
-      allocate(scene%element_section(n), source=1)
-      allocate(scene%material(1), scene%section(1), scene%step(1), scene%element_origin(n))
-      scene%element_node = 0
+      allocate(scene%x(2, (n_side + 1)**2), scene%element%node(4, n), scene%rigid(0))
+      allocate(scene%element%label(n), source=[(i, i = 1, n)])
+      allocate(scene%element%kind(n), source=find_element_row(kind))
+      allocate(scene%element%section(n), source=1)
+      allocate(scene%material(1), scene%section(1), scene%step(1), scene%element%origin(n))
+      scene%element%node = 0
       e = 0
       do j = 0, n_side
          do i = 0, n_side
@@ -120,11 +120,11 @@ contains
             corner = 1 + i + (n_side + 1)*j + [0, 1, n_side + 2, n_side + 1]
             e = e + 1
             if (kind == "CPE4") then
-               scene%element_node(:, e) = corner
+               scene%element%node(:, e) = corner
             else
-               scene%element_node(:3, e) = corner(:3)
+               scene%element%node(:3, e) = corner(:3)
                e = e + 1
-               scene%element_node(:3, e) = corner([1, 3, 4])
+               scene%element%node(:3, e) = corner([1, 3, 4])
             end if
          end do
       end do

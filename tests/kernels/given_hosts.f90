@@ -68,7 +68,7 @@ contains
       call csr_from_elements(self%pattern, 2*n, lists%start, lists%freedom, slot, error)
       if (allocated(error)) return
       call self%solid%begin_step(scene, 1, space, self%pattern, slot)
-      call response_init(self%response, 2, n, size(scene%element_kind))
+      call response_init(self%response, 2, n, size(scene%element%kind))
    end subroutine solid_host_init
 
    subroutine solid_host_respond(self, u0, du, wants_tangent, response)

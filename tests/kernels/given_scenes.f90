@@ -45,11 +45,11 @@ contains
             scene%surface(i)%face = [integer ::]
          end if
       end do
-      scene%element_label = scene%element_label(kept)
-      scene%element_origin = scene%element_origin(kept)
-      scene%element_kind = scene%element_kind(kept)
-      scene%element_node = scene%element_node(:, kept)
-      scene%element_section = scene%element_section(kept)
+      scene%element%label = scene%element%label(kept)
+      scene%element%origin = scene%element%origin(kept)
+      scene%element%kind = scene%element%kind(kept)
+      scene%element%node = scene%element%node(:, kept)
+      scene%element%section = scene%element%section(kept)
    end subroutine keep_elements
 
    !> `scene` with elements, and the same with the elements but those of `is_kept` as those of a
@@ -95,11 +95,11 @@ contains
       integer :: i
 
       call scene_begin(scene)
-      deallocate(scene%x, scene%u0, scene%v0, scene%node_origin)
+      deallocate(scene%x, scene%u0, scene%v0, scene%node%origin)
       allocate(scene%x(2, n), scene%u0(2, n), scene%v0(2, n), source=0.0_wp)
-      allocate(scene%node_origin(n))
+      allocate(scene%node%origin(n))
       scene%x(1, :) = [(real(i, wp), i = 1, n)]
-      scene%node_label = [(10*i, i = 1, n)]
+      scene%node%label = [(10*i, i = 1, n)]
       call add_step(scene, is_static, h, n_increment)
    end subroutine make_line
 

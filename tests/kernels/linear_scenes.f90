@@ -41,9 +41,9 @@ contains
       scene%x = reshape([scene%x, x], [2, node])
       scene%u0 = reshape([scene%u0, 0.0_wp, 0.0_wp], [2, node])
       scene%v0 = reshape([scene%v0, 0.0_wp, 0.0_wp], [2, node])
-      scene%node_label = [(i, i = 1, node)]
-      deallocate(scene%node_origin)
-      allocate(scene%node_origin(node))
+      scene%node%label = [(i, i = 1, node)]
+      deallocate(scene%node%origin)
+      allocate(scene%node%origin(node))
    end subroutine add_node
 
    !> A tie whose row k says: slave node k is the mean, by weights, of its masters. Rows carry

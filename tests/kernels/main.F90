@@ -31,6 +31,7 @@ program main
    use test_dgrad, only : collect_dgrad
    use test_dgrad_near, only : collect_dgrad_near
    use test_dgrad_series, only : collect_dgrad_series
+   use test_dgrad_space, only : collect_dgrad_space
    use test_dgrad_wide, only : collect_dgrad_wide
    use test_element, only : collect_element
    use test_element_kinds, only : collect_element_kinds
@@ -167,6 +168,7 @@ program main
    call run("dgrad_near", collect_dgrad_near)
    call run("dgrad_series", collect_dgrad_series)
    call run("dgrad", collect_dgrad)
+   call run("dgrad_space", collect_dgrad_space)
    call run("dgrad_wide", collect_dgrad_wide)
    call run("point_function", collect_point_function)
    call run("shape", collect_shape)

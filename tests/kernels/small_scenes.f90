@@ -35,12 +35,12 @@ contains
    subroutine scene_begin(scene)
       type(scene_t), intent(out) :: scene
 
-      scene%heading = ""
-      allocate(scene%file(0), scene%node_label(0), scene%node_origin(0), scene%x(2, 0))
-      allocate(scene%element_label(0), scene%element_origin(0), scene%element_kind(0))
-      call element_kinds_create(2, scene%kind)
-      allocate(scene%element_node(4, 0), scene%element_section(0))
-      allocate(scene%node_set(0), scene%element_set(0), scene%surface(0), scene%amplitude(0))
+      scene%deck%heading = ""
+      allocate(scene%deck%file(0), scene%node%label(0), scene%node%origin(0), scene%x(2, 0))
+      allocate(scene%element%label(0), scene%element%origin(0), scene%element%kind(0))
+      call element_kinds_create(2, scene%element%kinds)
+      allocate(scene%element%node(4, 0), scene%element%section(0))
+      allocate(scene%set%node(0), scene%set%element(0), scene%surface(0), scene%amplitude(0))
       allocate(scene%material(1), scene%section(1), scene%pair(0), scene%step(0))
       allocate(scene%tie(0), scene%equation(0), scene%rigid(0))
       allocate(scene%u0(2, 0), scene%v0(2, 0))
@@ -62,7 +62,7 @@ contains
       integer :: i, j, corner(4)
       real(wp), allocatable :: x(:, :)
 
-      block = block_t(find_element_row(name), n, size(scene%x, 2), size(scene%element_kind))
+      block = block_t(find_element_row(name), n, size(scene%x, 2), size(scene%element%kind))
       allocate(x(2, (n(1) + 1)*(n(2) + 1)))
       do j = 0, n(2)
          do i = 0, n(1)
@@ -84,11 +84,11 @@ contains
             end if
          end do
       end do
-      scene%node_label = [(i, i = 1, size(scene%x, 2))]
-      scene%element_label = [(i, i = 1, size(scene%element_kind))]
-      deallocate(scene%node_origin, scene%element_origin)
-      allocate(scene%node_origin(size(scene%x, 2)))
-      allocate(scene%element_origin(size(scene%element_kind)))
+      scene%node%label = [(i, i = 1, size(scene%x, 2))]
+      scene%element%label = [(i, i = 1, size(scene%element%kind))]
+      deallocate(scene%node%origin, scene%element%origin)
+      allocate(scene%node%origin(size(scene%x, 2)))
+      allocate(scene%element%origin(size(scene%element%kind)))
    end subroutine add_block
 
    subroutine add_element(scene, kind, node)
@@ -96,12 +96,12 @@ contains
       integer, intent(in) :: kind, node(4)
       integer, allocatable :: old(:, :)
 
-      call move_alloc(scene%element_node, old)
-      allocate(scene%element_node(4, size(old, 2) + 1))
-      scene%element_node(:, :size(old, 2)) = old
-      scene%element_node(:, size(old, 2) + 1) = node
-      scene%element_kind = [scene%element_kind, kind]
-      scene%element_section = [scene%element_section, 1]
+      call move_alloc(scene%element%node, old)
+      allocate(scene%element%node(4, size(old, 2) + 1))
+      scene%element%node(:, :size(old, 2)) = old
+      scene%element%node(:, size(old, 2) + 1) = node
+      scene%element%kind = [scene%element%kind, kind]
+      scene%element%section = [scene%element%section, 1]
    end subroutine add_element
 
    subroutine widen(field, more)
@@ -136,7 +136,7 @@ contains
 
       surface%name = name
       allocate(surface%element(0), surface%face(0))
-      per_cell = merge(1, 2, scene%kind(block%kind)%n_node == 4)
+      per_cell = merge(1, 2, scene%element%kinds(block%kind)%n_node == 4)
       do k = 1, size(sides)
          m = block%n(2 - mod(sides(k), 2))
          do i = 1, m
@@ -174,9 +174,9 @@ contains
       step%origin = origin_t()
       step%scheme = scheme_row(merge("STATIC ", "DYNAMIC", is_static), "")
       step%nlgeom = .true.
-      step%is_direct = .true.
-      step%h = h
-      step%duration = real(n, wp)*h
+      step%time%is_direct = .true.
+      step%time%h = h
+      step%time%duration = real(n, wp)*h
       allocate(step%prescribed(0), step%load(0), step%output(0))
       scene%step = [scene%step, step]
    end subroutine add_step

@@ -62,7 +62,7 @@ contains
 
       call make_two_blocks(scene, gap_start, lower, upper)
       call add_step(scene, .false., h, n_step)
-      scene%step(1)%initiation = initiation
+      scene%step(1)%contact%initiation = initiation
       if (is_clamped) call clamp(scene%step(1), [(i, i = 1, 10)])
       scene%v0(1, 11:) = 0.3_wp
       scene%v0(2, 11:) = -1.0_wp
@@ -254,7 +254,7 @@ contains
 
       call make_drop(scene, initiation_persistent, .true., march, error)
       if (allocated(error)) return
-      scene%step(1)%gap_tolerance = limit
+      scene%step(1)%contact%gap_tolerance = limit
       total = march%ledger%total
       n_cut = 0
       n_contact = 0
@@ -289,8 +289,8 @@ contains
       end do
       do k = 1, n_step/2
          do m = 1, 2
-            scene%step(1)%constraint_method = merge(method_null_space, method_saddle_point, m == 1)
-            march(m)%newton%correction%method = scene%step(1)%constraint_method
+            scene%step(1)%contact%method = merge(method_null_space, method_saddle_point, m == 1)
+            march(m)%newton%correction%method = scene%step(1)%contact%method
             call march_increment(march(m), scene, increment, error)
             if (allocated(error)) return
          end do
@@ -322,8 +322,8 @@ contains
       other%material(1)%constant(1) = m/(l*t**2)*scene%material(1)%constant(1)
       other%material(1)%density = m/l**3*scene%material(1)%density
       other%section(1)%thickness = l*scene%section(1)%thickness
-      other%step(1)%h = t*scene%step(1)%h
-      other%step(1)%duration = t*scene%step(1)%duration
+      other%step(1)%time%h = t*scene%step(1)%time%h
+      other%step(1)%time%duration = t*scene%step(1)%time%duration
       call begin(other, scaled, error)
       if (allocated(error)) return
       call run(scene, n_step/2, march, seen, error)

@@ -223,11 +223,11 @@ contains
       call scene_begin(scene)
       scene%x = x
       scene%u0 = 0.0_wp*x
-      deallocate(scene%element_node)
-      allocate(scene%element_node(3, n), source=0)
-      scene%element_node(:2, :) = edge
-      scene%element_kind = [(find_element_row("CPE3"), i = 1, n)]
-      scene%node_label = [(i, i = 1, size(x, 2))]
+      deallocate(scene%element%node)
+      allocate(scene%element%node(3, n), source=0)
+      scene%element%node(:2, :) = edge
+      scene%element%kind = [(find_element_row("CPE3"), i = 1, n)]
+      scene%node%label = [(i, i = 1, size(x, 2))]
       surface%name = "CHAIN"
       surface%element = [(i, i = 1, n)]
       surface%face = [(1, i = 1, n)]

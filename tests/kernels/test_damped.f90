@@ -60,7 +60,7 @@ contains
       allocate(none(0))
       call make_two_blocks(self%scene, 0.125_wp, lower, upper)
       self%scene%pair%formulation = formulations(k)
-      self%scene%pair%laws%damping = law
+      self%scene%pair%interaction%damping = law
       call add_step(self%scene, .false., 0.1_wp, 1)
       call system_init(self%system, self%scene, error)
       if (.not. allocated(error)) call system_begin_step(self%system, self%scene, 1, error)

@@ -73,7 +73,7 @@ contains
       scene%x = scene%x + move
       scene%material(1)%law = law(i_law)
       if (i_law == 2) scene%material(1)%constant = [0.2_wp*young, 1.0_wp/young]
-      sample%x(:, :sample%n) = scene%x(:, scene%element_node(:sample%n, 1))
+      sample%x(:, :sample%n) = scene%x(:, scene%element%node(:sample%n, 1))
       call solid_init(sample%solid, scene, error)
    end subroutine make_sample
 

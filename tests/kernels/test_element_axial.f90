@@ -66,7 +66,7 @@ contains
       row = element_row(n_plane_row() + kind)
       n = row%n_node
       sample%n_corner = row%n_corner
-      call scene%kind(n_plane_row() + kind)%shape%places(place)
+      call scene%element%kinds(n_plane_row() + kind)%shape%places(place)
       if (sample%n_corner == 4) place = 0.5_wp*place
       call shake(move, 0.2_wp)
       place(1, :) = place(1, :) + 1.5_wp
@@ -79,16 +79,16 @@ contains
       end do
       sample%what = trim(row%name) // ", law " // to_text(law) // ", nlgeom " &
          // to_text(merge(1, 0, nlgeom))
-      deallocate(scene%element_node, scene%node_label, scene%node_origin, scene%x, scene%u0, &
-         scene%v0, scene%element_origin)
-      allocate(scene%element_node(n, 1), scene%node_label(n), scene%node_origin(n), &
-         scene%element_origin(1))
+      deallocate(scene%element%node, scene%node%label, scene%node%origin, scene%x, scene%u0, &
+         scene%v0, scene%element%origin)
+      allocate(scene%element%node(n, 1), scene%node%label(n), scene%node%origin(n), &
+         scene%element%origin(1))
       scene%is_axial = .true.
-      scene%element_node(:, 1) = [(i, i = 1, n)]
-      scene%node_label = scene%element_node(:, 1)
-      scene%element_label = [1]
-      scene%element_kind = [n_plane_row() + kind]
-      scene%element_section = [1]
+      scene%element%node(:, 1) = [(i, i = 1, n)]
+      scene%node%label = scene%element%node(:, 1)
+      scene%element%label = [1]
+      scene%element%kind = [n_plane_row() + kind]
+      scene%element%section = [1]
       scene%x = place
       scene%u0 = 0.0_wp*place
       scene%v0 = 0.0_wp*place
@@ -332,13 +332,13 @@ contains
       do k = 1, n_axial_row()
          call make_sample(k, 1, .true., 0.0_wp, sample, error)
          if (allocated(error)) return
-         associate (mass => sample%solid%mass(:sample%n, :sample%n, 1), &
+         associate (mass => sample%solid%mass%consistent(:sample%n, :sample%n, 1), &
                corner => sample%x(:, :sample%n_corner))
             call check_near(error, sum(mass), ring(corner, .false.), tol, two_pi, &
                sample%what // ": mass")
             call check_near(error, dot_product(sample%x(2, :sample%n), sum(mass, 2)), &
                ring(corner, .true.), tol, two_pi, sample%what // ": centre")
-            call check_near(error, sum(mass, 2), sample%solid%volume_mass(:sample%n, 1), tol, &
+            call check_near(error, sum(mass, 2), sample%solid%mass%of_volume(:sample%n, 1), tol, &
                two_pi, sample%what // ": gravity")
          end associate
          if (allocated(error)) return

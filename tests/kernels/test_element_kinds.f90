@@ -67,7 +67,7 @@ contains
       call scene_begin(scene)
       row = element_row(kind)
       n = row%n_node
-      call scene%kind(kind)%shape%places(place)
+      call scene%element%kinds(kind)%shape%places(place)
       if (n == 4 .or. n == 8) place = 0.5_wp*place
       call shake(move, 0.2_wp)
       place(:, :row%n_corner) = place(:, :row%n_corner) + move(:, :row%n_corner)
@@ -79,15 +79,15 @@ contains
       end do
       sample%what = trim(row%name) // ", law " // to_text(law) // ", nlgeom " &
          // to_text(merge(1, 0, nlgeom))
-      deallocate(scene%element_node, scene%node_label, scene%node_origin, scene%x, scene%u0, &
-         scene%v0, scene%element_origin)
-      allocate(scene%element_node(n, 1), scene%node_label(n), scene%node_origin(n), &
-         scene%element_origin(1))
-      scene%element_node(:, 1) = [(i, i = 1, n)]
-      scene%node_label = scene%element_node(:, 1)
-      scene%element_label = [1]
-      scene%element_kind = [kind]
-      scene%element_section = [1]
+      deallocate(scene%element%node, scene%node%label, scene%node%origin, scene%x, scene%u0, &
+         scene%v0, scene%element%origin)
+      allocate(scene%element%node(n, 1), scene%node%label(n), scene%node%origin(n), &
+         scene%element%origin(1))
+      scene%element%node(:, 1) = [(i, i = 1, n)]
+      scene%node%label = scene%element%node(:, 1)
+      scene%element%label = [1]
+      scene%element%kind = [kind]
+      scene%element%section = [1]
       scene%x = place
       scene%u0 = 0.0_wp*place
       scene%v0 = 0.0_wp*place
@@ -388,13 +388,14 @@ contains
                   + dot_product(b, b))/12.0_wp
             end associate
          end do
-         associate (mass => sample%solid%mass(:sample%n, :sample%n, 1), x => sample%x(:, :sample%n))
+         associate (mass => sample%solid%mass%consistent(:sample%n, :sample%n, 1), x => &
+            sample%x(:, :sample%n))
             call check_near(error, sum(mass), area, tol, 1.0_wp, sample%what // ": mass")
             call check_near(error, matmul(x, sum(mass, 2)), first, tol, 1.0_wp, &
                sample%what // ": centre")
             call check_near(error, sum(matmul(x, mass)*x), second, tol, 1.0_wp, &
                sample%what // ": inertia")
-            call check_near(error, sum(mass, 2), sample%solid%volume_mass(:sample%n, 1), tol, &
+            call check_near(error, sum(mass, 2), sample%solid%mass%of_volume(:sample%n, 1), tol, &
                1.0_wp, sample%what // ": gravity")
          end associate
          if (allocated(error)) return
@@ -419,16 +420,16 @@ contains
          if (.not. row%has_mean_volume) cycle
          call scene_begin(scene)
          call make_sample(k, 1, .true., 0.0_wp, sample, error)
-         call scene%kind(k)%shape%places(scene%x)
+         call scene%element%kinds(k)%shape%places(scene%x)
          scene%x = 0.5_wp*scene%x
          scene%u0 = 0.0_wp*scene%x
          scene%v0 = 0.0_wp*scene%x
-         scene%element_node = sample%solid%node
-         scene%element_kind = [k]
-         scene%element_section = [1]
-         scene%element_label = [1]
-         deallocate(scene%element_origin)
-         allocate(scene%element_origin(1))
+         scene%element%node = sample%solid%node
+         scene%element%kind = [k]
+         scene%element%section = [1]
+         scene%element%label = [1]
+         deallocate(scene%element%origin)
+         allocate(scene%element%origin(1))
          scene%material(1)%constant = [young, nu]
          call solid_init(sample%solid, scene, error)
          if (allocated(error)) return

@@ -57,8 +57,8 @@ contains
       call make_two_blocks(scene, gap_start, lower, upper)
       call add_step(scene, .false., h, 40)
       scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
-      scene%step(1)%constraint_method = method_penalty
-      scene%step(1)%softness%stiffness = stiffness
+      scene%step(1)%contact%method = method_penalty
+      scene%step(1)%contact%softness%stiffness = stiffness
       if (is_clamped) call clamp(scene%step(1), [(i, i = 1, 10)])
       scene%v0(2, 11:) = -1.0_wp
       call march_init(march, scene, error)

@@ -47,9 +47,9 @@ contains
       type(scene_t), intent(out) :: scene
 
       scene%n_dim = 3
-      call element_kinds_create(3, scene%kind)
-      allocate(scene%x(3, 0), scene%element_kind(0), scene%element_node(8, 0))
-      allocate(scene%surface(0), scene%file(0))
+      call element_kinds_create(3, scene%element%kinds)
+      allocate(scene%x(3, 0), scene%element%kind(0), scene%element%node(8, 0))
+      allocate(scene%surface(0), scene%deck%file(0))
    end subroutine space_begin
 
    !> Add a box of hexahedra, or of tetrahedra, from `low` on.
@@ -82,8 +82,8 @@ contains
          end do
       end do
       scene%x = reshape([scene%x, x], [3, before + size(x, 2)])
-      scene%node_label = [(i, i = 1, size(scene%x, 2))]
-      scene%element_label = [(i, i = 1, size(scene%element_kind))]
+      scene%node%label = [(i, i = 1, size(scene%x, 2))]
+      scene%element%label = [(i, i = 1, size(scene%element%kind))]
 
    contains
 
@@ -99,14 +99,14 @@ contains
       type(scene_t), intent(inout) :: scene
       character(len=*), intent(in) :: name
       integer, intent(in) :: node(:)
-      integer :: column(size(scene%element_node, 1)), i
+      integer :: column(size(scene%element%node, 1)), i
 
       column = 0
       column(:size(node)) = node
-      scene%element_node = reshape([scene%element_node, column], &
-         [size(column), size(scene%element_node, 2) + 1])
-      i = find_element_kind(scene%kind, name)
-      scene%element_kind = [scene%element_kind, i]
+      scene%element%node = reshape([scene%element%node, column], &
+         [size(column), size(scene%element%node, 2) + 1])
+      i = find_element_kind(scene%element%kinds, name)
+      scene%element%kind = [scene%element%kind, i]
    end subroutine add_element
 
    !> All faces that one element alone has, by comparing each with each.
@@ -117,11 +117,11 @@ contains
 
       surface%name = "SKIN"
       allocate(surface%element(0), surface%face(0))
-      do e = 1, size(scene%element_kind)
-         faces: do f = 1, scene%kind(scene%element_kind(e))%n_face
-            do other = 1, size(scene%element_kind)
+      do e = 1, size(scene%element%kind)
+         faces: do f = 1, scene%element%kinds(scene%element%kind(e))%n_face
+            do other = 1, size(scene%element%kind)
                if (other == e) cycle
-               do g = 1, scene%kind(scene%element_kind(other))%n_face
+               do g = 1, scene%element%kinds(scene%element%kind(other))%n_face
                   if (same(nodes_of(e, f), nodes_of(other, g))) cycle faces
                end do
             end do
@@ -136,8 +136,8 @@ contains
          integer, intent(in) :: e, f
          integer, allocatable :: node(:)
 
-         associate (kind => scene%kind(scene%element_kind(e)))
-            node = scene%element_node(kind%face(f), e)
+         associate (kind => scene%element%kinds(scene%element%kind(e)))
+            node = scene%element%node(kind%face(f), e)
          end associate
       end function nodes_of
 
@@ -250,11 +250,11 @@ contains
 
       do k = 1, 2
          call space_begin(scene)
-         row = find_element_kind(scene%kind, name(k))
-         call scene%kind(row)%shape%places(scene%x)
-         scene%element_node = reshape([(i, i = 1, size(scene%x, 2))], [size(scene%x, 2), 1])
-         scene%element_kind = [row]
-         scene%node_label = scene%element_node(:, 1)
+         row = find_element_kind(scene%element%kinds, name(k))
+         call scene%element%kinds(row)%shape%places(scene%x)
+         scene%element%node = reshape([(i, i = 1, size(scene%x, 2))], [size(scene%x, 2), 1])
+         scene%element%kind = [row]
+         scene%node%label = scene%element%node(:, 1)
          call facets_init(facets, scene, skin(scene), error)
          if (allocated(error)) return
          call check_closed(error, facets, 1, name(k))
@@ -284,8 +284,8 @@ contains
       allocate(u, source=0.0_wp*scene%x)
       call check_normals(error, facets, scene%x, u, 2.0_wp*product(extent), 2.0_wp*box_area(), "bodies")
       do f = 1, facets%n_facet
-         associate (kind => scene%kind(scene%element_kind(facets%element(f))))
-            associate (face => scene%element_node(kind%face(facets%face(f)), facets%element(f)))
+         associate (kind => scene%element%kinds(scene%element%kind(facets%element(f))))
+            associate (face => scene%element%node(kind%face(facets%face(f)), facets%element(f)))
                do k = 1, kind%n_face_node
                   call check_true(error, any(face == facets%facet(k, f)), "of its element")
                end do

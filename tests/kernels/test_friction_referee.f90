@@ -46,9 +46,9 @@ contains
 
       call make_two_blocks(scene, 0.0927_wp, lower, upper)
       scene%pair(1)%formulation = formulation
-      scene%pair(1)%friction = mu
+      scene%pair(1)%interaction%friction = mu
       call add_step(scene, .false., 0.02_wp, n_step)
-      scene%step(1)%initiation = initiation_persistent
+      scene%step(1)%contact%initiation = initiation_persistent
       call clamp(scene%step(1), [(i, i = 1, 10)])
       scene%v0(1, 11:) = slide
       scene%v0(2, 11:) = -1.0_wp

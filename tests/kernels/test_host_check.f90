@@ -134,12 +134,12 @@ contains
       empty%is_read = .true.
       call stepper_build(empty, raised)
       call check_error(error, raised, err_input, "no elements, and no forces", "nothing at all")
-      empty%scene%given_node = [1, 2]
+      empty%scene%host%node = [1, 2]
       call stepper_build(empty, raised)
       call check_error(error, raised, err_input, "no forces were given", "nothing given")
       call open_given(massless, scene, chain, 0.0_wp, raised)
       call check_error(error, raised, err_input, "node 10 has given forces but no mass", "no mass")
-      scene%given_node = [1, 2]
+      scene%host%node = [1, 2]
       call open_given(stepper, scene, chain, 1.0_wp, error)
       if (allocated(error)) return
       call stepper_give_force(stepper, chain, raised)

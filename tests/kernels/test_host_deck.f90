@@ -99,7 +99,7 @@ contains
 
       call open_sample(stepper, error)
       if (allocated(error)) return
-      call check_equal(error, stepper%scene%given_node, [1, 2, 3, 4], "given nodes")
+      call check_equal(error, stepper%scene%host%node, [1, 2, 3, 4], "given nodes")
       call check_equal(error, size(stepper%scene%surface(1)%element), 1, "faces of the block")
       call check_equal(error, reshape(stepper%scene%surface(2)%edge, [2]), [3, 4], "edges")
       call check_equal(error, size(stepper%scene%surface(2)%element), 0, "no faces")

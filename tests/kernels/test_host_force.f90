@@ -60,7 +60,7 @@ contains
       real(wp) :: total, scale
       integer :: k, n_contact
 
-      allocate(kept(size(scene%element_kind)), source=.false.)
+      allocate(kept(size(scene%element%kind)), source=.false.)
       if (present(is_kept)) kept = is_kept
       call open_both(scene, kept, tells_magnitude, own, hosted, error)
       if (allocated(error)) return
@@ -141,7 +141,7 @@ contains
       type(scene_t) :: scene
 
       call make_drop(scene, 20)
-      scene%step(1)%initiation = initiation_velocity_update
+      scene%step(1)%contact%initiation = initiation_velocity_update
       call compare(error, scene, .true.)
    end subroutine test_host_update
 

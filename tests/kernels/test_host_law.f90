@@ -159,7 +159,7 @@ contains
       integer :: k
 
       associate (system => stepper%march%system, scene => stepper%scene)
-         call response_init(response, 2, size(scene%x, 2), size(scene%element_kind))
+         call response_init(response, 2, size(scene%x, 2), size(scene%element%kind))
          do k = 1, size(system%term)
             if (system%term(k)%term%role == role_internal) call system%term(k)%term%respond( &
                motion, response)
@@ -280,7 +280,7 @@ contains
       scene%material(2)%law = law_linear
       scene%section = [scene%section, scene%section]
       scene%section(2)%material = 2
-      scene%element_section(:4) = 2
+      scene%element%section(:4) = 2
       call add_step(scene, .false., 0.02_wp, n)
       call clamp(scene%step(1), [(i, i = 1, 5)])
       scene%v0(1, 11:) = 0.3_wp

@@ -83,7 +83,7 @@ contains
          call prepare(scene, formulations(k), raised)
          call check_error(error, raised, err_input, "3 slave nodes of surface UPPER penetrate " // &
             "surface LOWER, by 0.0625 at most", "overlap")
-         scene%pair(1)%adjust_distance = 0.0_wp
+         scene%pair(1)%adjust%distance = 0.0_wp
          call prepare(scene, formulations(k), raised)
          call check_true(error, .not. allocated(raised), "adjusted")
          call check_near(error, scene%x(2, 11:13), [0.0_wp, 0.0_wp, 0.0_wp], epsilon(1.0_wp), &
@@ -105,7 +105,7 @@ contains
       call prepare(scene, formulation_nts, raised)
       call check_error(error, raised, err_input, "2 slave nodes of surface LOWER penetrate " // &
          "surface LOWER, by 0.0625 at most; node (depth): 8 (0.0625), 9 (0.0625)", "overlap")
-      scene%pair(1)%adjust_distance = 0.0_wp
+      scene%pair(1)%adjust%distance = 0.0_wp
       call prepare(scene, formulation_nts, raised)
       call check_true(error, .not. allocated(raised), "adjusted")
       call check_near(error, scene%x(2, 6:10), [0.0_wp, 0.0_wp, -0.0625_wp, -0.0625_wp, 0.0_wp], &

@@ -365,10 +365,10 @@ contains
       call add_block(scene, "CPE4", [1, n - 1], [0.0_wp, 0.0_wp], [1.0_wp, 1.0_wp], slider)
       ! The nodes of a block without its elements.
       scene%x = reshape([(real(n - i, wp)/16.0_wp, 1.0_wp, i = 0, 2*n - 1)], [2, 2*n])
-      deallocate(scene%element_node, scene%element_kind, scene%element_section, &
-         scene%element_label, scene%element_origin)
-      allocate(scene%element_node(4, 0), scene%element_kind(0), scene%element_section(0), &
-         scene%element_label(0), scene%element_origin(0))
+      deallocate(scene%element%node, scene%element%kind, scene%element%section, &
+         scene%element%label, scene%element%origin)
+      allocate(scene%element%node(4, 0), scene%element%kind(0), scene%element%section(0), &
+         scene%element%label(0), scene%element%origin(0))
       call add_block(scene, "CPE4", [1, 1], [1.3_wp, 0.875_wp], [0.5_wp, 0.5_wp], slider)
       line%name = "LINE"
       line%is_profile = .true.

@@ -120,7 +120,7 @@ contains
       do m = 1, 2
          call make_tied(scene, lower, upper)
          call add_step(scene, .false., 0.05_wp, 40)
-         scene%step(1)%constraint_method = methods(m)
+         scene%step(1)%contact%method = methods(m)
          scene%v0(1, :) = 1.0_wp - 2.0_wp*scene%x(2, :)
          scene%v0(2, :) = 2.0_wp*scene%x(1, :)*(1.0_wp + 0.25_wp*scene%x(2, :))
          call run_free()
@@ -169,7 +169,7 @@ contains
          call add_equation(scene, [block_node(upper, 3, 1), bare, block_node(upper, 0, 1)], &
             [1, 1, 2], [1.0_wp, -0.5_wp, 0.25_wp])
          call add_step(scene, .false., 0.02_wp, 40)
-         scene%step(1)%constraint_method = methods(m)
+         scene%step(1)%contact%method = methods(m)
          call prescribe(scene%step(1), block_node(lower, 0, 1), 1, 0.2_wp)
          call prescribe(scene%step(1), block_node(lower, 0, 1), 2, -0.1_wp)
          call prescribe(scene%step(1), bare, 1, 0.3_wp)
@@ -266,7 +266,7 @@ contains
          call make_pulled(k == 1, .false., direct, side, none)
          do m = 1, 2
             call make_pulled(k == 1, .true., scene, side, bare)
-            scene%step(1)%constraint_method = methods(m)
+            scene%step(1)%contact%method = methods(m)
             call compare()
             if (allocated(error)) return
          end do
@@ -317,7 +317,7 @@ contains
       call add_load(scene%step(1), load)
       scene%step(1)%prescribed = scene%step(1)%prescribed([1, 2, 3, 4, 5, 6, 8])
       do m = 1, 2
-         scene%step(1)%constraint_method = methods(m)
+         scene%step(1)%contact%method = methods(m)
          call run_loaded()
          if (allocated(error)) return
       end do
@@ -355,7 +355,7 @@ contains
             block_node(lower, 3, 1)], [a, a, a], [2.0_wp, -1.0_wp, -1.0_wp])
       end do
       call add_step(scene, .false., 0.02_wp, 25)
-      scene%step(1)%constraint_method = methods(m)
+      scene%step(1)%contact%method = methods(m)
       scene%v0(2, upper%nodes_before + 1:) = -1.0_wp
    end subroutine make_impact
 
@@ -411,7 +411,7 @@ contains
 
       do m = 1, 2
          call make_impact(scene, m)
-         scene%step(1)%initiation = initiation_velocity_update
+         scene%step(1)%contact%initiation = initiation_velocity_update
          call run_update()
          if (allocated(error)) return
       end do
@@ -452,7 +452,7 @@ contains
 
       do m = 1, 2
          call make_pulled(.true., .true., scene, side, bare)
-         scene%step(1)%constraint_method = methods(m)
+         scene%step(1)%contact%method = methods(m)
          call prescribe(scene%step(1), side(2), 1, 0.2_wp)
          scene%step(1)%prescribed(9)%amplitude = 1
          call try()
@@ -488,7 +488,7 @@ contains
 
       do m = 1, 2
          call make_pulled(.true., .true., scene, side, bare)
-         scene%step(1)%constraint_method = methods(m)
+         scene%step(1)%contact%method = methods(m)
          call run_redundant(.false.)
          if (allocated(error)) return
          call add_equation(scene, [bare, side(2)], [1, 1], [-3.0_wp, 3.0_wp])

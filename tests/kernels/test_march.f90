@@ -131,7 +131,7 @@ contains
 
       call make_block(scene, "CPE4", [2, 1], block)
       call add_step(scene, .false., h, n)
-      scene%step(1)%newton_maximum = maximum
+      scene%step(1)%solution%newton_maximum = maximum
       scene%v0(1, :) = -2.0_wp*scene%x(2, :) + 0.5_wp*scene%x(1, :)
       scene%v0(2, :) = 2.0_wp*scene%x(1, :)
    end subroutine make_spin
@@ -201,7 +201,7 @@ contains
       integer :: n
 
       call make_spin(scene, 0.1_wp, 4, 20)
-      scene%step(1)%duration = 0.35_wp
+      scene%step(1)%time%duration = 0.35_wp
       call begin(scene, march, error)
       if (allocated(error)) return
       n = 0
@@ -228,7 +228,7 @@ contains
 
       call make_block(scene, "CPE4", [1, 1], block)
       call add_step(scene, .true., 0.01_wp, 100)
-      scene%step(1)%is_direct = .false.
+      scene%step(1)%time%is_direct = .false.
       call clamp(scene%step(1), [1, 2])
       call prescribe(scene%step(1), 3, 1, 0.2_wp)
       call begin(scene, march, error)
@@ -258,7 +258,7 @@ contains
       integer :: k
 
       call make_spin(scene, 0.01_wp, 10, 20)
-      scene%step(1)%max_increments = 3
+      scene%step(1)%time%max_increments = 3
       call begin(scene, march, error)
       if (allocated(error)) return
       do k = 1, 3
@@ -279,7 +279,7 @@ contains
       type(increment_t) :: increment
 
       call make_spin(scene, 0.1_wp, 10, 1)
-      scene%step(1)%h_min = 0.05_wp
+      scene%step(1)%time%h_min = 0.05_wp
       call begin(scene, march, error)
       if (allocated(error)) return
       call march_increment(march, scene, increment, raised)
@@ -297,7 +297,7 @@ contains
 
       call make_spin(scene, 0.1_wp, 10, 20)
       scene%u0(1, [3, 6]) = -1.5_wp
-      scene%element_label = [5, 88]
+      scene%element%label = [5, 88]
       call begin(scene, march, raised)
       call check_error(error, raised, err_analysis, "element 88", "inverted at the start")
       call march_free(march)

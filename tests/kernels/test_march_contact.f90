@@ -57,7 +57,7 @@ contains
       call make_two_blocks(scene, gap_start, lower, upper)
       scene%pair(1)%formulation = formulation
       call add_step(scene, .false., h, n_step)
-      scene%step(1)%initiation = initiation_persistent
+      scene%step(1)%contact%initiation = initiation_persistent
       call clamp(scene%step(1), [(i, i = 1, 10)])
       scene%v0(1, 11:) = slide
       scene%v0(2, 11:) = -1.0_wp
@@ -85,7 +85,7 @@ contains
 
       do formulation = formulation_nts, formulation_mortar
          call make_drop(scene, formulation, 0.6_wp)
-         scene%pair(1)%laws%friction = mu
+         scene%pair(1)%interaction%friction = mu
          block
             type(march_t) :: march
 
@@ -184,7 +184,7 @@ contains
       integer :: k
 
       call make_drop(scene, formulation_nts, 0.3_wp)
-      scene%pair(1)%laws%restitution = 0.5_wp
+      scene%pair(1)%interaction%restitution = 0.5_wp
       call begin(scene, march, error)
       if (allocated(error)) return
       start = march%ledger
@@ -213,7 +213,7 @@ contains
 
       do formulation = formulation_nts, formulation_mortar
          call make_drop(scene, formulation, 0.3_wp)
-         scene%step(1)%initiation = initiation_massless
+         scene%step(1)%contact%initiation = initiation_massless
          deallocate(scene%step(1)%prescribed)
          allocate(scene%step(1)%prescribed(0))
          block
@@ -254,8 +254,8 @@ contains
 
       do method = method_penalty, method_augmented_lagrange
          call make_drop(scene, formulation_nts, 0.3_wp)
-         scene%step(1)%constraint_method = method
-         scene%step(1)%softness%stiffness = 500.0_wp
+         scene%step(1)%contact%method = method
+         scene%step(1)%contact%softness%stiffness = 500.0_wp
          block
             type(march_t) :: march
 
@@ -270,7 +270,7 @@ contains
                most = max(most, march%ledger%contact_energy)
                push = sum(march%state%contact(2, 11:))
                if (method == method_augmented_lagrange) left = left &
-                  + push*scene%step(1)%softness%tolerance
+                  + push*scene%step(1)%contact%softness%tolerance
                call check_true(error, abs(march%ledger%total - start%total) <= left, &
                   "energy, method " // to_text(method))
                if (allocated(error)) return
@@ -299,10 +299,10 @@ contains
       do k = 1, 4
          formulation = merge(formulation_nts, formulation_mortar, mod(k, 2) == 0)
          call make_drop(scene, formulation, 0.3_wp)
-         scene%pair(1)%laws%damping%coefficient = coefficient
-         scene%pair(1)%laws%damping%clearance = 2.0_wp*gap_start
-         scene%pair(1)%laws%damping%flat = 1.0_wp
-         if (k > 2) scene%step(1)%h = short
+         scene%pair(1)%interaction%damping%coefficient = coefficient
+         scene%pair(1)%interaction%damping%clearance = 2.0_wp*gap_start
+         scene%pair(1)%interaction%damping%flat = 1.0_wp
+         if (k > 2) scene%step(1)%time%h = short
          deallocate(scene%step(1)%prescribed)
          allocate(scene%step(1)%prescribed(0))
          block

@@ -40,10 +40,10 @@ contains
       call make_block(scene, "CPE4", [1, 1], block)
       call add_step(scene, .false., h, 1)
       associate (step => scene%step(1))
-         step%is_direct = is_direct
-         step%duration = time(n)
-         step%corner = time([1, 3, 5])
-         step%tolerance = 1.0e-3_wp
+         step%time%is_direct = is_direct
+         step%time%duration = time(n)
+         step%time%corner = time([1, 3, 5])
+         step%time%tolerance = 1.0e-3_wp
          call march_count_grid(march, step)
       end associate
    end subroutine make_step
@@ -147,12 +147,12 @@ contains
       call add_step(scene, .true., h, 40)
       associate (step => scene%step(1))
          call check_equal(error, march_count_increments(step), 40, "of a given size")
-         step%is_direct = .false.
+         step%time%is_direct = .false.
          call check_equal(error, march_count_increments(step), 16, "that grow")
-         step%h_max = 3.0_wp*h
+         step%time%h_max = 3.0_wp*h
          call check_equal(error, march_count_increments(step), 5 + 18, "of 2 h at most")
-         step%h_max = 0.0_wp
-         step%corner = [16.0_wp*h, 17.0_wp*h]
+         step%time%h_max = 0.0_wp
+         step%time%corner = [16.0_wp*h, 17.0_wp*h]
          call check_equal(error, march_count_increments(step), 5 + 5 + 2 + 3 + 2, "with corners")
       end associate
    end subroutine test_count

@@ -245,8 +245,8 @@ contains
 
       do i = 1, 3
          call make_drop(scene, 20)
-         scene%step(1)%is_direct = .false.
-         scene%step(1)%tolerance = tolerance(i)
+         scene%step(1)%time%is_direct = .false.
+         scene%step(1)%time%tolerance = tolerance(i)
          block
             type(march_t) :: march
 
@@ -290,8 +290,8 @@ contains
 
       do events = min(events_pairs, events_nodes), max(events_pairs, events_nodes)
          call make_drop(scene, 8)
-         scene%step(1)%event_fraction = part
-         scene%step(1)%events = events
+         scene%step(1)%time%event_fraction = part
+         scene%step(1)%time%events = events
          block
             type(march_t) :: march
 
@@ -334,8 +334,8 @@ contains
       integer :: k, n_contact
 
       call make_drop(scene, 80)
-      scene%step(1)%h = step
-      scene%step(1)%duration = 80.0_wp*step
+      scene%step(1)%time%h = step
+      scene%step(1)%time%duration = 80.0_wp*step
       scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
       call begin(scene, march, error)
       if (allocated(error)) return

@@ -9,7 +9,7 @@ module test_midside
    use emcon_element_registry, only : find_element_row
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
-      formulation_nts, formulation_segment, smoothing_hermite, surface_laws_t
+      formulation_nts, formulation_segment, interaction_t, smoothing_hermite
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_midside_plane, only : midside_distribute, midside_distribute_rows, midside_init, &
@@ -52,12 +52,12 @@ contains
       call scene_begin(scene)
       call add_block(scene, "CPE4", [4, 2], [0.0_wp, -1.0_wp], [2.0_wp, 1.0_wp], lower)
       call add_block(scene, "CPE4", [2, 2], [0.25_wp, 0.0_wp], [1.5_wp, 1.0_wp], upper)
-      scene%element_node = reshape([cell(lower, 0), cell(lower, 2), cell(upper, 0)], [8, 3])
-      scene%element_kind = spread(find_element_row("CPE8"), 1, 3)
-      scene%element_section = [1, 1, 1]
-      scene%element_label = [1, 2, 3]
-      deallocate(scene%element_origin)
-      allocate(scene%element_origin(3))
+      scene%element%node = reshape([cell(lower, 0), cell(lower, 2), cell(upper, 0)], [8, 3])
+      scene%element%kind = spread(find_element_row("CPE8"), 1, 3)
+      scene%element%section = [1, 1, 1]
+      scene%element%label = [1, 2, 3]
+      deallocate(scene%element%origin)
+      allocate(scene%element%origin(3))
       scene%surface = [faces("LOWER", [2, 1], 3), faces("UPPER", [3], 1)]
 
    contains
@@ -106,7 +106,7 @@ contains
       type(contact_options_t) :: options
 
       call new_contact(scene, contact_pair_t(slave=2, master=1, formulation=formulations(k), &
-         laws=surface_laws_t(friction=0.2_wp)), contact, error)
+         interaction=interaction_t(friction=0.2_wp)), contact, error)
       if (allocated(error)) return
       if (k == 2) options%smoothing = smoothing_hermite
       call contact%suit_steps(.false.)
@@ -127,7 +127,7 @@ contains
 
       do k = 0, 1
          call make_rows(scene)
-         side = scene%element_node([1, 2, 5], 3)
+         side = scene%element%node([1, 2, 5], 3)
          scene%x(:, side) = reshape([0.0_wp, 0.0_wp, 2.0_wp, 0.0_wp, 1.0_wp, 0.0_wp], [2, 3])
          d = 0.2_wp*k
          scene%x(1, side(3)) = 1.0_wp + d
@@ -212,7 +212,7 @@ contains
 
       call make_rows(scene)
       call midside_init(midside(1), scene, [1])
-      top = [scene%element_node([3, 7, 4], 2), scene%element_node([7, 4], 1)]
+      top = [scene%element%node([3, 7, 4], 2), scene%element%node([7, 4], 1)]
       edges%edge = reshape([top(1:2), top(2:3), top(3:4), top(4:5)], [2, 4])
       nodes%is_nodal = .true.
       allocate(nodes%element(0), nodes%face(0))
@@ -349,7 +349,7 @@ contains
 
       call make_curved_rows(scene)
       call midside_init(midside, scene, [(k, k = 1, size(scene%surface))])
-      associate (own => scene%element_node([1, 2, 5], 3), other => scene%element_node([3, 4, 7], 1))
+      associate (own => scene%element%node([1, 2, 5], 3), other => scene%element%node([3, 4, 7], 1))
          points%slave = own([1, 3])
          points%start = [0, 3, 6]
          points%node = [own(1), other(3), other(1), own(3), other(3), other(2)]

@@ -9,7 +9,7 @@ module test_mortar
    use emcon_evaluation, only : evaluation_at_end, evaluation_moving
    use emcon_interactions, only : contact_options_t, contact_pair_t, integration_elements, &
       integration_segments, multiplier_dual, multiplier_standard, normal_edge, normal_nodal, &
-      smoothing_hermite, smoothing_none, surface_laws_t
+      smoothing_hermite, smoothing_none, interaction_t
    use emcon_kinds, only : wp
    use emcon_mortar, only : mortar_init, mortar_t
    use emcon_mortar_choice, only : pair_comes_near
@@ -519,7 +519,7 @@ contains
             call make(0.0_wp, shift(k), 0.0_wp, i, scene, mortar, error)
             if (allocated(error)) return
             still = 0.0_wp*scene%x
-            call contact_laws_of_surface(surface_laws_t(friction=0.5_wp), mortar%laws)
+            call contact_laws_of_surface(interaction_t(friction=0.5_wp), mortar%laws)
             call mortar%begin_step(scene%x, still, still)
             call mortar%measure(scene%x, still, still)
             item%rubs = .true.
@@ -590,7 +590,7 @@ contains
          do k = 1, 3
             call draw(i, k, 0.1_wp, scene, mortar, u, du, error)
             if (allocated(error)) return
-            call contact_laws_of_surface(surface_laws_t(friction=0.5_wp), mortar%laws)
+            call contact_laws_of_surface(interaction_t(friction=0.5_wp), mortar%laws)
             call mortar%begin_step(scene%x, u, du)
             call mortar%measure(scene%x, u, du)
             call mortar%evaluate([1, 2, 3], scene%x, u, du, none, item)
@@ -697,8 +697,8 @@ contains
       integer :: last
 
       call add_block(scene, "CPE4", [1, 1], [real(column, wp), 0.0_wp], [1.0_wp, 1.0_wp], wall)
-      last = size(scene%element_kind)
-      scene%element_node(1:2, last) = [block_node(block, column, 1), block_node(block, column + 1, &
+      last = size(scene%element%kind)
+      scene%element%node(1:2, last) = [block_node(block, column, 1), block_node(block, column + 1, &
          1)]
    end subroutine add_wall
 
@@ -870,7 +870,7 @@ contains
       do i = 1, n_combination
          call make(0.0_wp, 0.0_wp, 0.0_wp, i, scene, mortar, error)
          if (allocated(error)) return
-         call contact_laws_of_surface(surface_laws_t(friction=0.5_wp), mortar%laws)
+         call contact_laws_of_surface(interaction_t(friction=0.5_wp), mortar%laws)
          still = 0.0_wp*scene%x
          call mortar%begin_step(scene%x, still, still)
          first = mortar%state%slip_shift

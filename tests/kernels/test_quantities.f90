@@ -55,7 +55,7 @@ contains
       case (at_nodes)
          n = size(stepper%scene%x, 2)
       case (at_elements)
-         n = size(stepper%scene%element_kind)
+         n = size(stepper%scene%element%kind)
       case (at_contacts)
          n = stepper%march%system%n_constraint
       case (at_pairs)

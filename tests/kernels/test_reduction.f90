@@ -113,7 +113,7 @@ contains
       call system_begin_step(reduced, scene, 1, error)
       if (allocated(error)) return
       other = scene
-      other%step(1)%constraint_method = method_saddle_point
+      other%step(1)%contact%method = method_saddle_point
       call system_init(full, other, error)
       if (allocated(error)) return
       call system_begin_step(full, other, 1, error)

@@ -490,9 +490,9 @@ contains
       allocate(x(2, m + n), source=0.0_wp)
       scene%u0 = x
       scene%v0 = x
-      scene%node_label = [(i, i = 1, m + n)]
-      deallocate(scene%node_origin)
-      allocate(scene%node_origin(m + n))
+      scene%node%label = [(i, i = 1, m + n)]
+      deallocate(scene%node%origin)
+      allocate(scene%node%origin(m + n))
    end subroutine add_loose_nodes
 
    !> The right side moves as the left one does, or as much more as a node without element.

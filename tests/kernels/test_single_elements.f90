@@ -62,19 +62,19 @@ contains
       integer :: a, e, i, k, kind, n
 
       call scene_begin(scene)
-      call element_kinds_create(3, scene%kind)
+      call element_kinds_create(3, scene%element%kinds)
       scene%n_dim = 3
       scene%material(1)%law = law_code("neo hooke")
       scene%material(1)%constant = [0.2_wp*young, 1.0_wp/young]
       scene%material(1)%density = density
       allocate(x(3, most_nodes*n_element))
-      deallocate(scene%element_node, scene%x, scene%u0, scene%v0, scene%node_origin, &
-         scene%element_origin)
-      allocate(scene%element_node(most_nodes, size(which)), source=0)
+      deallocate(scene%element%node, scene%x, scene%u0, scene%v0, scene%node%origin, &
+         scene%element%origin)
+      allocate(scene%element%node(most_nodes, size(which)), source=0)
       n = 0
       do e = 1, size(which)
-         kind = find_element_kind(scene%kind, name(which(e)))
-         call scene%kind(kind)%shape%places(place)
+         kind = find_element_kind(scene%element%kinds, name(which(e)))
+         call scene%element%kinds(kind)%shape%places(place)
          if (size(place, 2) == 8) place = 0.5_wp*(place + 1.0_wp)
          do i = 1, size(place, 2)
             place(:, i) = place(:, i) + low(:, which(e))
@@ -83,17 +83,17 @@ contains
             end do
             if (k > n) n = k
             x(:, k) = place(:, i)
-            scene%element_node(i, e) = k
+            scene%element%node(i, e) = k
          end do
-         scene%element_kind = [scene%element_kind, kind]
+         scene%element%kind = [scene%element%kind, kind]
       end do
       scene%x = x(:, :n)
       scene%u0 = 0.0_wp*scene%x
       scene%v0 = 0.0_wp*scene%x
-      scene%node_label = [(i, i = 1, n)]
-      scene%element_label = which
-      scene%element_section = 0*which + 1
-      allocate(scene%node_origin(n), scene%element_origin(size(which)))
+      scene%node%label = [(i, i = 1, n)]
+      scene%element%label = which
+      scene%element%section = 0*which + 1
+      allocate(scene%node%origin(n), scene%element%origin(size(which)))
       call add_step(scene, .false., 0.25_wp, 4)
       do i = 1, 3
          do a = 1, 3
@@ -136,7 +136,7 @@ contains
          call make_system([e], .true., single, alone, error)
          if (allocated(error)) return
          n = size(single%x, 2)
-         associate (node => scene%element_node(:n, e))
+         associate (node => scene%element%node(:n, e))
             call system_respond(alone, motion_of(evaluation, single%x, u0(:, node), du(:, node)), &
                .false.)
             force(:, node) = force(:, node) + alone%response%part(role_internal)%force

@@ -56,15 +56,15 @@ contains
       do i = 1, 4
          expected(:, i) = mass/36.0_wp*cshift([4.0_wp, 2.0_wp, 1.0_wp, 2.0_wp], 1 - i)
       end do
-      call check_near(error, solid%mass(:, :, 1), expected, tol, mass, "rectangle")
+      call check_near(error, solid%mass%consistent(:, :, 1), expected, tol, mass, "rectangle")
       expected = zero
       expected(:3, :3) = 0.5_wp*mass/12.0_wp*reshape([2.0_wp, 1.0_wp, 1.0_wp, 1.0_wp, 2.0_wp, &
          1.0_wp, 1.0_wp, 1.0_wp, 2.0_wp], [3, 3])
-      call check_near(error, solid%mass(:, :, 2), expected, tol, mass, "triangle")
-      call check_near(error, solid%volume_mass(:, 1), spread(0.25_wp*mass, 1, 4), tol, mass, &
+      call check_near(error, solid%mass%consistent(:, :, 2), expected, tol, mass, "triangle")
+      call check_near(error, solid%mass%of_volume(:, 1), spread(0.25_wp*mass, 1, 4), tol, mass, &
          "quarters of the rectangle")
-      call check_near(error, solid%volume_mass(:, 3), mass/6.0_wp*[1.0_wp, 1.0_wp, 1.0_wp, zero], &
-         tol, mass, "thirds of the triangle")
+      call check_near(error, solid%mass%of_volume(:, 3), mass/6.0_wp*[1.0_wp, 1.0_wp, 1.0_wp, &
+         zero], tol, mass, "thirds of the triangle")
    end subroutine test_closed_forms
 
    !> Moved inner nodes leave the mass of the block; rows of the mass sum to int rho N.
@@ -85,10 +85,11 @@ contains
          scene%section(1)%thickness = 0.5_wp
          call solid_init(solid, scene, error)
          if (allocated(error)) return
-         call check_near(error, sum(solid%mass), 2.25_wp, tol, 2.25_wp, name(k) // ": total")
+         call check_near(error, sum(solid%mass%consistent), 2.25_wp, tol, 2.25_wp, name(k) &
+            // ": total")
          do e = 1, solid%n_element
-            call check_near(error, sum(solid%mass(:, :, e), dim=1), solid%volume_mass(:, e), tol, &
-               1.0_wp, name(k) // ": row sums")
+            call check_near(error, sum(solid%mass%consistent(:, :, e), dim=1), &
+               solid%mass%of_volume(:, e), tol, 1.0_wp, name(k) // ": row sums")
          end do
       end do
    end subroutine test_total
@@ -137,7 +138,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call solid_term_init(term, scene, error)
-      call response_init(response, 2, size(scene%x, 2), size(scene%element_kind))
+      call response_init(response, 2, size(scene%x, 2), size(scene%element%kind))
    end subroutine make_term
 
    pure function local(field) result(four)
@@ -205,8 +206,8 @@ contains
       type(solid_t) :: solid
 
       call make_block(scene, "CPE4", [2, 1], block)
-      scene%element_node(:, 2) = scene%element_node([1, 4, 3, 2], 2)
-      scene%element_label = [10, 77]
+      scene%element%node(:, 2) = scene%element%node([1, 4, 3, 2], 2)
+      scene%element%label = [10, 77]
       call solid_init(solid, scene, raised)
       call check_error(error, raised, err_input, "element 77", "clockwise element")
    end subroutine test_clockwise

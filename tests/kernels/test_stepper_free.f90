@@ -180,8 +180,8 @@ contains
       integer :: k, n_failed
 
       call make_drop(scene, 30)
-      scene%step(1)%newton_maximum = 3
-      scene%step(1)%h_min = 0.26_wp*drop_h
+      scene%step(1)%solution%newton_maximum = 3
+      scene%step(1)%time%h_min = 0.26_wp*drop_h
       call open_scene(stepper, scene, error)
       if (.not. allocated(error)) call open_scene(before, scene, error)
       if (allocated(error)) return
@@ -309,7 +309,7 @@ contains
       integer :: k
 
       call make_drop(scene, 20)
-      scene%step%newton = newton_full            ! a kept factor does not come along
+      scene%step%solution%newton = newton_full            ! a kept factor does not come along
       call open_scene(stepper, scene, error)
       if (.not. allocated(error)) call open_scene(fresh, scene, error)
       do k = 1, 10
@@ -494,14 +494,14 @@ contains
             if (allocated(error)) return
             total = sum(changed%march%state%reaction, dim=2)
             if (n == 3) call check_near(error, -total(1), 0.6_wp*max(0, k - late), &
-               max(scene%step(1)%newton_tolerance, 64.0_wp*epsilon(1.0_wp)), young, &
+               max(scene%step(1)%solution%newton_tolerance, 64.0_wp*epsilon(1.0_wp)), young, &
                "force " // to_text(k))
             if (allocated(error)) return
          end do
          call check_true(error, maxval(deck%march%state%u) > 0.05_wp, "it moves")
          if (n < 3) call check_same_state(error, changed, deck, "static, dynamic " // to_text(n))
          if (n == 3) call check_near(error, changed%march%state%u, deck%march%state%u, &
-            max(scene%step(1)%newton_tolerance, 64.0_wp*epsilon(1.0_wp)), 10.0_wp, "end")
+            max(scene%step(1)%solution%newton_tolerance, 64.0_wp*epsilon(1.0_wp)), 10.0_wp, "end")
          call stepper_close(deck)
          call stepper_close(changed)
          if (allocated(error)) return
@@ -530,12 +530,12 @@ contains
          if (allocated(error)) return
          total = sum(changed%march%state%reaction, dim=2)
          call check_near(error, -total(1), merge(-0.1_wp*k, -0.5_wp + 0.7_wp*(k - 5), k <= 5), &
-            max(scene%step(1)%newton_tolerance, 64.0_wp*epsilon(1.0_wp)), young, &
+            max(scene%step(1)%solution%newton_tolerance, 64.0_wp*epsilon(1.0_wp)), young, &
             "force " // to_text(k))
          if (allocated(error)) return
       end do
       call check_near(error, changed%march%state%u, deck%march%state%u, &
-         max(scene%step(1)%newton_tolerance, 64.0_wp*epsilon(1.0_wp)), 10.0_wp, "end")
+         max(scene%step(1)%solution%newton_tolerance, 64.0_wp*epsilon(1.0_wp)), 10.0_wp, "end")
       call stepper_close(deck)
       call stepper_close(changed)
    end subroutine test_load_later
@@ -576,7 +576,7 @@ contains
       deallocate(scene%step(1)%load)
       allocate(scene%step(1)%load(0))
       call open_scene(changed, scene, error)
-      scene%step(1)%duration = 8*drop_h
+      scene%step(1)%time%duration = 8*drop_h
       scene%step = [scene%step(1), scene%step(1), scene%step(1)]
       call free_corner(scene, 2)
       if (.not. allocated(error)) call open_scene(deck, scene, error)

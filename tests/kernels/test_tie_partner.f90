@@ -265,7 +265,7 @@ contains
 
       call make_straight(scene, even(4, 0.0_wp, 4.0_wp), even(5, 4.0_wp, 0.0_wp))
       ! The last node of the master, 15, becomes the first of the slave.
-      where (scene%element_node == 15) scene%element_node = 1
+      where (scene%element%node == 15) scene%element%node = 1
       call measure(scene, multiplier_dual, rows, error)
       call expect(error, ["share nodes (1)"])
    end subroutine test_common_nodes

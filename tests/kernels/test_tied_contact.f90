@@ -145,9 +145,9 @@ contains
       scene%pair = [pair]
       call add_step(scene, .true., 1.0_wp, 1)
       associate (step => scene%step(1))
-         step%contact%multiplier = merge(multiplier_dual, multiplier_standard, btest(i, 1))
-         step%contact%normal = merge(normal_nodal, normal_edge, btest(i, 2))
-         step%constraint_method = merge(method_null_space, method_saddle_point, btest(i, 3))
+         step%contact%options%multiplier = merge(multiplier_dual, multiplier_standard, btest(i, 1))
+         step%contact%options%normal = merge(normal_nodal, normal_edge, btest(i, 2))
+         step%contact%method = merge(method_null_space, method_saddle_point, btest(i, 3))
          do j = 1, size(scene%x, 2)
             if (abs(scene%x(1, j)) > 1.75_wp) call prescribe(step, j, 1, 0.0_wp)
             if (abs(scene%x(2, j)) > 0.75_wp) call prescribe(step, j, 2, &
@@ -241,7 +241,7 @@ contains
       integer, intent(in) :: k
 
       is_slave = abs(scene%x(2, k)) < 0.25_wp .and. &
-         k >= minval(scene%element_node(1, scene%surface(10)%element))
+         k >= minval(scene%element%node(1, scene%surface(10)%element))
    end function is_slave
 
    !> The upper block flies onto the lower one and slides along it, so far that nodes of either pass
@@ -260,11 +260,11 @@ contains
          allocate(scene%step(0))
          call add_step(scene, .false., 0.02_wp, 40)
          upper = minval(scene%surface(10)%element)
-         upper = minval(scene%element_node(:3, upper))
+         upper = minval(scene%element%node(:3, upper))
          scene%x(2, upper:) = scene%x(2, upper:) + 0.02_wp
          scene%v0(1, upper:) = 1.5_wp
          scene%v0(2, upper:) = -1.0_wp
-         scene%step(1)%constraint_method = merge(method_null_space, method_saddle_point, i > 6)
+         scene%step(1)%contact%method = merge(method_null_space, method_saddle_point, i > 6)
          call run_impact(i, error)
          if (allocated(error)) return
       end do

@@ -246,7 +246,7 @@ contains
       do pass = 1, 2
          call make_straight(scene, even(4, 0.0_wp, 4.0_wp), even(3, 4.0_wp, 0.0_wp))
          call add_tie(scene, "SEAM", 1, 2, multipliers(1), tolerance=1.0_wp)
-         scene%element_label = [(10*e, e = 1, size(scene%element_kind))]
+         scene%element%label = [(10*e, e = 1, size(scene%element%kind))]
          scene%x(2, :9) = scene%x(2, :9) - merge(0.48_wp, 0.25_wp, pass == 1)
          x = scene%x
          call ties_prepare(scene, notes, raised)

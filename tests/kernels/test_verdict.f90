@@ -60,7 +60,7 @@ contains
       verdict%energy%largest = 2.0_wp
       verdict%energy%dynamic_error = 3.0_wp*energy_bar()
       verdict%unconverged = 1.0e-3_wp
-      verdict%deepest = 1.0e-2_wp
+      verdict%overlap%deepest = 1.0e-2_wp
       verdict%law_missed = 1.5_wp
       verdict%largest_push = 3.0_wp
       call verdict_end(verdict)
@@ -85,7 +85,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(verdict_t) :: verdict
 
-      verdict%deepest = 0.11_wp
+      verdict%overlap%deepest = 0.11_wp
       call verdict_end(verdict)
       call check_true(error, verdict_is_failure(verdict, .false.), "a failure")
    end subroutine test_deep

@@ -47,11 +47,11 @@ contains
       n_edge = n - 1
       if (present(is_closed)) n_edge = merge(n, n - 1, is_closed)
       n_old = size(scene%x, 2)
-      n_element = size(scene%element_kind)
+      n_element = size(scene%element%kind)
       allocate(x(2, n_old + n + n_edge), node(4, n_element + n_edge))
       x(:, :n_old) = scene%x
       x(:, n_old + 1:n_old + n) = points
-      node(:, :n_element) = scene%element_node
+      node(:, :n_element) = scene%element%node
       do i = 1, n_edge
          last = mod(i, n) + 1
          a = points(:, last) - points(:, i)
@@ -59,7 +59,7 @@ contains
          node(:, n_element + i) = [n_old + i, n_old + last, n_old + n + i, 0]
       end do
       call move_alloc(x, scene%x)
-      call move_alloc(node, scene%element_node)
+      call move_alloc(node, scene%element%node)
       surface%name = name
       allocate(surface%element(n_edge), surface%face(n_edge))
       do i = 1, n_edge
@@ -69,10 +69,10 @@ contains
       scene%surface = [scene%surface, surface]
       n_element = n_element + n_edge
       n = size(scene%x, 2)
-      deallocate(scene%element_kind, scene%element_section, scene%node_label)
-      allocate(scene%element_kind(n_element), source=find_element_row("CPE3"))
-      allocate(scene%element_section(n_element), source=1)
-      allocate(scene%node_label(n), source=[(i, i = 1, n)])
+      deallocate(scene%element%kind, scene%element%section, scene%node%label)
+      allocate(scene%element%kind(n_element), source=find_element_row("CPE3"))
+      allocate(scene%element%section(n_element), source=1)
+      allocate(scene%node%label(n), source=[(i, i = 1, n)])
    end subroutine add_line
 
    !> Surface 1 is the slave: a line along x, its body above. Surface 2 is the master below it.
