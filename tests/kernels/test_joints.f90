@@ -610,6 +610,7 @@ contains
                call contact%evaluate(wanted, scene%x, u, du, target(:n), item(:n))
                do column = 1, size(u)
                   k = (column + 1)/2
+                  if (.not. any([(any(item(j)%node(:item(j)%n_node) == k), j = 1, n)])) cycle
                   a = 2 - mod(column, 2)
                   way = 0.0_wp
                   way(a, k) = step

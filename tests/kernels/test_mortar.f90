@@ -477,6 +477,7 @@ contains
       target = 0.02_wp
       call mortar%evaluate(wanted, scene%x, u, du, target, item)
       do k = 1, size(u, 2)
+         if (.not. any([(any(item(i)%node(:item(i)%n_node) == k), i = 1, n)])) cycle
          do a = 1, 2
             way = 0.0_wp
             way(a, k) = step
@@ -595,6 +596,7 @@ contains
             call mortar%measure(scene%x, u, du)
             call mortar%evaluate([1, 2, 3], scene%x, u, du, none, item)
             do n = 0, size(u) - 1
+               if (.not. any([(any(item(j)%node(:item(j)%n_node) == 1 + n/2), j = 1, 3)])) cycle
                way = 0.0_wp*u
                way(1 + mod(n, 2), 1 + n/2) = step
                call mortar%evaluate([1, 2, 3], scene%x, u, du + way, none, up)

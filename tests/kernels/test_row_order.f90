@@ -100,7 +100,7 @@ contains
    !> further hold those of 17 rows. x_k = -(y_1 + ... + y_k) comes out of both to the last bit.
    subroutine test_chain(error)
       type(error_t), allocatable, intent(out) :: error
-      integer, parameter :: n = 1024, levels = 10, most = n*(levels + 17 + 2)
+      integer, parameter :: n = 512, levels = 9, most = n*(levels + 17 + 2)
       type(csr_t) :: rows
       type(row_elimination_t) :: elimination
       integer, allocatable :: start(:), column(:)
