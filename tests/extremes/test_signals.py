@@ -6,7 +6,7 @@ import subprocess
 import time
 
 import pytest
-from scene_tools import DECKS, Deck, Run, assert_no_crash, emcon, run_deck, start, wait_for
+from scene_tools import Run, assert_no_crash, coarse_ring, emcon, run_deck, start, wait_for
 
 #: The whole run in one increment, cut into hundreds of parts: three iterations are not enough.
 ONE_INCREMENT = {"h": 1.5, "t_end": 1.5}
@@ -16,9 +16,15 @@ LONG = ["--set=h=0.0005"]
 
 @pytest.fixture(scope="module")
 def deck(tmp_path_factory):
-    deck = Deck.read(DECKS / "ring.inp")
+    deck = coarse_ring()
     deck.insert("*NEWTON, MAXIMUM=3")
     return deck.write(tmp_path_factory.mktemp("deck") / "ring.inp")
+
+
+@pytest.fixture(scope="module")
+def flight(tmp_path_factory):
+    """The same as it is."""
+    return coarse_ring().write(tmp_path_factory.mktemp("flight") / "ring.inp")
 
 
 @pytest.fixture(scope="module")
@@ -59,18 +65,18 @@ def test_a_cut_increment_listens(deck, whole, tmp_path, number):
 
 
 @pytest.mark.parametrize("number", [signal.SIGHUP, signal.SIGTERM])
-def test_a_signal_leaves_a_restart_file(tmp_path, number):
-    process, run = begun(tmp_path, DECKS / "ring.inp", *LONG)
+def test_a_signal_leaves_a_restart_file(flight, tmp_path, number):
+    process, run = begun(tmp_path, flight, *LONG)
     process.send_signal(number)
     err = end(process)
     assert process.returncode == 130, err
     assert run.file(".rst.h5").exists() and "emcon restart" in err
 
 
-def test_standard_output_that_nobody_reads_any_more(tmp_path):
+def test_standard_output_that_nobody_reads_any_more(flight, tmp_path):
     """As under `emcon deck | head -1`: the first line that is not taken stops the run."""
     read_end, write_end = os.pipe()
-    process, run = begun(tmp_path, DECKS / "ring.inp", *LONG, stdout=write_end)
+    process, run = begun(tmp_path, flight, *LONG, stdout=write_end)
     os.close(write_end)
     os.close(read_end)
     err = end(process)
@@ -103,9 +109,9 @@ def test_a_second_one_ends_at_once(deck, tmp_path):
     process.stderr.close()
 
 
-def test_the_same_signal_twice_in_a_moment_is_one(tmp_path):
+def test_the_same_signal_twice_in_a_moment_is_one(flight, tmp_path):
     """`timeout` signals the process and then its group."""
-    process, run = begun(tmp_path, DECKS / "ring.inp", *LONG)
+    process, run = begun(tmp_path, flight, *LONG)
     for _ in range(3):
         process.send_signal(signal.SIGTERM)
         time.sleep(0.002)
@@ -115,10 +121,10 @@ def test_the_same_signal_twice_in_a_moment_is_one(tmp_path):
 
 
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGHUP])
-def test_what_is_ignored_stays_ignored(tmp_path, number):
+def test_what_is_ignored_stays_ignored(flight, tmp_path, number):
     """Under `nohup`, and in the background of a script."""
     process, run = begun(
-        tmp_path, DECKS / "ring.inp", "--set=h=0.02", "--set=t_end=0.8", ignored=[number]
+        tmp_path, flight, "--set=h=0.02", "--set=t_end=0.8", ignored=[number]
     )
     for _ in range(3):
         process.send_signal(number)
