@@ -191,7 +191,7 @@ def test_accidents_end_in_messages(tmp_path):
     """Random damage to good decks never ends in anything but success or messages."""
     pick = random.Random(int(os.environ.get("EMCON_SEED", "1")))
     good = [deck.read_text() for deck in DECKS if deck.stem.startswith("good_")]
-    for i in range(int(os.environ.get("EMCON_ACCIDENTS", "300"))):
+    for i in range(int(os.environ.get("EMCON_ACCIDENTS", "150"))):
         text = pick.choice(good)
         for _ in range(pick.randrange(1, 4)):
             text = mutated(text, pick) or "\n"

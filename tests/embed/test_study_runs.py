@@ -385,7 +385,7 @@ def test_the_smallest_time_of_several(tmp_path: Path, monkeypatch: pytest.Monkey
 
 def test_a_study_that_is_killed_goes_on(tmp_path: Path) -> None:
     """kill -9 in the middle: whole members stay, the half one is repeated, the end is the same."""
-    options = ("--vary", "h=0.02,0.01,0.0004", "--set", "t_end=1.5", "--jobs", 1)
+    options = ("--vary", "h=0.02,0.01,0.001", "--set", "t_end=1.5", "--jobs", 1)
     running = subprocess.Popen(command(BAR, *options), cwd=tmp_path, env=ENVIRONMENT,
                                stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     members = tmp_path/"study"/"members"

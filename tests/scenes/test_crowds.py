@@ -75,7 +75,7 @@ def curve(edge, rest, x):
 @pytest.fixture(scope="module")
 def smooth_pile(tmp_path_factory):
     text = crowds.pile(4).text().replace("*DLOAD", "*SURFACE SMOOTHING, TYPE=HERMITE\n*DLOAD", 1)
-    return run_deck(Deck(text), tmp_path_factory.mktemp("smooth"), t_end=0.5, frame=0.02)
+    return run_deck(Deck(text), tmp_path_factory.mktemp("smooth"), t_end=0.5, frame=0.05)
 
 
 def test_smoothed_bodies_are_their_curves(smooth_pile):

@@ -95,15 +95,15 @@ def test_pressure_all_around(kind, tmp_path):
 
 @pytest.mark.parametrize("kind", KINDS + THIN)
 def test_free_flight(kind, tmp_path):
-    """A block that spins, flies and vibrates, 250 increments."""
+    """A block that spins, flies and vibrates, 100 increments."""
     mesh = Mesh(kind, 2, 1, [(0, 0), (2, 0), (2, 1), (0, 1)])
     speed = "".join(f"{k}, 1, {0.3 - 1.5*(y - 0.5) + 0.4*(x - 1)!r}\n"
                     f"{k}, 2, {-0.2 + 1.5*(x - 1) - 0.3*(y - 0.5)!r}\n"
                     for k, (x, y) in enumerate(mesh.x.tolist(), 1))
     after = (f"*INITIAL CONDITIONS, TYPE=VELOCITY\n{speed}*STEP, NLGEOM, INC=2000\n"
-             "*DYNAMIC, DIRECT\n0.02, 5.\n*NODE FILE, FREQUENCY=250\nU\n*END STEP\n")
+             "*DYNAMIC, DIRECT\n0.02, 2.\n*NODE FILE, FREQUENCY=100\nU\n*END STEP\n")
     history = run(mesh.deck(RUBBER, after), tmp_path).history
-    assert len(history) == 251
+    assert len(history) == 101
     for name in ("px", "py", "lz", "total"):
         drift = np.abs(history[name] - history[name][0]).max()
         assert drift <= 1e-12*abs(history[name][0]), name

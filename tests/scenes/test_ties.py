@@ -184,9 +184,9 @@ def spin_deck(velocity=None):
 
 @pytest.mark.parametrize("multiplier", MULTIPLIERS)
 def test_spinning_pieces_conserve(tmp_path, multiplier):
-    run = run_deck(DECKS / "tied_spin.inp", tmp_path, multiplier=multiplier)
+    run = run_deck(DECKS / "tied_spin.inp", tmp_path, multiplier=multiplier, t_end=4)
     history = run.history
-    assert len(history) == 1001 and history["cuts"].sum() == 0
+    assert len(history) == 401 and history["cuts"].sum() == 0
     assert history["strain"].max() > 0.02*history["total"][0]
     for name in CONSERVED:
         assert np.abs(history[name]/history[name][0] - 1).max() <= 1e-11, name
