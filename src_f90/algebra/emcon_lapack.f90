@@ -8,7 +8,7 @@ module emcon_lapack
    use emcon_text, only : to_text
    implicit none
    private
-   public :: dense_solve, dense_singular_values, dense_rank, dense_condition, dense_null_space
+   public :: dense_solve, dense_singular_values, dense_rank, dense_null_space
    public :: dense_eigen, dense_cholesky, dense_cholesky_solve
 
    interface
@@ -109,19 +109,6 @@ contains
       if (allocated(error)) return
       if (size(sigma) > 0) rank = count(sigma > rel*sigma(1))
    end subroutine dense_rank
-
-   !> Largest over smallest singular value; `huge` if the smallest is zero or there is none.
-   subroutine dense_condition(a, condition, error)
-      real(dp), intent(in) :: a(:, :)
-      real(dp), intent(out) :: condition
-      type(error_t), allocatable, intent(out) :: error
-      real(dp), allocatable :: sigma(:)
-
-      condition = huge(1.0_dp)
-      call dense_singular_values(a, sigma, error)
-      if (allocated(error) .or. size(sigma) == 0) return
-      if (sigma(size(sigma)) > sigma(1)/huge(1.0_dp)) condition = sigma(1)/sigma(size(sigma))
-   end subroutine dense_condition
 
    !> Orthonormal columns z with A z = 0, up to singular values of `rel` times the largest.
    subroutine dense_null_space(a, rel, z, error)

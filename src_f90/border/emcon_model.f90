@@ -9,7 +9,7 @@ module emcon_model
       c_loc, c_ptr
    use emcon_c_types, only : sizes_c
    use emcon_csr, only : csr_t
-   use emcon_errors, only : err_input, err_none, error_t, raise
+   use emcon_errors, only : err_input, err_none, error_t
    use emcon_record, only : record_t
    use emcon_rotation, only : n_turn
    use emcon_stepper, only : stepper_t

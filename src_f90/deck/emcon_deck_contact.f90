@@ -17,7 +17,7 @@ module emcon_deck_contact
    use emcon_options, only : option_code, option_default, option_words
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t, where_text
-   use emcon_text, only : read_real, squeezed, to_text
+   use emcon_text, only : read_real, squeezed
    implicit none
    private
    public :: read_interactions, read_pairs

@@ -14,7 +14,7 @@ module emcon_deck_mesh
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t, where_text
    use emcon_shape, only : max_element_nodes
-   use emcon_text, only : string_t, to_text
+   use emcon_text, only : to_text
    implicit none
    private
    public :: read_nodes, read_elements

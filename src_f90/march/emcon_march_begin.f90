@@ -14,7 +14,7 @@ module emcon_march_begin
    use emcon_interactions, only : contact_options_t
    use emcon_overlap_check, only : overlap_check_excuse, overlap_check_smooth, overlap_check_step, &
       overlap_t
-   use emcon_kinds, only : dp, wp
+   use emcon_kinds, only : wp
    use emcon_layer, only : layer_begin_step, layer_mark
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_overlap_query, only : overlap_text
@@ -176,17 +176,14 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      real(dp) :: deadline
 
       associate (step => scene%step(self%state%clock%i_step), state => self%state)
          call choose_scheme(self, step)
          call check_tolerance(self, scene, error)
          if (allocated(error)) return
-         deadline = self%newton%deadline
          call newton_init(self%newton, self%system%space%numbering%n_unknown, &
             scene%x, step%solution%newton_tolerance, step%solution%newton_maximum)
          self%newton%convergence%polishes = step%solution%polishes
-         self%newton%deadline = deadline
          call choose_solver(self, step)
          state%base = factor_base_t()
          self%newton%factor_policy%is_wanted = step%solution%newton == newton_kept .and. &

@@ -2,7 +2,7 @@
 module emcon_march_events
    use emcon_active_set, only : step_passes_event
    use emcon_kinds, only : wp
-   use emcon_march_types, only : step_check_t, increment_t, march_t, part_t
+   use emcon_march_types, only : increment_t, march_t, part_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : events_nodes, step_t
    use emcon_text, only : note_add, to_text

@@ -80,9 +80,9 @@ contains
       if (status == step_done) call find_ending(self, scene, part, status, error)
       if (status /= step_done .or. allocated(error)) return
       if (any(self%active%comes_and_goes)) call tell_held(self, scene, increment)
-      if (self%active%friction%n_asked > 0) call note_add(increment%notes, "contacts stick, " // &
-         "slide and open in turn: their laws were solved for the step linearised, times " // &
-         to_text(self%active%friction%n_asked))
+      if (self%active%friction%n_asked > 0) call note_add(increment%notes, "contacts keep " // &
+         "changing between stick, slip and open: their laws were solved for the step " // &
+         "linearised, " // to_text(self%active%friction%n_asked) // " times")
       if (any(self%active%is_dropped)) then
          call blocked_contact_text(self%system, scene, self%active%is_dropped, text)
          if (len(text) > 0) then
@@ -91,8 +91,8 @@ contains
             return
          end if
          call nodes_text(self, scene, self%active%is_dropped, text)
-         call note_add(increment%notes, "contact is left out, as it follows from that of other " &
-            // "nodes or has lost its surface, at slave nodes " // text)
+         call note_add(increment%notes, "contacts that are redundant or have lost their " // &
+            "surface are left out, at slave nodes " // text)
       end if
       call march_commit(self, scene, part%h, increment, error)
    end subroutine march_step

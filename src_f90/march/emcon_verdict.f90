@@ -345,13 +345,11 @@ contains
       integer :: i
 
       if (self%overlap%deepest > most_overlap(self)) call note_add(self%reasons, &
-         "bodies overlap by " // &
-         to_text(self%overlap%deepest, 3) // " of an edge at time " // to_text(self%overlap%time, &
-         9) // ", " // self%overlap%place)
+         "bodies overlap by " // to_text(self%overlap%deepest, 3) // " of an edge at time " // &
+         to_text(self%overlap%time, 9) // ", " // self%overlap%place)
       if (self%softness%give > far_behind) call note_add(self%reasons, &
-         "contact gives way by up to " // &
-         to_text(self%softness%give, 3) &
-         // " of an edge: STIFFNESS or FACTOR of *CONSTRAINT METHOD is too " // "small")
+         "contact penetrates by up to " // to_text(self%softness%give, 3) // &
+         " of an edge: STIFFNESS or FACTOR of *CONSTRAINT METHOD is too small")
       if (stand_off_mean(self%stand_off) > most_stand_off) then
          call stand_off_text(self, text)
          call note_add(self%reasons, text)

@@ -19,7 +19,6 @@ module emcon_scene_report
    use emcon_stepper, only : stepper_t
    use emcon_surface_facets, only : surface_facets
    use emcon_term_registry, only : terms_solid
-   use emcon_text, only : to_text
    implicit none
    private
    public :: scene_report

@@ -4,7 +4,6 @@ module emcon_progress
    use, intrinsic :: iso_fortran_env, only : output_unit
    use emcon_files, only : is_terminal
    use emcon_kinds, only : dp
-   use emcon_text, only : to_text
    use emcon_timer, only : wall_seconds
    implicit none
    private

@@ -62,8 +62,8 @@ contains
       end associate
       if (allocated(self%largest_force)) then
          if (self%softness%give > 0.0_wp) then
-            line = line // "contact gives way by up to " // to_text(self%softness%give, 3) // &
-               " of an edge and no more penetrates, "
+            line = line // "contact penetrates by up to " // to_text(self%softness%give, 3) // &
+               " of an edge, nothing else does, "
          else if (self%overlap%deepest > overlap_told) then
             line = line // "nothing penetrates by more than guards allow, "
          else if (size(self%largest_force) > 0) then
@@ -166,7 +166,7 @@ contains
          to_text(verdict_law_violation(self), 2) // " of the largest force")
       if (abs(ledger%contact_damping) > 0.0_wp) call note_add(lines, "contact damping took " // &
          to_text(ledger%contact_damping, 9))
-      if (self%softness%give > 0.0_wp) call note_add(lines, "contact gave way by at most " // &
+      if (self%softness%give > 0.0_wp) call note_add(lines, "largest penetration of contact " // &
          to_text(self%softness%give, 3) // " of an edge, at time " // to_text(self%softness%time, &
          9) // "; stored at the end " // to_text(ledger%contact_energy, 9))
       if (self%softness%most_augmentations > 0) call note_add(lines, "augmentations " // &

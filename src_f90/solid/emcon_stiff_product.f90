@@ -4,7 +4,7 @@
 !> of the diagonal are not needed and a translation rounds nothing. Source: docs/theory.md,
 !> section 3.
 module emcon_stiff_product
-   use emcon_csr, only : csr_find, csr_from_elements, csr_t
+   use emcon_csr, only : csr_from_elements, csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_stiff_product_plane, only : n_lane, n_plane, form_in_plane => stiff_product_form

@@ -4,7 +4,7 @@
 !> amplitude is multiplied by. Without one, the linear runs of a static step go on from where they
 !> are to the new value at the end of the step; in a dynamic step it holds from the next step on.
 module emcon_stepper_loads
-   use emcon_errors, only : err_input, error_t, raise
+   use emcon_errors, only : error_t
    use emcon_factor_policy, only : factor_policy_forget
    use emcon_kinds, only : wp
    use emcon_march, only : march_renumber

@@ -3,7 +3,7 @@ module test_lapack
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
-   use emcon_lapack, only : dense_condition, dense_eigen, dense_null_space, dense_rank, dense_solve
+   use emcon_lapack, only : dense_eigen, dense_null_space, dense_rank, dense_solve
    implicit none
    private
    public :: collect_lapack
@@ -23,7 +23,6 @@ contains
          test_case_t("solve singular", test_solve_singular), &
          test_case_t("rank and null space", test_null_space), &
          test_case_t("null space of nothing", test_null_space_of_nothing), &
-         test_case_t("condition of a diagonal", test_condition), &
          test_case_t("eigenvalues of a chain", test_eigen)]
    end subroutine collect_lapack
 
@@ -102,23 +101,6 @@ contains
       if (allocated(error)) return
       call check_equal(error, rank, 0, "rank of zeros")
    end subroutine test_null_space_of_nothing
-
-   subroutine test_condition(error)
-      type(error_t), allocatable, intent(out) :: error
-      real(dp) :: a(3, 3), condition
-
-      a = 0.0_dp
-      a(1, 2) = 4.0_dp
-      a(2, 1) = -8.0_dp
-      a(3, 3) = 0.5_dp
-      call dense_condition(a, condition, error)
-      if (allocated(error)) return
-      call check_near(error, real(condition, wp), 16.0_wp, tol, 16.0_wp, "condition")
-      a(3, 3) = 0.0_dp
-      call dense_condition(a, condition, error)
-      if (allocated(error)) return
-      call check_true(error, condition >= huge(1.0_dp), "condition of a singular matrix is huge")
-   end subroutine test_condition
 
    !> The chain (2, -1) of n: 4 sin^2(i pi/(2 n + 2)).
    subroutine test_eigen(error)

@@ -110,9 +110,9 @@ def test_a_penalty_keeps_energy_and_momenta(formulation, sides, factor, tmp_path
     is_deep = run.verdict["give"] > 0.1
     assert is_deep is (factor == 0.1)
     assert done.returncode == (3 if is_deep else 0)
-    assert [text.startswith("contact gives way by up to") for text in run.verdict["reasons"]] \
+    assert [text.startswith("contact penetrates by up to") for text in run.verdict["reasons"]] \
         == [True]*is_deep
-    assert f"contact gives way by up to {run.verdict['give']:.3g}"[:30] in run.log
+    assert f"contact penetrates by up to {run.verdict['give']:.3g}"[:30] in run.log
 
 
 @pytest.mark.parametrize(("cells", "h"), [((8, 3), 0.02), ((8, 3), 0.005), ((16, 6), 0.02)])
