@@ -224,18 +224,24 @@ def pressed(folder, formulation, level, is_free=False):
     return run, found/width - 1, force.max()/(width/level)/peak - 1
 
 
+@pytest.fixture(scope="module")
+def guided(tmp_path_factory):
+    """`guided(formulation, level)` is `pressed`; each is made once."""
+    return functools.cache(lambda *which: pressed(tmp_path_factory.mktemp("hertz"), *which))
+
+
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=" ".join)
 @pytest.mark.parametrize("level", [3, 6])
-def test_hertz_by_load(tmp_path, formulation, level):
+def test_hertz_by_load(guided, formulation, level):
     """No step that closes the contact first. Half-width and peak to second order of an edge."""
-    _, width, peak = pressed(tmp_path, formulation, level)
+    _, width, peak = guided(formulation, level)
     assert abs(width) < level**-2 and abs(peak) < level**-2
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=" ".join)
-def test_hertz_by_load_without_support(tmp_path, formulation):
+def test_hertz_by_load_without_support(guided, tmp_path, formulation):
     """Free to roll on the lower cylinder: with STABILIZE as if it were guided."""
-    held, width, peak = pressed(tmp_path / "held", formulation, 3)
+    held, width, peak = guided(formulation, 3)
     run, free_width, free_peak = pressed(tmp_path, formulation, 3, is_free=True)
     assert "rotate, on which no load does work" in run.errors
     assert (free_width, free_peak) == pytest.approx((width, peak), abs=1e-8)
