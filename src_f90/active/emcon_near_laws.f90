@@ -1,5 +1,7 @@
 !> Laws of contact that act on what is near, beside the rows of gaps: where surfaces are closer
-!> than the laws of their pair reach, and where contact acts. Source: docs/theory.md, eqs. (14n) to (14q).
+!> than the laws of their pair reach, and where contact acts.
+!>
+!> Source: docs/theory.md, eqs. (14n) to (14q).
 module emcon_near_laws
    use emcon_constraints, only : constraint_index, constraint_set_t
    use emcon_contact, only : contact_t
