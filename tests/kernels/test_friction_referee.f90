@@ -3,8 +3,8 @@
 module test_friction_referee
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_active_set, only : active_set_t, step_cycling, step_done
+   use emcon_coulomb_law, only : contact_slides, contact_sticks, is_same_status
    use emcon_errors, only : error_t
-   use emcon_friction_law, only : touch_sticks
    use emcon_friction_referee, only : friction_referee
    use emcon_interactions, only : formulation_mortar, formulation_nts
    use emcon_kinds, only : dp, wp
@@ -98,7 +98,7 @@ contains
       solved = march%active
       associate (active => march%active)
          active%is_active = active%is_candidate .or. active%is_active
-         where (active%is_active) active%friction%way = touch_sticks
+         where (active%is_active) active%friction%law%status%kind = contact_sticks
          ! Nothing of these is to be left, and no multiplier to be taken over.
          active%friction%is_idle = .true.
          active%friction%is_needed = .true.
@@ -119,22 +119,24 @@ contains
          end associate
          call check_true(error, .not. any(active%comes_and_goes), "nothing comes and goes")
          call check_true(error, all(active%is_active .eqv. solved%is_active), "what acts")
-         call check_true(error, all(active%friction%way == solved%friction%way .or. .not. &
-            solved%is_active), "what slides where to")
+         call check_true(error, all(is_same_status(active%friction%law%status, &
+            solved%friction%law%status) .or. .not. solved%is_active), "what slides where to")
       end associate
       associate (acts => solved%is_active, friction => march%active%friction, &
             lam => march%active%lam)
          call check_near(error, pack(lam, acts), pack(solved%lam, acts), tol, &
             maxval(solved%lam, mask=acts), "pushes")
-         sticks = acts .and. solved%friction%way == touch_sticks .and. &
+         sticks = acts .and. solved%friction%law%status%kind == contact_sticks .and. &
             .not. solved%friction%is_idle
-         call check_near(error, pack(friction%tau, sticks), pack(solved%friction%tau, sticks), &
-            tol, maxval(solved%lam, mask=acts), "friction of what sticks")
-         sticks = sticks .and. abs(friction%tau) > 0.0_wp
+         call check_near(error, pack(friction%tau(1, :), sticks), &
+            pack(solved%friction%tau(1, :), sticks), tol, maxval(solved%lam, mask=acts), &
+            "friction of what sticks")
+         sticks = sticks .and. abs(friction%tau(1, :)) > 0.0_wp
       end associate
       seen%sticks = seen%sticks + count(sticks)
       seen%opens = seen%opens + count(solved%is_candidate .and. .not. solved%is_active)
-      seen%slides = seen%slides + count(solved%is_active .and. abs(solved%friction%way) == 1)
+      seen%slides = seen%slides + count(solved%is_active .and. &
+         solved%friction%law%status%kind == contact_slides)
    end subroutine check_referee
 
 end module test_friction_referee
