@@ -2,14 +2,14 @@
 !>
 !> A test is `subroutine test_x(error)`; it has passed if `error` is not allocated at its end, so
 !> an error of the library may be handed on as it is. A comparison leaves an earlier failure
-!> standing: several may follow each other and the first one that fails is reported. Do not pass
-!> `error` to a library call after a comparison without looking at it first: `intent(out)` would
-!> erase the failure.
+!> standing: several may follow each other and the first one that fails is reported. That holds too
+!> where a library call with `intent(out)` has erased `error` since (`first_failure`).
 module check
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_errors, only : error_t, raise, err_internal
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
+   use first_failure, only : failure_keep
    implicit none
    private
    public :: test_case_t, check_near, check_equal, check_true, check_error
@@ -149,6 +149,7 @@ contains
       type(error_t), allocatable, intent(inout) :: error
       character(len=*), intent(in) :: message
 
+      call failure_keep(message)
       if (.not. allocated(error)) call raise(error, err_internal, message)
    end subroutine fail
 

@@ -7,6 +7,7 @@ program main
    use check, only : test_case_t
    use emcon_blas, only : blas_single_thread
    use emcon_errors, only : error_t
+   use first_failure, only : failure_take
    use test_active_set, only : collect_active_set
    use test_arcs, only : collect_arcs
    use test_blas, only : collect_blas
@@ -44,6 +45,7 @@ program main
    use test_blocked_contact, only : collect_blocked_contact
    use test_explicit, only : collect_explicit
    use test_facets, only : collect_facets
+   use test_first_touch, only : collect_first_touch
    use test_friction, only : collect_friction
    use test_friction_referee, only : collect_friction_referee
    use test_gauss, only : collect_gauss
@@ -74,6 +76,7 @@ program main
    use test_march_contact, only : collect_march_contact
    use test_march_grid, only : collect_march_grid
    use test_march_kinds, only : collect_march_kinds
+   use test_mass_return, only : collect_mass_return
    use test_midside, only : collect_midside
    use test_mortar, only : collect_mortar
    use test_mortar_pair, only : collect_mortar_pair
@@ -160,6 +163,7 @@ program main
    call run("host_contact", collect_host_contact)
    call run("initial_contact", collect_initial_contact)
    call run("lapack", collect_lapack)
+   call run("first_touch", collect_first_touch)
    call run("friction", collect_friction)
    call run("friction_referee", collect_friction_referee)
    call run("dashpot_law", collect_dashpot_law)
@@ -198,6 +202,7 @@ program main
    call run("node_potential", collect_node_potential)
    call run("guards", collect_guards)
    call run("hermite_gap", collect_hermite_gap)
+   call run("mass_return", collect_mass_return)
    call run("midside", collect_midside)
    call run("mortar_pair", collect_mortar_pair)
    call run("mortar", collect_mortar)
@@ -269,6 +274,7 @@ contains
       procedure(collect_procedure) :: collect
       type(test_case_t), allocatable :: tests(:)
       type(error_t), allocatable :: error
+      character(len=:), allocatable :: message
       integer :: i, n_run, n_bad
 
       if (only_suite /= " " .and. only_suite /= suite) return
@@ -280,11 +286,12 @@ contains
          n_run = n_run + 1
          call seed_random()
          call tests(i)%run(error)
-         if (allocated(error) .eqv. tests(i)%should_fail) cycle
+         call failure_take(message)
+         if (allocated(error) .and. .not. allocated(message)) message = error%message
+         if (allocated(message) .eqv. tests(i)%should_fail) cycle
          n_bad = n_bad + 1
-         if (allocated(error)) then
-            write(output_unit, "(6a)") "   FAILED ", suite, " ", trim(tests(i)%name), ": ", &
-               error%message
+         if (allocated(message)) then
+            write(output_unit, "(6a)") "   FAILED ", suite, " ", trim(tests(i)%name), ": ", message
          else
             write(output_unit, "(4a)") "   FAILED ", suite, " ", trim(tests(i)%name) &
                // ": passed, but should fail"

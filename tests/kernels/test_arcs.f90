@@ -147,8 +147,9 @@ contains
             if (allocated(error)) return
             associate (name => "combination " // to_text(k) // ", side " // to_text(side))
                call check_true(error, all(contact%state%is_near .and. contact%state%is_over), name)
-               call check_true(error, maxval(abs(contact%state%gap0)) <= tol, &
-                  "gaps between arcs, " // name)
+               ! Gaps of nodes are those of edges whose corners are rounded.
+               call check_true(error, maxval(abs(contact%state%gap0)) <= merge(0.01_wp*sagitta, &
+                  tol, k <= 2), "gaps between arcs, " // name)
                call check_true(error, maxval(abs(chords%state%gap0)) > 0.1_wp*sagitta, &
                   "gaps between chords, " // name)
                do i = 1, contact%n_constraint

@@ -4,6 +4,7 @@ module test_check
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_errors, only : err_file, err_input, error_t, raise
    use emcon_kinds, only : wp
+   use first_failure, only : failure_take
    use random_draws, only : draw_random
    implicit none
    private
@@ -26,7 +27,8 @@ contains
          test_case_t("truth", test_truth, should_fail=.true.), &
          test_case_t("error code", test_error_code, should_fail=.true.), &
          test_case_t("error missing", test_error_missing, should_fail=.true.), &
-         test_case_t("first failure stands", test_first_stands)]
+         test_case_t("first failure stands", test_first_stands), &
+         test_case_t("a failure that is erased", test_erased, should_fail=.true.)]
    end subroutine collect_check
 
    subroutine test_all_pass(error)
@@ -113,10 +115,21 @@ contains
    subroutine test_first_stands(error)
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: kept
+      character(len=:), allocatable :: message
 
       call check_equal(kept, 1, 2, "first")
       call check_equal(kept, 3, 4, "second")
+      call failure_take(message)
       call check_equal(error, kept%message, "first: 1, expected 2", "message")
+      call check_equal(error, message, kept%message, "kept beside it")
    end subroutine test_first_stands
+
+   !> As a call of the library does that is handed the error of a test.
+   subroutine test_erased(error)
+      type(error_t), allocatable, intent(out) :: error
+
+      call check_true(error, .false., "erased")
+      if (allocated(error)) deallocate(error)
+   end subroutine test_erased
 
 end module test_check

@@ -134,6 +134,8 @@ contains
       empty%is_read = .true.
       call stepper_build(empty, raised)
       call check_error(error, raised, err_input, "no elements, and no forces", "nothing at all")
+      empty%scene = scene
+      empty%is_read = .true.
       empty%scene%host%node = [1, 2]
       call stepper_build(empty, raised)
       call check_error(error, raised, err_input, "no forces were given", "nothing given")
