@@ -232,10 +232,9 @@ contains
          i = name_index_find(reader%names%interactions, name)
          is_known = i > 0 .or. reader%doubt%names
          if (i > 0) then
-            if (reader%interaction(i)%restitution < 1.0_wp) call data_error(reader, data, &
-               "the surface " // &
-               "interaction " // quoted(name) // " has a RESTITUTION, which is of pairs only; " // &
-               "name what it is of by *CONTACT PAIR")
+            if (reader%interaction(i)%restitution < 1.0_wp) call data_error(reader, data, "the " &
+               // "surface interaction " // quoted(name) // " has a RESTITUTION, which is of " // &
+               "pairs only; name what it is of by *CONTACT PAIR")
             if (reader%interaction(i)%friction > 0.0_wp) call data_error(reader, data, &
                "the surface " // &
                "interaction " // quoted(name) // " has *FRICTION, which is of pairs only; " // &

@@ -7,8 +7,7 @@ module emcon_newton
    use emcon_constraint, only : condition_rate
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_set_t, constraints_add_law_forces, &
-      constraints_add_row_forces, constraints_evaluate, constraints_force, &
-      constraints_have_law_forces, constraints_take_hold
+      constraints_add_row_forces, constraints_evaluate, constraints_force, constraints_take_hold
    use emcon_convergence, only : convergence_begin, convergence_init, convergence_judge, &
       convergence_nears_end, convergence_t, most_rounding, next_done, next_give_up, next_tangent, &
       round_off
@@ -529,13 +528,14 @@ contains
       type(newton_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
+      logical :: are_some                        ! forces of laws
 
-      if (.not. constraints_have_law_forces(set)) then
+      call vector_zero(size(self%contact), self%contact)
+      call constraints_add_law_forces(set, self%contact, are_some)
+      if (.not. are_some) then
          call pick_unknowns(system%space%numbering, system%response%residual, self%residual)
          return
       end if
-      call vector_zero(size(self%contact), self%contact)
-      call constraints_add_law_forces(set, self%contact)
       call vector_sum(size(self%left), system%response%residual, -1.0_wp, self%contact, self%left)
       call pick_unknowns(system%space%numbering, self%left, self%residual)
    end subroutine pick_residual

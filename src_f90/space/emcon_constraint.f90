@@ -9,9 +9,9 @@ module emcon_constraint
    implicit none
    private
    public :: condition_t, contact_response_t, condition_force, condition_find_force, &
-      condition_find_law_force, condition_row_force, condition_row_gradient, condition_rate, &
-      condition_drag, condition_friction, condition_stiffness, condition_normal, &
-      condition_normal_slope, constraint_t, constraint_box_t
+      condition_find_law_force, condition_find_rows_force, condition_row_force, &
+      condition_row_gradient, condition_rate, condition_drag, condition_friction, &
+      condition_stiffness, condition_normal, condition_normal_slope, constraint_t, constraint_box_t
 
    !> A condition has so many slips at most: one less than there are dimensions.
    integer, parameter, public :: most_slips = 2
@@ -132,6 +132,23 @@ contains
          force = force - tau(s)*self%t(:, i, s)
       end do
    end subroutine condition_find_force
+
+   !> The part of it that is of the rows.
+   pure subroutine condition_find_rows_force(self, lam, i, force)
+      type(condition_t), intent(in) :: self
+      real(wp), intent(in) :: lam                     !! of the row of its gap; 0: none [M L/T^2]
+      integer, intent(in) :: i                        !! 1..n_node
+      real(wp), intent(out) :: force(:)               !! (n_dim) [M L/T^2]
+      real(wp) :: tau(most_slips)
+      integer :: s
+
+      force = lam*self%g(:, i)
+      if (.not. self%rubs) return
+      tau = condition_friction(self, lam)
+      do s = 1, size(self%t, 3)
+         force = force - tau(s)*self%t(:, i, s)
+      end do
+   end subroutine condition_find_rows_force
 
    !> The part of it that laws give beside the rows.
    pure subroutine condition_find_law_force(self, i, force)

@@ -3,7 +3,7 @@
 !> A pair that is held in both orders, or watched by guards, is one here. Forces are those on the
 !> surface that the deck names first.
 module emcon_pair_sums
-   use emcon_constraint, only : condition_force, condition_t
+   use emcon_constraint, only : condition_find_law_force, condition_find_rows_force, condition_t
    use emcon_constraints, only : constraint_set_t, constraints_dissipated, constraints_lam
    use emcon_contact_law, only : loss_damping, loss_friction
    use emcon_evaluation, only : evaluation_contact_place, evaluation_has_inertia
@@ -123,23 +123,38 @@ contains
       type(motion_t), intent(in) :: motion
       real(wp), intent(in) :: h                  !! > 0 [T]
       type(side_t), intent(in) :: side
-      real(wp), dimension(size(motion%x, 1)) :: push, place, signed
+      real(wp), dimension(size(motion%x, 1)) :: push, place
       real(wp) :: part
       integer :: i
 
       part = evaluation_contact_place(motion%evaluation)
       do i = 1, item%n_slave
-         push = h*condition_force(item, lam, i)
-         associate (node => item%node(i), n => size(push))
+         associate (node => item%node(i))
             place = motion%x(:, node) + (motion%u0(:, node) + part*motion%du(:, node))
-            signed = merge(push, -push, side%is_first)
-            sum%push(:n) = sum%push(:n) + signed
-            if (side%is_dynamic) sum%impulse(:n) = sum%impulse(:n) + signed
-            sum%weight = sum%weight + sqrt(dot_product(push, push))
-            sum%moment(:n) = sum%moment(:n) + sqrt(dot_product(push, push))*place
          end associate
+         call condition_find_rows_force(item, lam, i, push)
+         call add_push(sum, h*push, place, side)
+         call condition_find_law_force(item, i, push)
+         if (any(abs(push) > 0.0_wp)) call add_push(sum, h*push, place, side)
       end do
    end subroutine add_forces
+
+   !> Add the impulse of a force at `place`.
+   pure subroutine add_push(sum, push, place, side)
+      type(pair_sum_t), intent(inout) :: sum
+      real(wp), intent(in) :: push(:)            !! (n_dim) [M L/T]
+      real(wp), intent(in) :: place(:)           !! (n_dim) [L]
+      type(side_t), intent(in) :: side
+      real(wp) :: signed(size(push))
+
+      associate (n => size(push))
+         signed = merge(push, -push, side%is_first)
+         sum%push(:n) = sum%push(:n) + signed
+         if (side%is_dynamic) sum%impulse(:n) = sum%impulse(:n) + signed
+         sum%weight = sum%weight + sqrt(dot_product(push, push))
+         sum%moment(:n) = sum%moment(:n) + sqrt(dot_product(push, push))*place
+      end associate
+   end subroutine add_push
 
    !> Add the impulses of jumps of the velocities at the end of a step.
    pure subroutine pair_sums_jump(self, system, jump)

@@ -6,7 +6,7 @@
 !> docs/theory.md, eq. (1).
 module emcon_constraints
    use emcon_constraint, only : condition_find_force, condition_find_law_force, &
-      condition_friction, condition_row_force, condition_t, &
+      condition_find_rows_force, condition_friction, condition_t, &
       constraint_t, contact_response_t
    use emcon_contact_law, only : contact_laws_dissipated, contact_laws_respond, contact_laws_t, &
       contact_values_t
@@ -20,7 +20,7 @@ module emcon_constraints
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_force
    public :: constraints_stick, constraints_take_hold, constraints_gives_back
    public :: constraints_add_forces, constraints_add_law_forces, constraints_add_row_forces, &
-      constraints_have_law_forces, constraints_lam, constraints_dissipated
+      constraints_lam, constraints_dissipated
    public :: constraint_index
 
    !> Of the rows of gaps that do not hold: laws give their multipliers.
@@ -284,30 +284,20 @@ contains
       end do
    end subroutine constraints_add_forces
 
-   !> Have laws beside the rows any forces?
-   pure logical function constraints_have_law_forces(self) result(have)
-      type(constraint_set_t), intent(in) :: self
-      integer :: k
-
-      have = .true.
-      do k = self%n_permanent + 1, self%n_condition
-         if (.not. allocated(self%law(k)%beside)) cycle
-         associate (response => self%item(k)%response)
-            if (abs(response%lam) > 0.0_wp .or. any(abs(response%tau) > 0.0_wp)) return
-         end associate
-      end do
-      have = .false.
-   end function constraints_have_law_forces
-
    !> Add the forces of laws beside the rows.
-   pure subroutine constraints_add_law_forces(self, force)
+   pure subroutine constraints_add_law_forces(self, force, are_some)
       type(constraint_set_t), intent(in) :: self
       real(wp), intent(inout), contiguous :: force(:, :)                 !! (n_dim, n_node)
+      logical, intent(out) :: are_some           !! there are any
       real(wp) :: part(size(force, 1))
       integer :: k, i
 
+      are_some = .false.
       do k = self%n_permanent + 1, self%n_condition
-         if (.not. allocated(self%law(k)%beside)) cycle
+         associate (response => self%item(k)%response)
+            if (.not. (abs(response%lam) > 0.0_wp .or. any(abs(response%tau) > 0.0_wp))) cycle
+         end associate
+         are_some = .true.
          do i = 1, self%item(k)%n_node
             call condition_find_law_force(self%item(k), i, part)
             associate (node => self%item(k)%node(i))
@@ -322,13 +312,16 @@ contains
       type(constraint_set_t), intent(in) :: self
       real(wp), intent(in) :: lam(:)             !! (n) [M L/T^2]
       real(wp), intent(inout), contiguous :: force(:, :)                 !! (n_dim, n_node)
-      integer :: k, n
+      real(wp) :: part(size(force, 1))
+      integer :: k, i
 
       do k = 1, self%n
-         associate (item => self%item(k))
-            n = item%n_node
-            force(:, item%node(:n)) = force(:, item%node(:n)) + lam(k)*condition_row_force(item, 0)
-         end associate
+         do i = 1, self%item(k)%n_node
+            call condition_find_rows_force(self%item(k), lam(k), i, part)
+            associate (node => self%item(k)%node(i))
+               force(:, node) = force(:, node) + part
+            end associate
+         end do
       end do
    end subroutine constraints_add_row_forces
 

@@ -45,6 +45,10 @@ module emcon_contact_law
    end type contact_place_t
 
    type, abstract :: contact_law_t
+      logical :: acts_near = .false.             !! on what is near, whether its row holds or not
+      real(wp) :: reach = 0.0_wp                 !! the gap up to which it does, >= 0 [L]
+      logical :: rubs = .false.                  !! it has forces along the surface
+      integer :: loss = loss_damping             !! the kind of loss that it dissipates by
    contains
       procedure(respond_interface), deferred :: respond
       procedure :: take
@@ -52,13 +56,9 @@ module emcon_contact_law
       procedure :: push_on
       procedure :: stored
       procedure :: dissipated
-      procedure :: loss
       procedure :: stiffest
       procedure :: closure
       procedure :: gives_back
-      procedure :: acts_near
-      procedure :: reach
-      procedure :: rubs
       procedure :: rate_change
    end type contact_law_t
 
@@ -130,13 +130,6 @@ contains
       dissipated = 0.0_wp
    end function dissipated
 
-   !> The kind of loss that this is.
-   pure integer function loss(self)
-      class(contact_law_t), intent(in) :: self
-
-      loss = loss_damping
-   end function loss
-
    !> As stiff as the law becomes by the gap, 0 unless overridden [M/T^2].
    pure real(wp) function stiffest(self)
       class(contact_law_t), intent(in) :: self
@@ -158,27 +151,6 @@ contains
 
       gives_back = .false.
    end function gives_back
-
-   !> Does the law act on what is near, whether its row holds or not? Not unless overridden.
-   pure logical function acts_near(self)
-      class(contact_law_t), intent(in) :: self
-
-      acts_near = .false.
-   end function acts_near
-
-   !> The gap up to which it does, >= 0, 0 unless overridden: where surfaces touch [L].
-   pure real(wp) function reach(self)
-      class(contact_law_t), intent(in) :: self
-
-      reach = 0.0_wp
-   end function reach
-
-   !> Does the law have forces along the surface? Not unless overridden.
-   pure logical function rubs(self)
-      class(contact_law_t), intent(in) :: self
-
-      rubs = .false.
-   end function rubs
 
    !> By how much an impact changes the rate of a gap once it has been reversed, 0 unless overridden
    !> [L/T].
@@ -215,7 +187,7 @@ contains
 
       if (.not. allocated(of_pair%beside)) return
       do i = 1, size(of_pair%beside)
-         if (.not. of_pair%beside(i)%law%acts_near()) cycle
+         if (.not. of_pair%beside(i)%law%acts_near) cycle
          call contact_laws_add(self, of_pair%beside(i)%law)
          call self%beside(size(self%beside))%law%begin(place)
       end do
@@ -251,7 +223,7 @@ contains
       if (.not. allocated(self%beside)) return
       do i = 1, size(self%beside)
          associate (law => self%beside(i)%law)
-            if (law%loss() == kind) dissipated = dissipated + law%dissipated(at, &
+            if (law%loss == kind) dissipated = dissipated + law%dissipated(at, &
                self%beside(i)%response)
          end associate
       end do
@@ -266,7 +238,7 @@ contains
       if (.not. allocated(self%beside)) return
       do i = 1, size(self%beside)
          associate (law => self%beside(i)%law)
-            if (law%acts_near()) reach = max(reach, law%reach())
+            if (law%acts_near) reach = max(reach, law%reach)
          end associate
       end do
    end function contact_laws_reach
@@ -279,7 +251,7 @@ contains
       rub = .false.
       if (.not. allocated(self%beside)) return
       do i = 1, size(self%beside)
-         rub = rub .or. self%beside(i)%law%rubs()
+         rub = rub .or. self%beside(i)%law%rubs
       end do
    end function contact_laws_rub
 

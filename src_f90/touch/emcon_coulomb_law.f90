@@ -51,8 +51,6 @@ module emcon_coulomb_law
       procedure :: take => coulomb_take
       procedure :: respond => coulomb_respond
       procedure :: dissipated => coulomb_dissipated
-      procedure :: loss => coulomb_loss
-      procedure :: rubs => coulomb_rubs
       procedure :: holds_slip
       procedure :: slip_held
       procedure :: leads_to
@@ -76,6 +74,8 @@ contains
 
       self%mu = surface%friction
       self%restitution = surface%rebound
+      self%rubs = .true.
+      self%loss = loss_friction
       acts = self%mu > 0.0_wp
    end subroutine coulomb_take
 
@@ -95,18 +95,6 @@ contains
 
       dissipated = dot_product(at%friction, at%slip)
    end function coulomb_dissipated
-
-   pure integer function coulomb_loss(self) result(loss)
-      class(coulomb_t), intent(in) :: self
-
-      loss = loss_friction
-   end function coulomb_loss
-
-   pure logical function coulomb_rubs(self) result(rubs)
-      class(coulomb_t), intent(in) :: self
-
-      rubs = self%mu > 0.0_wp
-   end function coulomb_rubs
 
    !> Are rows to hold the slips?
    pure logical function holds_slip(self)

@@ -25,9 +25,6 @@ module emcon_dashpot_law
       procedure :: begin => dashpot_begin
       procedure :: respond => dashpot_respond
       procedure :: dissipated => dashpot_dissipated
-      procedure :: acts_near => dashpot_acts_near
-      procedure :: reach => dashpot_reach
-      procedure :: rubs => dashpot_rubs
    end type dashpot_t
 
 contains
@@ -39,6 +36,9 @@ contains
       logical, intent(out) :: acts               !! the deck asks for it
 
       self%coefficients = surface%damping
+      self%acts_near = .true.
+      self%reach = surface%damping%clearance
+      self%rubs = surface%damping%tangent > 0.0_wp
       acts = self%coefficients%coefficient > 0.0_wp
    end subroutine dashpot_take
 
@@ -50,24 +50,6 @@ contains
       self%gap = place%gap
       self%is_closed = place%is_closed
    end subroutine dashpot_begin
-
-   pure logical function dashpot_acts_near(self) result(acts_near)
-      class(dashpot_t), intent(in) :: self
-
-      acts_near = .true.
-   end function dashpot_acts_near
-
-   pure real(wp) function dashpot_reach(self) result(reach)
-      class(dashpot_t), intent(in) :: self
-
-      reach = self%coefficients%clearance
-   end function dashpot_reach
-
-   pure logical function dashpot_rubs(self) result(rubs)
-      class(dashpot_t), intent(in) :: self
-
-      rubs = self%coefficients%tangent > 0.0_wp
-   end function dashpot_rubs
 
    !> Push and drag of a condition, docs/theory.md, eqs. (14o) and (14p).
    pure subroutine dashpot_respond(self, at, response)

@@ -1,15 +1,16 @@
-!> Conditions in space, with rows of a gap and of two slips: sticking, sliding, and by a law from
-!> outside. Values are quadratic in places, so that gradients in the middle are discrete ones.
+!> Conditions in space, with rows of a gap and of two slips: sticking, and sliding by Coulomb's law,
+!> with a law from outside beside these, and without rows by that law alone. Values are quadratic in places, so that gradients in the middle are discrete ones.
 module test_condition_rows
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_constraint, only : condition_drag, condition_normal, condition_t, constraint_t, &
       contact_response_t
    use emcon_constraint_rows, only : constraints_add_curvature, constraints_merge_pattern, &
       constraints_rows
-   use emcon_constraints, only : constraint_set_t, constraints_add_forces, constraints_dissipated, &
-      constraints_evaluate, constraints_force, constraints_lam, constraints_select, &
-      constraints_stick
+   use emcon_constraints, only : constraint_set_t, constraints_add_row_forces, &
+      constraints_dissipated, constraints_evaluate, constraints_force, constraints_lam, &
+      constraints_select, constraints_stick
    use emcon_contact_law, only : contact_law_t, contact_laws_add, contact_values_t, loss_damping
+   use emcon_coulomb_law, only : contact_slides, coulomb_t, slip_status_t
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_t
@@ -49,7 +50,7 @@ module test_condition_rows
       procedure :: dissipated
    end type quartic_t
 
-   !> One condition that sticks, one that slides, one of the law.
+   !> One condition that sticks, one that slides, both with the law beside, one of the law alone.
    type :: trial_t
       type(system_t) :: system
       type(numbering_t) :: numbering
@@ -143,6 +144,7 @@ contains
       type(trial_t), intent(out) :: trial
       type(curved_t) :: curved
       type(prescribed_t) :: none(0)
+      type(coulomb_t) :: coulomb
       real(wp), dimension(3, n_node) :: x, u0, du
       integer :: k, s
 
@@ -163,11 +165,15 @@ contains
          call constraints_select(set, [1, 2], by_law=[3])
          set%item%rubs = .true.
          set%item(2)%is_mean = .true.
-         set%item(2)%response%mu_sigma = [0.3_wp, -0.2_wp]
+         coulomb%mu = 0.25_wp
+         coulomb%status = slip_status_t(contact_slides, [0.6_wp, -0.8_wp])
+         call contact_laws_add(set%law(2), coulomb)
+         do k = 1, 3
+            call contact_laws_add(set%law(k), quartic_t())
+         end do
          set%target(3) = 8.0_wp                  ! it is closed
          call constraints_stick(set, [1], reshape([-0.4_wp, 0.9_wp], [2, 1]), [.true.])
          set%lam(:2) = [1.3_wp, 0.8_wp]
-         call contact_laws_add(set%law(3), quartic_t())
       end associate
       call shake(x, 1.0_wp)
       call shake(u0, 0.1_wp)
@@ -205,7 +211,7 @@ contains
       call check_equal(error, trial%set%condition, [1, 2, 1, 1], "conditions of rows")
       call check_equal(error, trial%set%slip, [0, 0, 1, 2], "their slips")
       force = 0.0_wp
-      call constraints_add_forces(trial%set, 1, 2, force)
+      call constraints_add_row_forces(trial%set, trial%set%lam(:2), force)
       rows = real(dense_of(trial%set%force_rows), wp)
       call check_near(error, matmul(trial%set%lam, rows(:, [trial%numbering%unknown])), &
          [force], 16.0_wp*real(epsilon(1.0_dp), wp), 10.0_wp, "forces")
@@ -262,7 +268,7 @@ contains
          call constraints_force(set, 1, force)
          work = 0.0_wp
          do k = 1, 2
-            work = work + constraints_lam(set, k)*set%item(k)%dgap &
+            work = work + (constraints_lam(set, k) + set%item(k)%response%lam)*set%item(k)%dgap &
                - dot_product(condition_drag(set%item(k), constraints_lam(set, k)), set%item(k)%slip)
          end do
          call check_true(error, set%item(3)%gap0 < 0.0_wp .and. set%item(3)%gap1 < 0.0_wp, "closed")

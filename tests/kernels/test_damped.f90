@@ -75,7 +75,8 @@ contains
          self%set%item%rubs = .true.
          do i = 1, contact%n_constraint
             self%set%target(i) = contact%state(i)%gap0
-            call contact_laws_add(self%set%law(i), dashpot_t(law, 0.5_wp, contact%state(i)%gap0))
+            call contact_laws_add(self%set%law(i), dashpot_t( &
+               coefficients=law, area=0.5_wp, gap=contact%state(i)%gap0))
          end do
       end associate
    end subroutine begin
