@@ -10,6 +10,7 @@ module test_single_elements
    use emcon_evaluation, only : evaluation_at_end, evaluation_t, instant_t
    use emcon_kinds, only : dp, wp
    use emcon_law_space, only : law_response_space, space_response_t
+   use emcon_materials, only : kinematics_linear
    use emcon_motion, only : motion_of, motion_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_scene, only : scene_t
@@ -47,6 +48,7 @@ contains
       tests = [ &
          test_case_t("forces and energies are the sums over the elements", test_sums), &
          test_case_t("tangent: differences, and products", test_tangent), &
+         test_case_t("small strains: those of KINEMATICS=LINEAR", test_linear), &
          test_case_t("stress and strain of a uniform field", test_stress), &
          test_case_t("kinetic energies of elements", test_energies), &
          test_case_t("von Mises stress", test_von_mises), &
@@ -144,9 +146,64 @@ contains
          call check_near(error, system%response%energy(e), alone%response%energy(1), tol, young, &
             name(e) // ": energy")
          call check_true(error, alone%response%energy(1) > 1.0e-3_wp*young, name(e) // ": strained")
+         if (allocated(error)) return
       end do
       call check_near(error, system%response%part(role_internal)%force, force, tol, young, "forces")
    end subroutine test_sums
+
+   !> Without NLGEOM the same, and nothing is taken from what other nodes move by: where one moves
+   !> alone the sizes of what forces consist of are those of the forces, but at itself.
+   subroutine test_linear(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: moved = 4
+      type(scheme_energy_momentum_t) :: scheme
+      type(scene_t) :: scene
+      type(system_t) :: one, other
+      type(motion_t) :: motion
+      real(wp), allocatable :: u0(:, :), du(:, :)
+      integer :: i, k
+
+      call make_scene([1, 2, 3, 4, 5], scene)
+      scene%material(1)%law = law_code("linear")
+      scene%material(1)%constant = [young, 0.3_wp]
+      scene%step(1)%nlgeom = .false.
+      call system_init(one, scene, error)
+      if (.not. allocated(error)) call system_begin_step(one, scene, 1, error)
+      if (allocated(error)) return
+      scene%step(1)%nlgeom = .true.
+      scene%section(1)%kinematics = kinematics_linear
+      call system_init(other, scene, error)
+      if (.not. allocated(error)) call system_begin_step(other, scene, 1, error)
+      if (allocated(error)) return
+      allocate(u0, du, source=0.0_wp*scene%x)
+      do k = 1, 2
+         u0 = 0.0_wp
+         du = 0.0_wp
+         if (k == 1) then
+            call shake(u0, 0.05_wp)
+            call shake(du, 0.05_wp)
+         else
+            du(:, moved) = [0.01_wp, 0.02_wp, -0.03_wp]
+         end if
+         motion = motion_of(scheme%evaluation(instant_t(), 0.25_wp), scene%x, u0, du)
+         one%response%with_sizes = .true.
+         other%response%with_sizes = .true.
+         call system_respond(one, motion, .false.)
+         call system_respond(other, motion, .false.)
+         associate (expected => one%response, found => other%response)
+            call check_near(error, found%part(role_internal)%force, &
+               expected%part(role_internal)%force, tol, young, "forces")
+            call check_true(error, all(found%part(role_internal)%magnitude >= &
+               abs(found%part(role_internal)%force)*(1.0_wp - tol)), "sizes")
+         end associate
+      end do
+      associate (part => other%response%part(role_internal))
+         do i = 1, size(scene%x, 2)
+            if (i /= moved) call check_near(error, part%magnitude(:, i), abs(part%force(:, i)), &
+               tol, young, "size at node " // to_text(i))
+         end do
+      end associate
+   end subroutine test_linear
 
    !> Along one way of all unknowns; errors of a difference as in test_system.
    subroutine test_tangent(error)
@@ -303,6 +360,7 @@ contains
          call critical_bound(system, motion_of(evaluation_at_end, scene%x, 0.0_wp*scene%x, &
             0.0_wp*scene%x), none, h(e), element(e), is_bounded)
          call check_true(error, is_bounded, "elements alone")
+         if (allocated(error)) return
       end do
       call check_near(error, h(0), minval(h(1:4)), tol, h(0), "the least")
       associate (which => [2, 4, 1, 3])
