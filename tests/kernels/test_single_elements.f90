@@ -15,6 +15,7 @@ module test_single_elements
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
+   use emcon_small_widen_space, only : small_widen
    use emcon_solid, only : solid_init, solid_t
    use emcon_stress, only : element_energies, element_means, nodal_stress, von_mises
    use emcon_system, only : system_begin_step, system_init, system_respond, system_t, &
@@ -50,6 +51,7 @@ contains
          test_case_t("tangent: differences, and products", test_tangent), &
          test_case_t("small strains: those of KINEMATICS=LINEAR", test_linear), &
          test_case_t("stress and strain of a uniform field", test_stress), &
+         test_case_t("the largest of small rotations and strains", test_widen), &
          test_case_t("kinetic energies of elements", test_energies), &
          test_case_t("von Mises stress", test_von_mises), &
          test_case_t("the fastest element", test_fastest)]
@@ -307,6 +309,28 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_stress
+
+   !> A turn by 0.02 and a pull by 0.03, whose squares stay where another motion is smaller.
+   subroutine test_widen(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: grad(3, 3) = reshape([0.03_wp, 0.02_wp, 0.0_wp, -0.02_wp, 0.0_wp, &
+         0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], [3, 3])
+      type(scene_t) :: scene
+      type(solid_t) :: solid
+      real(wp) :: rotation, strain
+      integer :: k
+
+      call make_scene([4], scene)
+      call solid_init(solid, scene, error)
+      if (allocated(error)) return
+      rotation = 0.0_wp
+      strain = 0.0_wp
+      do k = 1, 2
+         call small_widen(solid%geometry(1), matmul(grad, scene%x)/real(k, wp), rotation, strain)
+         call check_near(error, [rotation, strain], [0.02_wp**2, 0.03_wp**2], tol, 0.001_wp, &
+            "squares")
+      end do
+   end subroutine test_widen
 
    !> A translation of half of each mass, and nothing of rigid elements.
    subroutine test_energies(error)
