@@ -29,13 +29,13 @@ import shutil
 import subprocess
 import sys
 
-from traced_lines import RELEASE, ROOT, Code, lines_of_runs, lines_of_suites
+from traced_lines import KEPT, RELEASE, ROOT, Code, lines_of_runs, lines_of_suites
 
 FOLDERS = ["surfaces", "touch", "contact", "terms", "solid", "state", "active", "march"]
 GOAL = 0.95
-#: A mutant may never end: CPU time of a program, in times of what it takes and more [s]; of tests of
-#: runs more, as Python counts too.
-SLOWER, GRACE, GRACE_OF_RUNS = 5, 2, 8
+#: A mutant may never end: CPU time of a program, in times of what it takes and more [s], and of the
+#: tests that look at it.
+SLOWER, GRACE, LONGEST_OF_TESTS = 5, 2, 600
 #: Memory of any program [bytes].
 ROOM = 4 << 30
 #: CPU time that kernel suites and tests of runs may take before a mutant counts as not noticed [s].
@@ -226,10 +226,10 @@ class Trial:
         """Name of the first of these tests that fails; one that fails anyway has noticed nothing."""
         program = self.build.link("emcon", made, self.folder) if runs else None
         while chosen := within(by_turns([r for r in runs if r.name not in self.unsound]), LONGEST):
-            failed = failing_test(chosen, {"EMCON": str(program)})
+            failed = failing_test(chosen, program)
             if not failed:
                 break
-            if not failing_test([r for r in chosen if r.name == failed], {}):
+            if not failing_test([r for r in chosen if r.name == failed], ROOT / RELEASE / "emcon"):
                 return failed
             self.unsound.add(failed)
         return ""
@@ -257,17 +257,18 @@ def by_turns(tests):
     return sorted(tests, key=lambda t: order[t.name])
 
 
-def failing_test(tests, place):
-    """The first of these tests that fails; the program of `place` runs them."""
-    limit = GRACE_OF_RUNS + SLOWER*max(test.seconds for test in tests)
+def failing_test(tests, program):
+    """The first of these tests that fails; `program` runs them, each time for so long at most."""
+    limit = GRACE + SLOWER*max(test.seconds for test in tests)
+    limited = KEPT / f"limited_{os.getpid()}.sh"
+    limited.write_text(f'#!/bin/sh\nulimit -t {int(limit) + 1}\nexec {program} "$@"\n')
+    limited.chmod(0o755)
     done = call([sys.executable, "-m", "pytest", "-q", "-x", "--tb=no", "-p", "no:cacheprovider",
-                 *(f"tests/{test.name}" for test in tests)], ROOT, limit,
-                {"EMCON_PATIENCE": "20"} | place)
-    if done.returncode == 0:
-        return ""
+                 *(f"tests/{test.name}" for test in tests)], ROOT, LONGEST_OF_TESTS,
+                {"EMCON_PATIENCE": "20", "EMCON": str(limited)})
     told = [test.name for test in tests if re.search(
         rf"^(?:FAILED|ERROR) {re.escape(test.name)}(?: |$|::)", done.stdout, re.M)]
-    return told[0] if told else tests[0].name
+    return told[0] if told else ""
 
 
 def call(command, folder, seconds, place=None):
