@@ -38,7 +38,7 @@ REGISTRY = {
     "overlap_query_t": {"emcon_overlap_query_kinds"},
     "term_t": {"emcon_term_kinds"},
     "constraint_t": {"emcon_constraint_kinds"},
-    "host_force_t": {"emcon_stepper_given", "emcon_c_given"},
+    "host_force_t": {"emcon_stepper_user", "emcon_c_given"},
 }
 #: What is made of another kind of its room: gaps of nodes, interpolated or looked at.
 MADE_OF = {("emcon_segment", "emcon_nts"), ("emcon_start_gaps_plane", "emcon_nts")}

@@ -13,7 +13,7 @@ module emcon_active_set
    use emcon_motion, only : at_rest, motion_t
    use emcon_motion_bound, only : largest_motion, motion_bound_t, motion_bound_add
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
-   use emcon_softness, only : softness_owes, softness_select, softness_state_t
+   use emcon_penalty, only : penalty_owes, penalty_select, penalty_state_t
    use emcon_state, only : state_t
    use emcon_steps, only : step_is_dynamic, step_t
    use emcon_system, only : system_t
@@ -86,7 +86,7 @@ module emcon_active_set
       real(wp), allocatable :: overclosure(:)
       real(wp) :: left(0:1) = 0.0_wp
       type(friction_t) :: friction               !! what sticks, what slides
-      type(softness_state_t) :: softness         !! how stiff contacts are that give way
+      type(penalty_state_t) :: penalty         !! how stiff contacts are that give way
       type(near_laws_t) :: near_laws             !! what laws act on that is near
       type(contact_support_t) :: support         !! bodies that contact alone holds, in statics
       type(motion_bound_t) :: motion_bound       !! of all nodes, over the steps
@@ -164,7 +164,7 @@ contains
       if (size(system%contact) > 0) call motion_bound_add(self%motion_bound, motion%u0)
       self%was_active = state%contacts%is_active
       self%lam0 = state%contacts%lam
-      self%softness%closure = state%contacts%closure
+      self%penalty%closure = state%contacts%closure
       if (self%friction%is_on) then
          self%friction%direction0 = state%contacts%slides_along
          self%friction%tau0 = state%contacts%drag
@@ -195,7 +195,7 @@ contains
       self%n_tried = 0
       self%n_stale = 0
       self%n_early = 0
-      self%softness%n_augmentation = 0
+      self%penalty%n_augmentation = 0
       call near_laws_restart(self%near_laws)
       self%only_adds = .false.
       self%has_cycled = .false.
@@ -269,7 +269,7 @@ contains
                first => system%first_constraint(pair) + 1, &
                last => system%first_constraint(pair + 1))
             self%is_active(first:last) = .false.
-            if (self%skip_until(pair)%passes .or. self%softness%is_at_ends) cycle
+            if (self%skip_until(pair)%passes .or. self%penalty%is_at_ends) cycle
             if (.not. any(self%was_active(first:last))) then
                call active_set_update_gaps(self, system, pair, motion)
                cycle
@@ -277,7 +277,7 @@ contains
             call active_set_update_gaps(self, system, pair, motion, at_rest(motion%u0))
             self%is_active(first:last) = self%was_active(first:last) &
                .and. contact%state%is_near .and. (contact%state%is_over &
-               .or. softness_owes(self%softness, first, last))
+               .or. penalty_owes(self%penalty, first, last))
             if (.not. (contact%may_leave .and. any(self%is_active(first:last)))) cycle
             call pair_measure(system, pair, motion%x, motion%u0, motion%du)
             self%is_active(first:last) = self%is_active(first:last) &
@@ -319,7 +319,7 @@ contains
             self%set%is_kept(k) = (self%holds_gap .and. .not. self%closes(self%set%id(k))) .or. &
                (.not. self%pushes_out .and. &
                gap%gap0 < self%set%target(k) - touch_tol*gap%size)
-            if (self%softness%is_on .and. .not. self%softness%augments) then
+            if (self%penalty%is_on .and. .not. self%penalty%augments) then
                self%set%is_kept(k) = .false.
             end if
             if (self%set%is_kept(k)) self%set%target(k) = gap%gap0
@@ -327,7 +327,7 @@ contains
       end do
       self%set%n_permanent = count(self%set%id(:self%set%n) <= system%first_constraint(1))
       call friction_select(self%friction, self%set, self%n_tried)
-      call softness_select(self%softness, system, self%set, self%has_impacts .and. &
+      call penalty_select(self%penalty, system, self%set, self%has_impacts .and. &
          .not. motion%evaluation%pushes_at_end)
 
    contains

@@ -25,7 +25,7 @@ module emcon_active_set_solve
       newton_solve, newton_t
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_scene, only : scene_t
-   use emcon_softness, only : most_augmentations, softness_augment, softness_pulls
+   use emcon_penalty, only : most_augmentations, penalty_augment, penalty_pulls
    use emcon_system, only : system_t
    implicit none
    private
@@ -82,7 +82,7 @@ contains
             cycle
          end if
          if (status /= newton_converged .or. size(system%contact) == 0 &
-            .or. self%softness%is_at_ends) return
+            .or. self%penalty%is_at_ends) return
          call phase_enter(system%phases, phase_gaps, left)
          call active_set_advance(self, system, motion, is_done, status)
          is_measured = status /= step_cycling
@@ -157,9 +157,9 @@ contains
          self%n_newton = self%n_newton + newton%convergence%n_iteration
          if (status /= newton_converged) return
          newton%driven = 0.0_wp                         ! the prescribed motion is in `motion` now
-         call softness_augment(self%softness, self%set, is_done)
+         call penalty_augment(self%penalty, self%set, is_done)
          if (is_done) return
-         if (may_leave .and. softness_pulls(self%softness, self%set)) then
+         if (may_leave .and. penalty_pulls(self%penalty, self%set)) then
             status = newton_early
             return
          end if

@@ -184,7 +184,7 @@ contains
                   if (self%friction%is_on .and. .not. changes) then
                      call friction_turn(self%friction, system, self%set, k, turns)
                      has_changed = has_changed .or. turns
-                     if (rubs(self, id)) self%friction%lags = self%friction%lags &
+                     if (has_friction(self, id)) self%friction%lags = self%friction%lags &
                         .or. contact%state(i)%slip_shift > most_shift
                   end if
                else
@@ -271,7 +271,7 @@ contains
          if (is_new .and. self%gap_tolerance > 0.0_wp &
             .and. gap%gap0 > self%gap_tolerance*gap%size) status = step_stands_off
          held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
-         if (self%set%soft%is_on) held = held + contact%mean_gap(i, self%set%soft%left(k))
+         if (self%set%penalty%is_on) held = held + contact%mean_gap(i, self%set%penalty%left(k))
          self%is_stale = self%is_stale .or. &
             (.not. gap%is_leaving .and. abs(gap%gap1 - held) > touch_tol*gap%size)
       end associate
@@ -338,7 +338,7 @@ contains
             if (self%may_cut .and. gap%gap1 < min(gap%gap0, allowed(1)) - touch_tol*gap%size) then
                status = step_too_far
             end if
-         else if (gap%is_arriving .and. contact%step%gives_way) then
+         else if (gap%is_arriving .and. contact%step%is_penalty) then
             closes = gap%gap1 < allowed(1) &
                .and. gap%gap1 > -contact%max_penetration_at_start*gap%size
          else if (gap%is_arriving .and. self%has_impacts .and. .not. may_arrive(gap)) then
@@ -348,21 +348,21 @@ contains
          else if (self%was_active(id) .or. .not. gap%gap0 - allowed(0) &
             < -contact%max_penetration_at_start*gap%size) then
             closes = .not. gap%gap1 - allowed(1) >= -merge(0.0_wp, gap_noise, &
-               contact%step%gives_way)*gap%size
+               contact%step%is_penalty)*gap%size
             if (self%holds_gap .and. self%is_candidate(id) .and. (self%has_cycled &
-               .or. rubs(self, id))) closes = gap%gap1 - gap%gap0 < -gap_noise*gap%size
+               .or. has_friction(self, id))) closes = gap%gap1 - gap%gap0 < -gap_noise*gap%size
          end if
       end associate
    end subroutine look_at_open
 
    !> Does friction act on contact `id`?
-   pure logical function rubs(self, id)
+   pure logical function has_friction(self, id)
       type(active_set_t), intent(in) :: self
       integer, intent(in) :: id
 
-      rubs = self%friction%is_on
-      if (rubs) rubs = self%friction%law(id)%mu > 0.0_wp
-   end function rubs
+      has_friction = self%friction%is_on
+      if (has_friction) has_friction = self%friction%law(id)%mu > 0.0_wp
+   end function has_friction
 
    !> With nothing to hold at its start, a contact begins with the next step, or in a smaller one;
    !> in the smallest it begins at once, if it is deep.
@@ -433,7 +433,7 @@ contains
       type(active_set_t), intent(in) :: self
 
       keeps_gaps = self%holds_gap .and. .not. any(self%closes) .and. &
-         (.not. self%softness%is_on .or. self%softness%augments)
+         (.not. self%penalty%is_on .or. self%penalty%augments)
    end function keeps_gaps
 
 end module emcon_active_set_update

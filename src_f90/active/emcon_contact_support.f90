@@ -213,7 +213,7 @@ contains
 
       call take_look(self, system, scene, motion%u0 + motion%du, look)
       call gaps_evaluate(system, motion, is_active, set, self%grips)
-      call mechanism_rows_append(look%rows, set%item, set%item%rubs)
+      call mechanism_rows_append(look%rows, set%item, set%item%has_friction)
    end subroutine look_at_contacts
 
    !> The assemblies that can move.
@@ -250,23 +250,23 @@ contains
       type(free_t), intent(in) :: free
       logical, intent(inout) :: is_active(:)
       type(constraint_set_t) :: set
-      real(wp) :: way(size(motion%du, 1), size(motion%du, 2)), time, turn
+      real(wp) :: direction(size(motion%du, 1), size(motion%du, 2)), time, turn
       real(dp) :: rigid(bodies%n_motion*size(free%member)), share(size(free%along))
       logical :: is_next(size(is_active))
       integer :: place(bodies%n_motion), i
 
       share = free%along/norm2(free%along)
       rigid = matmul(free%z, share)
-      call mechanism_field(bodies, free%member, rigid, way)
+      call mechanism_field(bodies, free%member, rigid, direction)
       call gaps_evaluate(system, motion, gaps_that_can_act(system) &
          .and. .not. is_active, set)
-      call gaps_next_to_close(set, way, time, is_next)
+      call gaps_next_to_close(set, direction, time, is_next)
       self%is_pushed = .not. any(is_next)
       if (self%is_pushed) then
-         time = touch_time(scene, bodies%x, way)
+         time = touch_time(scene, bodies%x, direction)
          if (.not. time < huge(time)) return
          ! Touching, but past the end of the surface that would hold it.
-         if (time*maxval(abs(way)) <= in_the_way*maxval(bodies%size(free%member))) return
+         if (time*maxval(abs(direction)) <= in_the_way*maxval(bodies%size(free%member))) return
       end if
       self%is_pushed = .false.
       turn = 0.0_wp
@@ -281,7 +281,7 @@ contains
          time = largest_turn/turn
          is_next = .false.
       end if
-      call move(system, way, time, motion%du)
+      call move(system, direction, time, motion%du)
       is_active = is_active .or. is_next
    end subroutine follow_load
 
@@ -345,9 +345,9 @@ contains
    end subroutine find_load
 
    !> Move the unknown freedoms on, and those that follow from them.
-   subroutine move(system, way, time, du)
+   subroutine move(system, direction, time, du)
       type(system_t), intent(in) :: system
-      real(wp), intent(in) :: way(:, :)                  !! (n_dim, n_node)
+      real(wp), intent(in) :: direction(:, :)                  !! (n_dim, n_node)
       real(wp), intent(in) :: time
       real(wp), intent(inout), contiguous :: du(:, :)
       real(wp) :: vector(system%space%numbering%n_unknown)
@@ -355,7 +355,8 @@ contains
 
       do k = 1, size(vector)
          associate (dof => system%space%numbering%dof(k))
-            vector(k) = way(1 + mod(dof - 1, size(way, 1)), (dof - 1)/size(way, 1) + 1)
+            vector(k) = direction(1 + mod(dof - 1, size(direction, 1)), (dof - 1)/size(direction, &
+               1) + 1)
          end associate
       end do
       call add_to_dofs(system%space%numbering, vector, time, du)

@@ -49,7 +49,7 @@ contains
          id = set%id(k)
          call constraint_index(system, id, pair, i)
          set%target(k) = system%contact(pair)%contact%state(i)%gap1
-         if (present(grips)) set%item(k)%rubs = grips(id)
+         if (present(grips)) set%item(k)%has_friction = grips(id)
       end do
       call constraints_evaluate(set, system, motion)
    end subroutine gaps_evaluate
@@ -75,10 +75,10 @@ contains
    end function gaps_that_can_act
 
    !> Of the contacts `set` those that close first on a way, and when; huge if none does.
-   pure subroutine gaps_next_to_close(set, way, time, is_next)
+   pure subroutine gaps_next_to_close(set, direction, time, is_next)
       type(constraint_set_t), intent(in) :: set
-      real(wp), intent(in) :: way(:, :)          !! (n_dim, n_node) per time
-      real(wp), intent(out) :: time              !! >= 0, in the unit of `way`
+      real(wp), intent(in) :: direction(:, :)          !! (n_dim, n_node) per time
+      real(wp), intent(out) :: time              !! >= 0, in the unit of `direction`
       logical, intent(out) :: is_next(:)         !! (n_constraint)
       real(wp) :: rate(set%n), gap(set%n)
       integer :: k
@@ -87,7 +87,7 @@ contains
       is_next = .false.
       do k = 1, set%n
          associate (item => set%item(k))
-            rate(k) = -condition_rate(item, way)
+            rate(k) = -condition_rate(item, direction)
             gap(k) = max(0.0_wp, set%target(k))
             if (rate(k) <= in_the_way*sum(abs(item%c(:, :item%n_node)))) rate(k) = 0.0_wp
             if (rate(k) > 0.0_wp) time = min(time, gap(k)/rate(k))
@@ -106,15 +106,15 @@ contains
       integer, intent(in) :: member(:)           !! bodies of an assembly
       real(dp), intent(in) :: z(:, :)            !! (n_motion*members, n) motions left of it
       logical, intent(out) :: is_next(:)         !! (n_constraint)
-      real(wp) :: way(size(bodies%x, 1), size(bodies%of_node)), rate(set%n), smallest
+      real(wp) :: direction(size(bodies%x, 1), size(bodies%of_node)), rate(set%n), smallest
       integer :: j, k
 
       rate = 0.0_wp
       do j = 1, size(z, 2)
-         call mechanism_field(bodies, member, z(:, j), way)
+         call mechanism_field(bodies, member, z(:, j), direction)
          do k = 1, set%n
             associate (item => set%item(k))
-               rate(k) = max(rate(k), abs(condition_rate(item, way)) &
+               rate(k) = max(rate(k), abs(condition_rate(item, direction)) &
                   /sum(abs(item%c(:, :item%n_node))))
             end associate
          end do

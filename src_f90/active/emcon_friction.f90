@@ -31,7 +31,7 @@ module emcon_friction
    real(wp), parameter :: tied = 5.0e4_wp*epsilon(1.0_wp)
 
    type :: friction_t
-      logical :: is_on = .false.                 !! some contact rubs; else nothing is allocated
+      logical :: is_on = .false. !! some contact has friction; else nothing is allocated
       integer :: n_slip = 1                      !! n_dim - 1
       !> (n_constraint) Coulomb's law of each, with mu = 0 where there is none: how what acts holds
       type(coulomb_t), allocatable :: law(:)
@@ -169,7 +169,7 @@ contains
       do k = set%n_permanent + 1, set%n
          associate (item => set%item(k), law => self%law(set%id(k)))
             if (.not. law%mu > 0.0_wp) cycle
-            item%rubs = .true.
+            item%has_friction = .true.
             item%slip_target = law%slip_held()
             call contact_laws_add(set%law(k), law)
             sticks(k) = holds(self, set%id(k))

@@ -41,7 +41,7 @@ contains
       type(flexibility_t) :: flexibility
       logical :: is_solved
 
-      if (status /= step_cycling .or. self%softness%is_on .or. self%only_adds) return
+      if (status /= step_cycling .or. self%penalty%is_on .or. self%only_adds) return
       if (.not. self%friction%is_on .or. self%friction%n_asked == most_asked) return
       self%n_tried = 0
       call active_set_select(self, system, motion)
@@ -71,7 +71,7 @@ contains
       type(flexibility_t), intent(inout) :: flexibility
       type(friction_problem_t), intent(out) :: problem
       type(error_t), allocatable, intent(out) :: error
-      real(wp), dimension(system%space%numbering%n_unknown) :: force, way
+      real(wp), dimension(system%space%numbering%n_unknown) :: force, displacement
       integer :: i, n, first
 
       first = self%set%n_permanent + 1
@@ -82,54 +82,55 @@ contains
          problem%mu = self%friction%law(id)%mu*item(:n)%normal
          problem%slip_target = self%friction%law(id)%slip_target(1)
          call pick_unknowns(numbering, system%response%residual, force)
-         call flexibility_move(flexibility, -force, way, error)
+         call flexibility_move(flexibility, -force, displacement, error)
          if (allocated(error)) return
-         problem%gap = self%set%defect(first:self%set%n) + gap_rates(numbering, item(:n), way)
-         problem%slip = slip_rates(numbering, item(:n), way)
-         where (item(:n)%rubs) problem%slip = problem%slip + item(:n)%slip(1)
+         problem%gap = self%set%defect(first:self%set%n) + gap_rates(numbering, item(:n), &
+            displacement)
+         problem%slip = slip_rates(numbering, item(:n), displacement)
+         where (item(:n)%has_friction) problem%slip = problem%slip + item(:n)%slip(1)
          do i = 1, n
             call flexibility_move(flexibility, flexibility_row(numbering, item(i), item(i)%g), &
-               way, error)
+               displacement, error)
             if (allocated(error)) return
-            problem%w(:n, i) = gap_rates(numbering, item(:n), way)
-            problem%w(n + 1:, i) = -slip_rates(numbering, item(:n), way)
+            problem%w(:n, i) = gap_rates(numbering, item(:n), displacement)
+            problem%w(n + 1:, i) = -slip_rates(numbering, item(:n), displacement)
             ! Without friction there is no slip to solve for: any one by itself.
             problem%w(n + i, n + i) = problem%w(i, i)
-            if (.not. item(i)%rubs) cycle
+            if (.not. item(i)%has_friction) cycle
             call flexibility_move(flexibility, flexibility_row(numbering, item(i), &
-               -item(i)%t(:, :, 1)), way, error)
+               -item(i)%t(:, :, 1)), displacement, error)
             if (allocated(error)) return
-            problem%w(:n, n + i) = gap_rates(numbering, item(:n), way)
-            problem%w(n + 1:, n + i) = -slip_rates(numbering, item(:n), way)
+            problem%w(:n, n + i) = gap_rates(numbering, item(:n), displacement)
+            problem%w(n + 1:, n + i) = -slip_rates(numbering, item(:n), displacement)
          end do
       end associate
    end subroutine condense
 
    !> What gaps change by over a motion, to first order.
-   pure function gap_rates(numbering, item, way) result(rate)
+   pure function gap_rates(numbering, item, displacement) result(rate)
       type(numbering_t), intent(in) :: numbering
       type(condition_t), intent(in) :: item(:)   !! (n)
-      real(wp), intent(in) :: way(:)             !! (n_unknown) [L]
+      real(wp), intent(in) :: displacement(:)             !! (n_unknown) [L]
       real(wp) :: rate(size(item))               !! (n) [L]
       integer :: i
 
       do i = 1, size(item)
-         rate(i) = dot_product(flexibility_row(numbering, item(i), item(i)%c), way)
+         rate(i) = dot_product(flexibility_row(numbering, item(i), item(i)%c), displacement)
       end do
    end function gap_rates
 
-   !> The same of slips; 0 where nothing rubs.
-   pure function slip_rates(numbering, item, way) result(rate)
+   !> The same of slips; 0 without friction.
+   pure function slip_rates(numbering, item, displacement) result(rate)
       type(numbering_t), intent(in) :: numbering
       type(condition_t), intent(in) :: item(:)   !! (n)
-      real(wp), intent(in) :: way(:)             !! (n_unknown) [L]
+      real(wp), intent(in) :: displacement(:)             !! (n_unknown) [L]
       real(wp) :: rate(size(item))               !! (n) [L]
       integer :: i
 
       rate = 0.0_wp
       do i = 1, size(item)
-         if (item(i)%rubs) rate(i) = dot_product(flexibility_row(numbering, item(i), &
-            item(i)%t1(:, :, 1)), way)
+         if (item(i)%has_friction) rate(i) = dot_product(flexibility_row(numbering, item(i), &
+            item(i)%t1(:, :, 1)), displacement)
       end do
    end function slip_rates
 

@@ -36,13 +36,13 @@ module emcon_layer
 contains
 
    !> The layer of `scene` on its massless nodes, with the laws that the model is given.
-   subroutine layer_init(self, scene, is_massless, model, error, given)
+   subroutine layer_init(self, scene, is_massless, model, error, host)
       type(layer_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       logical, intent(in) :: is_massless(:)      !! (n_node)
       type(system_t), intent(in) :: model        !! whose contact it is
       type(error_t), allocatable, intent(out) :: error
-      type(host_t), intent(in), optional :: given
+      type(host_t), intent(in), optional :: host
       integer :: n
 
       self%is_massless = is_massless
@@ -50,8 +50,8 @@ contains
       self%is_on = any(is_massless)
       if (.not. self%is_on) return
       call cut_scene(self, scene)
-      if (present(given)) then
-         if (allocated(given%law)) allocate(self%laws%law, source=given%law)
+      if (present(host)) then
+         if (allocated(host%law)) allocate(self%laws%law, source=host%law)
       end if
       call system_init(self%system, self%scene, error, self%laws)
       if (allocated(error)) return

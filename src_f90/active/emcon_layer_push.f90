@@ -124,14 +124,14 @@ contains
    end subroutine respond_to
 
    !> Subtract what the forces on all freedoms change by where z moves by `way`.
-   subroutine add_tangent(self, way)
+   subroutine add_tangent(self, displacement)
       type(layer_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: way(:, :)
-      real(wp) :: product(size(way, 1), size(way, 2))
+      real(wp), intent(in), contiguous :: displacement(:, :)
+      real(wp) :: product(size(displacement, 1), size(displacement, 2))
       integer :: k, i, j, n_dim
 
-      n_dim = size(way, 1)
-      call system_tangent_times(self%system, self%motion, way, product)
+      n_dim = size(displacement, 1)
+      call system_tangent_times(self%system, self%motion, displacement, product)
       self%push = self%push - product
       do k = 1, self%active%set%n
          associate (item => self%active%set%item(k), lam => self%active%set%lam(k))
@@ -139,7 +139,7 @@ contains
                do i = 1, item%n_node
                   self%push(:, item%node(i)) = self%push(:, item%node(i)) + lam*matmul( &
                      item%h(n_dim*(i - 1) + 1:n_dim*i, n_dim*(j - 1) + 1:n_dim*j), &
-                     way(:, item%node(j)))
+                     displacement(:, item%node(j)))
                end do
             end do
          end associate

@@ -118,7 +118,7 @@ contains
       class(contact_t), intent(in) :: contact
       integer, intent(in) :: i
 
-      touches = .not. (reach_of(contact) > 0.0_wp .or. contact%step%gives_way) .and. &
+      touches = .not. (reach_of(contact) > 0.0_wp .or. contact%step%is_penalty) .and. &
          contact%state(i)%gap0 <= touch_tol*contact%state(i)%size
    end function touches
 
@@ -138,9 +138,9 @@ contains
             if (j > set%n) set%target(j) = contact%state(i)%gap0
             place = contact_place_t(area=self%area(set%id(j)), share=contact%share(i), &
                gap=contact%state(i)%gap0, is_closed=touches(contact, i) .or. &
-               (j <= set%n .and. .not. contact%step%gives_way))
+               (j <= set%n .and. .not. contact%step%is_penalty))
             call contact_laws_begin(set%law(j), contact%laws, place)
-            item%rubs = item%rubs .or. contact_laws_rub(set%law(j))
+            item%has_friction = item%has_friction .or. contact_laws_rub(set%law(j))
          end associate
       end do
    end subroutine near_laws_select

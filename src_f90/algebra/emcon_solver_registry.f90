@@ -5,11 +5,11 @@ module emcon_solver_registry
    implicit none
    private
    public :: solver_row_t, solver_row, n_solver_row, find_solver_row, solver_names, solver_create
-   public :: is_foreign_solver, factors_symmetric, solver_default, solver_mumps, solver_given
+   public :: is_foreign_solver, factors_symmetric, solver_default, solver_mumps, solver_user
 
    !> The default: CHOLMOD for definite matrices, UMFPACK for others; MUMPS where these are not.
-   !> Codes above `solver_given` are those that a program gives, in their order.
-   integer, parameter :: solver_default = 0, solver_mumps = 2, solver_given = 100
+   !> Codes above `solver_user` are those that a program gives, in their order.
+   integer, parameter :: solver_default = 0, solver_mumps = 2, solver_user = 100
 
    !> A choice: what decks call it, and whether this build has it.
    type :: solver_row_t
@@ -85,20 +85,20 @@ contains
 
    !> A solver for matrices of one kind, in place of another that was there: one of the same choice
    !> and kind stays, with the pattern that it has analysed.
-   subroutine solver_create(choice, symmetry, solver, given)
+   subroutine solver_create(choice, symmetry, solver, user)
       integer, intent(in) :: choice              !! one of `solver_` that is built, or above
       integer, intent(in) :: symmetry            !! one of `matrix_`
       class(sparse_solver_t), allocatable, intent(inout) :: solver
-      !> What solvers are copies of, for a choice above `solver_given`
-      class(sparse_solver_t), intent(in), optional :: given
+      !> What solvers are copies of, for a choice above `solver_user`
+      class(sparse_solver_t), intent(in), optional :: user
 
       if (allocated(solver)) then
          if (solver%choice == choice .and. solver%symmetry == symmetry) return
          call solver%free()
          deallocate(solver)
       end if
-      if (present(given)) then
-         allocate(solver, source=given)
+      if (present(user)) then
+         allocate(solver, source=user)
       else
          call allocate_solver(choice, symmetry, solver)
       end if

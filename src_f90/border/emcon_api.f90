@@ -93,7 +93,7 @@ module emcon_api
    use emcon_stepper_file, only : stepper_load, stepper_save
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
       stepper_set_state, stepper_snapshot, stepper_step
-   use emcon_stepper_given, only : stepper_give_constraint, stepper_give_contact, &
+   use emcon_stepper_user, only : stepper_give_constraint, stepper_give_contact, &
       stepper_give_contact_law, stepper_give_element, stepper_give_force, stepper_give_law, &
       stepper_give_mass, stepper_give_potential, stepper_give_scheme, stepper_give_solver
    use emcon_stepper_host, only : stepper_add_pair, stepper_add_surface, stepper_add_tie, &

@@ -197,15 +197,15 @@ contains
       real(wp), allocatable, intent(out) :: shear(:, :), slip(:, :)      !! (n_slip, n_contact)
       real(wp), allocatable, intent(out) :: path(:)                      !! (n_contact)
       integer, allocatable, intent(out) :: way(:)                        !! (n_contact)
-      real(dp), allocatable :: rubs(:, :), slid(:, :)
+      real(dp), allocatable :: along(:, :), slid(:, :)
       integer :: first
 
-      allocate(rubs, source=contact_quantity(model%stepper, "CSHEAR"))
+      allocate(along, source=contact_quantity(model%stepper, "CSHEAR"))
       allocate(slid, source=contact_quantity(model%stepper, "CSLIP"))
       first = model%stepper%march%system%first_constraint(1) + 1
       associate (n => size(slid, 1))
-         shear = real(rubs(:n - 1, first:), wp)
-         way = nint(rubs(n, first:))
+         shear = real(along(:n - 1, first:), wp)
+         way = nint(along(n, first:))
          slip = real(slid(:n - 1, first:), wp)
          path = real(slid(n, first:), wp)
       end associate

@@ -44,8 +44,8 @@ module emcon_contact
    type :: contact_step_t
       logical :: is_sharp = .false.                   !! convex corners are not rounded
       logical :: pushes_at_end = .false.              !! forces act at its end, else all over it
-      logical :: is_soft = .false.                    !! by a penalty, or augmented
-      logical :: gives_way = .false.                  !! it stores what it takes: a penalty
+      logical :: has_compliance = .false.             !! by a penalty, or augmented
+      logical :: is_penalty = .false.                 !! it stores what it takes: a penalty
    end type contact_step_t
 
    type, abstract, extends(constraint_t) :: contact_t
@@ -338,7 +338,8 @@ contains
          return
       end if
       if (.not. evaluation_is_equilibrium(motion%evaluation) &
-         .or. any(item%rubs)) call self%evaluate(wanted, motion%x, motion%u0, motion%du, target, &
+         .or. any(item%has_friction)) call self%evaluate(wanted, motion%x, motion%u0, motion%du, &
+            target, &
          item)
       if (.not. (evaluation_is_equilibrium(motion%evaluation) &
          .or. motion%evaluation%pushes_at_end)) then
@@ -347,11 +348,11 @@ contains
       end if
       gap0 = item%gap0
       dgap = item%dgap
-      if (any(item%rubs)) over = item
+      if (any(item%has_friction)) over = item
       call self%evaluate(wanted, motion%x, motion%from, motion%by, target, item)
       do k = 1, size(item)
          if (.not. item(k)%leaves_second) item(k)%h = motion%weight*item(k)%h
-         if (.not. item(k)%rubs) cycle
+         if (.not. item(k)%has_friction) cycle
          if (.not. item(k)%leaves_second) item(k)%ht = motion%weight*item(k)%ht
          ! Slip is over the step, wherever it pushes.
          item(k)%slip = over(k)%slip
@@ -369,7 +370,7 @@ contains
       integer :: k
 
       do k = 1, size(item)
-         if (item(k)%rubs .and. item(k)%is_mean) item(k)%normal = condition_normal(item(k))
+         if (item(k)%has_friction .and. item(k)%is_mean) item(k)%normal = condition_normal(item(k))
       end do
    end subroutine find_normals
 

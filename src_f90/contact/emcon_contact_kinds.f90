@@ -2,7 +2,7 @@
 submodule (emcon_contact_registry) emcon_contact_kinds
    use emcon_errors, only : err_input, raise
    use emcon_host_contact, only : host_contact_set_up
-   use emcon_interactions, only : formulation_given, formulation_mortar, formulation_segment
+   use emcon_interactions, only : formulation_user, formulation_mortar, formulation_segment
    use emcon_midside_plane, only : midside_init
    use emcon_mortar, only : mortar_init, mortar_t
    use emcon_nts, only : nts_init, nts_t
@@ -19,7 +19,7 @@ contains
       type(segment_t), allocatable :: segment
 
       select case (pair%formulation)
-      case (formulation_given)
+      case (formulation_user)
          call new_given(scene, pair, contact, error, user)
          return
       case (formulation_mortar)

@@ -213,10 +213,10 @@ contains
             ! What stores energy is followed as long as there is any to give back.
             least = least_cover*self%whole(i)
             self%scale(i) = max(area(0), least)
-            if (self%step%gives_way) least = tiny(least)
+            if (self%step%is_penalty) least = tiny(least)
             state%is_near = maxval(area) > 0.0_wp
             state%is_covered = .true.
-            state%is_over = area(1) >= least .or. (self%step%gives_way .and. area(0) >= least)
+            state%is_over = area(1) >= least .or. (self%step%is_penalty .and. area(0) >= least)
             state%is_leaving = .not. state%is_over
             state%is_arriving = area(0) < least
             state%gap0 = 0.0_wp
@@ -270,7 +270,7 @@ contains
             self%work, item(n))
          item(n)%size = self%state(i)%size
          item(n)%is_mean = .true.
-         if (item(n)%rubs) call add_slip(self%slide(i)%point, x, u0, du, item(n))
+         if (item(n)%has_friction) call add_slip(self%slide(i)%point, x, u0, du, item(n))
       end do
    end subroutine integrated_gap_evaluate
 

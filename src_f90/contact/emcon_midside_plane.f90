@@ -245,7 +245,7 @@ contains
       to = size(list)
       first = both(item%g, item%c)
       if (.not. item%leaves_second) second = item%h(:size(first, 1), :size(first, 1))
-      if (item%rubs) then
+      if (item%has_friction) then
          slip = item%slip(1)
          slip_first = both(item%t(:, :, 1), item%t1(:, :, 1))
          if (.not. item%leaves_second) slip_second = item%ht(:size(first, 1), :size(first, 1), 1)
@@ -254,7 +254,7 @@ contains
       item%node(:to) = list
       call take(first, item%g, item%c)
       if (.not. item%leaves_second) call take_second(second, item%h)
-      if (.not. item%rubs) return
+      if (.not. item%has_friction) return
       call condition_resize_slip(item)
       item%slip(1) = slip
       call take(slip_first, item%t(:, :, 1), item%t1(:, :, 1))

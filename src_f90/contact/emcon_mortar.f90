@@ -323,16 +323,16 @@ contains
 
       !> The nodes of an edge, behind `n_before` others: where they start, relative to the node
       !> `origin`, and how they move.
-      pure subroutine place_edge(node, origin, n_before, at, way)
+      pure subroutine place_edge(node, origin, n_before, at, displacement)
          integer, intent(in) :: node(:)          !! of the edge
          integer, intent(in) :: origin, n_before
-         real(wp), intent(inout) :: at(:, :), way(:, :)   !! (n_dim, >= n_before + nodes) [L]
+         real(wp), intent(inout) :: at(:, :), displacement(:, :) !! (n_dim, >= n_before + nodes) [L]
          integer :: i
 
          do i = 1, size(node)
             associate (j => n_before + i, a => node(i))
                at(:, j) = (x(:, a) - x(:, origin)) + (u0(:, a) - u0(:, origin))
-               way(:, j) = du(:, a)
+               displacement(:, j) = du(:, a)
             end associate
          end do
       end subroutine place_edge

@@ -177,16 +177,16 @@ contains
       call look(self, xi, along, above, norm)
       slave = sine(dot_product([1.0_wp - xi, xi], self%edge_along), &
          dot_product([1.0_wp - xi, xi], self%edge_above))
-      master = -sine(way(along), way(above))
+      master = -sine(extent(along), extent(above))
 
    contains
 
       !> From the first node of the master edge to its last.
-      pure real(wp) function way(place)
+      pure real(wp) function extent(place)
          real(wp), intent(in) :: place(:)        !! of master nodes
 
-         way = place(2) - place(1)
-      end function way
+         extent = place(2) - place(1)
+      end function extent
 
       pure real(wp) function sine(beside, opposite)
          real(wp), intent(in) :: beside, opposite   !! sides of a triangle with a right angle

@@ -224,7 +224,7 @@ contains
          state%gap0 = state%gap0 - self%offset - self%sagitta(i)
          state%size = stencil_length(x, stencil%node)
          if (allocated(self%own_slack)) state%closed = -min(state%size, self%own_size(i)) &
-            *merge(self%slack, self%own_slack(self%chain_node(i)), self%step%is_soft)
+            *merge(self%slack, self%own_slack(self%chain_node(i)), self%step%has_compliance)
          state%is_near = .true.
       end associate
    end function polygon_start

@@ -52,10 +52,10 @@ contains
       item%g(:, :n) = 0.0_wp
       item%c(:, :n) = 0.0_wp
       if (.not. item%leaves_second) item%h(:2*n, :2*n) = 0.0_wp
-      if (item%rubs) call condition_resize_slip(item)
+      if (item%has_friction) call condition_resize_slip(item)
       do i = 1, size(stencil)
          call add_polygon(stencil(i), 1.0_wp/size(stencil), x, u0, du, item)
-         if (item%rubs) call slip_add(polygon_slip(stencil(i), 1.0_wp/size(stencil)), &
+         if (item%has_friction) call slip_add(polygon_slip(stencil(i), 1.0_wp/size(stencil)), &
             x, u0, du, item)
       end do
    end subroutine polygon_constraint
@@ -137,7 +137,7 @@ contains
             item%h(:size(x, 1)*n, :size(x, 1)*n) = 0.0_wp
             call nodes_add_second(1.0_wp, size(x, 1), gap%h, in_order(:n), item%h)
          end if
-         if (item%rubs) call take_slip(smooth, local(:, :n), dlocal(:, :n), item)
+         if (item%has_friction) call take_slip(smooth, local(:, :n), dlocal(:, :n), item)
       end associate
    end subroutine smooth_constraint
 

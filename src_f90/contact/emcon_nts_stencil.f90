@@ -92,9 +92,9 @@ contains
       do side = 1, 2
          if (beside(side) == 0) cycle
          corner = master%facet(side, edge)
-         own = way(corner, master%facet(3 - side, edge))
-         arm = way(corner, master%facet(side, beside(side)))
-         to_slave = way(corner, slave)
+         own = vector(corner, master%facet(3 - side, edge))
+         arm = vector(corner, master%facet(side, beside(side)))
+         to_slave = vector(corner, slave)
          length = [sqrt(dot_product(own, own)), sqrt(dot_product(arm, arm))]
          if (.not. dot_product(own, arm) < -sharpest_cosine*product(length)) cycle
          past = dot_product(to_slave, arm)/length(2) - dot_product(to_slave, own)/length(1)
@@ -110,12 +110,12 @@ contains
    contains
 
       !> From node `p` to node `q`.
-      pure function way(p, q)
+      pure function vector(p, q)
          integer, intent(in) :: p, q
-         real(wp) :: way(2)
+         real(wp) :: vector(2)
 
-         way = (x(:, q) - x(:, p)) + (u(:, q) - u(:, p))
-      end function way
+         vector = (x(:, q) - x(:, p)) + (u(:, q) - u(:, p))
+      end function vector
 
    end subroutine edge_of_sector
 
@@ -219,24 +219,25 @@ contains
       integer, intent(in) :: before, after       !! local numbers as in `polygon_stencil_t`
       real(wp) :: along(size(x, 1)), from, to
 
-      along = way(first, last)
-      from = dot_product(way(first, slave), along)
-      to = dot_product(way(slave, last), along)
-      if (before > 0) from = 0.5_wp*(from + dot_product(way(first, slave), way(before, first)))
-      if (after > 0) to = 0.5_wp*(to + dot_product(way(slave, last), way(last, after)))
+      along = vector(first, last)
+      from = dot_product(vector(first, slave), along)
+      to = dot_product(vector(slave, last), along)
+      if (before > 0) from = 0.5_wp*(from + dot_product(vector(first, slave), vector(before, &
+         first)))
+      if (after > 0) to = 0.5_wp*(to + dot_product(vector(slave, last), vector(last, after)))
       part = 0.5_wp
       if (from + to > 0.0_wp) part = from/(from + to)
 
    contains
 
       !> The direction from node `p` to node `q`; to the slave node the whole way.
-      pure function way(p, q)
+      pure function vector(p, q)
          integer, intent(in) :: p, q
-         real(wp) :: way(size(x, 1))
+         real(wp) :: vector(size(x, 1))
 
-         way = x(:, q) - x(:, p)
-         if (p /= slave .and. q /= slave) way = way/sqrt(dot_product(way, way))
-      end function way
+         vector = x(:, q) - x(:, p)
+         if (p /= slave .and. q /= slave) vector = vector/sqrt(dot_product(vector, vector))
+      end function vector
 
    end function part_of_sector
 

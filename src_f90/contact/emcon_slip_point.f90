@@ -168,12 +168,12 @@ contains
 
    contains
 
-      pure function relative(k) result(way)
+      pure function relative(k) result(vector)
          integer, intent(in) :: k                !! node of the point
-         real(wp) :: way(size(x, 1))
+         real(wp) :: vector(size(x, 1))
 
          associate (node => self%node)
-            way = (x(:, node(k)) - x(:, node(3))) + (u0(:, node(k)) - u0(:, node(3)))
+            vector = (x(:, node(k)) - x(:, node(3))) + (u0(:, node(k)) - u0(:, node(3)))
          end associate
       end function relative
 

@@ -27,7 +27,7 @@ module emcon_start_gaps
       procedure :: is_connected
       procedure(nearest_interface), deferred :: nearest
       procedure(measure_interface), deferred :: measure
-      procedure(way_interface), deferred :: way
+      procedure(offset_interface), deferred :: offset
       procedure(faces_interface), deferred :: faces
       procedure(is_sharp_interface), deferred :: is_sharp
       procedure(crossing_interface), deferred :: crossing
@@ -54,14 +54,14 @@ module emcon_start_gaps
 
       !> The way of node `i` off its surface as last measured, along the normal: without it the gap
       !> is closed, to first order.
-      pure subroutine way_interface(self, i, scene, way, is_last)
+      pure subroutine offset_interface(self, i, scene, offset, is_last)
          import :: scene_t, start_gaps_t, wp
          class(start_gaps_t), intent(inout) :: self
          integer, intent(in) :: i                !! 1..n
          type(scene_t), intent(in) :: scene
-         real(wp), intent(out) :: way(:)         !! (n_dim) [L]
+         real(wp), intent(out) :: offset(:)         !! (n_dim) [L]
          logical, intent(out) :: is_last         !! it is round-off
-      end subroutine way_interface
+      end subroutine offset_interface
 
       !> Do the slave's surface at node `i` and the facet that is nearest to it face each other?
       pure logical function faces_interface(self, i, scene)

@@ -21,7 +21,7 @@ module emcon_start_gaps_plane
    contains
       procedure :: nearest
       procedure :: measure
-      procedure :: way => way_off
+      procedure :: offset => offset_off
       procedure :: faces
       procedure :: is_sharp
       procedure :: crossing
@@ -80,20 +80,20 @@ contains
       self%state = self%nts%state
    end subroutine measure
 
-   pure subroutine way_off(self, i, scene, way, is_last)
+   pure subroutine offset_off(self, i, scene, offset, is_last)
       class(start_gaps_plane_t), intent(inout) :: self
       integer, intent(in) :: i                   !! 1..n
       type(scene_t), intent(in) :: scene
-      real(wp), intent(out) :: way(:)            !! (2) [L]
+      real(wp), intent(out) :: offset(:)            !! (2) [L]
       logical, intent(out) :: is_last            !! it is round-off
       type(condition_t) :: item(1)
 
       call self%nts%evaluate_points([i], scene%x, self%u, self%still, [0.0_wp], item)
       associate (normal => item(1)%c(:, 1))
-         way = item(1)%gap1*normal/dot_product(normal, normal)
+         offset = item(1)%gap1*normal/dot_product(normal, normal)
       end associate
       is_last = abs(item(1)%gap1) <= epsilon(1.0_wp)*item(1)%size
-   end subroutine way_off
+   end subroutine offset_off
 
    pure logical function faces(self, i, scene)
       class(start_gaps_plane_t), intent(in) :: self

@@ -21,7 +21,7 @@ module emcon_deck
    use emcon_deck_general_contact, only : read_general_contact
    use emcon_deck_geometry, only : check_shapes
    use emcon_deck_element_kinds, only : read_element_kinds
-   use emcon_deck_given, only : read_given
+   use emcon_deck_user, only : read_given
    use emcon_deck_initial, only : read_initial_conditions
    use emcon_deck_keywords, only : find_keyword, keywords
    use emcon_deck_materials, only : read_materials, read_sections

@@ -6,7 +6,7 @@ module emcon_deck_check_contact
    use emcon_deck_check_surfaces, only : mark_nodes
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
-   use emcon_interactions, only : contact_pair_t, formulation_given, formulation_mortar, &
+   use emcon_interactions, only : contact_pair_t, formulation_user, formulation_mortar, &
       formulation_segment, multiplier_standard
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
@@ -102,7 +102,7 @@ contains
       logical :: is_bent
 
       if (pair%both_sides .or. pair%is_exchanged .or. pair%slave == pair%master) return
-      if (pair%formulation == formulation_given) return
+      if (pair%formulation == formulation_user) return
       call find_advice(scene, pair, advice, is_bent)
       if (advice == "") return
       if (n_stuck(scene, exchanged(pair)) > n_stuck(scene, pair)) then
@@ -158,7 +158,7 @@ contains
       integer, allocatable :: n_free(:)
       integer :: i
 
-      if (any(pair%formulation == [0, formulation_given]) .or. pair%both_sides) return
+      if (any(pair%formulation == [0, formulation_user]) .or. pair%both_sides) return
       allocate(is_slave(size(scene%node%label)), is_held(size(scene%node%label)), &
          is_guided(size(scene%node%label)), source=.false.)
       call mark_nodes(scene, scene%surface(pair%slave), is_slave)

@@ -10,7 +10,7 @@ module emcon_deck_contact
       option_name, reader_t, refuse_option
    use emcon_deck_surfaces, only : get_surfaces
    use emcon_diagnostics, only : add_error, quoted, suggestion
-   use emcon_interactions, only : contact_damping_t, contact_pair_t, formulation_given, &
+   use emcon_interactions, only : contact_damping_t, contact_pair_t, formulation_user, &
       formulation_mortar, formulation_nts, formulation_segment
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
@@ -29,11 +29,11 @@ contains
    subroutine read_interactions(reader)
       type(reader_t), intent(inout) :: reader
       character(len=:), allocatable :: name
-      integer :: i, n, rubs
+      integer :: i, n, last_friction
 
       allocate(reader%interaction(size(reader%card)), reader%interaction_name(size(reader%card)))
       n = 0
-      rubs = 0                                   ! the last interaction with *FRICTION
+      last_friction = 0                                   ! the last interaction with *FRICTION
       do i = 1, size(reader%card)
          associate (card => reader%card(i))
             select case (card%name)
@@ -55,9 +55,9 @@ contains
                   call read_contact_damping(reader, card, reader%interaction(max(1, n))%damping)
                   if (n == 0) reader%interaction(1)%damping = contact_damping_t()
                else if (card%name == "FRICTION") then
-                  if (n > 0 .and. n == rubs) call card_error(reader, card, &
+                  if (n > 0 .and. n == last_friction) call card_error(reader, card, &
                      "the surface interaction has *FRICTION already")
-                  rubs = n
+                  last_friction = n
                   call read_friction(reader, card, reader%interaction(max(1, n))%friction)
                   call read_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
                      // "left of the velocity along the surface of what sticks", &
@@ -187,7 +187,7 @@ contains
       of_card%is_asked = has_option(card, "SIDES")
       select case (option_name(card, "SIDES"))
       case ("", "AUTO")
-         of_card%may_choose = of_card%formulation /= formulation_given
+         of_card%may_choose = of_card%formulation /= formulation_user
       case ("ONE")
          continue
       case ("BOTH")
@@ -195,7 +195,7 @@ contains
          if (any(of_card%formulation == [formulation_segment, formulation_mortar])) then
             call refuse_option(reader, card, "SIDES", "AUTO, ONE", "SEGMENT and MORTAR hold what " &
                // "lies between the surfaces once; use TYPE=NODE TO SURFACE")
-         else if (of_card%formulation == formulation_given) then
+         else if (of_card%formulation == formulation_user) then
             call refuse_option(reader, card, "SIDES", "AUTO, ONE", "what TYPE=USER holds the " // &
                "program says that gives it")
          end if
@@ -337,7 +337,7 @@ contains
       if (has_option(card, "ADJUST")) call read_adjust(reader, card, scene, of_card)
       call read_guard(reader, card, any(pair%both_sides), of_card)
       call read_pair_initiation(reader, card, of_card%initiation)
-      if (any(pair%formulation == formulation_given)) call suit_given(reader, card, of_card)
+      if (any(pair%formulation == formulation_user)) call suit_user(reader, card, of_card)
       do i = 1, size(pair)
          pair(i)%adjust%distance = of_card%adjust%distance
          pair(i)%adjust%set = of_card%adjust%set
@@ -352,7 +352,7 @@ contains
    end subroutine read_pair_options
 
    !> What contact of a program has, and what it does not know of.
-   subroutine suit_given(reader, card, of_card)
+   subroutine suit_user(reader, card, of_card)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(contact_pair_t), intent(inout) :: of_card
@@ -375,7 +375,7 @@ contains
             "gives")
       end subroutine refuse
 
-   end subroutine suit_given
+   end subroutine suit_user
 
    !> INTERACTION= of a card: the thickness of its pad, restitution, friction, damping.
    subroutine read_interaction(reader, card, pair, of_card)

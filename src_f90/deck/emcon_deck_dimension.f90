@@ -7,7 +7,7 @@ module emcon_deck_dimension
    use emcon_kinds, only : wp
    use emcon_requests, only : output_t
    use emcon_scene, only : scene_t
-   use emcon_scheme_registry, only : scheme_given
+   use emcon_scheme_registry, only : scheme_user
    implicit none
    private
    public :: n_plane, n_space, type_dimension, other_dimension, find_dimension, is_axial_deck
@@ -132,7 +132,7 @@ contains
       do i = 1, size(is_kept)
          k = findloc(plane_cards%name == reader%card(i)%name .and. .not. &
             (plane_cards%is_of_space .and. n_dim == n_space), .true., 1)
-         if (is_given_pair(reader%card(i)) .and. n_dim == n_space) k = 0
+         if (is_user_pair(reader%card(i)) .and. n_dim == n_space) k = 0
          is_kept(i) = k == 0 .and. index(reader%card(i)%name, "CONTACTINCLUSIONS") == 0 &
             .and. index(reader%card(i)%name, "CONTACTPROPERTY") == 0
          if (k == 0) cycle
@@ -155,11 +155,11 @@ contains
    end subroutine refuse_plane_cards
 
    !> A contact pair whose contact a program gives?
-   pure logical function is_given_pair(card)
+   pure logical function is_user_pair(card)
       type(card_t), intent(in) :: card
 
-      is_given_pair = card%name == "CONTACTPAIR" .and. option_name(card, "TYPE") == "USER"
-   end function is_given_pair
+      is_user_pair = card%name == "CONTACTPAIR" .and. option_name(card, "TYPE") == "USER"
+   end function is_user_pair
 
    !> Refuse what materials, schemes of a program and output ask for and is of the plane. Values
    !> of options are refused where they are read, by their rows.
@@ -179,7 +179,7 @@ contains
       end do
       do i = 1, size(scene%step)
          associate (step => scene%step(i))
-            if (step%scheme%dissipates .and. step%scheme%code == scheme_given) call add_error( &
+            if (step%scheme%dissipates .and. step%scheme%code == scheme_user) call add_error( &
                reader%log, step%choice%origin, "*TIME INTEGRATION: SCHEME=" // &
                trim(step%scheme%word) // missing)
             do k = 1, size(step%output)

@@ -12,7 +12,7 @@ module emcon_deck_materials
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_t
-   use emcon_law_registry, only : find_law_row, law_create, law_given, law_row, &
+   use emcon_law_registry, only : find_law_row, law_create, law_user, law_row, &
       law_row_t, n_constant, n_law_row
    use emcon_materials, only : kinematics_nonlinear, material_t, section_t
    use emcon_name_index, only : name_index_find, name_index_put
@@ -177,7 +177,7 @@ contains
       real(wp) :: value
       integer :: i, n_constant
 
-      material%law = law_given
+      material%law = law_user
       n_constant = merge(-1, 0, has_option(card, "CONSTANTS"))
       call option_count(reader, card, "CONSTANTS", 0, n_constant)
       call data_open(data, card)
@@ -378,7 +378,7 @@ contains
       call choose_option(reader, card, "KINEMATICS", "kinematics", section%kinematics)
       if (section%kinematics == kinematics_nonlinear .or. section%material == 0) return
       associate (material => scene%material(section%material))
-         if (material%law == law_given) call card_error(reader, card, "KINEMATICS=" &
+         if (material%law == law_user) call card_error(reader, card, "KINEMATICS=" &
             // option_name(card, "KINEMATICS") // ": material " // material%name // " is a *USER " &
             // "MATERIAL; it needs *ELASTIC or *HYPERELASTIC")
       end associate

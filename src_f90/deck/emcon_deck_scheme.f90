@@ -6,7 +6,7 @@ module emcon_deck_scheme
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_scheme, only : scheme_row_t, setting_t
-   use emcon_scheme_registry, only : n_setting_range, scheme_given_row, scheme_row, &
+   use emcon_scheme_registry, only : n_setting_range, scheme_user_row, scheme_row, &
       setting_range, setting_range_t
    use emcon_steps, only : initiation_massless, initiation_velocity_update, step_t
    use emcon_text, only : read_real, squeezed, to_text
@@ -28,7 +28,7 @@ contains
       step%choice%name = option_name(card, "SCHEME")
       step%choice%row = scheme_row("DYNAMIC", step%choice%name)
       if (step%choice%row%code == 0) then
-         step%choice%row = scheme_given_row
+         step%choice%row = scheme_user_row
       else
          code = step%choice%row%code
          call check_option(reader, card, "SCHEME", "scheme", code)

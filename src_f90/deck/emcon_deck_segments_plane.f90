@@ -150,14 +150,14 @@ contains
    !> Do all points lie on one line? Then they do not tell how the body is turned.
    pure logical function is_straight(place)
       real(wp), intent(in) :: place(:, :)        !! (2, n) n > 1
-      real(wp) :: way(2), arm(2)
+      real(wp) :: chord(2), arm(2)
       integer :: i
 
-      way = place(:, size(place, 2)) - place(:, 1)
+      chord = place(:, size(place, 2)) - place(:, 1)
       is_straight = .false.
       do i = 2, size(place, 2) - 1
          arm = place(:, i) - place(:, 1)
-         if (abs(way(1)*arm(2) - way(2)*arm(1)) > rounding*dot_product(way, way)) return
+         if (abs(chord(1)*arm(2) - chord(2)*arm(1)) > rounding*dot_product(chord, chord)) return
       end do
       is_straight = .true.
    end function is_straight

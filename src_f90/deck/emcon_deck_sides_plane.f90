@@ -88,7 +88,7 @@ contains
       integer, intent(in) :: e
       real(wp), intent(out) :: along             !! the side
       real(wp), intent(out) :: beside            !! in any direction
-      real(wp) :: way(2), arm(2), part
+      real(wp) :: chord(2), arm(2), part
       integer :: f
 
       along = 0.0_wp
@@ -96,14 +96,14 @@ contains
       associate (kind => scene%element%kinds(scene%element%kind(e)))
          do f = 1, kind%n_face
             associate (node => scene%element%node(kind%face(f), e))
-               way = scene%x(:, node(2)) - scene%x(:, node(1))
+               chord = scene%x(:, node(2)) - scene%x(:, node(1))
                arm = scene%x(:, node(3)) - scene%x(:, node(1))
             end associate
-            arm = arm/maxval(abs(way))
-            way = way/maxval(abs(way))
-            part = dot_product(arm, way)/dot_product(way, way)
+            arm = arm/maxval(abs(chord))
+            chord = chord/maxval(abs(chord))
+            part = dot_product(arm, chord)/dot_product(chord, chord)
             along = max(along, abs(part - 0.5_wp))
-            beside = max(beside, norm2(arm - 0.5_wp*way)/norm2(way))
+            beside = max(beside, norm2(arm - 0.5_wp*chord)/norm2(chord))
          end do
       end associate
    end subroutine find_furthest

@@ -23,7 +23,7 @@ module emcon_deck_step
    use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
    use emcon_deck_rigid, only : read_turns
    use emcon_deck_scheme, only : check_schemes, read_scheme
-   use emcon_deck_softness, only : check_softness, read_constraint_method
+   use emcon_deck_penalty, only : check_penalty, read_constraint_method
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
       option_name, option_real, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
@@ -33,7 +33,7 @@ module emcon_deck_step
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_row
-   use emcon_solver_registry, only : find_solver_row, is_foreign_solver, solver_given, &
+   use emcon_solver_registry, only : find_solver_row, is_foreign_solver, solver_user, &
       solver_names, solver_row, solver_row_t
    use emcon_steps, only : step_t
    use emcon_text, only : to_text
@@ -89,7 +89,7 @@ contains
       call check_massless(reader, scene%step)
       call check_schemes(reader, scene%pair, scene%step)
       call check_restitution(reader, scene%pair, scene%step)
-      call check_softness(reader, scene%pair, scene%step)
+      call check_penalty(reader, scene%pair, scene%step)
       call check_damping(reader, scene)
       call check_friction(reader, scene%pair, scene%step, scene%surface%is_nodal)
       call check_contact_damping(reader, scene%pair, scene%step)
@@ -106,7 +106,7 @@ contains
 
       step%nlgeom = last%nlgeom
       step%contact%method = last%contact%method
-      step%contact%softness = last%contact%softness
+      step%contact%penalty = last%contact%penalty
       step%contact%initiation = last%contact%initiation
       step%contact%gap_tolerance = last%contact%gap_tolerance
       step%contact%options = last%contact%options
@@ -274,7 +274,7 @@ contains
          call card_warning(reader, card, "SOLVER=" // option_name(card, "SOLVER") // &
             " has no effect: solvers here are " // known)
       else if (i == 0) then
-         step%solution%solver = solver_given
+         step%solution%solver = solver_user
          step%solution%solver_name = option_name(card, "SOLVER")
          step%solution%solver_origin = card%origin
       else if (.not. row%is_built) then

@@ -167,7 +167,7 @@ contains
    pure subroutine above_negative_chord(a0, a1, width, slope, rate)
       real(wp), intent(in) :: a0, a1, width
       real(wp), intent(out) :: slope, rate
-      real(wp) :: total, low, high, first, last, way(2), within, reach
+      real(wp) :: total, low, high, first, last, span(2), within, reach
 
       total = abs(a1 - a0)
       if (.not. total > 0.0_wp) then
@@ -187,9 +187,9 @@ contains
             + 3.0_wp*(s**4 + (s*t)**2 + t**4))/16.0_wp)
       end associate
       ! Gauss's rule of three points, by parts of the way, is exact for the fifth degree.
-      way = abs(max(-width, min(width, [a0, a1])) - a0)/total
-      reach = 0.5_wp*sqrt(0.6_wp)*(way(2) - way(1))
-      associate (middle => 0.5_wp*(way(1) + way(2)))
+      span = abs(max(-width, min(width, [a0, a1])) - a0)/total
+      reach = 0.5_wp*sqrt(0.6_wp)*(span(2) - span(1))
+      associate (middle => 0.5_wp*(span(1) + span(2)))
          rate = within*(5.0_wp*moment(middle - reach) + 8.0_wp*moment(middle) &
             + 5.0_wp*moment(middle + reach))/18.0_wp
       end associate

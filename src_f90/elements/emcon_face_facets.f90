@@ -29,24 +29,24 @@ contains
       class(element_row_t), intent(in) :: kind
       integer, intent(in) :: i                   !! face, 1 to n_face
       integer :: facet(n_facet_node(kind), n_face_facet(kind))
-      integer :: node(kind%n_face_node), way(kind%n_face_node), k
+      integer :: node(kind%n_face_node), path(kind%n_face_node), k
 
       node = kind%face(i)                        ! corners, then those between them
       if (kind%n_dim == 2) then
          associate (n => size(node))
-            way = node([1, (k, k = 3, n), 2])
-            facet = reshape([(way(k:k + 1), k = 1, n - 1)], shape(facet))
+            path = node([1, (k, k = 3, n), 2])
+            facet = reshape([(path(k:k + 1), k = 1, n - 1)], shape(facet))
          end associate
          return
       end if
-      way = node
+      path = node
       if (kind%n_node > kind%n_corner) then
          associate (n_corner => size(node)/2)
-            way(1::2) = node(:n_corner)
-            way(2::2) = node(n_corner + 1:)
+            path(1::2) = node(:n_corner)
+            path(2::2) = node(n_corner + 1:)
          end associate
       end if
-      facet(:, 1) = [way(1), way(size(way):2:-1)]   ! faces run the other way, seen from outside
+      facet(:, 1) = [path(1), path(size(path):2:-1)]   ! faces run the other way, seen from outside
    end function face_facets
 
 end module emcon_face_facets

@@ -11,7 +11,7 @@ submodule (emcon_law_registry) emcon_law_kinds
    use emcon_law_yeoh, only : law_yeoh_t
    implicit none
 
-   !> Codes besides those of the registry, of which `law_given` has no row.
+   !> Codes besides those of the registry, of which `law_user` has no row.
    integer, parameter :: law_neo_hooke = 2, law_coupled_neo_hooke = 3, law_mooney_rivlin = 5, &
       law_yeoh = 6, law_ogden = 7
 

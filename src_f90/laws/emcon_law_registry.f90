@@ -8,11 +8,11 @@ module emcon_law_registry
    implicit none
    private
    public :: law_row_t, law_row, n_law_row, law_titles, law_variants, find_law_row, n_constant
-   public :: law_create, law_linearise, law_make_thin, law_linear, law_given
+   public :: law_create, law_linearise, law_make_thin, law_linear, law_user
 
    !> Codes of laws that others ask for: linear elasticity, under NLGEOM St. Venant-Kirchhoff; those
    !> given by a program.
-   integer, parameter :: law_linear = 1, law_given = 4
+   integer, parameter :: law_linear = 1, law_user = 4
 
    integer, parameter :: max_constant = 9
 

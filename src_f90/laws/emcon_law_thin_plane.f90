@@ -64,16 +64,16 @@ contains
       type(dg_t), intent(in) :: e3               !! not looked at
       type(dg_t) :: w, bulk
       type(normal_t) :: start, last
-      real(wp) :: way(n_plane)
+      real(wp) :: change(n_plane)
 
       associate (unused => e3)
       end associate
-      way = [e1%df, e2%df]
+      change = [e1%df, e2%df]
       call find_normal(self%solid, [e1%f0, e2%f0], start)
       last = start
       call find_normal(self%solid, [e1%f1, e2%f1], last)
-      bulk = bulk_energy(self%solid, [e1%f0, e2%f0], way, start%x, last%x - start%x)
-      call condense(bulk, start, last, [e1%f0, e2%f0], way, w)
+      bulk = bulk_energy(self%solid, [e1%f0, e2%f0], change, start%x, last%x - start%x)
+      call condense(bulk, start, last, [e1%f0, e2%f0], change, w)
    end function energy
 
    !> W of invariants of the plane that go from `p` by `by`, and a normal strain from `x` by `dx`.
@@ -97,7 +97,7 @@ contains
       type(normal_t), intent(inout) :: normal    !! x: a guess
       real(wp), parameter :: near = sqrt(epsilon(1.0_wp)), none(n_plane) = 0.0_wp
       integer, parameter :: most = 100           ! halvings: more than there are digits
-      real(wp) :: square, below, above, force, rate, way, trial
+      real(wp) :: square, below, above, force, rate, correction, trial
       type(dg_t) :: w
       integer :: i
 
@@ -110,39 +110,39 @@ contains
          rate = force + 2.0_wp*w%h(3, 3)*square
          if (force > 0.0_wp) above = normal%x
          if (force < 0.0_wp) below = normal%x
-         way = -force/rate                       ! of t, over t
-         trial = normal%x + way*square*(1.0_wp + 0.5_wp*way)
-         if (.not. (rate > 0.0_wp .and. way > -1.0_wp .and. trial >= below &
+         correction = -force/rate                       ! of t, over t
+         trial = normal%x + correction*square*(1.0_wp + 0.5_wp*correction)
+         if (.not. (rate > 0.0_wp .and. correction > -1.0_wp .and. trial >= below &
             .and. trial <= above)) then          ! 4 + 9 x: three times the stretch
             trial = 0.5_wp*(below + min(above, 4.0_wp + 9.0_wp*normal%x))
          end if
-         way = trial - normal%x
+         correction = trial - normal%x
          normal%x = trial
-         if (.not. abs(way) > near*abs(trial)) exit
+         if (.not. abs(correction) > near*abs(trial)) exit
       end do
       w = bulk_energy(solid, p, none, normal%x, 0.0_wp)
       normal%slope = -w%h(3, :n_plane)/w%h(3, 3)
    end subroutine find_normal
 
    !> W* of W, which is `bulk`.
-   pure subroutine condense(bulk, start, last, p, way, w)
+   pure subroutine condense(bulk, start, last, p, change, w)
       type(dg_t), intent(in) :: bulk
       type(normal_t), intent(in) :: start, last
-      real(wp), intent(in) :: p(n_plane), way(n_plane)     !! invariants at the start, their change
+      real(wp), intent(in) :: p(n_plane), change(n_plane) !! invariants at the start, their change
       type(dg_t), intent(out) :: w
       real(wp), dimension(n_plane) :: slope, part
       real(wp) :: square, rest
       integer :: j
 
       ! Way over its square, but 0 where the way is round-off: what it is multiplied by is smaller.
-      square = dot_product(way, way) + epsilon(1.0_wp)*dot_product(p, p) + tiny(1.0_wp)
-      part = way/square
-      rest = (last%x - start%x) - dot_product(start%slope, way)
+      square = dot_product(change, change) + epsilon(1.0_wp)*dot_product(p, p) + tiny(1.0_wp)
+      part = change/square
+      rest = (last%x - start%x) - dot_product(start%slope, change)
       slope = start%slope + rest*part
       w%f0 = bulk%f0
       w%f1 = bulk%f1
       w%g(:n_plane) = bulk%g(:n_plane) + bulk%g(3)*slope
-      w%df = dot_product(w%g(:n_plane), way)
+      w%df = dot_product(w%g(:n_plane), change)
       w%c(:n_plane) = bulk%c(:n_plane) + bulk%c(3)*last%slope
       do j = 1, n_plane
          w%h(:n_plane, j) = bulk%h(:n_plane, j) + bulk%h(:n_plane, 3)*last%slope(j) &

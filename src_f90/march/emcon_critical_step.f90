@@ -132,20 +132,20 @@ contains
       real(wp), intent(in) :: q(:)               !! (n_unknown)
       real(wp), intent(out), contiguous :: image(:)      !! (n_unknown)
       type(constraint_set_t), intent(in), optional :: closed
-      real(wp), dimension(size(place%x, 1), size(place%x, 2)) :: way, force
+      real(wp), dimension(size(place%x, 1), size(place%x, 2)) :: displacement, force
       real(wp) :: push
       integer :: i, k
 
-      way = 0.0_wp
-      call add_to_dofs(system%space%numbering, q, 1.0_wp, way)
-      call system_tangent_times(system, place, way, force)
+      displacement = 0.0_wp
+      call add_to_dofs(system%space%numbering, q, 1.0_wp, displacement)
+      call system_tangent_times(system, place, displacement, force)
       do i = 1, size(stiffness)
-         force(:, i) = force(:, i) + stiffness(i)*way(:, i)
+         force(:, i) = force(:, i) + stiffness(i)*displacement(:, i)
       end do
       if (present(closed)) then
          do k = 1, closed%n
             associate (item => closed%item(k))
-               push = closed%law(k)%row%stiffest()*condition_rate(item, way)
+               push = closed%law(k)%row%stiffest()*condition_rate(item, displacement)
                do i = 1, item%n_node
                   force(:, item%node(i)) = force(:, item%node(i)) + push*item%c(:, i)
                end do

@@ -13,8 +13,9 @@ module emcon_explicit
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_evaluation, only : instant_later, instant_t, evaluation_at_end
    use emcon_explicit_push, only : explicit_push
-   use emcon_explicit_soft, only : explicit_soft_force, explicit_soft_limit, explicit_soft_push, &
-      explicit_soft_widen
+   use emcon_explicit_penalty, only : explicit_penalty_force, explicit_penalty_limit, &
+      explicit_penalty_push, &
+      explicit_penalty_widen
    use emcon_kinds, only : dp, wp
    use emcon_lagged_forces, only : lagged_forces_take
    use emcon_march_guess, only : follow_links
@@ -54,7 +55,7 @@ contains
       self%system%lagged%is_known = .false.
       call check_mass(self, scene, error)
       if (allocated(error)) return
-      call explicit_soft_limit(self, scene)
+      call explicit_penalty_limit(self, scene)
       associate (place => self%explicit%place, step => scene%step(self%state%clock%i_step), &
             limit => self%state%explicit%critical_h)
          call motion_init(place, scene%x)
@@ -88,7 +89,7 @@ contains
       character(len=:), allocatable, intent(out) :: text
 
       text = "the critical step " // to_text(self%state%explicit%critical_h)
-      if (self%active%softness%is_at_ends) text = text // " with closed contacts"
+      if (self%active%penalty%is_at_ends) text = text // " with closed contacts"
       if (self%state%explicit%critical_element > 0) text = text // " (the fastest element is " // &
          to_text(scene%element%label(self%state%explicit%critical_element)) // ")"
    end subroutine limit_text
@@ -151,16 +152,16 @@ contains
             call system_respond(system, explicit%place, .false.)
             call system_check_response(system, "at the start of the increment", error)
             if (allocated(error)) return
-            call explicit_soft_push(self, is_end=.false.)
+            call explicit_penalty_push(self, is_end=.false.)
             call lagged_forces_take(system%lagged, system%response)
          end if
-         call explicit_soft_widen(self, has_grown)
+         call explicit_penalty_widen(self, has_grown)
          if (mod(self%state%clock%increment, overlap_query_every) == 0 &
             .and. self%state%clock%increment > self%state%clock%n_before) call find_limit(self, &
             part, error)
          if (has_grown .and. .not. allocated(error)) call critical_sharp(system, explicit%place, &
             0.0_wp*explicit%stiffness, self%state%explicit%critical_h, error, &
-            explicit%soft(explicit%i_start))
+            explicit%penalty(explicit%i_start))
          if (.not. allocated(error)) call check_limit(self, scene, part, error)
          system%lagged%is_on = .not. allocated(error)
       end associate
@@ -222,7 +223,7 @@ contains
          if (any(active%is_active)) return
          call phase_enter(system%phases, phase_gaps, left)
          call active_set_select(active, system, motion)
-         is_done = size(system%contact) == 0 .or. active%softness%is_at_ends
+         is_done = size(system%contact) == 0 .or. active%penalty%is_at_ends
          status = step_done
          if (.not. is_done) call active_set_advance(active, system, motion, is_done, status)
          call phase_leave(system%phases, left)
@@ -268,7 +269,7 @@ contains
          end_state%energy = system%response%energy
          end_state%potential = system%response%potential
          explicit%load = system%response%part(role_external)%force
-         call explicit_soft_push(self, is_end=.true.)
+         call explicit_penalty_push(self, is_end=.true.)
          call lagged_forces_take(system%lagged, system%response)
          call explicit_push(self, part%h, error)
          if (allocated(error)) return
@@ -305,12 +306,12 @@ contains
          where (self%system%space%numbering%unknown > 0) explicit%residual = 0.0_wp
          state%reaction = 0.5_wp*(state%reaction + explicit%residual)
          self%newton%contact = 0.5_wp*(self%newton%contact + explicit%contact)
-         if (self%active%softness%is_at_ends) call explicit_soft_force(explicit%soft(1 &
+         if (self%active%penalty%is_at_ends) call explicit_penalty_force(explicit%penalty(1 &
             - explicit%i_start), self%newton%contact)
          contact = 0.0_wp
          do k = 1, set%n
-            contact = contact + 0.25_wp*(set%lam(k)*(h*way_of(set, k, state%v) &
-               + way_of(set, k, motion%du)) + explicit%mu(k)*(condition_rate(set%item(k), &
+            contact = contact + 0.25_wp*(set%lam(k)*(h*gap_change(set, k, state%v) &
+               + gap_change(set, k, motion%du)) + explicit%mu(k)*(condition_rate(set%item(k), &
                motion%du) + h*condition_rate(set%item(k), self%end_state%v)))
             set%lam(k) = 0.5_wp*(set%lam(k) + explicit%mu(k))
          end do
@@ -323,17 +324,17 @@ contains
    end subroutine explicit_commit
 
    !> The rate of a condition with the field `way` by its discrete gradient.
-   pure real(wp) function way_of(set, k, way) result(rate)
+   pure real(wp) function gap_change(set, k, displacement) result(rate)
       type(constraint_set_t), intent(in) :: set
       integer, intent(in) :: k
-      real(wp), intent(in) :: way(:, :)          !! (n_dim, n_node)
+      real(wp), intent(in) :: displacement(:, :)          !! (n_dim, n_node)
       integer :: i
 
       rate = 0.0_wp
       do i = 1, set%item(k)%n_node
-         rate = rate + dot_product(set%item(k)%g(:, i), way(:, set%item(k)%node(i)))
+         rate = rate + dot_product(set%item(k)%g(:, i), displacement(:, set%item(k)%node(i)))
       end do
-   end function way_of
+   end function gap_change
 
    !> An error if there is far more energy than was put in, or none that is a number.
    subroutine check_growth(self, work, error)

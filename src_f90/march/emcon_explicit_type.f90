@@ -24,7 +24,7 @@ module emcon_explicit_type
       real(wp), allocatable :: mu(:)             !! (constraints of the step) multipliers there
       !> Contacts that give way at the start and the end of the step, at whichever of its two places
       !> that is.
-      type(constraint_set_t) :: soft(0:1)
+      type(constraint_set_t) :: penalty(0:1)
       integer :: i_start = 0                     !! that of the start
       real(wp), allocatable :: stiffness(:)      !! (n_node) of closed contacts [M/T^2]
       real(wp), allocatable :: met(:)            !! (n_node) that, or the most so far [M/T^2]

@@ -25,7 +25,7 @@ module emcon_march
    use emcon_pair_sums, only : pair_sums_init
    use emcon_rigid_rotation, only : rigid_rotation_init
    use emcon_scene, only : scene_t, where_text
-   use emcon_scheme_registry, only : scheme_given
+   use emcon_scheme_registry, only : scheme_user
    use emcon_state, only : state_t
    use emcon_step_control, only : control_forget
    use emcon_system, only : system_init
@@ -41,21 +41,21 @@ module emcon_march
 contains
 
    !> Build the system of `scene`, and of what it is given, and put it into its initial state.
-   subroutine march_init(self, scene, error, given)
+   subroutine march_init(self, scene, error, host)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(host_t), intent(in), optional :: given
+      type(host_t), intent(in), optional :: host
 
       call check_schemes(self, scene, error)
-      if (.not. allocated(error)) call system_init(self%system, scene, error, given)
+      if (.not. allocated(error)) call system_init(self%system, scene, error, host)
       if (allocated(error)) return
       allocate(self%massless%may_be(size(scene%x, 2)), &
          self%massless%without_density(size(scene%x, 2)))
       call terms_massless(self%system%term, self%massless%may_be, self%massless%without_density)
-      call layer_init(self%layer, scene, self%massless%may_be, self%system, error, given)
+      call layer_init(self%layer, scene, self%massless%may_be, self%system, error, host)
       if (allocated(error)) return
-      call host_copy_solvers(given, self%host%solver)
+      call host_copy_solvers(host, self%host%solver)
       call motion_init(self%motion, scene%x)
       allocate(self%end_state%v, source=at_rest(scene%x))
       associate (state => self%state)
@@ -91,7 +91,7 @@ contains
 
       do i = 1, size(scene%step)
          associate (choice => scene%step(i)%choice)
-            if (scene%step(i)%scheme%code /= scheme_given) cycle
+            if (scene%step(i)%scheme%code /= scheme_user) cycle
             if (host_scheme_find(self%host%scheme, choice%name) > 0) cycle
             call option_words("scheme", known)
             call raise(error, err_input, where_text(scene, choice%origin) // ": error: SCHEME=" // &

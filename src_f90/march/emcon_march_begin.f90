@@ -31,9 +31,9 @@ module emcon_march_begin
    use emcon_evaluation, only : evaluation_at_end
    use emcon_quasi_static, only : quasi_static_begin, quasi_static_hold
    use emcon_scene, only : scene_t, where_text
-   use emcon_scheme_registry, only : scheme_create, scheme_given
-   use emcon_softness, only : softness_begin_step
-   use emcon_solver_registry, only : solver_given
+   use emcon_scheme_registry, only : scheme_create, scheme_user
+   use emcon_penalty, only : penalty_begin_step
+   use emcon_solver_registry, only : solver_user
    use emcon_state, only : state_t
    use emcon_step_control, only : control_begin
    use emcon_steps, only : initiation_massless, initiation_persistent, method_null_space, &
@@ -192,7 +192,7 @@ contains
          if (.not. step_is_dynamic(step)) call contact_support_begin(self%active%support, &
             self%system, scene, state%u)
          call configure_contact(self, scene)
-         call softness_begin_step(self%active%softness, self%system, scene, step, error)
+         call penalty_begin_step(self%active%penalty, self%system, scene, step, error)
          if (allocated(error)) return
          call near_laws_begin_step(self%active%near_laws, self%system, &
             scene, step)
@@ -377,14 +377,14 @@ contains
       integer :: i, method
 
       method = merge(method_null_space, method_saddle_point, self%system%space%is_reduced)
-      if (step%solution%solver /= solver_given) then
+      if (step%solution%solver /= solver_user) then
          call correction_reset(self%newton%correction, method, step%solution%solver)
          call velocity_update_reset(self%velocity_update, step%solution%solver)
       else
          i = host_find_solver(self%host%solver, step%solution%solver_name)
-         call correction_reset(self%newton%correction, method, solver_given + i, &
+         call correction_reset(self%newton%correction, method, solver_user + i, &
             self%host%solver(i)%solver)
-         call velocity_update_reset(self%velocity_update, solver_given + i, &
+         call velocity_update_reset(self%velocity_update, solver_user + i, &
             self%host%solver(i)%solver)
       end if
    end subroutine choose_solver
@@ -410,7 +410,7 @@ contains
       type(step_t), intent(in) :: step
       integer :: k
 
-      if (step%scheme%code == scheme_given) then
+      if (step%scheme%code == scheme_user) then
          k = host_scheme_find(self%host%scheme, step%choice%name)
          call scheme_create(step%scheme, self%scheme, self%host%scheme(k)%scheme)
       else

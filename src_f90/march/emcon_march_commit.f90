@@ -25,7 +25,7 @@ module emcon_march_commit
    use emcon_quasi_static, only : quasi_static_move
    use emcon_restitution, only : restitution_take
    use emcon_scene, only : scene_t
-   use emcon_softness, only : softness_depth, softness_keep, softness_stored
+   use emcon_penalty, only : penalty_depth, penalty_keep, penalty_stored
    use emcon_stand_off, only : stand_off_add
    use emcon_steps, only : initiation_velocity_update, step_initiation
    use emcon_term, only : role_external, role_inertia, role_internal
@@ -120,7 +120,7 @@ contains
       real(wp) :: lag
 
       associate (state => self%state, system => self%system, explicit => self%explicit)
-         if (.not. self%active%softness%is_at_ends) then
+         if (.not. self%active%penalty%is_at_ends) then
             lag = 1.0_wp - evaluation_contact_place(self%motion%evaluation)
             if (self%layer%is_settled) then
                ! Forces act where nodes without mass were before their balance.
@@ -134,14 +134,15 @@ contains
             call record_jumps(self, scene, h)
             return
          end if
-         call pair_sums_add(state%sums, system, explicit%soft(explicit%i_start), self%motion, &
+         call pair_sums_add(state%sums, system, explicit%penalty(explicit%i_start), self%motion, &
             0.5_wp*h)
          explicit%i_start = 1 - explicit%i_start
-         associate (soft => explicit%soft(explicit%i_start))
-            call pair_sums_add(state%sums, system, soft, self%motion, 0.5_wp*h)
-            call pair_record_measure(state%pairs, system, soft, scene%x, state%u, self%motion%du, &
+         associate (penalty => explicit%penalty(explicit%i_start))
+            call pair_sums_add(state%sums, system, penalty, self%motion, 0.5_wp*h)
+            call pair_record_measure(state%pairs, system, penalty, scene%x, state%u, &
+               self%motion%du, &
                0.0_wp)
-            self%ledger%contact_energy = softness_stored(self%active%softness, soft)
+            self%ledger%contact_energy = penalty_stored(self%active%penalty, penalty)
          end associate
          call record_jumps(self, scene, h)
       end associate
@@ -168,12 +169,12 @@ contains
 
       call stand_off_add(increment%stand_off, self%system, self%active%set, h)
       call nodal_pull_add(increment%nodal_pull, self%active%set, size(self%state%u, 2))
-      increment%give = max(increment%give, softness_depth(self%active%softness, &
+      increment%give = max(increment%give, penalty_depth(self%active%penalty, &
          self%active%set))
-      if (self%active%softness%is_at_ends) increment%give = max(increment%give, &
-         softness_depth(self%active%softness, self%explicit%soft(self%explicit%i_start)))
+      if (self%active%penalty%is_at_ends) increment%give = max(increment%give, &
+         penalty_depth(self%active%penalty, self%explicit%penalty(self%explicit%i_start)))
       increment%n_augmentation = max(increment%n_augmentation, &
-         self%active%softness%n_augmentation)
+         self%active%penalty%n_augmentation)
       call friction_missed(self%active%friction, self%system, self%active%set, missed, largest)
       increment%law_missed = max(increment%law_missed, missed)
       increment%largest_push = max(increment%largest_push, largest)
@@ -243,23 +244,23 @@ contains
       integer :: k
 
       associate (state => self%state, set => self%active%set, layer => self%layer, &
-            soft => self%explicit%soft(self%explicit%i_start))
+            penalty => self%explicit%penalty(self%explicit%i_start))
          state%contacts%is_active = .false.
          state%contacts%lam = 0.0_wp
          state%contacts%closure = 0.0_wp
          state%contacts%slides_along = 0.0_wp
          state%contacts%drag = 0.0_wp
-         call softness_keep(self%active%softness, set, state%contacts%closure)
-         if (self%active%softness%is_at_ends) then
-            state%contacts%is_active(soft%id) = .true.
-            state%contacts%lam(soft%id) = soft%lam
-            call softness_keep(self%active%softness, soft, state%contacts%closure)
+         call penalty_keep(self%active%penalty, set, state%contacts%closure)
+         if (self%active%penalty%is_at_ends) then
+            state%contacts%is_active(penalty%id) = .true.
+            state%contacts%lam(penalty%id) = penalty%lam
+            call penalty_keep(self%active%penalty, penalty, state%contacts%closure)
          end if
          do k = 1, set%n
             state%contacts%is_active(set%id(k)) = .true.
             state%contacts%lam(set%id(k)) = set%lam(k)
             ! What has opened stores nothing that a later step could give back.
-            if (set%soft%is_on .and. set%soft%is_stored .and. k > set%n_permanent) &
+            if (set%penalty%is_on .and. set%penalty%is_stored .and. k > set%n_permanent) &
                state%contacts%is_active(set%id(k)) = set%law(k)%row%closure() < 0.0_wp
             if (size(state%contacts%drag) > 0) call keep_slip(self, k)
          end do
@@ -434,7 +435,7 @@ contains
       type(march_t), intent(inout) :: self
       real(wp) :: energy
 
-      energy = softness_stored(self%active%softness, self%active%set)
+      energy = penalty_stored(self%active%penalty, self%active%set)
       self%ledger%contact_work = self%ledger%contact_work + (energy - self%ledger%contact_energy)
       self%ledger%contact_energy = energy
    end subroutine book_stored

@@ -188,27 +188,27 @@ contains
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: h                  !! > 0 [T]
       real(wp), dimension(size(scene%x, 1), self%system%space%n_body) :: low, high
-      real(wp) :: way(self%system%space%n_body), place(size(scene%x, 1))
+      real(wp) :: reach(self%system%space%n_body), place(size(scene%x, 1))
       integer :: i, k
 
       keeps_apart = self%system%n_pair == 0
       if (keeps_apart .or. self%system%space%n_body < 2) return
       low = huge(1.0_wp)
       high = -huge(1.0_wp)
-      way = 0.0_wp
+      reach = 0.0_wp
       do i = 1, size(scene%x, 2)
          associate (b => self%system%space%body(i))
             if (b == 0) cycle
             place = scene%x(:, i) + self%state%u(:, i)
             low(:, b) = min(low(:, b), place)
             high(:, b) = max(high(:, b), place)
-            way(b) = max(way(b), h*sqrt(sum(self%state%v(:, i)**2)))
+            reach(b) = max(reach(b), h*sqrt(sum(self%state%v(:, i)**2)))
          end associate
       end do
-      do k = 2, size(way)
+      do k = 2, size(reach)
          do i = 1, k - 1
-            if (all(low(:, k) - high(:, i) <= way(i) + way(k) .and. &
-               low(:, i) - high(:, k) <= way(i) + way(k))) return
+            if (all(low(:, k) - high(:, i) <= reach(i) + reach(k) .and. &
+               low(:, i) - high(:, k) <= reach(i) + reach(k))) return
          end do
       end do
       keeps_apart = .true.

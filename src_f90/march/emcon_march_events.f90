@@ -76,7 +76,7 @@ contains
       real(wp), intent(in) :: h                  !! > 0 [T]
       logical, intent(in) :: is_event(:)         !! (n_constraint)
       real(wp), intent(out) :: part              !! 0..1
-      real(wp) :: way
+      real(wp) :: change
       integer :: k, i
 
       part = 1.0_wp
@@ -85,12 +85,12 @@ contains
          do k = set%n_permanent + 1, set%n
             if (.not. is_event(set%id(k))) cycle
             associate (item => set%item(k))
-               way = 0.0_wp
+               change = 0.0_wp
                do i = 1, item%n_node
-                  way = way + h*dot_product(item%c(:, i), self%motion%v0(:, item%node(i)))
+                  change = change + h*dot_product(item%c(:, i), self%motion%v0(:, item%node(i)))
                end do
-               if (-way > item%gap0) then
-                  part = min(part, max(0.0_wp, -item%gap0/way))
+               if (-change > item%gap0) then
+                  part = min(part, max(0.0_wp, -item%gap0/change))
                else
                   part = min(part, 0.5_wp)
                end if

@@ -15,7 +15,7 @@ module emcon_march_parts
    use emcon_mechanism_text, only : free_motion_text
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
-   use emcon_softness, only : most_augmentations
+   use emcon_penalty, only : most_augmentations
    use emcon_system, only : system_may_hold, system_t
    use emcon_term_registry, only : terms_solid
    use emcon_text, only : joined, note_add, notes_append, notes_t, string_t, to_text

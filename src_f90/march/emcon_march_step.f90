@@ -287,7 +287,7 @@ contains
       integer :: pair
 
       goes_in = .false.
-      if (overlap%depth <= deepest_new .or. self%active%softness%is_on) return
+      if (overlap%depth <= deepest_new .or. self%active%penalty%is_on) return
       do pair = 1, size(self%system%contact)
          associate (contact => self%system%contact(pair)%contact, &
                is_active => self%active%is_active(self%system%first_constraint(pair) + 1:))

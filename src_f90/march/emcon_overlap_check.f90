@@ -287,11 +287,11 @@ contains
    pure integer function count_looks(self, p, q) result(n)
       type(overlap_check_t), intent(in) :: self
       integer, intent(in) :: p, q
-      real(wp) :: way(size(self%most, 1)), motion
+      real(wp) :: extent(size(self%most, 1)), motion
 
       n = 1
-      way = max(self%most(:, p) - self%least(:, q), self%most(:, q) - self%least(:, p))
-      motion = sqrt(dot_product(way, way))
+      extent = max(self%most(:, p) - self%least(:, q), self%most(:, q) - self%least(:, p))
+      motion = sqrt(dot_product(extent, extent))
       associate (least => look_motion*min(self%thinnest(p), self%thinnest(q)))
          if (motion > least) n = ceiling(min(real(most_looks, wp), motion/least))
       end associate

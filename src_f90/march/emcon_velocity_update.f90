@@ -54,7 +54,7 @@ module emcon_velocity_update
    type :: velocity_update_t
       logical :: is_ready = .false.              !! mass factorised for the present numbering
       integer :: choice = solver_default         !! of the direct solver, as the deck asks
-      class(sparse_solver_t), allocatable :: given   !! by a program, for that choice
+      class(sparse_solver_t), allocatable :: user   !! by a program, for that choice
       class(sparse_solver_t), allocatable :: mass
       real(wp), allocatable :: push(:), jump(:)  !! (n_unknown)
       real(wp) :: part = 0.0_wp                  !! of the jump that was taken last [T]
@@ -63,14 +63,14 @@ module emcon_velocity_update
 contains
 
    !> The numbering has changed.
-   subroutine velocity_update_reset(self, choice, given)
+   subroutine velocity_update_reset(self, choice, user)
       type(velocity_update_t), intent(inout) :: self
       integer, intent(in) :: choice              !! one of `solver_`, or above
-      class(sparse_solver_t), intent(in), optional :: given    !! as in `solver_create`
+      class(sparse_solver_t), intent(in), optional :: user    !! as in `solver_create`
 
       self%choice = choice
-      if (allocated(self%given)) deallocate(self%given)
-      if (present(given)) allocate(self%given, source=given)
+      if (allocated(self%user)) deallocate(self%user)
+      if (present(user)) allocate(self%user, source=user)
       self%is_ready = .false.
    end subroutine velocity_update_reset
 
@@ -142,7 +142,7 @@ contains
       real(wp), intent(inout), contiguous :: v(:, :)     !! (n_dim, n_node)
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: momentum(size(v, 1), size(v, 2))
-      real(wp), allocatable :: row(:, :), way(:, :)
+      real(wp), allocatable :: row(:, :), response(:, :)
       real(dp) :: product(size(jump%row), size(jump%row)), mu(size(jump%row), 1)
       logical :: is_singular
 
@@ -150,16 +150,16 @@ contains
       if (.not. self%is_ready) call factorise_mass(self, system, error)
       if (allocated(error)) return
       if (self%mass%is_singular) return
-      call find_ways(self, system, set, jump%row, row, way, error)
+      call find_responses(self, system, set, jump%row, row, response, error)
       if (allocated(error)) return
-      product = real(matmul(transpose(row), way), dp)
+      product = real(matmul(transpose(row), response), dp)
       call dense_solve(product, reshape(real(jump%change, dp), shape(mu)), mu, is_singular)
       if (is_singular) return
       jump%impulse = real(mu(:, 1), wp)
       jump%lost = -dot_product(jump%impulse, jump%rate + 0.5_wp*jump%change)
       jump%is_done = jump%lost >= 0.0_wp
       if (.not. jump%is_done) return
-      self%jump = matmul(way, jump%impulse)
+      self%jump = matmul(response, jump%impulse)
       call mass_times(system, v, momentum)
       call pick(system, momentum, self%push)
       jump%gained = dot_product(self%push, self%jump) &
@@ -247,40 +247,41 @@ contains
       type(constraint_set_t), intent(in) :: set
       type(error_t), allocatable, intent(out) :: error
       real(wp), intent(in), optional :: wanted(:)    !! (conditions that are not linear)
-      real(wp), allocatable :: row(:, :), way(:, :)
+      real(wp), allocatable :: row(:, :), response(:, :)
       real(dp), dimension(set%n_permanent - set%n_linear, 1) :: rate, mu
       real(dp) :: product(size(rate), size(rate))
       integer :: k, l
       logical :: is_singular
 
       if (size(rate) == 0) return
-      call find_ways(self, system, set, [(k, k = set%n_linear + 1, set%n_permanent)], row, way, &
+      call find_responses(self, system, set, [(k, k = set%n_linear + 1, set%n_permanent)], row, &
+         response, &
          error)
       if (allocated(error)) return
       do k = 1, size(rate)
          rate(k, 1) = -real(dot_product(row(:, k), self%jump), dp)
          if (present(wanted)) rate(k, 1) = rate(k, 1) + real(wanted(k), dp)
          do l = 1, k
-            product(l, k) = real(dot_product(row(:, l), way(:, k)), dp)
+            product(l, k) = real(dot_product(row(:, l), response(:, k)), dp)
             product(k, l) = product(l, k)
          end do
       end do
       call dense_solve(product, rate, mu, is_singular)
-      if (.not. is_singular) self%jump = self%jump + matmul(way, real(mu(:, 1), wp))
+      if (.not. is_singular) self%jump = self%jump + matmul(response, real(mu(:, 1), wp))
    end subroutine keep_held
 
    !> Gradients of conditions at the end of the step, and what impulses of 1 along them move.
-   subroutine find_ways(self, system, set, which, row, way, error)
+   subroutine find_responses(self, system, set, which, row, response, error)
       type(velocity_update_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       integer, intent(in) :: which(:)            !! (n) of the conditions of the set
-      real(wp), allocatable, intent(out) :: row(:, :), way(:, :)     !! (n_unknown, n) C, M^-1 C^T
+      real(wp), allocatable, intent(out) :: row(:, :), response(:, :) !! (n_unknown, n) C, M^-1 C^T
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: field(size(system%space%is_alive, 1), size(system%space%is_alive, 2))
       integer :: k, i
 
-      allocate(row(size(self%jump), size(which)), way(size(self%jump), size(which)))
+      allocate(row(size(self%jump), size(which)), response(size(self%jump), size(which)))
       do k = 1, size(which)
          field = 0.0_wp
          associate (item => set%item(which(k)))
@@ -289,10 +290,10 @@ contains
             end do
          end associate
          call pick(system, field, row(:, k))
-         call self%mass%solve(row(:, k), way(:, k), error)
+         call self%mass%solve(row(:, k), response(:, k), error)
          if (allocated(error)) return
       end do
-   end subroutine find_ways
+   end subroutine find_responses
 
    !> Add `part` of the jump to `v`.
    subroutine add_jump(self, system, part, v)
@@ -364,7 +365,7 @@ contains
       real(dp), allocatable :: value(:)
       integer :: n
 
-      call solver_create(self%choice, matrix_definite, self%mass, self%given)
+      call solver_create(self%choice, matrix_definite, self%mass, self%user)
       n = system%space%numbering%n_unknown
       call terms_mass_values(system%term, value)
       call fill_massless(system%matrix, value)

@@ -60,11 +60,11 @@ module emcon_verdict
    end type overlap_found_t
 
    !> How contact that gives way has done so.
-   type :: softness_found_t
+   type :: penalty_found_t
       real(wp) :: give = 0.0_wp                  !! how deep contact has given way, per edge
       real(wp) :: time = 0.0_wp                  !! of that [T]
       integer :: most_augmentations = 0          !! of an augmented Lagrangian in an increment
-   end type softness_found_t
+   end type penalty_found_t
 
    type :: verdict_counts_t
       integer :: newton = 0
@@ -85,7 +85,7 @@ module emcon_verdict
       type(small_range_t) :: small               !! what linear sections have met
       real(wp) :: law_missed = 0.0_wp            !! of contact and friction, at most [M L/T^2]
       real(wp) :: largest_push = 0.0_wp          !! of contacts where there is friction [M L/T^2]
-      type(softness_found_t) :: softness
+      type(penalty_found_t) :: penalty
       type(verdict_counts_t) :: count
       real(wp), allocatable :: largest_force(:)  !! (n_pair) on the slave side
       type(force_scatter_t), allocatable :: scatter(:)   !! (pairs) of forces from increment to next
@@ -167,11 +167,11 @@ contains
          self%largest_push = max(self%largest_push, increment%largest_push)
          call scatter_follow(self%scatter, state%sums%sum, &
             evaluation_has_inertia(march%motion%evaluation))
-         if (increment%give > self%softness%give) then
-            self%softness%give = increment%give
-            self%softness%time = state%clock%time
+         if (increment%give > self%penalty%give) then
+            self%penalty%give = increment%give
+            self%penalty%time = state%clock%time
          end if
-         self%softness%most_augmentations = max(self%softness%most_augmentations, &
+         self%penalty%most_augmentations = max(self%penalty%most_augmentations, &
             increment%n_augmentation)
          if (increment%unconverged > self%unconverged) then
             self%unconverged = increment%unconverged
@@ -191,7 +191,8 @@ contains
       end do
       call follow_overlaps(self, scene, march, increment)
       if (size(self%small%section) > 0) call follow_linear(self, scene, march)
-      call energy_follow(self%energy, march%ledger, march%scheme, march%active%set%soft%is_stored, &
+      call energy_follow(self%energy, march%ledger, march%scheme, &
+         march%active%set%penalty%is_stored, &
          increment%work_scale)
       if (.not. march_is_done(march)) return
       call follow_bending(self, scene, march)
@@ -347,8 +348,8 @@ contains
       if (self%overlap%deepest > most_overlap(self)) call note_add(self%reasons, &
          "bodies overlap by " // to_text(self%overlap%deepest, 3) // " of an edge at time " // &
          to_text(self%overlap%time, 9) // ", " // self%overlap%place)
-      if (self%softness%give > far_behind) call note_add(self%reasons, &
-         "contact penetrates by up to " // to_text(self%softness%give, 3) // &
+      if (self%penalty%give > far_behind) call note_add(self%reasons, &
+         "contact penetrates by up to " // to_text(self%penalty%give, 3) // &
          " of an edge: STIFFNESS or FACTOR of *CONSTRAINT METHOD is too small")
       if (stand_off_mean(self%stand_off) > most_stand_off) then
          call stand_off_text(self, text)
@@ -366,8 +367,8 @@ contains
    pure real(wp) function most_overlap(self)
       type(verdict_t), intent(in) :: self
 
-      most_overlap = self%overlap%bar + most_give*self%softness%give
-      if (self%softness%give <= far_behind) most_overlap = min(most_overlap, far_behind)
+      most_overlap = self%overlap%bar + most_give*self%penalty%give
+      if (self%penalty%give <= far_behind) most_overlap = min(most_overlap, far_behind)
    end function most_overlap
 
    !> Has the run come to its end with nothing found wrong?
@@ -382,7 +383,7 @@ contains
       type(verdict_t), intent(in) :: self
       logical, intent(in) :: is_strict           !! whatever is bad is a failure
 
-      verdict_is_failure = max(self%overlap%deepest, self%softness%give) > far_behind .or. &
+      verdict_is_failure = max(self%overlap%deepest, self%penalty%give) > far_behind .or. &
          energy_is_failure(self%energy) .or. (is_strict .and. self%reasons%n > 0)
    end function verdict_is_failure
 

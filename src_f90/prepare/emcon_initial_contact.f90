@@ -8,7 +8,7 @@ module emcon_initial_contact
    use emcon_facets, only : facets_length, facets_text
    use emcon_guards, only : guard_slack
    use emcon_host, only : host_find_contact, host_t
-   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_given, &
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_user, &
       formulation_nts
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t, where_text
@@ -40,11 +40,11 @@ contains
 
    !> Move the nodes that ADJUST= names onto their surface and check every pair; the notes tell
    !> what was done.
-   subroutine initial_contact_prepare(scene, notes, error, given)
+   subroutine initial_contact_prepare(scene, notes, error, host)
       type(scene_t), intent(inout) :: scene
       type(notes_t), intent(inout) :: notes
       type(error_t), allocatable, intent(out) :: error
-      type(host_t), intent(in), optional :: given    !! contact of pairs, among others
+      type(host_t), intent(in), optional :: host    !! contact of pairs, among others
       type(contact_options_t) :: options
       class(start_gaps_t), allocatable :: contact
       logical :: is_checked(size(scene%surface))
@@ -61,8 +61,8 @@ contains
       is_checked = .false.
       do i = 1, size(scene%pair)
          associate (pair => scene%pair(i))
-            if (pair%formulation == formulation_given) then
-               if (.not. is_meant) call check_given(scene, i, options, noise, error, given)
+            if (pair%formulation == formulation_user) then
+               if (.not. is_meant) call check_given(scene, i, options, noise, error, host)
                if (allocated(error)) return
                cycle
             end if
@@ -255,7 +255,7 @@ contains
       class(start_gaps_t), intent(inout) :: contact
       type(notes_t), intent(inout) :: notes
       type(gap_state_t) :: state
-      real(wp) :: way(size(scene%x, 1)), largest
+      real(wp) :: offset(size(scene%x, 1)), largest
       logical :: is_meant, is_last
       integer :: i, k, n_moved
 
@@ -272,10 +272,10 @@ contains
          largest = max(largest, abs(state%gap0))
          n_moved = n_moved + 1
          do k = 1, most_moves
-            call contact%way(i, scene, way, is_last)
+            call contact%offset(i, scene, offset, is_last)
             associate (node => contact%node(i), duplicate => contact%duplicate(i))
-               scene%x(:, node) = scene%x(:, node) - way
-               if (duplicate > 0) scene%x(:, duplicate) = scene%x(:, duplicate) - way
+               scene%x(:, node) = scene%x(:, node) - offset
+               if (duplicate > 0) scene%x(:, duplicate) = scene%x(:, duplicate) - offset
             end associate
             if (is_last) exit
          end do
@@ -317,22 +317,22 @@ contains
 
    !> Slave nodes behind the master surface, as the contact that a program gives for pair `i` sees
    !> them.
-   subroutine check_given(scene, i, options, noise, error, given)
+   subroutine check_given(scene, i, options, noise, error, host)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: i
       type(contact_options_t), intent(in) :: options
       real(wp), intent(in) :: noise              !! of coordinates [L]
       type(error_t), allocatable, intent(out) :: error
-      type(host_t), intent(in), optional :: given
+      type(host_t), intent(in), optional :: host
       class(contact_t), allocatable :: contact
       real(wp) :: still(size(scene%x, 1), size(scene%x, 2))
       integer :: k, n
       character(len=:), allocatable :: found
 
       k = 0
-      if (present(given)) k = host_find_contact(given, i)
+      if (present(host)) k = host_find_contact(host, i)
       if (k == 0) return                         ! `system_init` tells that it is missing
-      call new_contact(scene, scene%pair(i), contact, error, given%contact(k)%contact)
+      call new_contact(scene, scene%pair(i), contact, error, host%contact(k)%contact)
       if (allocated(error)) return
       call contact%suit_steps(any(.not. step_is_dynamic(scene%step)))
       call contact%configure(scene%x, options)

@@ -202,7 +202,7 @@ contains
       character(len=:), allocatable, intent(out) :: text
       type(error_t), allocatable :: error
       real(dp), allocatable :: a(:, :), both(:, :), held(:, :), g(:, :), shift(:, :), &
-         way(:, :), turn(:, :)
+         direction(:, :), turn(:, :)
       integer :: m, n
 
       m = bodies%n_motion
@@ -221,8 +221,8 @@ contains
       call find_null_space(g(bodies%n_dim + 1:, :), tol, shift, error)
       if (allocated(error)) return
       text = ""
-      way = matmul(g(:bodies%n_dim, :), shift)
-      call directions_text(way, size(way, 2), tol, "move in ", "move along ", text)
+      direction = matmul(g(:bodies%n_dim, :), shift)
+      call directions_text(direction, size(direction, 2), tol, "move in ", "move along ", text)
       turn = g(bodies%n_dim + 1:, :)
       n = size(g, 2) - size(shift, 2)
       if (n > 0 .and. size(turn, 1) == 1) call join(text, "rotate")

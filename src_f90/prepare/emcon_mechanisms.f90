@@ -172,7 +172,7 @@ contains
       real(wp), intent(in) :: arm(:)                 !! (n_dim) [L]
       real(wp) :: field(size(arm), n_turn(size(arm)))
       integer, parameter :: n_axis = 3
-      real(wp) :: axis(n_axis), at(n_axis), way(n_axis)
+      real(wp) :: axis(n_axis), at(n_axis), velocity(n_axis)
       integer :: k
 
       at = 0.0_wp
@@ -180,8 +180,8 @@ contains
       do k = 1, size(field, 2)
          axis = 0.0_wp
          axis(k + n_axis - size(field, 2)) = 1.0_wp
-         way = cross_product(axis, at)
-         field(:, k) = way(:size(arm))
+         velocity = cross_product(axis, at)
+         field(:, k) = velocity(:size(arm))
       end do
    end function turn_field
 

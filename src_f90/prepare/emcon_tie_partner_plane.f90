@@ -282,16 +282,16 @@ contains
       integer, intent(in) :: node, segment
       real(wp), intent(in) :: xi                 !! 0 or 1
       real(wp), intent(in), contiguous :: x(:, :)
-      real(wp) :: eta, gap, way(2)
+      real(wp) :: eta, gap, offset(2)
       integer :: k
 
       associate (this => front(self%edge(segment)))
          call frame_hit(this%frame, polygon, xi, eta, gap)
          eta = max(0.0_wp, min(1.0_wp, eta))
          associate (ends => self%master%facet(:, this%edge))
-            way = (x(:, ends(1)) - x(:, node)) + eta*(x(:, ends(2)) - x(:, ends(1)))
+            offset = (x(:, ends(1)) - x(:, node)) + eta*(x(:, ends(2)) - x(:, ends(1)))
          end associate
-         if (dot_product(way, way) > this%tolerance**2) return
+         if (dot_product(offset, offset) > this%tolerance**2) return
       end associate
       k = find_sorted(self%slave%node, node)
       self%has_partner(k) = .true.

@@ -11,8 +11,8 @@ module emcon_run_log
    use emcon_report_row, only : report_rows_t
    use emcon_scene, only : scene_t
    use emcon_scene_report, only : scene_report
-   use emcon_scheme_registry, only : scheme_given
-   use emcon_solver_registry, only : solver_given
+   use emcon_scheme_registry, only : scheme_user
+   use emcon_solver_registry, only : solver_user
    use emcon_stepper, only : stepper_t
    use emcon_text, only : note_add, notes_append, notes_t, string_t, to_text
    use emcon_version, only : precision_names, this_precision, version
@@ -103,9 +103,9 @@ contains
 
       associate (step => scene%step(k))
          call option_text("solver", step%solution%solver, solver)
-         if (step%solution%solver == solver_given) solver = step%solution%solver_name
+         if (step%solution%solver == solver_user) solver = step%solution%solver_name
          scheme = trim(step%scheme%text)
-         if (step%scheme%code == scheme_given) scheme = "scheme " // step%choice%name
+         if (step%scheme%code == scheme_user) scheme = "scheme " // step%choice%name
          associate (setting => step%scheme%setting)
             if (setting%word /= "") scheme = scheme // " (" // trim(setting%word) // "=" // &
                to_text(setting%value) // ")"

@@ -98,14 +98,14 @@ contains
       call json_number(line, "penetration", self%overlap%deepest)
       call json_number(line, "penetration_time", self%overlap%time)
       call json_text(line, "penetration_place", self%overlap%place)
-      if (self%softness%give > 0.0_wp) then
-         call json_number(line, "give", self%softness%give)
-         call json_number(line, "give_time", self%softness%time)
+      if (self%penalty%give > 0.0_wp) then
+         call json_number(line, "give", self%penalty%give)
+         call json_number(line, "give_time", self%penalty%time)
       end if
       if (march%active%friction%is_on) call json_number(line, "law_violation", &
          verdict_law_violation(self))
-      if (self%softness%most_augmentations > 0) call json_number(line, "augmentations", &
-         real(self%softness%most_augmentations, wp))
+      if (self%penalty%most_augmentations > 0) call json_number(line, "augmentations", &
+         real(self%penalty%most_augmentations, wp))
       call add_forces(self, line)
       call json_number(line, "unconverged", self%unconverged)
       if (size(self%small%section) > 0) then
@@ -170,11 +170,11 @@ contains
          call restart_exchange(restart, "linear_range", self%small%rotation)
          call restart_exchange(restart, "linear_strain", self%small%strain)
       end if
-      if (restart_offers(restart, "give", self%softness%give > 0.0_wp &
-         .or. self%softness%most_augmentations > 0)) then
-         call restart_exchange(restart, "give", self%softness%give)
-         call restart_exchange(restart, "give", self%softness%time)
-         call restart_exchange(restart, "augmentations", self%softness%most_augmentations)
+      if (restart_offers(restart, "give", self%penalty%give > 0.0_wp &
+         .or. self%penalty%most_augmentations > 0)) then
+         call restart_exchange(restart, "give", self%penalty%give)
+         call restart_exchange(restart, "give", self%penalty%time)
+         call restart_exchange(restart, "augmentations", self%penalty%most_augmentations)
       end if
       if (restart_offers(restart, "law_missed", self%largest_push > 0.0_wp)) then
          call restart_exchange(restart, "law_missed", self%law_missed)

@@ -61,8 +61,8 @@ contains
             "not judged), "
       end associate
       if (allocated(self%largest_force)) then
-         if (self%softness%give > 0.0_wp) then
-            line = line // "contact penetrates by up to " // to_text(self%softness%give, 3) // &
+         if (self%penalty%give > 0.0_wp) then
+            line = line // "contact penetrates by up to " // to_text(self%penalty%give, 3) // &
                " of an edge, nothing else does, "
          else if (self%overlap%deepest > overlap_told) then
             line = line // "nothing penetrates by more than guards allow, "
@@ -166,11 +166,11 @@ contains
          to_text(verdict_law_violation(self), 2) // " of the largest force")
       if (abs(ledger%contact_damping) > 0.0_wp) call note_add(lines, "contact damping took " // &
          to_text(ledger%contact_damping, 9))
-      if (self%softness%give > 0.0_wp) call note_add(lines, "largest penetration of contact " // &
-         to_text(self%softness%give, 3) // " of an edge, at time " // to_text(self%softness%time, &
+      if (self%penalty%give > 0.0_wp) call note_add(lines, "largest penetration of contact " // &
+         to_text(self%penalty%give, 3) // " of an edge, at time " // to_text(self%penalty%time, &
          9) // "; stored at the end " // to_text(ledger%contact_energy, 9))
-      if (self%softness%most_augmentations > 0) call note_add(lines, "augmentations " // &
-         to_text(self%softness%most_augmentations) // " at most in a solve")
+      if (self%penalty%most_augmentations > 0) call note_add(lines, "augmentations " // &
+         to_text(self%penalty%most_augmentations) // " at most in a solve")
    end subroutine add_losses
 
    !> Whether overlap was looked for, and the deepest.
@@ -256,7 +256,7 @@ contains
          if (len(text) > 0) call note_add(lines, text)
       end if
       do p = 1, size(self%scatter)
-         if (.not. scatter_is_comb(self%scatter(p)) .or. march%active%softness%is_on) cycle
+         if (.not. scatter_is_comb(self%scatter(p)) .or. march%active%penalty%is_on) cycle
          k = abs(march%system%contact(findloc(abs(march%state%sums%of_pair), p, 1))%of_pair)
          call pair_text(scene, k, text)
          text = "the force of " // text // " jumps up and down from increment to increment " // &

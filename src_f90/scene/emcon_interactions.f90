@@ -5,13 +5,13 @@ module emcon_interactions
    implicit none
    private
    public :: contact_pair_t, contact_options_t, contact_damping_t, interaction_t, adjustment_t
-   public :: formulation_nts, formulation_segment, formulation_mortar, formulation_given
+   public :: formulation_nts, formulation_segment, formulation_mortar, formulation_user
    public :: integration_segments, integration_elements
    public :: multiplier_standard, multiplier_dual
    public :: normal_edge, normal_nodal, smoothing_none, smoothing_hermite
 
    integer, parameter :: formulation_nts = 1, formulation_segment = 2, formulation_mortar = 3, &
-      formulation_given = 4
+      formulation_user = 4
    integer, parameter :: integration_segments = 1, integration_elements = 2
    integer, parameter :: multiplier_standard = 1, multiplier_dual = 2
    integer, parameter :: normal_edge = 1, normal_nodal = 2

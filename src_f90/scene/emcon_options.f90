@@ -6,7 +6,7 @@ module emcon_options
    use emcon_couplings, only : tie_t
    use emcon_element_kind, only : element_row_t
    use emcon_element_registry, only : element_row, n_element_row
-   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_given, &
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_user, &
       formulation_mortar, formulation_nts, formulation_segment, integration_elements, &
       integration_segments, multiplier_dual, multiplier_standard, normal_edge, normal_nodal, &
       smoothing_hermite, smoothing_none
@@ -49,7 +49,7 @@ module emcon_options
          "gaps of nodes integrated over slave edges", "", n_plane, instead="NODE TO SURFACE"), &
       option_row_t("formulation", formulation_mortar, "MORTAR", "EMCON_MORTAR", "mortar", &
          ",LINMORTAR,PGLINMORTAR,SURFACETOSURFACE,"), &
-      option_row_t("formulation", formulation_given, "USER", "", "contact of the program", ""), &
+      option_row_t("formulation", formulation_user, "USER", "", "contact of the program", ""), &
       option_row_t("integration", integration_segments, "SEGMENTS", "EMCON_SEGMENTS", &
          "segments", ""), &
       option_row_t("integration", integration_elements, "ELEMENTS", "EMCON_ELEMENTS", &

@@ -8,7 +8,7 @@ module emcon_steps
    use emcon_solver_registry, only : solver_default
    implicit none
    private
-   public :: prescribed_t, turn_t, load_t, scheme_choice_t, softness_t
+   public :: prescribed_t, turn_t, load_t, scheme_choice_t, penalty_setting_t
    public :: step_t, step_time_t, step_contact_t, step_solution_t
    public :: load_point, load_pressure, load_gravity, load_moment, load_centrifugal
    public :: by_node, by_element, by_surface
@@ -75,12 +75,12 @@ module emcon_steps
    end type scheme_choice_t
 
    !> Contact that gives way: *CONSTRAINT METHOD, TYPE=PENALTY or AUGMENTED LAGRANGE.
-   type :: softness_t
+   type :: penalty_setting_t
       type(origin_t) :: origin
       real(wp) :: stiffness = 0.0_wp                 !! pressure by penetration [M/(L T)^2]; 0: by
       real(wp) :: factor = 1.0_wp                    !! this, times that of the elements
       real(wp) :: tolerance = 1.0e-8_wp              !! of gaps, by the edge: AUGMENTED LAGRANGE
-   end type softness_t
+   end type penalty_setting_t
 
    !> How a step is divided into increments.
    type :: step_time_t
@@ -102,7 +102,7 @@ module emcon_steps
    !> How its equations are solved.
    type :: step_solution_t
       integer :: solver = solver_default             !! one of `solver_`
-      character(len=:), allocatable :: solver_name   !! of `solver_given`, upper case, no blanks
+      character(len=:), allocatable :: solver_name   !! of `solver_user`, upper case, no blanks
       type(origin_t) :: solver_origin
       integer :: newton = newton_kept                !! one of `newton_`
       real(wp) :: newton_tolerance = 1.0e-10_wp      !! relative
@@ -113,7 +113,7 @@ module emcon_steps
    !> What holds for all contact in it.
    type :: step_contact_t
       integer :: method = method_null_space          !! one of `method_`
-      type(softness_t) :: softness
+      type(penalty_setting_t) :: penalty
       integer :: initiation = initiation_persistent
       real(wp) :: gap_tolerance = 0.0_wp             !! fraction of element size; 0: no limit
       type(contact_options_t) :: options

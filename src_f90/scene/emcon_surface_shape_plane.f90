@@ -28,20 +28,20 @@ contains
       type(surface_t), intent(in) :: surface
       type(surface_shape_t) :: shape
       integer, allocatable :: edge(:, :), from(:)
-      real(wp), allocatable :: way(:, :)
+      real(wp), allocatable :: along(:, :)
       integer :: i, n, power
 
       ! Coordinates may be as large or as small as numbers can be.
       power = -exponent(maxval(abs(scene%x)))
       call surface_facets(scene, surface, edge)
-      allocate(way(2, size(edge, 2)), source=0.0_wp)
+      allocate(along(2, size(edge, 2)), source=0.0_wp)
       allocate(from(size(scene%x, 2)), source=0)
       n = 0
       do i = 1, size(edge, 2)
          if (any(edge(:, i) == 0)) cycle
-         way(:, i) = scale(scene%x(:, edge(2, i)), power) - scale(scene%x(:, edge(1, i)), power)
+         along(:, i) = scale(scene%x(:, edge(2, i)), power) - scale(scene%x(:, edge(1, i)), power)
          from(edge(1, i)) = i
-         associate (length => norm2(way(:, i)))
+         associate (length => norm2(along(:, i)))
             if (.not. length > 0.0_wp) cycle
             n = n + 1
             shape%length = shape%length + length
@@ -53,7 +53,7 @@ contains
       do i = 1, size(edge, 2)
          if (any(edge(:, i) == 0)) cycle
          if (from(edge(2, i)) == 0) cycle
-         associate (turn => turn_of(way(:, i), way(:, from(edge(2, i)))))
+         associate (turn => turn_of(along(:, i), along(:, from(edge(2, i)))))
             if (turn <= corner) shape%turn = max(shape%turn, turn)
          end associate
       end do

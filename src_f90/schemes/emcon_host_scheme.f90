@@ -5,7 +5,7 @@ module emcon_host_scheme
    use emcon_evaluation, only : instant_t, most_past, evaluation_t
    use emcon_kinds, only : wp
    use emcon_scheme, only : scheme_row_t, scheme_t
-   use emcon_scheme_registry, only : scheme_given_row
+   use emcon_scheme_registry, only : scheme_user_row
    use emcon_text, only : to_text
    implicit none
    private
@@ -64,7 +64,7 @@ contains
       type(evaluation_t) :: evaluation
       integer :: k
 
-      row = scheme_given_row
+      row = scheme_user_row
       row%word = name
       row%n_past = scheme%row%n_past
       row%is_accelerated = scheme%row%is_accelerated

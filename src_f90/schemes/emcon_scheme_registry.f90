@@ -8,10 +8,10 @@ module emcon_scheme_registry
    private
    public :: scheme_row, n_scheme_row, scheme_create
    public :: setting_range_t, setting_range, n_setting_range
-   public :: scheme_given_row, scheme_static, scheme_energy_momentum, scheme_given
+   public :: scheme_user_row, scheme_static, scheme_energy_momentum, scheme_user
 
    !> Codes that others ask for.
-   integer, parameter :: scheme_static = 1, scheme_energy_momentum = 2, scheme_given = 3
+   integer, parameter :: scheme_static = 1, scheme_energy_momentum = 2, scheme_user = 3
 
    !> What the numbers of schemes may be.
    type :: setting_range_t
@@ -22,8 +22,8 @@ module emcon_scheme_registry
    end type setting_range_t
 
    !> Of schemes that a program gives, before it has: then they say themselves what they keep.
-   type(scheme_row_t), parameter :: scheme_given_row = &
-      scheme_row_t(scheme_given, "DYNAMIC", has_inertia=.true., looks_back=.true.)
+   type(scheme_row_t), parameter :: scheme_user_row = &
+      scheme_row_t(scheme_user, "DYNAMIC", has_inertia=.true., looks_back=.true.)
 
    !> A row by its number, or by what a deck says.
    interface scheme_row
@@ -74,13 +74,13 @@ contains
    end function scheme_row_by_word
 
    !> The scheme of a row, in place of another that was there.
-   subroutine scheme_create(row, scheme, given)
+   subroutine scheme_create(row, scheme, user)
       type(scheme_row_t), intent(in) :: row
       class(scheme_t), allocatable, intent(inout) :: scheme
-      class(scheme_t), intent(in), optional :: given   !! that of `scheme_given`
+      class(scheme_t), intent(in), optional :: user   !! that of `scheme_user`
 
       call allocate_scheme(row%code, scheme)
-      if (.not. allocated(scheme)) allocate(scheme, source=given)
+      if (.not. allocated(scheme)) allocate(scheme, source=user)
       scheme%row = row
    end subroutine scheme_create
 

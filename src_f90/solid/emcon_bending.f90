@@ -249,7 +249,7 @@ contains
       integer, intent(in) :: e
       logical, intent(in) :: nlgeom
       real(wp), intent(out) :: curve(n_axis, n_axis)     !! [1/L]
-      real(wp) :: way(n_axis), turn(n_axis), spread(n_axis, n_axis), size_of
+      real(wp) :: offset(n_axis), turn(n_axis), spread(n_axis, n_axis), size_of
       integer :: b, i, k
 
       curve = 0.0_wp
@@ -257,12 +257,12 @@ contains
       do i = 1, solid%geometry(e)%n_node
          associate (node => solid%node(i, e))
             do k = self%start(node) + 1, self%start(node + 1)
-               way = self%center(:, self%beside(k)) - self%center(:, e)
+               offset = self%center(:, self%beside(k)) - self%center(:, e)
                turn = turn_between(self%slope(:, :, e), self%slope(:, :, self%beside(k)), &
                   nlgeom .and. .not. solid%trait%is_linear(e))
                do b = 1, n_axis
-                  curve(:, b) = curve(:, b) + turn*way(b)
-                  spread(:, b) = spread(:, b) + way*way(b)
+                  curve(:, b) = curve(:, b) + turn*offset(b)
+                  spread(:, b) = spread(:, b) + offset*offset(b)
                end do
             end do
          end associate

@@ -233,10 +233,10 @@ contains
    end subroutine add_force
 
    !> How the force changes with the last end along `way`.
-   pure subroutine corotated_image(self, motion, way, image)
+   pure subroutine corotated_image(self, motion, displacement, image)
       type(corotated_t), intent(in) :: self
       type(corotated_motion_t), intent(in) :: motion
-      real(wp), intent(in) :: way(:, :)                  !! (2, n_node) [L]
+      real(wp), intent(in) :: displacement(:, :)                  !! (2, n_node) [L]
       real(wp), intent(out) :: image(:, :)               !! (2, n_node) [M L/T^2]
       real(wp) :: dg(2), drho, dd(2, max_plane_nodes), dk(2, max_plane_nodes)
       real(wp) :: dalpha, dbeta, q(2), more(2, max_plane_nodes), product
@@ -244,11 +244,11 @@ contains
 
       n = self%n_node
       associate (first => motion%first, last => motion%last)
-         dg = frame_of(self, way)
+         dg = frame_of(self, displacement)
          drho = dot_product(last%g, dg)/last%rho
          product = 0.0_wp
          do i = 1, n
-            dd(:, i) = (turned(dg, last%y(:, i)) + turned(last%g, way(:, i)))/last%rho
+            dd(:, i) = (turned(dg, last%y(:, i)) + turned(last%g, displacement(:, i)))/last%rho
             product = product + 0.5_wp*last%rho*dot_product(motion%k(:, i), dd(:, i))
             dd(:, i) = dd(:, i) - turned(last%g, last%y(:, i))*(drho/last%rho**2)
          end do
@@ -262,7 +262,7 @@ contains
             + 1.0_wp/(first%rho + last%rho))
       end associate
       q = dalpha*lever(self, motion%k, motion%y) - dbeta*motion%g &
-         + motion%alpha*(lever(self, dk, motion%y) + 0.5_wp*lever(self, motion%k, way)) &
+         + motion%alpha*(lever(self, dk, motion%y) + 0.5_wp*lever(self, motion%k, displacement)) &
          - 0.5_wp*motion%beta*dg
       call add_force(self, dalpha*motion%g + 0.5_wp*motion%alpha*dg, motion%k, q, image)
       call add_force(self, motion%alpha*motion%g, dk, [0.0_wp, 0.0_wp], more)

@@ -219,17 +219,17 @@ contains
       real(wp), intent(in) :: weight                     !! as in `motion_t`
       integer, intent(inout) :: s                        !! slots that were used
       real(dp), intent(inout) :: value(:), side(:)
-      real(wp), dimension(size(moved%g), size(self%own%node, 1)) :: way, image
+      real(wp), dimension(size(moved%g), size(self%own%node, 1)) :: displacement, image
       integer :: i, j, a, b
 
-      way = 0.0_wp
+      displacement = 0.0_wp
       do j = 1, self%own%n_node(k)
-         do b = 1, size(way, 1)
-            way(b, j) = 1.0_wp
-            call corotated_image(self%frame(k), moved, way, image)
-            way(b, j) = 0.0_wp
+         do b = 1, size(displacement, 1)
+            displacement(b, j) = 1.0_wp
+            call corotated_image(self%frame(k), moved, displacement, image)
+            displacement(b, j) = 0.0_wp
             do i = 1, self%own%n_node(k)
-               do a = 1, size(way, 1)
+               do a = 1, size(displacement, 1)
                   s = s + 1
                   associate (at => self%slot(s), more => real(weight*image(a, i), dp))
                      if (at > 0) value(at) = value(at) + more

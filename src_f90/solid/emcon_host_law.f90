@@ -43,23 +43,23 @@ module emcon_host_law
 
 contains
 
-   !> Take the law of `material` from those that are `given`.
-   subroutine host_law_take(scene, material, law, error, given)
+   !> Take the law of `material` from those that are `user`.
+   subroutine host_law_take(scene, material, law, error, user)
       type(scene_t), intent(in) :: scene
       type(material_t), intent(in) :: material
       type(host_law_t), intent(inout) :: law
       type(error_t), allocatable, intent(out) :: error
-      type(host_law_t), intent(in), optional :: given(:)   !! one for each such material
+      type(host_law_t), intent(in), optional :: user(:)   !! one for each such material
       character(len=:), allocatable :: fault
       integer :: i, n_strain
 
       n_strain = scene%n_dim + n_turn(scene%n_dim)
-      if (present(given)) then
-         do i = 1, size(given)
-            if (given(i)%material /= material%name) cycle
+      if (present(user)) then
+         do i = 1, size(user)
+            if (user(i)%material /= material%name) cycle
             law%material = material%name
-            if (allocated(given(i)%energy)) allocate(law%energy, source=given(i)%energy)
-            if (allocated(given(i)%law)) allocate(law%law, source=given(i)%law)
+            if (allocated(user(i)%energy)) allocate(law%energy, source=user(i)%energy)
+            if (allocated(user(i)%law)) allocate(law%law, source=user(i)%law)
          end do
       end if
       if (allocated(law%law)) then

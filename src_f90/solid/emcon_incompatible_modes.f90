@@ -21,26 +21,26 @@ contains
       type(element_geometry_t), intent(inout) :: geometry  !! the rest of it is set
       type(shape_table_t), intent(in) :: table   !! for stiffness
       real(wp), intent(in) :: moduli(:, :)       !! (n_strain, n_strain) at rest [M/(L T^2)]
-      real(wp) :: way(size(table%place, 1)), factor(table%n_gp), volume
+      real(wp) :: gradient(size(table%place, 1)), factor(table%n_gp), volume
       integer :: b, c, k, m, n_dim
 
       if (any(geometry%weight <= 0.0_wp)) return
-      n_dim = size(way)
+      n_dim = size(gradient)
       allocate(geometry%mode(size(moduli, 1), n_dim*n_dim, table%n_gp), &
          geometry%dual(size(moduli, 1), n_dim*n_dim, table%n_gp))
       volume = sum(geometry%weight)
       factor = (volume/sum(table%weight))*table%weight/geometry%weight
       m = 0
       do b = 1, n_dim
-         way = 0.0_wp
+         gradient = 0.0_wp
          do k = 1, table%n_gp
-            way = way + (geometry%weight(k)/volume) &
+            gradient = gradient + (geometry%weight(k)/volume) &
                *matmul(geometry%gradient(:, :, k), table%place(b, :))
          end do
          do c = 1, n_dim
             m = m + 1
             do k = 1, table%n_gp
-               geometry%mode(:, m, k) = (factor(k)*table%point(b, k))*strain_along(c, way)
+               geometry%mode(:, m, k) = (factor(k)*table%point(b, k))*strain_along(c, gradient)
             end do
             call make_orthogonal(geometry, moduli, m)
          end do
@@ -49,20 +49,20 @@ contains
 
    !> The strain of a displacement along axis `c` with the gradient `way`; behind the normal
    !> components each axis with the next one, and the first with the last.
-   pure function strain_along(c, way) result(strain)
+   pure function strain_along(c, gradient) result(strain)
       integer, intent(in) :: c                   !! 1 to n_dim
-      real(wp), intent(in) :: way(:)             !! (n_dim) [1/L]
-      real(wp) :: strain((size(way)*(size(way) + 1))/2)
+      real(wp), intent(in) :: gradient(:)             !! (n_dim) [1/L]
+      real(wp) :: strain((size(gradient)*(size(gradient) + 1))/2)
       integer :: column, row, s, n_dim
 
-      n_dim = size(way)
+      n_dim = size(gradient)
       strain = 0.0_wp
-      strain(c) = way(c)
+      strain(c) = gradient(c)
       do s = 1, size(strain) - n_dim
          row = merge(1, s, s == n_dim)
          column = merge(s, s + 1, s == n_dim)
-         if (c == row) strain(n_dim + s) = way(column)
-         if (c == column) strain(n_dim + s) = way(row)
+         if (c == row) strain(n_dim + s) = gradient(column)
+         if (c == column) strain(n_dim + s) = gradient(row)
       end do
    end function strain_along
 

@@ -138,14 +138,14 @@ contains
       class(linear_term_t), intent(in) :: self
       type(motion_t), intent(in) :: motion       !! placed
       real(wp), intent(inout) :: energy(:)       !! (n_element) [M L^2/T^2]
-      real(wp), dimension(size(self%own%stiffness, 1)) :: last, way, pull
+      real(wp), dimension(size(self%own%stiffness, 1)) :: last, change, pull
       integer :: j, k, m
 
       do k = 1, size(self%own%element)
          m = size(motion%x, 1)*self%own%n_node(k)
          call stiff_elements_gather(self%own, k, motion%from, last)
-         call stiff_elements_gather(self%own, k, motion%by, way)
-         last(:m) = last(:m) + way(:m)
+         call stiff_elements_gather(self%own, k, motion%by, change)
+         last(:m) = last(:m) + change(:m)
          pull(:m) = 0.0_wp
          do j = 1, m
             pull(:m) = pull(:m) + self%own%stiffness(:m, j, k)*last(j)

@@ -140,16 +140,16 @@ contains
       type(pressure_t), intent(in) :: p
       type(gradients_t), intent(in) :: gradients
       type(pack_response_t), intent(inout) :: part
-      real(wp) :: way(n_lane)
+      real(wp) :: scaled(n_lane)
       integer :: a, c, i, j
 
       do j = 1, n
          do c = 1, 2
-            way = p%rate/p%volume*gradients%last(:, c, j)
+            scaled = p%rate/p%volume*gradients%last(:, c, j)
             do i = 1, n
                do a = 1, 2
                   part%tangent(:, a, i, c, j) = part%tangent(:, a, i, c, j) &
-                     + gradients%step(:, a, i)*way
+                     + gradients%step(:, a, i)*scaled
                end do
             end do
          end do

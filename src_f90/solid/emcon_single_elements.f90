@@ -6,7 +6,7 @@ module emcon_single_elements
    use emcon_element_axial_plane, only : axial_element_respond
    use emcon_element_space, only : space_element_respond, space_motion_t, space_part_t
    use emcon_element_frequency, only : element_frequency
-   use emcon_given_space, only : given_space_respond
+   use emcon_user_space, only : user_space_respond
    use emcon_host_law, only : host_response_t
    use emcon_incompatible_space, only : incompatible_space_respond
    use emcon_kinds, only : dp, wp
@@ -34,9 +34,9 @@ contains
 
    !> Forces of a motion. What displacements are rounded by, forces are too. Threads share the
    !> elements of a block, whose forces are added in the order of the scene.
-   subroutine single_respond(solid, given, slots, motion, response, value, side)
+   subroutine single_respond(solid, user, slots, motion, response, value, side)
       type(solid_t), intent(in) :: solid
-      type(host_response_t), intent(in) :: given !! of the same motion
+      type(host_response_t), intent(in) :: user !! of the same motion
       type(element_slots_t), intent(in) :: slots
       type(motion_t), intent(in) :: motion                     !! placed
       type(response_t), intent(inout) :: response
@@ -49,13 +49,13 @@ contains
       with_tangent = present(value)
       n = merge(n_block, 1, response%n_thread > 1)
       allocate(local(n), part(n))
-      local%nlgeom = given%nlgeom
+      local%nlgeom = user%nlgeom
       do first = 0, solid%n_element - 1, n
          n = min(n, solid%n_element - first)
          !$omp parallel do default(none) num_threads(response%n_thread) if(n > 1) &
          !$omp shared(solid, given, motion, local, part, first, n, with_tangent) schedule(static)
          do k = 1, n
-            if (is_here(solid, first + k)) call respond_at(solid, given, first + k, motion, &
+            if (is_here(solid, first + k)) call respond_at(solid, user, first + k, motion, &
                with_tangent, local(k), part(k))
          end do
          !$omp end parallel do
@@ -99,9 +99,9 @@ contains
    end subroutine single_rest_tangent
 
    !> The response of element `e`, in space its motion from that of its first node.
-   subroutine respond_at(solid, given, e, motion, with_tangent, local, part)
+   subroutine respond_at(solid, user, e, motion, with_tangent, local, part)
       type(solid_t), intent(in) :: solid
-      type(host_response_t), intent(in) :: given !! of the same motion
+      type(host_response_t), intent(in) :: user !! of the same motion
       integer, intent(in) :: e                   !! 1..n_element
       type(motion_t), intent(in) :: motion       !! placed
       logical, intent(in) :: with_tangent        !! else no tangent is computed
@@ -121,13 +121,13 @@ contains
             end do
          end if
       end associate
-      call respond_to(solid, given, e, local, with_tangent, part)
+      call respond_to(solid, user, e, local, with_tangent, part)
    end subroutine respond_at
 
    !> The response of element `e` to a motion of its nodes.
-   pure subroutine respond_to(solid, given, e, local, with_tangent, part)
+   pure subroutine respond_to(solid, user, e, local, with_tangent, part)
       type(solid_t), intent(in) :: solid
-      type(host_response_t), intent(in) :: given !! of the same motion
+      type(host_response_t), intent(in) :: user !! of the same motion
       integer, intent(in) :: e                   !! 1..n_element
       type(space_motion_t), intent(in) :: local
       logical, intent(in) :: with_tangent        !! else no tangent is computed
@@ -135,8 +135,8 @@ contains
 
       associate (law => solid%law(solid%law_of(e)), rest => solid%rest(solid%law_of(e)))
          if (solid%host%first_point(e) > 0) then
-            call given_space_respond(solid%geometry(e), solid%host%first_point(e), &
-               given%points(solid%law_of(e)), local, with_tangent, part)
+            call user_space_respond(solid%geometry(e), solid%host%first_point(e), &
+               user%points(solid%law_of(e)), local, with_tangent, part)
          else if (solid%is_axial) then
             call axial_element_respond(solid%geometry(e), law%law, local, with_tangent, part)
          else if (solid%trait%has_mean(e)) then
@@ -212,9 +212,9 @@ contains
 
    !> Add the tangent of a motion times `direction` to `product`. Elements that `direction` does not
    !> touch are passed over.
-   subroutine single_tangent_times(solid, given, motion, direction, product)
+   subroutine single_tangent_times(solid, user, motion, direction, product)
       type(solid_t), intent(in) :: solid
-      type(host_response_t), intent(in) :: given !! of the same motion
+      type(host_response_t), intent(in) :: user !! of the same motion
       type(motion_t), intent(in) :: motion                             !! placed
       real(wp), intent(in), contiguous :: direction(:, :)              !! (n_dim, n_node) [L]
       real(wp), intent(inout), contiguous :: product(:, :)             !! (n_dim, n_node) [M L/T^2]
@@ -222,11 +222,11 @@ contains
       type(space_part_t) :: part
       integer :: a, e, i, j
 
-      local%nlgeom = given%nlgeom
+      local%nlgeom = user%nlgeom
       do e = 1, solid%n_element
          associate (node => solid%node(:solid%geometry(e)%n_node, e))
             if (.not. (is_here(solid, e) .and. any(abs(direction(:, node)) > 0.0_wp))) cycle
-            call respond_at(solid, given, e, motion, .true., local, part)
+            call respond_at(solid, user, e, motion, .true., local, part)
             if (part%is_inverted) return
             do i = 1, size(node)
                do a = 1, solid%n_dim
@@ -241,19 +241,19 @@ contains
    end subroutine single_tangent_times
 
    !> The fastest of the elements.
-   subroutine single_find_fastest(solid, given, motion, fastest)
+   subroutine single_find_fastest(solid, user, motion, fastest)
       type(solid_t), intent(in) :: solid
-      type(host_response_t), intent(in) :: given !! of the same motion
+      type(host_response_t), intent(in) :: user !! of the same motion
       type(motion_t), intent(in) :: motion       !! placed at its end
       type(fastest_t), intent(inout) :: fastest
       type(space_motion_t) :: local
       type(space_part_t) :: part
       integer :: e
 
-      local%nlgeom = given%nlgeom
+      local%nlgeom = user%nlgeom
       do e = 1, solid%n_element
          if (.not. is_here(solid, e)) cycle
-         call respond_at(solid, given, e, motion, .true., local, part)
+         call respond_at(solid, user, e, motion, .true., local, part)
          if (part%is_inverted) return
          associate (n => solid%geometry(e)%n_node, m => solid%n_dim)
             call compare_frequency(solid, e, motion%weight, part%tangent(:m, :n, :m, :n), &

@@ -10,7 +10,7 @@ module emcon_solid
    use emcon_kinds, only : wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t, law_t, n_lane
    use emcon_law_space, only : law_response_space, n_strain, space_response_t
-   use emcon_law_registry, only : law_create, law_given, law_linearise, law_make_thin
+   use emcon_law_registry, only : law_create, law_user, law_linearise, law_make_thin
    use emcon_materials, only : kinematics_corotated, kinematics_linear
    use emcon_scene, only : scene_t, where_text
    use emcon_shape, only : shape_table_t, shape_tabulate
@@ -88,11 +88,11 @@ module emcon_solid
 contains
 
    !> Geometry, laws and mass of the elements of `scene`, with the laws that a program gives.
-   subroutine solid_init(self, scene, error, given)
+   subroutine solid_init(self, scene, error, user)
       type(solid_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(host_law_t), intent(in), optional :: given(:)   !! one for each such material
+      type(host_law_t), intent(in), optional :: user(:)   !! one for each such material
       type(shape_table_t) :: stiffness(size(scene%element%kinds)), mass(size(scene%element%kinds))
       real(wp), allocatable :: at_rest(:)
       integer :: e, k, n, n_most
@@ -118,7 +118,7 @@ contains
       self%deck%section = scene%element%section
       call tell_apart(self, scene)
       if (any(self%trait%is_corotated)) allocate(self%x, source=scene%x)
-      call init_laws(self, scene, at_rest, error, given)
+      call init_laws(self, scene, at_rest, error, user)
       if (allocated(error)) return
       call init_kinds(self, scene, stiffness, mass, error)
       if (allocated(error)) return
@@ -318,12 +318,12 @@ contains
    end subroutine init_kinds
 
    !> The laws, and the largest entry of the tangent of each at rest.
-   subroutine init_laws(self, scene, at_rest, error, given)
+   subroutine init_laws(self, scene, at_rest, error, user)
       type(solid_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       real(wp), allocatable, intent(out) :: at_rest(:)   !! as `law` [M/(L T^2)]
       type(error_t), allocatable, intent(out) :: error
-      type(host_law_t), intent(in), optional :: given(:)
+      type(host_law_t), intent(in), optional :: user(:)
       integer :: k, n, n_law
 
       n_law = size(scene%material)
@@ -336,8 +336,8 @@ contains
          select case (scene%material(k)%law)
          case (0)
             cycle
-         case (law_given)
-            call host_law_take(scene, scene%material(k), self%host%law(k), error, given)
+         case (law_user)
+            call host_law_take(scene, scene%material(k), self%host%law(k), error, user)
             if (allocated(error)) return
             call move_alloc(self%host%law(k)%law, self%law(k)%law)
             if (allocated(self%host%law(k)%energy)) call host_rest_stiffness(self%host%law(k), &

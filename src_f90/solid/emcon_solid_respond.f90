@@ -8,7 +8,7 @@ module emcon_solid_respond
    use emcon_element_plane, only : element_motion_t, element_point, element_response_t, &
       point_is_regular, point_motion_t
    use emcon_element_space, only : space_motion_t
-   use emcon_given_space, only : given_space_strain
+   use emcon_user_space, only : user_space_strain
    use emcon_host_law, only : host_answer, host_points_make_room, host_response_t
    use emcon_incompatible_plane, only : incompatible_respond
    use emcon_kinds, only : wp
@@ -18,16 +18,16 @@ module emcon_solid_respond
    use emcon_solid, only : solid_t
    implicit none
    private
-   public :: solid_element_respond, solid_pack_respond, solid_evaluate_given, solid_gather
+   public :: solid_element_respond, solid_pack_respond, solid_evaluate_user, solid_gather
 
 contains
 
-   !> Response of a pack to a motion, which is that of `given` too.
-   pure subroutine solid_pack_respond(self, pack, motion, given, with_tangent, point, part)
+   !> Response of a pack to a motion, which is that of `user` too.
+   pure subroutine solid_pack_respond(self, pack, motion, user, with_tangent, point, part)
       type(solid_t), intent(in) :: self
       type(element_pack_t), intent(in) :: pack
       type(pack_motion_t), intent(in) :: motion
-      type(host_response_t), intent(in) :: given
+      type(host_response_t), intent(in) :: user
       logical, intent(in) :: with_tangent        !! else no tangent is computed
       type(pack_point_t), intent(inout) :: point         !! work space
       type(pack_response_t), intent(inout) :: part
@@ -45,7 +45,7 @@ contains
       do k = 1, pack%n_gp
          call pack_point(pack, k, motion, point)
          if (self%host%first_point(pack%element(1)) > 0) then
-            call host_answer(given%points(pack%law), self%host%first_point(pack%element) - 1 + k, &
+            call host_answer(user%points(pack%law), self%host%first_point(pack%element) - 1 + k, &
                point%law)
          else
             associate (law => self%law(pack%law)%law)
@@ -58,11 +58,11 @@ contains
    end subroutine solid_pack_respond
 
    !> Response of element `e` alone.
-   pure subroutine solid_element_respond(self, e, motion, given, with_tangent, part)
+   pure subroutine solid_element_respond(self, e, motion, user, with_tangent, part)
       type(solid_t), intent(in) :: self
       integer, intent(in) :: e                   !! 1 to n_element
       type(element_motion_t), intent(in) :: motion
-      type(host_response_t), intent(in) :: given
+      type(host_response_t), intent(in) :: user
       logical, intent(in) :: with_tangent        !! else no tangent is computed
       type(element_response_t), intent(inout) :: part
       type(element_pack_t) :: pack
@@ -78,7 +78,7 @@ contains
          motions%from(:, :, i) = spread(motion%from(:, i) - motion%from(:, 1), 1, n_lane)
          motions%by(:, :, i) = spread(motion%by(:, i) - motion%by(:, 1), 1, n_lane)
       end do
-      call solid_pack_respond(self, pack, motions, given, with_tangent, point, parts)
+      call solid_pack_respond(self, pack, motions, user, with_tangent, point, parts)
       part%energy = parts%energy(1)
       part%force(:, :n) = parts%force(1, :, :n)
       part%magnitude(:, :n) = parts%magnitude(1, :, :n)
@@ -88,60 +88,60 @@ contains
    end subroutine solid_element_respond
 
    !> Let the given laws answer to the step, each in one call for all its points.
-   subroutine solid_evaluate_given(self, u0, du, nlgeom, with_tangent, given)
+   subroutine solid_evaluate_user(self, u0, du, nlgeom, with_tangent, user)
       type(solid_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (n_dim, n_node)
       logical, intent(in) :: nlgeom              !! .false.: small strains
       logical, intent(in) :: with_tangent        !! else no tangent is computed
-      type(host_response_t), intent(inout) :: given
+      type(host_response_t), intent(inout) :: user
       integer :: k
 
-      given%material = 0
-      given%status = point_ok
-      given%nlgeom = nlgeom
-      call make_room(self, given)
+      user%material = 0
+      user%status = point_ok
+      user%nlgeom = nlgeom
+      call make_room(self, user)
       if (self%is_single) then
-         call gather_in_space(self, u0, du, given)
+         call gather_in_space(self, u0, du, user)
       else
-         call gather_strains(self, u0, du, nlgeom, given)
+         call gather_strains(self, u0, du, nlgeom, user)
       end if
-      if (given%inverted_element > 0) return
+      if (user%inverted_element > 0) return
       do k = 1, size(self%host%law)
          if (self%host%n_point(k) == 0) cycle
-         associate (points => given%points(k))
+         associate (points => user%points(k))
             call point_gradient(self%host%law(k)%energy, points%strain, points%dstrain, &
-               with_tangent, points%response, given%status)
+               with_tangent, points%response, user%status)
          end associate
-         if (given%status == point_ok) cycle
-         given%material = k
-         given%inverted_element = findloc(self%law_of, k, 1)
+         if (user%status == point_ok) cycle
+         user%material = k
+         user%inverted_element = findloc(self%law_of, k, 1)
          return
       end do
-   end subroutine solid_evaluate_given
+   end subroutine solid_evaluate_user
 
-   pure subroutine make_room(self, given)
+   pure subroutine make_room(self, user)
       type(solid_t), intent(in) :: self
-      type(host_response_t), intent(inout) :: given
+      type(host_response_t), intent(inout) :: user
       integer :: k
 
-      if (.not. allocated(given%points)) allocate(given%points(size(self%host%law)))
+      if (.not. allocated(user%points)) allocate(user%points(size(self%host%law)))
       do k = 1, size(self%host%law)
-         if (self%host%n_point(k) > 0) call host_points_make_room(given%points(k), &
+         if (self%host%n_point(k) > 0) call host_points_make_room(user%points(k), &
             self%host%law(k)%energy%n_variable, self%host%n_point(k))
       end do
    end subroutine make_room
 
    !> The strains of the elements of given laws, and the first of these that is inverted.
-   pure subroutine gather_strains(self, u0, du, nlgeom, given)
+   pure subroutine gather_strains(self, u0, du, nlgeom, user)
       type(solid_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
       logical, intent(in) :: nlgeom
-      type(host_response_t), intent(inout) :: given
+      type(host_response_t), intent(inout) :: user
       type(element_motion_t) :: local
       type(point_motion_t) :: point
       integer :: e, i, k
 
-      given%inverted_element = 0
+      user%inverted_element = 0
       local%nlgeom = nlgeom
       do e = 1, self%n_element
          if (self%host%first_point(e) == 0) cycle
@@ -149,12 +149,12 @@ contains
          do k = 1, self%geometry(e)%n_gp
             i = self%host%first_point(e) - 1 + k
             call element_point(self%geometry(e), k, local, point)
-            associate (points => given%points(self%law_of(e)))
+            associate (points => user%points(self%law_of(e)))
                points%strain(:, i) = point%strain
                points%dstrain(:, i) = point%dstrain
             end associate
             if (.not. point_is_regular(point, .false.)) then
-               given%inverted_element = e
+               user%inverted_element = e
                return
             end if
          end do
@@ -162,16 +162,16 @@ contains
    end subroutine gather_strains
 
    !> The same in three dimensions.
-   pure subroutine gather_in_space(self, u0, du, given)
+   pure subroutine gather_in_space(self, u0, du, user)
       type(solid_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (3, n_node)
-      type(host_response_t), intent(inout) :: given
+      type(host_response_t), intent(inout) :: user
       type(space_motion_t) :: local
       logical :: is_inverted
       integer :: e, i
 
-      given%inverted_element = 0
-      local%nlgeom = given%nlgeom
+      user%inverted_element = 0
+      local%nlgeom = user%nlgeom
       do e = 1, self%n_element
          if (self%host%first_point(e) == 0) cycle
          associate (node => self%node(:self%geometry(e)%n_node, e))
@@ -180,10 +180,10 @@ contains
                local%by(:, i) = du(:, node(i)) - du(:, node(1))
             end do
          end associate
-         call given_space_strain(self%geometry(e), self%host%first_point(e), local, &
-            given%points(self%law_of(e)), is_inverted)
+         call user_space_strain(self%geometry(e), self%host%first_point(e), local, &
+            user%points(self%law_of(e)), is_inverted)
          if (.not. is_inverted) cycle
-         given%inverted_element = e
+         user%inverted_element = e
          return
       end do
    end subroutine gather_in_space

@@ -16,7 +16,7 @@ module emcon_solid_term
    use emcon_point_function, only : point_failed
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_t
-   use emcon_solid_respond, only : solid_evaluate_given, solid_pack_respond
+   use emcon_solid_respond, only : solid_evaluate_user, solid_pack_respond
    use emcon_single_elements, only : compare_frequency, element_slots_t, single_find_fastest, &
       single_respond, single_tangent_times
    use emcon_space, only : lists_append, lists_t, space_t
@@ -32,7 +32,7 @@ module emcon_solid_term
       logical :: has_linear_laws = .false.       !! all materials of its elements are
       logical, private :: is_empty = .false.     !! no elements are left
       type(element_slots_t), private :: to       !! places of element matrices
-      type(host_response_t), private :: given   !! what given laws answer
+      type(host_response_t), private :: user   !! what given laws answer
       type(pack_shares_t), private :: shares    !! of the threads
    contains
       procedure :: lay_out
@@ -47,15 +47,15 @@ module emcon_solid_term
 contains
 
    !> The elements of `scene`, with the laws that a program gives.
-   subroutine solid_term_init(self, scene, error, given)
+   subroutine solid_term_init(self, scene, error, user)
       type(solid_term_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(host_law_t), intent(in), optional :: given(:)   !! one for each such material
+      type(host_law_t), intent(in), optional :: user(:)   !! one for each such material
       logical :: is_here(size(scene%material))
 
       self%role = role_internal
-      call solid_init(self%solid, scene, error, given)
+      call solid_init(self%solid, scene, error, user)
       is_here = .true.
       if (any(self%solid%trait%is_small)) then
          is_here = .false.
@@ -88,7 +88,7 @@ contains
       integer :: e, next
 
       self%nlgeom = scene%step(i_step)%nlgeom
-      self%given%nlgeom = self%nlgeom
+      self%user%nlgeom = self%nlgeom
       self%to%slot = slot
       if (allocated(self%to%first)) deallocate(self%to%first)
       allocate(self%to%first(self%solid%n_element), source=0)
@@ -109,14 +109,14 @@ contains
       integer :: t
 
       if (self%solid%host%is_used) then
-         call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, &
-            present(value), self%given)
-         if (self%given%inverted_element > 0) call refuse(self, self%given%inverted_element, &
+         call solid_evaluate_user(self%solid, motion%from, motion%by, self%nlgeom, &
+            present(value), self%user)
+         if (self%user%inverted_element > 0) call refuse(self, self%user%inverted_element, &
             response)
-         if (self%given%inverted_element > 0) return
+         if (self%user%inverted_element > 0) return
       end if
       if (self%solid%is_single) then
-         call single_respond(self%solid, self%given, self%to, motion, response, value, side)
+         call single_respond(self%solid, self%user, self%to, motion, response, value, side)
          return
       end if
       call shares_lay_out(self%shares, self%solid%pack, size(motion%by, 2), response%n_thread)
@@ -171,7 +171,7 @@ contains
       do k = self%shares%first(share) + 1, self%shares%first(share + 1)
          associate (pack => self%solid%pack(k), place => self%shares%place(k))
             call pack_gather(pack, motion%from, motion%by, local)
-            call solid_pack_respond(self%solid, pack, local, self%given, present(value), point, &
+            call solid_pack_respond(self%solid, pack, local, self%user, present(value), point, &
                part)
             if (any(part%is_inverted)) then
                self%shares%inverted(share) = pack%element(findloc(part%is_inverted, .true., 1))
@@ -291,13 +291,13 @@ contains
       integer, intent(in) :: e                   !! 1..n_element
       type(response_t), intent(inout) :: response
 
-      if (self%given%material == 0) then
+      if (self%user%material == 0) then
          response%refusal = "element " // to_text(self%solid%deck%label(e)) // " is inverted"
          return
       end if
       response%refusal = "the law given for material " // &
-         self%solid%deck%material(self%given%material)%text
-      if (self%given%status == point_failed) then
+         self%solid%deck%material(self%user%material)%text
+      if (self%user%status == point_failed) then
          response%refusal = response%refusal // " has failed"
          call raise(response%failure, err_analysis, response%refusal)
       else
@@ -318,12 +318,12 @@ contains
       integer :: k
 
       if (self%solid%host%is_used) then
-         call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, .true., &
-            self%given)
-         if (self%given%inverted_element > 0) return
+         call solid_evaluate_user(self%solid, motion%from, motion%by, self%nlgeom, .true., &
+            self%user)
+         if (self%user%inverted_element > 0) return
       end if
       if (self%solid%is_single) then
-         call single_tangent_times(self%solid, self%given, motion, direction, product)
+         call single_tangent_times(self%solid, self%user, motion, direction, product)
          return
       end if
       local%nlgeom = self%nlgeom
@@ -331,7 +331,7 @@ contains
          associate (pack => self%solid%pack(k))
             if (.not. touches(pack, direction)) cycle
             call pack_gather(pack, motion%from, motion%by, local)
-            call solid_pack_respond(self%solid, pack, local, self%given, .true., point, part)
+            call solid_pack_respond(self%solid, pack, local, self%user, .true., point, part)
             if (any(part%is_inverted)) return
             call add_image(pack, part, motion%weight, direction, product)
          end associate
@@ -415,19 +415,19 @@ contains
       integer :: k, l
 
       if (self%solid%host%is_used) then
-         call solid_evaluate_given(self%solid, motion%from, motion%by, self%nlgeom, .true., &
-            self%given)
-         if (self%given%inverted_element > 0) return
+         call solid_evaluate_user(self%solid, motion%from, motion%by, self%nlgeom, .true., &
+            self%user)
+         if (self%user%inverted_element > 0) return
       end if
       if (self%solid%is_single) then
-         call single_find_fastest(self%solid, self%given, motion, fastest)
+         call single_find_fastest(self%solid, self%user, motion, fastest)
          return
       end if
       local%nlgeom = self%nlgeom
       do k = 1, size(self%solid%pack)
          associate (pack => self%solid%pack(k))
             call pack_gather(pack, motion%from, motion%by, local)
-            call solid_pack_respond(self%solid, pack, local, self%given, .true., point, part)
+            call solid_pack_respond(self%solid, pack, local, self%user, .true., point, part)
             if (any(part%is_inverted)) return
             do l = 1, pack%n
                call compare_frequency(self%solid, pack%element(l), motion%weight, &

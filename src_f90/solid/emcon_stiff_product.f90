@@ -22,7 +22,7 @@ module emcon_stiff_product
       integer, allocatable, private :: first(:)          !! (n_group + 1) slots before each
       integer, allocatable, private :: column(:, :)      !! (n_lane, n_slot) rows of neighbours
       real(wp), allocatable, private :: block(:, :, :, :)   !! (n_lane, n_dim, n_dim, n_slot) K_ij
-      real(wp), allocatable, private :: way(:, :)        !! (n_lane*n_group, n_dim) displacements
+      real(wp), allocatable, private :: displacement(:, :) !! (n_lane*n_group, n_dim) displacements
       real(wp), allocatable, private :: computed(:)      !! (n_lane*n_group)
       real(wp), allocatable :: force(:, :)               !! (n_lane*n_group, n_dim) [M L/T^2]
       ! of `stiff_product_find_sizes`:
@@ -93,7 +93,8 @@ contains
          self%first(g + 1) = self%first(g) + n_other(self%node(n_lane*(g - 1) + 1))
       end do
       n = n_lane*n_group
-      allocate(self%way(n, self%n_dim), self%force(n, self%n_dim), self%magnitude(n, self%n_dim), &
+      allocate(self%displacement(n, self%n_dim), self%force(n, self%n_dim), self%magnitude(n, &
+         self%n_dim), &
          self%computed(n), self%largest(n), source=0.0_wp)
    end subroutine lay_out
 
@@ -139,11 +140,11 @@ contains
 
       if (present(by)) then
          do i = 1, self%n
-            self%way(i, :) = field(:, self%node(i)) + 0.5_wp*by(:, self%node(i))
+            self%displacement(i, :) = field(:, self%node(i)) + 0.5_wp*by(:, self%node(i))
          end do
       else
          do i = 1, self%n
-            self%way(i, :) = field(:, self%node(i))
+            self%displacement(i, :) = field(:, self%node(i))
          end do
       end if
    end subroutine stiff_product_load
@@ -155,7 +156,7 @@ contains
       integer :: a, b, g, i, k
 
       if (self%n_dim == n_plane) then
-         call form_in_plane(self%first, self%column, self%block, self%way, self%force)
+         call form_in_plane(self%first, self%column, self%block, self%displacement, self%force)
          return
       end if
       do g = 1, size(self%first) - 1
@@ -164,7 +165,7 @@ contains
          do k = self%first(g) + 1, self%first(g + 1)
             pull = 0.0_wp
             do b = 1, self%n_dim
-               d = self%way(self%column(:, k), b) - self%way(i + 1:i + n_lane, b)
+               d = self%displacement(self%column(:, k), b) - self%displacement(i + 1:i + n_lane, b)
                do a = 1, self%n_dim
                   pull(:, a) = pull(:, a) + self%block(:, a, b, k)*d
                end do
@@ -193,7 +194,7 @@ contains
             do l = 1, n_lane
                i = n_lane*(g - 1) + l
                j = self%column(l, k)
-               d = self%way(j, :) - self%way(i, :)
+               d = self%displacement(j, :) - self%displacement(i, :)
                pull = 0.0_wp
                do b = 1, self%n_dim
                   pull = pull + self%block(l, :, b, k)*d(b)

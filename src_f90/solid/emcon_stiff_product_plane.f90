@@ -14,11 +14,11 @@ module emcon_stiff_product_plane
 contains
 
    !> Forces of displacements, those of a node with all that it meets.
-   pure subroutine stiff_product_form(first, column, block, way, force)
+   pure subroutine stiff_product_form(first, column, block, displacement, force)
       integer, intent(in), contiguous :: first(:)          !! (n_group + 1) slots before each group
       integer, intent(in), contiguous :: column(:, :)      !! (n_lane, n_slot) rows of neighbours
       real(wp), intent(in), contiguous :: block(:, :, :, :)  !! (n_lane, 2, 2, n_slot) [M/T^2]
-      real(wp), intent(in), contiguous :: way(:, :)        !! (n_lane*n_group, 2) [L]
+      real(wp), intent(in), contiguous :: displacement(:, :)        !! (n_lane*n_group, 2) [L]
       real(wp), intent(inout), contiguous :: force(:, :)   !! (n_lane*n_group, 2) [M L/T^2]
       real(wp), dimension(n_lane) :: f1, f2, d1, d2
       integer :: g, i, k, l
@@ -29,11 +29,11 @@ contains
          f2 = 0.0_wp
          do k = first(g) + 1, first(g + 1)
             do l = 1, n_lane
-               d1(l) = way(column(l, k), 1)
-               d2(l) = way(column(l, k), 2)
+               d1(l) = displacement(column(l, k), 1)
+               d2(l) = displacement(column(l, k), 2)
             end do
-            d1 = d1 - way(i + 1:i + n_lane, 1)
-            d2 = d2 - way(i + 1:i + n_lane, 2)
+            d1 = d1 - displacement(i + 1:i + n_lane, 1)
+            d2 = d2 - displacement(i + 1:i + n_lane, 2)
             f1 = f1 + (block(:, 1, 1, k)*d1 + block(:, 1, 2, k)*d2)
             f2 = f2 + (block(:, 2, 1, k)*d1 + block(:, 2, 2, k)*d2)
          end do

@@ -11,7 +11,7 @@ module emcon_stress
    use emcon_element_axial_plane, only : axial_element_hold
    use emcon_element_plane, only : element_motion_t, element_point, point_motion_t
    use emcon_element_space, only : space_element_hold, space_motion_t
-   use emcon_given_space, only : given_space_hold
+   use emcon_user_space, only : user_space_hold
    use emcon_host_law, only : host_response_t, host_state
    use emcon_incompatible_modes, only : modes_relax
    use emcon_kinds, only : wp
@@ -20,7 +20,7 @@ module emcon_stress
    use emcon_mean_volume_space, only : mean_volume_space_hold
    use emcon_push_forward_plane, only : push_forward
    use emcon_solid, only : solid_t
-   use emcon_solid_respond, only : solid_evaluate_given
+   use emcon_solid_respond, only : solid_evaluate_user
    implicit none
    private
    public :: nodal_stress, element_means, element_energies, von_mises
@@ -33,16 +33,16 @@ contains
       real(wp), intent(in), contiguous :: u(:, :)            !! (n_dim, n_node)
       logical, intent(in) :: nlgeom              !! .false.: small strains
       real(wp), intent(out), contiguous :: stress(:, :)      !! (6, n_node)
-      type(host_response_t) :: given
+      type(host_response_t) :: user
       integer :: count_at(solid%n_node), e, i, k, node
       real(wp), dimension(6, maxval(solid%geometry%n_gp)) :: at_gp, strain
 
-      call respond_at(solid, u, nlgeom, given)
+      call respond_at(solid, u, nlgeom, user)
       stress = 0.0_wp
       count_at = 0
       do e = 1, solid%n_element
          if (solid%trait%is_rigid(e)) cycle
-         call state_of(solid, e, u, nlgeom, given, at_gp, strain)
+         call state_of(solid, e, u, nlgeom, user, at_gp, strain)
          do k = 1, solid%geometry(e)%n_gp
             do i = 1, solid%geometry(e)%n_node
                node = solid%node(i, e)
@@ -60,12 +60,12 @@ contains
    end subroutine nodal_stress
 
    !> Stress and strain at the quadrature points of element `e`, whatever it is.
-   pure subroutine state_of(solid, e, u, nlgeom, given, stress, strain)
+   pure subroutine state_of(solid, e, u, nlgeom, user, stress, strain)
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e
       real(wp), intent(in), contiguous :: u(:, :)
       logical, intent(in) :: nlgeom
-      type(host_response_t), intent(in) :: given
+      type(host_response_t), intent(in) :: user
       real(wp), intent(inout) :: stress(:, :), strain(:, :)
       type(law_points_t) :: points
       type(element_motion_t) :: motion
@@ -73,24 +73,24 @@ contains
       integer :: k
 
       if (solid%is_single) then
-         call state_of_single(solid, e, u, nlgeom, given, stress, strain)
+         call state_of_single(solid, e, u, nlgeom, user, stress, strain)
          return
       end if
       motion%nlgeom = nlgeom .and. .not. solid%trait%is_small(e)
       call place(solid, e, u, motion, turn)
-      call element_state(solid, e, motion, given, points, stress, strain)
+      call element_state(solid, e, motion, user, points, stress, strain)
       if (.not. solid%trait%is_corotated(e)) return
       do k = 1, solid%geometry(e)%n_gp
          call corotated_turn_stress(turn, stress(:, k))
       end do
    end subroutine state_of
 
-   pure subroutine state_of_single(solid, e, u, nlgeom, given, stress, strain)
+   pure subroutine state_of_single(solid, e, u, nlgeom, user, stress, strain)
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e
       real(wp), intent(in), contiguous :: u(:, :)
       logical, intent(in) :: nlgeom
-      type(host_response_t), intent(in) :: given
+      type(host_response_t), intent(in) :: user
       real(wp), intent(inout) :: stress(:, :), strain(:, :)
       type(space_motion_t) :: motion
       integer :: i
@@ -109,8 +109,8 @@ contains
       end associate
       associate (law => solid%law(solid%law_of(e)), rest => solid%rest(solid%law_of(e)))
          if (solid%host%first_point(e) > 0) then
-            call given_space_hold(solid%geometry(e), merge(solid%host%first_point(e), 0, &
-               given%inverted_element == 0), given%points(solid%law_of(e)), motion, stress, strain)
+            call user_space_hold(solid%geometry(e), merge(solid%host%first_point(e), 0, &
+               user%inverted_element == 0), user%points(solid%law_of(e)), motion, stress, strain)
          else if (solid%trait%has_mean(e)) then
             call mean_volume_space_hold(solid%geometry(e), law%law, rest%law, motion, stress, &
                strain)
@@ -121,17 +121,17 @@ contains
    end subroutine state_of_single
 
    !> What the given laws answer at the displacement `u`.
-   subroutine respond_at(solid, u, nlgeom, given)
+   subroutine respond_at(solid, u, nlgeom, user)
       type(solid_t), intent(in) :: solid
       real(wp), intent(in), contiguous :: u(:, :)
       logical, intent(in) :: nlgeom
-      type(host_response_t), intent(inout) :: given
+      type(host_response_t), intent(inout) :: user
       real(wp), allocatable :: zero(:, :)
 
       if (.not. solid%host%is_used) return
       allocate(zero, mold=u)
       zero = 0.0_wp
-      call solid_evaluate_given(solid, u, zero, nlgeom, .false., given)
+      call solid_evaluate_user(solid, u, zero, nlgeom, .false., user)
    end subroutine respond_at
 
    !> No motion of element `e` from displacements `u`; those of a corotated one are what is left in
@@ -170,11 +170,11 @@ contains
    end subroutine place_in_frame
 
    !> Stress and strain (E11, E22, 2 E12) at the quadrature points of element `e`.
-   pure subroutine element_state(solid, e, motion, given, points, stress, strain)
+   pure subroutine element_state(solid, e, motion, user, points, stress, strain)
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e
       type(element_motion_t), intent(in) :: motion       !! of no size
-      type(host_response_t), intent(in) :: given
+      type(host_response_t), intent(in) :: user
       type(law_points_t), intent(inout) :: points        !! workspace, `dstrain` is 0
       real(wp), intent(inout) :: stress(:, :), strain(:, :)   !! (6 and 3, n_gp), and room
       type(point_motion_t) :: point
@@ -197,7 +197,7 @@ contains
          else if (solid%host%first_point(e) == 0) then
             call solid%law(solid%law_of(e))%law%hold(points)
          else
-            call hold_given(given, solid%law_of(e), solid%host%first_point(e) + before, n, points)
+            call hold_user(user, solid%law_of(e), solid%host%first_point(e) + before, n, points)
          end if
          do l = 1, n
             call push_forward(f(:, :, l), points%stress(l, :), points%stress_33(l), &
@@ -209,8 +209,8 @@ contains
    end subroutine element_state
 
    !> What a given law has answered at `n` points from `first` on.
-   pure subroutine hold_given(given, law, first, n, points)
-      type(host_response_t), intent(in) :: given
+   pure subroutine hold_user(user, law, first, n, points)
+      type(host_response_t), intent(in) :: user
       integer, intent(in) :: law, first, n
       type(law_points_t), intent(inout) :: points
       type(law_response_t) :: state
@@ -218,12 +218,12 @@ contains
 
       points%stress = ieee_value(1.0_wp, ieee_quiet_nan)
       points%stress_33 = 0.0_wp
-      if (given%inverted_element /= 0) return
+      if (user%inverted_element /= 0) return
       do l = 1, n
-         state = host_state(given%points(law), first - 1 + l)
+         state = host_state(user%points(law), first - 1 + l)
          points%stress(l, :) = state%stress
       end do
-   end subroutine hold_given
+   end subroutine hold_user
 
    !> Means over the reference volume of each element, and that volume.
    subroutine element_means(solid, u, nlgeom, stress, strain, volume)
@@ -234,18 +234,18 @@ contains
       !> (3 or 6, n_element) E11, E22, 2 E12, or E11, E22, E33, 2 E12, 2 E23, 2 E13
       real(wp), intent(out) :: strain(:, :)
       real(wp), intent(out) :: volume(:)         !! (n_element) [L^3]
-      type(host_response_t) :: given
+      type(host_response_t) :: user
       real(wp), dimension(6, maxval(solid%geometry%n_gp)) :: stress_k, strain_k
       real(wp) :: weight
       integer :: e, k
 
-      call respond_at(solid, u, nlgeom, given)
+      call respond_at(solid, u, nlgeom, user)
       stress = 0.0_wp
       strain = 0.0_wp
       do e = 1, solid%n_element
          volume(e) = sum(solid%geometry(e)%weight)
          if (solid%trait%is_rigid(e)) cycle
-         call state_of(solid, e, u, nlgeom, given, stress_k, strain_k)
+         call state_of(solid, e, u, nlgeom, user, stress_k, strain_k)
          do k = 1, solid%geometry(e)%n_gp
             weight = solid%geometry(e)%weight(k)/volume(e)
             stress(:, e) = stress(:, e) + weight*stress_k(:, k)

@@ -47,7 +47,7 @@ module emcon_correction
       integer :: obstacle = obstacle_none        !! and why
       integer :: n_factorisation = 0             !! made so far
       integer :: choice = solver_default         !! of the direct solver, as the deck asks
-      class(sparse_solver_t), allocatable :: given             !! by a program, for that choice
+      class(sparse_solver_t), allocatable :: user             !! by a program, for that choice
       class(sparse_solver_t), allocatable :: solver            !! no active constraint
       class(sparse_solver_t), allocatable :: definite_solver   !! the same, positive definite
       logical, private :: is_definite = .false.  !! last factorisation: by that one
@@ -62,16 +62,16 @@ module emcon_correction
 contains
 
    !> Forget all layouts: the numbering has changed.
-   subroutine correction_reset(self, method, choice, given)
+   subroutine correction_reset(self, method, choice, user)
       type(correction_t), intent(inout) :: self
       integer, intent(in) :: method              !! one of `method_`
       integer, intent(in) :: choice              !! one of `solver_`, or above
-      class(sparse_solver_t), intent(in), optional :: given    !! as in `solver_create`
+      class(sparse_solver_t), intent(in), optional :: user    !! as in `solver_create`
 
       self%method = method
       self%choice = choice
-      if (allocated(self%given)) deallocate(self%given)
-      if (present(given)) allocate(self%given, source=given)
+      if (allocated(self%user)) deallocate(self%user)
+      if (present(user)) allocate(self%user, source=user)
       call make_solvers(self)
       if (allocated(self%layout%row_start)) deallocate(self%layout%row_start, self%layout%column)
    end subroutine correction_reset
@@ -79,11 +79,11 @@ contains
    subroutine make_solvers(self)
       type(correction_t), intent(inout) :: self
 
-      call solver_create(self%choice, matrix_general, self%solver, self%given)
-      call solver_create(self%choice, matrix_definite, self%definite_solver, self%given)
-      call kept_factor_set_up(self%kept, self%choice, self%given)
-      call solver_create(self%choice, matrix_general, self%null_space%solver, self%given)
-      call saddle_point_reset(self%saddle_point, self%choice, self%given)
+      call solver_create(self%choice, matrix_general, self%solver, self%user)
+      call solver_create(self%choice, matrix_definite, self%definite_solver, self%user)
+      call kept_factor_set_up(self%kept, self%choice, self%user)
+      call solver_create(self%choice, matrix_general, self%null_space%solver, self%user)
+      call saddle_point_reset(self%saddle_point, self%choice, self%user)
    end subroutine make_solvers
 
    !> Free what the solvers hold.
@@ -113,8 +113,8 @@ contains
          if (.not. has_pattern(self, set)) call take_pattern(self, set)
          return
       end if
-      if (set%soft%is_on) then
-         call lay_out_soft(self, system, set)
+      if (set%penalty%is_on) then
+         call lay_out_penalty(self, system, set)
          return
       end if
       call stopwatch_start(self%clock)
@@ -144,7 +144,7 @@ contains
 
    !> Contacts that give way depend on no others. Their null space is that of no contact: what they
    !> push is in the saddle point, or in the kept factor.
-   subroutine lay_out_soft(self, system, set)
+   subroutine lay_out_penalty(self, system, set)
       type(correction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
@@ -161,7 +161,7 @@ contains
             rows%redundant(:rows%n_redundant) <= set%n_permanent)
          self%n_redundant = size(self%redundant)
       end associate
-   end subroutine lay_out_soft
+   end subroutine lay_out_penalty
 
    !> The constraints stand on the unknowns that the layout was made for.
    pure logical function has_pattern(self, set)
@@ -244,7 +244,7 @@ contains
          call factorise_free(self, system, self%layout%merged, .false., is_singular, error)
          return
       end if
-      self%is_reduced = self%method == method_null_space .and. .not. set%soft%is_on
+      self%is_reduced = self%method == method_null_space .and. .not. set%penalty%is_on
       self%obstacle = obstacle_none
       if (self%is_reduced) then
          call null_space_factorise(self%null_space, set, self%layout%merged, is_singular, error)

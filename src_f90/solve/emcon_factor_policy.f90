@@ -191,7 +191,7 @@ contains
       self%n_correction = self%n_correction + 1
       call kept_factor_correct(correction%kept, set, residual, self%proposed(:size(dq)), error)
       if (allocated(error)) return
-      if (set%soft%is_under_way) then
+      if (set%penalty%is_under_way) then
          call move_with_multipliers(self, correction, dq, dlam)
       else
          call mixing_move(self%mixing, self%proposed, dq)

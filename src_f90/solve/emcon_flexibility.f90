@@ -35,7 +35,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: k
 
-      call solver_create(correction%choice, matrix_general, self%solver, correction%given)
+      call solver_create(correction%choice, matrix_general, self%solver, correction%user)
       call self%solver%analyse(system%matrix, error)
       if (.not. allocated(error)) call self%solver%factorise(system%matrix%value, error)
       if (allocated(error)) return
@@ -54,21 +54,21 @@ contains
    end subroutine flexibility_make
 
    !> The motion under a force, with what always holds.
-   subroutine flexibility_move(self, force, way, error)
+   subroutine flexibility_move(self, force, displacement, error)
       type(flexibility_t), intent(inout) :: self     !! not singular
       real(wp), intent(in) :: force(:)           !! (n_unknown) [M L/T^2]
-      real(wp), intent(out) :: way(:)            !! (n_unknown) [L]
+      real(wp), intent(out) :: displacement(:)            !! (n_unknown) [L]
       type(error_t), allocatable, intent(out) :: error
       real(dp) :: matrix(size(self%rate, 1), size(self%rate, 1))
       real(dp), dimension(size(self%rate, 1), 1) :: rate, lam
       logical :: is_singular
 
-      call self%solver%solve(force, way, error)
+      call self%solver%solve(force, displacement, error)
       if (allocated(error) .or. size(self%rate, 1) == 0) return
       matrix = real(matmul(self%rate, self%held), dp)
-      rate(:, 1) = real(matmul(self%rate, way), dp)
+      rate(:, 1) = real(matmul(self%rate, displacement), dp)
       call dense_solve(matrix, rate, lam, is_singular)
-      way = way - matmul(self%held, real(lam(:, 1), wp))
+      displacement = displacement - matmul(self%held, real(lam(:, 1), wp))
    end subroutine flexibility_move
 
    !> Derivatives by the nodes of a condition as those by the unknowns.

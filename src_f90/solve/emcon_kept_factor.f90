@@ -60,15 +60,15 @@ module emcon_kept_factor
 contains
 
    !> Factors are to be made by solvers of `choice`; there is none any more.
-   subroutine kept_factor_set_up(self, choice, given)
+   subroutine kept_factor_set_up(self, choice, user)
       type(kept_factor_t), intent(inout) :: self
       integer, intent(in) :: choice              !! one of `solver_`, or above
-      class(sparse_solver_t), intent(in), optional :: given    !! as in `solver_create`
+      class(sparse_solver_t), intent(in), optional :: user    !! as in `solver_create`
 
       if (allocated(self%blocks%kind)) then
          if (self%blocks%kind%choice /= choice) call blocks_free(self%blocks)
       end if
-      call solver_create(choice, matrix_definite, self%blocks%kind, given)
+      call solver_create(choice, matrix_definite, self%blocks%kind, user)
       self%blocks%may_be_rough = .true.
       call kept_factor_forget(self)
    end subroutine kept_factor_set_up
@@ -167,10 +167,10 @@ contains
       end do
       self%n_forward = self%n_forward + set%n
       call fill_products(self)
-      if (set%soft%is_on) then
+      if (set%penalty%is_on) then
          self%product = self%l
          self%compliance = 0.0_dp*self%mu
-         call soften(self, set, is_fit)
+         call add_penalty(self, set, is_fit)
       else
          call dense_cholesky(self%l, is_fit)
       end if
@@ -178,7 +178,7 @@ contains
 
    !> Factorise W^T W with the compliance of contacts that give way, for their present slopes: none
    !> without slope pushes, and all are soft enough for the factor.
-   subroutine soften(self, set, is_fit)
+   subroutine add_penalty(self, set, is_fit)
       type(kept_factor_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
       logical, intent(out) :: is_fit
@@ -188,13 +188,13 @@ contains
       self%l = self%product
       do k = set%n_permanent + 1, set%n
          associate (diagonal => self%l(k, k))
-            stiffness = real(set%soft%slope(k), dp)*self%blocks%scale*diagonal
+            stiffness = real(set%penalty%slope(k), dp)*self%blocks%scale*diagonal
             self%compliance(k) = diagonal*max(rounding, 1.0_dp/max(stiffness, rounding))
             diagonal = diagonal + self%compliance(k)
          end associate
       end do
       call dense_cholesky(self%l, is_fit)
-   end subroutine soften
+   end subroutine add_penalty
 
    !> Room for `n` entries of W; what there is stays.
    pure subroutine make_room(self, n)
@@ -258,7 +258,7 @@ contains
       type(condition_t), intent(in) :: item
       integer, intent(in) :: n                   !! coordinates of its nodes
       type(numbering_t), intent(in) :: numbering
-      real(dp) :: h(n, n), g(n), c(n), soft(n)
+      real(dp) :: h(n, n), g(n), c(n), flexible(n)
       integer :: i, k, n_dim
 
       n_dim = size(item%g, 1)
@@ -267,26 +267,27 @@ contains
       c = real(reshape(item%c(:, :item%n_node), [n]), dp)
       do i = 1, n
          k = n_dim*(item%node((i - 1)/n_dim + 1) - 1) + modulo(i - 1, n_dim) + 1
-         soft(i) = softness(self, numbering%column(numbering%start(k) + 1:numbering%start(k + 1)))
+         flexible(i) = flexibility(self, numbering%column(numbering%start(k) &
+            + 1:numbering%start(k + 1)))
       end do
-      if (any(soft*abs(g) > 0.0_dp)) h = h - spread(g, 2, n) &
-         *spread(matmul(soft*g, h)/dot_product(soft*g, g), 1, n)
-      if (any(soft*abs(c) > 0.0_dp)) h = h - spread(matmul(h, soft*c) &
-         /dot_product(soft*c, c), 2, n)*spread(c, 1, n)
-      bend_of = sqrt(maxval(h*h*spread(soft, 2, n)*spread(soft, 1, n)))
+      if (any(flexible*abs(g) > 0.0_dp)) h = h - spread(g, 2, n) &
+         *spread(matmul(flexible*g, h)/dot_product(flexible*g, g), 1, n)
+      if (any(flexible*abs(c) > 0.0_dp)) h = h - spread(matmul(h, flexible*c) &
+         /dot_product(flexible*c, c), 2, n)*spread(c, 1, n)
+      bend_of = sqrt(maxval(h*h*spread(flexible, 2, n)*spread(flexible, 1, n)))
    end function bend_of
 
    !> One over the stiffness of the softest unknown that a coordinate follows; 0 if it follows none.
-   pure real(dp) function softness(self, unknown)
+   pure real(dp) function flexibility(self, unknown)
       type(kept_factor_t), intent(in) :: self
       integer, intent(in) :: unknown(:)          !! <= 0: none
       integer :: i
 
-      softness = 0.0_dp
+      flexibility = 0.0_dp
       do i = 1, size(unknown)
-         if (unknown(i) > 0) softness = max(softness, 1.0_dp/self%diagonal(unknown(i)))
+         if (unknown(i) > 0) flexibility = max(flexibility, 1.0_dp/self%diagonal(unknown(i)))
       end do
-   end function softness
+   end function flexibility
 
    !> Is what the factor does not know, the curvature of the constraints as last looked at, small
    !> beside it, by their present multipliers? Those of contacts that give way follow the gaps, and
@@ -303,7 +304,7 @@ contains
       most = merge(most_curved, most_curved_far, is_near)
       do k = set%n_linear + 1, set%n
          lam = real(set%lam(k), dp)
-         if (set%soft%is_on) lam = lam + self%mu(k)
+         if (set%penalty%is_on) lam = lam + self%mu(k)
          if (abs(lam)*self%bend(k) > most) kept_factor_serves = .false.
       end do
    end function kept_factor_serves
@@ -319,14 +320,14 @@ contains
       integer :: k, j
       logical :: is_fit
 
-      if (set%soft%is_on) call soften(self, set, is_fit)
+      if (set%penalty%is_on) call add_penalty(self, set, is_fit)
       self%x = -real(residual, dp)
       call blocks_solve(self%blocks, .false., self%x, self%y, error)
       if (allocated(error)) return
       do k = 1, set%n
          self%mu(k) = -real(set%defect(k), dp)/self%blocks%scale
-         if (set%soft%is_on) self%mu(k) = self%mu(k) &
-            + self%compliance(k)*real(set%soft%lack(k), dp)
+         if (set%penalty%is_on) self%mu(k) = self%mu(k) &
+            + self%compliance(k)*real(set%penalty%lack(k), dp)
          do j = self%start(k) + 1, self%start(k + 1)
             self%mu(k) = self%mu(k) - self%w(j)*self%y(self%index(j) + 1)
          end do

@@ -66,7 +66,7 @@ module emcon_newton
       type(yardstick_t) :: rounding              !! of what their own evaluation rounds
       real(wp), allocatable :: dq(:)             !! (n_unknown) the last correction
       real(wp), allocatable :: dlam(:)           !! (n) and that of the multipliers
-      real(wp), allocatable :: way(:)            !! (n_unknown) the correction to search along
+      real(wp), allocatable :: direction(:)            !! (n_unknown) the correction to search along
       real(wp), allocatable :: contact(:, :)     !! (n_dim, n_node) forces of the set of constraints
       real(wp), allocatable :: left(:, :)        !! (n_dim, n_node) the residual with them
       !> (n_dim, n_node) prescribed motion that the first correction meets by its tangent; 0: none
@@ -93,10 +93,10 @@ contains
 
       call convergence_init(self%convergence, tolerance, maximum)
       self%is_idle = .false.
-      if (allocated(self%residual)) deallocate(self%residual, self%scale, self%dq, self%way, &
+      if (allocated(self%residual)) deallocate(self%residual, self%scale, self%dq, self%direction, &
          self%contact, self%left, self%driven)
       allocate(self%residual(n_unknown), self%scale(n_unknown), self%dq(n_unknown), &
-         self%way(n_unknown))
+         self%direction(n_unknown))
       allocate(self%contact, self%left, self%driven, mold=x)
       self%contact = 0.0_wp
       self%left = 0.0_wp
@@ -117,15 +117,15 @@ contains
       real(wp), allocatable :: lam(:)
       logical :: is_done
 
-      set%soft%is_under_way = set%soft%is_on .and. &
+      set%penalty%is_under_way = set%penalty%is_on .and. &
          .not. evaluation_is_equilibrium(motion%evaluation)
-      if (set%soft%is_under_way) lam = set%lam
+      if (set%penalty%is_under_way) lam = set%lam
       is_done = .false.
       if (self%factor_policy%is_allowed &
          .and. size(self%residual) > 0) call solve_by_kept_factor(self, system, set, motion, &
          status, is_done, error)
       if (is_done .or. allocated(error)) return
-      if (set%soft%is_under_way) set%lam = lam
+      if (set%penalty%is_under_way) set%lam = lam
       call solve_by_tangents(self, system, set, motion, status, error)
    end subroutine newton_solve
 
@@ -145,7 +145,7 @@ contains
       call begin(self, set%n_row)
       self%convergence%is_kept = .true.
       call factor_policy_begin(self%factor_policy, size(self%residual) &
-         + merge(set%n, 0, set%soft%is_under_way), motion%du)
+         + merge(set%n, 0, set%penalty%is_under_way), motion%du)
       is_done = .true.
       is_fit = .true.
       do
@@ -199,7 +199,7 @@ contains
       call phase_enter(system%phases, phase_factorise, left)
       call factor_policy_make(self%factor_policy, self%correction, system, set, motion, is_fit, &
          error)
-      if (is_fit .and. .not. set%soft%is_on) is_fit = kept_factor_serves( &
+      if (is_fit .and. .not. set%penalty%is_on) is_fit = kept_factor_serves( &
          self%correction%kept, set, self%convergence%knows_sizes)
       call phase_leave(system%phases, left)
    end subroutine make_factor
@@ -220,13 +220,13 @@ contains
       call phase_leave(system%phases, left)
       is_fit = .true.
       if (allocated(error)) return
-      if (set%soft%is_on) is_fit = kept_factor_serves(self%correction%kept, set, &
+      if (set%penalty%is_on) is_fit = kept_factor_serves(self%correction%kept, set, &
          self%convergence%knows_sizes)
       if (.not. is_fit) return
       system%phases%n_solve = system%phases%n_solve + 1
       self%n_solve = self%n_solve + 1
       call add_to_dofs(system%space%numbering, self%dq, 1.0_wp, du)
-      if (set%soft%is_under_way) set%lam = set%lam + self%dlam
+      if (set%penalty%is_under_way) set%lam = set%lam + self%dlam
    end subroutine correct_by_kept_factor
 
    !> The step by Newton's method.
@@ -318,15 +318,15 @@ contains
       goes_on = .false.
       if (.not. evaluation_is_equilibrium(motion%evaluation) .or. set%n == set%n_permanent) return
       if (self%line%is_on) then
-         call line_search_take(self%line, dot_product(self%way, self%residual))
+         call line_search_take(self%line, dot_product(self%direction, self%residual))
       else
          call line_search_begin(self%line, self%work, dot_product(self%dq, self%residual))
-         if (self%line%is_on) self%way = self%dq
+         if (self%line%is_on) self%direction = self%dq
          self%work = 0.0_wp
       end if
       goes_on = self%line%is_on
       if (.not. goes_on) return
-      self%dq = self%line%step*self%way
+      self%dq = self%line%step*self%direction
       call add_to_dofs(system%space%numbering, self%dq, 1.0_wp, motion%du)
       set%lam = set%lam + self%line%step*self%dlam
    end subroutine search
@@ -517,7 +517,7 @@ contains
       end do
       is_rounding = relative_size(self%residual, self%rounding) <= round_off &
          .and. defect <= round_off
-      if (set%soft%is_under_way) call measure_lack(self, system, set, norm, is_rounding)
+      if (set%penalty%is_under_way) call measure_lack(self, system, set, norm, is_rounding)
       ! A body that moves as a rigid one has no forces to compare its round-off with.
       self%is_idle = is_rounding .and. .not. has_load(system)
       if (.not. self%is_idle) is_rounding = is_rounding .and. norm <= most_rounding
@@ -549,7 +549,7 @@ contains
       logical, intent(inout) :: is_rounding
 
       call vector_zero(size(self%left), self%left)
-      call constraints_add_row_forces(set, set%soft%lack, self%left)
+      call constraints_add_row_forces(set, set%penalty%lack, self%left)
       call pick_unknowns(system%space%numbering, self%left, self%scale)
       norm = max(norm, relative_size(self%scale, self%forces))
       is_rounding = is_rounding .and. relative_size(self%scale, self%rounding) <= round_off

@@ -307,7 +307,7 @@ contains
       magnitude = abs(rest)
       do k = 1, set%n_row
          associate (item => set%item(set%condition(k)))
-            if (item%rubs) then
+            if (item%has_friction) then
                call subtract(item%node(:item%n_node), condition_row_force(item, set%slip(k)), &
                   lam(k))
             else

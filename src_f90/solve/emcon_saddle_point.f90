@@ -37,12 +37,12 @@ module emcon_saddle_point
 contains
 
    !> Choose the solvers anew.
-   subroutine saddle_point_reset(self, choice, given)
+   subroutine saddle_point_reset(self, choice, user)
       type(saddle_point_t), intent(inout) :: self
       integer, intent(in) :: choice              !! one of `solver_`, or above
-      class(sparse_solver_t), intent(in), optional :: given    !! as in `solver_create`
+      class(sparse_solver_t), intent(in), optional :: user    !! as in `solver_create`
 
-      call solver_create(choice, matrix_general, self%solver, given)
+      call solver_create(choice, matrix_general, self%solver, user)
       if (factors_symmetric(choice)) then
          call solver_create(choice, matrix_symmetric, self%symmetric_solver)
       else if (allocated(self%symmetric_solver)) then
@@ -66,13 +66,13 @@ contains
       type(csr_t), intent(in) :: matrix                  !! pattern of N
       type(error_t), allocatable, intent(out) :: error
       integer, allocatable :: row(:), column(:)
-      integer :: i, n, n_matrix, n_rows, n_soft
+      integer :: i, n, n_matrix, n_rows, n_penalty
 
       n = matrix%n_row
       n_matrix = size(matrix%column)
       n_rows = set%force_rows%row_start(set%n_row + 1)
-      n_soft = merge(set%n - set%n_permanent, 0, set%soft%is_on)
-      allocate(row(n_matrix + 2*n_rows + n_soft), column(n_matrix + 2*n_rows + n_soft))
+      n_penalty = merge(set%n - set%n_permanent, 0, set%penalty%is_on)
+      allocate(row(n_matrix + 2*n_rows + n_penalty), column(n_matrix + 2*n_rows + n_penalty))
       do i = 1, n
          row(matrix%row_start(i) + 1:matrix%row_start(i + 1)) = i
       end do
@@ -86,7 +86,7 @@ contains
       end do
       row(n_matrix + 1:n_matrix + n_rows) = set%force_rows%column(:n_rows) + 1
       column(n_matrix + n_rows + 1:n_matrix + 2*n_rows) = set%force_rows%column(:n_rows) + 1
-      row(n_matrix + 2*n_rows + 1:) = [(n + i, i = set%n_row - n_soft + 1, set%n_row)]
+      row(n_matrix + 2*n_rows + 1:) = [(n + i, i = set%n_row - n_penalty + 1, set%n_row)]
       column(n_matrix + 2*n_rows + 1:) = row(n_matrix + 2*n_rows + 1:)
       call csr_from_entries(self%full, n + set%n_row, n + set%n_row, row, column, self%slot)
       if (.not. allocated(self%solver)) call saddle_point_reset(self, solver_default)
@@ -121,10 +121,10 @@ contains
          self%full%value(self%slot(n_matrix + k)) = -self%scale*set%force_rows%value(k)
          self%full%value(self%slot(n_matrix + n_rows + k)) = self%scale*set%gap_rows%value(k)
       end do
-      if (set%soft%is_on) then
+      if (set%penalty%is_on) then
          do k = set%n_permanent + 1, set%n
             self%full%value(self%slot(n_matrix + 2*n_rows + k - set%n_permanent)) &
-               = compliance(self, set%soft%slope(k))
+               = compliance(self, set%penalty%slope(k))
          end do
       end if
       self%is_symmetric = is_mirrored(self, set, matrix)
@@ -194,10 +194,10 @@ contains
       n = size(residual)
       self%rhs(:n) = -residual
       self%rhs(n + 1:) = -real(self%scale, wp)*set%defect
-      if (set%soft%is_on) then
+      if (set%penalty%is_on) then
          do k = set%n_permanent + 1, set%n
-            self%rhs(n + k) = self%rhs(n + k) + real(compliance(self, set%soft%slope(k)), wp) &
-               *(set%soft%lack(k)/real(self%scale, wp))
+            self%rhs(n + k) = self%rhs(n + k) + real(compliance(self, set%penalty%slope(k)), wp) &
+               *(set%penalty%lack(k)/real(self%scale, wp))
          end do
       end if
       if (self%is_symmetric) then

@@ -42,7 +42,7 @@ module emcon_constraint
       real(wp), allocatable :: h(:, :)
       logical :: leaves_second = .false.              !! nobody asks for `h`
       ! Of slip, docs/theory.md, eqs. (14e) to (14h):
-      logical :: rubs = .false.                       !! the rest is known
+      logical :: has_friction = .false.                       !! the rest is known
       real(wp) :: slip(most_slips) = 0.0_wp           !! s over the step [L]
       real(wp) :: slip_target(most_slips) = 0.0_wp    !! a, at which it sticks [L]
       real(wp) :: stick(most_slips) = 0.0_wp          !! multipliers of the rows of slips [M L/T^2]
@@ -126,7 +126,7 @@ contains
       integer :: s
 
       force = (lam + self%response%lam)*self%g(:, i)
-      if (.not. self%rubs) return
+      if (.not. self%has_friction) return
       tau = condition_drag(self, lam)
       do s = 1, size(self%t, 3)
          force = force - tau(s)*self%t(:, i, s)
@@ -143,7 +143,7 @@ contains
       integer :: s
 
       force = lam*self%g(:, i)
-      if (.not. self%rubs) return
+      if (.not. self%has_friction) return
       tau = condition_friction(self, lam)
       do s = 1, size(self%t, 3)
          force = force - tau(s)*self%t(:, i, s)
@@ -158,7 +158,7 @@ contains
       integer :: s
 
       force = self%response%lam*self%g(:, i)
-      if (.not. self%rubs) return
+      if (.not. self%has_friction) return
       do s = 1, size(self%t, 3)
          force = force - self%response%tau(s)*self%t(:, i, s)
       end do
@@ -167,7 +167,7 @@ contains
    !> The normal force by a multiplier of 1, where friction of 1 acts along the surface with 1:
    !> resultants on the slave side. docs/theory.md, eq. (14r).
    pure real(wp) function condition_normal(self) result(normal)
-      type(condition_t), intent(in) :: self           !! it rubs
+      type(condition_t), intent(in) :: self           !! with friction
       real(wp) :: along
 
       along = norm2(sum(self%t(:, :self%n_slave, :), 2))/sqrt(real(size(self%t, 3), wp))
@@ -177,7 +177,7 @@ contains
 
    !> Its derivative by the end coordinates, node by node.
    pure function condition_normal_slope(self) result(slope)
-      type(condition_t), intent(in) :: self           !! it rubs, with second derivatives
+      type(condition_t), intent(in) :: self           !! with friction and second derivatives
       real(wp) :: slope(size(self%g, 1)*self%n_node)  !! [1/L]
       real(wp) :: push(size(self%g, 1)), along(size(self%g, 1), size(self%t, 3))
       integer :: i, a, row, s
@@ -220,7 +220,7 @@ contains
    !> The directions in which a unit of the multiplier of a row pushes: where the condition slides
    !> that of its gap is tilted against slip.
    pure function condition_row_force(self, slip) result(push)
-      type(condition_t), intent(in) :: self           !! it rubs, or `slip` is 0
+      type(condition_t), intent(in) :: self           !! with friction, or `slip` is 0
       integer, intent(in) :: slip                     !! 0: the row of the gap
       real(wp) :: push(size(self%g, 1), self%n_node)
       integer :: s
@@ -230,7 +230,7 @@ contains
          return
       end if
       push = self%g(:, :self%n_node)
-      if (.not. self%rubs) return
+      if (.not. self%has_friction) return
       do s = 1, size(self%t, 3)
          push = push - self%response%mu_sigma(s)*self%normal*self%t(:, :self%n_node, s)
       end do
@@ -238,7 +238,7 @@ contains
 
    !> The gradient of the value of a row at the end.
    pure function condition_row_gradient(self, slip) result(gradient)
-      type(condition_t), intent(in) :: self           !! it rubs, or `slip` is 0
+      type(condition_t), intent(in) :: self           !! with friction, or `slip` is 0
       integer, intent(in) :: slip                     !! 0: the row of the gap
       real(wp) :: gradient(size(self%g, 1), self%n_node)
 
@@ -250,9 +250,9 @@ contains
    end function condition_row_gradient
 
    !> By how much the value of a row changes at the end with the field `way`, to first order.
-   pure real(wp) function condition_rate(self, way, slip) result(rate)
-      type(condition_t), intent(in) :: self           !! it rubs if `slip` is above 0
-      real(wp), intent(in) :: way(:, :)               !! (n_dim, n_node of the scene)
+   pure real(wp) function condition_rate(self, displacement, slip) result(rate)
+      type(condition_t), intent(in) :: self           !! with friction if `slip` is above 0
+      real(wp), intent(in) :: displacement(:, :)               !! (n_dim, n_node of the scene)
       integer, intent(in), optional :: slip           !! of the row; 0, as by default: its gap
       integer :: i, s
 
@@ -261,9 +261,9 @@ contains
       rate = 0.0_wp
       do i = 1, self%n_node
          if (s == 0) then
-            rate = rate + dot_product(self%c(:, i), way(:, self%node(i)))
+            rate = rate + dot_product(self%c(:, i), displacement(:, self%node(i)))
          else
-            rate = rate - dot_product(self%t1(:, i, s), way(:, self%node(i)))
+            rate = rate - dot_product(self%t1(:, i, s), displacement(:, self%node(i)))
          end if
       end do
    end function condition_rate
@@ -279,7 +279,7 @@ contains
 
       m = size(stiffness, 1)
       n_slip = 0
-      if (self%rubs) n_slip = size(self%t, 3)
+      if (self%has_friction) n_slip = size(self%t, 3)
       stiffness = -(lam + self%response%lam)*self%h(:m, :m)
       along(:, 0) = reshape(self%g(:, :self%n_node), [m])
       tau = condition_drag(self, lam)

@@ -42,23 +42,25 @@ contains
       type(rigid_body_t), intent(in) :: rigid(:)         !! with their frames
       type(motion_t), intent(in) :: motion               !! of the step
       real(wp), intent(in) :: reaction(:, :)             !! (n_dim, n_node) [M L/T^2]
-      real(wp) :: first(size(reaction, 1)), way(size(reaction, 1))
+      real(wp) :: first(size(reaction, 1)), displacement(size(reaction, 1))
       integer :: b, k, node
 
       do b = 1, size(self%angle)
          self%moment(b) = 0.0_wp
          do k = size(rigid(b)%frame), 2, -1
             first = arm_of(rigid(b), k, motion%x) + arm_of(rigid(b), k, motion%u0)
-            way = arm_of(rigid(b), k, motion%du)
+            displacement = arm_of(rigid(b), k, motion%du)
             node = rigid(b)%frame(k)
-            self%moment(b) = self%moment(b) + moment_of(first + motion%evaluation%load_place*way, &
+            self%moment(b) = self%moment(b) + moment_of(first &
+               + motion%evaluation%load_place*displacement, &
                reaction(:, node))
             if (.not. allocated(rigid(b)%arm)) cycle
             node = rigid(b)%arm(k - 1)
-            self%moment(b) = self%moment(b) + moment_of(first + motion%evaluation%load_place*way, &
+            self%moment(b) = self%moment(b) + moment_of(first &
+               + motion%evaluation%load_place*displacement, &
                reaction(:, node))
          end do
-         self%angle(b) = self%angle(b) + turned_by(first, first + way)
+         self%angle(b) = self%angle(b) + turned_by(first, first + displacement)
       end do
    end subroutine rigid_rotation_measure
 

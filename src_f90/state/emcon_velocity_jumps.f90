@@ -37,18 +37,19 @@ contains
 
    !> Append impulses `lam` along the gradients at the end of the step. With `way` also what the
    !> multipliers of the set push where their directions turn by that motion.
-   pure subroutine jumps_add(jump, set, lam, way)
+   pure subroutine jumps_add(jump, set, lam, displacement)
       type(velocity_jump_t), allocatable, intent(inout) :: jump(:)   !! begun
-      type(constraint_set_t), intent(in) :: set  !! evaluated; with `way` second derivatives too
+      !> evaluated; with `displacement` second derivatives too
+      type(constraint_set_t), intent(in) :: set
       real(wp), intent(in) :: lam(:)             !! (n of the set) [M L/T]
-      real(wp), intent(in), optional :: way(:, :)    !! (n_dim, n_node) [L]
+      real(wp), intent(in), optional :: displacement(:, :)    !! (n_dim, n_node) [L]
       type(velocity_jump_t) :: more(set%n - set%n_permanent)
       integer :: k
 
       do k = 1, size(more)
          associate (j => set%n_permanent + k)
             more(k) = jump_of(set%item(j), set%id(j), lam(j))
-            if (present(way)) call turn(set%item(j), set%lam(j), way, more(k))
+            if (present(displacement)) call turn(set%item(j), set%lam(j), displacement, more(k))
          end associate
       end do
       call jumps_join(jump, more)
@@ -80,23 +81,23 @@ contains
    end function jump_of
 
    !> Add what `lam` pushes where the nodes of a condition move by `way` and its directions turn.
-   pure subroutine turn(item, lam, way, jump)
+   pure subroutine turn(item, lam, displacement, jump)
       type(condition_t), intent(in) :: item
       real(wp), intent(in) :: lam                !! [M L/T^2]
-      real(wp), intent(in) :: way(:, :)          !! (n_dim, n_node) [L]
+      real(wp), intent(in) :: displacement(:, :)          !! (n_dim, n_node) [L]
       type(velocity_jump_t), intent(inout) :: jump
       integer :: i, j, n_dim
 
-      n_dim = size(way, 1)
+      n_dim = size(displacement, 1)
       do j = 1, item%n_node
          do i = 1, item%n_node
             jump%impulse(:, i) = jump%impulse(:, i) + lam*matmul(item%h(n_dim*(i - 1) + 1:n_dim*i, &
-               n_dim*(j - 1) + 1:n_dim*j), way(:, item%node(j)))
+               n_dim*(j - 1) + 1:n_dim*j), displacement(:, item%node(j)))
          end do
          if (j <= item%n_slave) then
-            call add_moments(way(:, item%node(j)), lam*item%c(:, j), jump%slave_moment)
+            call add_moments(displacement(:, item%node(j)), lam*item%c(:, j), jump%slave_moment)
          else
-            call add_moments(way(:, item%node(j)), lam*item%c(:, j), jump%master_moment)
+            call add_moments(displacement(:, item%node(j)), lam*item%c(:, j), jump%master_moment)
          end if
       end do
    end subroutine turn

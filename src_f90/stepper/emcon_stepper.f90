@@ -5,7 +5,7 @@ module emcon_stepper
    use emcon_blas, only : blas_is_shareable
    use emcon_deck, only : deck_read
    use emcon_deck_further, only : further_until
-   use emcon_deck_given_scheme, only : take_given_schemes
+   use emcon_deck_user_scheme, only : take_user_schemes
    use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_errors, only : err_input, err_interrupt, error_t, raise
@@ -31,7 +31,7 @@ module emcon_stepper
    type :: stepper_t
       type(scene_t) :: scene
       type(march_t) :: march
-      type(host_t) :: given                     !! laws, forces and mass from outside
+      type(host_t) :: host                     !! laws, forces and mass from outside
       type(deck_source_t) :: source              !! the deck as read, for restart files
       type(string_t), allocatable :: override(:) !! NAME=VALUE as given
       logical :: is_lenient = .false.
@@ -140,14 +140,14 @@ contains
       type(stepper_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error
 
-      call take_given_schemes(self%march%host%scheme, self%scene, error)
+      call take_user_schemes(self%march%host%scheme, self%scene, error)
       if (.not. (allocated(error) &
-         .or. self%scene%host%is_whole)) call host_check_scene(self%given, self%scene, error)
+         .or. self%scene%host%is_whole)) call host_check_scene(self%host, self%scene, error)
       if (allocated(error)) return
       call ties_prepare(self%scene, self%notes, error)
       if (.not. (allocated(error) .or. self%scene%host%is_whole)) call prepare_contact(self, error)
       if (allocated(error)) return
-      call march_init(self%march, self%scene, error, self%given)
+      call march_init(self%march, self%scene, error, self%host)
       if (allocated(error)) return
       call march_set_threads(self%march, merge(threads_default(), 1, blas_is_shareable()))
       call march_begin_step(self%march, self%scene, 1, error)
@@ -174,7 +174,7 @@ contains
       type(stepper_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error
 
-      call initial_contact_prepare(self%scene, self%notes, error, self%given)
+      call initial_contact_prepare(self%scene, self%notes, error, self%host)
       if (.not. allocated(error)) call ties_move_nodes(self%scene, self%notes, error)
    end subroutine prepare_contact
 

@@ -22,7 +22,8 @@ contains
          "there is no model: none was built, or building it failed", error)
    end subroutine stepper_check_open
 
-   !> Nothing rubs or is damped: what sticks, what slides and what is near is told by no query.
+   !> There is no friction and no damping: what sticks, what slides and what is near is told by no
+   !> query.
    pure subroutine stepper_check_smooth(self, error)
       type(stepper_t), intent(in) :: self
       type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done

@@ -36,7 +36,7 @@ contains
 
       call exchange_source(self, restart)
       call exchange_state(self, restart)
-      n = host_count(self%given)
+      n = host_count(self%host)
       call exchange_given(restart, n)
    end subroutine stepper_save
 
@@ -473,9 +473,9 @@ contains
       n = 0
       call exchange_given(restart, n)
       call restart_check(restart, error)
-      if (allocated(error) .or. all(n == host_count(self%given))) return
+      if (allocated(error) .or. all(n == host_count(self%host))) return
       call count_text(n, stored)
-      call count_text(host_count(self%given), own)
+      call count_text(host_count(self%host), own)
       call raise(error, err_input, "the restart file is of a model with " // stored // &
          ", not with " // own // ": they are not in the file, read the deck " // &
          "and give them again before the restart file is loaded")

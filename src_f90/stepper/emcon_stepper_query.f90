@@ -74,7 +74,7 @@ contains
       call stepper_check_open(stepper, error)
       if (allocated(error)) return
       if (self%revision < 0) then
-         call march_init(self%march, stepper%scene, error, stepper%given)
+         call march_init(self%march, stepper%scene, error, stepper%host)
          if (allocated(error)) return
          allocate(self%contact, source=at_rest(stepper%scene%x))
          self%revision = 0
@@ -241,7 +241,7 @@ contains
          active%is_active = state%contacts%is_active .and. gap%is_near
          active%is_active(:system%first_constraint(1)) = system%acts
          active%lam = state%contacts%lam
-         active%softness%closure = state%contacts%closure
+         active%penalty%closure = state%contacts%closure
          active%n_tried = 0
       end associate
    end subroutine begin_contact

@@ -14,10 +14,10 @@ contains
 
    !> Curvature of the arc of an edge, > 0 where it bulges out of the body, 0 if it has none [1/L].
    !> At a corner or an end the node after next takes the place of the one that is not there.
-   pure real(wp) function arc_curvature(way) result(curvature)
+   pure real(wp) function arc_curvature(chord) result(curvature)
       !> (2, -2:2) from node to node along the surface, the edge itself at 0; 0 beyond a corner or
       !> an end [L]
-      real(wp), intent(in) :: way(2, -2:2)
+      real(wp), intent(in) :: chord(2, -2:2)
       real(wp) :: at(-1:2), one, other
 
       at = [turn(-1), turn(0), turn(1), turn(2)]
@@ -34,7 +34,7 @@ contains
       pure logical function goes_on(i)
          integer, intent(in) :: i
 
-         goes_on = any(abs(way(:, i)) > 0.0_wp)
+         goes_on = any(abs(chord(:, i)) > 0.0_wp)
       end function goes_on
 
       !> Curvature at the node before edge `i`, 0 if an edge is missing there.
@@ -43,7 +43,7 @@ contains
 
          turn = 0.0_wp
          if (.not. (goes_on(i - 1) .and. goes_on(i))) return
-         associate (a => way(:, i - 1), b => way(:, i))
+         associate (a => chord(:, i - 1), b => chord(:, i))
             turn = 2.0_wp*(a(1)*b(2) - a(2)*b(1)) &
                /sqrt(dot_product(a, a)*dot_product(b, b)*dot_product(a + b, a + b))
          end associate
@@ -74,7 +74,7 @@ contains
       real(wp), intent(in) :: angle              !! sharper turns are corners [degrees]
       real(wp), intent(out) :: curvature(:)      !! (n_edge) [1/L]
       logical :: is_corner(chain%n_facet)
-      real(wp) :: way(2, -2:2)
+      real(wp) :: chord(2, -2:2)
       integer :: beside(-2:2), e, i
 
       call chain_corners(chain, x, angle, is_corner)
@@ -85,12 +85,12 @@ contains
             beside(-i) = before(beside(1 - i))
             beside(i) = after(beside(i - 1))
          end do
-         way = 0.0_wp
+         chord = 0.0_wp
          do i = -2, 2
-            if (beside(i) > 0) way(:, i) = x(:, chain%facet(2, beside(i))) &
+            if (beside(i) > 0) chord(:, i) = x(:, chain%facet(2, beside(i))) &
                - x(:, chain%facet(1, beside(i)))
          end do
-         curvature(e) = arc_curvature(way)
+         curvature(e) = arc_curvature(chord)
       end do
 
    contains

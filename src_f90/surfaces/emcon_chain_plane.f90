@@ -245,9 +245,9 @@ contains
       allocate(found(0))
       length(0) = 0.0_wp
       do i = 1, self%n_facet
-         associate (way => (x(:, self%facet(2, i)) + u(:, self%facet(2, i))) &
+         associate (vector => (x(:, self%facet(2, i)) + u(:, self%facet(2, i))) &
                - (x(:, self%facet(1, i)) + u(:, self%facet(1, i))))
-            length(i) = norm2(way)
+            length(i) = norm2(vector)
          end associate
       end do
       call box_tree_init(tree, box(:, :, 1), box(:, :, 2))
@@ -357,12 +357,12 @@ contains
    end function runs_along
 
    !> The way from node `a` to node `b` at x + u, differences first.
-   pure function from_to(x, u, a, b) result(way)
+   pure function from_to(x, u, a, b) result(vector)
       real(wp), intent(in) :: x(:, :), u(:, :)
       integer, intent(in) :: a, b
-      real(wp) :: way(2)
+      real(wp) :: vector(2)
 
-      way = (x(:, b) - x(:, a)) + (u(:, b) - u(:, a))
+      vector = (x(:, b) - x(:, a)) + (u(:, b) - u(:, a))
    end function from_to
 
    pure real(wp) function cross(a, b)

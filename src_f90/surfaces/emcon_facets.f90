@@ -254,14 +254,14 @@ contains
       real(wp), dimension(size(x, 1)) :: a, b
       integer :: k
 
-      a = way(2)
+      a = vector(2)
       if (size(normal) == 2) then
          normal = [a(2), -a(1)]
          return
       end if
       normal = 0.0_wp
       do k = 3, n_node(self, f)
-         b = way(k)
+         b = vector(k)
          normal = normal + 0.5_wp*(cshift(a, 1)*cshift(b, 2) - cshift(a, 2)*cshift(b, 1))
          a = b
       end do
@@ -269,14 +269,14 @@ contains
    contains
 
       !> From the first node of the facet to its node `k`, differences first.
-      pure function way(k)
+      pure function vector(k)
          integer, intent(in) :: k
-         real(wp) :: way(size(x, 1))
+         real(wp) :: vector(size(x, 1))
 
          associate (first => self%facet(1, f), node => self%facet(k, f))
-            way = (x(:, node) - x(:, first)) + (u(:, node) - u(:, first))
+            vector = (x(:, node) - x(:, first)) + (u(:, node) - u(:, first))
          end associate
-      end function way
+      end function vector
 
    end function facets_normal
 

@@ -1,6 +1,6 @@
 !> When surfaces that move along a given way touch for the first time, however far apart they are.
 module emcon_first_touch_plane
-   use emcon_interactions, only : formulation_given
+   use emcon_interactions, only : formulation_user
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
@@ -17,16 +17,16 @@ contains
    !> The first time at which a node of a contact pair passes through an edge of the other surface
    !> from outside, or the layer in front of it; huge if that never happens. Every node is looked at
    !> with every edge.
-   real(wp) function touch_time(scene, x, way)
+   real(wp) function touch_time(scene, x, direction)
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) where nodes are [L]
-      real(wp), intent(in) :: way(:, :)          !! (n_dim, n_node) how they move per time [L]
+      real(wp), intent(in) :: direction(:, :)          !! (n_dim, n_node) how they move per time [L]
       integer, allocatable :: slave(:, :), master(:, :), node(:)
       integer :: i
 
       touch_time = huge(touch_time)
       do i = 1, size(scene%pair)
-         if (scene%pair(i)%formulation == formulation_given) cycle   ! it sees all gaps itself
+         if (scene%pair(i)%formulation == formulation_user) cycle   ! it sees all gaps itself
          associate (pair => scene%pair(i))
             call surface_facets(scene, scene%surface(pair%slave), slave)
             call surface_facets(scene, scene%surface(pair%master), master)
@@ -37,17 +37,17 @@ contains
             end if
          end associate
          touch_time = min(touch_time, nodes_time(node, master, scene%pair(i)%interaction%offset, &
-            x, way))
+            x, direction))
          node = unique_sorted(reshape(master, [size(master)]))
          touch_time = min(touch_time, nodes_time(node, slave, scene%pair(i)%interaction%offset, &
-            x, way))
+            x, direction))
       end do
    end function touch_time
 
-   pure real(wp) function nodes_time(node, edge, offset, x, way)
+   pure real(wp) function nodes_time(node, edge, offset, x, direction)
       integer, intent(in) :: node(:), edge(:, :)
       real(wp), intent(in) :: offset             !! thickness of the layer [L]
-      real(wp), intent(in) :: x(:, :), way(:, :)
+      real(wp), intent(in) :: x(:, :), direction(:, :)
       integer :: i, e
 
       nodes_time = huge(nodes_time)
@@ -55,7 +55,7 @@ contains
          do i = 1, size(node)
             if (any(edge(:, e) == node(i))) cycle
             nodes_time = min(nodes_time, passing_time(lifted(x(:, [node(i), edge(:, e)]), offset), &
-               way(:, [node(i), edge(:, e)])))
+               direction(:, [node(i), edge(:, e)])))
          end do
       end do
    end function nodes_time

@@ -22,7 +22,7 @@ module emcon_hermite
    private
    public :: hermite_curve_t, hermite_point_t, hermite_stencil_t, hermite_weights_t
    public :: hermite_closest, hermite_curve, hermite_point, hermite_weights
-   public :: hermite_way
+   public :: hermite_distance
    public :: joined_pieces, piece_before, piece_after, at_end
 
    !> Which part of the chain a curve is made of: the chosen edge and what is joined to it, or the
@@ -222,14 +222,14 @@ contains
       type(hermite_curve_t), intent(in) :: curve
       real(wp), intent(in) :: edge(2, 5), b(2), s
       real(wp), intent(out) :: low, high
-      real(wp) :: f, slope, straight, way, range(2), here, next
+      real(wp) :: f, slope, straight, direction, range(2), here, next
       integer :: i
 
       call defect(curve, edge, b, s, f, slope, straight)
-      way = sign(1.0_wp, f)
+      direction = sign(1.0_wp, f)
       range = real([curve%first - 3, curve%last - 2], wp)      ! the curve is straight beyond it
-      if (way < 0.0_wp) range = -range([2, 1])
-      here = way*s
+      if (direction < 0.0_wp) range = -range([2, 1])
+      here = direction*s
       next = here
       do i = 1, 2 + ceiling((range(2) - range(1))/search_step)
          if (here >= range(2)) then
@@ -237,12 +237,12 @@ contains
             exit
          end if
          next = max(range(1), min(here + search_step, range(2)))
-         call defect(curve, edge, b, way*next, f, slope, straight)
-         if (way*f <= 0.0_wp) exit
+         call defect(curve, edge, b, direction*next, f, slope, straight)
+         if (direction*f <= 0.0_wp) exit
          here = next
       end do
-      low = min(way*here, way*next)
-      high = max(way*here, way*next)
+      low = min(direction*here, direction*next)
+      high = max(direction*here, direction*next)
    end subroutine bracket
 
    !> The curve from `s0` to `s1`, exact also where that goes through several pieces; pieces outside
@@ -284,15 +284,15 @@ contains
    end function held
 
    !> Reference length from node 3 to the place `s`, < 0 before it; over `joined_pieces`.
-   pure real(wp) function hermite_way(curve, s) result(way)
+   pure real(wp) function hermite_distance(curve, s) result(distance)
       type(hermite_curve_t), intent(in) :: curve
       real(wp), intent(in) :: s                  !! place on the curve
 
       associate (l => curve%length)
-         way = l(3)*s + (l(curve%first) - l(3))*min(s, 0.0_wp) &
+         distance = l(3)*s + (l(curve%first) - l(3))*min(s, 0.0_wp) &
             - (l(curve%last) - l(3))*min(1.0_wp - s, 0.0_wp)
       end associate
-   end function hermite_way
+   end function hermite_distance
 
    pure integer function piece_of(curve, e)
       type(hermite_curve_t), intent(in) :: curve
@@ -328,16 +328,16 @@ contains
    end subroutine add_piece
 
    !> Add the straight end at node `k`, followed over `way` times the length of its piece.
-   pure subroutine add_straight(curve, k, way, w)
+   pure subroutine add_straight(curve, k, distance, w)
       type(hermite_curve_t), intent(in) :: curve
       integer, intent(in) :: k
-      type(dg_t), intent(in) :: way
+      type(dg_t), intent(in) :: distance
       type(hermite_weights_t), intent(inout) :: w
       integer :: i, e
 
       e = merge(k, k - 1, k == curve%first)
       do i = 1, w%n
-         w%y(i) = w%y(i) + (curve%length(e)*curve%tangent(w%edge(i), k))*way
+         w%y(i) = w%y(i) + (curve%length(e)*curve%tangent(w%edge(i), k))*distance
       end do
    end subroutine add_straight
 

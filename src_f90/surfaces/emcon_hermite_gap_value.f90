@@ -11,7 +11,7 @@
 !> Source: docs/theory.md, eq. (14b). Sign: gap > 0 is open.
 module emcon_hermite_gap_value
    use emcon_hermite, only : hermite_closest, hermite_curve, hermite_curve_t, hermite_point, &
-      hermite_point_t, hermite_stencil_t, hermite_way, joined_pieces, piece_after, piece_before
+      hermite_point_t, hermite_stencil_t, hermite_distance, joined_pieces, piece_after, piece_before
    use emcon_kinds, only : wp
    use emcon_rounded, only : rounded_negative
    implicit none
@@ -158,7 +158,7 @@ contains
       call hermite_roots(stencil, curve, x0, dx, s, root, is_found)
       if (.not. is_found) return
       slip = hermite_lever(stencil, curve, x0, root(0)) &
-         *(hermite_way(curve, root(1)) - hermite_way(curve, root(0)))
+         *(hermite_distance(curve, root(1)) - hermite_distance(curve, root(0)))
    end subroutine hermite_slip_value
 
    !> How far the slave node moves along the curve while the closest point, at `s`, moves by one of

@@ -58,29 +58,29 @@ contains
       type(near_list_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
       real(wp), intent(inout) :: within          !! 0 as a step begins [L]
-      real(wp) :: step_motion, way, nearest
+      real(wp) :: step_motion, moved, nearest
       integer :: i
 
       step_motion = 0.0_wp
-      way = 0.0_wp
+      moved = 0.0_wp
       do i = 1, size(self%node)
          associate (v => du(:, self%node(i)), w => u0(:, self%node(i)) - self%u(:, i))
             step_motion = max(step_motion, sum(v**2))
-            way = max(way, sum(w**2))
+            moved = max(moved, sum(w**2))
          end associate
       end do
-      way = sqrt(way)
+      moved = sqrt(moved)
       step_motion = sqrt(step_motion)
       within = max(within, &
          max(near_per_facet*self%facet_size, near_per_motion*step_motion) + self%depth)
-      if (.not. 2.0_wp*way + (within - self%depth) < surely*(self%reach - self%depth)) then
+      if (.not. 2.0_wp*moved + (within - self%depth) < surely*(self%reach - self%depth)) then
          call search(self, x, u0, self%depth + max(list_per_facet*self%facet_size, &
             list_per_motion*step_motion, list_beyond*(within - self%depth)))
-         way = 0.0_wp
+         moved = 0.0_wp
       end if
-      nearest = self%nearest - 2.0_wp*way
-      if (nearest <= within .and. way > 0.0_wp) call find_nearest(self, x, u0, &
-         self%reach - 2.0_wp*way, within, nearest)
+      nearest = self%nearest - 2.0_wp*moved
+      if (nearest <= within .and. moved > 0.0_wp) call find_nearest(self, x, u0, &
+         self%reach - 2.0_wp*moved, within, nearest)
       self%clearance = 0.0_wp
       if (nearest > within) self%clearance = surely*(nearest - self%depth)
    end subroutine near_list_update

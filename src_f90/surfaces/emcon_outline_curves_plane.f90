@@ -192,16 +192,17 @@ contains
       integer, intent(in) :: row(-1:)            !! (-1:4) of nodes
       real(wp), intent(in) :: share              !! 0 to 1
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
-      real(wp) :: way(2, -2:2)
+      real(wp) :: chord(2, -2:2)
       integer :: i
 
-      way = 0.0_wp
+      chord = 0.0_wp
       do i = -2, 2
          associate (a => row(i + 1), b => row(i + 2))
-            if (a > 0 .and. b > 0) way(:, i) = (x(:, b) - x(:, a)) + (u(:, b) - u(:, a))
+            if (a > 0 .and. b > 0) chord(:, i) = (x(:, b) - x(:, a)) + (u(:, b) - u(:, a))
          end associate
       end do
-      row_rise = arc_rise(arc_curvature(way), sqrt(dot_product(way(:, 0), way(:, 0))), share, &
+      row_rise = arc_rise(arc_curvature(chord), sqrt(dot_product(chord(:, 0), chord(:, 0))), &
+         share, &
          0.0_wp)
    end function row_rise
 
@@ -212,7 +213,7 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
       type(hermite_stencil_t) :: stencil
       type(hermite_point_t) :: point
-      real(wp) :: edge(2, 5), way(2)
+      real(wp) :: edge(2, 5), offset(2)
       integer :: i
 
       edge = 0.0_wp
@@ -226,8 +227,8 @@ contains
          end associate
       end do
       point = hermite_point(hermite_curve(stencil, joined_pieces), edge, share)
-      way = point%y - share*edge(:, 3)
-      piece_rise = -(edge(1, 3)*way(2) - edge(2, 3)*way(1)) &
+      offset = point%y - share*edge(:, 3)
+      piece_rise = -(edge(1, 3)*offset(2) - edge(2, 3)*offset(1)) &
          /sqrt(dot_product(edge(:, 3), edge(:, 3)))
    end function piece_rise
 

@@ -25,7 +25,7 @@ contains
       type(nearest_t), intent(inout) :: self
       integer, intent(in) :: edge                !! its number
       real(wp), intent(in) :: to_point(2), along(2)      !! [L]
-      real(wp) :: share, way(2), square
+      real(wp) :: share, offset(2), square
       integer :: side
 
       square = dot_product(along, along)
@@ -34,16 +34,16 @@ contains
       side = 0
       if (share <= 0.0_wp) then
          side = 1
-         way = to_point
+         offset = to_point
       else if (share >= 1.0_wp) then
          side = 2
-         way = to_point - along
+         offset = to_point - along
       else
-         way = to_point - share*along
+         offset = to_point - share*along
       end if
-      square = dot_product(way, way)
+      square = dot_product(offset, offset)
       if (.not. square < self%square) return
-      self = nearest_t(edge, side, square, way, along, max(0.0_wp, min(1.0_wp, share)))
+      self = nearest_t(edge, side, square, offset, along, max(0.0_wp, min(1.0_wp, share)))
    end subroutine nearest_update
 
    !> How deep the point is behind the nearest place, < 0 in front of it. At a node `along_next`

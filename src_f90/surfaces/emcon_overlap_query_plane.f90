@@ -78,13 +78,13 @@ contains
       class(overlap_query_plane_t), intent(in) :: self
       integer, intent(in) :: p                   !! from 1
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)     !! (2, n_node) [L]
-      real(wp) :: way(2)
+      real(wp) :: vector(2)
       integer :: e
 
       longest = 0.0_wp
       do e = self%outline%start(p), self%outline%start(p + 1) - 1
-         way = between(x, u, self%outline%facet(1, e), self%outline%facet(2, e))
-         longest = max(longest, dot_product(way, way))
+         vector = between(x, u, self%outline%facet(1, e), self%outline%facet(2, e))
+         longest = max(longest, dot_product(vector, vector))
       end do
       longest = sqrt(longest)
    end function overlap_query_longest
@@ -414,12 +414,12 @@ contains
    end subroutine take_deeper
 
    !> The way from node `i` to node `j` at x + u, differences first.
-   pure function between(x, u, i, j) result(way)
+   pure function between(x, u, i, j) result(vector)
       real(wp), intent(in) :: x(:, :), u(:, :)
       integer, intent(in) :: i, j
-      real(wp) :: way(2)
+      real(wp) :: vector(2)
 
-      way = (x(:, j) - x(:, i)) + (u(:, j) - u(:, i))
+      vector = (x(:, j) - x(:, i)) + (u(:, j) - u(:, i))
    end function between
 
 end module emcon_overlap_query_plane

@@ -133,14 +133,14 @@ contains
       real(wp), intent(in) :: x(:, :)            !! (2, n_node of the scene)
       real(wp), intent(in) :: tolerance          !! of the tie; < 0: not given [L]
       integer, intent(in) :: last, first
-      real(wp) :: way(2), edge, most
+      real(wp) :: vector(2), edge, most
 
       associate (before => chain%node_edge(1, last), after => chain%node_edge(2, first))
          edge = max(chain%size(before), chain%size(after))
          most = near*edge
          if (tolerance >= 0.0_wp) most = min(tolerance, farthest*edge)
-         way = x(:, chain%node(first)) - x(:, chain%node(last))
-         is_near = before /= after .and. norm2(way) <= most
+         vector = x(:, chain%node(first)) - x(:, chain%node(last))
+         is_near = before /= after .and. norm2(vector) <= most
       end associate
    end function is_near
 

@@ -49,7 +49,7 @@ contains
       integer :: n, side
 
       mean = mean_along(chain, k, x, u)
-      a = way(x, u, chain%facet(:, e))
+      a = vector(x, u, chain%facet(:, e))
       may_touch = faces(mean, a)
       if (.not. may_touch) return
       length = 0.0_wp
@@ -57,11 +57,11 @@ contains
       do side = 1, 2
          associate (own => chain%node_edge(side, k))
             if (own == 0) cycle
-            length = length + norm2(way(x, u, chain%facet(:, own)))
+            length = length + norm2(vector(x, u, chain%facet(:, own)))
             n = n + 1
          end associate
       end do
-      b = way(x, u, [chain%facet(1, e), chain%node(k)])
+      b = vector(x, u, [chain%facet(1, e), chain%node(k)])
       b = b - max(0.0_wp, min(1.0_wp, dot_product(b, a)/dot_product(a, a)))*a
       distance = norm2(b)
       if (distance*real(n, wp) <= deepest*length) return
@@ -91,7 +91,7 @@ contains
       integer, intent(in) :: edge(2)             !! nodes of the scene
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene) [L]
 
-      chain_faces = faces(mean_along(chain, k, x, u), way(x, u, edge))
+      chain_faces = faces(mean_along(chain, k, x, u), vector(x, u, edge))
    end function chain_faces
 
    !> Does an edge along `a` face a node whose edges go along `mean`?
@@ -113,7 +113,7 @@ contains
       do side = 1, 2
          associate (own => chain%node_edge(side, k))
             if (own == 0) cycle
-            a = way(x, u, chain%facet(:, own))
+            a = vector(x, u, chain%facet(:, own))
             mean = mean + a/norm2(a)
          end associate
       end do
@@ -126,12 +126,12 @@ contains
    end function cross
 
    !> The way from the first to the second of `node` at x + u, differences first.
-   pure function way(x, u, node)
+   pure function vector(x, u, node)
       real(wp), intent(in) :: x(:, :), u(:, :)
       integer, intent(in) :: node(2)
-      real(wp) :: way(2)
+      real(wp) :: vector(2)
 
-      way = (x(:, node(2)) - x(:, node(1))) + (u(:, node(2)) - u(:, node(1)))
-   end function way
+      vector = (x(:, node(2)) - x(:, node(1))) + (u(:, node(2)) - u(:, node(1)))
+   end function vector
 
 end module emcon_self_contact_plane

@@ -53,7 +53,7 @@ contains
       n = 0
       do k = 1, size(room)
          associate (item => self%item(condition(k)))
-            if (item%rubs) then
+            if (item%has_friction) then
                call fill_row(row, item, condition_row_force(item, slip(k)), &
                   condition_row_gradient(item, slip(k)), numbering, leaves_zeros=.true.)
             else
@@ -287,7 +287,7 @@ contains
       do k = self%n_linear + 1, self%n_condition
          associate (item => self%item(k))
             n = size(item%g, 1)*item%n_node
-            if (item%rubs .or. allocated(self%law(k)%beside)) then
+            if (item%has_friction .or. allocated(self%law(k)%beside)) then
                call subtract_sum(item, -1.0_wp, condition_stiffness(item, &
                   constraints_lam(self, k)), numbering, merged)
             else if (any(abs(item%h(:n, :n)) > 0.0_wp)) then

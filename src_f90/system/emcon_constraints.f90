@@ -56,7 +56,7 @@ module emcon_constraints
       logical, allocatable :: is_firm(:)
       real(wp), allocatable :: lam(:)            !! (n_row) multipliers [M L/T^2]
       real(wp), allocatable :: defect(:)         !! (n_row) what is left to the target [L]
-      type(soft_rows_t) :: soft                  !! what laws make of rows of gaps
+      type(soft_rows_t) :: penalty                  !! what laws make of rows of gaps
       type(csr_t) :: force_rows                  !! (n_row x n_unknown) directions of forces
       type(csr_t) :: gap_rows                    !! (n_row x n_unknown) gradients at the end
       type(csr_t) :: law_rows                    !! of conditions without a row, directions
@@ -80,7 +80,7 @@ contains
       self%id = id
       self%condition = [(k, k = 1, self%n)]
       self%slip = 0*self%condition
-      self%soft = soft_rows_t(is_stored=self%soft%is_stored)
+      self%penalty = soft_rows_t(is_stored=self%penalty%is_stored)
       if (allocated(self%item)) deallocate(self%item, self%law, self%target, self%is_kept, &
          self%is_firm, self%lam, self%defect)
       if (present(by_law)) then
@@ -90,7 +90,8 @@ contains
       allocate(self%item(self%n_condition), self%law(self%n_condition), self%is_kept(self%n), &
          self%is_firm(self%n))
       allocate(self%target(self%n_condition), self%lam(self%n), self%defect(self%n), &
-         self%soft%left(self%n), self%soft%slope(self%n), self%soft%lack(self%n), source=0.0_wp)
+         self%penalty%left(self%n), self%penalty%slope(self%n), self%penalty%lack(self%n), &
+            source=0.0_wp)
       self%is_kept = .false.
       self%is_firm = .true.
    end subroutine constraints_select
@@ -214,9 +215,9 @@ contains
 
       associate (item => self%item(k))
          values = contact_values_t(item%gap0, item%gap1, item%dgap, item%gap1, item%slip, &
-            frequency=self%frequency, is_stored=self%soft%is_stored)
+            frequency=self%frequency, is_stored=self%penalty%is_stored)
          if (k <= self%n) values%left = self%defect(k)
-         if (item%rubs) values%friction = condition_friction(item, constraints_lam(self, k))
+         if (item%has_friction) values%friction = condition_friction(item, constraints_lam(self, k))
       end associate
    end function values_of
 
@@ -238,15 +239,15 @@ contains
       integer, intent(in) :: k                   !! n_permanent + 1..n_condition
       type(contact_response_t) :: response
 
-      associate (law => self%law(k), soft => self%soft)
+      associate (law => self%law(k), penalty => self%penalty)
          if (allocated(law%beside)) call contact_laws_respond(law, values_of(self, k), &
             self%item(k)%response)
          if (.not. allocated(law%row)) return
          call law%row%respond(values_of(self, k), response)
-         soft%left(k) = self%defect(k)
-         soft%slope(k) = response%stiffness(0, 0)
-         soft%lack(k) = merge(response%lam - self%lam(k), 0.0_wp, soft%is_under_way)
-         self%lam(k) = response%lam - soft%lack(k)
+         penalty%left(k) = self%defect(k)
+         penalty%slope(k) = response%stiffness(0, 0)
+         penalty%lack(k) = merge(response%lam - self%lam(k), 0.0_wp, penalty%is_under_way)
+         self%lam(k) = response%lam - penalty%lack(k)
          self%defect(k) = 0.0_wp
       end associate
    end subroutine respond

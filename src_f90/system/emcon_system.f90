@@ -59,34 +59,34 @@ module emcon_system
 contains
 
    !> What stays the same in all steps of `scene`, and of what the model is given beside it.
-   subroutine system_init(self, scene, error, given)
+   subroutine system_init(self, scene, error, host)
       type(system_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(host_t), intent(in), optional :: given
+      type(host_t), intent(in), optional :: host
       type(lists_t) :: lists
 
-      call terms_create(scene, self%term, error, given)
+      call terms_create(scene, self%term, error, host)
       if (allocated(error)) return
       call lay_out(self, scene, lists)
       call space_init(self%space, scene, lists)
       if (scene%host%is_whole) self%space%is_alive = .true.
-      call constraints_create(scene, self%space%linear, self%permanent, given)
-      if (present(given)) then
-         if (allocated(given%contact_law)) allocate(self%contact_law, source=given%contact_law)
+      call constraints_create(scene, self%space%linear, self%permanent, host)
+      if (present(host)) then
+         if (allocated(host%contact_law)) allocate(self%contact_law, source=host%contact_law)
       end if
-      call init_contact(self, scene, error, given)
+      call init_contact(self, scene, error, host)
       if (allocated(error)) return
       call response_init(self%response, size(scene%x, 1), size(scene%x, 2), &
          size(scene%element%kind))
    end subroutine system_init
 
    !> The contact of pairs and guards, and the numbers of conditions: those of `held`, then theirs.
-   subroutine init_contact(self, scene, error, given)
+   subroutine init_contact(self, scene, error, host)
       type(system_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(host_t), intent(in), optional :: given
+      type(host_t), intent(in), optional :: host
       type(contact_pair_t), allocatable :: pair(:)
       integer :: i, k
 
@@ -107,10 +107,10 @@ contains
          merge(-1, 1, scene%guard%is_reverse)*scene%guard%of_pair
       do i = 1, size(pair)
          k = 0
-         if (present(given)) k = host_find_contact(given, i)
+         if (present(host)) k = host_find_contact(host, i)
          if (k > 0) then
             call new_contact(scene, pair(i), self%contact(i)%contact, error, &
-               given%contact(k)%contact)
+               host%contact(k)%contact)
          else
             call new_contact(scene, pair(i), self%contact(i)%contact, error)
          end if

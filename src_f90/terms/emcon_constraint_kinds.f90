@@ -17,8 +17,8 @@ contains
       integer :: i, n
 
       n = 0
-      if (present(given)) then
-         if (allocated(given%constraint)) n = size(given%constraint)
+      if (present(host)) then
+         if (allocated(host%constraint)) n = size(host%constraint)
       end if
       allocate(held(n_own + n), conditions, rigidity)
       call linear_conditions_init(conditions, linear)
@@ -26,7 +26,7 @@ contains
       call rigidity_init(rigidity, scene%rigid)
       call move_alloc(rigidity, held(n_own)%constraint)
       do i = 1, n
-         allocate(new, source=given%constraint(i)%constraint)
+         allocate(new, source=host%constraint(i)%constraint)
          call new%take_positions(scene%x)
          call move_alloc(new, held(n_own + i)%constraint)
       end do

@@ -12,11 +12,11 @@ module emcon_constraint_registry
    interface
       !> The linear rows, the shapes of rigid bodies, then copies of the constraints that are given,
       !> which learn the positions.
-      module subroutine constraints_create(scene, linear, held, given)
+      module subroutine constraints_create(scene, linear, held, host)
          type(scene_t), intent(in) :: scene
          type(linear_rows_t), intent(in) :: linear   !! of `scene`
          type(constraint_box_t), allocatable, intent(out) :: held(:)   !! (own + given ones)
-         type(host_t), intent(in), optional :: given
+         type(host_t), intent(in), optional :: host
       end subroutine constraints_create
    end interface
 

@@ -7,7 +7,7 @@ module emcon_host_check
    use emcon_host_force, only : host_force_t
    use emcon_kinds, only : dp, wp
    use emcon_scene, only : scene_t, where_text
-   use emcon_solver_registry, only : solver_given, solver_names
+   use emcon_solver_registry, only : solver_user, solver_names
    use emcon_sparse_solver, only : solver_box_t
    use emcon_text, only : to_text
    implicit none
@@ -153,15 +153,15 @@ contains
 
    !> There is something to compute, each node that the deck says is given has forces or mass, and
    !> solvers that it names are there.
-   subroutine host_check_scene(given, scene, error)
-      type(host_t), intent(in) :: given
+   subroutine host_check_scene(host, scene, error)
+      type(host_t), intent(in) :: host
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       integer :: i, n, counts(n_counted)
 
-      call check_solvers(given, scene, error)
+      call check_solvers(host, scene, error)
       if (allocated(error)) return
-      counts = host_count(given)
+      counts = host_count(host)
       if (all(counts(:2) == 0)) then
          if (allocated(scene%host%node)) then
             call raise(error, err_input, where_text(scene, scene%host%origin) // ": error: " // &
@@ -174,7 +174,7 @@ contains
       if (allocated(error) .or. .not. allocated(scene%host%node)) return
       do i = 1, size(scene%host%node)
          n = scene%host%node(i)
-         if (has_row(given%mass, n)) cycle
+         if (has_row(host%mass, n)) cycle
          if (has_force(n)) cycle
          call raise(error, err_input, where_text(scene, scene%host%origin) // ": error: *GIVEN " &
             // "FORCES names node " // to_text(scene%node%label(n)) // &
@@ -189,9 +189,9 @@ contains
          integer :: k, a
 
          has_force = .false.
-         if (.not. allocated(given%force)) return
-         do k = 1, size(given%force)
-            associate (pattern => given%force(k)%force%pattern)
+         if (.not. allocated(host%force)) return
+         do k = 1, size(host%force)
+            associate (pattern => host%force(k)%force%pattern)
                do a = 1, scene%n_dim
                   has_force = has_force .or. has_row(pattern, scene%n_dim*(node - 1) + a)
                end do
@@ -202,18 +202,18 @@ contains
    end subroutine host_check_scene
 
    !> Each solver that a step names and that is not of EMCON was given.
-   subroutine check_solvers(given, scene, error)
-      type(host_t), intent(in) :: given
+   subroutine check_solvers(host, scene, error)
+      type(host_t), intent(in) :: host
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(solver_box_t), allocatable :: solver(:)
       character(len=:), allocatable :: known
       integer :: i
 
-      call host_copy_solvers(given, solver)
+      call host_copy_solvers(host, solver)
       do i = 1, size(scene%step)
          associate (step => scene%step(i))
-            if (step%solution%solver /= solver_given) cycle
+            if (step%solution%solver /= solver_user) cycle
             if (host_find_solver(solver, step%solution%solver_name) > 0) cycle
             call solver_names(known)
             call raise(error, err_input, where_text(scene, step%solution%solver_origin) &

@@ -25,7 +25,7 @@ module emcon_inertia
       real(dp), allocatable :: value(:)          !! mass in the pattern of the matrix
       logical, allocatable :: is_massless(:)     !! (n_node) it has given its mass to its neighbours
       logical, allocatable :: without_density(:) !! (n_node) it has none of its own
-      type(csr_t), private :: given, added       !! (n_node x n_node) beside it [M]
+      type(csr_t), private :: host, added       !! (n_node x n_node) beside it [M]
       type(csr_t), private :: consistent, lumped     !! (n_node x n_node) one of them is `mass` [M]
       !> Their values in the precision of the state, and those of `mass`
       real(wp), allocatable, private :: consistent_value(:), lumped_value(:), mass_value(:)
@@ -46,15 +46,15 @@ module emcon_inertia
 contains
 
    !> The mass of `solid` and what is given beside it.
-   subroutine inertia_init(self, solid, n_dim, given, error)
+   subroutine inertia_init(self, solid, n_dim, host, error)
       type(inertia_t), intent(out) :: self
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: n_dim               !! > 0
-      type(csr_t), intent(in) :: given           !! (n_node x n_node) [M]; without rows: none
+      type(csr_t), intent(in) :: host           !! (n_node x n_node) [M]; without rows: none
       type(error_t), allocatable, intent(out) :: error
 
       self%role = role_inertia
-      self%given = given
+      self%host = host
       allocate(self%rate(n_dim, solid%n_node), self%product(n_dim, solid%n_node), source=0.0_wp)
       call add_up(self, solid, error)
    end subroutine inertia_init
@@ -80,7 +80,7 @@ contains
       real(hp), allocatable :: value(:)
       integer :: e, i, j, k, n
 
-      call list_pairs(self%given, pair)
+      call list_pairs(self%host, pair)
       call list_pairs(self%added, added)
       self%pair = reshape([pair, added], [n_end, size(pair, 2) + size(added, 2)])
       call element_lists(solid, 1, start, list)
@@ -100,7 +100,7 @@ contains
             end do
          end do
       end do
-      call add_beside(self%mass, self%given, value)
+      call add_beside(self%mass, self%host, value)
       call add_beside(self%mass, self%added, value)
       self%mass%value = real(value, dp)
       self%consistent = self%mass
@@ -133,7 +133,7 @@ contains
                end do
             end associate
          end do
-         call add_rows(value, self%given)
+         call add_rows(value, self%host)
          call add_rows(value, self%added)
          lumped%value = real(value, dp)
          self%lumped_value = real(value, wp)

@@ -96,7 +96,7 @@ contains
       integer, intent(in) :: node(:)                  !! (n_end)
       type(motion_t), intent(in) :: motion            !! placed
       type(condition_t), intent(inout) :: item
-      real(wp), dimension(size(motion%x, 1)) :: rest, w0, dw, way
+      real(wp), dimension(size(motion%x, 1)) :: rest, w0, dw, direction
       real(wp) :: length, mean
       integer :: a, n_dim
 
@@ -115,14 +115,14 @@ contains
       item%dgap = dot_product(rest + w0 + 0.5_wp*dw, dw)/length
       item%gap1 = dot_product(w0 + dw, rest + 0.5_wp*(w0 + dw))/length
       mean = 1.0_wp/(1.0_wp + motion%evaluation%start_weight)
-      way = rest + between(motion%from) + 0.5_wp*between(motion%by)
-      if (mean < 1.0_wp) way = rest + w0 + mean*dw
-      way = way/length
-      item%g(:, 1) = -way
-      item%g(:, n_end) = way
-      way = (rest + w0 + dw)/length
-      item%c(:, 1) = -way
-      item%c(:, n_end) = way
+      direction = rest + between(motion%from) + 0.5_wp*between(motion%by)
+      if (mean < 1.0_wp) direction = rest + w0 + mean*dw
+      direction = direction/length
+      item%g(:, 1) = -direction
+      item%g(:, n_end) = direction
+      direction = (rest + w0 + dw)/length
+      item%c(:, 1) = -direction
+      item%c(:, n_end) = direction
       item%h = 0.0_wp
       do a = 1, n_dim
          item%h(a, a) = 0.5_wp*mean*motion%weight/length

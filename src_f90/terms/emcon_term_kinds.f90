@@ -23,8 +23,8 @@ contains
       logical :: decays                          ! elements take energy
 
       n = 0
-      if (present(given)) then
-         if (allocated(given%force)) n = size(given%force)
+      if (present(host)) then
+         if (allocated(host%force)) n = size(host%force)
       end if
       has_linear = any(scene%section(scene%element%section)%kinematics == kinematics_linear)
       turns = any(scene%section(scene%element%section)%kinematics == kinematics_corotated)
@@ -38,23 +38,23 @@ contains
       if (has_linear) allocate(linear_term_t :: term(n_own + 1)%term)
       if (turns) allocate(corotated_term_t :: term(n_own + count([has_linear, turns]))%term)
       if (decays) allocate(dissipation_term_t :: term(first)%term)
-      call create_own(scene, term, error, given)
+      call create_own(scene, term, error, host)
       do i = 1, n
          if (allocated(error)) return
          allocate(host_term_t :: term(first + i)%term)
          select type (part => term(first + i)%term)
          type is (host_term_t)
-            call host_term_init(part, given%force(i)%force, scene, error)
+            call host_term_init(part, host%force(i)%force, scene, error)
          end select
       end do
    end procedure terms_create
 
    !> The elements, and the terms that stand on them.
-   subroutine create_own(scene, term, error, given)
+   subroutine create_own(scene, term, error, host)
       type(scene_t), intent(in) :: scene
       type(term_box_t), intent(inout), target :: term(:)
       type(error_t), allocatable, intent(out) :: error
-      type(host_t), intent(in), optional :: given
+      type(host_t), intent(in), optional :: host
       type(csr_t) :: extra
       type(solid_t), pointer :: solid
       integer :: i
@@ -62,9 +62,9 @@ contains
 
       select type (part => term(of_solid)%term)
       type is (solid_term_t)
-         if (present(given)) then
-            call solid_term_init(part, scene, error, given%law)
-            extra = given%mass
+         if (present(host)) then
+            call solid_term_init(part, scene, error, host%law)
+            extra = host%mass
          else
             call solid_term_init(part, scene, error)
          end if
@@ -72,7 +72,7 @@ contains
       if (.not. allocated(error) .and. extra%n_row > 0) call host_check_mass(extra, scene, error)
       if (allocated(error)) return
       solid => terms_solid(term)
-      call mark_given(size(scene%x, 1), extra, is_given, given)
+      call mark_given(size(scene%x, 1), extra, is_given, host)
       call massless_bare(scene, solid, is_given, without_density)
       call massless_find(scene, solid, is_given, without_density, is_massless)
       if (any(is_massless)) call massless_shed(solid, is_massless)
@@ -100,21 +100,21 @@ contains
    end subroutine create_own
 
    !> The nodes that mass or forces are given for.
-   pure subroutine mark_given(n_dim, mass, is_given, given)
+   pure subroutine mark_given(n_dim, mass, is_given, host)
       integer, intent(in) :: n_dim
       type(csr_t), intent(in) :: mass            !! (n_node x n_node); without rows: none
       logical, intent(out) :: is_given(:)        !! (n_node)
-      type(host_t), intent(in), optional :: given
+      type(host_t), intent(in), optional :: host
       integer :: i, k
 
       is_given = .false.
       do i = 1, mass%n_row
          is_given(i) = mass%row_start(i + 1) > mass%row_start(i)
       end do
-      if (.not. present(given)) return
-      if (.not. allocated(given%force)) return
-      do k = 1, size(given%force)
-         associate (pattern => given%force(k)%force%pattern)
+      if (.not. present(host)) return
+      if (.not. allocated(host%force)) return
+      do k = 1, size(host%force)
+         associate (pattern => host%force(k)%force%pattern)
             do i = 1, pattern%n_row
                if (pattern%row_start(i + 1) > pattern%row_start(i)) is_given((i - 1)/n_dim + 1) = &
                   .true.

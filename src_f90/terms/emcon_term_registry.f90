@@ -15,11 +15,11 @@ module emcon_term_registry
 
    interface
       !> The terms of `scene`, and of what it is given.
-      module subroutine terms_create(scene, term, error, given)
+      module subroutine terms_create(scene, term, error, host)
          type(scene_t), intent(in) :: scene
          type(term_box_t), allocatable, intent(out) :: term(:)   !! (n_term)
          type(error_t), allocatable, intent(out) :: error
-         type(host_t), intent(in), optional :: given
+         type(host_t), intent(in), optional :: host
       end subroutine terms_create
 
       !> The elements, for what is derived from them.

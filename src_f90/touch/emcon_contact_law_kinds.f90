@@ -3,7 +3,7 @@ submodule (emcon_contact_law_registry) emcon_contact_law_kinds
    use emcon_coulomb_law, only : coulomb_t
    use emcon_dashpot_law, only : dashpot_t
    use emcon_restitution_law, only : restitution_t
-   use emcon_soft_law, only : augmented_t, penalty_t
+   use emcon_penalty_law, only : augmented_t, penalty_t
    implicit none
 
 contains

@@ -74,7 +74,7 @@ contains
 
       self%mu = surface%friction
       self%restitution = surface%rebound
-      self%rubs = .true.
+      self%has_friction = .true.
       self%loss = loss_friction
       acts = self%mu > 0.0_wp
    end subroutine coulomb_take

@@ -38,7 +38,7 @@ contains
       self%coefficients = surface%damping
       self%acts_near = .true.
       self%reach = surface%damping%clearance
-      self%rubs = surface%damping%tangent > 0.0_wp
+      self%has_friction = surface%damping%tangent > 0.0_wp
       acts = self%coefficients%coefficient > 0.0_wp
    end subroutine dashpot_take
 
@@ -59,17 +59,17 @@ contains
       real(wp) :: by_mu, mean
       integer :: s
 
-      associate (law => self%coefficients, gap => self%gap, way => at%dgap)
+      associate (law => self%coefficients, gap => self%gap, dgap => at%dgap)
          by_mu = self%area*at%frequency
-         mean = dashpot_mean(law, gap, way)
-         response%lam = -by_mu*mean*way
-         response%stiffness(0, 0) = by_mu*dashpot_at(law, gap + way)
+         mean = dashpot_mean(law, gap, dgap)
+         response%lam = -by_mu*mean*dgap
+         response%stiffness(0, 0) = by_mu*dashpot_at(law, gap + dgap)
          if (.not. law%tangent > 0.0_wp) return
          if (self%is_closed) mean = law%coefficient
          do s = 1, size(at%slip)
             response%stiffness(s, s) = law%tangent*by_mu*mean
             if (.not. self%is_closed) response%stiffness(s, 0) = law%tangent*by_mu &
-               *dashpot_mean_slope(law, gap, way)*at%slip(s)
+               *dashpot_mean_slope(law, gap, dgap)*at%slip(s)
             response%tau(s) = response%stiffness(s, s)*at%slip(s)
          end do
       end associate
@@ -100,13 +100,13 @@ contains
 
    !> The mean of mu over the way from `gap` by `way`, >= 0; its derivative by the end of the way,
    !> times the way, is mu there less it.
-   pure real(wp) function dashpot_mean(law, gap, way) result(mean)
+   pure real(wp) function dashpot_mean(law, gap, dgap) result(mean)
       type(contact_damping_t), intent(in) :: law
-      real(wp), intent(in) :: gap, way           !! [L]
+      real(wp), intent(in) :: gap, dgap           !! [L]
       real(wp) :: low, high, from, to
 
-      low = min(gap, gap + way)
-      high = max(gap, gap + way)
+      low = min(gap, gap + dgap)
+      high = max(gap, gap + dgap)
       if (.not. high > low) then
          mean = dashpot_at(law, gap)
          return
@@ -117,28 +117,28 @@ contains
    end function dashpot_mean
 
    !> The derivative of the mean by the end of the way: that of mu, weighted by the part of the way.
-   pure real(wp) function dashpot_mean_slope(law, gap, way) result(slope)
+   pure real(wp) function dashpot_mean_slope(law, gap, dgap) result(slope)
       type(contact_damping_t), intent(in) :: law
-      real(wp), intent(in) :: gap, way           !! [L]
+      real(wp), intent(in) :: gap, dgap           !! [L]
       real(wp) :: from, to, part_from, part_to
 
       slope = 0.0_wp
       if (.not. law%clearance > 0.0_wp) then
-         if (passes(0.0_wp)) slope = -law%coefficient*(abs(gap)/way**2)
+         if (passes(0.0_wp)) slope = -law%coefficient*(abs(gap)/dgap**2)
          return
       end if
       if (.not. law%flat < 1.0_wp) then
-         if (passes(law%clearance)) slope = -law%coefficient*(abs(law%clearance - gap)/way**2)
+         if (passes(law%clearance)) slope = -law%coefficient*(abs(law%clearance - gap)/dgap**2)
          return
       end if
-      if (.not. abs(way) > 0.0_wp) then
+      if (.not. abs(dgap) > 0.0_wp) then
          if (gap > law%flat*law%clearance .and. gap < law%clearance) slope = &
             -0.5_wp*law%coefficient/((1.0_wp - law%flat)*law%clearance)
          return
       end if
-      call falling_part(law, min(gap, gap + way), max(gap, gap + way), from, to)
-      part_from = min(1.0_wp, max(0.0_wp, (from - gap)/way))
-      part_to = min(1.0_wp, max(0.0_wp, (to - gap)/way))
+      call falling_part(law, min(gap, gap + dgap), max(gap, gap + dgap), from, to)
+      part_from = min(1.0_wp, max(0.0_wp, (from - gap)/dgap))
+      part_to = min(1.0_wp, max(0.0_wp, (to - gap)/dgap))
       slope = -0.5_wp*abs(part_to - part_from)*(part_from + part_to)*law%coefficient &
          /((1.0_wp - law%flat)*law%clearance)
 
@@ -148,7 +148,7 @@ contains
       pure logical function passes(place)
          real(wp), intent(in) :: place
 
-         passes = (gap < place .neqv. gap + way < place) .and. abs(way) > 0.0_wp
+         passes = (gap < place .neqv. gap + dgap < place) .and. abs(dgap) > 0.0_wp
       end function passes
 
    end function dashpot_mean_slope

@@ -8,7 +8,7 @@ module given_scenes
    use emcon_march, only : increment_t
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_is_done, stepper_t
-   use emcon_stepper_given, only : stepper_give_force, stepper_give_mass
+   use emcon_stepper_user, only : stepper_give_force, stepper_give_mass
    use emcon_surface_facets, only : surface_facets
    use emcon_system, only : system_init, system_t
    use emcon_term_registry, only : terms_mass

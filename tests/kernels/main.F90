@@ -53,7 +53,7 @@ program main
    use test_host_check, only : collect_host_check
    use test_host_deck, only : collect_host_deck
    use test_host_force, only : collect_host_force
-   use test_given_space, only : collect_given_space
+   use test_given_space, only : collect_user_space
    use test_host_law, only : collect_host_law
    use test_guards, only : collect_guards
    use test_hermite_gap, only : collect_hermite_gap
@@ -254,7 +254,7 @@ program main
    call run("deck_ties", collect_deck_ties)
    call run("stepper_free", collect_stepper_free)
    call run("stepper_query", collect_stepper_query)
-   call run("given_space", collect_given_space)
+   call run("given_space", collect_user_space)
    call run("host_law", collect_host_law)
    call run("results", collect_results)
 

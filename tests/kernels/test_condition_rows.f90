@@ -163,7 +163,7 @@ contains
          system%first_constraint = [n_condition]
          call numbering_init(trial%numbering, spread(spread(.true., 1, 3), 2, n_node), none)
          call constraints_select(set, [1, 2], by_law=[3])
-         set%item%rubs = .true.
+         set%item%has_friction = .true.
          set%item(2)%is_mean = .true.
          coulomb%mu = 0.25_wp
          coulomb%status = slip_status_t(contact_slides, [0.6_wp, -0.8_wp])

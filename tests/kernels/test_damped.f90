@@ -72,7 +72,7 @@ contains
          call contact%begin_step(self%scene%x, self%u0, self%du)
          call contact%measure(self%scene%x, self%u0, self%du)
          call constraints_select(self%set, none, [(i, i = 1, contact%n_constraint)])
-         self%set%item%rubs = .true.
+         self%set%item%has_friction = .true.
          do i = 1, contact%n_constraint
             self%set%target(i) = contact%state(i)%gap0
             call contact_laws_add(self%set%law(i), dashpot_t( &

@@ -6,7 +6,7 @@ module test_explicit
    use emcon_constraints, only : constraint_set_t, constraints_select
    use emcon_critical_step, only : critical_bound, critical_sharp
    use emcon_errors, only : error_t
-   use emcon_explicit_soft, only : explicit_soft_widen
+   use emcon_explicit_penalty, only : explicit_penalty_widen
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_eigen
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
@@ -14,7 +14,7 @@ module test_explicit
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_row
-   use emcon_soft_law, only : penalty_t
+   use emcon_penalty_law, only : penalty_t
    use emcon_steps, only : method_penalty
    use emcon_system, only : system_t, system_tangent_times
    use emcon_term_registry, only : terms_mass_values
@@ -58,7 +58,7 @@ contains
       call add_step(scene, .false., h, 40)
       scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
       scene%step(1)%contact%method = method_penalty
-      scene%step(1)%contact%softness%stiffness = stiffness
+      scene%step(1)%contact%penalty%stiffness = stiffness
       if (is_clamped) call clamp(scene%step(1), [(i, i = 1, 10)])
       scene%v0(2, 11:) = -1.0_wp
       call march_init(march, scene, error)
@@ -206,29 +206,30 @@ contains
 
       call begin(scene, .true., march, error)
       if (allocated(error)) return
-      associate (soft => march%explicit%soft(march%explicit%i_start), met => march%explicit%met)
-         call explicit_soft_widen(march, has_grown)
+      associate (penalty => march%explicit%penalty(march%explicit%i_start), met => &
+         march%explicit%met)
+         call explicit_penalty_widen(march, has_grown)
          call check_true(error, .not. has_grown, "none is closed")
-         call make_closed(soft)
+         call make_closed(penalty)
          total = 0.0_wp
          do k = 1, 2
-            length = sqrt(sum(soft%item(k)%c(:, 2:3)**2, 1))
-            total(soft%item(k)%node(2:3)) = total(soft%item(k)%node(2:3)) &
-               + soft%law(k)%row%stiffest()*length*sum(length)
+            length = sqrt(sum(penalty%item(k)%c(:, 2:3)**2, 1))
+            total(penalty%item(k)%node(2:3)) = total(penalty%item(k)%node(2:3)) &
+               + penalty%law(k)%row%stiffest()*length*sum(length)
          end do
          met = total
-         call explicit_soft_widen(march, has_grown)
+         call explicit_penalty_widen(march, has_grown)
          call check_true(error, .not. has_grown, "as much as before")
          met(13) = 0.999_wp*total(13)
          met(12) = 2.0_wp*total(12)
-         call explicit_soft_widen(march, has_grown)
+         call explicit_penalty_widen(march, has_grown)
          call check_true(error, has_grown, "more than before")
          total = 1.1_wp*total
          total(12) = 2.0_wp/1.1_wp*total(12)
          call check_near(error, met, total, 16.0_wp*eps, maxval(total), "the most")
          met(13) = met(13)/1.11_wp
-         march%active%softness%is_at_ends = .false.
-         call explicit_soft_widen(march, has_grown)
+         march%active%penalty%is_at_ends = .false.
+         call explicit_penalty_widen(march, has_grown)
          call check_true(error, .not. has_grown, "not of other steps")
       end associate
       call march_free(march)

@@ -45,7 +45,7 @@ contains
          test_case_t("slip along an edge, and of the force", test_along), &
          test_case_t("Lemke: a problem by hand, and one without solution", test_lemke), &
          test_case_t("random small problems are always solved", test_random), &
-         test_case_t("random small problems with leads", test_leads)]
+         test_case_t("random small problems with targets of slip", test_slip_targets)]
    end subroutine collect_friction
 
    subroutine test_trial(error)
@@ -149,11 +149,11 @@ contains
 
    contains
 
-      pure integer function turned(way)
-         integer, intent(in) :: way
+      pure integer function turned(status)
+         integer, intent(in) :: status
 
-         turned = way
-         if (abs(way) == 1) turned = side*way
+         turned = status
+         if (abs(status) == 1) turned = side*status
       end function turned
 
    end subroutine test_led_trial
@@ -333,7 +333,7 @@ contains
       at%slip = [0.6_wp, -0.8_wp]
       call check_near(error, [law%dissipated(at, response)], [1.0_wp], tol, 1.0_wp, "work")
       call check_equal(error, law%loss, loss_friction, "loss")
-      call check_true(error, acts .and. law%rubs .and. .not. law%holds_slip(), "it slides")
+      call check_true(error, acts .and. law%has_friction .and. .not. law%holds_slip(), "it slides")
       call law%leads_to([0.4_wp, 0.2_wp], 0.0_wp)
       law%status = slip_status_t(contact_sticks)
       call check_near(error, law%slip_held(), [0.2_wp, 0.1_wp], tol, 1.0_wp, "it sticks there")
@@ -366,7 +366,7 @@ contains
          x = x + reshape([0.9_wp, 0.1_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 2.0_wp, -0.1_wp], [2, 4])
          call shake(u0, 0.1_wp)
          call shake(du, 0.3_wp)
-         item%rubs = .true.
+         item%has_friction = .true.
          call polygon_constraint(stencil(:n), x, u0, du, 0.0_wp, item)
          associate (place => item%node(:item%n_node))
             work = sum(item%t(:, :item%n_node, 1)*du(:, place))
@@ -379,7 +379,7 @@ contains
             worst = 0.0_wp
             do j = 1, 2*item%n_node
                associate (k => place(1 + (j - 1)/2), a => 1 + mod(j - 1, 2))
-                  other%rubs = .true.
+                  other%has_friction = .true.
                   moved = du
                   moved(a, k) = du(a, k) + small
                   call polygon_constraint(stencil(:n), x, u0, moved, 0.0_wp, other)
@@ -486,7 +486,7 @@ contains
       stencil(1)%node(:3) = [1, 2, 3]
       x = reshape([0.5_wp, 0.0_wp, 0.0_wp, 0.0_wp, 2.0_wp, 0.0_wp], [2, 3])
       du = reshape([0.0_wp, 1.25_wp, 0.0_wp, 0.0_wp, 0.0_wp, 2.0_wp], [2, 3]) - x
-      item%rubs = .true.
+      item%has_friction = .true.
       call polygon_constraint(stencil, x, 0.0_wp*x, du, 0.0_wp, item)
       item%response%mu_sigma(1) = -0.25_wp
       call check_near(error, [item%slip(1)], [0.75_wp], tol, 1.0_wp, "seen from the edge")
@@ -553,9 +553,10 @@ contains
          "law")
    end subroutine test_random
 
-   !> Slips that lead to some: where trials end the law with leads is met, which takes energy at
+   !> Slips that lead to some: where trials end the law with targets of slip is met, which takes
+   !> energy at
    !> each place; what Lemke's method finds sticks there, also where it would have to push.
-   subroutine test_leads(error)
+   subroutine test_slip_targets(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: n_case = 2000
       type(friction_problem_t) :: problem
@@ -588,10 +589,10 @@ contains
             if (allocated(error)) return
          end do
       end do
-      write(output_unit, "(a)") "   " // to_text(n_case) // " problems with leads, " // &
+      write(output_unit, "(a)") "   " // to_text(n_case) // " problems with targets of slip, " // &
          to_text(n_back) // " not by trials alone"
       call check_true(error, n_back < n_case/4, "trials end in most")
-   end subroutine test_leads
+   end subroutine test_slip_targets
 
    !> W = B A^-1 B' with A definite, by independent random rows, and a skew part of A.
    subroutine make_problem(problem, n)

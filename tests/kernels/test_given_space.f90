@@ -4,7 +4,7 @@ module test_given_space
    use emcon_element_space, only : space_element_hold, space_element_init, space_element_respond, &
       space_element_t, space_motion_t, space_part_t
    use emcon_errors, only : error_t
-   use emcon_given_space, only : given_space_hold, given_space_respond, given_space_strain
+   use emcon_user_space, only : user_space_hold, user_space_respond, user_space_strain
    use emcon_host_law, only : host_points_make_room, host_points_t
    use emcon_kinds, only : wp
    use emcon_law, only : lame_constants, law_t
@@ -15,7 +15,7 @@ module test_given_space
    use small_scenes, only : poisson, shake, young
    implicit none
    private
-   public :: collect_given_space
+   public :: collect_user_space
 
    real(wp), parameter :: eps = epsilon(1.0_wp)
    !> Sums over 8 points and nodes, each term of some dozen roundings; as test_element_space.
@@ -38,14 +38,14 @@ module test_given_space
 
 contains
 
-   subroutine collect_given_space(tests)
+   subroutine collect_user_space(tests)
       type(test_case_t), allocatable, intent(out) :: tests(:)
 
       tests = [ &
          test_case_t("forces and tangents of our own law", test_forces), &
          test_case_t("stress of our own law", test_stress), &
          test_case_t("an inverted element is told", test_inverted)]
-   end subroutine collect_given_space
+   end subroutine collect_user_space
 
    subroutine evaluate(self, z, wants_hessian, value, gradient, hessian, status)
       class(quadratic_t), intent(in) :: self
@@ -94,7 +94,7 @@ contains
       logical, intent(out) :: is_inverted
       integer :: status
 
-      call given_space_strain(sample%element, 2, motion, sample%points, is_inverted)
+      call user_space_strain(sample%element, 2, motion, sample%points, is_inverted)
       if (.not. is_inverted) call point_gradient(sample%given, sample%points%strain, &
          sample%points%dstrain, .true., sample%points%response, status)
    end subroutine answer
@@ -114,7 +114,7 @@ contains
          call shake(motion%by, 0.2_wp)
          call answer(sample, motion, is_inverted)
          call check_true(error, .not. is_inverted, "not inverted")
-         call given_space_respond(sample%element, 2, sample%points, motion, .true., one)
+         call user_space_respond(sample%element, 2, sample%points, motion, .true., one)
          call space_element_respond(sample%element, sample%law, motion, .true., other)
          call check_near(error, one%energy, other%energy, tol, young, "energy")
          call check_near(error, one%force(:, :8), other%force(:, :8), tol, young, "force")
@@ -134,11 +134,11 @@ contains
       call make_sample(sample, error)
       call shake(motion%from, 0.2_wp)
       call answer(sample, motion, is_inverted)
-      call given_space_hold(sample%element, 2, sample%points, motion, stress, strain)
+      call user_space_hold(sample%element, 2, sample%points, motion, stress, strain)
       call space_element_hold(sample%element, sample%law, motion, wanted, wanted_strain)
       call check_near(error, stress, wanted, tol, young, "stress")
       call check_near(error, strain, wanted_strain, tol, 1.0_wp, "strain")
-      call given_space_hold(sample%element, 0, sample%points, motion, stress, strain)
+      call user_space_hold(sample%element, 0, sample%points, motion, stress, strain)
       call check_true(error, all(stress /= stress), "no answer, no stress")
       call check_near(error, strain, wanted_strain, tol, 1.0_wp, "strain")
    end subroutine test_stress

@@ -7,7 +7,7 @@ module test_host_check
    use emcon_kinds, only : dp, wp
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_build, stepper_close, stepper_t
-   use emcon_stepper_given, only : stepper_give_force, stepper_give_mass
+   use emcon_stepper_user, only : stepper_give_force, stepper_give_mass
    use given_hosts, only : chain_host_init, chain_host_t
    use given_scenes, only : lump, make_line, open_given
    implicit none
@@ -66,7 +66,7 @@ contains
          stepper%is_read = .true.
          call stepper_give_force(stepper, host, raised)
          call check_error(error, raised, err_input, text, "pattern")
-         call check_true(error, .not. allocated(stepper%given%force), "nothing was given")
+         call check_true(error, .not. allocated(stepper%host%force), "nothing was given")
       end subroutine refuse
 
    end subroutine test_patterns

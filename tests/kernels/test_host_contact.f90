@@ -8,7 +8,7 @@ module test_host_contact
    use emcon_host, only : host_add_contact, host_t
    use emcon_host_contact, only : host_contact_t
    use emcon_initial_contact, only : initial_contact_prepare
-   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_given
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_user
    use emcon_kinds, only : wp
    use emcon_overlap_query, only : overlap_query_t
    use emcon_overlap_query_registry, only : new_overlap_query
@@ -124,7 +124,7 @@ contains
       class(contact_t), allocatable :: contact
 
       call make_two_blocks(scene, 0.0_wp, lower, upper)
-      scene%pair%formulation = formulation_given
+      scene%pair%formulation = formulation_user
       call new_contact(scene, scene%pair(1), contact, error, floor_t())
       if (allocated(error)) return
       call check_equal(error, [size(contact%state), size(contact%duplicate), &
@@ -140,7 +140,7 @@ contains
       class(contact_t), allocatable :: contact
 
       call make_two_blocks(scene, 0.0_wp, lower, upper)
-      scene%pair%formulation = formulation_given
+      scene%pair%formulation = formulation_user
       call expect("negative", "n_constraint = -1 is negative")
       call expect("no node", "node is not allocated")
       call expect("short node", "the size of node is 2, not n_constraint = 3")
@@ -173,11 +173,11 @@ contains
 
       call host_add_contact(given, 1, floor_t())
       call make_two_blocks(scene, 0.0_wp, lower, upper)
-      scene%pair%formulation = formulation_given
+      scene%pair%formulation = formulation_user
       call initial_contact_prepare(scene, notes, error, given)
       if (allocated(error)) return
       call make_two_blocks(scene, -0.125_wp, lower, upper)
-      scene%pair%formulation = formulation_given
+      scene%pair%formulation = formulation_user
       call initial_contact_prepare(scene, notes, raised, given)
       call check_error(error, raised, err_input, "3 slave nodes of surface", "overlap")
       call check_error(error, raised, err_input, "by 0.125 at most", "its depth")

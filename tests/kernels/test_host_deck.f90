@@ -10,7 +10,7 @@ module test_host_deck
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_is_done, &
       stepper_read_text, stepper_t
    use emcon_stepper_file, only : stepper_load, stepper_save
-   use emcon_stepper_given, only : stepper_give_force, stepper_give_law, stepper_give_mass, &
+   use emcon_stepper_user, only : stepper_give_force, stepper_give_law, stepper_give_mass, &
       stepper_give_potential
    use emcon_text, only : string_t
    use given_hosts, only : chain_host_init, chain_host_t, well_t
@@ -160,9 +160,9 @@ contains
             if (.not. allocated(error)) call open_sample(part(i), error)
          end do
          if (allocated(error)) return
-         part(1)%given%force = part(1)%given%force(:1)
-         part(2)%given%mass = csr_t()
-         part(3)%given%law = part(3)%given%law(:0)
+         part(1)%host%force = part(1)%host%force(:1)
+         part(2)%host%mass = csr_t()
+         part(3)%host%law = part(3)%host%law(:0)
          call stepper_load(part(1), restart, raised)
          call check_error(error, raised, err_input, "not with 1 given forces and 1", "no well")
          call stepper_load(part(2), restart, raised)

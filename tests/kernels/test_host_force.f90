@@ -11,7 +11,7 @@ module test_host_force
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_is_done, &
       stepper_t
    use emcon_stepper_free, only : stepper_set_state
-   use emcon_stepper_given, only : stepper_give_force, stepper_give_mass
+   use emcon_stepper_user, only : stepper_give_force, stepper_give_mass
    use emcon_stepper_query, only : query_evaluate, query_free, query_residual, query_t
    use emcon_steps, only : initiation_velocity_update
    use emcon_text, only : to_text

@@ -7,7 +7,7 @@ module test_host_law
    use emcon_errors, only : err_analysis, err_input, error_t
    use emcon_kinds, only : dp, wp
    use emcon_law, only : lame_constants
-   use emcon_law_registry, only : law_given, law_linear
+   use emcon_law_registry, only : law_user, law_linear
    use emcon_march, only : increment_t
    use emcon_motion, only : motion_of, motion_t
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
@@ -20,7 +20,7 @@ module test_host_law
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_read_source, &
       stepper_t
    use emcon_stepper_file, only : stepper_load, stepper_save
-   use emcon_stepper_given, only : stepper_give_law
+   use emcon_stepper_user, only : stepper_give_law
    use emcon_stepper_query, only : query_evaluate, query_free, query_t
    use emcon_stress, only : nodal_stress
    use emcon_text, only : string_t, to_text
@@ -134,7 +134,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       stepper%scene = scene
-      stepper%scene%material(1)%law = merge(law_given, law, is_given)
+      stepper%scene%material(1)%law = merge(law_user, law, is_given)
       stepper%is_read = .true.
       if (is_given) call stepper_give_law(stepper, "Rubber", elastic_of(law), error)
       if (.not. allocated(error)) call stepper_build(stepper, error)
@@ -428,7 +428,7 @@ contains
       type(elastic_t) :: elastic
 
       call make_block(scene, "CPE4", [1, 1], block)
-      scene%material(1)%law = law_given
+      scene%material(1)%law = law_user
       call add_step(scene, .true., 0.25_wp, 4)
       call clamp(scene%step(1), [1, 3])
       call prescribe(scene%step(1), 2, 1, 0.4_wp)
@@ -515,7 +515,7 @@ contains
       stepper%is_read = .true.
       call stepper_give_law(stepper, "RUBBER", elastic, refused)
       call check_error(error, refused, err_input, "has a law of its own", "not a user material")
-      stepper%scene%material(1)%law = law_given
+      stepper%scene%material(1)%law = law_user
       call stepper_give_law(stepper, "STEEL", elastic, refused)
       call check_error(error, refused, err_input, "there is no material STEEL", "unknown")
       call stepper_build(stepper, refused)
@@ -525,7 +525,7 @@ contains
       elastic%n_variable = 2
       call make_block(flat%scene, "CPE4", [1, 1], block)
       call add_step(flat%scene, .true., 1.0_wp, 1)
-      flat%scene%material(1)%law = law_given
+      flat%scene%material(1)%law = law_user
       flat%is_read = .true.
       call stepper_give_law(flat, "RUBBER", elastic, refused)
       call check_true(error, .not. allocated(refused), "given")

@@ -97,10 +97,10 @@ contains
       associate (set => problem%set)
          set%defect = 0.0_wp
          set%n_permanent = 0
-         set%soft%is_on = .true.
-         set%soft%slope = [(0.5_wp**k, k = 1, m)]
-         set%soft%lack = [((-2.0_wp)**(k - m), k = 1, m)]
-         set%soft%slope(m) = 0.0_wp
+         set%penalty%is_on = .true.
+         set%penalty%slope = [(0.5_wp**k, k = 1, m)]
+         set%penalty%lack = [((-2.0_wp)**(k - m), k = 1, m)]
+         set%penalty%slope(m) = 0.0_wp
          call kept_factor_take(kept, set, is_fit, error)
          if (allocated(error)) return
          call check_true(error, is_fit, "there is a factor")
@@ -114,9 +114,9 @@ contains
          rhs(:n, 1) = -real(problem%residual, dp)
          ! Rows times the slope: without one the multiplier is to vanish.
          do k = 1, m
-            full(n + k, :n) = real(set%soft%slope(k), dp)*full(:n, n + k)
+            full(n + k, :n) = real(set%penalty%slope(k), dp)*full(:n, n + k)
             full(n + k, n + k) = -1.0_dp
-            rhs(n + k, 1) = real(set%soft%lack(k), dp)
+            rhs(n + k, 1) = real(set%penalty%lack(k), dp)
          end do
       end associate
       call dense_solve(full, rhs, x, is_singular)

@@ -4,7 +4,7 @@ module test_law
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_box_t, law_response_plane, law_response_t
-   use emcon_law_registry, only : find_law_row, law_create, law_given, law_row, law_row_t, &
+   use emcon_law_registry, only : find_law_row, law_create, law_user, law_row, law_row_t, &
       n_constant, n_law => n_law_row
    use emcon_text, only : to_text
    use kind_rows, only : law_code, name => law_name
@@ -397,7 +397,7 @@ contains
       end do
       call check_near(error, real(find_law_row("HYPERELASTIC", "OGDEN", 4), wp), 0.0_wp, 0.0_wp, &
          1.0_wp, "no such order")
-      call law_create(law_given, [1.0_wp], created%law, raised)
+      call law_create(law_user, [1.0_wp], created%law, raised)
       call check_error(error, raised, err_input, "no law with the code", "law that is given")
    end subroutine test_registry
 

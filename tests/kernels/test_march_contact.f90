@@ -255,7 +255,7 @@ contains
       do method = method_penalty, method_augmented_lagrange
          call make_drop(scene, formulation_nts, 0.3_wp)
          scene%step(1)%contact%method = method
-         scene%step(1)%contact%softness%stiffness = 500.0_wp
+         scene%step(1)%contact%penalty%stiffness = 500.0_wp
          block
             type(march_t) :: march
 
@@ -270,7 +270,7 @@ contains
                most = max(most, march%ledger%contact_energy)
                push = sum(march%state%contact(2, 11:))
                if (method == method_augmented_lagrange) left = left &
-                  + push*scene%step(1)%contact%softness%tolerance
+                  + push*scene%step(1)%contact%penalty%tolerance
                call check_true(error, abs(march%ledger%total - start%total) <= left, &
                   "energy, method " // to_text(method))
                if (allocated(error)) return

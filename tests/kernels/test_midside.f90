@@ -251,7 +251,7 @@ contains
          call contact%begin_step(scene%x, scene%u0, du)
          call contact%measure(scene%x, scene%u0, du)
          allocate(item(contact%n_constraint))
-         item%rubs = .true.
+         item%has_friction = .true.
          call contact%evaluate([(i, i = 1, size(item))], scene%x, scene%u0, du, &
             spread(0.0_wp, 1, size(item)), item)
          do i = 1, size(item)
@@ -301,9 +301,9 @@ contains
       du = 0.1_wp*(du - 0.5_wp)
       call draw_random(way)
       way = way - 0.5_wp
-      item%rubs = .true.
-      low%rubs = .true.
-      high%rubs = .true.
+      item%has_friction = .true.
+      low%has_friction = .true.
+      high%has_friction = .true.
       do k = 1, size(formulations)
          call make_contact(scene, k, contact, error)
          if (allocated(error)) return

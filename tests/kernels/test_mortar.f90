@@ -523,7 +523,7 @@ contains
             call contact_laws_of_surface(interaction_t(friction=0.5_wp), mortar%laws)
             call mortar%begin_step(scene%x, still, still)
             call mortar%measure(scene%x, still, still)
-            item%rubs = .true.
+            item%has_friction = .true.
             call mortar%evaluate([1, 2, 3], scene%x, still, still, [0.0_wp, 0.0_wp, 0.0_wp], item)
             do j = 1, 3
                area = area_of(mortar, j)
@@ -562,7 +562,7 @@ contains
             if (scheme == 4) motion%evaluation%is_gradient = .true.
             if (scheme == 4) motion%evaluation%at = 0.0_wp
             call motion_evaluate(motion)
-            one%rubs = .true.
+            one%has_friction = .true.
             one%normal = 0.0_wp
             call mortar%linearise([j], motion, [0.0_wp], one)
             call check_near(error, one(1)%normal, expected, tol, 1.0_wp, "scheme " &
@@ -584,9 +584,9 @@ contains
       integer :: i, j, k, n, column, n_checked
 
       n_checked = 0
-      item%rubs = .true.
-      up%rubs = .true.
-      down%rubs = .true.
+      item%has_friction = .true.
+      up%has_friction = .true.
+      down%has_friction = .true.
       do i = 1, n_combination
          do k = 1, 3
             call draw(i, k, 0.1_wp, scene, mortar, u, du, error)

@@ -129,9 +129,9 @@ contains
 
       call make_problem(problem)
       associate (set => problem%set)
-         set%soft%is_on = .true.
-         set%soft%slope = [0.5_wp, 2.0_wp, 3.0_wp, 40.0_wp, 1.0e6_wp, 0.1_wp]
-         set%soft%lack = [0.3_wp, -0.2_wp, 0.0_wp, 1.0_wp, 0.5_wp, -2.0_wp]
+         set%penalty%is_on = .true.
+         set%penalty%slope = [0.5_wp, 2.0_wp, 3.0_wp, 40.0_wp, 1.0e6_wp, 0.1_wp]
+         set%penalty%lack = [0.3_wp, -0.2_wp, 0.0_wp, 1.0_wp, 0.5_wp, -2.0_wp]
          allocate(dq(size(problem%residual)), dlam(set%n))
          call saddle_point_init(saddle, set, problem%matrix, error)
          if (allocated(error)) return
@@ -142,8 +142,9 @@ contains
          if (allocated(error)) return
          force = real(dense_of(set%force_rows), wp)
          gap = real(dense_of(set%gap_rows), wp)
-         spring = set%soft%lack - set%soft%slope*(set%defect + matmul(gap, dq))
-         call check_near(error, dlam/(1.0_wp + set%soft%slope), spring/(1.0_wp + set%soft%slope), &
+         spring = set%penalty%lack - set%penalty%slope*(set%defect + matmul(gap, dq))
+         call check_near(error, dlam/(1.0_wp + set%penalty%slope), spring/(1.0_wp &
+            + set%penalty%slope), &
             tol_dp, 10.0_wp + maxval(abs(dq)), "springs")
          call check_near(error, matmul(real(dense_of(problem%matrix), wp), dq) &
             - matmul(transpose(force), dlam), -problem%residual, tol_dp, &

@@ -5,7 +5,7 @@ module test_soft_law
    use emcon_contact_law, only : contact_law_t, contact_values_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_soft_law, only : augmented_t, penalty_t
+   use emcon_penalty_law, only : augmented_t, penalty_t
    implicit none
    private
    public :: collect_soft_law

@@ -1,7 +1,7 @@
 !> Elements in three dimensions whose law a program gives at points.
 !>
 !> Source: docs/theory.md, section 2 (functions given at points) and eq. (11).
-module emcon_given_space
+module emcon_user_space
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use emcon_element_space, only : space_element_t, space_motion_t, space_part_add, &
       space_part_add_tangent, space_part_clear, space_part_t, space_point, space_point_cauchy, &
@@ -11,12 +11,12 @@ module emcon_given_space
    use emcon_law_space, only : space_response_t
    implicit none
    private
-   public :: given_space_strain, given_space_respond, given_space_hold
+   public :: user_space_strain, user_space_respond, user_space_hold
 
 contains
 
    !> Strains over a motion, for the law to answer to.
-   pure subroutine given_space_strain(self, first, motion, points, is_inverted)
+   pure subroutine user_space_strain(self, first, motion, points, is_inverted)
       type(space_element_t), intent(in) :: self
       integer, intent(in) :: first               !! number of its first point in `points`
       type(space_motion_t), intent(in) :: motion
@@ -32,10 +32,10 @@ contains
          points%strain(:, first - 1 + k) = point%strain
          points%dstrain(:, first - 1 + k) = point%dstrain
       end do
-   end subroutine given_space_strain
+   end subroutine user_space_strain
 
    !> Response to a motion that the law has answered to.
-   pure subroutine given_space_respond(self, first, points, motion, with_tangent, part)
+   pure subroutine user_space_respond(self, first, points, motion, with_tangent, part)
       type(space_element_t), intent(in) :: self
       integer, intent(in) :: first               !! number of its first point in `points`
       type(host_points_t), intent(in) :: points
@@ -57,11 +57,11 @@ contains
          response%tangent = points%response%tangent(:, :, i)
          call space_part_add_tangent(self, k, point, response, part)
       end do
-   end subroutine given_space_respond
+   end subroutine user_space_respond
 
    !> Cauchy stress and strain at the points of an element that does not move; where the law has
    !> not answered, the stress is not a number.
-   pure subroutine given_space_hold(self, first, points, motion, stress, strain)
+   pure subroutine user_space_hold(self, first, points, motion, stress, strain)
       type(space_element_t), intent(in) :: self
       integer, intent(in) :: first               !! number of its first point; 0: no answer
       type(host_points_t), intent(in) :: points
@@ -78,6 +78,6 @@ contains
          if (first > 0) stress(:, k) = space_point_cauchy(point, &
             points%response%gradient(:, first - 1 + k))
       end do
-   end subroutine given_space_hold
+   end subroutine user_space_hold
 
-end module emcon_given_space
+end module emcon_user_space

@@ -4,7 +4,7 @@
 !> discrete gradient of that, so that what it takes is what it stores, or its value at the end. An
 !> augmented Lagrangian pushes with a multiplier that is given, and k times what is left of the gap.
 !> Source: docs/theory.md, eqs. (20a) to (20f).
-module emcon_soft_law
+module emcon_penalty_law
    use emcon_constraint, only : contact_response_t
    use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
    use emcon_interactions, only : interaction_t
@@ -164,4 +164,4 @@ contains
       gives_back = self%before < 0.0_wp
    end function gives_back
 
-end module emcon_soft_law
+end module emcon_penalty_law

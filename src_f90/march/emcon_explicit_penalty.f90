@@ -3,7 +3,7 @@
 !> Which contacts are closed, and how deep, depends on the place alone. What they push with there is
 !> added to the internal forces that a step leaves to the next one. Source: docs/theory.md, section
 !> 14.
-module emcon_explicit_soft
+module emcon_explicit_penalty
    use emcon_active_set, only : active_set_update_gaps, active_set_pass
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate, &
       constraints_force, constraints_select
@@ -14,11 +14,12 @@ module emcon_explicit_soft
    use emcon_motion_bound, only : largest_motion
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_scene, only : scene_t
-   use emcon_softness, only : softness_select
+   use emcon_penalty, only : penalty_select
    use emcon_term, only : role_internal
    implicit none
    private
-   public :: explicit_soft_push, explicit_soft_force, explicit_soft_limit, explicit_soft_widen
+   public :: explicit_penalty_push, explicit_penalty_force, explicit_penalty_limit, &
+      explicit_penalty_widen
 
    !> A critical step that was found with closed contacts counts until a node is stiffened by so
    !> much more: places of contact move a little with each step.
@@ -28,41 +29,42 @@ contains
 
    !> Find the contacts that are closed at `self%explicit%place`, as the end of the present step or
    !> its start, and add what they push with to the response of the system there.
-   subroutine explicit_soft_push(self, is_end)
+   subroutine explicit_penalty_push(self, is_end)
       type(march_t), intent(inout) :: self
       logical, intent(in) :: is_end              !! of the step, else its start
       real(wp) :: force(size(self%end_state%v, 1), size(self%end_state%v, 2))
       integer :: left
 
-      if (.not. self%active%softness%is_at_ends) return
+      if (.not. self%active%penalty%is_at_ends) return
       call phase_enter(self%system%phases, phase_gaps, left)
       associate (explicit => self%explicit, response => self%system%response)
-         associate (soft => explicit%soft(merge(1 - explicit%i_start, explicit%i_start, is_end)))
-            call find_closed(self, soft, is_end)
-            if (soft%n > 0) then
-               call constraints_evaluate(soft, self%system, explicit%place, leaves_second=.true.)
-               call explicit_soft_force(soft, force)
+         associate (penalty => explicit%penalty(merge(1 - explicit%i_start, explicit%i_start, &
+            is_end)))
+            call find_closed(self, penalty, is_end)
+            if (penalty%n > 0) then
+               call constraints_evaluate(penalty, self%system, explicit%place, leaves_second=.true.)
+               call explicit_penalty_force(penalty, force)
                response%residual = response%residual - force
                response%part(role_internal)%force = response%part(role_internal)%force - force
             end if
          end associate
       end associate
       call phase_leave(self%system%phases, left)
-   end subroutine explicit_soft_push
+   end subroutine explicit_penalty_push
 
-   !> Hand the contacts that are closed at the place to `soft`. One that was open at the start is
+   !> Hand the contacts that are closed at the place to `penalty`. One that was open at the start is
    !> closed no deeper than both sides have moved: else the other side of a thin body is meant.
-   subroutine find_closed(self, soft, is_end)
+   subroutine find_closed(self, penalty, is_end)
       type(march_t), intent(inout) :: self
-      type(constraint_set_t), intent(inout) :: soft
+      type(constraint_set_t), intent(inout) :: penalty
       logical, intent(in) :: is_end
       logical :: is_closed(self%system%n_constraint)
       integer :: pair, i, k, id
-      real(wp) :: way
+      real(wp) :: margin
 
       is_closed = .false.
-      way = 0.0_wp
-      if (is_end) way = 2.0_wp*largest_motion(self%end_state%du)
+      margin = 0.0_wp
+      if (is_end) margin = 2.0_wp*largest_motion(self%end_state%du)
       associate (system => self%system, active => self%active, place => self%explicit%place)
          if (is_end) then
             call active_set_pass(active, system, self%motion)
@@ -79,32 +81,32 @@ contains
                      if (.not. (gap%is_near .and. gap%is_over)) cycle
                      is_closed(id) = gap%gap1 < gap%closed &
                         .and. (self%state%contacts%is_active(id) .or. gap%gap1 &
-                        - gap%closed > -contact%max_penetration_at_start*gap%size - way)
+                        - gap%closed > -contact%max_penetration_at_start*gap%size - margin)
                   end associate
                end do
             end associate
          end do
-         call constraints_select(soft, pack([(k, k = 1, size(is_closed))], is_closed))
-         do k = 1, soft%n
-            call constraint_index(system, soft%id(k), pair, i)
-            soft%target(k) = system%contact(pair)%contact%state(i)%closed
+         call constraints_select(penalty, pack([(k, k = 1, size(is_closed))], is_closed))
+         do k = 1, penalty%n
+            call constraint_index(system, penalty%id(k), pair, i)
+            penalty%target(k) = system%contact(pair)%contact%state(i)%closed
          end do
-         call softness_select(active%softness, system, soft, is_stored=.true.)
+         call penalty_select(active%penalty, system, penalty, is_stored=.true.)
       end associate
    end subroutine find_closed
 
    !> What the contacts of a set push with.
-   pure subroutine explicit_soft_force(soft, force)
-      type(constraint_set_t), intent(in) :: soft
+   pure subroutine explicit_penalty_force(penalty, force)
+      type(constraint_set_t), intent(in) :: penalty
       real(wp), intent(out), contiguous :: force(:, :)   !! (n_dim, n_node) [M L/T^2]
 
-      call constraints_force(soft, 1, force)
-   end subroutine explicit_soft_force
+      call constraints_force(penalty, 1, force)
+   end subroutine explicit_penalty_force
 
    !> What pairs stiffen each node by when all of them are closed: the matrix of contacts is below
    !> this diagonal where the nodes of both surfaces stand as close to each other, twice where both
    !> move. Source: docs/theory.md, eq. (42).
-   subroutine explicit_soft_limit(self, scene)
+   subroutine explicit_penalty_limit(self, scene)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(facets_t) :: slave, master
@@ -115,11 +117,11 @@ contains
       if (allocated(self%explicit%stiffness)) deallocate(self%explicit%stiffness)
       allocate(self%explicit%stiffness(size(scene%x, 2)), source=0.0_wp)
       self%explicit%met = self%explicit%stiffness
-      if (.not. self%active%softness%is_at_ends) return
+      if (.not. self%active%penalty%is_at_ends) return
       associate (bound => self%explicit%stiffness, system => self%system)
          do k = 1, size(system%contact)
             associate (contact => system%contact(k)%contact, stiffness => &
-                  self%active%softness%stiffness, first => system%first_constraint(k) + 1, &
+                  self%active%penalty%stiffness, first => system%first_constraint(k) + 1, &
                   last => system%first_constraint(k + 1), &
                   pair => scene%pair(abs(system%contact(k)%of_pair)))
                if (contact%slack > 0.0_wp) cycle
@@ -138,7 +140,7 @@ contains
          end do
       end associate
       self%explicit%met = self%explicit%stiffness
-   end subroutine explicit_soft_limit
+   end subroutine explicit_penalty_limit
 
    !> Are some of the nodes free to move?
    pure logical function moves(self, node)
@@ -176,32 +178,32 @@ contains
    !> Do the contacts that are closed at the start of the step stiffen a node by more than any have
    !> done before? Of one it is at most its stiffness times the node's gradient times those of all
    !> that move.
-   subroutine explicit_soft_widen(self, has_grown)
+   subroutine explicit_penalty_widen(self, has_grown)
       type(march_t), intent(inout) :: self
       logical, intent(out) :: has_grown          !! the critical step is to be found with them
       real(wp) :: total(size(self%end_state%v, 2)), slope(size(self%explicit%stiffness))
       integer :: k, i
 
       has_grown = .false.
-      associate (soft => self%explicit%soft(self%explicit%i_start), &
+      associate (penalty => self%explicit%penalty(self%explicit%i_start), &
             bound => self%explicit%met)
-         if (.not. self%active%softness%is_at_ends .or. soft%n == 0) return
+         if (.not. self%active%penalty%is_at_ends .or. penalty%n == 0) return
          total = 0.0_wp
-         do k = 1, soft%n
-            associate (item => soft%item(k))
+         do k = 1, penalty%n
+            associate (item => penalty%item(k))
                do i = 1, item%n_node
                   slope(i) = 0.0_wp
                   if (moves(self, item%node(i:i))) slope(i) = sqrt(sum(item%c(:, i)**2))
                end do
                do i = 1, item%n_node
                   total(item%node(i)) = total(item%node(i)) &
-                     + soft%law(k)%row%stiffest()*slope(i)*sum(slope(:item%n_node))
+                     + penalty%law(k)%row%stiffest()*slope(i)*sum(slope(:item%n_node))
                end do
             end associate
          end do
          has_grown = any(total > (1.0_wp + sqrt(epsilon(1.0_wp)))*bound)
          if (has_grown) bound = max(bound, room*total)
       end associate
-   end subroutine explicit_soft_widen
+   end subroutine explicit_penalty_widen
 
-end module emcon_explicit_soft
+end module emcon_explicit_penalty

@@ -4,7 +4,7 @@
 !> Copies are kept, also for a restart file that is loaded afterwards. Nodes that stand in no
 !> element are part of the model where they are given something. Gravity acts on the mass of
 !> elements only: the weight of given mass is for the giver to add.
-module emcon_stepper_given
+module emcon_stepper_user
    use emcon_constraint, only : constraint_t
    use emcon_contact_law, only : contact_law_t
    use emcon_csr, only : csr_t
@@ -17,9 +17,9 @@ module emcon_stepper_given
    use emcon_host_contact, only : host_contact_t
    use emcon_host_force, only : host_force_t
    use emcon_host_scheme, only : host_scheme_add, host_scheme_check, host_scheme_find
-   use emcon_interactions, only : formulation_given
+   use emcon_interactions, only : formulation_user
    use emcon_law, only : law_t
-   use emcon_law_registry, only : law_given
+   use emcon_law_registry, only : law_user
    use emcon_node_potential, only : node_potential_init, node_potential_t
    use emcon_point_function, only : point_function_t
    use emcon_scene, only : where_text
@@ -54,7 +54,7 @@ contains
       type(error_t), allocatable, intent(out) :: error   !! nothing was given
 
       call check_material(self, plain(name), error)
-      if (.not. allocated(error)) call host_add_law(self%given, plain(name), energy=energy)
+      if (.not. allocated(error)) call host_add_law(self%host, plain(name), energy=energy)
    end subroutine give_energy
 
    !> Give a law for the *USER MATERIAL called `name`. It takes the constants of that card.
@@ -65,7 +65,7 @@ contains
       type(error_t), allocatable, intent(out) :: error   !! nothing was given
 
       call check_material(self, plain(name), error)
-      if (.not. allocated(error)) call host_add_law(self%given, plain(name), law=law)
+      if (.not. allocated(error)) call host_add_law(self%host, plain(name), law=law)
    end subroutine give_law
 
    !> Can a law be given for the material `name`?
@@ -84,14 +84,14 @@ contains
       call check_that(k > 0, "there is no material " // name // " in the deck", error)
       if (allocated(error)) return
       associate (material => self%scene%material(k))
-         call check_that(material%law == law_given, "material " // name // " (" // &
+         call check_that(material%law == law_user, "material " // name // " (" // &
             where_text(self%scene, material%origin) // ") has a law of its own: to give one, it " &
             // "has to be a *USER MATERIAL", error)
       end associate
       is_given = .false.
-      if (allocated(self%given%law)) then
-         do i = 1, size(self%given%law)
-            is_given = is_given .or. self%given%law(i)%material == name
+      if (allocated(self%host%law)) then
+         do i = 1, size(self%host%law)
+            is_given = is_given .or. self%host%law(i)%material == name
          end do
       end if
       call check_that(.not. is_given, "the law of material " // name // " is given already", error)
@@ -156,7 +156,7 @@ contains
       call check_stage(self, error)
       if (.not. allocated(error)) call node_potential_init(force, name, node, &
          self%scene%n_dim, size(self%scene%x, 2), potential, error)
-      if (.not. allocated(error)) call host_add_force(self%given, force)
+      if (.not. allocated(error)) call host_add_force(self%host, force)
    end subroutine stepper_give_potential
 
    !> Give forces between nodes. Those of several calls add up.
@@ -168,7 +168,7 @@ contains
       call check_stage(self, error)
       if (.not. allocated(error)) call host_check_force(force, self%scene%n_dim, &
          size(self%scene%x, 2), error)
-      if (.not. allocated(error)) call host_add_force(self%given, force)
+      if (.not. allocated(error)) call host_add_force(self%host, force)
    end subroutine stepper_give_force
 
    !> Give a mass beside that of the elements, the same in both directions: symmetric, and no mass
@@ -179,10 +179,10 @@ contains
       type(error_t), allocatable, intent(out) :: error   !! nothing was given
 
       call check_stage(self, error)
-      call check_that(self%given%mass%n_row == 0, &
+      call check_that(self%host%mass%n_row == 0, &
          "a mass was given already; give one matrix with all of it", error)
       if (.not. allocated(error)) call host_check_mass(mass, self%scene, error)
-      if (.not. allocated(error)) self%given%mass = mass
+      if (.not. allocated(error)) self%host%mass = mass
    end subroutine stepper_give_mass
 
    !> Give conditions that hold at the end of every step, in both directions: a rod of fixed length,
@@ -195,7 +195,7 @@ contains
       call check_stage(self, error)
       call check_that(constraint%n_constraint > 0, "a constraint was given that has no " // &
          "conditions: n_constraint is to be their number", error)
-      if (.not. allocated(error)) call host_add_constraint(self%given, constraint)
+      if (.not. allocated(error)) call host_add_constraint(self%host, constraint)
    end subroutine stepper_give_constraint
 
    !> Give the formulation of contact of the *CONTACT PAIR, TYPE=USER of two surfaces.
@@ -211,16 +211,16 @@ contains
       if (allocated(error)) return
       associate (pair => self%scene%pair, surface => self%scene%surface)
          do k = size(pair), 1, -1
-            if (pair(k)%formulation /= formulation_given) cycle
+            if (pair(k)%formulation /= formulation_user) cycle
             if (surface(pair(k)%slave)%name == plain(slave) .and. &
                surface(pair(k)%master)%name == plain(master)) exit
          end do
       end associate
       call check_that(k > 0, "there is no *CONTACT PAIR, TYPE=USER of slave surface " // &
          plain(slave) // " and master surface " // plain(master) // " in the deck", error)
-      call check_that(host_find_contact(self%given, k) == 0, "the contact of surfaces " // &
+      call check_that(host_find_contact(self%host, k) == 0, "the contact of surfaces " // &
          plain(slave) // " and " // plain(master) // " is given already", error)
-      if (.not. allocated(error)) call host_add_contact(self%given, k, contact)
+      if (.not. allocated(error)) call host_add_contact(self%host, k, contact)
    end subroutine stepper_give_contact
 
    !> Give a direct solver, which steps with SOLVER=`name` factorise their matrices by.
@@ -234,7 +234,7 @@ contains
 
       call check_stage(self, error)
       if (allocated(error)) return
-      call host_copy_solvers(self%given, present)
+      call host_copy_solvers(self%host, present)
       call solver_names(known)
       word = plain(name)
       call check_that(find_solver_row(word) == 0, "a solver cannot be given as " // word // &
@@ -244,7 +244,7 @@ contains
          "other program has for its own", error)
       call check_that(host_find_solver(present, word) == 0, "the solver " // word // &
          " is given already", error)
-      if (.not. allocated(error)) call host_add_solver(self%given, word, solver)
+      if (.not. allocated(error)) call host_add_solver(self%host, word, solver)
    end subroutine stepper_give_solver
 
    !> Give the law of all contacts in steps with *CONSTRAINT METHOD, TYPE=PENALTY, in place of the
@@ -256,12 +256,12 @@ contains
 
       call check_stage(self, error)
       if (allocated(error)) return
-      call check_that(.not. allocated(self%given%contact_law), "a law of contact is given " // &
+      call check_that(.not. allocated(self%host%contact_law), "a law of contact is given " // &
          "already", error)
       call check_that(any(self%scene%step%contact%method == method_penalty), "a law of " // &
          "contact is given, but no step has a *CONSTRAINT METHOD, TYPE=PENALTY, in whose place " &
          // "it acts", error)
-      if (.not. allocated(error)) allocate(self%given%contact_law, source=law)
+      if (.not. allocated(error)) allocate(self%host%contact_law, source=law)
    end subroutine stepper_give_contact_law
 
    !> The deck is read, the model is not built.
@@ -284,4 +284,4 @@ contains
       plain = to_upper(adjustl(name))
    end function plain
 
-end module emcon_stepper_given
+end module emcon_stepper_user

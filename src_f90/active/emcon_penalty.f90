@@ -1,6 +1,6 @@
 !> Contact that gives way: how stiff each constraint of a step is, by the deck or by the elements at
 !> the surfaces. Source: docs/theory.md, eqs. (20a) to (20e).
-module emcon_softness
+module emcon_penalty
    use emcon_constraints, only : constraint_index, constraint_set_t
    use emcon_contact_law, only : contact_law_t, contact_place_t
    use emcon_contact_law_registry, only : contact_law_of_method
@@ -13,8 +13,8 @@ module emcon_softness
    use emcon_text, only : note_add, to_text
    implicit none
    private
-   public :: softness_state_t, softness_begin_step, softness_select, softness_augment, &
-      softness_stored, softness_depth, softness_pulls, softness_keep, softness_owes
+   public :: penalty_state_t, penalty_begin_step, penalty_select, penalty_augment, &
+      penalty_stored, penalty_depth, penalty_pulls, penalty_keep, penalty_owes
 
    !> Solves with multipliers that are given, at most.
    integer, parameter, public :: most_augmentations = 50
@@ -23,7 +23,7 @@ module emcon_softness
    !> A pull of this part of the largest multiplier tells that the set will change.
    real(wp), parameter :: pull = 1.0e-2_wp
 
-   type :: softness_state_t
+   type :: penalty_state_t
       logical :: is_on = .false.                 !! contact gives way in this step
       logical :: augments = .false.              !! and is pushed back: AUGMENTED LAGRANGE
       logical :: is_at_ends = .false.            !! and pushes where steps begin and end: explicit
@@ -34,13 +34,13 @@ module emcon_softness
       real(wp), allocatable :: area(:)           !! (n_constraint) of contacts [L^2]
       real(wp), allocatable :: edge(:)           !! (n_constraint) of the slave surface [L]
       real(wp), allocatable :: closure(:)        !! (n_constraint) that of `state_t` [L]
-   end type softness_state_t
+   end type penalty_state_t
 
 contains
 
    !> Set up for `step`, whose contacts are laid out.
-   subroutine softness_begin_step(self, system, scene, step, error)
-      type(softness_state_t), intent(out) :: self
+   subroutine penalty_begin_step(self, system, scene, step, error)
+      type(penalty_state_t), intent(out) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(step_t), intent(in) :: step
@@ -53,11 +53,11 @@ contains
          size(system%contact) > 0
       self%is_at_ends = self%is_on .and. step%scheme%is_explicit
       do k = 1, size(system%contact)
-         system%contact(k)%contact%step%is_soft = self%is_on
-         system%contact(k)%contact%step%gives_way = .false.
+         system%contact(k)%contact%step%has_compliance = self%is_on
+         system%contact(k)%contact%step%is_penalty = .false.
       end do
       if (.not. self%is_on) return
-      self%tolerance = step%contact%softness%tolerance
+      self%tolerance = step%contact%penalty%tolerance
       if (allocated(system%contact_law) .and. .not. self%augments) then
          allocate(self%law, source=system%contact_law)
       else
@@ -78,13 +78,13 @@ contains
          call set_contact(self, system, scene, step, k, inner, error)
          if (allocated(error)) return
       end do
-   end subroutine softness_begin_step
+   end subroutine penalty_begin_step
 
    !> The stiffness of contact `k`: one pressure by penetration for all of its nodes, that of the
    !> deck, or the mean of `inner` at its slave nodes by their area, or else at the master's. Where
    !> nodes of both sides push each side has half of it.
    subroutine set_contact(self, system, scene, step, k, inner, error)
-      type(softness_state_t), intent(inout) :: self
+      type(penalty_state_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
       type(step_t), intent(in) :: step
@@ -93,13 +93,13 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: area(system%contact(k)%contact%n_constraint), by_area, factor
 
-      factor = step%contact%softness%factor
+      factor = step%contact%penalty%factor
       if (self%augments) factor = augmented_factor*factor
       associate (contact => system%contact(k)%contact, before => system%first_constraint(k), &
-            given => step%contact%softness%stiffness)
+            given => step%contact%penalty%stiffness)
          call contact%own_area(scene%x, area)
          if (.not. sum(area) > 0.0_wp) then
-            call raise(error, err_input, where_text(scene, step%contact%softness%origin) &
+            call raise(error, err_input, where_text(scene, step%contact%penalty%origin) &
                // ": error: " &
                // "*CONSTRAINT METHOD: a slave surface made of nodes has no area to give way " // &
                "by; name its elements and faces, or use TYPE=NULL SPACE")
@@ -109,13 +109,13 @@ contains
          if (.not. given > 0.0_wp) by_area = factor*sum(inner(contact%node))/sum(area)
          if (.not. by_area > 0.0_wp) by_area = factor*of_opposite(system, k, inner)/sum(area)
          if (.not. by_area > 0.0_wp) then
-            call raise(error, err_input, where_text(scene, step%contact%softness%origin) &
+            call raise(error, err_input, where_text(scene, step%contact%penalty%origin) &
                // ": error: " &
                // "*CONSTRAINT METHOD: no elastic element stands on either surface of a contact " &
                // "pair: give its STIFFNESS, pressure by penetration")
             return
          end if
-         contact%step%gives_way = .not. self%augments .and. step_is_dynamic(step)
+         contact%step%is_penalty = .not. self%augments .and. step_is_dynamic(step)
          self%area(before + 1:before + size(area)) = area*merge(0.5_wp, 1.0_wp, &
             contact%both_sides)
          self%stiffness(before + 1:before + size(area)) = area*merge(0.5_wp, 1.0_wp, &
@@ -142,110 +142,111 @@ contains
    end function of_opposite
 
    !> Let the contacts of `set` give way, whose targets and multipliers stand.
-   subroutine softness_select(self, system, set, is_stored)
-      type(softness_state_t), intent(in) :: self
+   subroutine penalty_select(self, system, set, is_stored)
+      type(penalty_state_t), intent(in) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(inout) :: set
       logical, intent(in) :: is_stored           !! pushes are discrete gradients of what is stored
       type(contact_place_t) :: place
       integer :: k, pair, i
 
-      set%soft%is_on = self%is_on .and. set%n > 0
-      if (.not. set%soft%is_on) return
-      set%soft%is_stored = is_stored .and. .not. self%augments
+      set%penalty%is_on = self%is_on .and. set%n > 0
+      if (.not. set%penalty%is_on) return
+      set%penalty%is_stored = is_stored .and. .not. self%augments
       do k = 1, set%n
          call constraint_index(system, set%id(k), pair, i)
          if (pair == 0) cycle
          place = contact_place_t(self%area(set%id(k)), self%stiffness(set%id(k)), &
             system%contact(pair)%contact%share(i))
-         if (set%soft%is_stored .and. .not. self%is_at_ends) place%closure = self%closure(set%id(k))
+         if (set%penalty%is_stored .and. .not. self%is_at_ends) place%closure = &
+            self%closure(set%id(k))
          allocate(set%law(k)%row, source=self%law)
          call set%law(k)%row%begin(place)
          call set%law(k)%row%push_on(set%lam(k))
       end do
-   end subroutine softness_select
+   end subroutine penalty_select
 
    !> Take the multipliers as those to push with; `is_done` if that has closed what was left of the
    !> gaps.
-   pure subroutine softness_augment(self, set, is_done)
-      type(softness_state_t), intent(inout) :: self
+   pure subroutine penalty_augment(self, set, is_done)
+      type(penalty_state_t), intent(inout) :: self
       type(constraint_set_t), intent(inout) :: set
       logical, intent(out) :: is_done            !! else the step is to be solved again
       integer :: k
 
       is_done = .true.
-      if (.not. (self%augments .and. set%soft%is_on)) return
+      if (.not. (self%augments .and. set%penalty%is_on)) return
       self%n_augmentation = self%n_augmentation + 1
       do k = set%n_permanent + 1, set%n
-         if (abs(set%soft%left(k)) > self%tolerance*set%item(k)%size) is_done = .false.
+         if (abs(set%penalty%left(k)) > self%tolerance*set%item(k)%size) is_done = .false.
          call set%law(k)%row%push_on(set%lam(k))
       end do
-   end subroutine softness_augment
+   end subroutine penalty_augment
 
    !> Does a contact of `set` that is pushed back pull by more than may turn while gaps still close?
    !> Rows that say nearly the same never close all of their gaps: the multiplier of one falls on.
-   pure logical function softness_pulls(self, set) result(pulls)
-      type(softness_state_t), intent(in) :: self
+   pure logical function penalty_pulls(self, set) result(pulls)
+      type(penalty_state_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
       integer :: first
 
       first = set%n_permanent + 1
       pulls = self%augments .and. set%n >= first
       if (pulls) pulls = minval(set%lam(first:set%n)) < -pull*maxval(abs(set%lam(first:set%n)))
-   end function softness_pulls
+   end function penalty_pulls
 
    !> What the contacts of `set` store at the end of the step [M L^2/T^2].
-   pure real(wp) function softness_stored(self, set) result(energy)
-      type(softness_state_t), intent(in) :: self
+   pure real(wp) function penalty_stored(self, set) result(energy)
+      type(penalty_state_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
       integer :: k
 
       energy = 0.0_wp
-      if (self%augments .or. .not. set%soft%is_on) return
+      if (self%augments .or. .not. set%penalty%is_on) return
       do k = set%n_permanent + 1, set%n
          energy = energy + set%law(k)%row%stored()
       end do
-   end function softness_stored
+   end function penalty_stored
 
    !> What the contacts of `set` leave to the next step.
-   pure subroutine softness_keep(self, set, closure)
-      type(softness_state_t), intent(in) :: self
+   pure subroutine penalty_keep(self, set, closure)
+      type(penalty_state_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(inout) :: closure(:)      !! (n_constraint) those of others stand [L]
       integer :: k
 
-      if (self%augments .or. .not. set%soft%is_on) return
+      if (self%augments .or. .not. set%penalty%is_on) return
       do k = set%n_permanent + 1, set%n
          closure(set%id(k)) = set%law(k)%row%closure()
       end do
-   end subroutine softness_keep
+   end subroutine penalty_keep
 
    !> Has the step before left constraints `first` to `last` with something stored?
-   pure function softness_owes(self, first, last) result(owes)
-      type(softness_state_t), intent(in) :: self
+   pure function penalty_owes(self, first, last) result(owes)
+      type(penalty_state_t), intent(in) :: self
       integer, intent(in) :: first, last         !! a range of the constraints
       logical :: owes(last - first + 1)
 
       owes = .false.
       if (self%is_on .and. .not. self%augments) owes = self%closure(first:last) < 0.0_wp
-   end function softness_owes
+   end function penalty_owes
 
    !> How deep the contacts of `set` have given way: the largest, by the edge of the slave or of the
    !> master, whichever is shorter; of an augmented Lagrangian by that of its tolerance.
-   pure real(wp) function softness_depth(self, set) result(depth)
-      type(softness_state_t), intent(in) :: self
+   pure real(wp) function penalty_depth(self, set) result(depth)
+      type(penalty_state_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
       real(wp) :: edge
       integer :: k
 
       depth = 0.0_wp
-      if (.not. set%soft%is_on) return
+      if (.not. set%penalty%is_on) return
       do k = set%n_permanent + 1, set%n
          edge = set%item(k)%size
          if (self%edge(set%id(k)) > 0.0_wp .and. .not. self%augments) edge = min(edge, &
             self%edge(set%id(k)))
-         depth = max(depth, -set%soft%left(k)/edge)
+         depth = max(depth, -set%penalty%left(k)/edge)
       end do
-   end function softness_depth
+   end function penalty_depth
 
-end module emcon_softness
+end module emcon_penalty

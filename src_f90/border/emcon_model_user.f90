@@ -2,7 +2,7 @@
 !>
 !> Prototypes and what they are to do: emcon.h. A function returns 0, 1 for a state that it has no
 !> value for, or anything else for a failure.
-module emcon_model_given
+module emcon_model_user
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use, intrinsic :: iso_c_binding, only : c_associated, c_double, c_f_procpointer, c_funptr, &
       c_int, c_loc, c_null_funptr, c_null_ptr, c_ptr
@@ -14,7 +14,7 @@ module emcon_model_given
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
    use emcon_rotation, only : n_turn
    use emcon_stepper, only : stepper_t
-   use emcon_stepper_given, only : stepper_give_force, stepper_give_law, stepper_give_potential
+   use emcon_stepper_user, only : stepper_give_force, stepper_give_law, stepper_give_potential
    implicit none
    private
    public :: point_callback_t, force_callback_t
@@ -158,4 +158,4 @@ contains
       if (code == 1) status_of = point_outside
    end function status_of
 
-end module emcon_model_given
+end module emcon_model_user

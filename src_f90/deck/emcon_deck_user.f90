@@ -1,5 +1,5 @@
 !> *GIVEN FORCES: nodes whose forces and mass come from the program that reads the deck.
-module emcon_deck_given
+module emcon_deck_user
    use emcon_deck_named, only : set_names
    use emcon_deck_reader, only : card_error, card_t, has_option, need_name, reader_t
    use emcon_diagnostics, only : quoted, suggestion
@@ -64,4 +64,4 @@ contains
          "all nodes belong to elements; name those that are given forces by NSET=")
    end subroutine find_nodes
 
-end module emcon_deck_given
+end module emcon_deck_user

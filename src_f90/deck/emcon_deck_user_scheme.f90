@@ -1,5 +1,5 @@
 !> Schemes that a program gives, in the deck that calls them: what they do not go with.
-module emcon_deck_given_scheme
+module emcon_deck_user_scheme
    use emcon_deck_check_massless, only : check_massless_sections
    use emcon_deck_contact_damping, only : check_contact_damping
    use emcon_deck_damping, only : check_damping
@@ -11,17 +11,17 @@ module emcon_deck_given_scheme
    use emcon_errors, only : err_input, error_t, raise
    use emcon_host_scheme, only : host_scheme_find, host_scheme_row, host_scheme_t
    use emcon_scene, only : scene_t
-   use emcon_scheme_registry, only : scheme_given
+   use emcon_scheme_registry, only : scheme_user
    use emcon_text, only : string_t
    implicit none
    private
-   public :: take_given_schemes
+   public :: take_user_schemes
 
 contains
 
    !> Put the rows of the schemes `given` into the steps that call them by name, and see whether
    !> the deck goes with them. A name that was not given stays as it is.
-   subroutine take_given_schemes(given, scene, error)
+   subroutine take_user_schemes(given, scene, error)
       type(host_scheme_t), allocatable, intent(in) :: given(:)   !! (any) or not allocated
       type(scene_t), intent(inout) :: scene      !! without errors but for schemes
       type(error_t), allocatable, intent(out) :: error
@@ -30,13 +30,13 @@ contains
       if (.not. allocated(given)) return
       do i = 1, size(scene%step)
          associate (step => scene%step(i))
-            if (step%scheme%code /= scheme_given) cycle
+            if (step%scheme%code /= scheme_user) cycle
             k = host_scheme_find(given, step%choice%name)
             if (k > 0) step%scheme = host_scheme_row(step%choice%name, given(k)%scheme)
          end associate
       end do
       call check_again(scene, error)
-   end subroutine take_given_schemes
+   end subroutine take_user_schemes
 
    !> Check the deck again, now that the rows of all its schemes are known: its first error.
    subroutine check_again(scene, error)
@@ -62,4 +62,4 @@ contains
       end do
    end subroutine check_again
 
-end module emcon_deck_given_scheme
+end module emcon_deck_user_scheme
