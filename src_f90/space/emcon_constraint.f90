@@ -23,6 +23,7 @@ module emcon_constraint
       real(wp) :: tau(most_slips) = 0.0_wp            !! against slips [M L/T^2]
       !> Against slips by the normal force: mu sigma where it slides, 0 where it sticks
       real(wp) :: mu_sigma(most_slips) = 0.0_wp
+      real(wp) :: stick(most_slips) = 0.0_wp          !! multipliers of the rows of slips [M L/T^2]
       !> (row, by): -d lam or d tau, by the gap or slip at the end [M/T^2]
       real(wp) :: stiffness(0:most_slips, 0:most_slips) = 0.0_wp
    end type contact_response_t
@@ -45,7 +46,6 @@ module emcon_constraint
       logical :: has_friction = .false.                       !! the rest is known
       real(wp) :: slip(most_slips) = 0.0_wp           !! s over the step [L]
       real(wp) :: slip_target(most_slips) = 0.0_wp    !! a, at which it sticks [L]
-      real(wp) :: stick(most_slips) = 0.0_wp          !! multipliers of the rows of slips [M L/T^2]
       type(contact_response_t) :: response            !! of the laws of contact beside its rows
       !> Of integrated gaps, whose normal force is not the multiplier: see `condition_normal`
       logical :: is_mean = .false.
@@ -214,7 +214,7 @@ contains
       real(wp), intent(in) :: lam                     !! of the row of its gap; 0: none [M L/T^2]
       real(wp) :: tau(most_slips)                     !! 0 past the last slip [M L/T^2]
 
-      tau = self%response%mu_sigma*self%normal*lam + self%stick
+      tau = self%response%mu_sigma*self%normal*lam + self%response%stick
    end function condition_friction
 
    !> The directions in which a unit of the multiplier of a row pushes: where the condition slides

@@ -121,7 +121,7 @@ contains
       integer :: k
 
       do k = self%n + 1, self%n_row
-         self%item(self%condition(k))%stick(self%slip(k)) = self%lam(k)
+         self%item(self%condition(k))%response%stick(self%slip(k)) = self%lam(k)
       end do
    end subroutine constraints_take_hold
 

@@ -197,9 +197,10 @@ contains
    pure subroutine contact_laws_respond(self, at, response)
       type(contact_laws_t), intent(inout) :: self        !! some law acts beside the rows
       type(contact_values_t), intent(in) :: at
-      type(contact_response_t), intent(out) :: response
+      type(contact_response_t), intent(inout) :: response   !! what rows give stays
       integer :: i
 
+      response = contact_response_t(stick=response%stick)
       do i = 1, size(self%beside)
          associate (own => self%beside(i)%response)
             own = contact_response_t()
