@@ -267,7 +267,7 @@ def failing_test(tests, program):
                  *(f"tests/{test.name}" for test in tests)], ROOT, LONGEST_OF_TESTS,
                 {"EMCON_PATIENCE": "20", "EMCON": str(limited)})
     told = [test.name for test in tests if re.search(
-        rf"^(?:FAILED|ERROR) {re.escape(test.name)}(?: |$|::)", done.stdout, re.M)]
+        rf"^(?:FAILED|ERROR) tests/{re.escape(test.name)}(?: |$|::)", done.stdout, re.M)]
     return told[0] if told else ""
 
 
