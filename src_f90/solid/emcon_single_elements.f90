@@ -53,7 +53,7 @@ contains
       do first = 0, solid%n_element - 1, n
          n = min(n, solid%n_element - first)
          !$omp parallel do default(none) num_threads(response%n_thread) if(n > 1) &
-         !$omp shared(solid, given, motion, local, part, first, n, with_tangent) schedule(static)
+         !$omp shared(solid, user, motion, local, part, first, n, with_tangent) schedule(static)
          do k = 1, n
             if (is_here(solid, first + k)) call respond_at(solid, user, first + k, motion, &
                with_tangent, local(k), part(k))

@@ -38,7 +38,7 @@ contains
       allocate(way, source=0.0_wp*scene%x)
       do k = 1, 2*size(rate)
          offset = merge(0.03_wp, 0.0_wp, k > size(rate))
-         scene%pair(1)%offset = offset
+         scene%pair(1)%interaction%offset = offset
          way(1, :10) = rate(1 + mod(k - 1, size(rate)))*scene%x(1, :10)
          way(2, :10) = 1.0_wp
          call check_near(error, touch_time(scene, scene%x, way), gap - offset, tol, gap, &

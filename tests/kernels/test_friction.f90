@@ -11,7 +11,7 @@ module test_friction
       contact_sticks, contact_trial_t, coulomb_map, coulomb_t, coulomb_trial, coulomb_violation, &
       is_same_status, slip_status_t
    use emcon_friction_solve_plane, only : friction_problem_t, friction_solve
-   use emcon_interactions, only : surface_laws_t
+   use emcon_interactions, only : interaction_t
    use emcon_kinds, only : dp, wp
    use emcon_lemke, only : lemke_solve
    use emcon_nts_constraint, only : polygon_constraint
@@ -325,7 +325,7 @@ contains
       type(contact_values_t) :: at
       logical :: acts
 
-      call law%take(surface_laws_t(friction=0.25_wp, rebound=0.5_wp), 0, acts)
+      call law%take(interaction_t(friction=0.25_wp, rebound=0.5_wp), 0, acts)
       law%status = slip_status_t(contact_slides, [0.6_wp, -0.8_wp])
       call law%respond(at, response)
       call check_near(error, response%mu_sigma, [0.15_wp, -0.2_wp], tol, 1.0_wp, "part of the push")

@@ -42,7 +42,7 @@ contains
 
       call make_two_blocks(scene, 1.0_wp, lower, upper)
       call add_step(scene, .false., 0.02_wp, 10)
-      scene%step(1)%initiation = initiation_massless
+      scene%step(1)%contact%initiation = initiation_massless
       scene%v0(1, 11:) = 0.5_wp
       scene%v0(2, 11:) = -1.0_wp
       call march_init(march, scene, error)
