@@ -86,7 +86,7 @@ module emcon_active_set
       real(wp), allocatable :: overclosure(:)
       real(wp) :: left(0:1) = 0.0_wp
       type(friction_t) :: friction               !! what sticks, what slides
-      type(penalty_state_t) :: penalty         !! how stiff contacts are that give way
+      type(penalty_state_t) :: penalty           !! how stiff contacts are that give way
       type(near_laws_t) :: near_laws             !! what laws act on that is near
       type(contact_support_t) :: support         !! bodies that contact alone holds, in statics
       type(motion_bound_t) :: motion_bound       !! of all nodes, over the steps

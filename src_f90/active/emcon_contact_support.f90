@@ -347,7 +347,7 @@ contains
    !> Move the unknown freedoms on, and those that follow from them.
    subroutine move(system, direction, time, du)
       type(system_t), intent(in) :: system
-      real(wp), intent(in) :: direction(:, :)                  !! (n_dim, n_node)
+      real(wp), intent(in) :: direction(:, :)            !! (n_dim, n_node)
       real(wp), intent(in) :: time
       real(wp), intent(inout), contiguous :: du(:, :)
       real(wp) :: vector(system%space%numbering%n_unknown)

@@ -77,7 +77,7 @@ contains
    !> Of the contacts `set` those that close first on a way, and when; huge if none does.
    pure subroutine gaps_next_to_close(set, direction, time, is_next)
       type(constraint_set_t), intent(in) :: set
-      real(wp), intent(in) :: direction(:, :)          !! (n_dim, n_node) per time
+      real(wp), intent(in) :: direction(:, :)    !! (n_dim, n_node) per time
       real(wp), intent(out) :: time              !! >= 0, in the unit of `direction`
       logical, intent(out) :: is_next(:)         !! (n_constraint)
       real(wp) :: rate(set%n), gap(set%n)

@@ -110,7 +110,7 @@ contains
    pure function gap_rates(numbering, item, displacement) result(rate)
       type(numbering_t), intent(in) :: numbering
       type(condition_t), intent(in) :: item(:)   !! (n)
-      real(wp), intent(in) :: displacement(:)             !! (n_unknown) [L]
+      real(wp), intent(in) :: displacement(:)    !! (n_unknown) [L]
       real(wp) :: rate(size(item))               !! (n) [L]
       integer :: i
 
@@ -123,7 +123,7 @@ contains
    pure function slip_rates(numbering, item, displacement) result(rate)
       type(numbering_t), intent(in) :: numbering
       type(condition_t), intent(in) :: item(:)   !! (n)
-      real(wp), intent(in) :: displacement(:)             !! (n_unknown) [L]
+      real(wp), intent(in) :: displacement(:)    !! (n_unknown) [L]
       real(wp) :: rate(size(item))               !! (n) [L]
       integer :: i
 

@@ -59,7 +59,7 @@ module emcon_start_gaps
          class(start_gaps_t), intent(inout) :: self
          integer, intent(in) :: i                !! 1..n
          type(scene_t), intent(in) :: scene
-         real(wp), intent(out) :: offset(:)         !! (n_dim) [L]
+         real(wp), intent(out) :: offset(:)      !! (n_dim) [L]
          logical, intent(out) :: is_last         !! it is round-off
       end subroutine offset_interface
 

@@ -84,7 +84,7 @@ contains
       class(start_gaps_plane_t), intent(inout) :: self
       integer, intent(in) :: i                   !! 1..n
       type(scene_t), intent(in) :: scene
-      real(wp), intent(out) :: offset(:)            !! (2) [L]
+      real(wp), intent(out) :: offset(:)         !! (2) [L]
       logical, intent(out) :: is_last            !! it is round-off
       type(condition_t) :: item(1)
 

@@ -128,7 +128,7 @@ contains
    pure subroutine condense(bulk, start, last, p, change, w)
       type(dg_t), intent(in) :: bulk
       type(normal_t), intent(in) :: start, last
-      real(wp), intent(in) :: p(n_plane), change(n_plane) !! invariants at the start, their change
+      real(wp), intent(in) :: p(n_plane), change(n_plane)  !! invariants at the start, their change
       type(dg_t), intent(out) :: w
       real(wp), dimension(n_plane) :: slope, part
       real(wp) :: square, rest

@@ -327,7 +327,7 @@ contains
    pure real(wp) function gap_change(set, k, displacement) result(rate)
       type(constraint_set_t), intent(in) :: set
       integer, intent(in) :: k
-      real(wp), intent(in) :: displacement(:, :)          !! (n_dim, n_node)
+      real(wp), intent(in) :: displacement(:, :) !! (n_dim, n_node)
       integer :: i
 
       rate = 0.0_wp

@@ -54,7 +54,7 @@ module emcon_velocity_update
    type :: velocity_update_t
       logical :: is_ready = .false.              !! mass factorised for the present numbering
       integer :: choice = solver_default         !! of the direct solver, as the deck asks
-      class(sparse_solver_t), allocatable :: user   !! by a program, for that choice
+      class(sparse_solver_t), allocatable :: user    !! by a program, for that choice
       class(sparse_solver_t), allocatable :: mass
       real(wp), allocatable :: push(:), jump(:)  !! (n_unknown)
       real(wp) :: part = 0.0_wp                  !! of the jump that was taken last [T]
@@ -66,7 +66,7 @@ contains
    subroutine velocity_update_reset(self, choice, user)
       type(velocity_update_t), intent(inout) :: self
       integer, intent(in) :: choice              !! one of `solver_`, or above
-      class(sparse_solver_t), intent(in), optional :: user    !! as in `solver_create`
+      class(sparse_solver_t), intent(in), optional :: user     !! as in `solver_create`
 
       self%choice = choice
       if (allocated(self%user)) deallocate(self%user)

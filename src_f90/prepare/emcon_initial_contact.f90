@@ -44,7 +44,7 @@ contains
       type(scene_t), intent(inout) :: scene
       type(notes_t), intent(inout) :: notes
       type(error_t), allocatable, intent(out) :: error
-      type(host_t), intent(in), optional :: host    !! contact of pairs, among others
+      type(host_t), intent(in), optional :: host     !! contact of pairs, among others
       type(contact_options_t) :: options
       class(start_gaps_t), allocatable :: contact
       logical :: is_checked(size(scene%surface))

@@ -77,7 +77,7 @@ contains
    subroutine scheme_create(row, scheme, user)
       type(scheme_row_t), intent(in) :: row
       class(scheme_t), allocatable, intent(inout) :: scheme
-      class(scheme_t), intent(in), optional :: user   !! that of `scheme_user`
+      class(scheme_t), intent(in), optional :: user    !! that of `scheme_user`
 
       call allocate_scheme(row%code, scheme)
       if (.not. allocated(scheme)) allocate(scheme, source=user)

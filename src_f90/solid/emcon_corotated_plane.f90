@@ -236,7 +236,7 @@ contains
    pure subroutine corotated_image(self, motion, displacement, image)
       type(corotated_t), intent(in) :: self
       type(corotated_motion_t), intent(in) :: motion
-      real(wp), intent(in) :: displacement(:, :)                  !! (2, n_node) [L]
+      real(wp), intent(in) :: displacement(:, :)         !! (2, n_node) [L]
       real(wp), intent(out) :: image(:, :)               !! (2, n_node) [M L/T^2]
       real(wp) :: dg(2), drho, dd(2, max_plane_nodes), dk(2, max_plane_nodes)
       real(wp) :: dalpha, dbeta, q(2), more(2, max_plane_nodes), product

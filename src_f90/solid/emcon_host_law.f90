@@ -49,7 +49,7 @@ contains
       type(material_t), intent(in) :: material
       type(host_law_t), intent(inout) :: law
       type(error_t), allocatable, intent(out) :: error
-      type(host_law_t), intent(in), optional :: user(:)   !! one for each such material
+      type(host_law_t), intent(in), optional :: user(:)    !! one for each such material
       character(len=:), allocatable :: fault
       integer :: i, n_strain
 

@@ -51,7 +51,7 @@ contains
    !> components each axis with the next one, and the first with the last.
    pure function strain_along(c, gradient) result(strain)
       integer, intent(in) :: c                   !! 1 to n_dim
-      real(wp), intent(in) :: gradient(:)             !! (n_dim) [1/L]
+      real(wp), intent(in) :: gradient(:)        !! (n_dim) [1/L]
       real(wp) :: strain((size(gradient)*(size(gradient) + 1))/2)
       integer :: column, row, s, n_dim
 

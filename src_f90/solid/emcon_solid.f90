@@ -92,7 +92,7 @@ contains
       type(solid_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(host_law_t), intent(in), optional :: user(:)   !! one for each such material
+      type(host_law_t), intent(in), optional :: user(:)    !! one for each such material
       type(shape_table_t) :: stiffness(size(scene%element%kinds)), mass(size(scene%element%kinds))
       real(wp), allocatable :: at_rest(:)
       integer :: e, k, n, n_most

@@ -32,7 +32,7 @@ module emcon_solid_term
       logical :: has_linear_laws = .false.       !! all materials of its elements are
       logical, private :: is_empty = .false.     !! no elements are left
       type(element_slots_t), private :: to       !! places of element matrices
-      type(host_response_t), private :: user   !! what given laws answer
+      type(host_response_t), private :: user    !! what given laws answer
       type(pack_shares_t), private :: shares    !! of the threads
    contains
       procedure :: lay_out
@@ -51,7 +51,7 @@ contains
       type(solid_term_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
-      type(host_law_t), intent(in), optional :: user(:)   !! one for each such material
+      type(host_law_t), intent(in), optional :: user(:)    !! one for each such material
       logical :: is_here(size(scene%material))
 
       self%role = role_internal

@@ -18,7 +18,7 @@ contains
       integer, intent(in), contiguous :: first(:)          !! (n_group + 1) slots before each group
       integer, intent(in), contiguous :: column(:, :)      !! (n_lane, n_slot) rows of neighbours
       real(wp), intent(in), contiguous :: block(:, :, :, :)  !! (n_lane, 2, 2, n_slot) [M/T^2]
-      real(wp), intent(in), contiguous :: displacement(:, :)        !! (n_lane*n_group, 2) [L]
+      real(wp), intent(in), contiguous :: displacement(:, :) !! (n_lane*n_group, 2) [L]
       real(wp), intent(inout), contiguous :: force(:, :)   !! (n_lane*n_group, 2) [M L/T^2]
       real(wp), dimension(n_lane) :: f1, f2, d1, d2
       integer :: g, i, k, l

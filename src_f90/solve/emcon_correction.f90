@@ -47,7 +47,7 @@ module emcon_correction
       integer :: obstacle = obstacle_none        !! and why
       integer :: n_factorisation = 0             !! made so far
       integer :: choice = solver_default         !! of the direct solver, as the deck asks
-      class(sparse_solver_t), allocatable :: user             !! by a program, for that choice
+      class(sparse_solver_t), allocatable :: user              !! by a program, for that choice
       class(sparse_solver_t), allocatable :: solver            !! no active constraint
       class(sparse_solver_t), allocatable :: definite_solver   !! the same, positive definite
       logical, private :: is_definite = .false.  !! last factorisation: by that one
@@ -66,7 +66,7 @@ contains
       type(correction_t), intent(inout) :: self
       integer, intent(in) :: method              !! one of `method_`
       integer, intent(in) :: choice              !! one of `solver_`, or above
-      class(sparse_solver_t), intent(in), optional :: user    !! as in `solver_create`
+      class(sparse_solver_t), intent(in), optional :: user     !! as in `solver_create`
 
       self%method = method
       self%choice = choice

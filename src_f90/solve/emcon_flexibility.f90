@@ -57,7 +57,7 @@ contains
    subroutine flexibility_move(self, force, displacement, error)
       type(flexibility_t), intent(inout) :: self     !! not singular
       real(wp), intent(in) :: force(:)           !! (n_unknown) [M L/T^2]
-      real(wp), intent(out) :: displacement(:)            !! (n_unknown) [L]
+      real(wp), intent(out) :: displacement(:)   !! (n_unknown) [L]
       type(error_t), allocatable, intent(out) :: error
       real(dp) :: matrix(size(self%rate, 1), size(self%rate, 1))
       real(dp), dimension(size(self%rate, 1), 1) :: rate, lam

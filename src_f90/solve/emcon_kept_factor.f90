@@ -63,7 +63,7 @@ contains
    subroutine kept_factor_set_up(self, choice, user)
       type(kept_factor_t), intent(inout) :: self
       integer, intent(in) :: choice              !! one of `solver_`, or above
-      class(sparse_solver_t), intent(in), optional :: user    !! as in `solver_create`
+      class(sparse_solver_t), intent(in), optional :: user     !! as in `solver_create`
 
       if (allocated(self%blocks%kind)) then
          if (self%blocks%kind%choice /= choice) call blocks_free(self%blocks)
@@ -169,7 +169,7 @@ contains
       call fill_products(self)
       if (set%penalty%is_on) then
          self%product = self%l
-         self%compliance = 0.0_dp*self%mu
+         self%compliance = spread(0.0_dp, 1, set%n)
          call add_penalty(self, set, is_fit)
       else
          call dense_cholesky(self%l, is_fit)

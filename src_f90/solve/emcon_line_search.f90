@@ -1,15 +1,15 @@
 !> How much of a correction to take, from what the residual does along it.
 !>
-!> A correction c from the residual r0 leaves c.r = 0 at its end to first order. Its work is c.K c
-!> with the tangent K, -c.r0 where it closes no gaps; where it closes gaps alone, r0 is round-off.
-!> Where a node passes a kink of a surface on the way, the force turns at once, and c.r is large and
+!> A correction c from the residual r0 leaves c.r = 0 at its end to first order, c.r0 < 0 being the
+!> work at its start. One that begins at rest closes gaps alone: r0 is round-off there, and what it
+!> works is c.K c with the tangent K. Where a node passes a kink of a surface on the way, the force turns at once, and c.r is large and
 !> > 0 at the end: the state that is looked for is on the way, where it vanishes. Source:
 !> docs/theory.md, section 8.
 module emcon_line_search
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: line_search_t, line_search_begin, line_search_take
+   public :: line_search_t, line_search_work, line_search_begin, line_search_take
 
    !> Work below this part of that at the start is small.
    real(wp), parameter :: small = 0.5_wp
@@ -27,10 +27,19 @@ module emcon_line_search
 
 contains
 
+   !> The work of a correction against which that at its end is held.
+   pure real(wp) function line_search_work(at_start, by_tangent) result(work)
+      real(wp), intent(in) :: at_start           !! c.r0 [F L]
+      real(wp), intent(in) :: by_tangent         !! c.K c [F L]
+
+      work = at_start
+      if (abs(at_start) <= sqrt(epsilon(1.0_wp))*by_tangent) work = -by_tangent
+   end function line_search_work
+
    !> Begin at the end of a correction, if it went too far.
    pure subroutine line_search_begin(self, at_start, at_end)
       type(line_search_t), intent(out) :: self
-      real(wp), intent(in) :: at_start           !! c.r0 or -c.K c, whichever is less [F L]
+      real(wp), intent(in) :: at_start           !! as of `line_search_work` [F L]
       real(wp), intent(in) :: at_end             !! c.r there [F L]
 
       self%is_on = at_start < 0.0_wp .and. at_end > small*abs(at_start)

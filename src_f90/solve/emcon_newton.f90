@@ -22,7 +22,8 @@ module emcon_newton
    use emcon_kept_factor, only : kept_factor_has_room, kept_factor_serves
    use emcon_kinds, only : dp, int64, wp
    use emcon_lane_sums, only : relative_size, yardstick_of, yardstick_t
-   use emcon_line_search, only : line_search_begin, line_search_t, line_search_take
+   use emcon_line_search, only : line_search_begin, line_search_t, line_search_take, &
+      line_search_work
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_numbering, only : add_to_dofs, pick_magnitudes, pick_unknowns
    use emcon_phases, only : phase_eliminate, phase_enter, phase_factorise, phase_gaps, &
@@ -66,7 +67,7 @@ module emcon_newton
       type(yardstick_t) :: rounding              !! of what their own evaluation rounds
       real(wp), allocatable :: dq(:)             !! (n_unknown) the last correction
       real(wp), allocatable :: dlam(:)           !! (n) and that of the multipliers
-      real(wp), allocatable :: direction(:)            !! (n_unknown) the correction to search along
+      real(wp), allocatable :: direction(:)      !! (n_unknown) the correction to search along
       real(wp), allocatable :: contact(:, :)     !! (n_dim, n_node) forces of the set of constraints
       real(wp), allocatable :: left(:, :)        !! (n_dim, n_node) the residual with them
       !> (n_dim, n_node) prescribed motion that the first correction meets by its tangent; 0: none
@@ -409,9 +410,9 @@ contains
       system%phases%n_solve = system%phases%n_solve + 1
       self%n_solve = self%n_solve + 1
       if (set%n > set%n_linear .and. .not. self%convergence%is_polish) then
-         ! Where gaps are all that is to be closed, c.r0 is round-off.
          if (evaluation_is_equilibrium(motion%evaluation)) self%work = self%convergence%damping &
-            *min(dot_product(self%dq, self%residual), -correction_work(self%correction, self%dq))
+            *line_search_work(dot_product(self%dq, self%residual), &
+            correction_work(self%correction, self%dq))
          self%dq = self%convergence%damping*self%dq
          self%dlam = self%convergence%damping*self%dlam
       end if

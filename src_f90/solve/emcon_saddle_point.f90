@@ -40,7 +40,7 @@ contains
    subroutine saddle_point_reset(self, choice, user)
       type(saddle_point_t), intent(inout) :: self
       integer, intent(in) :: choice              !! one of `solver_`, or above
-      class(sparse_solver_t), intent(in), optional :: user    !! as in `solver_create`
+      class(sparse_solver_t), intent(in), optional :: user     !! as in `solver_create`
 
       call solver_create(choice, matrix_general, self%solver, user)
       if (factors_symmetric(choice)) then

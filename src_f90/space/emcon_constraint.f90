@@ -43,7 +43,7 @@ module emcon_constraint
       real(wp), allocatable :: h(:, :)
       logical :: leaves_second = .false.              !! nobody asks for `h`
       ! Of slip, docs/theory.md, eqs. (14e) to (14h):
-      logical :: has_friction = .false.                       !! the rest is known
+      logical :: has_friction = .false.               !! the rest is known
       real(wp) :: slip(most_slips) = 0.0_wp           !! s over the step [L]
       real(wp) :: slip_target(most_slips) = 0.0_wp    !! a, at which it sticks [L]
       type(contact_response_t) :: response            !! of the laws of contact beside its rows
@@ -252,7 +252,7 @@ contains
    !> By how much the value of a row changes at the end with the field `way`, to first order.
    pure real(wp) function condition_rate(self, displacement, slip) result(rate)
       type(condition_t), intent(in) :: self           !! with friction if `slip` is above 0
-      real(wp), intent(in) :: displacement(:, :)               !! (n_dim, n_node of the scene)
+      real(wp), intent(in) :: displacement(:, :)      !! (n_dim, n_node of the scene)
       integer, intent(in), optional :: slip           !! of the row; 0, as by default: its gap
       integer :: i, s
 

@@ -42,7 +42,7 @@ contains
       !> evaluated; with `displacement` second derivatives too
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in) :: lam(:)             !! (n of the set) [M L/T]
-      real(wp), intent(in), optional :: displacement(:, :)    !! (n_dim, n_node) [L]
+      real(wp), intent(in), optional :: displacement(:, :) !! (n_dim, n_node) [L]
       type(velocity_jump_t) :: more(set%n - set%n_permanent)
       integer :: k
 
@@ -84,7 +84,7 @@ contains
    pure subroutine turn(item, lam, displacement, jump)
       type(condition_t), intent(in) :: item
       real(wp), intent(in) :: lam                !! [M L/T^2]
-      real(wp), intent(in) :: displacement(:, :)          !! (n_dim, n_node) [L]
+      real(wp), intent(in) :: displacement(:, :) !! (n_dim, n_node) [L]
       type(velocity_jump_t), intent(inout) :: jump
       integer :: i, j, n_dim
 

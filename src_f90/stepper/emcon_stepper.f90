@@ -31,7 +31,7 @@ module emcon_stepper
    type :: stepper_t
       type(scene_t) :: scene
       type(march_t) :: march
-      type(host_t) :: host                     !! laws, forces and mass from outside
+      type(host_t) :: host                      !! laws, forces and mass from outside
       type(deck_source_t) :: source              !! the deck as read, for restart files
       type(string_t), allocatable :: override(:) !! NAME=VALUE as given
       logical :: is_lenient = .false.

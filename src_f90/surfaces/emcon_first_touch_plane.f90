@@ -20,7 +20,7 @@ contains
    real(wp) function touch_time(scene, x, direction)
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) where nodes are [L]
-      real(wp), intent(in) :: direction(:, :)          !! (n_dim, n_node) how they move per time [L]
+      real(wp), intent(in) :: direction(:, :)    !! (n_dim, n_node) how they move per time [L]
       integer, allocatable :: slave(:, :), master(:, :), node(:)
       integer :: i
 

@@ -7,7 +7,7 @@
 module emcon_constraints
    use emcon_constraint, only : condition_find_force, condition_find_law_force, &
       condition_find_rows_force, condition_friction, condition_t, &
-      constraint_t, contact_response_t
+      constraint_t, contact_response_t, most_slips
    use emcon_contact_law, only : contact_laws_dissipated, contact_laws_respond, contact_laws_t, &
       contact_values_t
    use emcon_csr, only : csr_t
@@ -56,7 +56,7 @@ module emcon_constraints
       logical, allocatable :: is_firm(:)
       real(wp), allocatable :: lam(:)            !! (n_row) multipliers [M L/T^2]
       real(wp), allocatable :: defect(:)         !! (n_row) what is left to the target [L]
-      type(soft_rows_t) :: penalty                  !! what laws make of rows of gaps
+      type(soft_rows_t) :: penalty               !! what laws make of rows of gaps
       type(csr_t) :: force_rows                  !! (n_row x n_unknown) directions of forces
       type(csr_t) :: gap_rows                    !! (n_row x n_unknown) gradients at the end
       type(csr_t) :: law_rows                    !! of conditions without a row, directions
@@ -290,9 +290,10 @@ contains
       type(constraint_set_t), intent(in) :: self
       real(wp), intent(inout), contiguous :: force(:, :)                 !! (n_dim, n_node)
       logical, intent(out) :: are_some           !! there are any
-      real(wp) :: part(size(force, 1))
-      integer :: k, i
+      real(wp) :: part(most_slips + 1)
+      integer :: k, i, n
 
+      n = size(force, 1)
       are_some = .false.
       do k = self%n_permanent + 1, self%n_condition
          associate (response => self%item(k)%response)
@@ -300,9 +301,9 @@ contains
          end associate
          are_some = .true.
          do i = 1, self%item(k)%n_node
-            call condition_find_law_force(self%item(k), i, part)
+            call condition_find_law_force(self%item(k), i, part(:n))
             associate (node => self%item(k)%node(i))
-               force(:, node) = force(:, node) + part
+               force(:, node) = force(:, node) + part(:n)
             end associate
          end do
       end do
@@ -313,14 +314,15 @@ contains
       type(constraint_set_t), intent(in) :: self
       real(wp), intent(in) :: lam(:)             !! (n) [M L/T^2]
       real(wp), intent(inout), contiguous :: force(:, :)                 !! (n_dim, n_node)
-      real(wp) :: part(size(force, 1))
-      integer :: k, i
+      real(wp) :: part(most_slips + 1)
+      integer :: k, i, n
 
+      n = size(force, 1)
       do k = 1, self%n
          do i = 1, self%item(k)%n_node
-            call condition_find_rows_force(self%item(k), lam(k), i, part)
+            call condition_find_rows_force(self%item(k), lam(k), i, part(:n))
             associate (node => self%item(k)%node(i))
-               force(:, node) = force(:, node) + part
+               force(:, node) = force(:, node) + part(:n)
             end associate
          end do
       end do

@@ -25,7 +25,7 @@ module emcon_inertia
       real(dp), allocatable :: value(:)          !! mass in the pattern of the matrix
       logical, allocatable :: is_massless(:)     !! (n_node) it has given its mass to its neighbours
       logical, allocatable :: without_density(:) !! (n_node) it has none of its own
-      type(csr_t), private :: host, added       !! (n_node x n_node) beside it [M]
+      type(csr_t), private :: host, added        !! (n_node x n_node) beside it [M]
       type(csr_t), private :: consistent, lumped     !! (n_node x n_node) one of them is `mass` [M]
       !> Their values in the precision of the state, and those of `mass`
       real(wp), allocatable, private :: consistent_value(:), lumped_value(:), mass_value(:)
@@ -50,7 +50,7 @@ contains
       type(inertia_t), intent(out) :: self
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: n_dim               !! > 0
-      type(csr_t), intent(in) :: host           !! (n_node x n_node) [M]; without rows: none
+      type(csr_t), intent(in) :: host            !! (n_node x n_node) [M]; without rows: none
       type(error_t), allocatable, intent(out) :: error
 
       self%role = role_inertia

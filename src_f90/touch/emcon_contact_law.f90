@@ -47,7 +47,7 @@ module emcon_contact_law
    type, abstract :: contact_law_t
       logical :: acts_near = .false.             !! on what is near, whether its row holds or not
       real(wp) :: reach = 0.0_wp                 !! the gap up to which it does, >= 0 [L]
-      logical :: has_friction = .false.                  !! it has forces along the surface
+      logical :: has_friction = .false.          !! it has forces along the surface
       integer :: loss = loss_damping             !! the kind of loss that it dissipates by
    contains
       procedure(respond_interface), deferred :: respond

@@ -102,7 +102,7 @@ contains
    !> times the way, is mu there less it.
    pure real(wp) function dashpot_mean(law, gap, dgap) result(mean)
       type(contact_damping_t), intent(in) :: law
-      real(wp), intent(in) :: gap, dgap           !! [L]
+      real(wp), intent(in) :: gap, dgap          !! [L]
       real(wp) :: low, high, from, to
 
       low = min(gap, gap + dgap)
@@ -119,7 +119,7 @@ contains
    !> The derivative of the mean by the end of the way: that of mu, weighted by the part of the way.
    pure real(wp) function dashpot_mean_slope(law, gap, dgap) result(slope)
       type(contact_damping_t), intent(in) :: law
-      real(wp), intent(in) :: gap, dgap           !! [L]
+      real(wp), intent(in) :: gap, dgap          !! [L]
       real(wp) :: from, to, part_from, part_to
 
       slope = 0.0_wp

@@ -3,7 +3,8 @@ module test_line_search
    use check, only : check_near, check_true, test_case_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_line_search, only : line_search_begin, line_search_t, line_search_take
+   use emcon_line_search, only : line_search_begin, line_search_t, line_search_take, &
+      line_search_work
    use emcon_text, only : to_text
    implicit none
    private
@@ -19,6 +20,7 @@ contains
 
       tests = [ &
          test_case_t("what is short or ends well is taken whole", test_whole), &
+         test_case_t("the tangent tells the work where the residual is round-off", test_work), &
          test_case_t("a corner on the way is met", test_corner), &
          test_case_t("a sharp corner ends the search between its sides", test_sharp)]
    end subroutine collect_line_search
@@ -35,6 +37,22 @@ contains
          call check_true(error, .not. line%is_on, "case " // to_text(i))
       end do
    end subroutine test_whole
+
+   !> From rest it is that of the tangent, whatever the sign of what is left of the residual.
+   subroutine test_work(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: least = sqrt(epsilon(1.0_wp))
+      real(wp), parameter :: start(6) = [-2.0_wp, -4.0_wp*least, 4.0_wp*least, -0.5_wp*least, &
+         0.0_wp, 0.5_wp*least]
+      integer :: i
+
+      do i = 1, size(start)
+         call check_near(error, line_search_work(start(i), 2.0_wp), merge(start(i), -2.0_wp, &
+            i <= 3), 0.0_wp, 1.0_wp, "case " // to_text(i))
+      end do
+      call check_near(error, line_search_work(1.0e-20_wp, -1.0_wp), 1.0e-20_wp, 0.0_wp, 1.0_wp, &
+         "where the tangent is not definite")
+   end subroutine test_work
 
    !> The work rises from -1 to `last` within the corner, wherever it is.
    subroutine test_corner(error)
