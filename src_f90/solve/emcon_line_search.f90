@@ -13,6 +13,8 @@ module emcon_line_search
 
    !> Work below this part of that at the start is small.
    real(wp), parameter :: small = 0.5_wp
+   !> Where the residual works less than this part of what the tangent does, gaps are closed.
+   real(wp), parameter :: of_gaps = 1.0e-2_wp
    !> Places looked at: enough to meet a rounded corner, 1e-4 of an edge, in a way of many edges.
    integer, parameter :: most_places = 24
 
@@ -33,7 +35,7 @@ contains
       real(wp), intent(in) :: by_tangent         !! c.K c [F L]
 
       work = at_start
-      if (abs(at_start) <= sqrt(epsilon(1.0_wp))*by_tangent) work = -by_tangent
+      if (abs(at_start) <= of_gaps*by_tangent) work = -by_tangent
    end function line_search_work
 
    !> Begin at the end of a correction, if it went too far.
