@@ -49,7 +49,7 @@ MOST_LINES, MOST_ARGUMENTS = 60, 7
 FROM_C = {"stepper", "border"}
 #: A type is taken in at a glance; these hold more than one subject and are still to be split.
 MOST_COMPONENTS = 20
-STILL_BIG = {"active_set_t", "condition_t"}
+STILL_BIG = {"active_set_t"}
 
 STRING = re.compile(r"\"[^\"\n]*\"|'[^'\n]*'")
 COMMENT = re.compile(r"!.*")
