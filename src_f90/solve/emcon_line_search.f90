@@ -2,9 +2,9 @@
 !>
 !> A correction c from the residual r0 leaves c.r = 0 at its end to first order, c.r0 < 0 being the
 !> work at its start. One that begins at rest closes gaps alone: r0 is round-off there, and what it
-!> works is c.K c with the tangent K. Where a node passes a kink of a surface on the way, the force turns at once, and c.r is large and
-!> > 0 at the end: the state that is looked for is on the way, where it vanishes. Source:
-!> docs/theory.md, section 8.
+!> works is c.K c with the tangent K. Where a node passes a kink of a surface on the way, the force
+!> turns at once, and c.r is large and > 0 at the end: the state that is looked for is on the way,
+!> where it vanishes. Source: docs/theory.md, section 8.
 module emcon_line_search
    use emcon_kinds, only : wp
    implicit none

@@ -1,5 +1,6 @@
 !> Conditions in space, with rows of a gap and of two slips: sticking, and sliding by Coulomb's law,
-!> with a law from outside beside these, and without rows by that law alone. Values are quadratic in places, so that gradients in the middle are discrete ones.
+!> with a law from outside beside these, and without rows by that law alone. Values are quadratic in
+!> places, so that gradients in the middle are discrete ones.
 module test_condition_rows
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_constraint, only : condition_drag, condition_normal, condition_t, constraint_t, &

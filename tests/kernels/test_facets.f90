@@ -219,7 +219,8 @@ contains
       type(facets_t) :: facets
       real(wp), allocatable :: u(:, :)
       !> A motion that is homogeneous keeps faces flat: its gradient, whose determinant is 1.
-      real(wp), parameter :: shear(3, 3) = reshape([1.0_wp, 0.3_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.2_wp, &
+      real(wp), parameter :: shear(3, 3) = reshape([1.0_wp, 0.3_wp, 0.0_wp, &
+         0.0_wp, 1.0_wp, 0.2_wp, &
          0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
       character(len=4), parameter :: name(2) = ["C3D8", "C3D4"]
       integer :: k
@@ -282,7 +283,8 @@ contains
       if (allocated(error)) return
       call check_closed(error, facets, 2, "bodies")
       allocate(u, source=0.0_wp*scene%x)
-      call check_normals(error, facets, scene%x, u, 2.0_wp*product(extent), 2.0_wp*box_area(), "bodies")
+      call check_normals(error, facets, scene%x, u, 2.0_wp*product(extent), &
+         2.0_wp*box_area(), "bodies")
       do f = 1, facets%n_facet
          associate (kind => scene%element%kinds(scene%element%kind(facets%element(f))))
             associate (face => scene%element%node(kind%face(facets%face(f)), facets%element(f)))
@@ -312,7 +314,8 @@ contains
       if (allocated(error)) return
       call check_equal(error, count(facets%neighbour == 0), 2*sum(n_cell(:2)), "rim")
       call check_equal(error, maxval(facets%part), 1, "one part")
-      call check_near(error, facets%size, 0.0_wp*facets%size + product(extent(:2)/n_cell(:2)), tol, &
+      call check_near(error, facets%size, 0.0_wp*facets%size + &
+         product(extent(:2)/n_cell(:2)), tol, &
          1.0_wp, "sizes")
       call check_near(error, facets_normal(facets, 1, scene%x, 0.0_wp*scene%x), &
          [0.0_wp, 0.0_wp, facets%size(1)], tol, 1.0_wp, "upwards")

@@ -127,14 +127,16 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: mu = 0.5_wp, c = 4.0_wp, lam = 2.0_wp, a = 0.5_wp
       integer, parameter :: n = 12
-      integer, parameter :: was(n) = [contact_open, contact_open, contact_open, contact_open, contact_open, &
+      integer, parameter :: was(n) = [contact_open, contact_open, contact_open, &
+         contact_open, contact_open, &
          contact_sticks, contact_sticks, contact_rests, contact_free, contact_free, 1, -1]
       real(wp), parameter :: tau(n) = [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, -0.2_wp, 1.1_wp, &
          0.2_wp, 0.0_wp, 0.0_wp, 1.0_wp, -1.0_wp]
       real(wp), parameter :: slip(n) = [-0.6_wp, -0.1_wp, 0.3_wp, 0.6_wp, 0.8_wp, a, a, 0.0_wp, &
          1.5_wp, -1.5_wp, -2.0_wp, 2.0_wp]
       integer, parameter :: expected(n) = [-1, contact_rests, contact_free, contact_sticks, 1, &
-         contact_free, 1, contact_free, contact_sticks, contact_rests, contact_sticks, contact_rests]
+         contact_free, 1, contact_free, contact_sticks, contact_rests, contact_sticks, &
+         contact_rests]
       integer :: next(n), side, k
 
       do side = -1, 1, 2
@@ -584,7 +586,8 @@ contains
             if (.not. fell_back) at(k)%slip_target(1) = problem%slip_target(k)
             call check_true(error, coulomb_violation(at(k), problem%mu(k), 1.0_wp) < bound*scale, &
                "law: case " // to_text(i))
-            if (.not. fell_back) call check_true(error, at(k)%tau(1)*at(k)%slip(1) >= -bound*scale**2, &
+            if (.not. fell_back) call check_true(error, &
+               at(k)%tau(1)*at(k)%slip(1) >= -bound*scale**2, &
                "dissipation: case " // to_text(i))
             if (allocated(error)) return
          end do

@@ -78,7 +78,8 @@ contains
             call check_near(error, b%v, a%v, real(k, wp)*eps, scale, "v in step " // to_text(k))
             call check_near(error, b%u, a%u, real(k**2, wp)*drop_h*eps, scale, &
                "u in step " // to_text(k))
-            call check_true(error, all(a%contacts%is_active .eqv. b%contacts%is_active), "same contacts")
+            call check_true(error, all(a%contacts%is_active .eqv. b%contacts%is_active), &
+               "same contacts")
          end associate
          if (allocated(error)) return
          call check_near(error, hosted%march%ledger%potential + hosted%march%ledger%strain, &
