@@ -58,7 +58,10 @@ contains
       scene%element%label = [1, 2, 3]
       deallocate(scene%element%origin)
       allocate(scene%element%origin(3))
-      scene%surface = [faces("LOWER", [2, 1], 3), faces("UPPER", [3], 1)]
+      if (allocated(scene%surface)) deallocate(scene%surface)
+      allocate(scene%surface(2))
+      call set_faces(scene%surface(1), "LOWER", [2, 1], 3)
+      call set_faces(scene%surface(2), "UPPER", [3], 1)
 
    contains
 
@@ -75,14 +78,15 @@ contains
          end do
       end function cell
 
-      pure type(surface_t) function faces(name, element, face) result(surface)
+      pure subroutine set_faces(surface, name, element, face)
+         type(surface_t), intent(out) :: surface
          character(len=*), intent(in) :: name
          integer, intent(in) :: element(:), face
 
          surface%name = name
          allocate(surface%element, source=element)
          allocate(surface%face, source=spread(face, 1, size(element)))
-      end function faces
+      end subroutine set_faces
 
    end subroutine make_rows
 
