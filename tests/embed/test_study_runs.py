@@ -74,9 +74,9 @@ def table(folder: Path) -> list[dict[str, str]]:
 
 
 def stamps(folder: Path) -> dict[str, int]:
-    """When each whole member was written."""
+    """When each whole member was written; one in work has the name of a part."""
     return {p.parent.name: p.stat().st_mtime_ns
-            for p in (folder/"study"/"members").glob(f"*/{RECORD}")}
+            for p in (folder/"study"/"members").glob(f"*/{RECORD}") if ".part-" not in p.parent.name}
 
 
 FREE = ("--vary", "h=0.1,0.05", "--set", "t_end=0.5", "--set", "frame=0.5")
