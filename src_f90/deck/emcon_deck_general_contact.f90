@@ -235,18 +235,16 @@ contains
             if (reader%interaction(i)%restitution < 1.0_wp) call data_error(reader, data, "the " &
                // "surface interaction " // quoted(name) // " has a RESTITUTION, which is of " // &
                "pairs only; name what it is of by *CONTACT PAIR")
-            if (reader%interaction(i)%friction > 0.0_wp) call data_error(reader, data, &
-               "the surface " // &
-               "interaction " // quoted(name) // " has *FRICTION, which is of pairs only; " // &
-               "name what it is of by *CONTACT PAIR")
+            if (reader%interaction(i)%friction > 0.0_wp) call data_error(reader, data, "the " // &
+               "surface interaction " // quoted(name) // " has *FRICTION, which is of pairs " // &
+               "only; name what it is of by *CONTACT PAIR")
             if (reader%interaction(i)%damping%coefficient > 0.0_wp) call data_error(reader, data, &
-               "the " // &
-               "surface interaction " // quoted(name) // " has *CONTACT DAMPING, which is of " // &
-               "pairs only; name what it is of by *CONTACT PAIR")
-            if (reader%interaction(i)%offset > 0.0_wp) call data_error(reader, data, &
-               "the surface interaction " &
-               // quoted(name) // " has a PAD THICKNESS, which has no meaning where surfaces may " &
-               // "be in contact with themselves; name what it keeps apart by *CONTACT PAIR")
+               "the surface interaction " // quoted(name) // " has *CONTACT DAMPING, which is " // &
+               "of pairs only; name what it is of by *CONTACT PAIR")
+            if (reader%interaction(i)%offset > 0.0_wp) call data_error(reader, data, "the " // &
+               "surface interaction " // quoted(name) // " has a PAD THICKNESS, which has no " // &
+               "meaning where surfaces may be in contact with themselves; name what it keeps " // &
+               "apart by *CONTACT PAIR")
          end if
          if (.not. is_known) call data_error(reader, data, "unknown surface interaction " &
             // quoted(name) // suggestion(name, reader%interaction_name))

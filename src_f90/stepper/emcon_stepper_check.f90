@@ -28,12 +28,11 @@ contains
       type(stepper_t), intent(in) :: self
       type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
 
-      call check_that(.not. any(self%scene%pair%interaction%friction > 0.0_wp), &
-         "contact with *FRICTION " // &
-         "is not evaluated from outside: advance the model by increments", error)
+      call check_that(.not. any(self%scene%pair%interaction%friction > 0.0_wp), "contact with " &
+         // "*FRICTION is not evaluated from outside: advance the model by increments", error)
       call check_that(.not. any(self%scene%pair%interaction%damping%coefficient > 0.0_wp), &
-         "contact with " // &
-         "*CONTACT DAMPING is not evaluated from outside: advance the model by increments", error)
+         "contact with *CONTACT DAMPING is not evaluated from outside: advance the model by " // &
+         "increments", error)
    end subroutine stepper_check_smooth
 
    !> An input error of this text, unless something holds.
