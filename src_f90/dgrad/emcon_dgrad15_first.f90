@@ -3,12 +3,7 @@
 !>
 !> Source: docs/theory.md, section 2.
 module emcon_dgrad15_first
-   use emcon_dgrad_series, only : atanh_excess, exp_of, expm1_of, log1p_excess, log1p_of, &
-      sinh_ratio
-   use emcon_kinds, only : wp
-   use emcon_rounded, only : above_negative, above_negative_chord, above_negative_slope, &
-      rounded_chord, rounded_clip, rounded_negative, rounded_negative_chord, &
-      rounded_negative_slope, rounded_part, rounded_part_slope
+   include "emcon_dgrad_use.inc"
    implicit none
    private
 

@@ -7,7 +7,7 @@ module emcon_dgrad_wide
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: wide_t, change_t, wide_clear, wide_constant, wide_add, wide_add_product, wide_add_part
+   public :: wide_t, change_t, wide_clear, wide_add, wide_add_product, wide_add_part
 
    !> Values at both ends and their difference, as dg_t of emcon_dgrad.inc has them.
    type :: change_t
@@ -32,15 +32,14 @@ contains
    pure subroutine wide_clear(self, n, leaves_second)
       type(wide_t), intent(inout) :: self
       integer, intent(in) :: n
-      logical, intent(in), optional :: leaves_second   !! no second derivatives
+      logical, intent(in) :: leaves_second       !! no second derivatives
 
       if (allocated(self%g)) then
          if (size(self%g) < n) deallocate(self%g, self%c, self%h)
       end if
       if (.not. allocated(self%g)) allocate(self%g(n), self%c(n), self%h(n, n))
       self%n = n
-      self%n_second = n
-      if (present(leaves_second)) self%n_second = merge(0, n, leaves_second)
+      self%n_second = merge(0, n, leaves_second)
       self%f0 = 0.0_wp
       self%f1 = 0.0_wp
       self%df = 0.0_wp
@@ -48,16 +47,6 @@ contains
       self%c(:n) = 0.0_wp
       self%h(:n, :self%n_second) = 0.0_wp
    end subroutine wide_clear
-
-   pure subroutine wide_constant(self, n, value)
-      type(wide_t), intent(inout) :: self
-      integer, intent(in) :: n
-      real(wp), intent(in) :: value
-
-      call wide_clear(self, n)
-      self%f0 = value
-      self%f1 = value
-   end subroutine wide_constant
 
    !> Add `factor` times `a`, over the same variables.
    pure subroutine wide_add(self, factor, a)

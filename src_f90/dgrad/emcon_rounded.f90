@@ -12,8 +12,8 @@ module emcon_rounded
    implicit none
    private
    public :: rounded_part, rounded_part_slope, rounded_chord, rounded_clip, rounded_clip_slope
-   public :: rounded_negative, rounded_negative_slope, rounded_negative_chord
-   public :: above_negative, above_negative_slope, above_negative_chord
+   public :: rounded_negative, rounded_negative_slope, above_negative, above_negative_slope
+   public :: negative_chord
 
 contains
 
@@ -97,18 +97,19 @@ contains
       end associate
    end function rounded_negative_slope
 
-   !> Divided difference of `rounded_negative` from `a0` to `a1` and its derivative by a1, as of
-   !> `rounded_chord`; width > 0.
-   pure subroutine rounded_negative_chord(a0, a1, width, slope, rate)
+   !> Divided difference of `rounded_negative`, or of `above_negative`, from `a0` to `a1` and its
+   !> derivative by a1, as of `rounded_chord`; width > 0.
+   pure subroutine negative_chord(is_above, a0, a1, width, slope, rate)
+      logical, intent(in) :: is_above
       real(wp), intent(in) :: a0, a1, width
       real(wp), intent(out) :: slope, rate
-      real(wp) :: total, low, high, first, last, within
+      real(wp) :: total, low, high, first, last, span(2), within, reach, mean
 
       total = abs(a1 - a0)
       if (.not. total > 0.0_wp) then
-         slope = rounded_negative_slope(a1, width)
+         slope = merge(above_negative_slope(a1, width), rounded_negative_slope(a1, width), is_above)
          rate = 0.0_wp
-         if (abs(a1) < width) rate = 0.5_wp*curvature(a1)
+         if (abs(a1) < width) rate = 0.5_wp*negative_curvature(is_above, a1, width)
          return
       end if
       low = min(a0, a1)
@@ -117,28 +118,57 @@ contains
       last = min(high, width)
       within = max(0.0_wp, last - first)/total
       associate (s => first/width, t => last/width)
-         slope = max(0.0_wp, min(high, -width) - low)/total &
-            + within*(0.5_wp - (s + t)*(6.0_wp - (s*s + t*t))/16.0_wp)
+         if (is_above) then
+            mean = 0.5_wp - (s + t)*(15.0_wp - 10.0_wp*(s*s + t*t) + 3.0_wp*(s**4 + (s*t)**2 &
+               + t**4))/16.0_wp
+         else
+            mean = 0.5_wp - (s + t)*(6.0_wp - (s*s + t*t))/16.0_wp
+         end if
       end associate
-      associate (middle => 0.5_wp*(first + last))
-         rate = within*(moment(first) + 4.0_wp*moment(middle) + moment(last))/6.0_wp
-      end associate
+      slope = max(0.0_wp, min(high, -width) - low)/total + within*mean
+      if (is_above) then
+         ! Gauss's rule of three points, by parts of the way, is exact for the fifth degree.
+         span = abs(max(-width, min(width, [a0, a1])) - a0)/total
+         reach = 0.5_wp*sqrt(0.6_wp)*(span(2) - span(1))
+         associate (middle => 0.5_wp*(span(1) + span(2)))
+            rate = within*(5.0_wp*moment(middle - reach) + 8.0_wp*moment(middle) &
+               + 5.0_wp*moment(middle + reach))/18.0_wp
+         end associate
+      else
+         rate = within*(moment_at(first) + 4.0_wp*moment_at(0.5_wp*(first + last)) &
+            + moment_at(last))/6.0_wp
+      end if
 
    contains
 
-      pure real(wp) function curvature(a)
-         real(wp), intent(in) :: a
+      !> `part`: of the way from a0 to a1.
+      pure real(wp) function moment(part)
+         real(wp), intent(in) :: part
 
-         curvature = 0.75_wp*((a/width)**2 - 1.0_wp)/width
-      end function curvature
-
-      pure real(wp) function moment(a)
-         real(wp), intent(in) :: a
-
-         moment = curvature(a)*(abs(a - a0)/total)
+         moment = negative_curvature(is_above, a0 + part*(a1 - a0), width)*part
       end function moment
 
-   end subroutine rounded_negative_chord
+      pure real(wp) function moment_at(a)
+         real(wp), intent(in) :: a
+
+         moment_at = negative_curvature(is_above, a, width)*(abs(a - a0)/total)
+      end function moment_at
+
+   end subroutine negative_chord
+
+   !> The curvature of `rounded_negative`, or of `above_negative`, within the band; width > 0.
+   pure real(wp) function negative_curvature(is_above, a, width) result(curvature)
+      logical, intent(in) :: is_above
+      real(wp), intent(in) :: a, width
+
+      associate (square => (a/width)**2)
+         if (is_above) then
+            curvature = -1.875_wp*(1.0_wp - square)*(1.0_wp - 3.0_wp*square)/width
+         else
+            curvature = 0.75_wp*(square - 1.0_wp)/width
+         end if
+      end associate
+   end function negative_curvature
 
    !> min(a, 0), rounded to above; with t = a/width, width t (1 - t)^3 (8 + 9 t + 3 t^2)/16 where
    !> |t| < 1.
@@ -161,57 +191,6 @@ contains
             *(4.0_wp - t*(7.0_wp + t*(18.0_wp + 9.0_wp*t)))
       end associate
    end function above_negative_slope
-
-   !> Divided difference of `above_negative` from `a0` to `a1` and its derivative by a1, as of
-   !> `rounded_chord`; width > 0.
-   pure subroutine above_negative_chord(a0, a1, width, slope, rate)
-      real(wp), intent(in) :: a0, a1, width
-      real(wp), intent(out) :: slope, rate
-      real(wp) :: total, low, high, first, last, span(2), within, reach
-
-      total = abs(a1 - a0)
-      if (.not. total > 0.0_wp) then
-         slope = above_negative_slope(a1, width)
-         rate = 0.0_wp
-         if (abs(a1) < width) rate = 0.5_wp*curvature(a1)
-         return
-      end if
-      low = min(a0, a1)
-      high = max(a0, a1)
-      first = max(low, -width)
-      last = min(high, width)
-      within = max(0.0_wp, last - first)/total
-      associate (s => first/width, t => last/width)
-         slope = max(0.0_wp, min(high, -width) - low)/total &
-            + within*(0.5_wp - (s + t)*(15.0_wp - 10.0_wp*(s*s + t*t) &
-            + 3.0_wp*(s**4 + (s*t)**2 + t**4))/16.0_wp)
-      end associate
-      ! Gauss's rule of three points, by parts of the way, is exact for the fifth degree.
-      span = abs(max(-width, min(width, [a0, a1])) - a0)/total
-      reach = 0.5_wp*sqrt(0.6_wp)*(span(2) - span(1))
-      associate (middle => 0.5_wp*(span(1) + span(2)))
-         rate = within*(5.0_wp*moment(middle - reach) + 8.0_wp*moment(middle) &
-            + 5.0_wp*moment(middle + reach))/18.0_wp
-      end associate
-
-   contains
-
-      pure real(wp) function curvature(a)
-         real(wp), intent(in) :: a
-
-         associate (square => (a/width)**2)
-            curvature = -1.875_wp*(1.0_wp - square)*(1.0_wp - 3.0_wp*square)/width
-         end associate
-      end function curvature
-
-      !> `part`: of the way from a0 to a1.
-      pure real(wp) function moment(part)
-         real(wp), intent(in) :: part
-
-         moment = curvature(a0 + part*(a1 - a0))*part
-      end function moment
-
-   end subroutine above_negative_chord
 
    !> `a` held within 0..1, both corners rounded; width < 1/2.
    elemental real(wp) function rounded_clip(a, width)

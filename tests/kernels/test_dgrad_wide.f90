@@ -4,7 +4,7 @@ module test_dgrad_wide
    use emcon_dgrad11, only : dg_constant, dg_sqrt, dg_t, dg_variable, operator(*), operator(+), &
       operator(/)
    use emcon_dgrad_wide, only : change_t, wide_add, wide_add_part, wide_add_product, wide_clear, &
-      wide_constant, wide_t
+      wide_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
@@ -90,15 +90,17 @@ contains
          call draw(x0, dx)
          a = sample([1, 4, 7], x0([1, 4, 7]), dx([1, 4, 7]))
          b = sample([7, 2, 10], x0([7, 2, 10]), dx([7, 2, 10]))
-         call wide_clear(wide_a, n_var)
+         call wide_clear(wide_a, n_var, .false.)
          call add(wide_a, 1.0_wp, a, all_of_them)
-         call wide_clear(wide_b, n_var)
+         call wide_clear(wide_b, n_var, .false.)
          call add(wide_b, 1.0_wp, b, all_of_them)
-         call wide_constant(s, n_var, 3.0_wp)
+         call wide_clear(s, n_var, .false.)
+         s%f0 = 3.0_wp
+         s%f1 = 3.0_wp
          call wide_add(s, -2.0_wp, wide_a)
          call wide_add_product(s, 0.5_wp, wide_a, wide_b)
          call check_same(error, s, dg_constant(3.0_wp) + (-2.0_wp)*a + 0.5_wp*(a*b), "sum")
-         call wide_clear(s, n_var)
+         call wide_clear(s, n_var, .false.)
          call wide_add_product(s, 1.0_wp, wide_a, wide_a)
          call check_same(error, s, a*a, "square")
          call check_near(error, dot_product(s%g(:n_var), dx), s%df, tol, 10.0_wp, "identity")
@@ -113,7 +115,7 @@ contains
 
       do i = 1, 50
          call draw(x0, dx)
-         call wide_clear(s, n_var)
+         call wide_clear(s, n_var, .false.)
          call add(s, 1.0_wp, sample([1, 2, 3], x0([9, 2, 5]), dx([9, 2, 5])), [9, 2, 5])
          call add(s, -0.5_wp, sample([2, 1, 3], x0([1, 9, 6]), dx([1, 9, 6])), [9, 1, 6])
          call check_same(error, s, sample([9, 2, 5], x0([9, 2, 5]), dx([9, 2, 5])) &
@@ -133,13 +135,13 @@ contains
          call draw(x0, dx)
          do k = 1, 3
             associate (j => shared(:, k))
-               call wide_clear(s, n_var)
+               call wide_clear(s, n_var, .false.)
                call add(s, 1.0_wp, sample([1, 2, 3], x0(j), dx(j)), j)
                call check_same(error, s, sample(j, x0(j), dx(j)), "shared " // to_text(k))
             end associate
          end do
          dx(7) = 0.0_wp
-         call wide_clear(s, n_var)
+         call wide_clear(s, n_var, .false.)
          call add(s, 1.0_wp, sample([1, 2, 3], x0([4, 7, 8]), dx([4, 7, 8])), [4, 0, 8])
          call check_same(error, s, sample([4, 0, 8], x0([4, 7, 8]), dx([4, 7, 8])), "at rest")
       end do
@@ -157,7 +159,7 @@ contains
       call draw(x0, dx)
       a = sample([1, 2, 3], x0, dx)
       do k = 1, size(size_of)
-         call wide_clear(s, size_of(k))
+         call wide_clear(s, size_of(k), .false.)
          call check_true(error, size(s%g) >= size_of(k), "room")
          if (size_of(k) <= n_var) call check_same(error, s, dg_constant(0.0_wp), "cleared")
          call add(s, 1.0_wp, a, [1, 2, 3])
