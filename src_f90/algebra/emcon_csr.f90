@@ -11,7 +11,7 @@ module emcon_csr
    implicit none
    private
    public :: csr_t, csr_from_elements, csr_from_entries, csr_from_values, csr_sort_columns
-   public :: csr_find, csr_is_same, csr_copy_pattern, csr_copy_filled
+   public :: csr_list_users, csr_find, csr_is_same, csr_copy_pattern, csr_copy_filled
    public :: csr_multiply, csr_multiply_transposed, csr_transpose
 
    type :: csr_t
@@ -53,7 +53,7 @@ contains
             // " of " // to_text(n))
       end if
       if (allocated(error)) return
-      call list_users(n, list_start, dof, user_start, user)
+      call csr_list_users(n, list_start, dof, user_start, user)
       call element_pattern(self, n, list_start, dof, user_start, user, error)
       if (allocated(error)) return
       call csr_sort_columns(self)
@@ -63,10 +63,12 @@ contains
    end subroutine csr_from_elements
 
    !> For each unknown i the elements that have it: user(user_start(i) + 1 : user_start(i + 1)).
-   pure subroutine list_users(n, list_start, dof, user_start, user)
-      integer, intent(in) :: n
-      integer, intent(in), contiguous :: list_start(:), dof(:)
-      integer, allocatable, intent(out) :: user_start(:), user(:)
+   pure subroutine csr_list_users(n, list_start, dof, user_start, user)
+      integer, intent(in) :: n                          !! number of unknowns
+      integer, intent(in), contiguous :: list_start(:)  !! (n_element + 1) starts in `dof`, from 1
+      integer, intent(in), contiguous :: dof(:)         !! unknowns 1..n; <= 0: no unknown
+      integer, allocatable, intent(out) :: user_start(:)   !! (n + 1) from 0
+      integer, allocatable, intent(out) :: user(:)      !! elements from 1, ascending for each
       integer, allocatable :: last(:)
       integer :: e, i, k
 
@@ -87,7 +89,7 @@ contains
             user(last(i)) = e
          end do
       end do
-   end subroutine list_users
+   end subroutine csr_list_users
 
    !> Rows of the pattern, columns not yet sorted: once to count, once to fill.
    subroutine element_pattern(self, n, list_start, dof, user_start, user, error)
@@ -166,7 +168,7 @@ contains
 
       allocate(slot(size(row)), source=0)
       slot = merge(row, 0, column > 0)
-      call list_users(n_row, [(k, k = 1, size(row) + 1)], slot, start, entry)
+      call csr_list_users(n_row, [(k, k = 1, size(row) + 1)], slot, start, entry)
       self%n_row = n_row
       self%n_col = n_col
       allocate(self%row_start(n_row + 1), source=0)

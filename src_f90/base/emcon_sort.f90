@@ -3,7 +3,7 @@ module emcon_sort
    use emcon_kinds, only : dp
    implicit none
    private
-   public :: sort_order, find_sorted, unique_sorted
+   public :: sort_order, sort_few, find_sorted, unique_sorted
 
    !> The stable ascending order of integers (exact in `dp`) or reals.
    interface sort_order
@@ -11,6 +11,21 @@ module emcon_sort
    end interface sort_order
 
 contains
+
+   !> Sort a few integers in place.
+   pure subroutine sort_few(list)
+      integer, intent(inout) :: list(:)
+      integer :: i, k, value
+
+      do i = 2, size(list)
+         value = list(i)
+         do k = i - 1, 1, -1
+            if (list(k) <= value) exit
+            list(k + 1) = list(k)
+         end do
+         list(k + 1) = value
+      end do
+   end subroutine sort_few
 
    !> The order that sorts the integers `key`: key(order) ascends, equal keys keep their places.
    pure function sort_order_integer(key) result(order)

@@ -6,6 +6,7 @@ module emcon_nts_stencil
    use emcon_kinds, only : wp
    use emcon_nts_gap_value, only : first, last, slave
    use emcon_slip_point, only : slip_point, slip_point_t
+   use emcon_vectors_plane, only : between
    implicit none
    private
    public :: polygon_stencil_t, polygon_stencil, smooth_stencil_t, smooth_stencil, edge_of_sector
@@ -92,9 +93,9 @@ contains
       do side = 1, 2
          if (beside(side) == 0) cycle
          corner = master%facet(side, edge)
-         own = vector(corner, master%facet(3 - side, edge))
-         arm = vector(corner, master%facet(side, beside(side)))
-         to_slave = vector(corner, slave)
+         own = between(x, u, corner, master%facet(3 - side, edge))
+         arm = between(x, u, corner, master%facet(side, beside(side)))
+         to_slave = between(x, u, corner, slave)
          length = [sqrt(dot_product(own, own)), sqrt(dot_product(arm, arm))]
          if (.not. dot_product(own, arm) < -sharpest_cosine*product(length)) cycle
          past = dot_product(to_slave, arm)/length(2) - dot_product(to_slave, own)/length(1)
@@ -106,17 +107,6 @@ contains
             return
          end if
       end do
-
-   contains
-
-      !> From node `p` to node `q`.
-      pure function vector(p, q)
-         integer, intent(in) :: p, q
-         real(wp) :: vector(2)
-
-         vector = (x(:, q) - x(:, p)) + (u(:, q) - u(:, p))
-      end function vector
-
    end subroutine edge_of_sector
 
    !> Is the corner a-b-c blunt enough for a bisector?
@@ -125,8 +115,8 @@ contains
       integer, intent(in) :: a, b, c
       real(wp) :: d(2), e(2)
 
-      d = (x(:, b) - x(:, a)) + (u(:, b) - u(:, a))
-      e = (x(:, c) - x(:, b)) + (u(:, c) - u(:, b))
+      d = between(x, u, a, b)
+      e = between(x, u, b, c)
       is_blunt = dot_product(d, e) > sharpest_cosine*sqrt(dot_product(d, d)*dot_product(e, e))
    end function is_blunt
 

@@ -6,6 +6,7 @@
 !> them strains along the plate's normal, which the plate has not, and stress there. What is of
 !> the plane is here a part of space. Source: docs/theory.md, eq. (11h).
 module emcon_bending
+   use emcon_csr, only : csr_list_users
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_eigen
@@ -131,29 +132,12 @@ contains
    pure subroutine join_elements(self, solid)
       type(bending_t), intent(inout) :: self
       type(solid_t), intent(in) :: solid
-      integer :: e, i, at(solid%n_node)
+      integer :: e
 
-      allocate(self%start(solid%n_node + 1), source=0)
-      do e = 1, solid%n_element
-         do i = 1, solid%geometry(e)%n_node
-            associate (n => self%start(solid%node(i, e) + 1))
-               n = n + 1
-            end associate
-         end do
-      end do
-      do i = 1, solid%n_node
-         self%start(i + 1) = self%start(i + 1) + self%start(i)
-      end do
-      allocate(self%beside(self%start(solid%n_node + 1)))
-      at = self%start(:solid%n_node)
-      do e = 1, solid%n_element
-         do i = 1, solid%geometry(e)%n_node
-            associate (node => solid%node(i, e))
-               at(node) = at(node) + 1
-               self%beside(at(node)) = e
-            end associate
-         end do
-      end do
+      associate (m => size(solid%node, 1))
+         call csr_list_users(solid%n_node, [(1 + m*e, e = 0, solid%n_element)], &
+            reshape(solid%node(:, :solid%n_element), [m*solid%n_element]), self%start, self%beside)
+      end associate
    end subroutine join_elements
 
    !> Moduli of the laws at rest, and of those without what the mean change of volume resists.

@@ -4,7 +4,7 @@
 !> reference node is what the support has to give. Source: docs/theory.md, section 13.
 module emcon_rigid_rotation
    use emcon_kinds, only : wp
-   use emcon_moment_plane, only : moment_of
+   use emcon_vectors_plane, only : cross
    use emcon_motion, only : motion_t
    use emcon_rigid_bodies, only : rigid_body_t
    use emcon_rotation, only : n_turn
@@ -51,12 +51,12 @@ contains
             first = arm_of(rigid(b), k, motion%x) + arm_of(rigid(b), k, motion%u0)
             displacement = arm_of(rigid(b), k, motion%du)
             node = rigid(b)%frame(k)
-            self%moment(b) = self%moment(b) + moment_of(first &
+            self%moment(b) = self%moment(b) + cross(first &
                + motion%evaluation%load_place*displacement, &
                reaction(:, node))
             if (.not. allocated(rigid(b)%arm)) cycle
             node = rigid(b)%arm(k - 1)
-            self%moment(b) = self%moment(b) + moment_of(first &
+            self%moment(b) = self%moment(b) + cross(first &
                + motion%evaluation%load_place*displacement, &
                reaction(:, node))
          end do
@@ -71,7 +71,7 @@ contains
       real(wp), intent(in), contiguous :: v(:, :)            !! (n_dim, n_node) [L/T]
 
       associate (arm => arm_of(rigid, 2, x) + arm_of(rigid, 2, u))
-         spin = moment_of(arm, arm_of(rigid, 2, v))/sum(arm**2)
+         spin = cross(arm, arm_of(rigid, 2, v))/sum(arm**2)
       end associate
    end function rigid_rotation_spin
 

@@ -7,7 +7,7 @@
 module emcon_box_tree
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_kinds, only : dp, wp
-   use emcon_sort, only : sort_order
+   use emcon_sort, only : sort_few, sort_order
    implicit none
    private
    public :: box_tree_t, box_tree_init, box_tree_find
@@ -214,20 +214,12 @@ contains
 
    pure subroutine sort_list(list)
       integer, intent(inout), contiguous :: list(:)
-      integer :: i, k, value
 
       if (size(list) > short_list) then
          list = list(sort_order(list))
          return
       end if
-      do i = 2, size(list)
-         value = list(i)
-         do k = i - 1, 1, -1
-            if (list(k) <= value) exit
-            list(k + 1) = list(k)
-         end do
-         list(k + 1) = value
-      end do
+      call sort_few(list)
    end subroutine sort_list
 
 end module emcon_box_tree

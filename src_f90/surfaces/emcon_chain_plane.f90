@@ -11,6 +11,7 @@ module emcon_chain_plane
    use emcon_scene, only : scene_t
    use emcon_search, only : search_boxes
    use emcon_text, only : to_text
+   use emcon_vectors_plane, only : between, cross
    implicit none
    private
    public :: chain_t, chain_init, chain_number, chain_shorter, chain_shortest, chain_thickness, &
@@ -186,7 +187,7 @@ contains
          do j = 1, 2
             e = self%node_edge(j, k)
             if (e == 0) cycle
-            a = from_to(x, u, self%facet(1, e), self%facet(2, e))
+            a = between(x, u, self%facet(1, e), self%facet(2, e))
             length(k) = length(k) + 0.5_wp*sqrt(dot_product(a, a))
          end do
       end do
@@ -275,16 +276,16 @@ contains
       real(wp) :: a(2), b(2), length_a, length_b, side(4)
 
       associate (p => self%facet(:, i), q => self%facet(:, j))
-         a = from_to(x, u, p(1), p(2))
-         b = from_to(x, u, q(1), q(2))
+         a = between(x, u, p(1), p(2))
+         b = between(x, u, q(1), q(2))
          length_a = norm2(a)
          length_b = norm2(b)
          is_crossing = .false.
          if (.not. min(length_a, length_b) > 0.0_wp) return
-         side(1) = cross(a, from_to(x, u, p(1), q(1)))/length_a
-         side(2) = cross(a, from_to(x, u, p(1), q(2)))/length_a
-         side(3) = cross(b, from_to(x, u, q(1), p(1)))/length_b
-         side(4) = cross(b, from_to(x, u, q(1), p(2)))/length_b
+         side(1) = cross(a, between(x, u, p(1), q(1)))/length_a
+         side(2) = cross(a, between(x, u, p(1), q(2)))/length_a
+         side(3) = cross(b, between(x, u, q(1), p(1)))/length_b
+         side(4) = cross(b, between(x, u, q(1), p(2)))/length_b
       end associate
       is_crossing = all(abs(side) > touch_tol*min(length_a, length_b)) &
          .and. ((side(1) > 0.0_wp) .neqv. (side(2) > 0.0_wp)) &
@@ -305,11 +306,11 @@ contains
       passes_at_node = .false.
       if (self%neighbour(next, e) == 0) return
       q = self%facet(2, e)
-      e_arm(:, 1) = from_to(x, u, q, self%facet(1, e))
-      e_arm(:, 2) = from_to(x, u, q, self%facet(2, self%neighbour(next, e)))
-      f_arm(:, 1) = from_to(x, u, q, self%facet(1, f))
-      f_arm(:, 2) = from_to(x, u, q, self%facet(2, f))
-      b = from_to(x, u, self%facet(1, f), self%facet(2, f))
+      e_arm(:, 1) = between(x, u, q, self%facet(1, e))
+      e_arm(:, 2) = between(x, u, q, self%facet(2, self%neighbour(next, e)))
+      f_arm(:, 1) = between(x, u, q, self%facet(1, f))
+      f_arm(:, 2) = between(x, u, q, self%facet(2, f))
+      b = between(x, u, self%facet(1, f), self%facet(2, f))
       length = norm2(b)
       near = touch_tol*min(length, max(norm2(e_arm(:, 1)), norm2(e_arm(:, 2))))
       along = -dot_product(b, f_arm(:, 1))/length
@@ -317,11 +318,11 @@ contains
       if (along < -near .or. along > length + near) return
       if (along <= near) then
          if (self%neighbour(previous, f) == 0) return
-         f_arm(:, 1) = from_to(x, u, q, self%facet(1, self%neighbour(previous, f)))
+         f_arm(:, 1) = between(x, u, q, self%facet(1, self%neighbour(previous, f)))
       end if
       if (along >= length - near) then
          if (self%neighbour(next, f) == 0) return
-         f_arm(:, 2) = from_to(x, u, q, self%facet(2, self%neighbour(next, f)))
+         f_arm(:, 2) = between(x, u, q, self%facet(2, self%neighbour(next, f)))
       end if
       passes_at_node = is_between(f_arm(:, 1), e_arm) .neqv. is_between(f_arm(:, 2), e_arm)
       if (runs_along(e_arm(:, 1), f_arm) .or. runs_along(e_arm(:, 2), f_arm)) then
@@ -355,20 +356,5 @@ contains
          if (abs(cross(a, arm(:, k))) <= touch_tol*norm2(a)*norm2(arm(:, k))) runs_along = .true.
       end do
    end function runs_along
-
-   !> The way from node `a` to node `b` at x + u, differences first.
-   pure function from_to(x, u, a, b) result(vector)
-      real(wp), intent(in) :: x(:, :), u(:, :)
-      integer, intent(in) :: a, b
-      real(wp) :: vector(2)
-
-      vector = (x(:, b) - x(:, a)) + (u(:, b) - u(:, a))
-   end function from_to
-
-   pure real(wp) function cross(a, b)
-      real(wp), intent(in) :: a(2), b(2)
-
-      cross = a(1)*b(2) - a(2)*b(1)
-   end function cross
 
 end module emcon_chain_plane

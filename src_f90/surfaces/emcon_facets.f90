@@ -4,6 +4,7 @@
 !> face counter-clockwise from outside. Its sides are where others may go on: in the plane side k is
 !> node k, in space it goes from node k to the next one.
 module emcon_facets
+   use emcon_csr, only : csr_list_users
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
@@ -93,38 +94,13 @@ contains
    !> List the facets of each node, by `corner`.
    pure subroutine facets_join_nodes(self)
       class(facets_t), intent(inout) :: self
-      integer :: next(size(self%node)), f, k
+      integer :: f
 
-      if (allocated(self%around)) deallocate(self%around, self%around_start)
-      next = 0
-      do f = 1, self%n_facet
-         do k = 1, n_corner(f)
-            next(self%corner(k, f)) = next(self%corner(k, f)) + 1
-         end do
-      end do
-      allocate(self%around_start(size(next) + 1), source=1)
-      do k = 1, size(next)
-         self%around_start(k + 1) = self%around_start(k) + next(k)
-      end do
-      allocate(self%around(sum(next)), source=0)
-      next = self%around_start(:size(next))
-      do f = 1, self%n_facet
-         do k = 1, n_corner(f)
-            associate (node => self%corner(k, f))
-               self%around(next(node)) = f
-               next(node) = next(node) + 1
-            end associate
-         end do
-      end do
-
-   contains
-
-      pure integer function n_corner(f)
-         integer, intent(in) :: f
-
-         n_corner = count(self%corner(:, f) > 0)
-      end function n_corner
-
+      associate (m => size(self%corner, 1))
+         call csr_list_users(size(self%node), [(1 + m*f, f = 0, self%n_facet)], &
+            reshape(self%corner, [size(self%corner)]), self%around_start, self%around)
+      end associate
+      self%around_start = self%around_start + 1
    end subroutine facets_join_nodes
 
    !> Find what is beyond each side: the facet that has the same side, run the other way.

@@ -6,6 +6,7 @@
 module emcon_facing_plane
    use emcon_chain_plane, only : chain_t
    use emcon_kinds, only : wp
+   use emcon_vectors_plane, only : between, cross
    implicit none
    private
    public :: facing_allows
@@ -39,20 +40,14 @@ contains
          .and. dot_product(along, before + after) > 0.0_wp
    end function facing_allows
 
-   !> Unit vector from the first to the second of `node` at x + u, differences first.
+   !> Unit vector from the first to the second of `node` at x + u.
    pure function direction(x, u, node)
       real(wp), intent(in) :: x(:, :), u(:, :)
       integer, intent(in) :: node(2)
       real(wp) :: direction(2)
 
-      direction = (x(:, node(2)) - x(:, node(1))) + (u(:, node(2)) - u(:, node(1)))
+      direction = between(x, u, node(1), node(2))
       direction = direction/norm2(direction)
    end function direction
-
-   pure real(wp) function cross(a, b)
-      real(wp), intent(in) :: a(2), b(2)
-
-      cross = a(1)*b(2) - a(2)*b(1)
-   end function cross
 
 end module emcon_facing_plane

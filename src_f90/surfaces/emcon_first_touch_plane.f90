@@ -5,6 +5,7 @@ module emcon_first_touch_plane
    use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
    use emcon_surface_facets, only : surface_facets
+   use emcon_vectors_plane, only : cross
    implicit none
    private
    public :: touch_time
@@ -95,12 +96,6 @@ contains
          end associate
       end do
    end function passing_time
-
-   pure real(wp) function cross(a, b)
-      real(wp), intent(in) :: a(2), b(2)
-
-      cross = a(1)*b(2) - a(2)*b(1)
-   end function cross
 
    !> Root `i` of a0 + a1 t + a2 t^2, huge where there is none.
    pure real(wp) function root(a0, a1, a2, i)

@@ -14,6 +14,7 @@ module emcon_hermite_gap_value
       hermite_point_t, hermite_stencil_t, hermite_distance, joined_pieces, piece_after, piece_before
    use emcon_kinds, only : wp
    use emcon_rounded, only : rounded_negative
+   use emcon_vectors_plane, only : cross
    implicit none
    private
    public :: hermite_begin, hermite_gap_value, hermite_roots, hermite_slip_value, hermite_lever
@@ -177,11 +178,5 @@ contains
       stretch = sqrt(dot_product(p%tangent, p%tangent))
       lever = stretch - dot_product(b - p%y, p%bend)/(p%length*stretch)
    end function hermite_lever
-
-   pure real(wp) function cross(a, b)
-      real(wp), intent(in) :: a(2), b(2)
-
-      cross = a(1)*b(2) - a(2)*b(1)
-   end function cross
 
 end module emcon_hermite_gap_value

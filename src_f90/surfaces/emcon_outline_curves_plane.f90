@@ -202,8 +202,7 @@ contains
          end associate
       end do
       row_rise = arc_rise(arc_curvature(chord), sqrt(dot_product(chord(:, 0), chord(:, 0))), &
-         share, &
-         0.0_wp)
+         share, 0.0_wp)
    end function row_rise
 
    !> How far the curve of a smoothed edge lies in front of it.

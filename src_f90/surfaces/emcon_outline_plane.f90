@@ -108,6 +108,7 @@ contains
       integer, intent(in) :: piece(:)            !! (n_node)
       integer, intent(in) :: edge(:, :)          !! (2, n_edge) of the outlines
       integer, allocatable, intent(out) :: number(:)   !! (n_piece) as in `piece`, ascending
+      integer, allocatable :: node(:)
       integer :: s, i
 
       associate (pair => scene%pair)
@@ -116,7 +117,9 @@ contains
       allocate(self%on(size(scene%surface)))
       do s = 1, size(scene%surface)
          allocate(self%on(s)%piece(0))
-         if (any(self%pair == s)) call pieces_of(scene, scene%surface(s), piece, self%on(s)%piece)
+         if (.not. any(self%pair == s)) cycle
+         call surface_nodes(scene, scene%surface(s), node)
+         self%on(s)%piece = unique_sorted(piece(node))
       end do
       number = unique_sorted(piece(edge(1, :)))
       if (size(scene%pair) == 0 .and. size(number) < 2) number = [integer ::]
@@ -146,18 +149,6 @@ contains
          if (p > 0) self%body(p) = body(i)
       end do
    end subroutine find_bodies
-
-   !> The pieces that `surface` is on.
-   pure subroutine pieces_of(scene, surface, piece, found)
-      type(scene_t), intent(in) :: scene
-      type(surface_t), intent(in) :: surface
-      integer, intent(in) :: piece(:)
-      integer, allocatable, intent(out) :: found(:)    !! ascending
-      integer, allocatable :: node(:)
-
-      call surface_nodes(scene, surface, node)
-      found = unique_sorted(piece(node))
-   end subroutine pieces_of
 
    !> The edges that one element alone has, but those that a tie covers; in space there are none.
    subroutine find_free_edges(scene, edge, thickness)

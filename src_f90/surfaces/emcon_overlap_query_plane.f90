@@ -15,6 +15,7 @@ module emcon_overlap_query_plane
       nearest_update
    use emcon_overlap_query, only : overlap_query_t, overlap_t
    use emcon_scene, only : scene_t
+   use emcon_vectors_plane, only : between
    implicit none
    private
    public :: overlap_query_plane_t, overlap_query_plane_init
@@ -143,8 +144,7 @@ contains
             if (self%links%link(2, e) == 0) call try_node(self, x, e, 2, &
                self%near(self%found(:n_found)), reach, overlap)
          end if
-         call try_edge(self, x, e, self%near(self%found(:n_found)), p == q, reach, &
-            overlap)
+         call try_edge(self, x, e, self%near(self%found(:n_found)), p == q, reach, overlap)
       end do
    end subroutine overlap_query_one_way
 
@@ -412,14 +412,5 @@ contains
          overlap%facet(:size(edge, 1)) = edge(:, nearest%edge)
       end associate
    end subroutine take_deeper
-
-   !> The way from node `i` to node `j` at x + u, differences first.
-   pure function between(x, u, i, j) result(vector)
-      real(wp), intent(in) :: x(:, :), u(:, :)
-      integer, intent(in) :: i, j
-      real(wp) :: vector(2)
-
-      vector = (x(:, j) - x(:, i)) + (u(:, j) - u(:, i))
-   end function between
 
 end module emcon_overlap_query_plane

@@ -5,6 +5,7 @@
 module emcon_self_contact_plane
    use emcon_chain_plane, only : chain_distance, chain_t
    use emcon_kinds, only : wp
+   use emcon_vectors_plane, only : between, cross
    implicit none
    private
    public :: self_contact_is_meant, self_contact_may_touch, self_contact_is_apart, chain_faces
@@ -49,7 +50,7 @@ contains
       integer :: n, side
 
       mean = mean_along(chain, k, x, u)
-      a = vector(x, u, chain%facet(:, e))
+      a = between(x, u, chain%facet(1, e), chain%facet(2, e))
       may_touch = faces(mean, a)
       if (.not. may_touch) return
       length = 0.0_wp
@@ -57,11 +58,11 @@ contains
       do side = 1, 2
          associate (own => chain%node_edge(side, k))
             if (own == 0) cycle
-            length = length + norm2(vector(x, u, chain%facet(:, own)))
+            length = length + norm2(between(x, u, chain%facet(1, own), chain%facet(2, own)))
             n = n + 1
          end associate
       end do
-      b = vector(x, u, [chain%facet(1, e), chain%node(k)])
+      b = between(x, u, chain%facet(1, e), chain%node(k))
       b = b - max(0.0_wp, min(1.0_wp, dot_product(b, a)/dot_product(a, a)))*a
       distance = norm2(b)
       if (distance*real(n, wp) <= deepest*length) return
@@ -91,7 +92,7 @@ contains
       integer, intent(in) :: edge(2)             !! nodes of the scene
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (2, n_node of the scene) [L]
 
-      chain_faces = faces(mean_along(chain, k, x, u), vector(x, u, edge))
+      chain_faces = faces(mean_along(chain, k, x, u), between(x, u, edge(1), edge(2)))
    end function chain_faces
 
    !> Does an edge along `a` face a node whose edges go along `mean`?
@@ -113,25 +114,10 @@ contains
       do side = 1, 2
          associate (own => chain%node_edge(side, k))
             if (own == 0) cycle
-            a = vector(x, u, chain%facet(:, own))
+            a = between(x, u, chain%facet(1, own), chain%facet(2, own))
             mean = mean + a/norm2(a)
          end associate
       end do
    end function mean_along
-
-   pure real(wp) function cross(a, b)
-      real(wp), intent(in) :: a(2), b(2)
-
-      cross = a(1)*b(2) - a(2)*b(1)
-   end function cross
-
-   !> The way from the first to the second of `node` at x + u, differences first.
-   pure function vector(x, u, node)
-      real(wp), intent(in) :: x(:, :), u(:, :)
-      integer, intent(in) :: node(2)
-      real(wp) :: vector(2)
-
-      vector = (x(:, node(2)) - x(:, node(1))) + (u(:, node(2)) - u(:, node(1)))
-   end function vector
 
 end module emcon_self_contact_plane

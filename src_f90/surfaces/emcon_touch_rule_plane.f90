@@ -14,8 +14,7 @@ module emcon_touch_rule_plane
    use emcon_tied_edges, only : tied_ends_find
    implicit none
    private
-   public :: touch_rule_t, touch_rule_init, touch_rule_sees, touch_rule_may, &
-      touch_rule_allows
+   public :: touch_rule_t, touch_rule_init, touch_rule_sees, touch_rule_may, touch_rule_allows
 
    !> Classes of bodies at most, and with them constraints of a node.
    integer, parameter :: most_classes = 4

@@ -3,7 +3,7 @@ module emcon_constraint_rows
    use emcon_constraint, only : condition_row_force, condition_row_gradient, condition_stiffness, &
       condition_t
    use emcon_constraints, only : constraint_set_t, constraints_lam
-   use emcon_csr, only : csr_find, csr_t
+   use emcon_csr, only : csr_find, csr_list_users, csr_t
    use emcon_kinds, only : dp, wp
    use emcon_numbering, only : numbering_t
    implicit none
@@ -179,7 +179,7 @@ contains
       integer, allocatable :: seen(:)
 
       call curved_rows(self, row_start, column)
-      call list_rows(row_start, column, base%n_row, user_start, user)
+      call csr_list_users(base%n_row, row_start + 1, column + 1, user_start, user)
       allocate(seen(base%n_row), slot(size(base%column)))
       merged%n_row = base%n_row
       merged%n_col = base%n_col
@@ -191,7 +191,7 @@ contains
             do k = base%row_start(i) + 1, base%row_start(i + 1)
                call add_column(base%column(k))
             end do
-            do l = user_start(i), user_start(i + 1) - 1
+            do l = user_start(i) + 1, user_start(i + 1)
                do k = row_start(user(l)) + 1, row_start(user(l) + 1)
                   call add_column(column(k))
                end do
@@ -249,32 +249,6 @@ contains
          column = [column, self%law_rows%column(:start(size(start)))]
       end associate
    end subroutine curved_rows
-
-   !> For each of `n` unknowns the rows that it occurs in.
-   pure subroutine list_rows(row_start, column, n, user_start, user)
-      integer, intent(in) :: row_start(:)        !! (rows + 1)
-      integer, intent(in) :: column(:)           !! from 0
-      integer, intent(in) :: n
-      integer, allocatable, intent(out) :: user_start(:), user(:)
-      integer :: i, k, place(n)
-
-      allocate(user_start(n + 1), source=0)
-      allocate(user(size(column)))
-      do k = 1, size(column)
-         user_start(column(k) + 2) = user_start(column(k) + 2) + 1
-      end do
-      user_start(1) = 1
-      do i = 1, n
-         user_start(i + 1) = user_start(i + 1) + user_start(i)
-         place(i) = user_start(i)
-      end do
-      do i = 1, size(row_start) - 1
-         do k = row_start(i) + 1, row_start(i + 1)
-            user(place(column(k) + 1)) = i
-            place(column(k) + 1) = place(column(k) + 1) + 1
-         end do
-      end do
-   end subroutine list_rows
 
    !> Subtract the derivatives of the forces of all conditions by q1 from the matrix `merged`, with
    !> multipliers of rows as they are.
