@@ -4,7 +4,7 @@ module emcon_condition_nodes
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: condition_resize, condition_resize_slip, condition_include
+   public :: condition_resize, condition_resize_slip, condition_include, nodes_append
 
 contains
 
@@ -27,15 +27,11 @@ contains
       type(condition_t), intent(inout) :: self   !! with its values and derivatives
       integer, intent(in) :: node(:)             !! of the scene; not of the slave side if new
       type(condition_t) :: old
-      integer :: i, n, list(self%n_node + size(node)), n_dim
+      integer :: n, list(self%n_node + size(node)), n_dim
 
       n = self%n_node
       list(:n) = self%node(:n)
-      do i = 1, size(node)
-         if (any(list(:n) == node(i))) cycle
-         n = n + 1
-         list(n) = node(i)
-      end do
+      call nodes_append(node, list, n)
       if (n == self%n_node) return
       old = self
       n_dim = size(self%g, 1)
@@ -51,6 +47,19 @@ contains
          self%h(:n_dim*m, :n_dim*m) = old%h(:n_dim*m, :n_dim*m)
       end associate
    end subroutine condition_include
+
+   !> Append those of `node` that are nodes and not among list(:n) yet.
+   pure subroutine nodes_append(node, list, n)
+      integer, intent(in) :: node(:)             !! of the scene; 0: none
+      integer, intent(inout) :: list(:), n       !! with room for all of them
+      integer :: i
+
+      do i = 1, size(node)
+         if (node(i) == 0 .or. any(list(:n) == node(i))) cycle
+         n = n + 1
+         list(n) = node(i)
+      end do
+   end subroutine nodes_append
 
    !> Make room for the derivatives of slip, and set them to 0.
    pure subroutine condition_resize_slip(self)

@@ -2,13 +2,14 @@
 !>
 !> Source: docs/theory.md, eqs. (15) and (15b).
 module emcon_edge_moments
-   use emcon_condition_nodes, only : condition_resize
+   use emcon_condition_nodes, only : condition_resize, nodes_append
    use emcon_constraint, only : condition_t
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_dgrad_wide, only : wide_add, wide_add_product, wide_clear, wide_t
    use emcon_kinds, only : wp
    use emcon_mortar_frame, only : moment_area, moment_area_xi, moment_cover, moment_gap, &
       moment_gap_xi, n_moment
+   use emcon_sort, only : sort_few
    implicit none
    private
    public :: edge_moments_t, gap_integral_t, form_begin, form_share, form_constraint
@@ -52,27 +53,13 @@ contains
       self%n_node = size(node)
       self%n_slave = n_slave
       self%node(:self%n_node) = node
-      call put_in_order(self%node(3:n_slave))
-      call put_in_order(self%node(n_slave + 1:self%n_node))
+      ! Sums over nodes do not depend on which pair came first.
+      call sort_few(self%node(3:n_slave))
+      call sort_few(self%node(n_slave + 1:self%n_node))
       do i = 1, n_moment
          call wide_clear(self%moment(i), 2*(self%n_node - 1), leaves_second)
       end do
    end subroutine form_begin
-
-   !> Sort a few numbers: sums over nodes do not depend on which pair came first.
-   pure subroutine put_in_order(list)
-      integer, intent(inout) :: list(:)
-      integer :: i, k, value
-
-      do i = 2, size(list)
-         value = list(i)
-         do k = i - 1, 1, -1
-            if (list(k) < value) exit
-            list(k + 1) = list(k)
-         end do
-         list(k + 1) = value
-      end do
-   end subroutine put_in_order
 
    !> Share of the edge's node `side` (1, 2) in the weighted gap and the covered area, at both ends.
    !>
@@ -121,14 +108,14 @@ contains
       do k = 1, 2
          if (gap%edge(k) == 0) cycle
          associate (edge => form(gap%edge(k)))
-            call append(edge%node(:edge%n_slave), list, n)
+            call nodes_append(edge%node(:edge%n_slave), list, n)
          end associate
       end do
       item%n_slave = n
       do k = 1, 2
          if (gap%edge(k) == 0) cycle
          associate (edge => form(gap%edge(k)))
-            call append(edge%node(edge%n_slave + 1:edge%n_node), list, n)
+            call nodes_append(edge%node(edge%n_slave + 1:edge%n_node), list, n)
          end associate
       end do
       call condition_resize(item, n)
@@ -150,18 +137,6 @@ contains
          end associate
       end do
    end subroutine form_constraint
-
-   pure subroutine append(node, list, n)
-      integer, intent(in) :: node(:)
-      integer, intent(inout) :: list(:), n
-      integer :: i
-
-      do i = 1, size(node)
-         if (any(list(:n) == node(i))) cycle
-         n = n + 1
-         list(n) = node(i)
-      end do
-   end subroutine append
 
    !> Share of node `side` in Phi - target W.
    pure subroutine weighted(edge, side, is_dual, target, part, skew, theta)

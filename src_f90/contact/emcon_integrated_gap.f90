@@ -157,25 +157,35 @@ contains
    !> where the step begins, or where it is expected to end of what is covered there first.
    pure subroutine integrated_gap_sagittas(self)
       class(integrated_gap_t), intent(inout) :: self
-      real(wp) :: rise(0:1), area(0:1), part_rise(0:1), part_area(0:1)
+      real(wp) :: rise(0:1), area(0:1)
       integer :: i, k
 
       do i = 1, self%n_constraint
-         rise = 0.0_wp
-         area = 0.0_wp
-         do k = 1, 2
-            if (self%node_edge(k, i) == 0) cycle
-            call form_share(self%form(self%node_edge(k, i)), 3 - k, self%is_dual, part_rise, &
-               part_area)
-            rise = rise + part_rise
-            area = area + part_area
-         end do
+         call add_shares(self, i, rise, area)
          self%sagitta(i) = 0.0_wp
          do k = 1, 0, -1
             if (area(k) >= least_cover*self%whole(i)) self%sagitta(i) = rise(k)/area(k)
          end do
       end do
    end subroutine integrated_gap_sagittas
+
+   !> The integral of gaps, and the area that is covered, over both edges at the node.
+   pure subroutine add_shares(self, i, gap, area)
+      class(integrated_gap_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(out) :: gap(0:1), area(0:1)   !! at start and end [L^3], [L^2]
+      real(wp) :: part_gap(0:1), part_area(0:1)
+      integer :: k
+
+      gap = 0.0_wp
+      area = 0.0_wp
+      do k = 1, 2
+         if (self%node_edge(k, i) == 0) cycle
+         call form_share(self%form(self%node_edge(k, i)), 3 - k, self%is_dual, part_gap, part_area)
+         gap = gap + part_gap
+         area = area + part_area
+      end do
+   end subroutine add_shares
 
    pure function integrated_gap_slip(self, i, x, u0, du) result(slip)
       class(integrated_gap_t), intent(in) :: self
@@ -195,20 +205,12 @@ contains
    pure subroutine integrated_gap_measure(self, x, u0, du)
       class(integrated_gap_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
-      real(wp) :: gap(0:1), area(0:1), part_gap(0:1), part_area(0:1), least
-      integer :: i, k
+      real(wp) :: gap(0:1), area(0:1), least
+      integer :: i
 
       call self%measure_edges(x, u0, du)
       do i = 1, self%n_constraint
-         gap = 0.0_wp
-         area = 0.0_wp
-         do k = 1, 2
-            if (self%node_edge(k, i) == 0) cycle
-            call form_share(self%form(self%node_edge(k, i)), 3 - k, self%is_dual, part_gap, &
-               part_area)
-            gap = gap + part_gap
-            area = area + part_area
-         end do
+         call add_shares(self, i, gap, area)
          associate (state => self%state(i))
             ! What stores energy is followed as long as there is any to give back.
             least = least_cover*self%whole(i)
@@ -222,8 +224,7 @@ contains
             state%gap0 = 0.0_wp
             state%gap1 = 0.0_wp
             state%was_open = .true.
-            if (area(0) > 0.0_wp) state%gap0 = gap(0)/area(0) - self%offset &
-               - self%sagitta(i)
+            if (area(0) > 0.0_wp) state%gap0 = gap(0)/area(0) - self%offset - self%sagitta(i)
             if (state%is_arriving) state%was_open = is_open(self, i)
             if (area(1) >= least) state%gap1 = gap(1)/area(1) - self%offset - self%sagitta(i)
             self%cover(i) = area(1)

@@ -6,6 +6,7 @@
 module emcon_mortar
    use emcon_arcs_plane, only : arc_rise, arcs_find
    use emcon_chain_plane, only : chain_corners, chain_distance, chain_shorter
+   use emcon_condition_nodes, only : nodes_append
    use emcon_contact_law, only : contact_laws_reach
    use emcon_edge_moments, only : form_begin
    use emcon_errors, only : error_t
@@ -17,9 +18,9 @@ module emcon_mortar
    use emcon_kinds, only : wp
    use emcon_mortar_choice, only : pair_append, pair_comes_near, pair_cut_corners, pair_is_meant, &
       pairs_drop_far, pairs_seen
-   use emcon_mortar_frame, only : frame_cover, frame_hit, frame_init, frame_lean, frame_moments, &
-      frame_point, frame_t, moment_area, moment_area_xi, moment_cover, moment_gap, moment_gap_xi, &
-      n_moment, n_place, pair_stencil_t, place_after, place_before, local_master
+   use emcon_mortar_frame, only : frame_cover, frame_hit, frame_init, frame_lean, frame_point, &
+      frame_t, moment_area, moment_area_xi, moment_cover, n_moment, n_place, pair_stencil_t, &
+      place_after, place_before, local_master
    use emcon_mortar_pair2, only : segment_add2 => segment_add
    use emcon_mortar_pair2_first, only : segment_add2_first => segment_add
    use emcon_mortar_pair4, only : point_add, segment_add4 => segment_add
@@ -153,7 +154,7 @@ contains
                call stencil_gather(self%pair(k), x, u0, du, local, dlocal)
                do i = 0, 1
                   call frame_init(frame, self%pair(k), local + i*dlocal)
-                  value(:, i) = value(:, i) + rise_moments(self, e, k, frame)
+                  value(:, i) = value(:, i) + moments_of(self, e, k, frame, .true.)
                end do
             end do
          end associate
@@ -161,34 +162,49 @@ contains
       call integrated_gap_sagittas(self)
    end subroutine choose_sagittas
 
-   !> Moments of pair `k` of slave edge `e`, with the rise of the arcs in the place of the gap.
-   pure function rise_moments(self, e, k, frame) result(moment)
+   !> Moments of pair `k` of slave edge `e` over the segment that it covers, or over the Gauss
+   !> points that look at it: docs/theory.md, eq. (15).
+   pure function moments_of(self, e, k, frame, of_arcs) result(moment)
       type(mortar_t), intent(in) :: self
       integer, intent(in) :: e, k
       type(frame_t), intent(in) :: frame
+      logical, intent(in) :: of_arcs             !! with their rise in the place of the gap
       real(wp) :: moment(n_moment)
-      real(wp) :: low, high, part, xi, eta, gap, rise, lean, master_lean
+      real(wp) :: low, high, area, part, xi, eta, value
+      logical :: is_segment
       integer :: i
 
       moment = 0.0_wp
       low = 0.0_wp
       high = 1.0_wp
-      if (self%options%integration /= integration_elements) call frame_cover(frame, low, high)
+      is_segment = self%options%integration /= integration_elements
+      if (is_segment) call frame_cover(frame, low, high)
       if (.not. high > low) return
+      area = (high - low)*frame%length
       do i = 1, size(self%point)
-         part = (high - low)*self%weight(i)
-         if (self%options%integration == integration_elements) part = share(self, i, e, k)
+         part = self%weight(i)
+         if (.not. is_segment) part = share(self, i, e, k)
          if (.not. part > 0.0_wp) cycle
          xi = low + (high - low)*self%point(i)
-         call frame_point(frame, self%pair(k), xi, eta, gap)
-         call frame_lean(frame, xi, lean, master_lean)
-         associate (m => self%pair(k)%edge)
-            rise = arc_rise(self%slave_curvature(e), self%slave%size(e), xi, lean) &
-               + arc_rise(self%master_curvature(m), self%master%size(m), eta, master_lean)
-         end associate
-         moment = moment + part*frame%length*[rise, rise*xi, 1.0_wp, xi, 1.0_wp/frame%length]
+         call frame_point(frame, self%pair(k), xi, eta, value)
+         if (of_arcs) value = rise_at(self, e, self%pair(k)%edge, frame, xi, eta)
+         moment = moment + [part*area*value, part*area*value*xi, part*area, part*area*xi, part]
       end do
-   end function rise_moments
+      if (is_segment) moment(moment_area:) = [area, area*0.5_wp*(low + high), high - low]
+   end function moments_of
+
+   !> How far the arcs of slave edge `e` and master edge `m` rise in the way between their places.
+   pure real(wp) function rise_at(self, e, m, frame, xi, eta) result(rise)
+      type(mortar_t), intent(in) :: self
+      integer, intent(in) :: e, m
+      type(frame_t), intent(in) :: frame
+      real(wp), intent(in) :: xi, eta            !! 0 to 1 along the edges
+      real(wp) :: lean, master_lean
+
+      call frame_lean(frame, xi, lean, master_lean)
+      rise = arc_rise(self%slave_curvature(e), self%slave%size(e), xi, lean) &
+         + arc_rise(self%master_curvature(m), self%master%size(m), eta, master_lean)
+   end function rise_at
 
    !> The points of quadrature of its gap with the weights that they have in it where forces act: at
    !> the end of the step as that is expected, or in the middle.
@@ -344,7 +360,7 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
       type(frame_t) :: frame(0:1)
       real(wp), dimension(size(x, 1), n_place) :: local, dlocal
-      real(wp) :: part(n_moment, 0:1)
+      real(wp) :: part(n_moment, 0:1), eta, gap
       integer :: e, k, i
 
       do e = 1, self%slave%n_facet
@@ -355,49 +371,18 @@ contains
                call stencil_gather(self%pair(k), x, u0, du, local, dlocal)
                do i = 0, 1
                   call frame_init(frame(i), self%pair(k), local + i*dlocal)
-                  if (self%options%integration == integration_elements) then
-                     part(:, i) = point_moments(self, e, k, frame(i))
-                  else
-                     part(:, i) = frame_moments(frame(i), self%pair(k), self%point, self%weight)
-                  end if
+                  part(:, i) = moments_of(self, e, k, frame(i), .false.)
                end do
                value = value + part
                if (part(moment_cover, 0) > 0.0_wp .or. .not. part(moment_cover, 1) > 0.0_wp) cycle
-               ahead = min(ahead, gap_ahead(frame(0), self%pair(k), &
-                  part(moment_area_xi, 1)/part(moment_area, 1)) - self%offset)
+               ! On the line of the master edge, in the middle of what it comes to cover.
+               call frame_hit(frame(0), self%pair(k), &
+                  part(moment_area_xi, 1)/part(moment_area, 1), eta, gap)
+               ahead = min(ahead, gap - self%offset)
             end do
          end associate
       end do
    end subroutine mortar_measure_edges
-
-   !> The gap of slave point `xi` over the line of the master edge.
-   pure real(wp) function gap_ahead(frame, stencil, xi)
-      type(frame_t), intent(in) :: frame
-      type(pair_stencil_t), intent(in) :: stencil
-      real(wp), intent(in) :: xi
-      real(wp) :: eta
-
-      call frame_hit(frame, stencil, xi, eta, gap_ahead)
-   end function gap_ahead
-
-   !> Moments of the Gauss points of edge `e` that look at pair `k`.
-   pure function point_moments(self, e, k, frame) result(moment)
-      type(mortar_t), intent(in) :: self
-      integer, intent(in) :: e, k
-      type(frame_t), intent(in) :: frame
-      real(wp) :: moment(n_moment)
-      real(wp) :: eta, gap, area, weight
-      integer :: i
-
-      moment = 0.0_wp
-      do i = 1, size(self%point)
-         weight = share(self, i, e, k)
-         if (.not. weight > 0.0_wp) cycle
-         call frame_point(frame, self%pair(k), self%point(i), eta, gap)
-         area = weight*frame%length
-         moment = moment + [area*gap, area*gap*self%point(i), area, area*self%point(i), weight]
-      end do
-   end function point_moments
 
    !> Weight of Gauss point `i` of edge `e` that belongs to pair `k`: all, half or none.
    pure real(wp) function share(self, i, e, k)
@@ -444,27 +429,14 @@ contains
       list(:2) = self%slave%facet(:, e)
       n = 2
       do k = self%start(e), self%start(e + 1) - 1
-         call collect(self%pair(k)%node([place_before, place_after]), list, n)
+         call nodes_append(self%pair(k)%node([place_before, place_after]), list, n)
       end do
       n_slave = n
       do k = self%start(e), self%start(e + 1) - 1
-         call collect(self%pair(k)%node(local_master), list, n)
+         call nodes_append(self%pair(k)%node(local_master), list, n)
       end do
       call form_begin(self%form(e), list(:n), n_slave, self%leaves_second)
    end subroutine begin_form
-
-   !> Append those of `node` that are there and not on the list yet.
-   pure subroutine collect(node, list, n)
-      integer, intent(in) :: node(:)
-      integer, intent(inout) :: list(:), n
-      integer :: i
-
-      do i = 1, size(node)
-         if (node(i) == 0 .or. any(list(:n) == node(i))) cycle
-         n = n + 1
-         list(n) = node(i)
-      end do
-   end subroutine collect
 
    !> Add the moments of the segment of pair `k` to those of slave edge `e`.
    pure subroutine add_segment(self, e, k, local, dlocal, variable)

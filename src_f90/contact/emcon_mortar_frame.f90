@@ -9,7 +9,7 @@ module emcon_mortar_frame
    implicit none
    private
    public :: pair_stencil_t, frame_t, frame_init, frame_project, frame_meet, frame_hit, &
-      frame_point, frame_moments, frame_cover, frame_lean
+      frame_point, frame_cover, frame_lean
    public :: place_first, place_last, place_before, place_after, local_master
    public :: moment_gap, moment_gap_xi, moment_area, moment_area_xi, moment_cover, n_moment
    public :: n_place, end_rounding
@@ -272,30 +272,6 @@ contains
       low = rounded_clip(frame_meet(self, 2), end_rounding)
       high = rounded_clip(frame_meet(self, 1), end_rounding)
    end subroutine frame_cover
-
-   !> Moments over the segment that the master edge covers: docs/theory.md, eq. (15).
-   pure function frame_moments(self, stencil, point, weight) result(moment)
-      type(frame_t), intent(in) :: self
-      type(pair_stencil_t), intent(in) :: stencil
-      real(wp), intent(in) :: point(:), weight(:)        !! quadrature rule on 0..1
-      real(wp) :: moment(n_moment)
-      real(wp) :: low, high, xi, eta, gap, area
-      integer :: i
-
-      moment = 0.0_wp
-      call frame_cover(self, low, high)
-      if (.not. high > low) return
-      area = (high - low)*self%length
-      do i = 1, size(point)
-         xi = low + (high - low)*point(i)
-         call frame_hit(self, stencil, xi, eta, gap)
-         moment(moment_gap) = moment(moment_gap) + weight(i)*area*gap
-         moment(moment_gap_xi) = moment(moment_gap_xi) + weight(i)*area*gap*xi
-      end do
-      moment(moment_area) = area
-      moment(moment_area_xi) = area*0.5_wp*(low + high)
-      moment(moment_cover) = high - low
-   end function frame_moments
 
    pure real(wp) function cross(a, b)
       real(wp), intent(in) :: a(2), b(2)

@@ -11,8 +11,7 @@ module emcon_nts_choice
    use emcon_facing_plane, only : facing_allows
    use emcon_interactions, only : contact_pair_t, smoothing_hermite, smoothing_none
    use emcon_kinds, only : wp
-   use emcon_near_list, only : near_list_init, near_list_t, near_list_update, &
-      near_list_within
+   use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
    use emcon_nts_stencil, only : edge_distance, edge_of_sector, is_outside, polygon_stencil, &
       polygon_stencil_t, smooth_stencil, smooth_stencil_t
    use emcon_scene, only : scene_t
@@ -68,8 +67,7 @@ contains
       call chain_join(self%slave, scene)
       call chain_join(self%master, scene)
       self%is_self = pair%slave == pair%master
-      if (self%is_self) call touch_rule_init(self%rule, self%slave, scene, &
-         pair%both_sides)
+      if (self%is_self) call touch_rule_init(self%rule, self%slave, scene, pair%both_sides)
       associate (n => size(self%slave%node))
          self%chain_node = [(1 + mod(i, n), i = 0, n*self%rule%n_class - 1)]
          self%class = [(1 + i/n, i = 0, n*self%rule%n_class - 1)]

@@ -3,7 +3,7 @@
 !>
 !> Source: docs/theory.md, sections 4.2 and 4.3.
 module emcon_nts_constraint
-   use emcon_condition_nodes, only : condition_resize, condition_resize_slip
+   use emcon_condition_nodes, only : condition_resize, condition_resize_slip, nodes_append
    use emcon_constraint, only : condition_t
    use emcon_dgrad8, only : dg8_t => dg_t
    use emcon_dgrad8_first, only : dg8_first_t => dg_t
@@ -35,15 +35,11 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node)
       real(wp), intent(in) :: target             !! gap to hold [L]
       type(condition_t), intent(inout) :: item
-      integer :: n, i, k, list(sum(stencil%n))
+      integer :: n, i, list(sum(stencil%n))
 
       n = 0
       do i = 1, size(stencil)
-         do k = 1, stencil(i)%n
-            if (any(list(:n) == stencil(i)%node(k))) cycle
-            n = n + 1
-            list(n) = stencil(i)%node(k)
-         end do
+         call nodes_append(stencil(i)%node(:stencil(i)%n), list, n)
       end do
       call begin_constraint(item, x, list(:n))
       item%gap0 = -target

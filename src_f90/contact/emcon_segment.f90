@@ -4,6 +4,7 @@
 !> It stands between node to segment, whose gaps it takes, and mortar, whose constraints it makes.
 !> Source: docs/theory.md, eq. (15i); paper, section 2 ("several extensions").
 module emcon_segment
+   use emcon_condition_nodes, only : nodes_append
    use emcon_constraint, only : condition_t
    use emcon_dgrad8, only : dg_dot, dg_sqrt, dg_t, difference
    use emcon_dgrad_wide, only : change_t, wide_add, wide_add_part, wide_add_product, wide_clear
@@ -270,16 +271,12 @@ contains
    pure subroutine begin_form(self, e)
       type(segment_t), intent(inout) :: self
       integer, intent(in) :: e
-      integer :: list(2 + sum(self%nodal%n_node)), n, i, k
+      integer :: list(2 + sum(self%nodal%n_node)), n, k
 
       list(:2) = self%slave%facet(:, e)
       n = 2
       do k = 1, 2
-         do i = 2, self%nodal(k)%n_node
-            if (any(list(:n) == self%nodal(k)%node(i))) cycle
-            n = n + 1
-            list(n) = self%nodal(k)%node(i)
-         end do
+         call nodes_append(self%nodal(k)%node(2:self%nodal(k)%n_node), list, n)
       end do
       call form_begin(self%form(e), list(:n), 2, self%leaves_second)
    end subroutine begin_form

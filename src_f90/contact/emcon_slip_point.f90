@@ -8,9 +8,9 @@ module emcon_slip_point
    use emcon_dgrad8_first, only : dg8_first_t => dg_t
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_kinds, only : wp
+   use emcon_nts_gap, only : nts_slip
+   use emcon_nts_gap_first, only : nts_slip_first => nts_slip
    use emcon_nts_gap_value, only : first, last, slave
-   use emcon_nts_slip, only : nts_slip
-   use emcon_nts_slip_first, only : nts_slip_first => nts_slip
    implicit none
    private
    public :: slip_point_t, slip_list_t, slip_point, slip_over, slip_add, slip_share

@@ -222,8 +222,7 @@ contains
       at_tip = rest%length > 0.0_wp .and. abs(beyond) <= unsure
       select case (was%kind)
       case (contact_sticks)
-         is_undecided = at_tip .or. (.not. beyond < 0.0_wp .and. &
-            abs(norm2(tip) - most) <= unsure)
+         is_undecided = at_tip .or. (.not. beyond < 0.0_wp .and. abs(norm2(tip) - most) <= unsure)
       case (contact_rests)
          is_undecided = at_start .or. (.not. along > 0.0_wp .and. rest%length > 0.0_wp .and. &
             abs(norm2(drag) - most) <= unsure)

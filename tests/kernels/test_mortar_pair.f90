@@ -8,7 +8,7 @@ module test_mortar_pair
    use emcon_errors, only : error_t
    use emcon_gauss, only : gauss_points
    use emcon_kinds, only : wp
-   use emcon_mortar_frame, only : end_rounding, frame_hit, frame_init, frame_moments, &
+   use emcon_mortar_frame, only : end_rounding, frame_hit, frame_cover, frame_init, &
       frame_point, frame_project, frame_t, moment_area, moment_area_xi, moment_cover, moment_gap, &
       moment_gap_xi, n_moment, n_place, pair_stencil_t
    use emcon_mortar_pair2, only : segment_moments2 => segment_moments
@@ -177,12 +177,21 @@ contains
       type(pair_stencil_t), intent(in) :: stencil
       real(wp), intent(in) :: x(:, :)
       integer, intent(in) :: n_point
-      real(wp) :: value(n_moment), point(n_point), weight(n_point)
+      real(wp) :: value(n_moment), point(n_point), weight(n_point), low, high, eta, gap
       type(frame_t) :: frame
+      integer :: i
 
       call gauss_points(point, weight)
       call frame_init(frame, stencil, x)
-      value = frame_moments(frame, stencil, point, weight)
+      value = 0.0_wp
+      call frame_cover(frame, low, high)
+      if (.not. high > low) return
+      do i = 1, n_point
+         associate (xi => low + (high - low)*point(i))
+            call frame_hit(frame, stencil, xi, eta, gap)
+            value = value + weight(i)*(high - low)*[frame%length*[gap, gap*xi, 1.0_wp, xi], 1.0_wp]
+         end associate
+      end do
    end function moments
 
    !> Part of the slave edge that the master edge covers: > 0 only if it does.
