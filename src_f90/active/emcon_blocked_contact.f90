@@ -3,7 +3,7 @@
 module emcon_blocked_contact
    use emcon_active_set, only : touch_tol
    use emcon_kinds, only : wp
-   use emcon_numbering, only : numbering_t
+   use emcon_numbering, only : numbering_holds
    use emcon_scene, only : scene_t
    use emcon_surface_nodes, only : surface_nodes
    use emcon_system, only : system_t
@@ -30,7 +30,7 @@ contains
             do i = 1, contact%n_constraint
                if (.not. is_dropped(first + i)) cycle
                if (.not. contact%state(i)%gap1 < -touch_tol*contact%state(i)%size) cycle
-               if (.not. is_bound(system%space%numbering, contact%node(i))) cycle
+               if (.not. numbering_holds(system%space%numbering, contact%node(i))) cycle
                if (.not. surface_is_bound(system, scene, pair%master)) cycle
                text = "slave node " // to_text(scene%node%label(contact%node(i))) // &
                   " of surface " // scene%surface(pair%slave)%name // " is " // &
@@ -55,19 +55,8 @@ contains
       call surface_nodes(scene, scene%surface(number), node)
       surface_is_bound = .true.
       do i = 1, size(node)
-         surface_is_bound = surface_is_bound .and. is_bound(system%space%numbering, node(i))
+         surface_is_bound = surface_is_bound .and. numbering_holds(system%space%numbering, node(i))
       end do
    end function surface_is_bound
-
-   !> Are all freedoms of a node prescribed, or follow from what is?
-   pure logical function is_bound(numbering, node)
-      type(numbering_t), intent(in) :: numbering
-      integer, intent(in) :: node                !! of the scene
-      integer :: n_dim
-
-      n_dim = size(numbering%unknown, 1)
-      is_bound = all(numbering%column(numbering%start(n_dim*(node - 1) + 1) + 1: &
-         numbering%start(n_dim*node + 1)) == 0)
-   end function is_bound
 
 end module emcon_blocked_contact

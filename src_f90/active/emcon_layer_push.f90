@@ -3,10 +3,12 @@
 !>
 !> Source: docs/theory.md, eq. (22c).
 module emcon_layer_push
+   use emcon_constraint, only : condition_add_field
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate, &
       constraints_force, constraints_select
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_solve
+   use emcon_curvature, only : curvature_add_times
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
@@ -30,7 +32,7 @@ contains
       type(constraint_set_t) :: opened
       real(wp), allocatable :: y(:), mu(:)
       real(wp) :: field(size(self%du, 1), size(self%du, 2))
-      integer :: k, i
+      integer :: k
 
       associate (system => self%system, set => self%active%set)
          call constraints_select(opened, pack([(k, k = 1, size(weight))], &
@@ -53,11 +55,7 @@ contains
          self%jump%id = self%n_before + self%jump%id
          call add_tangent(self, field)
          do k = 1, set%n
-            do i = 1, set%item(k)%n_node
-               associate (node => set%item(k)%node(i))
-                  self%push(:, node) = self%push(:, node) + mu(k)*set%item(k)%c(:, i)
-               end associate
-            end do
+            call condition_add_field(set%item(k), mu(k), set%item(k)%c, self%push)
          end do
       end associate
    end subroutine layer_find_push
@@ -128,22 +126,10 @@ contains
       type(layer_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: displacement(:, :)
       real(wp) :: product(size(displacement, 1), size(displacement, 2))
-      integer :: k, i, j, n_dim
 
-      n_dim = size(displacement, 1)
       call system_tangent_times(self%system, self%motion, displacement, product)
       self%push = self%push - product
-      do k = 1, self%active%set%n
-         associate (item => self%active%set%item(k), lam => self%active%set%lam(k))
-            do j = 1, item%n_node
-               do i = 1, item%n_node
-                  self%push(:, item%node(i)) = self%push(:, item%node(i)) + lam*matmul( &
-                     item%h(n_dim*(i - 1) + 1:n_dim*i, n_dim*(j - 1) + 1:n_dim*j), &
-                     displacement(:, item%node(j)))
-               end do
-            end do
-         end associate
-      end do
+      call curvature_add_times(self%active%set, self%active%set%lam, displacement, self%push)
    end subroutine add_tangent
 
 end module emcon_layer_push

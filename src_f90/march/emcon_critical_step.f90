@@ -4,11 +4,11 @@
 !> by the fastest element. The value itself comes from Lanczos' method, in the inner product of the
 !> mass. Source: docs/theory.md, section 14.
 module emcon_critical_step
-   use emcon_constraint, only : condition_rate
+   use emcon_constraint, only : condition_add_field, condition_rate
    use emcon_constraints, only : constraint_set_t
-   use emcon_csr, only : csr_t
+   use emcon_csr, only : csr_multiply, csr_t
    use emcon_errors, only : error_t
-   use emcon_kinds, only : dp, wp
+   use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_solver_registry, only : solver_create, solver_default
@@ -83,7 +83,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(constraint_set_t), intent(in), optional :: closed   !! contacts that give way there
       class(sparse_solver_t), allocatable :: mass
-      real(dp), allocatable :: value(:)
+      type(csr_t) :: weight
       real(wp), allocatable, dimension(:) :: q, before, image, solved
       real(wp) :: alpha(most_vectors), beta(0:most_vectors), largest, last
       integer :: i, n
@@ -91,14 +91,15 @@ contains
       h = huge(h)
       n = system%space%numbering%n_unknown
       if (n == 0) return
-      call terms_mass_values(system%term, value)
+      weight = system%matrix
+      call terms_mass_values(system%term, weight%value)
       call solver_create(solver_default, matrix_definite, mass)
       call mass%analyse(system%matrix, error)
-      if (.not. allocated(error)) call mass%factorise(value, error)
+      if (.not. allocated(error)) call mass%factorise(weight%value, error)
       if (allocated(error)) return
       q = [(sin(real(i, wp)) + merge(0.5_wp, -0.5_wp, mod(i, 3) == 0), i = 1, n)]
-      allocate(before(n), solved(n), source=0.0_wp)
-      image = product_of(system%matrix, value, q)
+      allocate(before(n), solved(n), image(n), source=0.0_wp)
+      call csr_multiply(weight, q, image)
       q = q/sqrt(dot_product(q, image))
       beta(0) = 0.0_wp
       last = 0.0_wp
@@ -108,7 +109,7 @@ contains
          call mass%solve(image, solved, error)
          if (allocated(error)) exit
          solved = solved - alpha(i)*q - beta(i - 1)*before
-         image = product_of(system%matrix, value, solved)
+         call csr_multiply(weight, solved, image)
          beta(i) = sqrt(max(0.0_wp, dot_product(solved, image)))
          largest = tridiagonal_largest(alpha(:i), beta(1:i - 1))
          if (mod(i, overlap_query_every) == 0) then
@@ -133,7 +134,6 @@ contains
       real(wp), intent(out), contiguous :: image(:)      !! (n_unknown)
       type(constraint_set_t), intent(in), optional :: closed
       real(wp), dimension(size(place%x, 1), size(place%x, 2)) :: displacement, force
-      real(wp) :: push
       integer :: i, k
 
       displacement = 0.0_wp
@@ -145,30 +145,13 @@ contains
       if (present(closed)) then
          do k = 1, closed%n
             associate (item => closed%item(k))
-               push = closed%law(k)%row%stiffest()*condition_rate(item, displacement)
-               do i = 1, item%n_node
-                  force(:, item%node(i)) = force(:, item%node(i)) + push*item%c(:, i)
-               end do
+               call condition_add_field(item, closed%law(k)%row%stiffest() &
+                  *condition_rate(item, displacement), item%c, force)
             end associate
          end do
       end if
       call pick_unknowns(system%space%numbering, force, image)
    end subroutine stiffness_times
-
-   pure function product_of(matrix, value, x) result(y)
-      type(csr_t), intent(in) :: matrix          !! its pattern
-      real(dp), intent(in) :: value(:)
-      real(wp), intent(in) :: x(:)
-      real(wp) :: y(size(x))
-      integer :: i, k
-
-      y = 0.0_wp
-      do i = 1, matrix%n_row
-         do k = matrix%row_start(i) + 1, matrix%row_start(i + 1)
-            y(i) = y(i) + real(value(k), wp)*x(matrix%column(k) + 1)
-         end do
-      end do
-   end function product_of
 
    !> The largest eigenvalue of a symmetric tridiagonal matrix, by halving: it is where the last of
    !> the pivots of T - z turns negative.

@@ -7,14 +7,13 @@ module emcon_explicit
    use emcon_active_set, only : active_set_select, step_done
    use emcon_active_set_update, only : active_set_advance
    use emcon_constraint, only : condition_rate
-   use emcon_constraints, only : constraint_set_t
+   use emcon_constraints, only : constraint_set_t, constraints_force
    use emcon_critical_step, only : critical_bound, critical_sharp
    use emcon_csr, only : csr_find
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_evaluation, only : instant_later, instant_t, evaluation_at_end
    use emcon_explicit_push, only : explicit_push
-   use emcon_explicit_penalty, only : explicit_penalty_force, explicit_penalty_limit, &
-      explicit_penalty_push, &
+   use emcon_explicit_penalty, only : explicit_penalty_limit, explicit_penalty_push, &
       explicit_penalty_widen
    use emcon_kinds, only : dp, wp
    use emcon_lagged_forces, only : lagged_forces_take
@@ -306,8 +305,8 @@ contains
          where (self%system%space%numbering%unknown > 0) explicit%residual = 0.0_wp
          state%reaction = 0.5_wp*(state%reaction + explicit%residual)
          self%newton%contact = 0.5_wp*(self%newton%contact + explicit%contact)
-         if (self%active%penalty%is_at_ends) call explicit_penalty_force(explicit%penalty(1 &
-            - explicit%i_start), self%newton%contact)
+         if (self%active%penalty%is_at_ends) call constraints_force(explicit%penalty(1 &
+            - explicit%i_start), 1, self%newton%contact)
          contact = 0.0_wp
          do k = 1, set%n
             contact = contact + 0.25_wp*(set%lam(k)*(h*gap_change(set, k, state%v) &

@@ -12,14 +12,14 @@ module emcon_explicit_penalty
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t
    use emcon_motion_bound, only : largest_motion
+   use emcon_numbering, only : numbering_holds
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_scene, only : scene_t
    use emcon_penalty, only : penalty_select
    use emcon_term, only : role_internal
    implicit none
    private
-   public :: explicit_penalty_push, explicit_penalty_force, explicit_penalty_limit, &
-      explicit_penalty_widen
+   public :: explicit_penalty_push, explicit_penalty_limit, explicit_penalty_widen
 
    !> A critical step that was found with closed contacts counts until a node is stiffened by so
    !> much more: places of contact move a little with each step.
@@ -43,7 +43,7 @@ contains
             call find_closed(self, penalty, is_end)
             if (penalty%n > 0) then
                call constraints_evaluate(penalty, self%system, explicit%place, leaves_second=.true.)
-               call explicit_penalty_force(penalty, force)
+               call constraints_force(penalty, 1, force)
                response%residual = response%residual - force
                response%part(role_internal)%force = response%part(role_internal)%force - force
             end if
@@ -95,14 +95,6 @@ contains
       end associate
    end subroutine find_closed
 
-   !> What the contacts of a set push with.
-   pure subroutine explicit_penalty_force(penalty, force)
-      type(constraint_set_t), intent(in) :: penalty
-      real(wp), intent(out), contiguous :: force(:, :)   !! (n_dim, n_node) [M L/T^2]
-
-      call constraints_force(penalty, 1, force)
-   end subroutine explicit_penalty_force
-
    !> What pairs stiffen each node by when all of them are closed: the matrix of contacts is below
    !> this diagonal where the nodes of both surfaces stand as close to each other, twice where both
    !> move. Source: docs/theory.md, eq. (42).
@@ -118,7 +110,8 @@ contains
       allocate(self%explicit%stiffness(size(scene%x, 2)), source=0.0_wp)
       self%explicit%met = self%explicit%stiffness
       if (.not. self%active%penalty%is_at_ends) return
-      associate (bound => self%explicit%stiffness, system => self%system)
+      associate (bound => self%explicit%stiffness, system => self%system, &
+            numbering => self%system%space%numbering)
          do k = 1, size(system%contact)
             associate (contact => system%contact(k)%contact, stiffness => &
                   self%active%penalty%stiffness, first => system%first_constraint(k) + 1, &
@@ -133,7 +126,8 @@ contains
                end associate
                if (allocated(error)) return      ! contact of them would not have been built
                twice = 1.0_wp
-               if (moves(self, contact%node) .and. moves(self, master%node)) twice = 2.0_wp
+               if (.not. (all(numbering_holds(numbering, contact%node)) .or. &
+                  all(numbering_holds(numbering, master%node)))) twice = 2.0_wp
                bound(contact%node) = bound(contact%node) + twice*stiffness(first:last)
                call add_opposite(bound, master, twice*sum(stiffness(first:last))/sum(slave%size))
             end associate
@@ -141,25 +135,6 @@ contains
       end associate
       self%explicit%met = self%explicit%stiffness
    end subroutine explicit_penalty_limit
-
-   !> Are some of the nodes free to move?
-   pure logical function moves(self, node)
-      type(march_t), intent(in) :: self
-      integer, intent(in) :: node(:)
-      integer :: k, d, t
-
-      moves = .true.
-      associate (numbering => self%system%space%numbering)
-         do k = 1, size(node)
-            do d = size(numbering%unknown, 1)*(node(k) - 1) + 1, size(numbering%unknown, 1)*node(k)
-               do t = numbering%start(d) + 1, numbering%start(d + 1)
-                  if (numbering%column(t) > 0) return
-               end do
-            end do
-         end do
-      end associate
-      moves = .false.
-   end function moves
 
    !> Add what master nodes are stiffened by: a pressure by depth over their part of each facet.
    pure subroutine add_opposite(bound, master, by_size)
@@ -186,14 +161,15 @@ contains
 
       has_grown = .false.
       associate (penalty => self%explicit%penalty(self%explicit%i_start), &
-            bound => self%explicit%met)
+            bound => self%explicit%met, numbering => self%system%space%numbering)
          if (.not. self%active%penalty%is_at_ends .or. penalty%n == 0) return
          total = 0.0_wp
          do k = 1, penalty%n
             associate (item => penalty%item(k))
                do i = 1, item%n_node
                   slope(i) = 0.0_wp
-                  if (moves(self, item%node(i:i))) slope(i) = sqrt(sum(item%c(:, i)**2))
+                  if (.not. numbering_holds(numbering, item%node(i))) slope(i) &
+                     = sqrt(sum(item%c(:, i)**2))
                end do
                do i = 1, item%n_node
                   total(item%node(i)) = total(item%node(i)) &

@@ -2,15 +2,14 @@
 !> hold velocities there: conditions that always hold, and contacts, which do not pull.
 !> Source: docs/theory.md, section 14.
 module emcon_explicit_push
-   use emcon_constraint, only : condition_rate
+   use emcon_constraint, only : condition_add_field, condition_rate
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_analysis, error_t, raise
-   use emcon_evaluation, only : evaluation_velocity
    use emcon_kept_factor, only : kept_factor_correct, kept_factor_forget, &
       kept_factor_multipliers, kept_factor_renew, kept_factor_take
    use emcon_kinds, only : wp
-   use emcon_march_guess, only : follow_links
+   use emcon_march_guess, only : end_velocities, follow_links
    use emcon_march_types, only : march_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_system, only : mass_times, system_respond
@@ -28,21 +27,13 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp), dimension(self%system%space%numbering%n_unknown) :: residual, dq
       logical :: was_made
-      integer :: i, a
 
       associate (system => self%system, explicit => self%explicit, kept => &
             self%newton%correction%kept)
          explicit%residual = system%response%residual
          call pick_unknowns(system%space%numbering, explicit%residual, residual)
          explicit%v1 = self%end_state%v
-         do i = 1, size(self%end_state%v, 2)
-            do a = 1, size(self%end_state%v, 1)
-               if (system%space%numbering%unknown(a, i) > 0) explicit%v1(a, i) = &
-                  evaluation_velocity(self%motion%evaluation, self%motion%v0(a, i), &
-                  self%motion%du(a, i))
-            end do
-         end do
-         call follow_links(system, explicit%v1)
+         call end_velocities(self, explicit%v1)
          if (explicit%is_free) then
             explicit%mu = [real(wp) ::]
             call add_to_dofs(system%space%numbering, residual/explicit%mass, -0.5_wp*h, &
@@ -141,7 +132,7 @@ contains
       type(march_t), intent(inout) :: self
       real(wp), intent(in) :: h                  !! > 0 [T]
       real(wp), dimension(size(self%end_state%v, 1), size(self%end_state%v, 2)) :: change, product
-      integer :: k, i
+      integer :: k
 
       associate (explicit => self%explicit, set => self%active%set)
          change = (2.0_wp/h)*(explicit%v1 - self%motion%evaluation%rate*self%motion%du)
@@ -151,13 +142,10 @@ contains
          allocate(explicit%contact, mold=explicit%v1)
          explicit%contact = 0.0_wp
          do k = 1, set%n
-            do i = 1, set%item(k)%n_node
-               associate (node => set%item(k)%node(i), force => explicit%mu(k)*set%item(k)%c(:, i))
-                  explicit%residual(:, node) = explicit%residual(:, node) - force
-                  if (k > set%n_permanent) explicit%contact(:, node) = explicit%contact(:, node) &
-                     + force
-               end associate
-            end do
+            associate (item => set%item(k), mu => explicit%mu(k))
+               call condition_add_field(item, -mu, item%c, explicit%residual)
+               if (k > set%n_permanent) call condition_add_field(item, mu, item%c, explicit%contact)
+            end associate
          end do
       end associate
    end subroutine find_reactions

@@ -194,8 +194,7 @@ contains
          call configure_contact(self, scene)
          call penalty_begin_step(self%active%penalty, self%system, scene, step, error)
          if (allocated(error)) return
-         call near_laws_begin_step(self%active%near_laws, self%system, &
-            scene, step)
+         call near_laws_begin_step(self%active%near_laws, self%system, scene, step)
          call begin_overclosure(self, scene, step)
          call begin_massless(self, scene, step, error)
          if (allocated(error)) return

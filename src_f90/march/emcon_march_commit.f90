@@ -12,7 +12,7 @@ module emcon_march_commit
    use emcon_factor_policy, only : factor_policy_commit
    use emcon_interlock_plane, only : interlock_tell
    use emcon_kinds, only : wp
-   use emcon_march_guess, only : follow_links
+   use emcon_march_guess, only : end_velocities, follow_links
    use emcon_march_past, only : march_past_keep
    use emcon_march_types, only : increment_t, march_t
    use emcon_nodal_pull, only : nodal_pull_add
@@ -20,8 +20,7 @@ module emcon_march_commit
    use emcon_pair_record, only : pair_record_jump, pair_record_measure
    use emcon_pair_sums, only : pair_sums_add, pair_sums_begin, pair_sums_jump
    use emcon_phases, only : phase_enter, phase_leave, phase_restitution
-   use emcon_evaluation, only : evaluation_contact_place, evaluation_has_inertia, &
-      evaluation_velocity
+   use emcon_evaluation, only : evaluation_contact_place, evaluation_has_inertia
    use emcon_quasi_static, only : quasi_static_move
    use emcon_restitution, only : restitution_take
    use emcon_scene, only : scene_t
@@ -55,14 +54,16 @@ contains
          system%response%residual = system%response%residual - self%newton%contact
          call gather_dependent(system%space%numbering, system%response%residual)
          call book_stabilization(self, increment)
-         call find_velocities(self)
+         where (system%space%numbering%unknown > 0) system%response%residual = 0.0_wp
          state%reaction = system%response%residual/(1.0_wp + self%motion%evaluation%start_weight)
          if (set%n_permanent > 0) call constraints_force(set, set%n_permanent + 1, &
             self%newton%contact)
          if (self%explicit%is_on) then
+            self%end_state%v = self%explicit%v1
             call explicit_commit(self, h, error)
             if (allocated(error)) return
          else
+            call end_velocities(self, self%end_state%v)
             call book_work(self)
          end if
          call march_past_keep(self, h)
@@ -117,19 +118,16 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: h                  !! > 0 [T]
-      real(wp) :: lag
+      real(wp) :: lag, place(size(scene%x, 1), size(scene%x, 2))
 
       associate (state => self%state, system => self%system, explicit => self%explicit)
          if (.not. self%active%penalty%is_at_ends) then
             lag = 1.0_wp - evaluation_contact_place(self%motion%evaluation)
-            if (self%layer%is_settled) then
-               ! Forces act where nodes without mass were before their balance.
-               call pair_record_measure(state%pairs, system, self%active%set, scene%x, state%u &
-                  + (self%motion%du - self%end_state%du), self%motion%du, lag)
-            else
-               call pair_record_measure(state%pairs, system, self%active%set, scene%x, state%u, &
-                  self%motion%du, lag)
-            end if
+            place = state%u
+            ! Forces act where nodes without mass were before their balance.
+            if (self%layer%is_settled) place = state%u + (self%motion%du - self%end_state%du)
+            call pair_record_measure(state%pairs, system, self%active%set, scene%x, place, &
+               self%motion%du, lag)
             call pair_sums_add(state%sums, system, self%active%set, self%motion, h)
             call record_jumps(self, scene, h)
             return
@@ -140,8 +138,7 @@ contains
          associate (penalty => explicit%penalty(explicit%i_start))
             call pair_sums_add(state%sums, system, penalty, self%motion, 0.5_wp*h)
             call pair_record_measure(state%pairs, system, penalty, scene%x, state%u, &
-               self%motion%du, &
-               0.0_wp)
+               self%motion%du, 0.0_wp)
             self%ledger%contact_energy = penalty_stored(self%active%penalty, penalty)
          end associate
          call record_jumps(self, scene, h)
@@ -169,12 +166,10 @@ contains
 
       call stand_off_add(increment%stand_off, self%system, self%active%set, h)
       call nodal_pull_add(increment%nodal_pull, self%active%set, size(self%state%u, 2))
-      increment%give = max(increment%give, penalty_depth(self%active%penalty, &
-         self%active%set))
+      increment%give = max(increment%give, penalty_depth(self%active%penalty, self%active%set))
       if (self%active%penalty%is_at_ends) increment%give = max(increment%give, &
          penalty_depth(self%active%penalty, self%explicit%penalty(self%explicit%i_start)))
-      increment%n_augmentation = max(increment%n_augmentation, &
-         self%active%penalty%n_augmentation)
+      increment%n_augmentation = max(increment%n_augmentation, self%active%penalty%n_augmentation)
       call friction_missed(self%active%friction, self%system, self%active%set, missed, largest)
       increment%law_missed = max(increment%law_missed, missed)
       increment%largest_push = max(increment%largest_push, largest)
@@ -192,27 +187,6 @@ contains
             *(maxval(abs(motion%x)) + maxval(abs(self%state%u)) + maxval(abs(motion%du)))
       end associate
    end function work_scale
-
-   !> The velocities at the end, and no reaction where they are unknown.
-   subroutine find_velocities(self)
-      type(march_t), intent(inout) :: self
-      integer :: i, a
-
-      associate (motion => self%motion, system => self%system)
-         do i = 1, size(self%end_state%v, 2)
-            do a = 1, size(self%end_state%v, 1)
-               if (.not. system%space%numbering%unknown(a, i) > 0) cycle
-               self%end_state%v(a, i) = evaluation_velocity(motion%evaluation, self%state%v(a, i), &
-                  motion%du(a, i))
-               if (allocated(motion%v_past)) self%end_state%v(a, i) = self%end_state%v(a, i) &
-                  + motion%v_past(a, i)
-               system%response%residual(a, i) = 0.0_wp
-            end do
-         end do
-         call follow_links(system, self%end_state%v)
-         if (self%explicit%is_on) self%end_state%v = self%explicit%v1
-      end associate
-   end subroutine find_velocities
 
    !> The velocities that impacts and what has no mass call for.
    subroutine restitute(self, scene, h, notes, error)
@@ -388,7 +362,7 @@ contains
    !> taken as linear over the step.
    subroutine book_work(self)
       type(march_t), intent(inout) :: self
-      real(wp) :: contact_work, decay, damped, damping, friction
+      real(wp) :: contact_work, decay, damped, damping, friction, energy
       integer :: k
 
       associate (state => self%state, part => self%system%response%part, &
@@ -423,21 +397,15 @@ contains
          self%ledger%friction = self%ledger%friction + friction
          self%ledger%contact_damping = self%ledger%contact_damping + damped
          self%ledger%contact_work = self%ledger%contact_work + contact_work
-         call book_stored(self)
+         ! What penalties store is of the balance: contact work is what is made or taken beyond it.
+         energy = penalty_stored(self%active%penalty, set)
+         self%ledger%contact_work = self%ledger%contact_work &
+            + (energy - self%ledger%contact_energy)
+         self%ledger%contact_energy = energy
          call terms_dissipation(self%system%term, decay, damping)
          self%ledger%decay = self%ledger%decay + decay
          self%ledger%damping = self%ledger%damping + damping
       end associate
    end subroutine book_work
-
-   !> What penalties store is of the balance: contact work is what is made or taken beyond it.
-   subroutine book_stored(self)
-      type(march_t), intent(inout) :: self
-      real(wp) :: energy
-
-      energy = penalty_stored(self%active%penalty, self%active%set)
-      self%ledger%contact_work = self%ledger%contact_work + (energy - self%ledger%contact_energy)
-      self%ledger%contact_energy = energy
-   end subroutine book_stored
 
 end module emcon_march_commit

@@ -1,7 +1,7 @@
 !> The first guess of a step: prescribed motion, and what the velocities lead to.
 module emcon_march_guess
-   use emcon_evaluation, only : evaluation_displacement, evaluation_has_inertia, instant_later, &
-      instant_t
+   use emcon_evaluation, only : evaluation_displacement, evaluation_has_inertia, &
+      evaluation_velocity, instant_later, instant_t
    use emcon_kinds, only : wp
    use emcon_march_past, only : march_past_take
    use emcon_march_types, only : march_t
@@ -11,7 +11,7 @@ module emcon_march_guess
    use emcon_system, only : system_t
    implicit none
    private
-   public :: march_guess, follow_links
+   public :: march_guess, end_velocities, follow_links
 
 contains
 
@@ -63,6 +63,24 @@ contains
       call follow_links(self%system, self%motion%offset)
       call follow_links(self%system, self%newton%driven)
    end subroutine march_guess
+
+   !> The velocities at the end of the solved step; those that are prescribed stand.
+   subroutine end_velocities(self, v)
+      type(march_t), intent(in) :: self
+      real(wp), intent(inout), contiguous :: v(:, :)         !! (n_dim, n_node) [L/T]
+      integer :: i, a
+
+      associate (motion => self%motion, unknown => self%system%space%numbering%unknown)
+         do i = 1, size(v, 2)
+            do a = 1, size(v, 1)
+               if (.not. unknown(a, i) > 0) cycle
+               v(a, i) = evaluation_velocity(motion%evaluation, motion%v0(a, i), motion%du(a, i))
+               if (allocated(motion%v_past)) v(a, i) = v(a, i) + motion%v_past(a, i)
+            end do
+         end do
+      end associate
+      call follow_links(self%system, v)
+   end subroutine end_velocities
 
    !> Let dependent entries of a motion follow the others, also where `numbering` does not know
    !> them: with multipliers they have to move in the same way.

@@ -4,6 +4,7 @@
 !> impulses along the normals: momenta stay, and the energy that goes is known.
 !> Source: docs/theory.md, eq. (22e).
 module emcon_restitution
+   use emcon_constraint, only : condition_rate
    use emcon_constraints, only : constraint_index
    use emcon_contact_law, only : contact_laws_rate_change
    use emcon_errors, only : error_t
@@ -74,11 +75,7 @@ contains
       associate (set => self%active%set)
          is_row = [(k > set%n_linear, k = 1, set%n)]
          do k = set%n_linear + 1, set%n
-            rate(k) = 0.0_wp
-            do i = 1, set%item(k)%n_node
-               rate(k) = rate(k) + dot_product(set%item(k)%c(:, i), &
-                  self%end_state%v(:, set%item(k)%node(i)))
-            end do
+            rate(k) = condition_rate(set%item(k), self%end_state%v)
             call constraint_index(self%system, set%id(k), pair, i)
             if (pair == 0) cycle
             associate (contact => self%system%contact(pair)%contact, &

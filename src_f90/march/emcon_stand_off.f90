@@ -25,19 +25,10 @@ contains
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in) :: h                  !! [T]
-
-      if (set%n > set%n_permanent) call add_all(self, system, set, set%n_permanent + 1, h)
-   end subroutine stand_off_add
-
-   pure subroutine add_all(self, system, set, first, h)
-      type(stand_off_t), intent(inout) :: self
-      type(system_t), intent(in) :: system
-      type(constraint_set_t), intent(in) :: set
-      integer, intent(in) :: first               !! place in the set
-      real(wp), intent(in) :: h
       real(wp) :: force(set%n), gap
-      integer :: k, pair, i
+      integer :: k, pair, i, first
 
+      first = set%n_permanent + 1
       do k = first, set%n
          associate (item => set%item(k))
             associate (total => sum(item%g(:, :item%n_slave), dim=2))
@@ -55,7 +46,7 @@ contains
          self%impulse = self%impulse + force(k)*h
          self%impulse_gap = self%impulse_gap + force(k)*h*gap
       end do
-   end subroutine add_all
+   end subroutine stand_off_add
 
    !> Mean gap, weighted by the impulses that went across it.
    pure real(wp) function stand_off_mean(self)

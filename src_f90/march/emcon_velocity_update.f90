@@ -5,7 +5,7 @@
 !> bodies apart and keeps the momenta. Source: Laursen & Love (2002); docs/theory.md,
 !> eqs. (21) and (22).
 module emcon_velocity_update
-   use emcon_constraint, only : condition_t
+   use emcon_constraint, only : condition_add_field, condition_t
    use emcon_constraints, only : constraint_set_t
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : error_t
@@ -255,8 +255,7 @@ contains
 
       if (size(rate) == 0) return
       call find_responses(self, system, set, [(k, k = set%n_linear + 1, set%n_permanent)], row, &
-         response, &
-         error)
+         response, error)
       if (allocated(error)) return
       do k = 1, size(rate)
          rate(k, 1) = -real(dot_product(row(:, k), self%jump), dp)
@@ -279,16 +278,12 @@ contains
       real(wp), allocatable, intent(out) :: row(:, :), response(:, :) !! (n_unknown, n) C, M^-1 C^T
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: field(size(system%space%is_alive, 1), size(system%space%is_alive, 2))
-      integer :: k, i
+      integer :: k
 
       allocate(row(size(self%jump), size(which)), response(size(self%jump), size(which)))
       do k = 1, size(which)
          field = 0.0_wp
-         associate (item => set%item(which(k)))
-            do i = 1, item%n_node
-               field(:, item%node(i)) = field(:, item%node(i)) + item%c(:, i)
-            end do
-         end associate
+         call condition_add_field(set%item(which(k)), 1.0_wp, set%item(which(k))%c, field)
          call pick(system, field, row(:, k))
          call self%mass%solve(row(:, k), response(:, k), error)
          if (allocated(error)) return
@@ -344,14 +339,11 @@ contains
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in) :: weight(:)          !! (n)
       real(wp), intent(out) :: force(:, :)
-      integer :: k, i, node
+      integer :: k
 
       force = 0.0_wp
       do k = set%n_permanent + 1, set%n
-         do i = 1, set%item(k)%n_node
-            node = set%item(k)%node(i)
-            force(:, node) = force(:, node) + weight(k)*set%item(k)%c(:, i)
-         end do
+         call condition_add_field(set%item(k), weight(k), set%item(k)%c, force)
       end do
    end subroutine push_forces
 

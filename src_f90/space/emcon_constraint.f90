@@ -9,9 +9,9 @@ module emcon_constraint
    implicit none
    private
    public :: condition_t, contact_response_t, condition_force, condition_find_force, &
-      condition_find_law_force, condition_find_rows_force, condition_row_force, &
-      condition_row_gradient, condition_rate, condition_drag, condition_friction, &
-      condition_stiffness, condition_normal, condition_normal_slope, constraint_t, constraint_box_t
+      condition_add_field, condition_row_force, condition_row_gradient, condition_rate, &
+      condition_drag, condition_friction, condition_stiffness, condition_normal, &
+      condition_normal_slope, constraint_t, constraint_box_t
 
    !> A condition has so many slips at most: one less than there are dimensions.
    integer, parameter, public :: most_slips = 2
@@ -113,56 +113,38 @@ contains
       integer, intent(in) :: i                        !! 1..n_node
       real(wp) :: force(size(self%g, 1))              !! (n_dim) [M L/T^2]
 
-      call condition_find_force(self, lam, i, force)
+      call condition_find_force(self, lam + self%response%lam, condition_drag(self, lam), i, force)
    end function condition_force
 
-   !> The same, without an array of its own.
-   pure subroutine condition_find_force(self, lam, i, force)
+   !> The force on node `i` of a push along the gap and of friction against slips, without an array
+   !> of its own.
+   pure subroutine condition_find_force(self, push, tau, i, force)
       type(condition_t), intent(in) :: self
-      real(wp), intent(in) :: lam                     !! of the row of its gap; 0: none [M L/T^2]
+      real(wp), intent(in) :: push                    !! [M L/T^2]
+      real(wp), intent(in) :: tau(:)                  !! (most_slips) no matter without friction
       integer, intent(in) :: i                        !! 1..n_node
       real(wp), intent(out) :: force(:)               !! (n_dim) [M L/T^2]
-      real(wp) :: tau(most_slips)
       integer :: s
 
-      force = (lam + self%response%lam)*self%g(:, i)
+      force = push*self%g(:, i)
       if (.not. self%has_friction) return
-      tau = condition_drag(self, lam)
       do s = 1, size(self%t, 3)
          force = force - tau(s)*self%t(:, i, s)
       end do
    end subroutine condition_find_force
 
-   !> The part of it that is of the rows.
-   pure subroutine condition_find_rows_force(self, lam, i, force)
+   !> Add `factor` times vectors of the nodes of a condition to a field.
+   pure subroutine condition_add_field(self, factor, part, field)
       type(condition_t), intent(in) :: self
-      real(wp), intent(in) :: lam                     !! of the row of its gap; 0: none [M L/T^2]
-      integer, intent(in) :: i                        !! 1..n_node
-      real(wp), intent(out) :: force(:)               !! (n_dim) [M L/T^2]
-      real(wp) :: tau(most_slips)
-      integer :: s
+      real(wp), intent(in) :: factor
+      real(wp), intent(in) :: part(:, :)              !! (n_dim, >= n_node)
+      real(wp), intent(inout) :: field(:, :)          !! (n_dim, n_node of the scene)
+      integer :: i
 
-      force = lam*self%g(:, i)
-      if (.not. self%has_friction) return
-      tau = condition_friction(self, lam)
-      do s = 1, size(self%t, 3)
-         force = force - tau(s)*self%t(:, i, s)
+      do i = 1, self%n_node
+         field(:, self%node(i)) = field(:, self%node(i)) + factor*part(:, i)
       end do
-   end subroutine condition_find_rows_force
-
-   !> The part of it that laws give beside the rows.
-   pure subroutine condition_find_law_force(self, i, force)
-      type(condition_t), intent(in) :: self
-      integer, intent(in) :: i                        !! 1..n_node
-      real(wp), intent(out) :: force(:)               !! (n_dim) [M L/T^2]
-      integer :: s
-
-      force = self%response%lam*self%g(:, i)
-      if (.not. self%has_friction) return
-      do s = 1, size(self%t, 3)
-         force = force - self%response%tau(s)*self%t(:, i, s)
-      end do
-   end subroutine condition_find_law_force
+   end subroutine condition_add_field
 
    !> The normal force by a multiplier of 1, where friction of 1 acts along the surface with 1:
    !> resultants on the slave side. docs/theory.md, eq. (14r).

@@ -14,7 +14,8 @@ module emcon_numbering
    use emcon_steps, only : prescribed_t
    implicit none
    private
-   public :: numbering_t, numbering_init, pick_unknowns, pick_magnitudes, add_to_dofs
+   public :: numbering_t, numbering_init, numbering_holds, pick_unknowns, pick_magnitudes, &
+      add_to_dofs
    public :: spread_dependent, gather_dependent, numbering_matrix, numbering_links, unresolved_t
 
    type :: numbering_t
@@ -241,6 +242,17 @@ contains
       end function is_dependent
 
    end subroutine collect_terms
+
+   !> Are all freedoms of a node prescribed, or follow from what is?
+   elemental logical function numbering_holds(self, node)
+      type(numbering_t), intent(in) :: self
+      integer, intent(in) :: node                !! of the scene
+
+      associate (n_dim => size(self%unknown, 1))
+         numbering_holds = all(self%column(self%start(n_dim*(node - 1) + 1) + 1: &
+            self%start(n_dim*node + 1)) == 0)
+      end associate
+   end function numbering_holds
 
    !> T^T field: the forces on the unknowns that the forces `field` on all freedoms amount to.
    pure subroutine pick_unknowns(self, field, vector)

@@ -157,25 +157,27 @@ contains
       total%master(n + 1:m) = total%master(n + 1:m) + jump%master_moment/h
       do i = 1, size(jump%node)
          force = jump%impulse(:, i)/h
-         if (i <= jump%n_slave) then
-            call add_force(total%slave(:m), place(:, jump%node(i)), force)
-         else
-            call add_force(total%master(:m), place(:, jump%node(i)), force)
-         end if
+         call add_force(total, i <= jump%n_slave, place(:, jump%node(i)), force)
       end do
       if (is_exchanged) call exchange_sides(total)
    end subroutine add_total
 
-   !> Add a force and its moment.
-   pure subroutine add_force(total, place, force)
-      real(wp), intent(inout) :: total(:)        !! (3 or 6)
+   !> Add a force and its moment on one side.
+   pure subroutine add_force(total, is_slave, place, force)
+      type(pair_total_t), intent(inout) :: total
+      logical, intent(in) :: is_slave            !! else on the master side
       real(wp), intent(in) :: place(:)           !! (n_dim) where it acts [L]
       real(wp), intent(in) :: force(:)           !! (n_dim) [M L/T^2]
-      integer :: n
+      real(wp) :: part(most_components)
+      integer :: n, m
 
       n = size(place)
-      total(:n) = total(:n) + force
-      call add_moments(place, force, total(n + 1:))
+      m = n + n_turn(n)
+      part = merge(total%slave, total%master, is_slave)
+      part(:n) = part(:n) + force
+      call add_moments(place, force, part(n + 1:m))
+      if (is_slave) total%slave = part
+      if (.not. is_slave) total%master = part
    end subroutine add_force
 
    pure subroutine exchange_sides(total)
@@ -195,20 +197,15 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :), du(:, :)
       real(wp), intent(in) :: lag
       real(wp) :: place(size(x, 1)), force(size(x, 1))
-      integer :: k, i, n
+      integer :: k, i
 
-      n = size(x, 1) + n_turn(size(x, 1))
       do k = range%first, range%last
          do i = 1, set%item(k)%n_node
             associate (node => set%item(k)%node(i))
                place = x(:, node) + (u(:, node) - lag*du(:, node))
             end associate
             force = condition_force(set%item(k), constraints_lam(set, k), i)
-            if (i <= set%item(k)%n_slave) then
-               call add_force(total%slave(:n), place, force)
-            else
-               call add_force(total%master(:n), place, force)
-            end if
+            call add_force(total, i <= set%item(k)%n_slave, place, force)
          end do
       end do
    end subroutine add_up

@@ -3,7 +3,7 @@
 !> A pair that is held in both orders, or watched by guards, is one here. Forces are those on the
 !> surface that the deck names first.
 module emcon_pair_sums
-   use emcon_constraint, only : condition_find_law_force, condition_find_rows_force, condition_t
+   use emcon_constraint, only : condition_find_force, condition_friction, condition_t
    use emcon_constraints, only : constraint_set_t, constraints_dissipated, constraints_lam
    use emcon_contact_law, only : loss_damping, loss_friction
    use emcon_evaluation, only : evaluation_contact_place, evaluation_has_inertia
@@ -132,9 +132,9 @@ contains
          associate (node => item%node(i))
             place = motion%x(:, node) + (motion%u0(:, node) + part*motion%du(:, node))
          end associate
-         call condition_find_rows_force(item, lam, i, push)
+         call condition_find_force(item, lam, condition_friction(item, lam), i, push)
          call add_push(sum, h*push, place, side)
-         call condition_find_law_force(item, i, push)
+         call condition_find_force(item, item%response%lam, item%response%tau, i, push)
          if (any(abs(push) > 0.0_wp)) call add_push(sum, h*push, place, side)
       end do
    end subroutine add_forces

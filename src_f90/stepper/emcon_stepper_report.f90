@@ -4,7 +4,7 @@ module emcon_stepper_report
    use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_select
    use emcon_contact, only : gap_state_t
    use emcon_csr, only : csr_copy_filled, csr_t
-   use emcon_curvature, only : curvature_matrix, curvature_times
+   use emcon_curvature, only : curvature_add_times, curvature_matrix
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_numbering, only : numbering_init, numbering_t
@@ -136,7 +136,8 @@ contains
       call check_field("direction", direction, stepper%scene, error)
       if (allocated(error)) return
       allocate(product, mold=direction)
-      call curvature_times(self%march%active%set, factor, direction, product)
+      product = 0.0_wp
+      call curvature_add_times(self%march%active%set, factor, direction, product)
    end subroutine query_curvature_times
 
    !> There are evaluated constraints, and `list` has a number for each of them.

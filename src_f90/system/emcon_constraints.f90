@@ -5,9 +5,8 @@
 !> a sum of displacements; it stands here only where it is not eliminated in the numbering. Sign:
 !> docs/theory.md, eq. (1).
 module emcon_constraints
-   use emcon_constraint, only : condition_find_force, condition_find_law_force, &
-      condition_find_rows_force, condition_friction, condition_t, &
-      constraint_t, contact_response_t, most_slips
+   use emcon_constraint, only : condition_drag, condition_find_force, condition_friction, &
+      condition_t, constraint_t, contact_response_t, most_slips
    use emcon_contact_law, only : contact_laws_dissipated, contact_laws_respond, contact_laws_t, &
       contact_values_t
    use emcon_csr, only : csr_t
@@ -19,8 +18,8 @@ module emcon_constraints
    private
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_force
    public :: constraints_stick, constraints_take_hold, constraints_gives_back
-   public :: constraints_add_forces, constraints_add_law_forces, constraints_add_row_forces, &
-      constraints_lam, constraints_dissipated
+   public :: constraints_add_law_forces, constraints_add_row_forces, constraints_lam, &
+      constraints_dissipated
    public :: constraint_index
 
    !> Of the rows of gaps that do not hold: laws give their multipliers.
@@ -260,52 +259,50 @@ contains
       real(wp), intent(out), contiguous :: force(:, :)                   !! (n_dim, n_node)
       real(wp), intent(inout), contiguous, optional :: magnitude(:, :)   !! (n_dim, n_node)
 
+      real(wp) :: lam
+      integer :: k
+
       call vector_zero(size(force), force)
-      if (first <= self%n_condition) call constraints_add_forces(self, first, self%n_condition, &
-         force, magnitude)
+      do k = first, self%n_condition
+         lam = constraints_lam(self, k)
+         call add_force(self%item(k), lam + self%item(k)%response%lam, &
+            condition_drag(self%item(k), lam), force, magnitude)
+      end do
    end subroutine constraints_force
 
-   !> Add the forces of the conditions `first` to `last`.
-   pure subroutine constraints_add_forces(self, first, last, force, magnitude)
-      type(constraint_set_t), intent(in) :: self
-      integer, intent(in) :: first, last         !! places in the set, from 1
+   !> Add the forces of one condition by a push along its gap and friction against its slips.
+   pure subroutine add_force(item, push, tau, force, magnitude)
+      type(condition_t), intent(in) :: item
+      real(wp), intent(in) :: push, tau(:)
       real(wp), intent(inout), contiguous :: force(:, :)                 !! (n_dim, n_node)
       real(wp), intent(inout), contiguous, optional :: magnitude(:, :)   !! (n_dim, n_node)
-      real(wp) :: part(size(force, 1)), lam
-      integer :: k, i, node
+      real(wp) :: part(most_slips + 1)
+      integer :: i, n
 
-      do k = first, last
-         lam = constraints_lam(self, k)
-         do i = 1, self%item(k)%n_node
-            node = self%item(k)%node(i)
-            call condition_find_force(self%item(k), lam, i, part)
-            force(:, node) = force(:, node) + part
-            if (present(magnitude)) magnitude(:, node) = magnitude(:, node) + abs(part)
-         end do
+      n = size(force, 1)
+      do i = 1, item%n_node
+         associate (node => item%node(i))
+            call condition_find_force(item, push, tau, i, part(:n))
+            force(:, node) = force(:, node) + part(:n)
+            if (present(magnitude)) magnitude(:, node) = magnitude(:, node) + abs(part(:n))
+         end associate
       end do
-   end subroutine constraints_add_forces
+   end subroutine add_force
 
    !> Add the forces of laws beside the rows.
    pure subroutine constraints_add_law_forces(self, force, are_some)
       type(constraint_set_t), intent(in) :: self
       real(wp), intent(inout), contiguous :: force(:, :)                 !! (n_dim, n_node)
       logical, intent(out) :: are_some           !! there are any
-      real(wp) :: part(most_slips + 1)
-      integer :: k, i, n
+      integer :: k
 
-      n = size(force, 1)
       are_some = .false.
       do k = self%n_permanent + 1, self%n_condition
          associate (response => self%item(k)%response)
             if (.not. (abs(response%lam) > 0.0_wp .or. any(abs(response%tau) > 0.0_wp))) cycle
+            are_some = .true.
+            call add_force(self%item(k), response%lam, response%tau, force)
          end associate
-         are_some = .true.
-         do i = 1, self%item(k)%n_node
-            call condition_find_law_force(self%item(k), i, part(:n))
-            associate (node => self%item(k)%node(i))
-               force(:, node) = force(:, node) + part(:n)
-            end associate
-         end do
       end do
    end subroutine constraints_add_law_forces
 
@@ -314,17 +311,10 @@ contains
       type(constraint_set_t), intent(in) :: self
       real(wp), intent(in) :: lam(:)             !! (n) [M L/T^2]
       real(wp), intent(inout), contiguous :: force(:, :)                 !! (n_dim, n_node)
-      real(wp) :: part(most_slips + 1)
-      integer :: k, i, n
+      integer :: k
 
-      n = size(force, 1)
       do k = 1, self%n
-         do i = 1, self%item(k)%n_node
-            call condition_find_rows_force(self%item(k), lam(k), i, part(:n))
-            associate (node => self%item(k)%node(i))
-               force(:, node) = force(:, node) + part(:n)
-            end associate
-         end do
+         call add_force(self%item(k), lam(k), condition_friction(self%item(k), lam(k)), force)
       end do
    end subroutine constraints_add_row_forces
 

@@ -7,7 +7,7 @@ module emcon_curvature
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: curvature_matrix, curvature_times
+   public :: curvature_matrix, curvature_add_times
 
 contains
 
@@ -42,15 +42,14 @@ contains
       call csr_from_values(matrix, n_dof, n_dof, row, column, value)
    end subroutine curvature_matrix
 
-   !> The same times `direction`.
-   subroutine curvature_times(self, factor, direction, product)
+   !> Add the same times `direction`.
+   subroutine curvature_add_times(self, factor, direction, product)
       type(constraint_set_t), intent(in) :: self     !! evaluated
       real(wp), intent(in) :: factor(:)              !! (n) multipliers [M L/T^2]
       real(wp), intent(in) :: direction(:, :)        !! (n_dim, n_node)
-      real(wp), intent(out) :: product(:, :)         !! (n_dim, n_node)
+      real(wp), intent(inout) :: product(:, :)       !! (n_dim, n_node)
       integer :: k, i, j
 
-      product = 0.0_wp
       do k = 1, self%n
          associate (item => self%item(k), n_dim => size(direction, 1))
             do j = 1, item%n_node
@@ -62,6 +61,6 @@ contains
             end do
          end associate
       end do
-   end subroutine curvature_times
+   end subroutine curvature_add_times
 
 end module emcon_curvature
