@@ -4,8 +4,7 @@ module emcon_active_set
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_gives_back, &
       constraints_select
    use emcon_contact_support, only : contact_support_forget, contact_support_t
-   use emcon_near_laws, only : near_laws_are_none, near_laws_restart, near_laws_select, &
-      near_laws_t, near_laws_update
+   use emcon_near_laws, only : near_laws_are_none, near_laws_select, near_laws_t, near_laws_update
    use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_friction, only : friction_begin, friction_init, friction_select, friction_t
    use emcon_gaps, only : gaps_forget, pair_measure, pair_search
@@ -196,7 +195,7 @@ contains
       self%n_stale = 0
       self%n_early = 0
       self%penalty%n_augmentation = 0
-      call near_laws_restart(self%near_laws)
+      if (self%near_laws%is_on) self%near_laws%is_near = .false.
       self%only_adds = .false.
       self%has_cycled = .false.
       self%is_candidate = self%was_active
@@ -292,12 +291,16 @@ contains
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       logical, intent(in), optional :: is_measured   !! as the gaps were when last looked at
+      logical :: is_known
       integer :: k, pair, i
 
-      call remember(self)
+      self%n_tried = self%n_tried + 1
+      self%tried(:, self%n_tried) = self%is_active
       if (self%set%n_condition == 0 .and. .not. (any(self%is_active) .or. self%near_laws%is_on)) &
          return
-      if (.not. knows_gaps()) call measure_all(self, system, motion)
+      is_known = .false.
+      if (present(is_measured)) is_known = is_measured
+      if (.not. is_known) call measure_all(self, system, motion)
       if (self%near_laws%is_on) then
          call find_near(self, system)
          call constraints_select(self%set, places_of(self%is_active), &
@@ -329,14 +332,6 @@ contains
       call friction_select(self%friction, self%set, self%n_tried)
       call penalty_select(self%penalty, system, self%set, self%has_impacts .and. &
          .not. motion%evaluation%pushes_at_end)
-
-   contains
-
-      logical function knows_gaps()
-         knows_gaps = .false.
-         if (present(is_measured)) knows_gaps = is_measured
-      end function knows_gaps
-
    end subroutine active_set_select
 
    !> Where a list is true.
@@ -429,12 +424,5 @@ contains
       self%is_active = self%is_active .and. .not. self%is_dropped
       self%n_tried = 0
    end subroutine active_set_drop
-
-   subroutine remember(self)
-      type(active_set_t), intent(inout) :: self
-
-      self%n_tried = self%n_tried + 1
-      self%tried(:, self%n_tried) = self%is_active
-   end subroutine remember
 
 end module emcon_active_set

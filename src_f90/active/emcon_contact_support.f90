@@ -258,8 +258,7 @@ contains
       share = free%along/norm2(free%along)
       rigid = matmul(free%z, share)
       call mechanism_field(bodies, free%member, rigid, direction)
-      call gaps_evaluate(system, motion, gaps_that_can_act(system) &
-         .and. .not. is_active, set)
+      call gaps_evaluate(system, motion, gaps_that_can_act(system) .and. .not. is_active, set)
       call gaps_next_to_close(set, direction, time, is_next)
       self%is_pushed = .not. any(is_next)
       if (self%is_pushed) then

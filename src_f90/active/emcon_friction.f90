@@ -6,7 +6,7 @@
 !> to be candidates within the step. Source: docs/theory.md, section 4.13.
 module emcon_friction
    use emcon_constraint, only : condition_friction, condition_normal, condition_t
-   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_stick
+   use emcon_constraints, only : constraint_set_t, constraints_stick
    use emcon_contact, only : contact_t
    use emcon_contact_law, only : contact_laws_add
    use emcon_coulomb_law, only : contact_free, contact_open, contact_slides, contact_sticks, &
@@ -137,23 +137,12 @@ contains
             do i = 1, contact%n_constraint
                id = system%first_constraint(pair) + i
                if (.not. was_active(id)) cycle
-               if (self%law(id)%mu > 0.0_wp) call find_target(self%law(id), contact, i, motion, du)
+               if (self%law(id)%mu > 0.0_wp) call self%law(id)%leads_to(contact%slip(i, motion%x, &
+                  motion%u0, du), slip_rounding*contact%state(i)%size)
             end do
          end associate
       end do
    end subroutine find_targets
-
-   !> The slip with which contact `i` of a pair ends its velocity along the surface.
-   pure subroutine find_target(law, contact, i, motion, du)
-      type(coulomb_t), intent(inout) :: law
-      class(contact_t), intent(in) :: contact
-      integer, intent(in) :: i
-      type(motion_t), intent(in) :: motion
-      real(wp), intent(in) :: du(:, :)           !! (n_dim, n_node) the way to that end [L]
-
-      call law%leads_to(contact%slip(i, motion%x, motion%u0, du), &
-         slip_rounding*contact%state(i)%size)
-   end subroutine find_target
 
    !> Give the conditions of `set`, just selected, their laws, and what sticks rows of its slips.
    pure subroutine friction_select(self, set, n_tried)
@@ -283,8 +272,8 @@ contains
             contact => system%contact(pair)%contact)
          if (.not. law%mu > 0.0_wp) return
          if (is_new .and. .not. evaluation_is_equilibrium(motion%evaluation)) then
-            call find_target(law, contact, i, motion, evaluation_displacement(motion%evaluation, &
-               motion%v0, 0.0_wp))
+            call law%leads_to(contact%slip(i, motion%x, motion%u0, evaluation_displacement( &
+               motion%evaluation, motion%v0, 0.0_wp)), slip_rounding*contact%state(i)%size)
          end if
          at%gap = min(gap, -tiny(gap))
          at%slip(:self%n_slip) = contact%slip(i, motion%x, motion%u0, motion%du)

@@ -6,7 +6,7 @@
 !> docs/theory.md, section 4.13, eq. (14i).
 module emcon_friction_referee
    use emcon_active_set, only : active_set_select, active_set_t, step_cycling, step_done
-   use emcon_constraint, only : condition_t
+   use emcon_constraint, only : condition_row_gradient, condition_t
    use emcon_constraints, only : constraints_evaluate
    use emcon_correction, only : correction_t
    use emcon_errors, only : error_t
@@ -84,55 +84,44 @@ contains
          call pick_unknowns(numbering, system%response%residual, force)
          call flexibility_move(flexibility, -force, displacement, error)
          if (allocated(error)) return
-         problem%gap = self%set%defect(first:self%set%n) + gap_rates(numbering, item(:n), &
+         problem%gap = self%set%defect(first:self%set%n) + rates(numbering, item(:n), 0, &
             displacement)
-         problem%slip = slip_rates(numbering, item(:n), displacement)
+         problem%slip = -rates(numbering, item(:n), 1, displacement)
          where (item(:n)%has_friction) problem%slip = problem%slip + item(:n)%slip(1)
          do i = 1, n
             call flexibility_move(flexibility, flexibility_row(numbering, item(i), item(i)%g), &
                displacement, error)
             if (allocated(error)) return
-            problem%w(:n, i) = gap_rates(numbering, item(:n), displacement)
-            problem%w(n + 1:, i) = -slip_rates(numbering, item(:n), displacement)
+            problem%w(:n, i) = rates(numbering, item(:n), 0, displacement)
+            problem%w(n + 1:, i) = rates(numbering, item(:n), 1, displacement)
             ! Without friction there is no slip to solve for: any one by itself.
             problem%w(n + i, n + i) = problem%w(i, i)
             if (.not. item(i)%has_friction) cycle
             call flexibility_move(flexibility, flexibility_row(numbering, item(i), &
                -item(i)%t(:, :, 1)), displacement, error)
             if (allocated(error)) return
-            problem%w(:n, n + i) = gap_rates(numbering, item(:n), displacement)
-            problem%w(n + 1:, n + i) = -slip_rates(numbering, item(:n), displacement)
+            problem%w(:n, n + i) = rates(numbering, item(:n), 0, displacement)
+            problem%w(n + 1:, n + i) = rates(numbering, item(:n), 1, displacement)
          end do
       end associate
    end subroutine condense
 
-   !> What gaps change by over a motion, to first order.
-   pure function gap_rates(numbering, item, displacement) result(rate)
+   !> What gaps change by over a motion, to first order, or slips, with the other sign; 0 without
+   !> friction.
+   pure function rates(numbering, item, slip, displacement) result(rate)
       type(numbering_t), intent(in) :: numbering
       type(condition_t), intent(in) :: item(:)   !! (n)
-      real(wp), intent(in) :: displacement(:)    !! (n_unknown) [L]
-      real(wp) :: rate(size(item))               !! (n) [L]
-      integer :: i
-
-      do i = 1, size(item)
-         rate(i) = dot_product(flexibility_row(numbering, item(i), item(i)%c), displacement)
-      end do
-   end function gap_rates
-
-   !> The same of slips; 0 without friction.
-   pure function slip_rates(numbering, item, displacement) result(rate)
-      type(numbering_t), intent(in) :: numbering
-      type(condition_t), intent(in) :: item(:)   !! (n)
+      integer, intent(in) :: slip                !! 0: of gaps
       real(wp), intent(in) :: displacement(:)    !! (n_unknown) [L]
       real(wp) :: rate(size(item))               !! (n) [L]
       integer :: i
 
       rate = 0.0_wp
       do i = 1, size(item)
-         if (item(i)%has_friction) rate(i) = dot_product(flexibility_row(numbering, item(i), &
-            item(i)%t1(:, :, 1)), displacement)
+         if (slip == 0 .or. item(i)%has_friction) rate(i) = dot_product(flexibility_row( &
+            numbering, item(i), condition_row_gradient(item(i), slip)), displacement)
       end do
-   end function slip_rates
+   end function rates
 
    !> The set that the problem ends with, and its forces to start from.
    subroutine follow(self, problem, is_solved)

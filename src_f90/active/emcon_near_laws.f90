@@ -13,8 +13,8 @@ module emcon_near_laws
    use emcon_system, only : system_t
    implicit none
    private
-   public :: near_laws_t, near_laws_begin_step, near_laws_restart, near_laws_update, &
-      near_laws_select, near_laws_are_none
+   public :: near_laws_t, near_laws_begin_step, near_laws_update, near_laws_select, &
+      near_laws_are_none
 
    !> A gap of less than this fraction of an edge is round-off.
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
@@ -38,7 +38,7 @@ contains
       integer :: k
 
       do k = 1, size(system%contact)
-         self%is_on = self%is_on .or. reach_of(system%contact(k)%contact) >= 0.0_wp
+         self%is_on = self%is_on .or. contact_laws_reach(system%contact(k)%contact%laws) >= 0.0_wp
       end do
       self%is_on = self%is_on .and. step_is_dynamic(step)
       if (.not. self%is_on) return
@@ -46,7 +46,7 @@ contains
       allocate(self%is_near(system%n_constraint), source=.false.)
       do k = 1, size(system%contact)
          associate (contact => system%contact(k)%contact, before => system%first_constraint(k))
-            if (reach_of(contact) < 0.0_wp) cycle
+            if (contact_laws_reach(contact%laws) < 0.0_wp) cycle
             associate (area => self%area(before + 1:before + contact%n_constraint))
                call contact%own_area(scene%x, area)
                if (.not. sum(area) > 0.0_wp) area = 1.0_wp
@@ -56,27 +56,13 @@ contains
       end do
    end subroutine near_laws_begin_step
 
-   !> An increment begins, or begins again.
-   pure subroutine near_laws_restart(self)
-      type(near_laws_t), intent(inout) :: self
-
-      if (self%is_on) self%is_near = .false.
-   end subroutine near_laws_restart
-
-   !> The gap up to which such laws of a contact act [L]; < 0: there are none.
-   pure real(wp) function reach_of(contact)
-      class(contact_t), intent(in) :: contact
-
-      reach_of = contact_laws_reach(contact%laws)
-   end function reach_of
-
    !> Has a contact no such laws, in this step?
    pure logical function near_laws_are_none(self, contact) result(are_none)
       type(near_laws_t), intent(in) :: self
       class(contact_t), intent(in) :: contact
 
       are_none = .not. self%is_on
-      if (.not. are_none) are_none = reach_of(contact) < 0.0_wp
+      if (.not. are_none) are_none = contact_laws_reach(contact%laws) < 0.0_wp
    end function near_laws_are_none
 
    !> Take in what contact `k`, measured, finds near enough.
@@ -108,7 +94,7 @@ contains
             gap%is_leaving)
          comes_near = comes_near .and. &
             gap%gap0 >= -contact%max_penetration_at_start*gap%size .and. &
-            (min(gap%gap0, gap%gap1) < reach_of(contact) .or. touches(contact, i))
+            (min(gap%gap0, gap%gap1) < contact_laws_reach(contact%laws) .or. touches(contact, i))
       end associate
    end function comes_near
 
@@ -118,8 +104,8 @@ contains
       class(contact_t), intent(in) :: contact
       integer, intent(in) :: i
 
-      touches = .not. (reach_of(contact) > 0.0_wp .or. contact%step%is_penalty) .and. &
-         contact%state(i)%gap0 <= touch_tol*contact%state(i)%size
+      touches = .not. (contact_laws_reach(contact%laws) > 0.0_wp .or. contact%step%is_penalty) &
+         .and. contact%state(i)%gap0 <= touch_tol*contact%state(i)%size
    end function touches
 
    !> Let such laws act on the conditions of `set` that are near, beside their rows or where they

@@ -71,8 +71,7 @@ contains
          call system%term(k)%term%add_stiffness(inner)
       end do
       mass = 0.0_wp
-      if (self%augments .and. step_is_dynamic(step)) call terms_mass_rows(system%term, &
-         mass)
+      if (self%augments .and. step_is_dynamic(step)) call terms_mass_rows(system%term, mass)
       inner = inner + 2.0_wp*mass/step%time%h**2
       do k = 1, size(system%contact)
          call set_contact(self, system, scene, step, k, inner, error)

@@ -114,26 +114,27 @@ contains
       real(wp), intent(in) :: size               !! >= 0
       logical, intent(in) :: is_rounding         !! nothing else is left
       integer, intent(out) :: next               !! one of the `next_` codes
-
-      if (self%is_kept) then
-         call judge_kept(self, size, is_rounding, next)
-      else
-         call judge_newton(self, size, is_rounding, next)
-      end if
-   end subroutine convergence_judge
-
-   !> On with a kept factor down to round-off as long as that gains, then with a new one, once.
-   pure subroutine judge_kept(self, size, is_rounding, next)
-      type(convergence_t), intent(inout) :: self
-      real(wp), intent(in) :: size
-      logical, intent(in) :: is_rounding
-      integer, intent(out) :: next
-      logical :: is_stalled, has_gained
+      logical :: has_gained
 
       self%n_history = self%n_history + 1
       self%history(self%n_history) = size
       has_gained = size <= polish_gain*self%last
       self%last = size
+      if (self%is_kept) then
+         call judge_kept(self, size, is_rounding, has_gained, next)
+      else
+         call judge_newton(self, size, is_rounding, has_gained, next)
+      end if
+   end subroutine convergence_judge
+
+   !> On with a kept factor down to round-off as long as that gains, then with a new one, once.
+   pure subroutine judge_kept(self, size, is_rounding, has_gained, next)
+      type(convergence_t), intent(inout) :: self
+      real(wp), intent(in) :: size
+      logical, intent(in) :: is_rounding, has_gained
+      integer, intent(out) :: next
+      logical :: is_stalled
+
       self%knows_sizes = size < near
       self%n_stall = self%n_stall + 1
       if (size < stall_gain*self%best) self%n_stall = 0
@@ -160,17 +161,12 @@ contains
 
    !> Once it is within the tolerance, or nothing but round-off, go on with the old tangent as long
    !> as that gains.
-   pure subroutine judge_newton(self, size, is_rounding, next)
+   pure subroutine judge_newton(self, size, is_rounding, has_gained, next)
       type(convergence_t), intent(inout) :: self
-      real(wp), intent(in) :: size               !! >= 0
-      logical, intent(in) :: is_rounding         !! nothing else is left
-      integer, intent(out) :: next               !! one of the `next_` codes
-      logical :: has_gained
+      real(wp), intent(in) :: size
+      logical, intent(in) :: is_rounding, has_gained
+      integer, intent(out) :: next
 
-      self%n_history = self%n_history + 1
-      self%history(self%n_history) = size
-      has_gained = size <= polish_gain*self%last
-      self%last = size
       next = next_done
       if (size <= round_off) return
       if (size <= self%tolerance .and. .not. self%polishes) return

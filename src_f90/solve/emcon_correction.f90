@@ -15,8 +15,7 @@ module emcon_correction
    use emcon_saddle_point, only : saddle_point_factorise, saddle_point_free, saddle_point_init, &
       saddle_point_reset, saddle_point_solve, saddle_point_t
    use emcon_solver_registry, only : solver_create, solver_default
-   use emcon_sparse_solver, only : matrix_definite, matrix_general, solver_renew, &
-      sparse_solver_t
+   use emcon_sparse_solver, only : matrix_definite, matrix_general, solver_renew, sparse_solver_t
    use emcon_steps, only : method_null_space
    use emcon_system, only : system_t
    use emcon_timer, only : stopwatch_start, stopwatch_stop, stopwatch_t
@@ -294,8 +293,7 @@ contains
       self%is_definite = .false.
       if (is_symmetric) then
          call self%definite_solver%analyse(matrix, error)
-         if (.not. allocated(error)) call solver_renew(self%definite_solver, &
-            matrix%value, error)
+         if (.not. allocated(error)) call solver_renew(self%definite_solver, matrix%value, error)
          if (allocated(error)) return
          self%is_definite = .not. self%definite_solver%is_singular
       end if

@@ -118,8 +118,7 @@ contains
       if (allocated(self%proposed)) then
          if (size(self%proposed) /= n_unknown) deallocate(self%proposed, self%made)
       end if
-      if (.not. allocated(self%proposed)) allocate(self%proposed(n_unknown), &
-         self%made(n_unknown))
+      if (.not. allocated(self%proposed)) allocate(self%proposed(n_unknown), self%made(n_unknown))
       self%knows_set = .false.
       self%n_look = 0
       call mixing_begin(self%mixing, n_unknown)

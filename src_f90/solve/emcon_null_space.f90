@@ -79,9 +79,7 @@ contains
       type(constraint_set_t), intent(in) :: set
       type(numbering_t), intent(in) :: numbering
 
-      call begin(self, numbering%n_unknown, set%n_row)
-      self%n_entry = huge(self%n_entry)                  ! no N to be compared with
-      call null_space_update(self, set, numbering)
+      call null_space_init(self, set, huge(self%n_entry), numbering)     ! no N to compare with
       if (self%obstacle /= obstacle_none) return
       call lay_out_matrices(self, set%force_rows)
       call fill_matrices(self, set)
