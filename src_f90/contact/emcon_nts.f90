@@ -3,7 +3,7 @@
 !> The master surface is a polygon, or smoothed. A surface may be in contact with itself.
 !> Source: docs/theory.md, section 4.
 module emcon_nts
-   use emcon_arcs_plane, only : arc_rise, arcs_find
+   use emcon_arcs_plane, only : arc_height, arcs_find
    use emcon_chain_plane, only : chain_corners, chain_tributary
    use emcon_constraint, only : condition_t
    use emcon_contact, only : gap_state_t
@@ -18,8 +18,7 @@ module emcon_nts
       choice_settle, choice_take_nearer, nts_choice_t
    use emcon_nts_constraint, only : polygon_constraint, smooth_constraint
    use emcon_nts_gap_value, only : nts_gap_value
-   use emcon_nts_stencil, only : most_nodes, part_of_sector, polygon_slip, stencil_gather, &
-      stencil_length
+   use emcon_nts_stencil, only : most_nodes, polygon_slip, stencil_gather, stencil_length
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t
    use emcon_slip_point, only : slip_list_t, slip_over
@@ -141,19 +140,20 @@ contains
       end do
    end subroutine nts_begin_step
 
-   !> How far the arc of the master rises over its edge where node `i` stands.
+   !> How much higher the arc of the master is than its edge where node `i` stands.
    pure real(wp) function sagitta_under(self, i, x, u0) result(sagitta)
       type(nts_t), intent(in) :: self
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      real(wp), dimension(size(x, 1), most_nodes) :: local, dlocal
+      real(wp), dimension(size(x, 1), 3) :: local, dlocal
+      real(wp) :: gap, xi
 
       sagitta = 0.0_wp
       if (self%edge(i) == 0) return
-      associate (stencil => self%polygon(1, i), e => self%edge(i))
-         call stencil_gather(x, u0, u0, stencil%n, stencil%node, local, dlocal)
-         sagitta = arc_rise(self%curvature(e), self%master%size(e), &
-            part_of_sector(local(:, :stencil%n), stencil%before, stencil%after), 0.0_wp)
+      associate (length => self%master%size(self%edge(i)))
+         call stencil_gather(x, u0, u0, 3, self%polygon(1, i)%node, local, dlocal)
+         call nts_gap_value(local, 0, 0, self%polygon(1, i)%rounding, gap, xi)
+         sagitta = arc_height(self%curvature(self%edge(i)), length, (xi - 0.5_wp)*length, gap)
       end associate
    end function sagitta_under
 

@@ -10,7 +10,7 @@ module emcon_nts_stencil
    implicit none
    private
    public :: polygon_stencil_t, polygon_stencil, smooth_stencil_t, smooth_stencil, edge_of_sector
-   public :: part_of_sector, polygon_slip, stencil_gather, stencil_length, edge_distance, is_outside
+   public :: polygon_slip, stencil_gather, stencil_length, edge_distance, is_outside
    public :: most_nodes
 
    !> Nodes of a stencil at most: slave node and five edges.
@@ -201,35 +201,6 @@ contains
 
       polygon_slip = slip_point(self%node([slave, slave, first, last]), 0.0_wp, weight)
    end function polygon_slip
-
-   !> Where the slave node is between the bisectors at both ends of the edge, 0 at the first and 1
-   !> at the last: over a node of an arc that is the node, at any distance from it.
-   pure real(wp) function part_of_sector(x, before, after) result(part)
-      real(wp), intent(in) :: x(:, :)            !! (2, 3 to 5) of the stencil's nodes [L]
-      integer, intent(in) :: before, after       !! local numbers as in `polygon_stencil_t`
-      real(wp) :: along(size(x, 1)), from, to
-
-      along = vector(first, last)
-      from = dot_product(vector(first, slave), along)
-      to = dot_product(vector(slave, last), along)
-      if (before > 0) from = 0.5_wp*(from + dot_product(vector(first, slave), vector(before, &
-         first)))
-      if (after > 0) to = 0.5_wp*(to + dot_product(vector(slave, last), vector(last, after)))
-      part = 0.5_wp
-      if (from + to > 0.0_wp) part = from/(from + to)
-
-   contains
-
-      !> The direction from node `p` to node `q`; to the slave node the whole way.
-      pure function vector(p, q)
-         integer, intent(in) :: p, q
-         real(wp) :: vector(size(x, 1))
-
-         vector = x(:, q) - x(:, p)
-         if (p /= slave .and. q /= slave) vector = vector/sqrt(dot_product(vector, vector))
-      end function vector
-
-   end function part_of_sector
 
    !> Reference length of the stencil's edge: what gaps are measured against.
    pure real(wp) function stencil_length(x, node)

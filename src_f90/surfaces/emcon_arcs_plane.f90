@@ -8,7 +8,7 @@ module emcon_arcs_plane
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: arc_curvature, arc_rise, arcs_find
+   public :: arc_curvature, arc_height, arc_rise, arcs_find
 
 contains
 
@@ -66,6 +66,21 @@ contains
          + sqrt(max(0.0_wp, (1.0_wp - 0.25_wp*(curvature*length)**2)*(1.0_wp - lean**2)))
       rise = half/(along + sqrt(max(epsilon(1.0_wp), along**2 + curvature*half)))
    end function arc_rise
+
+   !> How much higher an arc is than its edge where the ray from its center through a node meets it,
+   !> > 0 out of the body [L]. Source: docs/theory.md, eq. (20h).
+   elemental real(wp) function arc_height(curvature, length, along, above) result(height)
+      real(wp), intent(in) :: curvature          !! [1/L]
+      real(wp), intent(in) :: length             !! of the edge [L]
+      real(wp), intent(in) :: along, above       !! of the node from the middle of the edge [L]
+      real(wp) :: cosine, place, half, ratio
+
+      cosine = sqrt(max(epsilon(1.0_wp), 1.0_wp - 0.25_wp*(curvature*length)**2))
+      place = along*(cosine/max(epsilon(1.0_wp), cosine + curvature*above))
+      half = curvature*max(0.0_wp, 0.25_wp*length**2 - place**2)
+      ratio = sqrt(max(epsilon(1.0_wp), 1.0_wp - curvature*half))
+      height = half*cosine/(ratio*(1.0_wp + ratio))
+   end function arc_height
 
    !> The arcs of all edges of a surface in the reference configuration.
    pure subroutine arcs_find(chain, x, angle, curvature)

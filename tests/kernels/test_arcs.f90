@@ -1,7 +1,7 @@
 !> Arcs that edges are chords of: circles in closed form, what is no arc, and gaps between arcs.
 module test_arcs
    use check, only : check_near, check_true, test_case_t
-   use emcon_arcs_plane, only : arc_rise, arcs_find
+   use emcon_arcs_plane, only : arc_height, arc_rise, arcs_find
    use emcon_chain_plane, only : chain_init, chain_t
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t
@@ -63,11 +63,35 @@ contains
                place = scene%x(:, chain%facet(1, e)) + share*a + [a(2), -a(1)]/norm2(a) &
                   *arc_rise(curvature(e), chain%size(e), share, 0.0_wp)
                call check_near(error, norm2(place), 2.0_wp, tol, 1.0_wp, "radius")
+               call check_height(scene%x(:, chain%facet(:, e)), share, curvature(e), error)
             end do
          end do
          deallocate(curvature)
       end do
    end subroutine test_circle
+
+   !> The arc under nodes on one radius, from inside and outside and however far off.
+   subroutine check_height(x, share, curvature, error)
+      real(wp), intent(in) :: x(2, 2)            !! ends of an edge on the radius 2
+      real(wp), intent(in) :: share              !! of it, where the radius goes through
+      real(wp), intent(in) :: curvature
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp), parameter :: radius(3) = [1.7_wp, 2.0_wp, 2.5_wp]
+      real(wp) :: along(2), normal(2), middle(2), direction(2), node(2)
+      integer :: k
+
+      along = (x(:, 2) - x(:, 1))/norm2(x(:, 2) - x(:, 1))
+      normal = [along(2), -along(1)]
+      middle = 0.5_wp*(x(:, 1) + x(:, 2))
+      direction = x(:, 1) + share*(x(:, 2) - x(:, 1))
+      direction = direction/norm2(direction)
+      do k = 1, size(radius)
+         node = radius(k)*direction - middle
+         call check_near(error, arc_height(curvature, norm2(x(:, 2) - x(:, 1)), &
+            dot_product(node, along), dot_product(node, normal)), &
+            dot_product(2.0_wp*direction - middle, normal), tol, 1.0_wp, "along a radius")
+      end do
+   end subroutine check_height
 
    !> Sides of four edges by the heights of their nodes.
    subroutine test_no_arc(error)
@@ -147,9 +171,8 @@ contains
             if (allocated(error)) return
             associate (name => "combination " // to_text(k) // ", side " // to_text(side))
                call check_true(error, all(contact%state%is_near .and. contact%state%is_over), name)
-               ! Gaps of nodes are those of edges whose corners are rounded.
-               call check_true(error, maxval(abs(contact%state%gap0)) <= merge(0.01_wp*sagitta, &
-                  tol, k <= 2), "gaps between arcs, " // name)
+               call check_near(error, maxval(abs(contact%state%gap0)), 0.0_wp, tol, sagitta, &
+                  "gaps between arcs, " // name)
                call check_true(error, maxval(abs(chords%state%gap0)) > 0.1_wp*sagitta, &
                   "gaps between chords, " // name)
                do i = 1, contact%n_constraint

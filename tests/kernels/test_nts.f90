@@ -7,7 +7,7 @@ module test_nts
    use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite
    use emcon_kinds, only : wp
    use emcon_nts, only : nts_init, nts_nearest, nts_t
-   use emcon_nts_stencil, only : part_of_sector, smooth_stencil, smooth_stencil_t
+   use emcon_nts_stencil, only : smooth_stencil, smooth_stencil_t
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
    use emcon_touch_rule_plane, only : touch_rule_may
@@ -38,7 +38,6 @@ contains
          test_case_t("a strip in contact with itself", test_self), &
          test_case_t("corners that meet are held by the faces that bear", test_corners), &
          test_case_t("faces stay chosen where gaps are evaluated at the end", test_faces_stay), &
-         test_case_t("where a node stands on an arc", test_part_of_sector), &
          test_case_t("sharp corners are the polygon, round ones stand out", test_sharp), &
          test_case_t("wide tops where corners face each other", test_wide_tops)]
    end subroutine collect_nts
@@ -142,28 +141,6 @@ contains
       i = findloc(item(1)%node(:item(1)%n_node), nts%node(own), 1)
       call check_near(error, item(1)%c(:, i), [0.0_wp, 1.0_wp], tol, 1.0_wp, "its gradient")
    end subroutine test_faces_stay
-
-   !> Of a regular polygon, from inside and outside and however far off: over its nodes a node is at
-   !> the ends of an edge, over the middle of that in its middle, and turned about it on the other
-   !> side by as much.
-   subroutine test_part_of_sector(error)
-      type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: half = acos(-1.0_wp)/12.0_wp, off(3) = [0.7_wp, 1.0_wp, 1.4_wp]
-      real(wp) :: x(2, 5), part(-4:4)
-      integer :: i, k
-
-      x(:, 2:) = reshape([-sin(half), cos(half), sin(half), cos(half), -sin(3.0_wp*half), &
-         cos(3.0_wp*half), sin(3.0_wp*half), cos(3.0_wp*half)], [2, 4])
-      do k = 1, size(off)
-         do i = -4, 4
-            x(:, 1) = off(k)*[sin(0.25_wp*half*real(i, wp)), cos(0.25_wp*half*real(i, wp))]
-            part(i) = part_of_sector(x, 4, 5)
-         end do
-         call check_near(error, part([-4, 0, 4]), [0.0_wp, 0.5_wp, 1.0_wp], tol, 1.0_wp, "places")
-         call check_near(error, part, 1.0_wp - part(4:-4:-1), tol, 1.0_wp, "mirrored")
-         call check_true(error, all(part(-3:) > part(:3)), "in order")
-      end do
-   end subroutine test_part_of_sector
 
    !> A node beside the bisector of a corner of a right angle, by half of the width over which the
    !> corner is rounded: with `is_sharp` the gap is that over the polygon, else it is smaller, by a
