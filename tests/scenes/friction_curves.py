@@ -67,23 +67,31 @@ def bush(cells, smoothing="NONE", mu=0.3, fit=0.02, turn=0.1):
     return Deck(head + "".join(f"*STEP, NLGEOM\n{begin}\n{body}" for begin in (fitted, turned)))
 
 
-def bush_torques(run, mu=0.3):
-    """Of each increment in which all slides: the torque at the hub by mu times all the pressure on
-    it, radius 1, added up from the places of nodes."""
+def bush_torques(run, edges, mu=0.3):
+    """Of each increment in which all slides, by mu times all the pressure on the hub, radius 1: the
+    torque, and the moments of what the nodes of the hole push with across and along the `edges`
+    that they stand over."""
     fields = run.fields()
     hole = np.flatnonzero(fields["contact_status"][-1] > 0)
+    rim = np.setdiff1d(np.flatnonzero(np.abs(np.linalg.norm(fields.x, axis=1) - 1) < 1e-9), hole)[0]
     place = fields.x + fields["displacement"]
     seen = []
     for k, now in enumerate(place[:, hole]):
         if not (fields["contact_status"][k, hole] == 2).all():
             continue
-        around = now[np.argsort(np.arctan2(now[:, 1], now[:, 0]))]
+        angle = np.arctan2(now[:, 1], now[:, 0])
+        order = np.argsort(angle)
+        around = now[order]
         edge = np.linalg.norm(np.roll(around, -1, 0) - around, axis=1)
-        pressure = fields["contact_pressure"][k, hole[np.argsort(np.arctan2(now[:, 1], now[:, 0]))]]
-        push = pressure @ (0.5*(edge + np.roll(edge, 1)))
+        push = fields["contact_pressure"][k, hole[order]]*(0.5*(edge + np.roll(edge, 1)))
         moment = fields["reaction_moment"][k].ravel()
-        seen.append(abs(moment[np.abs(moment).argmax()])/(mu*push))
-    return np.array(seen)
+        start, end = (np.arctan2(*at[::-1]) for at in (fields.x[rim], place[k, rim]))
+        # From the middle of the edge; the hub's nodes are at whole numbers of edges.
+        lead = (angle[order] - (end - start)) % (2*np.pi/edges) - np.pi/edges
+        radius = np.linalg.norm(around, axis=1)
+        arms = mu*radius*np.cos(lead) - radius*np.sin(lead)
+        seen.append([np.abs(moment).max(), push @ arms]/(mu*push.sum()))
+    return np.array(seen).T
 
 
 def belt_on_drum(edges, mu, smoothing="NONE"):

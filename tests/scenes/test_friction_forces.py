@@ -23,12 +23,31 @@ def ratios(run, floor, since=0.0):
     return np.abs(whole), np.abs(force[..., 0][pushed]/force[..., 1][pushed])
 
 
-def rubs(run, floor=28, since=0.0, node=0.01):
-    """Surfaces lean by what they are pressed in over a part of their length: by some 1e-3."""
+def lean(run):
+    """The largest slopes of edges of the surfaces at the height 0, in any frame, of all bodies: they
+    lean where they are pressed in over a part of their length, and what a mean gap leaves between
+    edges turns its gradient by no more."""
+    fields, steepest = run.fields(), 0.0
+    place = fields.x + fields["displacement"]
+    bodies = fields["body"][-1].ravel()
+    for body in np.unique(bodies):
+        node = np.unique(np.concatenate([fields.cells[k] for k in np.flatnonzero(bodies == body)]))
+        side = node[np.abs(fields.x[node, 1]) < 1e-9]
+        edge = np.diff(place[:, side[np.argsort(fields.x[side, 0])]], axis=1)
+        steepest += np.abs(edge[..., 1]/edge[..., 0]).max()
+    return steepest
+
+
+def rubs(run, floor=28, since=0.0):
+    """In sum and of each node by 1 %; in statics, of each node, by what surfaces lean,
+    (mu + s)/(1 - mu s) at a slope s."""
     whole, nodes = ratios(run, floor, since)
-    assert len(whole) > 4
+    slope = lean(run)
+    assert len(whole) > 4 and slope < 0.01
     assert np.abs(whole/MU - 1).max() < 0.01
-    assert np.abs(nodes/MU - 1).max() < node
+    assert np.abs(nodes/MU - 1).max() < 0.01
+    if since == 0:
+        assert np.abs(nodes - MU).max() < slope*(1 + MU*MU)/(1 - MU*slope)
     assert run.verdict["law_violation"] < 1e-9
     assert not any("catch" in text for text in run.verdict["warnings"])
 
@@ -55,11 +74,12 @@ def test_guards_rub_as_their_pair(tmp_path):
 @pytest.mark.parametrize("leaves", [False, True])
 @pytest.mark.parametrize("more", [MESHED[k] for k in (1, 2, 3)])
 def test_a_block_of_two_pieces_or_with_inertia(more, leaves, tmp_path):
-    """Over the joint of a tie, and damped in a dynamic step, once the start has died away."""
+    """Over the joint of a tie, and damped in a dynamic step, once the start has died away: there
+    mortar shares friction among nodes as at the expected end of the step, not as in its middle."""
     tied = unguarded(dragged(MU, leaves=leaves, tied=True))
     rubs(run_one_sided(tied, tmp_path/"tied", **more))
-    moving = dragged(MU, leaves=leaves, statics=False, increments=24)
-    rubs(run_one_sided(unguarded(moving), tmp_path/"moving", **more), since=0.4, node=0.02)
+    moving = dragged(MU, leaves=leaves, statics=False, increments=48)
+    rubs(run_one_sided(unguarded(moving), tmp_path/"moving", **more), since=0.4)
 
 
 @pytest.mark.parametrize("cells", [(3, 1), (11, 2)])
