@@ -21,6 +21,7 @@ module emcon_verdict
    use emcon_small_range, only : small_limit, small_range_init, small_range_t, small_range_widen
    use emcon_solid, only : solid_t
    use emcon_stand_off, only : stand_off_mean, stand_off_t
+   use emcon_steps, only : most_stand_off
    use emcon_term_registry, only : terms_solid
    use emcon_text, only : note_add, notes_t, to_text
    implicit none
@@ -38,9 +39,8 @@ module emcon_verdict
    !> The laws of contact and friction may be missed by this part of the largest force; forces that
    !> differ by half of the second number are one to `emcon_friction`.
    real(wp), parameter :: law_bar = max(half_digits, 1.0e5_wp*epsilon(1.0_wp))
-   !> Air across which contact forces act, per edge, in the mean over the impulse, that is told; and
-   !> that is bad.
-   real(wp), parameter :: told_stand_off = 0.1_wp, most_stand_off = 0.5_wp
+   !> Air across which contact forces act, per edge, in the mean over the impulse, that is told.
+   real(wp), parameter :: told_stand_off = 0.1_wp
    !> Rotation [rad] beyond which linear sections are wrong by a fifth.
    real(wp), parameter :: most_turn = 0.2_wp
    character(len=*), parameter :: unpaired = ": no contact pair brings the two together; name " // &

@@ -17,6 +17,7 @@ module emcon_steps
    public :: method_null_space, method_saddle_point, method_penalty, method_augmented_lagrange
    public :: newton_kept, newton_full
    public :: events_pairs, events_nodes
+   public :: most_stand_off
    public :: prescribed_find, step_is_dynamic, step_initiation
 
    integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3, load_moment = 4, &
@@ -28,6 +29,8 @@ module emcon_steps
       method_augmented_lagrange = 4
    integer, parameter :: newton_kept = 1, newton_full = 2
    integer, parameter :: events_pairs = 1, events_nodes = 2
+   !> Air across which contact forces may act, per edge: results with more are bad.
+   real(wp), parameter :: most_stand_off = 0.5_wp
 
    !> One prescribed degree of freedom: u = `value` times the amplitude.
    !>
@@ -115,7 +118,7 @@ module emcon_steps
       integer :: method = method_null_space          !! one of `method_`
       type(penalty_setting_t) :: penalty
       integer :: initiation = initiation_persistent
-      real(wp) :: gap_tolerance = 0.0_wp             !! fraction of element size; 0: no limit
+      real(wp) :: gap_tolerance = most_stand_off     !! fraction of element size; 0: no limit
       type(contact_options_t) :: options
       logical :: resolves_overclosure = .false.      !! what is closed at the start opens to 0
       integer :: overclosure_amplitude = 0           !! part that is left over time; 0: linear to 0

@@ -14,7 +14,7 @@ TOLERANCE = 1e-9
 @pytest.mark.parametrize(("form", "sides"), FORMS)
 def test_two_discs(tmp_path, form, sides, n_edge, h):
     run = run_deck(row(2, n_edge, h, max(0.3, 2*h)), tmp_path, formulation=form, sides=sides)
-    assert defect(run) < TOLERANCE
+    assert defect(run) < TOLERANCE and run.verdict["verdict"] == "good"
 
 
 @pytest.mark.parametrize(("form", "h"), [("NODE TO SURFACE", 0.05), ("SEGMENT", 0.05),

@@ -131,10 +131,22 @@ def test_round_off_of_forces_at_rest_is_no_error(tmp_path):
     assert "round-off of the forces" in run.log
 
 
+def thrown(h, card=""):
+    return blocks(f"{THROWN}*STEP, NLGEOM\n*DYNAMIC, DIRECT\n{h}, 16.{card}", gap=5.3)
+
+
+@pytest.mark.parametrize("h, left", [(5, 0.3), (8, 0.3), (16, 0.3), (1.8, 0.35)])
+def test_air_is_half_an_edge_at_most(tmp_path, h, left):
+    """The increment of contact is halved until less than that is left of the height, an edge being 1."""
+    found = run_deck(thrown(h), tmp_path).verdict
+    assert found["stand_off"] == pytest.approx(left, rel=1e-6)
+    assert found["verdict"] == "good"
+
+
 @pytest.mark.parametrize("h, verdict, told", [(0.4, "good", 0), (5, "good", 1), (8, "bad", 0)])
 def test_air_that_holds_a_block(tmp_path, h, verdict, told):
     """Thrown at 1 from a height of 5.3: what is left of it where the step of contact begins."""
-    run = run_deck(blocks(f"{THROWN}*STEP, NLGEOM\n*DYNAMIC, DIRECT\n{h}, 16.", gap=5.3), tmp_path)
+    run = run_deck(thrown(h, "\n*CONTACT INITIATION, GAP TOLERANCE=9"), tmp_path)
     found = run.verdict
     assert found["mean_stand_off"] == pytest.approx(5.3 % h, rel=1e-6)
     assert (found["verdict"], found["warning_count"]) == (verdict, told)
