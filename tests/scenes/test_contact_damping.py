@@ -87,6 +87,27 @@ def test_a_rigid_block_falls_by_second_order(tmp_path):
     assert error[1]/error[2] == pytest.approx(4, rel=0.05)
 
 
+@pytest.mark.parametrize("way", [1, -1])
+@pytest.mark.parametrize("multiplier", ["DUAL", "STANDARD"])
+def test_what_is_covered_while_gaps_close_is_damped(multiplier, way, tmp_path):
+    """Half of a block is over a floor, that it comes onto by 1, or leaves, as it falls by 0.3 at 1:
+    M v' = -mu (1 + way t) v. Taken until contact closes the gap: M (1 - v^2)/2, but for the last
+    step, which is mu A h v^2/4 short at most as it ends on the floor, and for what the covered part
+    changes by in a step: 3/2 of that, as gaps count by what is covered at its end."""
+    h, mu = 0.02, 1.0
+    deck = damped(block_over_floor(h, 0.4, height=0.3, velocity=(-way, -1.0), cells=(8, 4),
+                                   floor=((-6, -1), (7, 1), (7, 1))), mu, 0.5, 1.0)
+    deck.replace("*END STEP", "*BOUNDARY\n9000, 6, 6\n*END STEP")
+    history = run_deck(deck, tmp_path, formulation="MORTAR", multiplier=multiplier,
+                       initiation="ADMISSIBLE").history
+    time = np.linspace(0, 0.4, 4001)
+    v = np.exp(-mu/MASS*(time + way*time**2/2))
+    k = np.searchsorted(np.concatenate([[0], np.cumsum((v[1:] + v[:-1])/2)*time[1]]), 0.3)
+    covered, taken = 1 + way*time[k], MASS*(1 - v[k]**2)/2
+    found = history["contact_damping_loss"][np.flatnonzero(history["active"] > 0)[0]]
+    assert abs(found - taken) < mu*covered*h*v[k]**2/4 + 1.5*taken*h/min(1, covered)
+
+
 @pytest.mark.parametrize("clearance", [None, 0.1])
 @pytest.mark.parametrize("more", KINDS)
 def test_a_rigid_block_slides_ever_slower(more, clearance, tmp_path):
