@@ -104,11 +104,29 @@ contains
             call nts(side)%begin_step(scene%x, u, 0.0_wp*u)
             call nts(side)%measure(scene%x, u, 0.0_wp*u)
          end do
+         call check_near(error, least_way_out(scene%x + u), depth, tol, 1.0_wp, &
+            "the squares as convex sets, case " // to_text(k))
          gap(1) = nts(1)%state(findloc(nts(1)%node, block_node(lower, 0, 1), 1))%gap0
          gap(2) = nts(2)%state(findloc(nts(2)%node, block_node(upper, 0, 0), 1))%gap0
          call check_near(error, minval(gap), -depth, rounding, 1.0_wp, "corner behind, case " &
             // to_text(k))
       end do
+
+   contains
+
+      !> The shortest way by which the second square leaves the first, over directions a degree apart.
+      pure real(wp) function least_way_out(x) result(way)
+         real(wp), intent(in) :: x(:, :)         !! (2, 8), four nodes of each
+         real(wp) :: direction(2)
+         integer :: i
+
+         way = huge(way)
+         do i = 0, 359
+            direction = [cos(i*acos(-1.0_wp)/180.0_wp), sin(i*acos(-1.0_wp)/180.0_wp)]
+            way = min(way, maxval(matmul(direction, x(:, :4))) - minval(matmul(direction, x(:, 5:))))
+         end do
+      end function least_way_out
+
    end subroutine test_corners
 
    !> A square right on its twin goes in by a tenth and aside by as much. Statics evaluate gaps
