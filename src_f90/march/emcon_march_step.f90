@@ -320,14 +320,19 @@ contains
       end if
    end subroutine tell_held
 
-   !> The contacts of the last step that opened and closed in turn, by their slave nodes.
+   !> The contacts of the last step that opened and closed in turn, by their slave nodes; none: they
+   !> are the same, and friction comes back.
    subroutine cycling_text(self, scene, text)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       character(len=:), allocatable, intent(out) :: text   !! names nodes by their labels
 
       call nodes_text(self, scene, self%active%comes_and_goes, text)
-      text = "contact opens and closes in turn at slave nodes " // text
+      if (text == "") then
+         text = "contacts stick and slide in turn"
+      else
+         text = "contact opens and closes in turn at slave nodes " // text
+      end if
    end subroutine cycling_text
 
    !> The slave nodes of the constraints that `is_meant` marks.
