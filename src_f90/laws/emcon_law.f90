@@ -5,15 +5,16 @@
 !> tangent follow here for all laws. In terms of E nothing cancels at small strains, as
 !> det C - 1 = 2 e1 + 4 e2 + 8 e3. Source: docs/theory.md, eq. (7).
 module emcon_law
-   use emcon_dgrad3, only : dg_sqrt, dg_t, dg_variable, operator(+), operator(/)
+   use emcon_dgrad3, only : dg_sqrt, dg_t, dg_variable, operator(*), operator(+), &
+      operator(/)
    use emcon_invariants, only : isochoric_excess, volume_energy, volume_excess
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
    implicit none
    private
-   public :: law_t, law_box_t, law_points_t, law_response_t, n_lane
+   public :: law_t, law_volumetric_t, law_box_t, law_points_t, law_response_t, n_lane
    public :: law_response_plane, law_respond_one, law_hold_one, volume_excess
-   public :: change_points_t, law_change_points, max_part, no_volume
+   public :: change_points_t, law_change_points, max_part
    public :: claim, isochoric_excess, lame_constants, take_elastic, volume_energy
 
    !> Points that are computed side by side. No lane knows of another: the bits of a point depend
@@ -42,6 +43,14 @@ module emcon_law
       procedure :: volume => law_volume
       procedure :: part => law_part
    end type law_t
+
+   !> A law that resists a change of volume by the sum of (J - 1)^(2 i)/D_i; a D_i of 0 has no term.
+   type, abstract, extends(law_t) :: law_volumetric_t
+      real(wp) :: d(max_part) = 0.0_wp           !! [L T^2/M]; the first > 0
+   contains
+      procedure :: divide => volumetric_divide
+      procedure :: volume => volumetric_volume
+   end type law_volumetric_t
 
    !> For arrays of laws of different types.
    type :: law_box_t
@@ -214,6 +223,27 @@ contains
       end associate
       w = dg_t()
    end function law_part
+
+   !> Below all round-off is what is left of the change of volume.
+   subroutine volumetric_divide(self, rest)
+      class(law_volumetric_t), intent(in) :: self
+      class(law_t), allocatable, intent(out) :: rest
+
+      allocate(rest, source=self)
+      select type (rest)
+      class is (law_volumetric_t)
+         rest%d = scale(rest%d, no_volume)
+      end select
+   end subroutine volumetric_divide
+
+   !> By the mean of J - 1.
+   pure function volumetric_volume(self, v) result(u)
+      class(law_volumetric_t), intent(in) :: self
+      type(dg_t), intent(in) :: v                !! change of volume
+      type(dg_t) :: u                            !! [M/(L T^2)]
+
+      u = volume_energy(self%d, v*(v + 2.0_wp))
+   end function volumetric_volume
 
    !> The change of volume of points in plane strain, with its gradients.
    pure subroutine law_change_points(law, with_tangent, points)

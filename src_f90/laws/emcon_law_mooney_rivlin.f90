@@ -4,23 +4,20 @@
 module emcon_law_mooney_rivlin
    use emcon_dgrad_near, only : dg_t
    use emcon_kinds, only : wp
-   use emcon_law, only : claim, law_points_t, law_hold_one, law_respond_one, law_t, n_lane, &
-      no_volume
+   use emcon_law, only : claim, law_points_t, law_hold_one, law_respond_one, law_volumetric_t, &
+      n_lane
    implicit none
    private
    public :: law_mooney_rivlin_t
 
-   type, extends(law_t) :: law_mooney_rivlin_t
+   type, extends(law_volumetric_t) :: law_mooney_rivlin_t
       real(wp) :: c10 = 0.0_wp                   !! [M/(L T^2)]
       real(wp) :: c01 = 0.0_wp
-      real(wp) :: d1 = 0.0_wp                    !! > 0 [L T^2/M]
    contains
       procedure :: take => mooney_rivlin_take
       procedure :: energy
       procedure :: respond
       procedure :: hold
-      procedure :: divide
-      procedure :: volume
    end type law_mooney_rivlin_t
 
    logical, parameter :: is_near = .true.
@@ -35,11 +32,11 @@ contains
 
       self%c10 = constant(1)
       self%c01 = constant(2)
-      self%d1 = constant(3)
+      self%d(1) = constant(3)
       self%shear = 2.0_wp*(self%c10 + self%c01)
       call claim(self%shear > 0.0_wp, "C10 + C01", self%c10 + self%c01, &
          "must be positive", fault)
-      call claim(self%d1 >= 0.0_wp, "D1", self%d1, "must not be negative", fault)
+      call claim(self%d(1) >= 0.0_wp, "D1", self%d(1), "must not be negative", fault)
    end subroutine mooney_rivlin_take
 
    !> For strains of any size: emcon_law_mooney_rivlin.inc.
@@ -65,28 +62,6 @@ contains
       class(law_mooney_rivlin_t), intent(in) :: self
       include "emcon_law_held.inc"
    end subroutine hold
-
-   !> As `law_t` has it.
-   subroutine divide(self, rest)
-      class(law_mooney_rivlin_t), intent(in) :: self
-      class(law_t), allocatable, intent(out) :: rest
-      type(law_mooney_rivlin_t) :: other
-
-      other = self
-      other%d1 = scale(self%d1, no_volume)
-      allocate(rest, source=other)
-   end subroutine divide
-
-   !> By the mean of J - 1.
-   pure function volume(self, v) result(u)
-      use emcon_dgrad3, only : dg_t, operator(*), operator(+)
-      use emcon_invariants, only : volume_energy
-      class(law_mooney_rivlin_t), intent(in) :: self
-      type(dg_t), intent(in) :: v                !! change of volume
-      type(dg_t) :: u                            !! [M/(L T^2)]
-
-      u = volume_energy([self%d1], v*(v + 2.0_wp))
-   end function volume
 
    include "../dgrad/emcon_dgrad_rules.inc"
    include "../dgrad/emcon_dgrad_near.inc"

@@ -8,21 +8,18 @@ module emcon_law_ogden
       operator(-), operator(+), operator(/)
    use emcon_dgrad_series, only : cosh_chord, cosh_excess, expm1_of, log1p_of
    use emcon_kinds, only : wp
-   use emcon_law, only : claim, law_t, no_volume, volume_energy, volume_excess
+   use emcon_law, only : claim, law_volumetric_t, volume_energy, volume_excess
    implicit none
    private
    public :: law_ogden_t
 
-   type, extends(law_t) :: law_ogden_t
+   type, extends(law_volumetric_t) :: law_ogden_t
       integer :: order = 0                       !! N, 1..3
       real(wp) :: mu(3) = 0.0_wp                 !! (:N) [M/(L T^2)]
       real(wp) :: alpha(3) = 1.0_wp              !! (:N) not 0
-      real(wp) :: d(3) = 0.0_wp                  !! (:N) [L T^2/M]; the first > 0
    contains
       procedure :: take => ogden_take
       procedure :: energy => ogden_energy
-      procedure :: divide
-      procedure :: volume
       procedure :: part
    end type law_ogden_t
 
@@ -120,26 +117,6 @@ contains
       end do
       w%g(3) = (s33 - dot_product(w%g, [1.0_wp, e1%f1, 0.0_wp]))/e2%f1
    end subroutine set_normal_slope
-
-   !> As `law_t` has it.
-   subroutine divide(self, rest)
-      class(law_ogden_t), intent(in) :: self
-      class(law_t), allocatable, intent(out) :: rest
-      type(law_ogden_t) :: other
-
-      other = self
-      other%d = scale(self%d, no_volume)
-      allocate(rest, source=other)
-   end subroutine divide
-
-   !> By the mean of J - 1.
-   pure function volume(self, v) result(u)
-      class(law_ogden_t), intent(in) :: self
-      type(dg_t), intent(in) :: v                !! change of volume
-      type(dg_t) :: u                            !! [M/(L T^2)]
-
-      u = volume_energy(self%d(:self%order), v*(v + 2.0_wp))
-   end function volume
 
    !> With p = alpha ln(J)/3 a term is exp(-p) (t - 3 (exp(p) - 1 - p)); the first one has the
    !> energy of the change of volume beside it.

@@ -4,22 +4,19 @@
 module emcon_law_yeoh
    use emcon_dgrad_near, only : dg_t
    use emcon_kinds, only : wp
-   use emcon_law, only : claim, law_points_t, law_hold_one, law_respond_one, law_t, n_lane, &
-      no_volume
+   use emcon_law, only : claim, law_points_t, law_hold_one, law_respond_one, law_volumetric_t, &
+      n_lane
    implicit none
    private
    public :: law_yeoh_t
 
-   type, extends(law_t) :: law_yeoh_t
+   type, extends(law_volumetric_t) :: law_yeoh_t
       real(wp) :: c(3) = 0.0_wp                  !! C10, C20, C30 [M/(L T^2)]
-      real(wp) :: d(3) = 0.0_wp                  !! [L T^2/M]; the first > 0
    contains
       procedure :: take => yeoh_take
       procedure :: energy
       procedure :: respond
       procedure :: hold
-      procedure :: divide
-      procedure :: volume
    end type law_yeoh_t
 
    logical, parameter :: is_near = .true.
@@ -62,28 +59,6 @@ contains
       class(law_yeoh_t), intent(in) :: self
       include "emcon_law_held.inc"
    end subroutine hold
-
-   !> As `law_t` has it.
-   subroutine divide(self, rest)
-      class(law_yeoh_t), intent(in) :: self
-      class(law_t), allocatable, intent(out) :: rest
-      type(law_yeoh_t) :: other
-
-      other = self
-      other%d = scale(self%d, no_volume)
-      allocate(rest, source=other)
-   end subroutine divide
-
-   !> By the mean of J - 1.
-   pure function volume(self, v) result(u)
-      use emcon_dgrad3, only : dg_t, operator(*), operator(+)
-      use emcon_invariants, only : volume_energy
-      class(law_yeoh_t), intent(in) :: self
-      type(dg_t), intent(in) :: v                !! change of volume
-      type(dg_t) :: u                            !! [M/(L T^2)]
-
-      u = volume_energy(self%d, v*(v + 2.0_wp))
-   end function volume
 
    include "../dgrad/emcon_dgrad_rules.inc"
    include "../dgrad/emcon_dgrad_near.inc"
