@@ -12,29 +12,24 @@ module emcon_corotated_term
    use emcon_motion, only : motion_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
-   use emcon_space, only : lists_append, lists_t, space_t
-   use emcon_stiff_elements, only : stiff_elements_fastest, stiff_elements_init, &
-      stiff_elements_t
-   use emcon_term, only : fastest_t, response_t, role_internal, term_t
+   use emcon_space, only : space_t
+   use emcon_stiff_elements, only : stiff_term_init, stiff_term_t
+   use emcon_term, only : response_t
    use emcon_text, only : to_text
    implicit none
    private
    public :: corotated_term_t, corotated_term_init
 
-   type, extends(term_t) :: corotated_term_t
-      type(stiff_elements_t), private :: own
-      type(fastest_t), private :: fastest                    !! of them
+   type, extends(stiff_term_t) :: corotated_term_t
       type(corotated_t), allocatable, private :: frame(:)    !! (n)
       type(corotated_pack_t), allocatable, private :: pack(:)
       integer, allocatable, private :: label(:)              !! (n) of the elements
       integer, allocatable, private :: slot(:)   !! element matrices by columns
    contains
-      procedure :: lay_out
       procedure :: begin_step
       procedure :: respond
       procedure :: find_energy
       procedure :: tangent_times
-      procedure :: find_fastest
       procedure :: is_symmetric
    end type corotated_term_t
 
@@ -47,9 +42,7 @@ contains
       integer, intent(in) :: n_dim               !! > 0
       integer :: k, m
 
-      self%role = role_internal
-      call stiff_elements_init(self%own, solid, n_dim, solid%trait%is_corotated)
-      call stiff_elements_fastest(self%own, solid, self%fastest)
+      call stiff_term_init(self, solid, n_dim, solid%trait%is_corotated)
       self%label = solid%deck%label(self%own%element)
       allocate(self%frame(size(self%own%element)))
       do k = 1, size(self%frame)
@@ -82,16 +75,6 @@ contains
          end do
       end do
    end subroutine fill_packs
-
-   !> The freedoms of each element.
-   pure subroutine lay_out(self, lists)
-      class(corotated_term_t), intent(in) :: self
-      type(lists_t), intent(inout) :: lists
-
-      associate (start => self%own%start)
-         call lists_append(lists, start(2:) - start(:size(start) - 1), self%own%freedom)
-      end associate
-   end subroutine lay_out
 
    !> As `term_t` has it.
    subroutine begin_step(self, scene, i_step, space, matrix, slot)
@@ -275,15 +258,5 @@ contains
 
       is_symmetric = motion%evaluation%is_gradient .or. size(self%frame) == 0
    end function is_symmetric
-
-   !> The fastest of the elements. A frame that turns keeps the frequencies.
-   subroutine find_fastest(self, motion, fastest, is_bounded)
-      class(corotated_term_t), intent(inout) :: self
-      type(motion_t), intent(in) :: motion       !! placed at its end
-      type(fastest_t), intent(inout) :: fastest
-      logical, intent(inout) :: is_bounded       !! by elements
-
-      if (self%fastest%square > fastest%square) fastest = self%fastest
-   end subroutine find_fastest
 
 end module emcon_corotated_term

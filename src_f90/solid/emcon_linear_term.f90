@@ -11,29 +11,24 @@ module emcon_linear_term
    use emcon_reduction, only : reduction_fold
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
-   use emcon_space, only : lists_append, lists_t, space_t
-   use emcon_stiff_elements, only : stiff_elements_fastest, stiff_elements_gather, &
-      stiff_elements_init, stiff_elements_t
+   use emcon_space, only : space_t
+   use emcon_stiff_elements, only : stiff_elements_gather, stiff_term_init, stiff_term_t
    use emcon_stiff_product, only : stiff_product_find_sizes, stiff_product_form, &
       stiff_product_init, stiff_product_load, stiff_product_t
-   use emcon_term, only : fastest_t, response_t, role_internal, term_t
+   use emcon_term, only : response_t
    implicit none
    private
    public :: linear_term_t, linear_term_init
 
-   type, extends(term_t) :: linear_term_t
-      type(stiff_elements_t), private :: own
-      type(fastest_t), private :: fastest                    !! of them
+   type, extends(stiff_term_t) :: linear_term_t
       type(stiff_product_t), private :: product
       real(wp), allocatable, private :: rounding(:)      !! (n_node) as `stiffness` of solid_t
       real(dp), allocatable, private :: value(:)         !! K/2 in the pattern of the matrix
    contains
-      procedure :: lay_out
       procedure :: begin_step
       procedure :: respond
       procedure :: find_energy
       procedure :: tangent_times
-      procedure :: find_fastest
    end type linear_term_t
 
 contains
@@ -47,9 +42,7 @@ contains
       integer, allocatable :: start(:), node(:)
       integer :: i, k
 
-      self%role = role_internal
-      call stiff_elements_init(self%own, solid, n_dim, solid%trait%is_linear)
-      call stiff_elements_fastest(self%own, solid, self%fastest)
+      call stiff_term_init(self, solid, n_dim, solid%trait%is_linear)
       call element_lists(solid, 1, start, node, solid%trait%is_linear)
       call stiff_product_init(self%product, n_dim, solid%n_node, start, node, self%own%stiffness, &
          error)
@@ -62,16 +55,6 @@ contains
          end do
       end do
    end subroutine linear_term_init
-
-   !> The freedoms of each element.
-   pure subroutine lay_out(self, lists)
-      class(linear_term_t), intent(in) :: self
-      type(lists_t), intent(inout) :: lists
-
-      associate (start => self%own%start)
-         call lists_append(lists, start(2:) - start(:size(start) - 1), self%own%freedom)
-      end associate
-   end subroutine lay_out
 
    !> Put half of the stiffness into the pattern of the matrix.
    subroutine begin_step(self, scene, i_step, space, matrix, slot)
@@ -170,15 +153,5 @@ contains
          end associate
       end do
    end subroutine tangent_times
-
-   !> The fastest of the elements.
-   subroutine find_fastest(self, motion, fastest, is_bounded)
-      class(linear_term_t), intent(inout) :: self
-      type(motion_t), intent(in) :: motion       !! placed at its end
-      type(fastest_t), intent(inout) :: fastest
-      logical, intent(inout) :: is_bounded       !! by elements
-
-      if (self%fastest%square > fastest%square) fastest = self%fastest
-   end subroutine find_fastest
 
 end module emcon_linear_term

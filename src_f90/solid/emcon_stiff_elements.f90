@@ -1,4 +1,4 @@
-!> Elements whose stiffness stays: which they are, and the stiffness of their laws at rest.
+!> Terms of elements whose stiffness stays: which elements, and the stiffness of their laws at rest.
 module emcon_stiff_elements
    use emcon_element_frequency, only : element_frequency
    use emcon_element_lists, only : element_lists
@@ -6,13 +6,15 @@ module emcon_stiff_elements
    use emcon_host_law, only : host_response_t
    use emcon_kinds, only : wp
    use emcon_lumped_mass, only : lumped_mass
+   use emcon_motion, only : motion_t
    use emcon_single_elements, only : single_rest_tangent
    use emcon_solid, only : solid_t
    use emcon_solid_respond, only : solid_element_respond
-   use emcon_term, only : fastest_t
+   use emcon_space, only : lists_append, lists_t
+   use emcon_term, only : fastest_t, role_internal, term_t
    implicit none
    private
-   public :: stiff_elements_t, stiff_elements_init, stiff_elements_gather, stiff_elements_fastest
+   public :: stiff_elements_t, stiff_elements_gather, stiff_term_t, stiff_term_init
 
    type :: stiff_elements_t
       integer, allocatable :: element(:)         !! (n) their numbers
@@ -23,7 +25,47 @@ module emcon_stiff_elements
       real(wp), allocatable :: rounding(:, :)    !! (n_most, n) as `stiffness` of solid_t
    end type stiff_elements_t
 
+   type, abstract, extends(term_t) :: stiff_term_t
+      type(stiff_elements_t) :: own
+      type(fastest_t), private :: fastest        !! of them
+   contains
+      procedure :: lay_out
+      procedure :: find_fastest
+   end type stiff_term_t
+
 contains
+
+   !> The term of some elements of `solid`, whose law is linear.
+   subroutine stiff_term_init(self, solid, n_dim, is_in)
+      class(stiff_term_t), intent(inout) :: self
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: n_dim               !! > 0
+      logical, intent(in) :: is_in(:)            !! (n_element) these
+
+      self%role = role_internal
+      call stiff_elements_init(self%own, solid, n_dim, is_in)
+      call stiff_elements_fastest(self%own, solid, self%fastest)
+   end subroutine stiff_term_init
+
+   !> The freedoms of each element.
+   pure subroutine lay_out(self, lists)
+      class(stiff_term_t), intent(in) :: self
+      type(lists_t), intent(inout) :: lists
+
+      associate (start => self%own%start)
+         call lists_append(lists, start(2:) - start(:size(start) - 1), self%own%freedom)
+      end associate
+   end subroutine lay_out
+
+   !> The fastest of the elements. A frame that turns keeps the frequencies.
+   subroutine find_fastest(self, motion, fastest, is_bounded)
+      class(stiff_term_t), intent(inout) :: self
+      type(motion_t), intent(in) :: motion       !! placed at its end
+      type(fastest_t), intent(inout) :: fastest
+      logical, intent(inout) :: is_bounded       !! by elements
+
+      if (self%fastest%square > fastest%square) fastest = self%fastest
+   end subroutine find_fastest
 
    !> Some elements of `solid`, whose law is linear.
    subroutine stiff_elements_init(self, solid, n_dim, is_in)
