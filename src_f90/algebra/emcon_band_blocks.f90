@@ -25,7 +25,6 @@ module emcon_band_blocks
    interface
       subroutine dgbtrf(m, n, kl, ku, ab, ldab, ipiv, info)
          import :: dp
-         implicit none
          integer, intent(in) :: m, n, kl, ku, ldab
          real(dp), intent(inout) :: ab(ldab, *)
          integer, intent(out) :: ipiv(*), info
@@ -33,7 +32,6 @@ module emcon_band_blocks
 
       subroutine dgbtrs(trans, n, kl, ku, nrhs, ab, ldab, ipiv, b, ldb, info)
          import :: dp
-         implicit none
          character(len=1), intent(in) :: trans
          integer, intent(in) :: n, kl, ku, nrhs, ldab, ldb
          real(dp), intent(in) :: ab(ldab, *)

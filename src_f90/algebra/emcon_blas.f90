@@ -11,14 +11,12 @@ module emcon_blas
    interface
       function emcon_blas_set_threads(n) result(done) bind(c)
          import :: c_int
-         implicit none
          integer(c_int), value :: n
          integer(c_int) :: done
       end function emcon_blas_set_threads
 
       subroutine emcon_blas_name(n, name) bind(c)
          import :: c_char, c_int
-         implicit none
          integer(c_int), value :: n
          character(kind=c_char), intent(out) :: name(*)
       end subroutine emcon_blas_name

@@ -54,14 +54,12 @@ module emcon_cholmod
    interface
       function emcon_cholmod_new(halves) result(handle) bind(c)
          import :: c_int, c_ptr
-         implicit none
          integer(c_int), value :: halves
          type(c_ptr) :: handle
       end function emcon_cholmod_new
 
       function emcon_cholmod_analyse(handle, n, ap, ai) result(status) bind(c)
          import :: c_int, c_ptr
-         implicit none
          type(c_ptr), value :: handle
          integer(c_int), value :: n
          integer(c_int), intent(in) :: ap(*), ai(*)
@@ -71,7 +69,6 @@ module emcon_cholmod
       function emcon_cholmod_factorise(handle, n, ap, ai, ax, rcond, n_factor) &
          result(status) bind(c)
          import :: c_double, c_int, c_ptr
-         implicit none
          type(c_ptr), value :: handle
          integer(c_int), value :: n
          integer(c_int), intent(in) :: ap(*), ai(*)
@@ -82,7 +79,6 @@ module emcon_cholmod
 
       function emcon_cholmod_solve(handle, n, b, x) result(status) bind(c)
          import :: c_double, c_int, c_ptr
-         implicit none
          type(c_ptr), value :: handle
          integer(c_int), value :: n
          real(c_double), intent(in) :: b(*)
@@ -92,7 +88,6 @@ module emcon_cholmod
 
       function emcon_cholmod_half(handle, n, is_second, b, x) result(status) bind(c)
          import :: c_double, c_int, c_ptr
-         implicit none
          type(c_ptr), value :: handle
          integer(c_int), value :: n, is_second
          real(c_double), intent(in) :: b(*)
@@ -103,7 +98,6 @@ module emcon_cholmod
       function emcon_cholmod_reach(handle, n, m, column, value, n_reached, index, x) &
          result(status) bind(c)
          import :: c_double, c_int, c_ptr
-         implicit none
          type(c_ptr), value :: handle
          integer(c_int), value :: n, m
          integer(c_int), intent(in) :: column(*)
@@ -115,7 +109,6 @@ module emcon_cholmod
 
       function emcon_cholmod_density(handle) result(density) bind(c)
          import :: c_double, c_ptr
-         implicit none
          type(c_ptr), value :: handle
          real(c_double) :: density
       end function emcon_cholmod_density
@@ -123,7 +116,6 @@ module emcon_cholmod
       function emcon_cholmod_nodes(handle, n, ap, ai, n_node, n_row) &
          result(status) bind(c)
          import :: c_int, c_ptr
-         implicit none
          type(c_ptr), value :: handle
          integer(c_int), value :: n
          integer(c_int), intent(in) :: ap(*), ai(*)
@@ -133,14 +125,12 @@ module emcon_cholmod
 
       subroutine emcon_cholmod_take_nodes(handle, order, first, row_start, row) bind(c)
          import :: c_int, c_ptr
-         implicit none
          type(c_ptr), value :: handle
          integer(c_int), intent(inout) :: order(*), first(*), row_start(*), row(*)
       end subroutine emcon_cholmod_take_nodes
 
       subroutine emcon_cholmod_free(handle) bind(c)
          import :: c_ptr
-         implicit none
          type(c_ptr), value :: handle
       end subroutine emcon_cholmod_free
    end interface

@@ -14,7 +14,6 @@ module emcon_lapack
    interface
       subroutine dgesv(n, nrhs, a, lda, ipiv, b, ldb, info)
          import :: dp
-         implicit none
          integer, intent(in) :: n, nrhs, lda, ldb
          real(dp), intent(inout) :: a(lda, *), b(ldb, *)
          integer, intent(out) :: ipiv(*), info
@@ -22,7 +21,6 @@ module emcon_lapack
 
       subroutine dgesvd(jobu, jobvt, m, n, a, lda, s, u, ldu, vt, ldvt, work, lwork, info)
          import :: dp
-         implicit none
          character(len=1), intent(in) :: jobu, jobvt
          integer, intent(in) :: m, n, lda, ldu, ldvt, lwork
          real(dp), intent(inout) :: a(lda, *)
@@ -32,7 +30,6 @@ module emcon_lapack
 
       subroutine dsyev(jobz, uplo, n, a, lda, w, work, lwork, info)
          import :: dp
-         implicit none
          character(len=1), intent(in) :: jobz, uplo
          integer, intent(in) :: n, lda, lwork
          real(dp), intent(inout) :: a(lda, *)
@@ -42,7 +39,6 @@ module emcon_lapack
 
       subroutine dpotrf(uplo, n, a, lda, info)
          import :: dp
-         implicit none
          character(len=1), intent(in) :: uplo
          integer, intent(in) :: n, lda
          real(dp), intent(inout) :: a(lda, *)
@@ -51,7 +47,6 @@ module emcon_lapack
 
       subroutine dpotrs(uplo, n, nrhs, a, lda, b, ldb, info)
          import :: dp
-         implicit none
          character(len=1), intent(in) :: uplo
          integer, intent(in) :: n, nrhs, lda, ldb
          real(dp), intent(in) :: a(lda, *)

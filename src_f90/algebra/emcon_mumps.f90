@@ -39,14 +39,12 @@ module emcon_mumps
    interface
       function emcon_mumps_new(symmetry) result(handle) bind(c)
          import :: c_int, c_ptr
-         implicit none
          integer(c_int), value :: symmetry
          type(c_ptr) :: handle
       end function emcon_mumps_new
 
       function emcon_mumps_analyse(handle, n, n_entry, row, column) result(status) bind(c)
          import :: c_int, c_ptr
-         implicit none
          type(c_ptr), value :: handle
          integer(c_int), value :: n, n_entry
          integer(c_int), intent(in) :: row(*), column(*)
@@ -55,7 +53,6 @@ module emcon_mumps
 
       function emcon_mumps_factorise(handle, value, n_factor, n_negative) result(status) bind(c)
          import :: c_double, c_int, c_ptr
-         implicit none
          type(c_ptr), value :: handle
          real(c_double), intent(in) :: value(*)
          real(c_double), intent(inout) :: n_factor
@@ -65,7 +62,6 @@ module emcon_mumps
 
       function emcon_mumps_solve(handle, x) result(status) bind(c)
          import :: c_double, c_int, c_ptr
-         implicit none
          type(c_ptr), value :: handle
          real(c_double), intent(inout) :: x(*)
          integer(c_int) :: status
@@ -73,7 +69,6 @@ module emcon_mumps
 
       subroutine emcon_mumps_free(handle) bind(c)
          import :: c_ptr
-         implicit none
          type(c_ptr), value :: handle
       end subroutine emcon_mumps_free
    end interface

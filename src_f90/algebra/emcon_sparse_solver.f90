@@ -58,7 +58,6 @@ module emcon_sparse_solver
       !> Order the pattern of a square matrix; returns at once if it is the one already analysed.
       subroutine analyse_pattern(self, matrix, error)
          import :: csr_t, error_t, sparse_solver_t
-         implicit none
          class(sparse_solver_t), intent(inout) :: self
          type(csr_t), intent(in) :: matrix              !! its values are not read
          type(error_t), allocatable, intent(out) :: error
@@ -67,7 +66,6 @@ module emcon_sparse_solver
       !> Factorise the matrix of the analysed pattern; look at `is_singular` afterwards.
       subroutine factorise_values(self, value, error)
          import :: dp, error_t, sparse_solver_t
-         implicit none
          class(sparse_solver_t), intent(inout) :: self
          real(dp), intent(in), contiguous :: value(:)   !! (n_slot) of the pattern
          type(error_t), allocatable, intent(out) :: error
@@ -76,7 +74,6 @@ module emcon_sparse_solver
       !> x = A^-1 rhs
       subroutine solve_system(self, rhs, x, error)
          import :: error_t, sparse_solver_t, wp
-         implicit none
          class(sparse_solver_t), intent(inout) :: self
          real(wp), intent(in), contiguous :: rhs(:)     !! (n)
          real(wp), intent(out), contiguous :: x(:)      !! (n)
@@ -85,7 +82,6 @@ module emcon_sparse_solver
 
       subroutine free_memory(self)
          import :: sparse_solver_t
-         implicit none
          class(sparse_solver_t), intent(inout) :: self
       end subroutine free_memory
    end interface

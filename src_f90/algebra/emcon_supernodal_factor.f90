@@ -30,7 +30,6 @@ module emcon_supernodal_factor
    interface
       subroutine spotrf(uplo, n, a, lda, info)
          import :: sp
-         implicit none
          character(len=1), intent(in) :: uplo
          integer, intent(in) :: n, lda
          real(sp), intent(inout) :: a(lda, *)
@@ -39,7 +38,6 @@ module emcon_supernodal_factor
 
       subroutine strtri(uplo, diag, n, a, lda, info)
          import :: sp
-         implicit none
          character(len=1), intent(in) :: uplo, diag
          integer, intent(in) :: n, lda
          real(sp), intent(inout) :: a(lda, *)
@@ -48,7 +46,6 @@ module emcon_supernodal_factor
 
       subroutine strsm(side, uplo, transa, diag, m, n, alpha, a, lda, b, ldb)
          import :: sp
-         implicit none
          character(len=1), intent(in) :: side, uplo, transa, diag
          integer, intent(in) :: m, n, lda, ldb
          real(sp), intent(in) :: alpha, a(lda, *)
@@ -57,7 +54,6 @@ module emcon_supernodal_factor
 
       subroutine ssyrk(uplo, trans, n, k, alpha, a, lda, beta, c, ldc)
          import :: sp
-         implicit none
          character(len=1), intent(in) :: uplo, trans
          integer, intent(in) :: n, k, lda, ldc
          real(sp), intent(in) :: alpha, a(lda, *), beta

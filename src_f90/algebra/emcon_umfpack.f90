@@ -47,14 +47,12 @@ module emcon_umfpack
    interface
       subroutine umfpack_di_defaults(control) bind(c)
          import :: c_double
-         implicit none
          real(c_double), intent(out) :: control(*)
       end subroutine umfpack_di_defaults
 
       function umfpack_di_symbolic(n_row, n_col, ap, ai, ax, symbolic, control, info) &
          result(status) bind(c)
          import :: c_double, c_int, c_ptr
-         implicit none
          integer(c_int), value :: n_row, n_col
          integer(c_int), intent(in) :: ap(*), ai(*)
          real(c_double), intent(in) :: ax(*), control(*)
@@ -66,7 +64,6 @@ module emcon_umfpack
       function umfpack_di_numeric(ap, ai, ax, symbolic, numeric, control, info) &
          result(status) bind(c)
          import :: c_double, c_int, c_ptr
-         implicit none
          integer(c_int), intent(in) :: ap(*), ai(*)
          real(c_double), intent(in) :: ax(*), control(*)
          type(c_ptr), value :: symbolic
@@ -78,7 +75,6 @@ module emcon_umfpack
       function umfpack_di_wsolve(sys, ap, ai, ax, x, b, numeric, control, info, wi, w) &
          result(status) bind(c)
          import :: c_double, c_int, c_ptr
-         implicit none
          integer(c_int), value :: sys
          integer(c_int), intent(in) :: ap(*), ai(*)
          real(c_double), intent(in) :: ax(*), b(*), control(*)
@@ -90,13 +86,11 @@ module emcon_umfpack
 
       subroutine umfpack_di_free_symbolic(symbolic) bind(c)
          import :: c_ptr
-         implicit none
          type(c_ptr), intent(inout) :: symbolic
       end subroutine umfpack_di_free_symbolic
 
       subroutine umfpack_di_free_numeric(numeric) bind(c)
          import :: c_ptr
-         implicit none
          type(c_ptr), intent(inout) :: numeric
       end subroutine umfpack_di_free_numeric
    end interface

@@ -11,13 +11,11 @@ module emcon_heap
       !> Keep freed memory for the next that asks, in the whole process: a matter for a main
       !> program, not for a library inside another.
       subroutine heap_keep() bind(c, name="emcon_heap_keep")
-         implicit none
       end subroutine heap_keep
 
       !> Free a block that was never touched: glibc adapts, and keeps what is freed below its size.
       !> Settings of the host program stand.
       subroutine heap_adapt() bind(c, name="emcon_heap_adapt")
-         implicit none
       end subroutine heap_adapt
    end interface
 
