@@ -16,17 +16,17 @@ contains
    subroutine check_materials(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      logical, allocatable :: is_used(:), without_density(:), has_weight(:), has_inertia(:), &
-         resists(:), moves(:)
+      logical, allocatable :: is_used(:), is_bare(:), has_weight(:), has_inertia(:), resists(:), &
+         moves(:)
       integer :: i, k, material
       logical :: needs_mass
 
       if (reader%doubt%names .or. reader%doubt%elements .or. reader%doubt%rigid) return
-      without_density = scene%element%section == 0
-      if (any(without_density)) then
-         i = first_true(without_density)
+      is_bare = scene%element%section == 0
+      if (any(is_bare)) then
+         i = findloc(is_bare, .true., 1)
          call add_error(reader%log, scene%element%origin(i), "element " &
-            // label_list(pack(scene%element%label, without_density)) &
+            // label_list(pack(scene%element%label, is_bare)) &
             // " has no section; give one by *SOLID SECTION")
       end if
       allocate(is_used(size(scene%material)), has_weight(size(scene%material)), &
@@ -99,62 +99,51 @@ contains
       end do
    end subroutine mark_rigid_materials
 
-   pure integer function first_true(list)
-      logical, intent(in) :: list(:)
-
-      do first_true = 1, size(list)
-         if (list(first_true)) return
-      end do
-   end function first_true
-
    !> Nodes without element have no mass and no stiffness: a warning, an error if a force acts on
    !> them. In the degrees of freedom that stand in an equation they are part of the model, and so
    !> are nodes of *GIVEN FORCES.
    subroutine check_nodes(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      logical, allocatable :: without_density(:), is_idle(:), is_loaded(:), is_coupled(:, :)
+      logical, allocatable :: is_bare(:), is_idle(:), is_loaded(:), is_coupled(:, :)
       integer :: i, k
 
       if (reader%doubt%nodes .or. reader%doubt%elements .or. reader%doubt%positions &
          .or. reader%doubt%equations .or. reader%doubt%rigid) return
       if (any(scene%element%node(1, :) == 0)) return
-      allocate(without_density(size(scene%node%label)), source=.true.)
+      allocate(is_bare(size(scene%node%label)), source=.true.)
       do i = 1, size(scene%element%label)
          do k = 1, scene%element%kinds(scene%element%kind(i))%n_node
-            without_density(scene%element%node(k, i)) = .false.
+            is_bare(scene%element%node(k, i)) = .false.
          end do
       end do
-      if (allocated(scene%host%node)) without_density(scene%host%node) = .false.
+      if (allocated(scene%host%node)) is_bare(scene%host%node) = .false.
       do i = 1, size(scene%rigid)
-         without_density(scene%rigid(i)%node) = .false.
-         if (allocated(scene%rigid(i)%arm)) without_density(scene%rigid(i)%arm) = .false.
+         is_bare(scene%rigid(i)%node) = .false.
+         if (allocated(scene%rigid(i)%arm)) is_bare(scene%rigid(i)%arm) = .false.
       end do
       do i = 1, size(scene%surface)
          associate (surface => scene%surface(i))
-            if (surface%is_profile) without_density([surface%edge]) = .false.
-            if (surface%inner_node > 0) without_density(surface%inner_node) = .false.
+            if (surface%is_profile) is_bare([surface%edge]) = .false.
+            if (surface%inner_node > 0) is_bare(surface%inner_node) = .false.
          end associate
       end do
-      if (.not. any(without_density) .or. all(without_density)) return
+      if (.not. any(is_bare) .or. all(is_bare)) return
       call mark_coupled(scene, is_coupled)
-      is_idle = without_density .and. .not. any(is_coupled, 1)
-      if (any(is_idle)) call add_warning(reader%log, scene%node%origin(first_true(is_idle)), &
-         "node " // label_list(pack(scene%node%label, is_idle)) &
+      is_idle = is_bare .and. .not. any(is_coupled, 1)
+      if (any(is_idle)) call add_warning(reader%log, scene%node%origin(findloc(is_idle, .true., &
+         1)), "node " // label_list(pack(scene%node%label, is_idle)) &
          // " belongs to no element; it is left out")
       call mark_loaded(scene, is_coupled, is_loaded)
       call tell_bare(is_loaded .and. is_idle, "but *CLOAD acts on it")
-      call tell_bare(is_loaded .and. without_density .and. .not. is_idle, &
+      call tell_bare(is_loaded .and. is_bare .and. .not. is_idle, &
          "but *CLOAD acts on it in a direction that is in no *EQUATION")
       is_loaded = .false.
-      do i = 1, size(scene%pair)
-         if (scene%pair(i)%slave > 0) call mark_nodes(scene, scene%surface(scene%pair(i)%slave), &
-            is_loaded)
-      end do
-      call tell_bare(is_loaded .and. without_density, "but is a slave node of *CONTACT PAIR")
-      without_density = without_density .and. .not. is_loaded
-      call mark_partners(scene, is_loaded)
-      call tell_bare(is_loaded .and. without_density, &
+      call mark_nodes(scene, scene%pair%slave, is_loaded)
+      call tell_bare(is_loaded .and. is_bare, "but is a slave node of *CONTACT PAIR")
+      is_bare = is_bare .and. .not. is_loaded
+      call mark_nodes(scene, [scene%pair%master, scene%tie%slave, scene%tie%master], is_loaded)
+      call tell_bare(is_loaded .and. is_bare, &
          "but is a node of a surface in *CONTACT PAIR or *TIE")
 
    contains
@@ -163,30 +152,12 @@ contains
          logical, intent(in) :: is_wrong(:)
          character(len=*), intent(in) :: text
 
-         if (any(is_wrong)) call add_error(reader%log, scene%node%origin(first_true(is_wrong)), &
-            "node " // label_list(pack(scene%node%label, is_wrong)) // " belongs to no element, " &
-            // text)
+         if (any(is_wrong)) call add_error(reader%log, scene%node%origin(findloc(is_wrong, &
+            .true., 1)), "node " // label_list(pack(scene%node%label, is_wrong)) // " belongs to " &
+            // "no element, " // text)
       end subroutine tell_bare
 
    end subroutine check_nodes
-
-   !> Mark the nodes of all surfaces in ties, and of master surfaces in contact.
-   pure subroutine mark_partners(scene, is_in)
-      type(scene_t), intent(in) :: scene
-      logical, intent(inout) :: is_in(:)                         !! (n_node)
-      integer :: i
-
-      do i = 1, size(scene%pair)
-         if (scene%pair(i)%master > 0) call mark_nodes(scene, scene%surface(scene%pair(i)%master), &
-            is_in)
-      end do
-      do i = 1, size(scene%tie)
-         if (scene%tie(i)%slave > 0) call mark_nodes(scene, scene%surface(scene%tie(i)%slave), &
-            is_in)
-         if (scene%tie(i)%master > 0) call mark_nodes(scene, scene%surface(scene%tie(i)%master), &
-            is_in)
-      end do
-   end subroutine mark_partners
 
    !> The nodes on which a force acts in a direction that is not coupled.
    pure subroutine mark_loaded(scene, is_coupled, is_loaded)

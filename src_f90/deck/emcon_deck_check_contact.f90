@@ -67,7 +67,7 @@ contains
 
       is_slave = .false.
       is_stuck = .false.
-      call mark_nodes(scene, scene%surface(pair%slave), is_slave)
+      call mark_nodes(scene, [pair%slave], is_slave)
       do i = 1, size(scene%step)
          is_stuck = is_stuck .or. constraint_freedom(scene, scene%step(i), pair) < scene%n_dim
       end do
@@ -129,8 +129,8 @@ contains
       allocate(is_slave(size(scene%node%label)), is_master(size(scene%node%label)), &
          source=.false.)
       associate (slave => scene%surface(pair%slave), master => scene%surface(pair%master))
-         call mark_nodes(scene, slave, is_slave)
-         call mark_nodes(scene, master, is_master)
+         call mark_nodes(scene, [pair%slave], is_slave)
+         call mark_nodes(scene, [pair%master], is_master)
          has_common = any(is_slave .and. is_master)
          if (.not. has_common) return
          whole = ""
@@ -161,7 +161,7 @@ contains
       if (any(pair%formulation == [0, formulation_user]) .or. pair%both_sides) return
       allocate(is_slave(size(scene%node%label)), is_held(size(scene%node%label)), &
          is_guided(size(scene%node%label)), source=.false.)
-      call mark_nodes(scene, scene%surface(pair%slave), is_slave)
+      call mark_nodes(scene, [pair%slave], is_slave)
       do i = 1, size(scene%step)
          n_free = constraint_freedom(scene, scene%step(i), pair)
          is_held = is_held .or. (is_slave .and. n_free == 0)
@@ -199,7 +199,7 @@ contains
       n_free = own
       if (all(pair%formulation /= [formulation_segment, formulation_mortar])) return
       is_master = .false.
-      call mark_nodes(scene, scene%surface(pair%master), is_master)
+      call mark_nodes(scene, [pair%master], is_master)
       if (any(is_master .and. own > 0)) then
          n_free = scene%n_dim
       else if (step%contact%options%multiplier == multiplier_standard) then

@@ -70,12 +70,7 @@ contains
       do i = 1, size(scene%equation)
          is_held(scene%equation(i)%node) = .true.
       end do
-      do i = 1, size(scene%tie)
-         if (scene%tie(i)%slave > 0) call mark_nodes(scene, scene%surface(scene%tie(i)%slave), &
-            is_held)
-         if (scene%tie(i)%master > 0) call mark_nodes(scene, scene%surface(scene%tie(i)%master), &
-            is_held)
-      end do
+      call mark_nodes(scene, [scene%tie%slave, scene%tie%master], is_held)
    end subroutine mark_held
 
    !> Angular velocity of the rotation that comes closest to the velocities of nodes.

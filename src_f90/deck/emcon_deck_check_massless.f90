@@ -17,7 +17,7 @@ contains
    subroutine check_massless_sections(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      logical, allocatable :: is_massless(:), without_density(:), meets(:)
+      logical, allocatable :: is_massless(:), is_bare(:), meets(:)
       type(origin_t) :: origin
       integer :: k
 
@@ -46,20 +46,21 @@ contains
                "with MASSLESS sections; use SCHEME=ENERGY MOMENTUM")
          end associate
       end do
-      call mark_bare(scene, is_massless, without_density)
-      call mark_contact(scene, meets)
-      if (.not. any(meets .and. without_density)) return
+      call mark_bare(scene, is_massless, is_bare)
+      allocate(meets(size(is_bare)), source=.false.)
+      call mark_nodes(scene, [scene%pair%slave, scene%pair%master], meets)
+      if (.not. any(meets .and. is_bare)) return
       do k = 1, size(scene%step)
-         call check_step(reader, scene, k, without_density)
+         call check_step(reader, scene, k, is_bare)
       end do
    end subroutine check_massless_sections
 
    !> What is restored in a step by a jump of velocities goes along forces on masses.
-   subroutine check_step(reader, scene, k, without_density)
+   subroutine check_step(reader, scene, k, is_bare)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: k                   !! of a step
-      logical, intent(in) :: without_density(:)  !! (n_node)
+      logical, intent(in) :: is_bare(:)          !! (n_node)
       logical, allocatable :: is_joined(:)
 
       associate (step => scene%step(k))
@@ -68,43 +69,27 @@ contains
             // "in contact is of a MASSLESS section; use PERSISTENT or MASSLESS")
          if (step_initiation(step) /= initiation_massless) return
          call mark_joined(scene, is_joined)
-         if (any(is_joined .and. without_density)) call add_error(reader%log, step%origin, &
+         if (any(is_joined .and. is_bare)) call add_error(reader%log, step%origin, &
             "*CONTACT INITIATION, TYPE=MASSLESS balances MASSLESS sections in contact by " // &
             "themselves, but one is in a *TIE or an *EQUATION; use PERSISTENT")
       end associate
    end subroutine check_step
 
    !> Nodes of massless elements alone.
-   pure subroutine mark_bare(scene, is_massless, without_density)
+   pure subroutine mark_bare(scene, is_massless, is_bare)
       type(scene_t), intent(in) :: scene
       logical, intent(in) :: is_massless(:)              !! (n_element)
-      logical, allocatable, intent(out) :: without_density(:) !! (n_node)
+      logical, allocatable, intent(out) :: is_bare(:)    !! (n_node)
       integer :: pass, e
 
-      allocate(without_density(size(scene%x, 2)), source=.false.)
+      allocate(is_bare(size(scene%x, 2)), source=.false.)
       do pass = 1, 2
          do e = 1, size(is_massless)
             if (is_massless(e) .neqv. pass == 1) cycle
-            without_density(pack(scene%element%node(:, e), scene%element%node(:, e) > 0)) = pass &
-               == 1
+            is_bare(pack(scene%element%node(:, e), scene%element%node(:, e) > 0)) = pass == 1
          end do
       end do
    end subroutine mark_bare
-
-   !> Nodes of surfaces in contact.
-   pure subroutine mark_contact(scene, meets)
-      type(scene_t), intent(in) :: scene
-      logical, allocatable, intent(out) :: meets(:)      !! (n_node)
-      integer :: i
-
-      allocate(meets(size(scene%x, 2)), source=.false.)
-      do i = 1, size(scene%pair)
-         if (scene%pair(i)%slave > 0) call mark_nodes(scene, scene%surface(scene%pair(i)%slave), &
-            meets)
-         if (scene%pair(i)%master > 0) call mark_nodes(scene, &
-            scene%surface(scene%pair(i)%master), meets)
-      end do
-   end subroutine mark_contact
 
    !> Nodes of ties and equations.
    pure subroutine mark_joined(scene, is_joined)
@@ -113,12 +98,7 @@ contains
       integer :: i
 
       allocate(is_joined(size(scene%x, 2)), source=.false.)
-      do i = 1, size(scene%tie)
-         if (scene%tie(i)%slave > 0) call mark_nodes(scene, scene%surface(scene%tie(i)%slave), &
-            is_joined)
-         if (scene%tie(i)%master > 0) call mark_nodes(scene, &
-            scene%surface(scene%tie(i)%master), is_joined)
-      end do
+      call mark_nodes(scene, [scene%tie%slave, scene%tie%master], is_joined)
       do i = 1, size(scene%equation)
          is_joined(scene%equation(i)%node) = .true.
       end do

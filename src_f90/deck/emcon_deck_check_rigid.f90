@@ -26,9 +26,8 @@ contains
       if (size(scene%rigid) == 0) return
       allocate(is_slave(size(body)))
       do i = 1, size(scene%tie)
-         if (scene%tie(i)%slave == 0) cycle
          is_slave = .false.
-         call mark_nodes(scene, scene%surface(scene%tie(i)%slave), is_slave)
+         call mark_nodes(scene, [scene%tie(i)%slave], is_slave)
          is_slave = is_slave .and. body > 0
          if (any(is_slave)) call add_error(reader%log, scene%tie(i)%origin, "*TIE " // &
             scene%tie(i)%name // ": slave node " // label_list(pack(scene%node%label, is_slave)) &

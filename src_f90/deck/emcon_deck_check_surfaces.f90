@@ -88,15 +88,19 @@ contains
       repeated = pack(list(2:), list(2:) == list(:size(list) - 1))
    end function repeated
 
-   !> Mark the nodes of a surface.
+   !> Mark the nodes of surfaces; those that are unknown, and told, have the number 0.
    pure subroutine mark_nodes(scene, surface, is_in)
       type(scene_t), intent(in) :: scene
-      type(surface_t), intent(in) :: surface
+      integer, intent(in) :: surface(:)            !! their numbers
       logical, intent(inout) :: is_in(:)           !! (n_node)
       integer, allocatable :: node(:)
+      integer :: i
 
-      call surface_nodes(scene, surface, node)
-      is_in(node) = .true.
+      do i = 1, size(surface)
+         if (surface(i) == 0) cycle
+         call surface_nodes(scene, scene%surface(surface(i)), node)
+         is_in(node) = .true.
+      end do
    end subroutine mark_nodes
 
    !> Which of the edges of `surface` belong to the surface `other` too, of edges or of nodes?

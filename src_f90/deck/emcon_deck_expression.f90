@@ -237,7 +237,7 @@ contains
             call read_parentheses(self, expression, value)
             if (expression%fault == "") call apply_function(word, value, expression%fault)
          else
-            call overlap_query_up(self, word, value, expression%fault)
+            call look_up(self, word, value, expression%fault)
          end if
       else
          expression%fault = quoted(mark) // " is not expected"
@@ -280,7 +280,7 @@ contains
       end associate
    end subroutine read_number
 
-   subroutine overlap_query_up(self, word, value, fault)
+   subroutine look_up(self, word, value, fault)
       type(parameter_table_t), intent(in) :: self
       character(len=*), intent(in) :: word
       real(wp), intent(out) :: value
@@ -297,7 +297,7 @@ contains
       else
          fault = "unknown parameter " // quoted(word) // suggestion(word, parameter_list(self))
       end if
-   end subroutine overlap_query_up
+   end subroutine look_up
 
    pure subroutine apply_function(name, value, fault)
       character(len=*), intent(in) :: name

@@ -39,7 +39,7 @@ contains
       type(scene_t), intent(in) :: scene
       integer, allocatable, intent(out) :: list(:)
       character(len=:), allocatable :: name
-      logical :: without_density(0:size(scene%node%label))
+      logical :: is_bare(0:size(scene%node%label))
       integer :: e, i, k
 
       if (has_option(card, "NSET")) then
@@ -52,13 +52,13 @@ contains
          if (name /= "" .and. .not. reader%doubt%names) call card_error(reader, card, &
             "unknown node set " // quoted(name) // suggestion(name, set_names(scene%set%node)))
       end if
-      without_density = .true.
+      is_bare = .true.
       do e = 1, size(scene%element%label)
          do k = 1, scene%element%kinds(scene%element%kind(e))%n_node
-            without_density(scene%element%node(k, e)) = .false.
+            is_bare(scene%element%node(k, e)) = .false.
          end do
       end do
-      list = pack([(i, i = 1, size(scene%node%label))], without_density(1:))
+      list = pack([(i, i = 1, size(scene%node%label))], is_bare(1:))
       if (size(list) == 0 .and. .not. (has_option(card, "NSET") .or. reader%doubt%nodes &
          .or. reader%doubt%elements)) call card_error(reader, card, &
          "all nodes belong to elements; name those that are given forces by NSET=")
