@@ -2,7 +2,7 @@
 module emcon_deck_cards
    use emcon_deck_keywords, only : find_keyword, in_model, in_step, is_neutral, keyword_names, &
       keyword_t, keywords, mark_flag, mark_none, mark_unsupported, mark_value, &
-      mark_without_effect, parameter_mark, parameter_names, parameter_reason
+      mark_without_effect, parameter_mark, parameter_names, parameter_reason, refusal_of, refusal_t
    use emcon_deck_parameters, only : parameter_define, parameters_init, parameters_t, &
       substitute_parameters, unused_override
    use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, option_t, reader_t
@@ -194,6 +194,7 @@ contains
       integer, intent(in) :: i_line
       type(card_t), intent(out) :: card
       character(len=:), allocatable :: variants
+      type(refusal_t) :: refusal
       integer :: i_comma, i
 
       card%origin = line_origin(reader, i_line)
@@ -204,10 +205,11 @@ contains
       card%name = squeezed(text(2:i_comma - 1))
       call split_options(text(i_comma:), card%option)
       i = find_keyword(card%name)
-      if (i == 0) then
+      refusal = refusal_of(card%name)
+      if (refusal%reason /= "") then
+         call refuse_unsupported(reader, card, refusal)
+      else if (i == 0) then
          call refuse_keyword(reader, card)
-      else if (keywords(i)%reason /= "") then
-         call refuse_unsupported(reader, card, keywords(i))
       else
          call law_variants(card%name, variants)
          if (variants /= "") variants = variants(2:) // ","
@@ -230,15 +232,15 @@ contains
       card%name = ""
    end subroutine refuse_keyword
 
-   subroutine refuse_unsupported(reader, card, keyword)
+   subroutine refuse_unsupported(reader, card, refusal)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(inout) :: card
-      type(keyword_t), intent(in) :: keyword
+      type(refusal_t), intent(in) :: refusal
 
-      if (reader%is_lenient .and. keyword%is_output) then
-         call card_warning(reader, card, "not supported, left out: " // trim(keyword%reason))
+      if (reader%is_lenient .and. refusal%is_output) then
+         call card_warning(reader, card, "not supported, left out: " // trim(refusal%reason))
       else
-         call card_error(reader, card, "known but not supported: " // trim(keyword%reason))
+         call card_error(reader, card, "known but not supported: " // trim(refusal%reason))
       end if
       select case (card%name)
       case ("NGEN", "NCOPY", "NFILL", "ELGEN", "ELCOPY", "PART", "ASSEMBLY", "INSTANCE", &

@@ -171,7 +171,6 @@ contains
       type(conditions_t), intent(inout) :: self
       type(prescribed_t), intent(in) :: new
       logical, intent(out) :: is_other
-      type(prescribed_t), allocatable :: grown(:)
       real(wp) :: before
       integer :: i, n
 
@@ -184,10 +183,9 @@ contains
       else
          n = self%n_prescribed
          if (n == size(self%prescribed)) then
-            allocate(grown(2*n))
-            grown(:n) = self%prescribed
-            call move_alloc(grown, self%prescribed)
-            call grow_marks(self%prescribed_step, self%prescribed_dropped)
+            self%prescribed = [self%prescribed, self%prescribed]
+            self%prescribed_step = [self%prescribed_step, self%prescribed_step]
+            self%prescribed_dropped = [self%prescribed_dropped, self%prescribed_dropped]
          end if
          i = n + 1
          self%n_prescribed = i
@@ -225,7 +223,12 @@ contains
          end if
       end if
       if (i == 0) then
-         if (self%n_load == size(self%load)) call grow_loads(self)
+         if (self%n_load == size(self%load)) then
+            self%load = [self%load, self%load]
+            self%load_step = [self%load_step, self%load_step]
+            self%load_dropped = [self%load_dropped, self%load_dropped]
+            self%load_next = [self%load_next, self%load_next]
+         end if
          self%n_load = self%n_load + 1
          i = self%n_load
       end if
@@ -265,36 +268,6 @@ contains
          k = self%load_next(k)
       end do
    end subroutine replace_loads
-
-   subroutine grow_loads(self)
-      type(conditions_t), intent(inout) :: self
-      type(load_t), allocatable :: grown(:)
-      integer, allocatable :: grown_next(:)
-      integer :: n
-
-      n = size(self%load)
-      allocate(grown(2*n), grown_next(2*n))
-      grown(:n) = self%load
-      grown_next(:n) = self%load_next
-      call move_alloc(grown, self%load)
-      call move_alloc(grown_next, self%load_next)
-      call grow_marks(self%load_step, self%load_dropped)
-   end subroutine grow_loads
-
-   subroutine grow_marks(step, dropped)
-      integer, allocatable, intent(inout) :: step(:)
-      logical, allocatable, intent(inout) :: dropped(:)
-      integer, allocatable :: grown_step(:)
-      logical, allocatable :: grown_dropped(:)
-      integer :: n
-
-      n = size(step)
-      allocate(grown_step(2*n), grown_dropped(2*n))
-      grown_step(:n) = step
-      grown_dropped(:n) = dropped
-      call move_alloc(grown_step, step)
-      call move_alloc(grown_dropped, dropped)
-   end subroutine grow_marks
 
    !> Drop the loads of earlier steps that one kind of card gave.
    subroutine drop_loads(self, given)

@@ -6,18 +6,18 @@ module emcon_deck_contact
    use emcon_deck_friction, only : read_friction
    use emcon_deck_named, only : set_names
    use emcon_deck_options, only : check_option
-   use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, need_name, &
-      option_name, reader_t, refuse_option
+   use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, n_lines, need_name, &
+      option_name, option_number, option_word, reader_t, refuse_option
    use emcon_deck_surfaces, only : get_surfaces
    use emcon_diagnostics, only : add_error, quoted, suggestion
-   use emcon_interactions, only : contact_damping_t, contact_pair_t, formulation_user, &
-      formulation_mortar, formulation_nts, formulation_segment
+   use emcon_interactions, only : adjustment_t, contact_damping_t, contact_pair_t, &
+      formulation_user, formulation_mortar, formulation_nts, formulation_segment
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_options, only : option_code, option_default, option_words
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t, where_text
-   use emcon_text, only : read_real, squeezed
+   use emcon_text, only : read_real
    implicit none
    private
    public :: read_interactions, read_pairs
@@ -42,11 +42,11 @@ contains
                n = n + 1
                reader%interaction_name(n)%text = name
                if (name /= "") call name_index_put(reader%names%interactions, name, n)
-               call read_number(reader, card, "PAD THICKNESS", "a length of 0 or more: it keeps " &
-                  // "surfaces apart; overlap at the start is resolved by *CONTACT INTERFERENCE", &
-                  reader%interaction(n)%offset)
-               call read_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is left " &
-                  // "of the velocity at which bodies meet", &
+               call option_number(reader, card, "PAD THICKNESS", "a length of 0 or more: it " &
+                  // "keeps surfaces apart; overlap at the start is resolved by *CONTACT " // &
+                  "INTERFERENCE", 0.0_wp, huge(1.0_wp), reader%interaction(n)%offset)
+               call option_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
+                  // "left of the velocity at which bodies meet", 0.0_wp, 1.0_wp, &
                   reader%interaction(n)%restitution)
             case ("SURFACEBEHAVIOR", "FRICTION", "CONTACTDAMPING")
                if (n == 0 .and. .not. reader%doubt%names) call card_error(reader, card, &
@@ -59,8 +59,8 @@ contains
                      "the surface interaction has *FRICTION already")
                   last_friction = n
                   call read_friction(reader, card, reader%interaction(max(1, n))%friction)
-                  call read_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
-                     // "left of the velocity along the surface of what sticks", &
+                  call option_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
+                     // "left of the velocity along the surface of what sticks", 0.0_wp, 1.0_wp, &
                      reader%interaction(max(1, n))%rebound)
                else
                   call check_behavior(reader, card)
@@ -72,45 +72,19 @@ contains
       reader%interaction_name = reader%interaction_name(:n)
    end subroutine read_interactions
 
-   !> The value of a parameter, 0 or more; of RESTITUTION up to 1.
-   subroutine read_number(reader, card, name, what, value)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      character(len=*), intent(in) :: name         !! blanks are for the message
-      character(len=*), intent(in) :: what         !! it is, for the message
-      real(wp), intent(inout) :: value             !! as it is if the option is absent or wrong
-      character(len=:), allocatable :: text
-      real(wp) :: number
-      logical :: is_ok
-
-      if (.not. has_option(card, squeezed(name))) return
-      text = option_name(card, squeezed(name))
-      call read_real(text, number, is_ok)
-      if (is_ok) is_ok = number >= 0.0_wp .and. &
-         number <= merge(1.0_wp, huge(number), name == "RESTITUTION")
-      if (is_ok) then
-         value = number
-      else
-         call card_error(reader, card, name // "=" // quoted(text) // " is not " // what)
-      end if
-   end subroutine read_number
-
    subroutine check_behavior(reader, card)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
+      character(len=*), parameter :: name = "PRESSURE-OVERCLOSURE"
+      character(len=:), allocatable :: word
 
-      select case (option_name(card, "PRESSURE-OVERCLOSURE"))
-      case ("", "HARD")
-         call refuse_lines(reader, card)
-      case ("TIED")
-         call refuse_option(reader, card, "PRESSURE-OVERCLOSURE", "HARD", &
-            "surfaces are tied by *TIE")
-      case ("LINEAR", "EXPONENTIAL", "TABULAR", "SCALEFACTOR")
-         call refuse_option(reader, card, "PRESSURE-OVERCLOSURE", "HARD", &
-            "contact is enforced exactly, without penalty")
-      case default
-         call refuse_option(reader, card, "PRESSURE-OVERCLOSURE", "HARD", "")
-      end select
+      if (option_name(card, name) == "TIED") then
+         call refuse_option(reader, card, name, "HARD", "surfaces are tied by *TIE")
+         return
+      end if
+      call option_word(reader, card, name, "HARD", word, "LINEAR, EXPONENTIAL, TABULAR, " // &
+         "SCALE FACTOR", "contact is enforced exactly, without penalty")
+      if (word == "HARD") call refuse_lines(reader, card)
    end subroutine check_behavior
 
    !> All *CONTACT PAIR cards.
@@ -124,12 +98,7 @@ contains
       type(name_index_t) :: given                  !! pairs so far, by slave and master
       integer :: i, n, n_before, most
 
-      most = 0
-      do i = 1, size(reader%card)
-         if (reader%card(i)%name == "CONTACTPAIR") then
-            most = most + reader%card(i)%last - reader%card(i)%first + 1
-         end if
-      end do
+      most = n_lines(reader, "CONTACTPAIR")
       allocate(pair(most), line(most))
       n = 0
       do i = 1, size(reader%card)
@@ -182,15 +151,13 @@ contains
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(contact_pair_t), intent(inout) :: of_card
-      character(len=*), parameter :: known = "AUTO, ONE, BOTH"
+      character(len=:), allocatable :: word
 
       of_card%is_asked = has_option(card, "SIDES")
-      select case (option_name(card, "SIDES"))
-      case ("", "AUTO")
+      call option_word(reader, card, "SIDES", "AUTO, ONE, BOTH", word)
+      if (word == "AUTO") then
          of_card%may_choose = of_card%formulation /= formulation_user
-      case ("ONE")
-         continue
-      case ("BOTH")
+      else if (word == "BOTH") then
          of_card%both_sides = of_card%formulation == formulation_nts
          if (any(of_card%formulation == [formulation_segment, formulation_mortar])) then
             call refuse_option(reader, card, "SIDES", "AUTO, ONE", "SEGMENT and MORTAR hold what " &
@@ -199,9 +166,7 @@ contains
             call refuse_option(reader, card, "SIDES", "AUTO, ONE", "what TYPE=USER holds the " // &
                "program says that gives it")
          end if
-      case default
-         call refuse_option(reader, card, "SIDES", known, "")
-      end select
+      end if
    end subroutine read_sides
 
    !> Where the program may choose: both sides node to surface, if the slave has edges; one of them
@@ -260,8 +225,7 @@ contains
       other%master = pair%slave
       other%is_reverse = .true.
       if (.not. pair%may_choose) return
-      other%adjust%distance = -1.0_wp                ! it speaks of the slave
-      other%adjust%set = 0
+      other%adjust = adjustment_t()                  ! it speaks of the slave
    end function reversed
 
    !> A surface of nodes has no edges: it may only be the slave of another one, node to surface.
@@ -339,14 +303,9 @@ contains
       call read_pair_initiation(reader, card, of_card%initiation)
       if (any(pair%formulation == formulation_user)) call suit_user(reader, card, of_card)
       do i = 1, size(pair)
-         pair(i)%adjust%distance = of_card%adjust%distance
-         pair(i)%adjust%set = of_card%adjust%set
+         pair(i)%adjust = of_card%adjust
          pair(i)%is_guarded = of_card%is_guarded
-         pair(i)%interaction%offset = of_card%interaction%offset
-         pair(i)%interaction%restitution = of_card%interaction%restitution
-         pair(i)%interaction%friction = of_card%interaction%friction
-         pair(i)%interaction%rebound = of_card%interaction%rebound
-         pair(i)%interaction%damping = of_card%interaction%damping
+         pair(i)%interaction = of_card%interaction
          pair(i)%initiation = of_card%initiation
       end do
    end subroutine read_pair_options
@@ -404,15 +363,10 @@ contains
       type(card_t), intent(in) :: card
       logical, intent(in) :: both_sides
       type(contact_pair_t), intent(inout) :: of_card
+      character(len=:), allocatable :: word
 
-      select case (option_name(card, "GUARD"))
-      case ("", "YES")
-         of_card%is_guarded = .true.
-      case ("NO")
-         of_card%is_guarded = .false.
-      case default
-         call refuse_option(reader, card, "GUARD", "YES, NO", "")
-      end select
+      call option_word(reader, card, "GUARD", "YES, NO", word)
+      of_card%is_guarded = word /= "NO"
       if (both_sides .and. has_option(card, "GUARD")) call card_error(reader, card, "GUARD has " &
          // "no meaning where the nodes of both surfaces are held; take it out, or say SIDES=ONE")
    end subroutine read_guard

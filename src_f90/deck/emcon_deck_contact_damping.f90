@@ -1,14 +1,13 @@
 !> *CONTACT DAMPING of surface interactions, and what it does not go with.
 module emcon_deck_contact_damping
    use emcon_deck_fields, only : data_error, data_open, data_t, drop_zeros, get_real, next_line
-   use emcon_deck_reader, only : card_error, card_t, has_option, option_name, reader_t, &
-      refuse_option
-   use emcon_diagnostics, only : add_error, add_warning, quoted
+   use emcon_deck_reader, only : card_error, card_t, option_number, option_word, reader_t
+   use emcon_diagnostics, only : add_error, add_warning
    use emcon_interactions, only : contact_damping_t, contact_pair_t
    use emcon_kinds, only : wp
    use emcon_steps, only : initiation_massless, method_penalty, step_initiation, &
       step_is_dynamic, step_t
-   use emcon_text, only : read_real, to_text
+   use emcon_text, only : to_text
    implicit none
    private
    public :: read_contact_damping, check_contact_damping
@@ -22,12 +21,17 @@ contains
       type(card_t), intent(in) :: card
       type(contact_damping_t), intent(inout) :: damping
       type(data_t) :: data
-      integer :: n
-      logical :: is_known, is_number
+      character(len=:), allocatable :: word
+      integer :: n, n_before
 
+      n_before = reader%log%n_errors
       damping = contact_damping_t()
-      call read_definition(reader, card, is_known)
-      call read_tangent(reader, card, damping%tangent, is_number)
+      call option_word(reader, card, "DEFINITION", "DAMPING COEFFICIENT", word, &
+         "CRITICAL DAMPING FRACTION", "what is critical is by a contact stiffness, and " // &
+         "contact that is held exactly has none")
+      call option_number(reader, card, "TANGENT FRACTION", "a number of 0 or more: the " // &
+         "coefficient along the surface by that normal to it", 0.0_wp, huge(1.0_wp), &
+         damping%tangent)
       call data_open(data, card)
       n = 0
       do while (next_line(reader, data))
@@ -43,54 +47,14 @@ contains
          if (data%ok) call check_line(reader, data, damping)
       end do
       if (n == 0) call card_error(reader, card, "a data line with the coefficient is missing")
-      if (.not. (is_known .and. is_number)) damping = contact_damping_t()
+      if (reader%log%n_errors > n_before) damping = contact_damping_t()
    end subroutine read_contact_damping
-
-   !> DEFINITION of a card: what it is without.
-   subroutine read_definition(reader, card, is_known)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      logical, intent(out) :: is_known           !! else it is refused
-      character(len=*), parameter :: known = "DAMPING COEFFICIENT"
-
-      is_known = .false.
-      select case (option_name(card, "DEFINITION"))
-      case ("", "DAMPINGCOEFFICIENT")
-         is_known = .true.
-      case ("CRITICALDAMPINGFRACTION")
-         call refuse_option(reader, card, "DEFINITION", known, &
-            "what is critical is by a contact stiffness, and contact that is held exactly has none")
-      case default
-         call refuse_option(reader, card, "DEFINITION", known, "")
-      end select
-   end subroutine read_definition
-
-   !> TANGENT FRACTION of a card; 0 where it is absent.
-   subroutine read_tangent(reader, card, tangent, is_ok)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      real(wp), intent(inout) :: tangent
-      logical, intent(out) :: is_ok              !! else it is refused
-      real(wp) :: number
-
-      is_ok = .true.
-      if (.not. has_option(card, "TANGENTFRACTION")) return
-      call read_real(option_name(card, "TANGENTFRACTION"), number, is_ok)
-      if (is_ok) is_ok = number >= 0.0_wp
-      if (is_ok) then
-         tangent = number
-      else
-         call card_error(reader, card, "TANGENT FRACTION=" // &
-            quoted(option_name(card, "TANGENTFRACTION")) // " is not a number of 0 or more: the " &
-            // "coefficient along the surface by that normal to it")
-      end if
-   end subroutine read_tangent
 
    !> The numbers of a data line, which could be read.
    subroutine check_line(reader, data, damping)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
-      type(contact_damping_t), intent(inout) :: damping
+      type(contact_damping_t), intent(in) :: damping
 
       if (damping%coefficient < 0.0_wp) call data_error(reader, data, "the damping coefficient " &
          // to_text(damping%coefficient) // " is negative")
@@ -101,7 +65,6 @@ contains
          // "to 1")
       if (data%n > 3) call data_error(reader, data, "a coefficient, a clearance and a fraction " &
          // "of it are read; leave out what stands behind them")
-      if (.not. data%ok) damping = contact_damping_t()
    end subroutine check_line
 
    !> Damping is of steps whose scheme has its forces along discrete gradients, and of surfaces with

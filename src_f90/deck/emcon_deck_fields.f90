@@ -100,7 +100,10 @@ contains
          ! What follows the last comma may be blanks only.
          if (comma > len(data%text) .and. last < first) data%ends_in_comma = data%n > 0
          data%n = data%n + 1
-         if (data%n > size(data%from)) call grow_fields(data)
+         if (data%n > size(data%from)) then
+            data%from = [data%from, data%from]
+            data%to = [data%to, data%to]
+         end if
          data%from(data%n) = first
          data%to(data%n) = last
          first = comma + 1
@@ -116,20 +119,6 @@ contains
 
       is_space = character_ == " " .or. (iachar(character_) >= 9 .and. iachar(character_) <= 13)
    end function is_space
-
-   subroutine grow_fields(data)
-      type(data_t), intent(inout) :: data
-      integer, allocatable :: grown(:)
-      integer :: n
-
-      n = size(data%from)
-      allocate(grown(2*n))
-      grown(:n) = data%from
-      call move_alloc(grown, data%from)
-      allocate(grown(2*n))
-      grown(:n) = data%to
-      call move_alloc(grown, data%to)
-   end subroutine grow_fields
 
    pure logical function is_blank(data, k)
       type(data_t), intent(in) :: data

@@ -232,23 +232,31 @@ contains
          i = name_index_find(reader%names%interactions, name)
          is_known = i > 0 .or. reader%doubt%names
          if (i > 0) then
-            if (reader%interaction(i)%restitution < 1.0_wp) call data_error(reader, data, "the " &
-               // "surface interaction " // quoted(name) // " has a RESTITUTION, which is of " // &
-               "pairs only; name what it is of by *CONTACT PAIR")
-            if (reader%interaction(i)%friction > 0.0_wp) call data_error(reader, data, "the " // &
-               "surface interaction " // quoted(name) // " has *FRICTION, which is of pairs " // &
-               "only; name what it is of by *CONTACT PAIR")
-            if (reader%interaction(i)%damping%coefficient > 0.0_wp) call data_error(reader, data, &
-               "the surface interaction " // quoted(name) // " has *CONTACT DAMPING, which is " // &
-               "of pairs only; name what it is of by *CONTACT PAIR")
-            if (reader%interaction(i)%offset > 0.0_wp) call data_error(reader, data, "the " // &
-               "surface interaction " // quoted(name) // " has a PAD THICKNESS, which has no " // &
-               "meaning where surfaces may be in contact with themselves; name what it keeps " // &
-               "apart by *CONTACT PAIR")
+            associate (given => reader%interaction(i))
+               call refuse(given%restitution < 1.0_wp, "a RESTITUTION, which is of pairs only", &
+                  "is of")
+               call refuse(given%friction > 0.0_wp, "*FRICTION, which is of pairs only", "is of")
+               call refuse(given%damping%coefficient > 0.0_wp, "*CONTACT DAMPING, which is of " // &
+                  "pairs only", "is of")
+               call refuse(given%offset > 0.0_wp, "a PAD THICKNESS, which has no meaning " // &
+                  "where surfaces may be in contact with themselves", "keeps apart")
+            end associate
          end if
          if (.not. is_known) call data_error(reader, data, "unknown surface interaction " &
             // quoted(name) // suggestion(name, reader%interaction_name))
       end do
+
+   contains
+
+      subroutine refuse(has, what, does)
+         logical, intent(in) :: has
+         character(len=*), intent(in) :: what
+         character(len=*), intent(in) :: does        !! to what is to be named
+
+         if (has) call data_error(reader, data, "the surface interaction " // quoted(name) // &
+            " has " // what // "; name what it " // does // " by *CONTACT PAIR")
+      end subroutine refuse
+
    end subroutine check_properties
 
 end module emcon_deck_general_contact

@@ -1,11 +1,12 @@
 !> The keyword registry: what the deck language knows. One row per keyword.
 module emcon_deck_keywords
+   use emcon_diagnostics, only : entries
    use emcon_kinds, only : wp
    use emcon_law_registry, only : law_titles
    use emcon_text, only : read_real, squeezed, string_t
    implicit none
    private
-   public :: keyword_t, keywords, find_keyword, keyword_names
+   public :: keyword_t, keywords, find_keyword, keyword_names, refusal_of, refusal_t
    public :: parameter_mark, parameter_names, parameter_reason, is_neutral
    public :: in_model, in_step, in_both
    public :: mark_none, mark_flag, mark_value, mark_either, mark_unsupported, mark_without_effect
@@ -21,19 +22,20 @@ module emcon_deck_keywords
    !> One keyword. `parameters` lists them with commas, without blanks inside: `NAME=` takes a
    !> value, `NAME` none, `NAME?` may; `!NAME` is known but not supported, `~NAME` has no effect;
    !> `!NAME:VALUE` and `~NAME:VALUE` are accepted with the value that changes nothing.
-   !> A `reason` says why a known keyword is not supported; empty: it is.
    type :: keyword_t
       character(len=27) :: name = ""
       integer :: place = in_both
       character(len=192) :: parameters = ""
-      character(len=64) :: reason = ""
-      logical :: is_output = .false.         !! --lenient reads on if it is not supported
       logical :: has_data = .true.           !! data lines may follow
    end type keyword_t
 
-   character(len=*), parameter :: no_rods = "only plane strain solids are read", &
-      no_thermal = "there is no temperature", no_couple = "linear couplings go by *EQUATION"
-   character(len=*), parameter :: no_export = "results go by *NODE FILE, *EL FILE and *... PRINT"
+   !> Why keywords are not supported.
+   type :: refusal_t
+      character(len=64) :: reason = ""
+      character(len=180) :: names = ""       !! with commas between them
+      logical :: is_output = .false.         !! --lenient reads on
+   end type refusal_t
+
    character(len=*), parameter :: printed = "FREQUENCY=,TIMEPOINTS=,TOTALS=,~GLOBAL:YES"
    character(len=*), parameter :: filed = "FREQUENCY=,TIMEPOINTS=,~OUTPUT:2D,!POSITION,!USER"
 
@@ -118,135 +120,108 @@ module emcon_deck_keywords
       keyword_t("CONTACT PRINT", in_step, "~NSET,~SET," // printed), &
       keyword_t("ENERGY PRINT", in_step, "~ELSET,~FREQUENCY:1,~TIMEPOINTS"), &
       keyword_t("RESTART", in_both, "WRITE,FREQUENCY=,~OVERLAY,!READ", has_data=.false.), &
-      keyword_t("END STEP", in_step, has_data=.false.), &
-      keyword_t("MPC", in_model, "", no_couple), &
-      keyword_t("COUPLING", in_model, "", no_couple), &
-      keyword_t("KINEMATIC", in_model, "", no_couple), &
-      keyword_t("DISTRIBUTING", in_model, "", no_couple), &
-      keyword_t("EMBEDDED ELEMENT", in_model, "", no_couple), &
-      keyword_t("RIGID SURFACE", in_model, "", "use *RIGID BODY and TYPE=SEGMENTS"), &
-      keyword_t("TRANSFORM", in_model, "", "degrees of freedom are those of the global axes"), &
-      keyword_t("ORIENTATION", in_model, "", "materials are isotropic"), &
-      keyword_t("SYSTEM", in_model, "", "coordinates are those of the global axes"), &
-      keyword_t("NGEN", in_model, "", "nodes are given one by one by *NODE"), &
-      keyword_t("NCOPY", in_model, "", "nodes are given one by one by *NODE"), &
-      keyword_t("NFILL", in_model, "", "nodes are given one by one by *NODE"), &
-      keyword_t("ELGEN", in_model, "", "elements are given one by one by *ELEMENT"), &
-      keyword_t("ELCOPY", in_model, "", "elements are given one by one by *ELEMENT"), &
-      keyword_t("PART", in_model, "", "write a flat deck (no parts and instances)"), &
-      keyword_t("END PART", in_model, "", "write a flat deck (no parts and instances)"), &
-      keyword_t("ASSEMBLY", in_model, "", "write a flat deck (no parts and instances)"), &
-      keyword_t("END ASSEMBLY", in_model, "", "write a flat deck (no parts and instances)"), &
-      keyword_t("INSTANCE", in_model, "", "write a flat deck (no parts and instances)"), &
-      keyword_t("END INSTANCE", in_model, "", "write a flat deck (no parts and instances)"), &
-      keyword_t("PLASTIC", in_model, "", "materials are elastic"), &
-      keyword_t("CYCLIC HARDENING", in_model, "", "materials are elastic"), &
-      keyword_t("CREEP", in_model, "", "materials are elastic"), &
-      keyword_t("VISCOELASTIC", in_model, "", "materials are elastic"), &
-      keyword_t("HYPERFOAM", in_model, "", "use *HYPERELASTIC, NEO HOOKE"), &
-      keyword_t("DEPVAR", in_model, "", "materials have no state variables"), &
-      keyword_t("EXPANSION", in_model, "", no_thermal), &
-      keyword_t("CONDUCTIVITY", in_model, "", no_thermal), &
-      keyword_t("SPECIFIC HEAT", in_model, "", no_thermal), &
-      keyword_t("PHYSICAL CONSTANTS", in_model, "", no_thermal), &
-      keyword_t("TEMPERATURE", in_step, "", no_thermal), &
-      keyword_t("DFLUX", in_step, "", no_thermal), &
-      keyword_t("FILM", in_step, "", no_thermal), &
-      keyword_t("RADIATE", in_step, "", no_thermal), &
-      keyword_t("HEAT TRANSFER", in_step, "", no_thermal), &
-      keyword_t("UEL PROPERTY", in_model, "", "use *SOLID SECTION"), &
-      keyword_t("SHELL SECTION", in_model, "", no_rods), &
-      keyword_t("BEAM SECTION", in_model, "", no_rods), &
-      keyword_t("MEMBRANE SECTION", in_model, "", no_rods), &
-      keyword_t("SPRING", in_model, "", no_rods), &
-      keyword_t("DASHPOT", in_model, "", no_rods), &
-      keyword_t("MASS", in_model, "", no_rods), &
-      keyword_t("GAP", in_model, "", "use *CONTACT PAIR"), &
-      keyword_t("CONTACT EXCLUSIONS", in_both, "", "list what touches by *CONTACT INCLUSIONS"), &
-      keyword_t("CONTACT FORMULATION", in_both, "", "all with all holds the nodes of both sides"), &
-      keyword_t("CLEARANCE", in_model, "", "use ADJUST of *CONTACT PAIR"), &
-      keyword_t("CHANGE FRICTION", in_step, "", "coefficients hold for the whole run"), &
-      keyword_t("MODEL CHANGE", in_step, "", "pairs and elements stay for the whole run"), &
-      keyword_t("BASE MOTION", in_step, "", "use *BOUNDARY with an amplitude"), &
-      keyword_t("CONTROLS", in_step, "", "use *NEWTON"), &
-      keyword_t("FREQUENCY", in_step, "", "the procedures are *STATIC and *DYNAMIC"), &
-      keyword_t("BUCKLE", in_step, "", "the procedures are *STATIC and *DYNAMIC"), &
-      keyword_t("MODAL DYNAMIC", in_step, "", "the procedures are *STATIC and *DYNAMIC"), &
-      keyword_t("STEADY STATE DYNAMICS", in_step, "", "the procedures are *STATIC and *DYNAMIC"), &
-      keyword_t("VISCO", in_step, "", "the procedures are *STATIC and *DYNAMIC"), &
-      keyword_t("OUTPUT", in_step, "", no_export, .true.), &
-      keyword_t("NODE OUTPUT", in_step, "", "use *NODE FILE or *NODE PRINT", .true.), &
-      keyword_t("ELEMENT OUTPUT", in_step, "", "use *EL FILE or *EL PRINT", .true.), &
-      keyword_t("CONTACT OUTPUT", in_step, "", "use *CONTACT FILE or *CONTACT PRINT", .true.), &
-      keyword_t("ENERGY OUTPUT", in_step, "", "use *ENERGY PRINT", .true.), &
-      keyword_t("ELEMENT FILE", in_step, "", "use *EL FILE", .true.), &
-      keyword_t("SECTION PRINT", in_step, "", no_export, .true.), &
-      keyword_t("SECTION FILE", in_step, "", no_export, .true.), &
-      keyword_t("FILE FORMAT", in_both, "", no_export, .true.), &
-      keyword_t("MONITOR", in_step, "", no_export, .true.), &
-      keyword_t("INTEGRATED OUTPUT", in_step, "", no_export, .true.), &
-      keyword_t("INTEGRATED OUTPUT SECTION", in_model, "", no_export, .true.), &
-      keyword_t("INCREMENTATION OUTPUT", in_step, "", no_export, .true.), &
-      keyword_t("FILTER", in_model, "", no_export, .true.), &
-      keyword_t("DIAGNOSTICS", in_both, "", "diagnostics are in the log", .true.), &
-      keyword_t("PRINT", in_step, "", no_export, .true.)]
+      keyword_t("END STEP", in_step, has_data=.false.)]
+
+   !> Keywords of other programs that are known but not supported.
+   type(refusal_t), parameter :: refusals(*) = [ &
+      refusal_t("linear couplings go by *EQUATION", &
+         "MPC,COUPLING,KINEMATIC,DISTRIBUTING,EMBEDDED ELEMENT"), &
+      refusal_t("use *RIGID BODY and TYPE=SEGMENTS", "RIGID SURFACE"), &
+      refusal_t("degrees of freedom are those of the global axes", "TRANSFORM"), &
+      refusal_t("materials are isotropic", "ORIENTATION"), &
+      refusal_t("coordinates are those of the global axes", "SYSTEM"), &
+      refusal_t("nodes are given one by one by *NODE", "NGEN,NCOPY,NFILL"), &
+      refusal_t("elements are given one by one by *ELEMENT", "ELGEN,ELCOPY"), &
+      refusal_t("write a flat deck (no parts and instances)", &
+         "PART,END PART,ASSEMBLY,END ASSEMBLY,INSTANCE,END INSTANCE"), &
+      refusal_t("materials are elastic", "PLASTIC,CYCLIC HARDENING,CREEP,VISCOELASTIC"), &
+      refusal_t("use *HYPERELASTIC, NEO HOOKE", "HYPERFOAM"), &
+      refusal_t("materials have no state variables", "DEPVAR"), &
+      refusal_t("there is no temperature", &
+         "EXPANSION,CONDUCTIVITY,SPECIFIC HEAT,PHYSICAL CONSTANTS,TEMPERATURE,DFLUX,FILM," &
+         // "RADIATE,HEAT TRANSFER"), &
+      refusal_t("use *SOLID SECTION", "UEL PROPERTY"), &
+      refusal_t("only plane strain solids are read", &
+         "SHELL SECTION,BEAM SECTION,MEMBRANE SECTION,SPRING,DASHPOT,MASS"), &
+      refusal_t("use *CONTACT PAIR", "GAP"), &
+      refusal_t("list what touches by *CONTACT INCLUSIONS", "CONTACT EXCLUSIONS"), &
+      refusal_t("all with all holds the nodes of both sides", "CONTACT FORMULATION"), &
+      refusal_t("use ADJUST of *CONTACT PAIR", "CLEARANCE"), &
+      refusal_t("coefficients hold for the whole run", "CHANGE FRICTION"), &
+      refusal_t("pairs and elements stay for the whole run", "MODEL CHANGE"), &
+      refusal_t("use *BOUNDARY with an amplitude", "BASE MOTION"), &
+      refusal_t("use *NEWTON", "CONTROLS"), &
+      refusal_t("the procedures are *STATIC and *DYNAMIC", &
+         "FREQUENCY,BUCKLE,MODAL DYNAMIC,STEADY STATE DYNAMICS,VISCO"), &
+      refusal_t("results go by *NODE FILE, *EL FILE and *... PRINT", &
+         "OUTPUT,SECTION PRINT,SECTION FILE,FILE FORMAT,MONITOR,INTEGRATED OUTPUT," &
+         // "INTEGRATED OUTPUT SECTION,INCREMENTATION OUTPUT,FILTER,PRINT", .true.), &
+      refusal_t("use *NODE FILE or *NODE PRINT", "NODE OUTPUT", .true.), &
+      refusal_t("use *EL FILE or *EL PRINT", "ELEMENT OUTPUT", .true.), &
+      refusal_t("use *CONTACT FILE or *CONTACT PRINT", "CONTACT OUTPUT", .true.), &
+      refusal_t("use *ENERGY PRINT", "ENERGY OUTPUT", .true.), &
+      refusal_t("use *EL FILE", "ELEMENT FILE", .true.), &
+      refusal_t("diagnostics are in the log", "DIAGNOSTICS", .true.)]
 
 contains
 
-   !> Index in `keywords` of `name` (upper case, without blanks); 0: unknown.
-   pure integer function find_keyword(name)
+   !> Index in `keywords` of `name` (upper case, without blanks); 0: it is not supported.
+   pure integer function find_keyword(name) result(i)
+      character(len=*), intent(in) :: name
+
+      do i = size(keywords), 1, -1
+         if (squeezed(keywords(i)%name) == name) return
+      end do
+   end function find_keyword
+
+   !> Why `name` (upper case, without blanks) is not supported; without reason: it is not known.
+   pure type(refusal_t) function refusal_of(name) result(refusal)
       character(len=*), intent(in) :: name
       integer :: i
 
-      do i = 1, size(keywords)
-         if (squeezed(keywords(i)%name) == name) then
-            find_keyword = i
-            return
-         end if
+      do i = 1, size(refusals)
+         if (index("," // squeezed(refusals(i)%names) // ",", "," // name // ",") > 0) &
+            refusal = refusals(i)
       end do
-      find_keyword = 0
-   end function find_keyword
+   end function refusal_of
 
    !> All names, with a star, for suggestions.
    pure function keyword_names() result(list)
-      type(string_t) :: list(size(keywords))
+      type(string_t), allocatable :: list(:)
+      character(len=:), allocatable :: names
       integer :: i
 
+      names = ""
       do i = 1, size(keywords)
-         list(i)%text = "*" // trim(keywords(i)%name)
+         names = names // trim(keywords(i)%name) // ","
+      end do
+      do i = 1, size(refusals)
+         names = names // trim(refusals(i)%names) // ","
+      end do
+      allocate(list, source=entries(names))
+      do i = 1, size(list)
+         list(i)%text = "*" // list(i)%text
       end do
    end function keyword_names
 
    !> How a keyword with the list `parameters` takes the parameter `name`: one of `mark_`.
    pure integer function parameter_mark(parameters, name)
       character(len=*), intent(in) :: parameters, name
-      integer :: first, last
-      character(len=:), allocatable :: entry_text
+      type(string_t), allocatable :: list(:)
+      integer :: i
 
       parameter_mark = mark_none
-      first = 1
-      do while (first <= len_trim(parameters))
-         last = index(parameters(first:), ",") + first - 2
-         if (last < first) last = len_trim(parameters)
-         entry_text = parameters(first:last)
-         first = last + 2
-         if (bare_name(entry_text) /= name) cycle
-         select case (entry_text(1:1))
-         case ("!")
-            parameter_mark = mark_unsupported
-         case ("~")
-            parameter_mark = mark_without_effect
-         case default
-            select case (entry_text(len(entry_text):))
-            case ("=")
-               parameter_mark = mark_value
-            case ("?")
-               parameter_mark = mark_either
-            case default
-               parameter_mark = mark_flag
-            end select
-         end select
-         return
+      allocate(list, source=entries(parameters))
+      do i = 1, size(list)
+         associate (text => list(i)%text)
+            if (bare_name(text) /= name) cycle
+            parameter_mark = mark_flag
+            if (index(text, "=", .true.) == len(text)) parameter_mark = mark_value
+            if (index(text, "?", .true.) == len(text)) parameter_mark = mark_either
+            if (text(1:1) == "!") parameter_mark = mark_unsupported
+            if (text(1:1) == "~") parameter_mark = mark_without_effect
+            return
+         end associate
       end do
    end function parameter_mark
 
@@ -312,19 +287,14 @@ contains
    pure function parameter_names(parameters) result(list)
       character(len=*), intent(in) :: parameters
       type(string_t), allocatable :: list(:)
-      integer :: first, last, n
+      integer :: i, n
 
-      allocate(list(len_trim(parameters)))
+      allocate(list, source=entries(parameters))
       n = 0
-      first = 1
-      do while (first <= len_trim(parameters))
-         last = index(parameters(first:), ",") + first - 2
-         if (last < first) last = len_trim(parameters)
-         if (scan(parameters(first:first), "!~") == 0) then
-            n = n + 1
-            list(n)%text = bare_name(parameters(first:last))
-         end if
-         first = last + 2
+      do i = 1, size(list)
+         if (scan(list(i)%text(1:1), "!~") == 1) cycle
+         n = n + 1
+         list(n)%text = bare_name(list(i)%text)
       end do
       list = list(:n)
    end function parameter_names

@@ -6,8 +6,8 @@ module emcon_deck_loads
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_integer, get_name, get_real, is_blank, next_line
    use emcon_deck_named, only : get_nodes
-   use emcon_deck_reader, only : card_error, card_t, has_option, option_name, reader_t, &
-      refuse_option
+   use emcon_deck_reader, only : card_error, card_t, has_option, option_name, option_word, &
+      reader_t
    use emcon_deck_rigid, only : mark_rigid
    use emcon_deck_tables, only : card_table_name, table_names
    use emcon_diagnostics, only : label_list, quoted, suggestion
@@ -61,14 +61,10 @@ contains
    logical function is_new(reader, card)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
+      character(len=:), allocatable :: word
 
-      is_new = option_name(card, "OP") == "NEW"
-      select case (option_name(card, "OP"))
-      case ("", "NEW", "MOD")
-         continue
-      case default
-         call refuse_option(reader, card, "OP", "MOD, NEW", "")
-      end select
+      call option_word(reader, card, "OP", "MOD, NEW", word)
+      is_new = word == "NEW"
    end function is_new
 
    !> *BOUNDARY: node or set, first dof, last dof, value; or node or set, name of a support.
@@ -173,21 +169,15 @@ contains
    subroutine check_boundary_options(reader, card)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
+      character(len=:), allocatable :: word
 
       if (has_option(card, "FIXED") .and. card%step == 0) then
          call card_error(reader, card, "FIXED may stand only inside a step")
       else if (has_option(card, "FIXED") .and. has_option(card, "AMPLITUDE")) then
          call card_error(reader, card, "FIXED and AMPLITUDE exclude each other")
       end if
-      select case (option_name(card, "TYPE"))
-      case ("", "DISPLACEMENT")
-         continue
-      case ("VELOCITY", "ACCELERATION")
-         call refuse_option(reader, card, "TYPE", "DISPLACEMENT", &
-            "give the displacement over time by an amplitude")
-      case default
-         call refuse_option(reader, card, "TYPE", "DISPLACEMENT", "")
-      end select
+      call option_word(reader, card, "TYPE", "DISPLACEMENT", word, "VELOCITY, ACCELERATION", &
+         "give the displacement over time by an amplitude")
    end subroutine check_boundary_options
 
    !> Which degrees of freedom a line prescribes, and the value.

@@ -6,8 +6,8 @@ module emcon_deck_materials
       get_real, is_blank, next_line
    use emcon_deck_named, only : hint_at_set, set_names
    use emcon_deck_options, only : choose_option
-   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, need_name, &
-      option_count, option_name, reader_t, refuse_option
+   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, n_cards, need_name, &
+      option_count, option_name, option_word, reader_t
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
@@ -32,11 +32,7 @@ contains
       type(scene_t), intent(inout) :: scene
       integer :: i, n
 
-      n = 0
-      do i = 1, size(reader%card)
-         if (reader%card(i)%name == "MATERIAL") n = n + 1
-      end do
-      allocate(scene%material(n))
+      allocate(scene%material(n_cards(reader, "MATERIAL")))
       n = 0
       do i = 1, size(reader%card)
          associate (card => reader%card(i))
@@ -109,12 +105,15 @@ contains
       real(wp), allocatable :: value(:)
       type(error_t), allocatable :: error
       class(law_t), allocatable :: law
+      character(len=:), allocatable :: word
       type(law_row_t) :: row
       integer :: i_row
       logical :: ok
 
       call choose_law(reader, card, material%law, i_row)
-      if (card%name == "ELASTIC") call check_isotropic(reader, card)
+      if (card%name == "ELASTIC" .and. option_name(card, "TYPE") /= "ISOTROPIC") call &
+         option_word(reader, card, "TYPE", "ISO", word, "ORTHO, ANISO, ENGINEERING CONSTANTS, " // &
+         "ORTHOTROPIC, ANISOTROPIC, LAMINA", "materials are isotropic")
       if (i_row == 0) return
       row = law_row(i_row)
       allocate(value(n_constant(row)))
@@ -192,20 +191,6 @@ contains
       call card_error(reader, card, "CONSTANTS is " // to_text(n_constant) &
          // ", but the data lines hold " // to_text(size(material%constant)))
    end subroutine read_given
-
-   subroutine check_isotropic(reader, card)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-
-      select case (option_name(card, "TYPE"))
-      case ("", "ISO", "ISOTROPIC")
-         continue
-      case ("ORTHO", "ANISO", "ENGINEERINGCONSTANTS", "ORTHOTROPIC", "ANISOTROPIC", "LAMINA")
-         call refuse_option(reader, card, "TYPE", "ISO", "materials are isotropic")
-      case default
-         call refuse_option(reader, card, "TYPE", "ISO", "")
-      end select
-   end subroutine check_isotropic
 
    !> D1 = 0 means incompressible, which displacement elements cannot be. CalculiX takes D1 = 0.1
    !> over the shear modulus at rest, about nu = 0.475, and so do we.
@@ -298,11 +283,7 @@ contains
       type(scene_t), intent(inout) :: scene
       integer :: i, n
 
-      n = 0
-      do i = 1, size(reader%card)
-         if (reader%card(i)%name == "SOLIDSECTION") n = n + 1
-      end do
-      allocate(scene%section(n))
+      allocate(scene%section(n_cards(reader, "SOLIDSECTION")))
       n = 0
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= "SOLIDSECTION") cycle

@@ -5,8 +5,8 @@ module emcon_deck_mesh
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       drop_zeros, get_integer, get_real, is_blank, next_line
    use emcon_deck_labels, only : find_label, label_map_init
-   use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, need_name, &
-      option_name, reader_t
+   use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, n_lines, &
+      need_name, option_name, reader_t
    use emcon_diagnostics, only : add_error, label_list, quoted
    use emcon_element_kind, only : element_kind_t, element_row_t, find_element_kind
    use emcon_element_registry, only : element_row, n_element_row
@@ -36,20 +36,6 @@ module emcon_deck_mesh
 
 contains
 
-   !> Number of data lines of the cards called `name`: no fewer than what they define.
-   pure integer function count_lines(reader, name)
-      type(reader_t), intent(in) :: reader
-      character(len=*), intent(in) :: name
-      integer :: i
-
-      count_lines = 0
-      do i = 1, size(reader%card)
-         if (reader%card(i)%name == name) then
-            count_lines = count_lines + reader%card(i)%last - reader%card(i)%first + 1
-         end if
-      end do
-   end function count_lines
-
    !> All *NODE cards.
    subroutine read_nodes(reader, scene)
       type(reader_t), intent(inout) :: reader
@@ -58,7 +44,7 @@ contains
       logical :: is_solid_told
       integer :: i, n, most
 
-      most = count_lines(reader, "NODE")
+      most = n_lines(reader, "NODE")
       allocate(scene%node%label(most), scene%node%origin(most), scene%x(scene%n_dim, most))
       n = 0
       is_solid_told = .false.
@@ -142,7 +128,7 @@ contains
       type(origin_t), allocatable :: line_origin_of(:)
       integer :: i, k, n, n_line, most
 
-      most = count_lines(reader, "ELEMENT")
+      most = n_lines(reader, "ELEMENT")
       allocate(scene%element%label(most), scene%element%origin(most), scene%element%kind(most), &
          scene%element%node(max_element_nodes, most))
       allocate(reader%line_label(most), reader%line_node(2, most), line_origin_of(most))

@@ -5,7 +5,7 @@ module emcon_deck_output
    use emcon_deck_fields, only : data_error, data_open, data_t, data_warning, get_name, next_line
    use emcon_deck_named, only : hint_at_set, set_names
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
-      option_name, reader_t, refuse_option
+      option_name, option_word, reader_t
    use emcon_deck_tables, only : table_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_mesh, only : named_set_t
@@ -68,6 +68,7 @@ contains
       type(output_t) :: new
       type(output_t), allocatable :: grown(:)
       integer, allocatable :: kept(:)
+      character(len=:), allocatable :: word
       integer :: i, i_row, n
 
       i_row = 1
@@ -80,15 +81,11 @@ contains
       call read_set(reader, card, scene, new)
       call option_count(reader, card, "FREQUENCY", 0, new%frequency)
       call read_times(reader, card, new)
-      select case (option_name(card, "TOTALS"))
-      case ("", "NO")
-         continue
-      case ("YES", "ONLY")
-         new%totals = .true.
-         new%only_totals = option_name(card, "TOTALS") == "ONLY"
-      case default
-         call refuse_option(reader, card, "TOTALS", "YES, ONLY, NO", "")
-      end select
+      if (option_name(card, "TOTALS") /= "") then
+         call option_word(reader, card, "TOTALS", "YES, ONLY, NO", word)
+         new%totals = word == "YES" .or. word == "ONLY"
+         new%only_totals = word == "ONLY"
+      end if
       call check_contact(reader, card, scene, new)
       kept = pack([(i, i = 1, size(self%step))], &
          self%output%kind /= new%kind .or. self%step == card%step)
@@ -197,14 +194,14 @@ contains
 
       select case (new%kind)
       case (output_node_file, output_node_print)
-         call overlap_query_up("NSET", "node set", scene%set%node, reader%names%node_sets)
+         call look_up("NSET", "node set", scene%set%node, reader%names%node_sets)
       case (output_element_file, output_element_print)
-         call overlap_query_up("ELSET", "element set", scene%set%element, reader%names%element_sets)
+         call look_up("ELSET", "element set", scene%set%element, reader%names%element_sets)
       end select
 
    contains
 
-      subroutine overlap_query_up(option, what, set, index_of)
+      subroutine look_up(option, what, set, index_of)
          character(len=*), intent(in) :: option, what
          type(named_set_t), intent(in) :: set(:)
          type(name_index_t), intent(in) :: index_of
@@ -221,7 +218,7 @@ contains
             call card_warning(reader, card, option &
                // "= does not narrow it: the field file holds all nodes and elements")
          end if
-      end subroutine overlap_query_up
+      end subroutine look_up
 
    end subroutine read_set
 

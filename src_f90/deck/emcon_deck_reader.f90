@@ -2,7 +2,7 @@
 module emcon_deck_reader
    use emcon_amplitudes, only : amplitude_t
    use emcon_deck_labels, only : label_map_t
-   use emcon_diagnostics, only : add_error, add_warning, diagnostics_t, quoted, suggestion
+   use emcon_diagnostics, only : add_error, add_warning, diagnostics_t, entries, quoted, suggestion
    use emcon_interactions, only : interaction_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : named_set_t
@@ -13,10 +13,12 @@ module emcon_deck_reader
    private
    public :: reader_t, doubts_t, names_t, card_t, option_t, max_name
    public :: line_origin, source_line, card_error, card_warning, bare_name
-   public :: has_option, option_name, option_count, option_real, option_angle, need_name
-   public :: refuse_option
+   public :: n_cards, n_lines
+   public :: has_option, option_name, option_count, option_number, option_real, option_angle
+   public :: need_name, option_word, refuse_option
 
    integer, parameter :: max_name = 80             !! characters of a name
+   real(wp), parameter :: above_zero = nearest(0.0_wp, 1.0_wp)
 
    !> One parameter of a card.
    type :: option_t
@@ -80,6 +82,28 @@ module emcon_deck_reader
    end type reader_t
 
 contains
+
+   !> Number of cards called `name`.
+   pure integer function n_cards(reader, name)
+      type(reader_t), intent(in) :: reader
+      character(len=*), intent(in) :: name
+      integer :: i
+
+      n_cards = count([(reader%card(i)%name == name, i = 1, size(reader%card))])
+   end function n_cards
+
+   !> Number of their data lines: no fewer than what they define.
+   pure integer function n_lines(reader, name)
+      type(reader_t), intent(in) :: reader
+      character(len=*), intent(in) :: name
+      integer :: i
+
+      n_lines = 0
+      do i = 1, size(reader%card)
+         if (reader%card(i)%name == name) n_lines = n_lines + reader%card(i)%last &
+            - reader%card(i)%first + 1
+      end do
+   end function n_lines
 
    pure type(origin_t) function line_origin(reader, i_line)
       type(reader_t), intent(in) :: reader
@@ -208,11 +232,14 @@ contains
       end if
    end subroutine option_count
 
-   !> Value of a parameter that is a positive number; unchanged if it is absent or wrong.
-   subroutine option_real(reader, card, name, value)
+   !> Value of a parameter that is a number from `least` to `most`; unchanged if it is absent or
+   !> wrong.
+   subroutine option_number(reader, card, name, what, least, most, value)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       character(len=*), intent(in) :: name         !! blanks are for the message
+      character(len=*), intent(in) :: what         !! it is to be, for the message
+      real(wp), intent(in) :: least, most
       real(wp), intent(inout) :: value
       real(wp) :: number
       integer :: i
@@ -221,36 +248,64 @@ contains
       i = find_option(card, squeezed(name))
       if (i == 0) return
       call read_real(card%option(i)%value, number, ok)
-      if (ok) ok = number > 0.0_wp
-      if (ok) then
-         value = number
-      else
-         call card_error(reader, card, name // "=" // quoted(card%option(i)%value) &
-            // " is not a positive number")
-      end if
+      if (ok) ok = number >= least .and. number <= most
+      if (ok) value = number
+      if (.not. ok) call card_error(reader, card, name // "=" // quoted(card%option(i)%value) &
+         // " is not " // what)
+   end subroutine option_number
+
+   !> The same of a positive number.
+   subroutine option_real(reader, card, name, value)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      character(len=*), intent(in) :: name         !! blanks are for the message
+      real(wp), intent(inout) :: value
+
+      call option_number(reader, card, name, "a positive number", above_zero, huge(value), value)
    end subroutine option_real
 
-   !> Value of FEATURE ANGLE: degrees between 0 and 180, both excluded; unchanged if it is absent
-   !> or wrong.
+   !> The same of FEATURE ANGLE.
    subroutine option_angle(reader, card, value)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       real(wp), intent(inout) :: value             !! [degrees]
-      real(wp) :: number
-      integer :: i
-      logical :: ok
 
-      i = find_option(card, "FEATUREANGLE")
-      if (i == 0) return
-      call read_real(card%option(i)%value, number, ok)
-      if (ok) ok = number > 0.0_wp .and. number < 180.0_wp
-      if (ok) then
-         value = number
-      else
-         call card_error(reader, card, "FEATURE ANGLE=" // quoted(card%option(i)%value) &
-            // " is not a number of degrees above 0 and below 180")
-      end if
+      call option_number(reader, card, "FEATURE ANGLE", "a number of degrees above 0 and below " &
+         // "180", above_zero, nearest(180.0_wp, -1.0_wp), value)
    end subroutine option_angle
+
+   !> The word of a parameter that is one of `known`, the first one if it is absent; empty if it is
+   !> refused.
+   subroutine option_word(reader, card, name, known, word, foreign, reason)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      character(len=*), intent(in) :: name
+      character(len=*), intent(in) :: known        !! "A, B", as it is told
+      character(len=:), allocatable, intent(out) :: word   !! without blanks
+      character(len=*), intent(in), optional :: foreign   !! words of other programs
+      character(len=*), intent(in), optional :: reason     !! why these are refused
+
+      word = option_name(card, name)
+      if (word == "") then
+         word = squeezed(known(:scan(known // ",", ",") - 1))
+      else if (.not. is_in(known)) then
+         if (present(foreign)) then
+            if (is_in(foreign)) call refuse_option(reader, card, name, known, reason)
+            if (is_in(foreign)) word = ""
+         end if
+         if (word /= "") call refuse_option(reader, card, name, known, "")
+         word = ""
+      end if
+
+   contains
+
+      pure logical function is_in(list)
+         character(len=*), intent(in) :: list
+
+         is_in = index("," // squeezed(list) // ",", "," // word // ",") > 0
+      end function is_in
+
+   end subroutine option_word
 
    !> An error: the value of a parameter is none of `known`; a `reason` says why.
    subroutine refuse_option(reader, card, name, known, reason)
@@ -265,27 +320,12 @@ contains
       if (reason == "") then
          call card_error(reader, card, "unknown " // name // "=" // quoted(card%option(i)%value) &
             // "; known: " // known &
-            // suggestion(bare_name(card%option(i)%value), split_list(known)))
+            // suggestion(bare_name(card%option(i)%value), entries(known)))
       else
          call card_error(reader, card, name // "=" // quoted(card%option(i)%value) &
             // " is known but not supported (" // reason // "); supported: " // known)
       end if
    end subroutine refuse_option
-
-   !> The entries of "A, B, C".
-   pure function split_list(text) result(list)
-      character(len=*), intent(in) :: text
-      type(string_t), allocatable :: list(:)
-      integer :: i, first, last
-
-      allocate(list(count([(text(i:i) == ",", i = 1, len(text))]) + 1))
-      first = 1
-      do i = 1, size(list)
-         last = index(text(first:) // ",", ",") + first - 2
-         list(i)%text = text(first:last)
-         first = last + 3
-      end do
-   end function split_list
 
    !> A name as it is compared: upper case, no blanks, no quotes around it.
    pure function bare_name(text) result(name)

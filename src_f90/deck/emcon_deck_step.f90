@@ -25,7 +25,7 @@ module emcon_deck_step
    use emcon_deck_scheme, only : check_schemes, read_scheme
    use emcon_deck_penalty, only : check_penalty, read_constraint_method
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
-      option_name, option_real, reader_t, refuse_option
+      option_name, option_real, option_word, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
@@ -192,18 +192,14 @@ contains
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(step_t), intent(inout) :: step
+      character(len=:), allocatable :: word
 
       call option_count(reader, card, "INC", 1, step%time%max_increments)
       if (has_option(card, "NLGEOM")) then
-         select case (option_name(card, "NLGEOM"))
-         case ("", "YES")
-            step%nlgeom = .true.
-         case ("NO")
-            if (step%nlgeom) call card_warning(reader, card, &
-               "NLGEOM=NO has no effect: an earlier step has set NLGEOM, and it stays")
-         case default
-            call refuse_option(reader, card, "NLGEOM", "YES, NO", "")
-         end select
+         call option_word(reader, card, "NLGEOM", "YES, NO", word)
+         if (word == "NO" .and. step%nlgeom) call card_warning(reader, card, &
+            "NLGEOM=NO has no effect: an earlier step has set NLGEOM, and it stays")
+         step%nlgeom = step%nlgeom .or. word == "YES"
       end if
       select case (option_name(card, "AMPLITUDE"))
       case ("")
@@ -310,7 +306,7 @@ contains
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(step_t), intent(inout) :: step
-      character(len=:), allocatable :: known
+      character(len=:), allocatable :: known, word
 
       select case (option_name(card, "TYPE"))
       case ("")
@@ -326,14 +322,8 @@ contains
          call card_error(reader, card, "TOLERANCE is relative and must be below 1")
       end if
       call option_count(reader, card, "MAXIMUM", 1, step%solution%newton_maximum)
-      select case (option_name(card, "POLISH"))
-      case ("", "YES")
-         step%solution%polishes = .true.
-      case ("NO")
-         step%solution%polishes = .false.
-      case default
-         call refuse_option(reader, card, "POLISH", "YES, NO", "")
-      end select
+      call option_word(reader, card, "POLISH", "YES, NO", word)
+      step%solution%polishes = word /= "NO"
    end subroutine read_newton
 
    subroutine read_restart(reader, card, step)

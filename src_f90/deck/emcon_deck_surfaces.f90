@@ -7,8 +7,8 @@ module emcon_deck_surfaces
    use emcon_deck_labels, only : find_label
    use emcon_deck_named, only : get_elements, get_lines, get_nodes
    use emcon_deck_options, only : choose_option
-   use emcon_deck_reader, only : card_error, card_t, card_warning, need_name, option_name, &
-      reader_t, refuse_option
+   use emcon_deck_reader, only : card_error, card_t, card_warning, n_cards, need_name, &
+      option_name, reader_t, refuse_option
    use emcon_deck_segments_plane, only : read_segments
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
@@ -39,14 +39,9 @@ contains
       integer :: i, n, i_same
       character(len=:), allocatable :: name
 
-      allocate(scene%surface(0))
-      n = 0
-      do i = 1, size(reader%card)
-         if (reader%card(i)%name == "SURFACE") n = n + 1
-      end do
-      if (n == 0) return
-      deallocate(scene%surface)
+      n = n_cards(reader, "SURFACE")
       allocate(scene%surface(n))
+      if (n == 0) return
       call adjacency_init(adjacency, scene)
       n = 0
       do i = 1, size(reader%card)
@@ -325,17 +320,12 @@ contains
    pure subroutine append_face(faces, element, face)
       type(faces_t), intent(inout) :: faces
       integer, intent(in) :: element, face
-      integer, allocatable :: grown(:)
       integer :: n
 
       n = faces%n
       if (n == size(faces%face)) then
-         allocate(grown(2*n))
-         grown(:n) = faces%element
-         call move_alloc(grown, faces%element)
-         allocate(grown(2*n))
-         grown(:n) = faces%face
-         call move_alloc(grown, faces%face)
+         faces%element = [faces%element, faces%element]
+         faces%face = [faces%face, faces%face]
       end if
       faces%n = n + 1
       faces%element(n + 1) = element

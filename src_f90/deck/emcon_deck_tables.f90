@@ -2,8 +2,8 @@
 module emcon_deck_tables
    use emcon_amplitudes, only : amplitude_t
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, next_line
-   use emcon_deck_reader, only : card_error, card_t, has_option, need_name, option_name, reader_t, &
-      refuse_option
+   use emcon_deck_reader, only : card_error, card_t, has_option, n_cards, need_name, option_name, &
+      option_word, reader_t
    use emcon_diagnostics, only : quoted
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find, name_index_put, name_index_t
@@ -109,11 +109,7 @@ contains
       character(len=:), allocatable :: name
       integer :: i, n, i_same
 
-      n = 0
-      do i = 1, size(reader%card)
-         if (reader%card(i)%name == keyword) n = n + 1
-      end do
-      allocate(table(n))
+      allocate(table(n_cards(reader, keyword)))
       n = 0
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= keyword) cycle
@@ -144,25 +140,14 @@ contains
       type(card_t), intent(in) :: card
       type(amplitude_t), intent(inout) :: table
       real(wp), allocatable :: number(:)
+      character(len=:), allocatable :: word
       integer :: n, n_before
 
       n_before = reader%log%n_errors
-      select case (option_name(card, "TIME"))
-      case ("TOTALTIME")
-         table%is_total_time = .true.
-      case ("", "STEPTIME")
-         continue
-      case default
-         call refuse_option(reader, card, "TIME", "STEP TIME, TOTAL TIME", "")
-      end select
-      select case (option_name(card, "DEFINITION"))
-      case ("", "TABULAR")
-         continue
-      case ("PERIODIC", "EQUALLYSPACED", "MODULATED", "DECAY", "SMOOTHSTEP", "USER")
-         call refuse_option(reader, card, "DEFINITION", "TABULAR", "amplitudes are tables")
-      case default
-         call refuse_option(reader, card, "DEFINITION", "TABULAR", "")
-      end select
+      call option_word(reader, card, "TIME", "STEP TIME, TOTAL TIME", word)
+      table%is_total_time = word == "TOTALTIME"
+      call option_word(reader, card, "DEFINITION", "TABULAR", word, "PERIODIC, EQUALLY SPACED" // &
+         ", MODULATED, DECAY, SMOOTH STEP, USER", "amplitudes are tables")
       call read_numbers(reader, card, "time or value", number)
       n = size(number)/2
       if (size(number) == 0) then
@@ -240,7 +225,6 @@ contains
       type(card_t), intent(in) :: card
       character(len=*), intent(in) :: what
       real(wp), allocatable, intent(out) :: number(:)
-      real(wp), allocatable :: grown(:)
       type(data_t) :: data
       integer :: k, n
 
@@ -249,11 +233,7 @@ contains
       call data_open(data, card)
       do while (next_line(reader, data))
          do k = 1, data%n
-            if (n == size(number)) then
-               allocate(grown(2*n))
-               grown(:n) = number
-               call move_alloc(grown, number)
-            end if
+            if (n == size(number)) number = [number, number]
             n = n + 1
             number(n) = 0.0_wp
             call get_real(reader, data, k, what, number(n))

@@ -3,8 +3,8 @@ module emcon_deck_ties
    use emcon_couplings, only : tie_t
    use emcon_deck_fields, only : data_error, data_open, data_t, next_line
    use emcon_deck_options, only : choose_option
-   use emcon_deck_reader, only : card_error, card_t, line_origin, need_name, option_name, &
-      option_real, reader_t, refuse_option
+   use emcon_deck_reader, only : card_error, card_t, line_origin, n_lines, need_name, &
+      option_name, option_real, option_word, reader_t
    use emcon_deck_surfaces, only : get_surfaces
    use emcon_diagnostics, only : quoted
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
@@ -22,15 +22,9 @@ contains
       type(tie_t), allocatable :: tie(:)
       type(tie_t) :: common
       type(name_index_t) :: card_of, tie_of
-      integer :: i, n, most
+      integer :: i, n
 
-      most = 0
-      do i = 1, size(reader%card)
-         if (reader%card(i)%name == "TIE") then
-            most = most + reader%card(i)%last - reader%card(i)%first + 1
-         end if
-      end do
-      allocate(tie(most))
+      allocate(tie(n_lines(reader, "TIE")))
       n = 0
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= "TIE") cycle
@@ -46,28 +40,15 @@ contains
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(tie_t), intent(out) :: tie
+      character(len=:), allocatable :: word
 
       call need_name(reader, card, "NAME", tie%name)
       call option_real(reader, card, "POSITION TOLERANCE", tie%tolerance)
       call choose_option(reader, card, "MULTIPLIER", "tie multiplier", tie%multiplier)
-      select case (option_name(card, "ADJUST"))
-      case ("", "YES")
-         continue
-      case ("NO")
-         call refuse_option(reader, card, "ADJUST", "YES", "slave nodes are always put onto the " &
-            // "master surface: across a gap angular momentum would be lost")
-      case default
-         call refuse_option(reader, card, "ADJUST", "YES", "")
-      end select
-      select case (option_name(card, "TYPE"))
-      case ("", "SURFACETOSURFACE")
-         continue
-      case ("NODETOSURFACE")
-         call refuse_option(reader, card, "TYPE", "SURFACE TO SURFACE", &
-            "ties are integrated over edges, so that a uniform stress passes through")
-      case default
-         call refuse_option(reader, card, "TYPE", "SURFACE TO SURFACE", "")
-      end select
+      call option_word(reader, card, "ADJUST", "YES", word, "NO", "slave nodes are always put " // &
+         "onto the master surface: across a gap angular momentum would be lost")
+      call option_word(reader, card, "TYPE", "SURFACE TO SURFACE", word, "NODE TO SURFACE", &
+         "ties are integrated over edges, so that a uniform stress passes through")
    end subroutine read_tie_options
 
    !> The card `i` must not have the name of an earlier one.

@@ -8,7 +8,7 @@ module emcon_diagnostics
    implicit none
    private
    public :: diagnostics_t, add_error, add_warning, diagnostics_texts
-   public :: quoted, suggestion, label_list
+   public :: quoted, suggestion, label_list, entries
 
    !> So many errors (and as many warnings) are told; the others are counted.
    integer, parameter :: max_told = 50
@@ -165,6 +165,26 @@ contains
       call nearest_word(word, known, near)
       if (near /= "") n = len("; did you mean ?") + len(near)
    end function suggestion_length
+
+   !> The entries of "A, B,C", without empty ones.
+   pure function entries(list) result(part)
+      character(len=*), intent(in) :: list
+      type(string_t), allocatable :: part(:)
+      integer :: first, last, n
+
+      allocate(part(len(list)))
+      n = 0
+      first = 1
+      do while (first <= len(list))
+         last = first + scan(list(first:) // ",", ",") - 2
+         if (list(first:last) /= "") then
+            n = n + 1
+            part(n)%text = trim(adjustl(list(first:last)))
+         end if
+         first = last + 2
+      end do
+      part = part(:n)
+   end function entries
 
    !> "5, 7, 12 and 4 more"
    pure function label_list(label) result(text)

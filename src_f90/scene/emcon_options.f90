@@ -21,6 +21,7 @@ module emcon_options
       initiation_massless, initiation_persistent, initiation_velocity_update, &
       method_augmented_lagrange, method_null_space, method_penalty, method_saddle_point, &
       newton_full, newton_kept, step_t
+   use emcon_text, only : squeezed
    implicit none
    private
    public :: option_row_t, n_option_row, option_row, option_code, option_default, option_refusal, &
@@ -142,7 +143,7 @@ contains
       do i = 1, n_option_row()
          row = option_row(i)
          if (row%kind /= kind) cycle
-         if (without_blanks(row%word) == word .or. index(row%also, "," // word // ",") > 0) then
+         if (squeezed(row%word) == word .or. index(row%also, "," // word // ",") > 0) then
            code = row%code
          end if
       end do
@@ -244,20 +245,5 @@ contains
          if (row%kind == kind .and. row%code == code) text = trim(row%text)
       end do
    end subroutine option_text
-
-   !> The text with its blanks moved to its end.
-   pure function without_blanks(text) result(squeezed)
-      character(len=*), intent(in) :: text
-      character(len=len(text)) :: squeezed
-      integer :: i, n
-
-      squeezed = ""
-      n = 0
-      do i = 1, len(text)
-         if (text(i:i) == " ") cycle
-         n = n + 1
-         squeezed(n:n) = text(i:i)
-      end do
-   end function without_blanks
 
 end module emcon_options
