@@ -100,42 +100,28 @@ public:
    static Model open(const std::string &deck, const std::string &parameters = "",
                      bool is_lenient = false)
    {
-      Model model;
-      model.check(emcon_open(deck.c_str(), parameters.c_str(), is_lenient, model.address()));
-      return model;
+      return made(emcon_open, deck.c_str(), parameters.c_str(), is_lenient);
    }
 
    // Read without building: give the model what a deck cannot say, then `build`.
    static Model read(const std::string &deck, const std::string &parameters = "",
                      bool is_lenient = false)
    {
-      Model model;
-      model.check(emcon_read(deck.c_str(), parameters.c_str(), is_lenient, model.address()));
-      return model;
+      return made(emcon_read, deck.c_str(), parameters.c_str(), is_lenient);
    }
 
    static Model read_text(const std::string &text, const std::string &name = "deck",
                           const std::string &parameters = "", bool is_lenient = false)
    {
-      Model model;
-      model.check(emcon_read_text(text.c_str(), name.c_str(), parameters.c_str(), is_lenient,
-                                  model.address()));
-      return model;
+      return made(emcon_read_text, text.c_str(), name.c_str(), parameters.c_str(), is_lenient);
    }
 
-   static Model load(const std::string &path)
-   {
-      Model model;
-      model.check(emcon_load(path.c_str(), model.address()));
-      return model;
-   }
+   static Model load(const std::string &path) { return made(emcon_load, path.c_str()); }
 
    // A model of a host in the plane: nodes at the positions x0, y0, x1, y1, ...
    static Model of_nodes(const std::vector<double> &x)
    {
-      Model model;
-      model.check(emcon_new(static_cast<int>(x.size()/2), x.data(), model.address()));
-      return model;
+      return made(emcon_new, static_cast<int>(x.size()/2), x.data());
    }
 
    void build() { call(emcon_build); }
@@ -154,12 +140,7 @@ public:
 
    // ---- the run of the deck, and steps ----
 
-   emcon_increment advance()
-   {
-      emcon_increment made;
-      call(emcon_advance, &made);
-      return made;
-   }
+   emcon_increment advance() { return told(emcon_advance); }
 
    emcon_increment step(double h)
    {
@@ -192,26 +173,9 @@ public:
 
    // ---- what a model holds ----
 
-   emcon_sizes sizes() const
-   {
-      emcon_sizes found;
-      call(emcon_get_sizes, &found);
-      return found;
-   }
-
-   double time() const
-   {
-      double found = 0;
-      call(emcon_get_time, &found);
-      return found;
-   }
-
-   emcon_ledger ledger() const
-   {
-      emcon_ledger found;
-      call(emcon_get_ledger, &found);
-      return found;
-   }
+   emcon_sizes sizes() const { return told(emcon_get_sizes); }
+   double time() const { return told(emcon_get_time); }
+   emcon_ledger ledger() const { return told(emcon_get_ledger); }
 
    Verdict verdict() const
    {
@@ -384,10 +348,27 @@ private:
       fail(status, text && *text ? text : emcon_status_text(status));
    }
 
+   // The model that a function makes of what stands before its place.
+   template <class Function, class... Arguments>
+   static Model made(Function function, Arguments... arguments)
+   {
+      Model model;
+      model.check(function(arguments..., model.address()));
+      return model;
+   }
+
+   // What a function tells by its only argument.
+   template <class Value>
+   Value told(int (*function)(emcon_model *, Value *)) const
+   {
+      Value found = Value();
+      call(function, &found);
+      return found;
+   }
+
    std::string text_of(int (*function)(emcon_model *, const char **)) const
    {
-      const char *text = nullptr;
-      call(function, &text);
+      const char *text = told(function);
       return text ? text : "";
    }
 
