@@ -47,7 +47,7 @@ contains
          if (data%ok .and. new%place == on_surface) then
             call get_faces(reader, data, scene, item, face)
          else if (data%ok) then
-            call refuse_surface(reader, data, scene)
+            call refuse_surface(reader, data)
             if (data%ok) call get_elements(reader, data, 1, scene, item)
             if (data%ok) call check_faces(reader, data, scene, item, new%place)
             if (data%ok) face = spread(new%place, 1, size(item))
@@ -152,10 +152,9 @@ contains
    end subroutine get_faces
 
    !> A surface has no numbers of faces, and no volume.
-   subroutine refuse_surface(reader, data, scene)
+   subroutine refuse_surface(reader, data)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
-      type(scene_t), intent(in) :: scene
       character(len=:), allocatable :: name
 
       if (is_label(data, 1)) return

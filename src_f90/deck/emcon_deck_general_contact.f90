@@ -7,6 +7,7 @@ module emcon_deck_general_contact
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t, n_neighbours
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, is_blank, &
       next_line
+   use emcon_deck_named, only : refuse_name
    use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
    use emcon_deck_surfaces, only : surface_names
    use emcon_diagnostics, only : quoted, suggestion
@@ -103,8 +104,7 @@ contains
       if (.not. data%ok) return
       surface = name_index_find(reader%names%surfaces, name)
       if (surface == 0) then
-         if (.not. reader%doubt%names) call data_error(reader, data, "unknown surface " &
-            // quoted(name) // suggestion(name, surface_names(scene%surface)))
+         call refuse_name(reader, data, "surface", name, surface_names(scene%surface))
       else if (scene%surface(surface)%is_nodal) then
          call data_error(reader, data, "the surface " // quoted(name) // " has TYPE=NODE, but " &
             // "its edges are needed too; define it by element faces (*SURFACE, TYPE=ELEMENT)")
@@ -214,7 +214,6 @@ contains
       type(data_t) :: data
       character(len=:), allocatable :: name
       integer :: i, side
-      logical :: is_known
 
       call data_open(data, card)
       do while (next_line(reader, data))
@@ -230,8 +229,9 @@ contains
          call get_name(reader, data, 3, "surface interaction", name)
          if (.not. data%ok) cycle
          i = name_index_find(reader%names%interactions, name)
-         is_known = i > 0 .or. reader%doubt%names
-         if (i > 0) then
+         if (i == 0) then
+            call refuse_name(reader, data, "surface interaction", name, reader%interaction_name)
+         else
             associate (given => reader%interaction(i))
                call refuse(given%restitution < 1.0_wp, "a RESTITUTION, which is of pairs only", &
                   "is of")
@@ -242,8 +242,6 @@ contains
                   "where surfaces may be in contact with themselves", "keeps apart")
             end associate
          end if
-         if (.not. is_known) call data_error(reader, data, "unknown surface interaction " &
-            // quoted(name) // suggestion(name, reader%interaction_name))
       end do
 
    contains

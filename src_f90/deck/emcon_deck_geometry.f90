@@ -1,8 +1,7 @@
 !> The shape of elements, as far as it can be seen from their corners.
 module emcon_deck_geometry
-   use emcon_deck_jacobian, only : is_integrable, warn_of_corners
+   use emcon_deck_jacobian, only : is_integrable, refuse_shapes, warn_of_corners
    use emcon_deck_reader, only : reader_t
-   use emcon_diagnostics, only : add_error, label_list
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    implicit none
@@ -30,27 +29,13 @@ contains
       do i = 1, size(fault)
          fault(i) = element_shape(scene, i)
       end do
-      call tell(shape_flat, " has no area; check its nodes and their order")
-      call tell(shape_clockwise, " is inverted: its nodes run clockwise")
+      call refuse_shapes(reader, scene, fault == shape_flat, " has no area; check its nodes and " &
+         // "their order")
+      call refuse_shapes(reader, scene, fault == shape_clockwise, " is inverted: its nodes run " &
+         // "clockwise")
       call warn_of_corners(reader, scene, fault == shape_corner)
-      call tell(shape_folded, " is folded: the angle at a corner is 180 degrees or more")
-
-   contains
-
-      subroutine tell(kind, text)
-         integer, intent(in) :: kind
-         character(len=*), intent(in) :: text
-         integer :: k
-
-         do k = 1, size(fault)
-            if (fault(k) == kind) exit
-         end do
-         if (k > size(fault)) return
-         reader%doubt%shapes = .true.
-         call add_error(reader%log, scene%element%origin(k), "element " &
-            // label_list(pack(scene%element%label, fault == kind)) // text)
-      end subroutine tell
-
+      call refuse_shapes(reader, scene, fault == shape_folded, " is folded: the angle at a " // &
+         "corner is 180 degrees or more")
    end subroutine check_shapes
 
    !> Judge the cross products of the edges at the corners of a plane element.

@@ -1,14 +1,14 @@
 !> Where the Jacobian of elements is positive that have corners where it is not.
 module emcon_deck_jacobian
    use emcon_deck_reader, only : reader_t
-   use emcon_diagnostics, only : add_warning, label_list
+   use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_kinds, only : wp
    use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
    use emcon_shape, only : shape_t, shape_table_t, shape_tabulate
    implicit none
    private
-   public :: is_integrable, warn_of_corners
+   public :: is_integrable, refuse_shapes, warn_of_shapes, warn_of_corners
 
    integer, parameter :: n_space = 3
    !> Jacobian at a point, over the largest one, below which it is round-off of the coordinates.
@@ -67,11 +67,33 @@ contains
       type(scene_t), intent(in) :: scene
       logical, intent(in) :: is_bad(:)           !! (n_element) has a corner without area or volume
 
-      if (.not. any(is_bad)) return
-      call add_warning(reader%log, scene%element%origin(findloc(is_bad, .true., 1)), "element " &
-         // label_list(pack(scene%element%label, is_bad)) // " is folded at a corner: the " &
-         // "Jacobian is not positive there, but at all points of integration; stresses near " &
-         // "that corner are not reliable")
+      call warn_of_shapes(reader, scene, is_bad, " is folded at a corner: the Jacobian is not " &
+         // "positive there, but at all points of integration; stresses near that corner are not " &
+         // "reliable")
    end subroutine warn_of_corners
+
+   !> Tell of elements, if there are some, what is wrong with them.
+   subroutine warn_of_shapes(reader, scene, is_bad, text)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: is_bad(:)           !! (n_element)
+      character(len=*), intent(in) :: text       !! behind the labels
+
+      if (any(is_bad)) call add_warning(reader%log, scene%element%origin(findloc(is_bad, .true., &
+         1)), "element " // label_list(pack(scene%element%label, is_bad)) // text)
+   end subroutine warn_of_shapes
+
+   !> The same as an error.
+   subroutine refuse_shapes(reader, scene, is_bad, text)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      logical, intent(in) :: is_bad(:)           !! (n_element)
+      character(len=*), intent(in) :: text       !! behind the labels
+
+      if (.not. any(is_bad)) return
+      reader%doubt%shapes = .true.
+      call add_error(reader%log, scene%element%origin(findloc(is_bad, .true., 1)), "element " &
+         // label_list(pack(scene%element%label, is_bad)) // text)
+   end subroutine refuse_shapes
 
 end module emcon_deck_jacobian

@@ -5,8 +5,8 @@ module emcon_deck_mesh
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       drop_zeros, get_integer, get_real, is_blank, next_line
    use emcon_deck_labels, only : find_label, label_map_init
-   use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, n_lines, &
-      need_name, option_name, reader_t
+   use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, n_cards, &
+      n_lines, need_name, option_name, reader_t
    use emcon_diagnostics, only : add_error, label_list, quoted
    use emcon_element_kind, only : element_kind_t, element_row_t, find_element_kind
    use emcon_element_registry, only : element_row, n_element_row
@@ -151,7 +151,7 @@ contains
       reader%line_node = reader%line_node(:, :n_line)
       call map_elements(reader, scene, line_origin_of(:n_line))
       reader%doubt%shapes = reader%doubt%shapes .or. reader%doubt%elements
-      if (n == 0 .and. .not. (reader%doubt%elements .or. is_given(reader))) then
+      if (n == 0 .and. .not. reader%doubt%elements .and. n_cards(reader, "GIVENFORCES") == 0) then
          call add_error(reader%log, origin_t(1, 0), "the deck has no element")
       end if
    end subroutine read_elements
@@ -177,17 +177,6 @@ contains
          where (index > n) index = n - index
       end associate
    end subroutine map_elements
-
-   !> Does the deck say that forces come from elsewhere?
-   pure logical function is_given(reader)
-      type(reader_t), intent(in) :: reader
-      integer :: i
-
-      is_given = .false.
-      do i = 1, size(reader%card)
-         is_given = is_given .or. reader%card(i)%name == "GIVENFORCES"
-      end do
-   end function is_given
 
    !> One card; the items that it defines count from 1 for elements, below 0 for lines.
    subroutine read_element_card(reader, i_card, scene, line_origin_of, n, n_line)

@@ -1,8 +1,8 @@
 !> The shape of elements of three dimensions, before anything is computed with them.
 module emcon_deck_shapes_space
-   use emcon_deck_jacobian, only : is_integrable, warn_of_corners
+   use emcon_deck_jacobian, only : is_integrable, refuse_shapes, warn_of_corners, &
+      warn_of_shapes
    use emcon_deck_reader, only : reader_t
-   use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_element_kind, only : element_kind_t
    use emcon_kinds, only : wp
    use emcon_rotation, only : cross_product
@@ -37,31 +37,18 @@ contains
       do e = 1, size(fault)
          fault(e) = fault_of(scene, e)
       end do
-      call tell(is_flat, " has no volume; check its nodes and their order")
-      call tell(is_mirrored, " is inverted: its nodes run as in a mirror, the first face has to " &
-         // "run counter-clockwise seen from the other nodes")
-      call tell(is_folded, " is folded: its volume is not positive everywhere")
+      call refuse_shapes(reader, scene, fault == is_flat, " has no volume; check its nodes and " &
+         // "their order")
+      call refuse_shapes(reader, scene, fault == is_mirrored, " is inverted: its nodes run as in " &
+         // "a mirror, the first face has to run counter-clockwise seen from the other nodes")
+      call refuse_shapes(reader, scene, fault == is_folded, " is folded: its volume is not " &
+         // "positive everywhere")
       call warn_of_corners(reader, scene, fault == is_corner)
-      call tell(is_off, " has a node outside the middle half of its edge, where the element " &
-         // "folds; put it into the middle")
-      if (any(fault == is_doubtful)) call add_warning(reader%log, &
-         scene%element%origin(findloc(fault, is_doubtful, 1)), "element " &
-         // label_list(pack(scene%element%label, fault == is_doubtful)) // " has a node far off " &
-         // "the middle of its edge: strains are less exact, and infinite at a corner if it " &
-         // "stands at a quarter")
-
-   contains
-
-      subroutine tell(kind, text)
-         integer, intent(in) :: kind
-         character(len=*), intent(in) :: text
-
-         if (.not. any(fault == kind)) return
-         reader%doubt%shapes = .true.
-         call add_error(reader%log, scene%element%origin(findloc(fault, kind, 1)), "element " &
-            // label_list(pack(scene%element%label, fault == kind)) // text)
-      end subroutine tell
-
+      call refuse_shapes(reader, scene, fault == is_off, " has a node outside the middle half of " &
+         // "its edge, where the element folds; put it into the middle")
+      call warn_of_shapes(reader, scene, fault == is_doubtful, " has a node far off the middle " &
+         // "of its edge: strains are less exact, and infinite at a corner if it stands at a " &
+         // "quarter")
    end subroutine check_shapes_space
 
    !> What is wrong with element `e`; 0: nothing.

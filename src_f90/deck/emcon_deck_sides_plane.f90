@@ -1,9 +1,10 @@
 !> The sides of elements in the plane that have nodes between their corners.
 module emcon_deck_sides_plane
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t
-   use emcon_deck_jacobian, only : is_integrable, warn_of_corners
+   use emcon_deck_jacobian, only : is_integrable, refuse_shapes, warn_of_corners, &
+      warn_of_shapes
    use emcon_deck_reader, only : reader_t
-   use emcon_diagnostics, only : add_error, add_warning, label_list
+   use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
@@ -45,29 +46,15 @@ contains
          is_off(e) = .not. (is_bent(e) .or. is_folded(e) .or. is_corner(e)) .and. &
             (along > off_middle .or. beside > half_circle)
       end do
-      if (any(is_bent)) call tell(is_bent, " has a node outside the middle half of its side, " &
-         // "where the element folds; put it into the middle")
-      if (any(is_folded)) call tell(is_folded, " is folded by the nodes of its sides: " &
-         // "its area is not positive everywhere")
+      call refuse_shapes(reader, scene, is_bent, " has a node outside the middle half of its " &
+         // "side, where the element folds; put it into the middle")
+      call refuse_shapes(reader, scene, is_folded, " is folded by the nodes of its sides: its " &
+         // "area is not positive everywhere")
       call warn_of_corners(reader, scene, is_corner)
-      if (any(is_off)) call add_warning(reader%log, scene%element%origin(findloc(is_off, .true., &
-         1)), "element " // label_list(pack(scene%element%label, is_off)) // " has a node " &
-         // "far off the middle of its side: strains are less exact, and infinite at a corner " &
-         // "if it stands at a quarter")
+      call warn_of_shapes(reader, scene, is_off, " has a node far off the middle of its side: " &
+         // "strains are less exact, and infinite at a corner if it stands at a quarter")
       if (.not. (reader%doubt%elements .or. reader%doubt%shapes)) call check_neighbours(reader, &
          scene)
-
-   contains
-
-      subroutine tell(is_wrong, text)
-         logical, intent(in) :: is_wrong(:)
-         character(len=*), intent(in) :: text
-
-         reader%doubt%shapes = .true.
-         call add_error(reader%log, scene%element%origin(findloc(is_wrong, .true., 1)), &
-            "element " // label_list(pack(scene%element%label, is_wrong)) // text)
-      end subroutine tell
-
    end subroutine check_sides
 
    !> Has an element of the scene nodes between its corners?

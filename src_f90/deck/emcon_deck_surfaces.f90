@@ -5,12 +5,12 @@ module emcon_deck_surfaces
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_integer, get_name, is_blank, next_line
    use emcon_deck_labels, only : find_label
-   use emcon_deck_named, only : get_elements, get_lines, get_nodes
+   use emcon_deck_named, only : get_elements, get_lines, get_nodes, refuse_name
    use emcon_deck_options, only : choose_option
    use emcon_deck_reader, only : card_error, card_t, card_warning, n_cards, need_name, &
       option_name, reader_t, refuse_option
    use emcon_deck_segments_plane, only : read_segments
-   use emcon_diagnostics, only : label_list, quoted, suggestion
+   use emcon_diagnostics, only : label_list, quoted
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_of_lines, surface_of_faces, surface_of_nodes, &
       surface_of_segments, surface_t
@@ -374,10 +374,8 @@ contains
          call get_name(reader, data, side, trim(role(side)) // " surface", name)
          if (.not. data%ok) cycle
          i_surface(side) = name_index_find(reader%names%surfaces, name)
-         if (i_surface(side) == 0 .and. .not. reader%doubt%names) then
-            call data_error(reader, data, "unknown " // trim(role(side)) // " surface " &
-               // quoted(name) // suggestion(name, surface_names(scene%surface)))
-         end if
+         if (i_surface(side) == 0) call refuse_name(reader, data, trim(role(side)) // &
+            " surface", name, surface_names(scene%surface))
       end do
       slave = i_surface(1)
       master = i_surface(2)
