@@ -12,50 +12,38 @@ submodule (emcon_element_registry) emcon_element_kinds
    use emcon_shape_triangle_plane, only : shape_triangle_t
    implicit none
 
+   !> Faces in the plane, counter-clockwise: corners alone, and with the middles.
+   integer, parameter :: triangle(face_room(1)) = reshape([1, 2, 2, 3, 3, 1], face_room, pad=[0])
+   integer, parameter :: quadrilateral(face_room(1)) = reshape([1, 2, 2, 3, 3, 4, 4, 1], &
+      face_room, pad=[0])
+   integer, parameter :: bent_triangle(face_room(1)) = reshape([1, 2, 4, 2, 3, 5, 3, 1, 6], &
+      face_room, pad=[0])
+   integer, parameter :: bent_quadrilateral(face_room(1)) = reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, &
+      4, 1, 8], face_room, pad=[0])
+
    type(element_row_t), parameter :: plane_rows(*) = [ &
-      element_row_t("CPE3", 2, 3, 3, 3, 2, reshape([1, 2, 2, 3, 3, 1], face_room, pad=[0]), 5, 3), &
-      element_row_t("CPE4", 2, 4, 4, 4, 2, &
-         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4), &
-      element_row_t("CPE4H", 2, 4, 4, 4, 2, &
-         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, .true.), &
-      element_row_t("CPE4I", 2, 4, 4, 4, 2, &
-         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, has_modes=.true.), &
-      element_row_t("CPE6", 2, 6, 3, 3, 3, &
-         reshape([1, 2, 4, 2, 3, 5, 3, 1, 6], face_room, pad=[0]), 22, 6), &
-      element_row_t("CPE8", 2, 8, 4, 4, 3, &
-         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8), &
-      element_row_t("CPE8R", 2, 8, 4, 4, 3, &
-         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8), &
-      element_row_t("CPS3", 2, 3, 3, 3, 2, reshape([1, 2, 2, 3, 3, 1], face_room, pad=[0]), 5, 3, &
-         is_thin=.true.), &
-      element_row_t("CPS4", 2, 4, 4, 4, 2, &
-         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, is_thin=.true.), &
-      element_row_t("CPS4I", 2, 4, 4, 4, 2, &
-         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, is_thin=.true., &
+      element_row_t("CPE3", 2, 3, 3, 3, 2, triangle, 5, 3), &
+      element_row_t("CPE4", 2, 4, 4, 4, 2, quadrilateral, 9, 4), &
+      element_row_t("CPE4H", 2, 4, 4, 4, 2, quadrilateral, 9, 4, .true.), &
+      element_row_t("CPE4I", 2, 4, 4, 4, 2, quadrilateral, 9, 4, has_modes=.true.), &
+      element_row_t("CPE6", 2, 6, 3, 3, 3, bent_triangle, 22, 6), &
+      element_row_t("CPE8", 2, 8, 4, 4, 3, bent_quadrilateral, 23, 8), &
+      element_row_t("CPE8R", 2, 8, 4, 4, 3, bent_quadrilateral, 23, 8), &
+      element_row_t("CPS3", 2, 3, 3, 3, 2, triangle, 5, 3, is_thin=.true.), &
+      element_row_t("CPS4", 2, 4, 4, 4, 2, quadrilateral, 9, 4, is_thin=.true.), &
+      element_row_t("CPS4I", 2, 4, 4, 4, 2, quadrilateral, 9, 4, is_thin=.true., &
          has_modes=.true.), &
-      element_row_t("CPS6", 2, 6, 3, 3, 3, &
-         reshape([1, 2, 4, 2, 3, 5, 3, 1, 6], face_room, pad=[0]), 22, 6, is_thin=.true.), &
-      element_row_t("CPS8", 2, 8, 4, 4, 3, &
-         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8, &
-         is_thin=.true.), &
-      element_row_t("CPS8R", 2, 8, 4, 4, 3, &
-         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8, &
-         is_thin=.true.)]
+      element_row_t("CPS6", 2, 6, 3, 3, 3, bent_triangle, 22, 6, is_thin=.true.), &
+      element_row_t("CPS8", 2, 8, 4, 4, 3, bent_quadrilateral, 23, 8, is_thin=.true.), &
+      element_row_t("CPS8R", 2, 8, 4, 4, 3, bent_quadrilateral, 23, 8, is_thin=.true.)]
 
    !> Solids of revolution: their sections.
    type(element_row_t), parameter :: axial_rows(*) = [ &
-      element_row_t("CAX3", 2, 3, 3, 3, 2, reshape([1, 2, 2, 3, 3, 1], face_room, pad=[0]), 5, 3, &
-         is_axial=.true.), &
-      element_row_t("CAX4", 2, 4, 4, 4, 2, &
-         reshape([1, 2, 2, 3, 3, 4, 4, 1], face_room, pad=[0]), 9, 4, is_axial=.true.), &
-      element_row_t("CAX6", 2, 6, 3, 3, 3, &
-         reshape([1, 2, 4, 2, 3, 5, 3, 1, 6], face_room, pad=[0]), 22, 6, is_axial=.true.), &
-      element_row_t("CAX8", 2, 8, 4, 4, 3, &
-         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8, &
-         is_axial=.true.), &
-      element_row_t("CAX8R", 2, 8, 4, 4, 3, &
-         reshape([1, 2, 5, 2, 3, 6, 3, 4, 7, 4, 1, 8], face_room, pad=[0]), 23, 8, &
-         is_axial=.true.)]
+      element_row_t("CAX3", 2, 3, 3, 3, 2, triangle, 5, 3, is_axial=.true.), &
+      element_row_t("CAX4", 2, 4, 4, 4, 2, quadrilateral, 9, 4, is_axial=.true.), &
+      element_row_t("CAX6", 2, 6, 3, 3, 3, bent_triangle, 22, 6, is_axial=.true.), &
+      element_row_t("CAX8", 2, 8, 4, 4, 3, bent_quadrilateral, 23, 8, is_axial=.true.), &
+      element_row_t("CAX8R", 2, 8, 4, 4, 3, bent_quadrilateral, 23, 8, is_axial=.true.)]
 
    !> Faces of hexahedra, seen from inside counter-clockwise: corners alone, and with the middles.
    integer, parameter :: hexahedron_faces(face_room(1)) = reshape([1, 2, 3, 4, 5, 8, 7, 6, &

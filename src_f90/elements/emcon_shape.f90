@@ -8,6 +8,7 @@ module emcon_shape
    implicit none
    private
    public :: max_element_nodes, max_plane_nodes, shape_t, shape_table_t, shape_tabulate, shape_fault
+   public :: shape_gauss_points
 
    !> Most nodes of an element, and of one in the plane: work space for one has room for these.
    integer, parameter :: max_element_nodes = 20, max_plane_nodes = 9
@@ -153,5 +154,31 @@ contains
          end do
       end do
    end subroutine shape_fault
+
+   !> Gauss points of -1..1 in each coordinate, the first one runs fastest: of three along a side
+   !> exact to degree 5, of two to degree 3.
+   pure subroutine shape_gauss_points(n_dim, n_side, point, weight)
+      integer, intent(in) :: n_dim
+      integer, intent(in) :: n_side              !! points along a side, 2 or 3
+      real(wp), allocatable, intent(out) :: point(:, :)      !! (n_dim, n_side**n_dim)
+      real(wp), allocatable, intent(out) :: weight(:)        !! (n_side**n_dim)
+      real(wp), parameter :: near = 1.0_wp/sqrt(3.0_wp), wide = sqrt(0.6_wp)
+      real(wp) :: x(n_side), w(n_side)
+      integer :: at(n_dim), a, i
+
+      if (n_side == 3) then
+         x = [-wide, 0.0_wp, wide]
+         w = [5.0_wp, 8.0_wp, 5.0_wp]/9.0_wp
+      else
+         x = [-near, near]
+         w = 1.0_wp
+      end if
+      allocate(point(n_dim, n_side**n_dim), weight(n_side**n_dim))
+      do i = 1, size(weight)
+         at = 1 + [(modulo((i - 1)/n_side**a, n_side), a = 0, n_dim - 1)]
+         point(:, i) = x(at)
+         weight(i) = product(w(at))
+      end do
+   end subroutine shape_gauss_points
 
 end module emcon_shape

@@ -52,8 +52,6 @@ contains
       real(wp), allocatable, intent(out) :: weight(:)        !! (n_gp)
       real(wp), parameter :: g = 1.0_wp/sqrt(3.0_wp)
 
-      associate (unused => is_mass)
-      end associate
       point = g*node
       weight = spread(1.0_wp, 1, 8)
    end subroutine rule

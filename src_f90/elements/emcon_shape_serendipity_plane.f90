@@ -1,7 +1,7 @@
 !> Quadrilateral of eight nodes: quadratic functions without x^2 y^2 on [-1, 1] x [-1, 1].
 module emcon_shape_serendipity_plane
    use emcon_kinds, only : wp
-   use emcon_shape, only : shape_t
+   use emcon_shape, only : shape_gauss_points, shape_t
    implicit none
    private
    public :: shape_serendipity_t
@@ -60,25 +60,8 @@ contains
       logical, intent(in) :: is_mass             !! three along a side
       real(wp), allocatable, intent(out) :: point(:, :)      !! (2, n_gp)
       real(wp), allocatable, intent(out) :: weight(:)        !! (n_gp)
-      real(wp), parameter :: g = 1.0_wp/sqrt(3.0_wp), wide = sqrt(0.6_wp)
-      real(wp), allocatable :: x(:), w(:)
-      integer :: i, j, n
 
-      if (is_mass .or. self%n_side == 3) then
-         x = [-wide, 0.0_wp, wide]
-         w = [5.0_wp, 8.0_wp, 5.0_wp]/9.0_wp
-      else
-         x = [-g, g]
-         w = [1.0_wp, 1.0_wp]
-      end if
-      n = size(x)
-      allocate(point(2, n*n), weight(n*n))
-      do j = 1, n
-         do i = 1, n
-            point(:, i + n*(j - 1)) = [x(i), x(j)]
-            weight(i + n*(j - 1)) = w(i)*w(j)
-         end do
-      end do
+      call shape_gauss_points(2, merge(3, self%n_side, is_mass), point, weight)
    end subroutine serendipity_rule
 
    !> The bilinear function that fits the values at the points best: 1, x, y and x y are orthogonal

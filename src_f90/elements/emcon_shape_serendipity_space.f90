@@ -1,7 +1,7 @@
 !> Hexahedron of 20 nodes: quadratic functions on a cube of side 2, one node in each side.
 module emcon_shape_serendipity_space
    use emcon_kinds, only : wp
-   use emcon_shape, only : shape_t
+   use emcon_shape, only : shape_gauss_points, shape_t
    implicit none
    private
    public :: shape_serendipity_space_t
@@ -64,29 +64,8 @@ contains
       logical, intent(in) :: is_mass             !! else for stiffness
       real(wp), allocatable, intent(out) :: point(:, :)      !! (3, n_gp)
       real(wp), allocatable, intent(out) :: weight(:)        !! (n_gp)
-      real(wp), parameter :: g = 1.0_wp/sqrt(3.0_wp)
-      real(wp), parameter :: wide = sqrt(0.6_wp)
-      real(wp), allocatable :: x(:), w(:)
-      integer :: i, j, k, n
 
-      if (is_mass .or. self%n_side == 3) then
-         x = [-wide, 0.0_wp, wide]
-         w = [5.0_wp, 8.0_wp, 5.0_wp]/9.0_wp
-      else
-         x = [-g, g]
-         w = [1.0_wp, 1.0_wp]
-      end if
-      allocate(point(3, size(x)**3), weight(size(x)**3))
-      n = 0
-      do k = 1, size(x)
-         do j = 1, size(x)
-            do i = 1, size(x)
-               n = n + 1
-               point(:, n) = [x(i), x(j), x(k)]
-               weight(n) = w(i)*w(j)*w(k)
-            end do
-         end do
-      end do
+      call shape_gauss_points(3, merge(3, self%n_side, is_mass), point, weight)
    end subroutine rule
 
 end module emcon_shape_serendipity_space
