@@ -9,10 +9,9 @@ module emcon_blas
    public :: ieee_status_type
 
    interface
-      function emcon_blas_set_threads(n) result(done) bind(c)
+      integer(c_int) function emcon_blas_set_threads(n) bind(c)
          import :: c_int
          integer(c_int), value :: n
-         integer(c_int) :: done
       end function emcon_blas_set_threads
 
       subroutine emcon_blas_name(n, name) bind(c)

@@ -52,47 +52,42 @@ module emcon_cholmod
    end type cholmod_t
 
    interface
-      function emcon_cholmod_new(halves) result(handle) bind(c)
+      type(c_ptr) function emcon_cholmod_new(halves) bind(c)
          import :: c_int, c_ptr
          integer(c_int), value :: halves
-         type(c_ptr) :: handle
       end function emcon_cholmod_new
 
-      function emcon_cholmod_analyse(handle, n, ap, ai) result(status) bind(c)
+      integer(c_int) function emcon_cholmod_analyse(handle, n, ap, ai) bind(c)
          import :: c_int, c_ptr
          type(c_ptr), value :: handle
          integer(c_int), value :: n
          integer(c_int), intent(in) :: ap(*), ai(*)
-         integer(c_int) :: status
       end function emcon_cholmod_analyse
 
-      function emcon_cholmod_factorise(handle, n, ap, ai, ax, rcond, n_factor) &
-         result(status) bind(c)
+      integer(c_int) function emcon_cholmod_factorise(handle, n, ap, ai, ax, rcond, n_factor) &
+         bind(c)
          import :: c_double, c_int, c_ptr
          type(c_ptr), value :: handle
          integer(c_int), value :: n
          integer(c_int), intent(in) :: ap(*), ai(*)
          real(c_double), intent(in) :: ax(*)
          real(c_double), intent(inout) :: rcond, n_factor
-         integer(c_int) :: status
       end function emcon_cholmod_factorise
 
-      function emcon_cholmod_solve(handle, n, b, x) result(status) bind(c)
+      integer(c_int) function emcon_cholmod_solve(handle, n, b, x) bind(c)
          import :: c_double, c_int, c_ptr
          type(c_ptr), value :: handle
          integer(c_int), value :: n
          real(c_double), intent(in) :: b(*)
          real(c_double), intent(inout) :: x(*)
-         integer(c_int) :: status
       end function emcon_cholmod_solve
 
-      function emcon_cholmod_half(handle, n, is_second, b, x) result(status) bind(c)
+      integer(c_int) function emcon_cholmod_half(handle, n, is_second, b, x) bind(c)
          import :: c_double, c_int, c_ptr
          type(c_ptr), value :: handle
          integer(c_int), value :: n, is_second
          real(c_double), intent(in) :: b(*)
          real(c_double), intent(inout) :: x(*)
-         integer(c_int) :: status
       end function emcon_cholmod_half
 
       function emcon_cholmod_reach(handle, n, m, column, value, n_reached, index, x) &
@@ -107,20 +102,17 @@ module emcon_cholmod
          integer(c_int) :: status
       end function emcon_cholmod_reach
 
-      function emcon_cholmod_density(handle) result(density) bind(c)
+      real(c_double) function emcon_cholmod_density(handle) bind(c)
          import :: c_double, c_ptr
          type(c_ptr), value :: handle
-         real(c_double) :: density
       end function emcon_cholmod_density
 
-      function emcon_cholmod_nodes(handle, n, ap, ai, n_node, n_row) &
-         result(status) bind(c)
+      integer(c_int) function emcon_cholmod_nodes(handle, n, ap, ai, n_node, n_row) bind(c)
          import :: c_int, c_ptr
          type(c_ptr), value :: handle
          integer(c_int), value :: n
          integer(c_int), intent(in) :: ap(*), ai(*)
          integer(c_int), intent(inout) :: n_node, n_row
-         integer(c_int) :: status
       end function emcon_cholmod_nodes
 
       subroutine emcon_cholmod_take_nodes(handle, order, first, row_start, row) bind(c)

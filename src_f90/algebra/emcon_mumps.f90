@@ -37,34 +37,30 @@ module emcon_mumps
    end type mumps_t
 
    interface
-      function emcon_mumps_new(symmetry) result(handle) bind(c)
+      type(c_ptr) function emcon_mumps_new(symmetry) bind(c)
          import :: c_int, c_ptr
          integer(c_int), value :: symmetry
-         type(c_ptr) :: handle
       end function emcon_mumps_new
 
-      function emcon_mumps_analyse(handle, n, n_entry, row, column) result(status) bind(c)
+      integer(c_int) function emcon_mumps_analyse(handle, n, n_entry, row, column) bind(c)
          import :: c_int, c_ptr
          type(c_ptr), value :: handle
          integer(c_int), value :: n, n_entry
          integer(c_int), intent(in) :: row(*), column(*)
-         integer(c_int) :: status
       end function emcon_mumps_analyse
 
-      function emcon_mumps_factorise(handle, value, n_factor, n_negative) result(status) bind(c)
+      integer(c_int) function emcon_mumps_factorise(handle, value, n_factor, n_negative) bind(c)
          import :: c_double, c_int, c_ptr
          type(c_ptr), value :: handle
          real(c_double), intent(in) :: value(*)
          real(c_double), intent(inout) :: n_factor
          integer(c_int), intent(inout) :: n_negative
-         integer(c_int) :: status
       end function emcon_mumps_factorise
 
-      function emcon_mumps_solve(handle, x) result(status) bind(c)
+      integer(c_int) function emcon_mumps_solve(handle, x) bind(c)
          import :: c_double, c_int, c_ptr
          type(c_ptr), value :: handle
          real(c_double), intent(inout) :: x(*)
-         integer(c_int) :: status
       end function emcon_mumps_solve
 
       subroutine emcon_mumps_free(handle) bind(c)

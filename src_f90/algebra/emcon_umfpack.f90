@@ -61,15 +61,14 @@ module emcon_umfpack
          integer(c_int) :: status
       end function umfpack_di_symbolic
 
-      function umfpack_di_numeric(ap, ai, ax, symbolic, numeric, control, info) &
-         result(status) bind(c)
+      integer(c_int) function umfpack_di_numeric(ap, ai, ax, symbolic, numeric, control, info) &
+         bind(c)
          import :: c_double, c_int, c_ptr
          integer(c_int), intent(in) :: ap(*), ai(*)
          real(c_double), intent(in) :: ax(*), control(*)
          type(c_ptr), value :: symbolic
          type(c_ptr), intent(out) :: numeric
          real(c_double), intent(inout) :: info(*)
-         integer(c_int) :: status
       end function umfpack_di_numeric
 
       function umfpack_di_wsolve(sys, ap, ai, ax, x, b, numeric, control, info, wi, w) &

@@ -18,9 +18,8 @@ program emcon
          integer(c_int), value :: code
       end subroutine c_exit
 
-      function emcon_has_room() result(has_room) bind(c)
+      integer(c_int) function emcon_has_room() bind(c)
          import :: c_int
-         integer(c_int) :: has_room
       end function emcon_has_room
    end interface
 

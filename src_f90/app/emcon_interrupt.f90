@@ -25,18 +25,16 @@ module emcon_interrupt
    type(timespec_t), volatile :: time_told
 
    interface
-      function c_signal(number, handler) result(previous) bind(c, name="signal")
+      type(c_funptr) function c_signal(number, handler) bind(c, name="signal")
          import :: c_funptr, c_int
          integer(c_int), value :: number
          type(c_funptr), value :: handler
-         type(c_funptr) :: previous
       end function c_signal
 
-      function c_clock_gettime(clock, time) result(stat) bind(c, name="clock_gettime")
+      integer(c_int) function c_clock_gettime(clock, time) bind(c, name="clock_gettime")
          import :: c_int, timespec_t
          integer(c_int), value :: clock
          type(timespec_t), intent(out) :: time
-         integer(c_int) :: stat
       end function c_clock_gettime
 
       !> Ends at once, without what `exit` still does; allowed in a signal handler.

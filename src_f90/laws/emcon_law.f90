@@ -182,9 +182,6 @@ contains
    subroutine law_divide(self, rest)
       class(law_t), intent(in) :: self
       class(law_t), allocatable, intent(out) :: rest   !! not allocated: the law has no parts
-
-      associate (unused => self)
-      end associate
    end subroutine law_divide
 
    !> The change of volume v that U is of: J - 1.
@@ -193,8 +190,6 @@ contains
       type(dg_t), intent(in) :: e1, e2, e3       !! invariants of E
       type(dg_t) :: v, y
 
-      associate (unused => self)
-      end associate
       y = volume_excess(e1, e2, e3)
       v = y/(dg_sqrt(y + 1.0_wp) + 1.0_wp)
    end function law_change
@@ -205,8 +200,6 @@ contains
       type(dg_t), intent(in) :: v                !! change of volume, `change` or its mean
       type(dg_t) :: u                            !! [M/(L T^2)]
 
-      associate (unused => self, no => v)
-      end associate
       u = dg_t()
    end function law_volume
 
@@ -219,8 +212,6 @@ contains
       type(dg_t), intent(in) :: t                !! of second order at small strains
       type(dg_t) :: w                            !! [M/(L T^2)]
 
-      associate (unused => self, no => i, never => y, neither => t)
-      end associate
       w = dg_t()
    end function law_part
 

@@ -103,8 +103,6 @@ contains
       type(dg_t), intent(in) :: e1, e2, e3       !! invariants of E
       type(dg_t) :: v
 
-      associate (unused => self)
-      end associate
       v = e1 + 0.0_wp*e2 + 0.0_wp*e3
    end function change
 

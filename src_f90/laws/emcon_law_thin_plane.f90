@@ -66,8 +66,6 @@ contains
       type(normal_t) :: start, last
       real(wp) :: change(n_plane)
 
-      associate (unused => e3)
-      end associate
       change = [e1%df, e2%df]
       call find_normal(self%solid, [e1%f0, e2%f0], start)
       last = start

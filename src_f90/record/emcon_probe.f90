@@ -37,9 +37,8 @@ module emcon_probe
 
    interface
       !> Of POSIX; the number of this process.
-      function c_getpid() bind(c, name="getpid") result(number)
+      integer(c_int) function c_getpid() bind(c, name="getpid")
          import :: c_int
-         integer(c_int) :: number
       end function c_getpid
    end interface
 

@@ -34,20 +34,18 @@ module emcon_hdf5
    integer(size_t), parameter :: cache_size = 65536_size_t
 
    interface
-      function c_h5pset_obj_track_times(plist, is_tracked) &
-         bind(c, name="H5Pset_obj_track_times") result(stat)
+      integer(c_int) function c_h5pset_obj_track_times(plist, is_tracked) &
+         bind(c, name="H5Pset_obj_track_times")
          import :: c_bool, c_int, c_int64_t
          integer(c_int64_t), value :: plist
          logical(c_bool), value :: is_tracked
-         integer(c_int) :: stat
       end function c_h5pset_obj_track_times
 
-      function c_h5fget_vfd_handle(file, plist, handle) &
-         bind(c, name="H5Fget_vfd_handle") result(stat)
+      integer(c_int) function c_h5fget_vfd_handle(file, plist, handle) &
+         bind(c, name="H5Fget_vfd_handle")
          import :: c_int, c_int64_t, c_ptr
          integer(c_int64_t), value :: file, plist
          type(c_ptr), intent(out) :: handle
-         integer(c_int) :: stat
       end function c_h5fget_vfd_handle
    end interface
 

@@ -67,17 +67,12 @@ contains
       real(wp), intent(in), contiguous :: du(:, :)           !! (n_dim, n_node) [L]
       real(wp), intent(in), contiguous :: v0(:, :), v1(:, :) !! (n_dim, n_node) [L/T]
       real(wp), intent(inout), contiguous :: past(:, :, :)   !! (n_dim, n_node, n_past)
-
-      associate (unused => self, no => h + du(1, 1) + v0(1, 1) + v1(1, 1) + past(1, 1, 1))
-      end associate
    end subroutine carry
 
    !> Is the energy balance of a step exact? If not, what it is off by is shown, not judged.
    pure logical function keeps_energy(self)
       class(scheme_t), intent(in) :: self
 
-      associate (unused => self)
-      end associate
       keeps_energy = .false.
    end function keeps_energy
 
@@ -86,8 +81,6 @@ contains
    pure real(wp) function error_constant(self)
       class(scheme_t), intent(in) :: self
 
-      associate (unused => self)
-      end associate
       error_constant = 0.0_wp
    end function error_constant
 

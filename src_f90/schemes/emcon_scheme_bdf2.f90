@@ -25,8 +25,6 @@ contains
       type(evaluation_t) :: evaluation
       real(wp) :: ratio, k, l
 
-      associate (unused => self)
-      end associate
       if (.not. start%h_before > 0.0_wp) then
          evaluation = evaluation_moving(h, lapse=0.5_wp*h, v_weight=2.0_wp)
          evaluation%at = 0.5_wp
@@ -53,8 +51,6 @@ contains
       real(wp), intent(in), contiguous :: v0(:, :), v1(:, :) !! (n_dim, n_node) [L/T]
       real(wp), intent(inout), contiguous :: past(:, :, :)   !! (n_dim, n_node, 2) [L], [L/T]
 
-      associate (unused => self, no => h)
-      end associate
       past(:, :, 1) = du
       past(:, :, 2) = v1 - v0
    end subroutine bdf2_carry

@@ -37,8 +37,6 @@ contains
    pure logical function decaying_keeps_energy(self) result(keeps_energy)
       class(scheme_energy_decaying_t), intent(in) :: self
 
-      associate (unused => self)
-      end associate
       keeps_energy = .true.
    end function decaying_keeps_energy
 
@@ -50,8 +48,6 @@ contains
       real(wp), intent(in), contiguous :: v0(:, :), v1(:, :) !! (n_dim, n_node) [L/T]
       real(wp), intent(inout), contiguous :: past(:, :, :)   !! (n_dim, n_node, 1) [L]
 
-      associate (unused => self, no => h + v0(1, 1) + v1(1, 1))
-      end associate
       past(:, :, 1) = du
    end subroutine decaying_carry
 

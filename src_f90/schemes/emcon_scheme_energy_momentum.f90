@@ -38,8 +38,6 @@ contains
    pure real(wp) function energy_momentum_error_constant(self) result(constant)
       class(scheme_energy_momentum_t), intent(in) :: self
 
-      associate (unused => self)
-      end associate
       constant = 1.0_wp/12.0_wp
    end function energy_momentum_error_constant
 

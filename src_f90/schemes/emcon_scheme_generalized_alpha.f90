@@ -72,8 +72,6 @@ contains
       real(wp), intent(inout), contiguous :: past(:, :, :)   !! (n_dim, n_node, 1) [L/T^2]
       type(weights_t) :: alpha
 
-      associate (unused => du)
-      end associate
       alpha = weights_of(self%row%setting)
       past(:, :, 1) = ((v1 - v0)/h - (1.0_wp - alpha%gamma)*past(:, :, 1))/alpha%gamma
    end subroutine alpha_carry

@@ -97,8 +97,6 @@ contains
       type(csr_t), intent(in) :: matrix
       integer, intent(in) :: slot(:)             !! element matrices by columns
 
-      associate (unused => space, no => matrix)
-      end associate
       self%nlgeom = scene%step(i_step)%nlgeom
       self%slot = slot
    end subroutine begin_step
