@@ -9,6 +9,7 @@ program main
    use emcon_errors, only : error_t
    use first_failure, only : failure_take
    use test_active_set, only : collect_active_set
+   use test_active_choice, only : collect_active_choice
    use test_arcs, only : collect_arcs
    use test_blas, only : collect_blas
    use test_band_blocks, only : collect_band_blocks
@@ -76,10 +77,12 @@ program main
    use test_march_contact, only : collect_march_contact
    use test_march_grid, only : collect_march_grid
    use test_march_kinds, only : collect_march_kinds
+   use test_step_control, only : collect_step_control
    use test_mass_return, only : collect_mass_return
    use test_midside, only : collect_midside
    use test_mortar, only : collect_mortar
    use test_mortar_pair, only : collect_mortar_pair
+   use test_pair_forces, only : collect_pair_forces
    use test_name_index, only : collect_name_index
    use test_newton, only : collect_newton
    use test_node_potential, only : collect_node_potential
@@ -205,6 +208,7 @@ program main
    call run("mass_return", collect_mass_return)
    call run("midside", collect_midside)
    call run("mortar_pair", collect_mortar_pair)
+   call run("pair_forces", collect_pair_forces)
    call run("mortar", collect_mortar)
    call run("damped", collect_damped)
    call run("tie", collect_tie)
@@ -236,6 +240,7 @@ program main
    call run("verdict", collect_verdict)
    call run("scheme", collect_scheme)
    call run("active_set", collect_active_set)
+   call run("active_choice", collect_active_choice)
    call run("energy_watch", collect_energy_watch)
    call run("velocity_jumps", collect_velocity_jumps)
    call run("near_list", collect_near_list)
@@ -247,6 +252,7 @@ program main
    call run("march_contact", collect_march_contact)
    call run("march_grid", collect_march_grid)
    call run("march_kinds", collect_march_kinds)
+   call run("step_control", collect_step_control)
    call run("ties", collect_ties)
    call run("links", collect_links)
    call run("tied_contact", collect_tied_contact)
