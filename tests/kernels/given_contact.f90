@@ -3,6 +3,8 @@ module given_contact
    use emcon_active_set, only : active_set_init, active_set_t
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t
+   use emcon_contact_law, only : contact_laws_add
+   use emcon_coulomb_law, only : coulomb_t
    use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_init, motion_t
@@ -30,17 +32,19 @@ module given_contact
 contains
 
    !> A system of contacts with the gaps `given`, the last `n_guard` of which are guards of the
-   !> first ones, and its active set, at rest.
-   subroutine open_given_contact(system, active, motion, given, n_guard)
+   !> first ones, and its active set, at rest. With `law` all have friction.
+   subroutine open_given_contact(system, active, motion, given, n_guard, law)
       type(system_t), intent(out) :: system
       type(active_set_t), intent(out) :: active
       type(motion_t), intent(out) :: motion
       type(gap_state_t), intent(in) :: given(:, :)   !! (constraints of each contact, contacts)
       integer, intent(in) :: n_guard
+      type(coulomb_t), intent(in), optional :: law
       type(given_contact_t) :: contact
       integer :: k, i, n
 
       n = size(given)
+      if (present(law)) call contact_laws_add(contact%laws, law)
       allocate(system%permanent(0), system%term(0), system%acts(0))
       allocate(system%contact(size(given, 2)), system%first_constraint(size(given, 2) + 1))
       system%n_pair = size(given, 2) - n_guard

@@ -49,6 +49,7 @@ program main
    use test_first_touch, only : collect_first_touch
    use test_friction, only : collect_friction
    use test_friction_referee, only : collect_friction_referee
+   use test_friction_ways, only : collect_friction_ways
    use test_gauss, only : collect_gauss
    use test_holding, only : collect_holding
    use test_host_check, only : collect_host_check
@@ -82,7 +83,9 @@ program main
    use test_midside, only : collect_midside
    use test_mortar, only : collect_mortar
    use test_mortar_pair, only : collect_mortar_pair
+   use test_motion_bound, only : collect_motion_bound
    use test_pair_forces, only : collect_pair_forces
+   use test_penalty_state, only : collect_penalty_state
    use test_name_index, only : collect_name_index
    use test_newton, only : collect_newton
    use test_node_potential, only : collect_node_potential
@@ -169,6 +172,7 @@ program main
    call run("first_touch", collect_first_touch)
    call run("friction", collect_friction)
    call run("friction_referee", collect_friction_referee)
+   call run("friction_ways", collect_friction_ways)
    call run("dashpot_law", collect_dashpot_law)
    call run("gauss", collect_gauss)
    call run("band_blocks", collect_band_blocks)
@@ -208,7 +212,9 @@ program main
    call run("mass_return", collect_mass_return)
    call run("midside", collect_midside)
    call run("mortar_pair", collect_mortar_pair)
+   call run("motion_bound", collect_motion_bound)
    call run("pair_forces", collect_pair_forces)
+   call run("penalty_state", collect_penalty_state)
    call run("mortar", collect_mortar)
    call run("damped", collect_damped)
    call run("tie", collect_tie)
