@@ -75,6 +75,7 @@ program main
    use test_links, only : collect_links
    use test_loads, only : collect_loads
    use test_march, only : collect_march
+   use test_march_check, only : collect_march_check
    use test_march_contact, only : collect_march_contact
    use test_march_grid, only : collect_march_grid
    use test_march_kinds, only : collect_march_kinds
@@ -255,6 +256,7 @@ program main
    call run("explicit", collect_explicit)
    call run("holding", collect_holding)
    call run("march", collect_march)
+   call run("march_check", collect_march_check)
    call run("march_contact", collect_march_contact)
    call run("march_grid", collect_march_grid)
    call run("march_kinds", collect_march_kinds)
