@@ -113,6 +113,7 @@ program main
    use test_single_elements, only : collect_single_elements
    use test_soft_law, only : collect_soft_law
    use test_solid, only : collect_solid
+   use test_solid_parts, only : collect_solid_parts
    use test_solvers, only : collect_solvers
    use test_stepper_free, only : collect_stepper_free
    use test_stepper_query, only : collect_stepper_query
@@ -197,6 +198,7 @@ program main
    call run("single_elements", collect_single_elements)
    call run("soft_law", collect_soft_law)
    call run("solid", collect_solid)
+   call run("solid_parts", collect_solid_parts)
    call run("facets", collect_facets)
    call run("chain", collect_chain)
    call run("search", collect_search)

@@ -1,0 +1,345 @@
+!> Parts of the elements together: shares of threads, lanes of packs, advice on stiff elements, and
+!> how far linear sections have turned.
+module test_solid_parts
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_corotated_pack_plane, only : corotated_pack_fill, corotated_pack_gather, &
+      corotated_pack_motion_t, corotated_pack_t
+   use emcon_corotated_plane, only : corotated_t
+   use emcon_element, only : element_geometry_t
+   use emcon_element_pack_plane, only : element_pack_t, pack_gather, pack_motion_t, pack_response_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_law, only : n_lane
+   use emcon_locking, only : locking_element, strainless_element
+   use emcon_materials, only : kinematics_corotated, kinematics_linear
+   use emcon_pack_shares, only : border_keep, pack_shares_t, shares_has, shares_lay_out
+   use emcon_scene, only : scene_t
+   use emcon_small_range, only : small_range_init, small_range_t, small_range_widen
+   use emcon_small_widen_space, only : small_widen
+   use emcon_solid, only : solid_init, solid_t
+   use emcon_text, only : to_text
+   use random_draws, only : draw_random
+   use small_scenes, only : add_block, block_t, make_block, poisson, scene_begin, shake
+   implicit none
+   private
+   public :: collect_solid_parts
+
+   real(wp), parameter :: tol = 64.0_wp*epsilon(1.0_wp)
+
+contains
+
+   subroutine collect_solid_parts(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("shares of packs", test_shares), &
+         test_case_t("what a pack at a border keeps", test_border), &
+         test_case_t("motions of lanes", test_lanes), &
+         test_case_t("turns and strains of linear sections", test_small), &
+         test_case_t("corotated sections do not turn", test_corotated), &
+         test_case_t("turns and strains in space", test_space), &
+         test_case_t("elements that lock", test_locking)]
+   end subroutine collect_solid_parts
+
+   !> Packs of one to all lanes with nodes by chance, in one to five shares: by their points, in
+   !> their order. A node of several shares is summed by the last of them.
+   subroutine test_shares(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n_pack = 9, n_node = 40
+      type(element_pack_t) :: pack(n_pack)
+      type(pack_shares_t) :: shares
+      real(wp) :: drawn(n_lane)
+      integer :: k, i, n
+
+      do k = 1, n_pack
+         pack(k)%n = 1 + mod(3*k, n_lane)
+         pack(k)%n_node = 3 + mod(k, 2)
+         pack(k)%n_gp = merge(4, 1, mod(k, 3) == 0)
+         allocate(pack(k)%node(n_lane, pack(k)%n_node), source=0)
+         allocate(pack(k)%gradient(n_lane, 2, pack(k)%n_node, 1))
+         do i = 1, pack(k)%n_node
+            call draw_random(drawn)
+            pack(k)%node(:pack(k)%n, i) = 3*k + int(8.0_wp*drawn(:pack(k)%n))
+         end do
+      end do
+      do n = 1, 5
+         call shares_lay_out(shares, pack, n_node, n)
+         call check_shares(error, shares, pack, n)
+      end do
+      shares%turn(1) = 77
+      call shares_lay_out(shares, pack, n_node, 5)
+      call check_equal(error, shares%turn(1), 77, "laid out once")
+      call shares_lay_out(shares, pack(:0), n_node, 2)
+      call check_equal(error, [shares%first, size(shares%border)], [0, 0, 0, 0], "no packs")
+   end subroutine test_shares
+
+   subroutine check_shares(error, shares, pack, n)
+      type(error_t), allocatable, intent(inout) :: error
+      type(pack_shares_t), intent(in) :: shares
+      type(element_pack_t), intent(in) :: pack(:)
+      integer, intent(in) :: n
+      integer, dimension(size(shares%turn)) :: low, high
+      integer :: share(size(pack)), k, t, i, n_border
+      real(wp) :: part
+
+      part = sum(pack%n_gp)/real(n, wp)
+      t = 1
+      do k = 1, size(pack)
+         do while (sum(pack(:k - 1)%n_gp) >= t*part)
+            t = t + 1
+         end do
+         share(k) = t
+      end do
+      call check_equal(error, shares%first, [(count(share < t), t = 1, n + 1)], "before each share")
+      low = huge(1)
+      high = 0
+      do k = 1, size(pack)
+         do i = 1, pack(k)%n_node
+            associate (node => pack(k)%node(:pack(k)%n, i))
+               low(node) = min(low(node), share(k))
+               high(node) = max(high(node), share(k))
+            end associate
+         end do
+      end do
+      call check_equal(error, shares%turn, merge(high, 0, high > low), "turns " // to_text(n))
+      n_border = 0
+      do k = 1, size(pack)
+         if (any(shares%turn(reshape(pack(k)%node(:pack(k)%n, :), &
+            [pack(k)%n*pack(k)%n_node])) > 0)) then
+            n_border = n_border + 1
+            call check_equal(error, shares%place(k), n_border, "at a border")
+            call check_equal(error, shares%border(n_border)%pack, k, "its pack")
+            call check_equal(error, shape(shares%border(n_border)%force), [n_lane, 2, &
+               pack(k)%n_node], "its forces")
+         else
+            call check_equal(error, shares%place(k), 0, "inside")
+         end if
+         do t = 1, n
+            call check_true(error, shares_has(shares, pack(k), t, t) .eqv. any(shares%turn( &
+               reshape(pack(k)%node(:pack(k)%n, :), [pack(k)%n*pack(k)%n_node])) == t), &
+               "has a turn")
+         end do
+      end do
+      call check_equal(error, size(shares%border), n_border, "borders")
+      call check_true(error, n_border > 0 .eqv. n > 1, "some are")
+   end subroutine check_shares
+
+   subroutine test_border(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(pack_shares_t) :: shares
+      type(element_pack_t) :: pack(2)
+      type(pack_response_t) :: part
+      real(wp) :: largest(n_lane)
+      integer :: k
+
+      do k = 1, 2
+         pack(k)%n = 1
+         pack(k)%n_node = 3
+         pack(k)%n_gp = 1
+         pack(k)%node = spread([1, 2, 3], 1, n_lane)
+         allocate(pack(k)%gradient(n_lane, 2, 3, 1))
+      end do
+      call shares_lay_out(shares, pack, 3, 2)
+      call draw_random(part%force)
+      call draw_random(part%magnitude)
+      call draw_random(part%tangent(:, :, :, 1, 1))
+      call draw_random(largest)
+      part%tangent(:, :, :, 2, 3) = part%tangent(:, :, :, 1, 1)
+      associate (border => shares%border(2))
+         part%with_sizes = .false.
+         call border_keep(border, part, largest, .false.)
+         call check_true(error, all(abs(border%force - part%force(:, :, :3)) <= 0.0_wp), "forces")
+         call check_true(error, all(abs(border%magnitude) <= 0.0_wp) .and. &
+            all(abs(border%largest) <= 0.0_wp) .and. .not. allocated(border%tangent), "alone")
+         part%with_sizes = .true.
+         call border_keep(border, part, largest, .true.)
+         call check_true(error, all(abs(border%magnitude - part%magnitude(:, :, :3)) <= 0.0_wp), &
+            "sizes")
+         call check_near(error, border%largest, largest, 0.0_wp, 1.0_wp, "largest")
+         call check_true(error, all(abs(border%tangent(:, :, :, 2, 3) - part%tangent(:, :, :3, 2, &
+            3)) <= 0.0_wp), "tangent")
+      end associate
+   end subroutine test_border
+
+   !> Motions are those from the first node of each element; lanes that are left over repeat the
+   !> first one.
+   subroutine test_lanes(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: node(3, 3) = reshape([2, 5, 7, 6, 4, 2, 1, 3, 7], [3, 3])
+      type(corotated_t) :: frame(3)
+      type(corotated_pack_t) :: pack
+      type(corotated_pack_motion_t) :: motion
+      type(element_pack_t) :: plain
+      type(pack_motion_t) :: moved
+      real(wp), dimension(2, 7) :: from, by
+      integer :: k, i, l
+
+      do k = 1, 3
+         frame(k)%n_node = 3
+         allocate(frame(k)%stiffness(6, 6), source=0.0_wp)
+      end do
+      call shake(from, 1.0_wp)
+      call shake(by, 1.0_wp)
+      call corotated_pack_fill(pack, [3, 1], node, frame)
+      call corotated_pack_gather(pack, from, by, motion)
+      plain%n = 2
+      plain%n_node = 3
+      plain%node = pack%node
+      call pack_gather(plain, from, by, moved)
+      do l = 1, n_lane
+         k = merge(1, 3, l == 2)
+         call check_equal(error, pack%element(l), k, "element")
+         do i = 1, 3
+            call check_near(error, motion%from(l, :, i), from(:, node(i, k)) &
+               - from(:, node(1, k)), 0.0_wp, 1.0_wp, "from")
+            call check_near(error, motion%by(l, :, i), by(:, node(i, k)) - by(:, node(1, k)), &
+               0.0_wp, 1.0_wp, "by")
+            call check_near(error, [moved%from(l, :, i), moved%by(l, :, i)], &
+               [motion%from(l, :, i), motion%by(l, :, i)], 0.0_wp, 1.0_wp, "the same of others")
+         end do
+      end do
+   end subroutine test_lanes
+
+   !> Three blocks, of sections 1 to 3, of which the first and the last are `kinematics`.
+   subroutine make_solid(scene, kinematics, solid, error)
+      type(scene_t), intent(out) :: scene
+      integer, intent(in) :: kinematics
+      type(solid_t), intent(out) :: solid
+      type(error_t), allocatable, intent(out) :: error
+      type(block_t) :: block
+      integer :: k
+
+      call scene_begin(scene)
+      do k = 1, 3
+         call add_block(scene, merge("CPE3", "CPE4", k == 3), [2, 1], [3.0_wp*k, 0.0_wp], &
+            [2.0_wp, 1.0_wp], block)
+         scene%element%section(block%elements_before + 1:) = k
+      end do
+      scene%section = [scene%section, scene%section, scene%section]
+      scene%section(1)%kinematics = kinematics
+      scene%section(3)%kinematics = kinematics
+      call solid_init(solid, scene, error)
+   end subroutine make_solid
+
+   !> |skew part of grad u| by one component, |symmetric part|; what was larger stays.
+   subroutine test_small(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: h(2, 2) = reshape([0.1_wp, -0.3_wp, 0.4_wp, -0.2_wp], [2, 2])
+      type(scene_t) :: scene
+      type(solid_t) :: solid
+      type(small_range_t) :: range
+      real(wp), allocatable :: u(:, :)
+
+      call make_solid(scene, kinematics_linear, solid, error)
+      if (allocated(error)) return
+      call small_range_init(range, solid)
+      call check_equal(error, range%section, [1, 3], "linear sections")
+      call check_near(error, [range%rotation, range%strain], [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], &
+         0.0_wp, 1.0_wp, "at rest")
+      u = matmul(h, scene%x) + 5.0_wp
+      u(:, block_of(3):) = 2.0_wp*u(:, block_of(3):)
+      call small_range_widen(range, solid, u)
+      call check_near(error, range%rotation, [0.35_wp, 0.7_wp], tol, 1.0_wp, "rotations")
+      call check_near(error, range%strain, sqrt(0.01_wp + 0.04_wp + 0.5_wp*0.01_wp)*[1.0_wp, &
+         2.0_wp], tol, 1.0_wp, "strains")
+      u(:, block_of(3):) = 0.25_wp*u(:, block_of(3):)
+      u(:, :block_of(2) - 1) = 3.0_wp*u(:, :block_of(2) - 1)
+      call small_range_widen(range, solid, u)
+      call check_near(error, range%rotation, [1.05_wp, 0.7_wp], tol, 1.0_wp, "the largest")
+      call check_near(error, range%strain, sqrt(0.055_wp)*[3.0_wp, 2.0_wp], tol, 1.0_wp, &
+         "the largest strains")
+
+   contains
+
+      !> First node of a block of 3 x 2 nodes.
+      pure integer function block_of(k)
+         integer, intent(in) :: k
+
+         block_of = 6*(k - 1) + 1
+      end function block_of
+
+   end subroutine test_small
+
+   !> By a turn of one radian, after a strain of a tenth.
+   subroutine test_corotated(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: stretch(2, 2) = reshape([1.1_wp, 0.02_wp, 0.02_wp, 0.95_wp], [2, 2])
+      real(wp), parameter :: turn(2, 2) = reshape([cos(1.0_wp), sin(1.0_wp), -sin(1.0_wp), &
+         cos(1.0_wp)], [2, 2])
+      type(scene_t) :: scene
+      type(solid_t) :: solid
+      type(small_range_t) :: range
+
+      call make_solid(scene, kinematics_corotated, solid, error)
+      if (allocated(error)) return
+      call small_range_init(range, solid)
+      call small_range_widen(range, solid, matmul(turn, matmul(stretch, scene%x)) - scene%x)
+      call check_near(error, range%rotation, [0.0_wp, 0.0_wp], tol, 1.0_wp, "rotations")
+      call check_near(error, range%strain, spread(sqrt(0.01_wp + 0.0025_wp + 0.0008_wp), 1, 2), &
+         tol, 1.0_wp, "strains")
+   end subroutine test_corotated
+
+   !> Of four nodes at the origin and on the axes.
+   subroutine test_space(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(element_geometry_t) :: geometry
+      real(wp) :: h(3, 3), u(3, 4), rotation, strain
+
+      geometry%n_node = 4
+      geometry%n_gp = 1
+      allocate(geometry%gradient(3, 4, 1))
+      geometry%gradient(:, :, 1) = reshape([-1.0_wp, -1.0_wp, -1.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, &
+         0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [3, 4])
+      call shake(h, 1.0_wp)
+      u(:, 1) = 2.0_wp
+      u(:, 2:) = h + 2.0_wp
+      rotation = 0.0_wp
+      strain = 0.0_wp
+      call small_widen(geometry, u, rotation, strain)
+      call check_near(error, rotation, 0.25_wp*((h(1, 2) - h(2, 1))**2 + (h(1, 3) - h(3, 1))**2 &
+         + (h(2, 3) - h(3, 2))**2), tol, 1.0_wp, "rotation")
+      call check_near(error, strain, h(1, 1)**2 + h(2, 2)**2 + h(3, 3)**2 + 0.5_wp*((h(1, 2) &
+         + h(2, 1))**2 + (h(1, 3) + h(3, 1))**2 + (h(2, 3) + h(3, 2))**2), tol, 4.0_wp, "strain")
+      rotation = 100.0_wp
+      strain = 101.0_wp
+      call small_widen(geometry, u, rotation, strain)
+      call check_near(error, [rotation, strain], [100.0_wp, 101.0_wp], 0.0_wp, 1.0_wp, &
+         "larger ones")
+   end subroutine test_space
+
+   !> Above a ratio of Poisson of 0.45, by the largest of all; rigid elements never do.
+   subroutine test_locking(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: ratios(4) = [poisson, 0.449_wp, 0.451_wp, 0.49_wp]
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(solid_t) :: solid
+      real(wp) :: ratio
+      integer :: k, e
+
+      do k = 1, 4
+         call make_block(scene, "CPE4", [2, 1], block)
+         scene%material = [scene%material, scene%material]
+         scene%section = [scene%section, scene%section]
+         scene%section(2)%material = 2
+         scene%element%section = [1, 2]
+         scene%material(2)%constant(2) = ratios(k)
+         call solid_init(solid, scene, error)
+         if (allocated(error)) return
+         call locking_element(solid, e, ratio)
+         call check_equal(error, e, merge(0, 2, k < 3), "it locks")
+         call check_near(error, ratio, merge(0.0_wp, ratios(k), k < 3), 1.0e3_wp*tol, 1.0_wp, &
+            "its ratio")
+         call check_equal(error, strainless_element(solid), 0, "points enough")
+         solid%trait%is_rigid = .true.
+         call locking_element(solid, e, ratio)
+         call check_equal(error, e, 0, "rigid")
+      end do
+      solid%trait%is_rigid = .false.
+      solid%geometry(2)%n_gp = 1
+      call check_equal(error, strainless_element(solid), 2, "one point for five motions")
+      solid%geometry%n_node = 3
+      call check_equal(error, strainless_element(solid), 0, "of a triangle")
+   end subroutine test_locking
+
+end module test_solid_parts
