@@ -78,6 +78,7 @@ program main
    use test_march_check, only : collect_march_check
    use test_march_contact, only : collect_march_contact
    use test_march_grid, only : collect_march_grid
+   use test_march_size, only : collect_march_size
    use test_march_kinds, only : collect_march_kinds
    use test_step_control, only : collect_step_control
    use test_mass_return, only : collect_mass_return
@@ -261,6 +262,7 @@ program main
    call run("march_check", collect_march_check)
    call run("march_contact", collect_march_contact)
    call run("march_grid", collect_march_grid)
+   call run("march_size", collect_march_size)
    call run("march_kinds", collect_march_kinds)
    call run("step_control", collect_step_control)
    call run("ties", collect_ties)
