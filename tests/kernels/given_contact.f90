@@ -3,8 +3,7 @@ module given_contact
    use emcon_active_set, only : active_set_init, active_set_t
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t
-   use emcon_contact_law, only : contact_laws_add
-   use emcon_coulomb_law, only : coulomb_t
+   use emcon_contact_law, only : contact_law_t, contact_laws_add
    use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_init, motion_t
@@ -32,14 +31,14 @@ module given_contact
 contains
 
    !> A system of contacts with the gaps `given`, the last `n_guard` of which are guards of the
-   !> first ones, and its active set, at rest. With `law` all have friction.
+   !> first ones, and its active set, at rest. With `law` that acts on all.
    subroutine open_given_contact(system, active, motion, given, n_guard, law)
       type(system_t), intent(out) :: system
       type(active_set_t), intent(out) :: active
       type(motion_t), intent(out) :: motion
       type(gap_state_t), intent(in) :: given(:, :)   !! (constraints of each contact, contacts)
       integer, intent(in) :: n_guard
-      type(coulomb_t), intent(in), optional :: law
+      class(contact_law_t), intent(in), optional :: law
       type(given_contact_t) :: contact
       integer :: k, i, n
 

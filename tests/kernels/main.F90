@@ -89,6 +89,7 @@ program main
    use test_pair_forces, only : collect_pair_forces
    use test_penalty_state, only : collect_penalty_state
    use test_name_index, only : collect_name_index
+   use test_near_laws, only : collect_near_laws
    use test_newton, only : collect_newton
    use test_node_potential, only : collect_node_potential
    use test_nts, only : collect_nts
@@ -130,6 +131,7 @@ program main
 #endif
    use test_quantities, only : collect_quantities
    use test_verdict, only : collect_verdict
+   use test_verdict_follow, only : collect_verdict_follow
    use test_velocity_update, only : collect_velocity_update
    implicit none
 
@@ -244,10 +246,12 @@ program main
    call run("system", collect_system)
    call run("line_search", collect_line_search)
    call run("name_index", collect_name_index)
+   call run("near_laws", collect_near_laws)
    call run("newton", collect_newton)
    call run("velocity_update", collect_velocity_update)
    call run("quantities", collect_quantities)
    call run("verdict", collect_verdict)
+   call run("verdict_follow", collect_verdict_follow)
    call run("scheme", collect_scheme)
    call run("active_set", collect_active_set)
    call run("active_choice", collect_active_choice)

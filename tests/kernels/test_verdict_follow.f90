@@ -1,0 +1,161 @@
+!> Running figures of the verdict: what it keeps of increments that go up and down.
+module test_verdict_follow
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_march, only : increment_t, march_free
+   use emcon_overlap_query, only : overlap_t
+   use emcon_scene, only : scene_t
+   use emcon_stepper, only : stepper_t
+   use emcon_text, only : note_add, notes_t, to_text
+   use emcon_verdict, only : verdict_update
+   use stepper_scenes, only : make_drop, open_scene
+   implicit none
+   private
+   public :: collect_verdict_follow
+
+   real(wp), parameter :: tol = 16.0_wp*epsilon(1.0_wp)
+
+contains
+
+   subroutine collect_verdict_follow(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("the most, and when", test_most), &
+         test_case_t("counts and sums", test_counts), &
+         test_case_t("the deepest overlap, of a pair or of none", test_overlap), &
+         test_case_t("warnings that differ", test_warnings)]
+   end subroutine collect_verdict_follow
+
+   subroutine open(stepper, error)
+      type(stepper_t), intent(inout) :: stepper
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+
+      call make_drop(scene, 10)
+      call open_scene(stepper, scene, error)
+   end subroutine open
+
+   subroutine follow(stepper, time, increment)
+      type(stepper_t), intent(inout) :: stepper
+      real(wp), intent(in) :: time
+      type(increment_t), intent(in) :: increment
+
+      stepper%march%state%clock%time = time
+      call verdict_update(stepper%verdict, stepper%scene, stepper%march, increment)
+   end subroutine follow
+
+   !> Of three increments the second one has the most.
+   subroutine test_most(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: size(3) = [0.25_wp, 0.75_wp, 0.5_wp]
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      integer :: k
+
+      call open(stepper, error)
+      if (allocated(error)) return
+      do k = 1, 3
+         increment = increment_t(give=size(k), unconverged=2.0_wp*size(k), &
+            law_missed=3.0_wp*size(k), largest_push=4.0_wp*size(k), n_augmentation=nint(20.0_wp*size(k)), &
+            n_held=nint(40.0_wp*size(k)))
+         increment%stand_off%largest = 5.0_wp*size(k)
+         increment%nodal_pull%pull = 6.0_wp*size(k)
+         increment%nodal_pull%force = 7.0_wp*size(k)
+         stepper%march%state%pairs%total(1)%slave(:3) = size(k)*[-3.0_wp, 4.0_wp, 100.0_wp]
+         call follow(stepper, real(k, wp), increment)
+      end do
+      associate (verdict => stepper%verdict)
+         call check_near(error, [verdict%penalty%give, verdict%unconverged, verdict%law_missed, &
+            verdict%largest_push, verdict%stand_off%largest, verdict%nodal_pull%pull, &
+            verdict%nodal_pull%force, verdict%largest_force], 0.75_wp*[1.0_wp, 2.0_wp, 3.0_wp, &
+            4.0_wp, 5.0_wp, 6.0_wp, 7.0_wp, 5.0_wp], tol, 10.0_wp, "the most")
+         call check_near(error, [verdict%penalty%time, verdict%unconverged_time], &
+            [2.0_wp, 2.0_wp], 0.0_wp, 1.0_wp, "when")
+         call check_equal(error, [verdict%penalty%most_augmentations, verdict%count%most_held], &
+            [15, 30], "the most of them")
+      end associate
+      call march_free(stepper%march)
+   end subroutine test_most
+
+   subroutine test_counts(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      integer :: k
+
+      call open(stepper, error)
+      if (allocated(error)) return
+      do k = 1, 3
+         increment = increment_t(n_newton=k, n_cut=2*k, is_guarded=k /= 2, n_held=k - 1)
+         increment%stand_off%impulse = 2.0_wp*k
+         increment%stand_off%impulse_gap = 3.0_wp*k
+         call follow(stepper, real(k, wp), increment)
+      end do
+      associate (verdict => stepper%verdict)
+         call check_equal(error, [verdict%count%newton, verdict%count%cut, verdict%count%guarded, &
+            verdict%count%held], [6, 12, 2, 2], "counts")
+         call check_near(error, [verdict%stand_off%impulse, verdict%stand_off%impulse_gap], &
+            [12.0_wp, 18.0_wp], tol, 10.0_wp, "sums")
+      end associate
+      call march_free(stepper%march)
+   end subroutine test_counts
+
+   subroutine test_overlap(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: paired(5) = [0.1_wp, 0.2_wp, 0.3_wp, 0.1_wp, 0.4_wp]
+      real(wp), parameter :: stray(5) = [0.0_wp, 0.3_wp, 0.1_wp, 0.2_wp, 0.4_wp]
+      real(wp), parameter :: deepest(5) = [0.1_wp, 0.3_wp, 0.3_wp, 0.3_wp, 0.4_wp]
+      integer, parameter :: since(5) = [1, 2, 2, 2, 5]
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      integer :: k
+
+      call open(stepper, error)
+      if (allocated(error)) return
+      do k = 1, 5
+         increment = increment_t()
+         increment%overlap = overlap_t(depth=paired(k), length=1.0_wp, node=11, &
+            of_facets=0.01_wp*abs(k - 3))
+         increment%overlap%facet(:2) = [7, 8]
+         increment%stray = overlap_t(depth=stray(k), length=1.0_wp, node=12)
+         increment%stray%facet(:2) = [6, 7]
+         call follow(stepper, real(k, wp), increment)
+         associate (found => stepper%verdict%overlap)
+            call check_near(error, [found%deepest, found%time], [deepest(k), real(since(k), wp)], &
+               0.0_wp, 1.0_wp, "deepest " // to_text(k))
+            call check_true(error, (index(found%place, "node 12 ") > 0 .and. index(found%place, &
+               "no contact pair") > 0) .eqv. (k > 1 .and. k < 5), "of none " // to_text(k))
+            call check_true(error, (index(found%place, "node 11 ") > 0) .neqv. (k > 1 .and. k < 5), &
+               "of a pair " // to_text(k))
+            call check_near(error, found%of_facets, 0.02_wp, tol, 1.0_wp, "of edges")
+         end associate
+      end do
+      call march_free(stepper%march)
+   end subroutine test_overlap
+
+   !> All are counted; the first twenty different ones are kept.
+   subroutine test_warnings(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      integer :: k, before
+
+      call open(stepper, error)
+      if (allocated(error)) return
+      before = stepper%verdict%n_warning
+      do k = 1, 25
+         increment%warnings = notes_t()
+         call note_add(increment%warnings, "warning " // to_text(k))
+         call note_add(increment%warnings, "warning 1")
+         call follow(stepper, real(k, wp), increment)
+      end do
+      call check_equal(error, stepper%verdict%n_warning - before, 50, "all")
+      call check_equal(error, stepper%verdict%warnings%n, 20, "kept")
+      call check_equal(error, stepper%verdict%warnings%item(20)%text, "warning " &
+         // to_text(20 - before), "the last one")
+      call march_free(stepper%march)
+   end subroutine test_warnings
+
+end module test_verdict_follow
