@@ -116,6 +116,7 @@ program main
    use test_soft_law, only : collect_soft_law
    use test_solid, only : collect_solid
    use test_solid_parts, only : collect_solid_parts
+   use test_bending, only : collect_bending
    use test_solvers, only : collect_solvers
    use test_stepper_free, only : collect_stepper_free
    use test_stepper_query, only : collect_stepper_query
@@ -202,6 +203,7 @@ program main
    call run("soft_law", collect_soft_law)
    call run("solid", collect_solid)
    call run("solid_parts", collect_solid_parts)
+   call run("bending", collect_bending)
    call run("facets", collect_facets)
    call run("chain", collect_chain)
    call run("search", collect_search)
