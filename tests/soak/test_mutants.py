@@ -3,9 +3,19 @@
 import platform
 import subprocess
 
+import mutants
 import pytest
 from kernel_coverage import ranges
-from mutants import MISTAKES, by_turns, code_of, last_version, mistakes, statement, within
+from mutants import (
+    MISTAKES,
+    by_turns,
+    code_of,
+    failing_test,
+    last_version,
+    mistakes,
+    statement,
+    within,
+)
 from traced_lines import Passed, Tracer
 
 
@@ -85,6 +95,49 @@ def test_tests_that_are_asked():
     assert [t.name for t in by_turns(tests)] == ["a::2", "b::1", "a::1", "a::3"]
     assert [t.name for t in within(by_turns(tests), 5)] == ["a::2", "b::1"]
     assert len(within(tests, 0)) == 1
+
+
+@pytest.mark.parametrize("told, failing", [
+    ("FAILED tests/a.py::test_x - AssertionError", "a.py::test_x"),
+    ("FAILED tests/a.py::test_x", "a.py::test_x"),
+    ("ERROR tests/a.py::test_x - OSError", "a.py::test_x"),
+    ("FAILED tests/a.py::test_x[1-b c] - Error", "a.py::test_x[1-b c]"),
+    ("FAILED tests/b.py::test_any - Error", "b.py"),
+    ("FAILED tests/a.py::test_xy - Error", ""),
+    ("FAILED tests/a.py::test_x[2] - Error", ""),
+    ("E   FAILED tests/a.py::test_x - Error", ""),
+    ("2 passed in 1.0s", ""),
+    ("", "")])  # fmt: skip
+def test_the_test_that_pytest_names(monkeypatch, tmp_path, told, failing):
+    """A test fails where pytest says so of its whole name; a run that ends otherwise names none."""
+    monkeypatch.setattr(mutants, "KEPT", tmp_path)
+    monkeypatch.setattr(mutants, "call", lambda *_: subprocess.CompletedProcess((), 1, told))
+    tests = [Passed(name, 1, {}) for name in ("a.py::test_x", "a.py::test_x[1-b c]", "b.py")]
+    assert failing_test(tests, "program") == failing
+
+
+RUN = """import os, subprocess
+
+def test_run():
+    assert subprocess.run([os.environ["EMCON"], "7"]).returncode == 0
+
+def test_other():
+    pass
+"""
+
+
+def test_the_test_that_fails(monkeypatch, tmp_path):
+    """A program of one's own is run by tests, and its exit code is what they see."""
+    monkeypatch.setattr(mutants, "KEPT", tmp_path)
+    monkeypatch.setattr(mutants, "ROOT", tmp_path)
+    (tmp_path / "tests").mkdir()
+    (tmp_path / "tests/test_a.py").write_text(RUN)
+    program = tmp_path / "program"
+    tests = [Passed(f"test_a.py::test_{name}", 1, {}) for name in ("other", "run")]
+    for word, failing in (("7", ""), ("8", "test_a.py::test_run")):
+        program.write_text(f'#!/bin/sh\ntest "$1" = {word}\n')
+        program.chmod(0o755)
+        assert failing_test(tests, program) == failing
 
 
 def test_ranges():
