@@ -7,6 +7,7 @@ found is kept below build/mutants until the program or a file of tests changes.
 
 import bisect
 import collections
+import concurrent.futures
 import dataclasses
 import json
 import os
@@ -132,12 +133,19 @@ def suites():
     return re.findall(r'call run\("(\w+)"', (ROOT / "tests/kernels/main.F90").read_text())
 
 
-def lines_of_runs(folders):
+def lines_of_runs(folders, jobs=None):
     """The tests of whole runs with the lines of `folders` that the program runs in each.
 
     A test whose runs others look at too stands for its file."""
+    with concurrent.futures.ProcessPoolExecutor(jobs) as pool:
+        found = pool.map(lines_of_file, FILES, [folders]*len(FILES))
+        return [passed for of_file in found for passed in of_file]
 
-    def measure(file):
+
+def lines_of_file(file, folders):
+    """The same of the tests of one file."""
+
+    def measure():
         tracer = Tracer(RELEASE / "emcon", sources(folders))
         subprocess.run([sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider",
                         f"tests/{file}"], cwd=ROOT, stdout=subprocess.DEVNULL, check=False,
@@ -155,12 +163,8 @@ def lines_of_runs(folders):
             if time < DEAREST:
                 yield name, time, lines[name]
 
-    found = []
-    for file in FILES:
-        name = f"{pathlib.Path(file).stem}_{'_'.join(folders)}"
-        found += kept(name, [ROOT / RELEASE / "emcon", ROOT / "tests" / file],
-                      lambda file=file: measure(file))
-    return found
+    return kept(f"{pathlib.Path(file).stem}_{'_'.join(folders)}",
+                [ROOT / RELEASE / "emcon", ROOT / "tests" / file], measure)
 
 
 class Code:
