@@ -41,6 +41,7 @@ program main
    use test_element_space, only : collect_element_space
    use test_energy_watch, only : collect_energy_watch
    use test_velocity_jumps, only : collect_velocity_jumps
+   use test_velocity_pushes, only : collect_velocity_pushes
    use test_near_list, only : collect_near_list
    use test_corner_tops, only : collect_corner_tops
    use test_blocked_contact, only : collect_blocked_contact
@@ -259,6 +260,7 @@ program main
    call run("active_choice", collect_active_choice)
    call run("energy_watch", collect_energy_watch)
    call run("velocity_jumps", collect_velocity_jumps)
+   call run("velocity_pushes", collect_velocity_pushes)
    call run("near_list", collect_near_list)
    call run("corner_tops", collect_corner_tops)
    call run("blocked_contact", collect_blocked_contact)

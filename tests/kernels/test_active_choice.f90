@@ -593,6 +593,7 @@ contains
          call check_passes(.false., "another look")
          call active_set_update_gaps(active, system, 1, motion)
          call check_passes(.true., "at which it is clear")
+         call check_equal(error, [contact%n_look, skip%n_look], [3, 3], "looks")
          contact%clear = 0.0_wp
          call active_set_update_gaps(active, system, 1, motion)
          skip%apart = 5.0_wp

@@ -1,0 +1,227 @@
+!> Jumps of the velocities at the end of a step: rates of gaps that change, energies that forces
+!> give, accelerations. Kinetic energies and momenta are found by the mass.
+module test_velocity_pushes
+   use check, only : check_near, check_true, test_case_t
+   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_select
+   use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_t
+   use emcon_kinds, only : dp, wp
+   use emcon_motion, only : motion_of
+   use emcon_scene, only : scene_t
+   use emcon_system, only : mass_times, system_begin_step, system_init, system_t
+   use emcon_text, only : to_text
+   use emcon_velocity_update, only : push_t, rate_jump_t, velocity_update_accelerate, &
+      velocity_update_change, velocity_update_free, velocity_update_push, velocity_update_t
+   use small_scenes, only : add_step, block_t, clamp, make_two_blocks, shake
+   implicit none
+   private
+   public :: collect_velocity_pushes
+
+   real(wp), parameter :: tol = 1.0e3_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+
+contains
+
+   subroutine collect_velocity_pushes(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("rates of gaps change as asked for", test_change), &
+         test_case_t("no jump that would give energy", test_gain), &
+         test_case_t("a force gives or takes an energy", test_push), &
+         test_case_t("forces accelerate what is free", test_accelerate)]
+   end subroutine collect_velocity_pushes
+
+   !> Two blocks in touch at three nodes, free or the lower one clamped at its bottom.
+   subroutine begin(system, set, v, x, is_clamped, error)
+      type(system_t), intent(out) :: system
+      type(constraint_set_t), intent(out) :: set
+      real(wp), allocatable, intent(out) :: v(:, :), x(:, :)
+      logical, intent(in) :: is_clamped
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      integer :: i
+
+      call make_two_blocks(scene, 0.0_wp, lower, upper)
+      call add_step(scene, .false., 0.1_wp, 1)
+      if (is_clamped) call clamp(scene%step(1), [(i, i = 1, 5)])
+      call system_init(system, scene, error)
+      if (.not. allocated(error)) call system_begin_step(system, scene, 1, error)
+      if (allocated(error)) return
+      x = scene%x
+      allocate(v, source=0.0_wp*x)
+      call system%contact(1)%contact%begin_step(x, v, v)
+      call constraints_select(set, [1, 2, 3])
+      call constraints_evaluate(set, system, motion_of(evaluation_t(), x, v, v))
+      call shake(v, 0.1_wp)
+      if (is_clamped) v(:, :5) = 0.0_wp
+      v(2, 11:) = v(2, 11:) + 1.0_wp
+   end subroutine begin
+
+   real(wp) function energy_of(system, v) result(energy)
+      type(system_t), intent(in) :: system
+      real(wp), intent(in), contiguous :: v(:, :)
+      real(wp) :: p(2, size(v, 2))
+
+      call mass_times(system, v, p)
+      energy = 0.5_wp*sum(v*p)
+   end function energy_of
+
+   !> px, py and the moment about the origin.
+   function momenta_of(system, v, x) result(momenta)
+      type(system_t), intent(in) :: system
+      real(wp), intent(in), contiguous :: v(:, :), x(:, :)
+      real(wp) :: momenta(3), p(2, size(v, 2))
+
+      call mass_times(system, v, p)
+      momenta = [sum(p, 2), sum(x(1, :)*p(2, :) - x(2, :)*p(1, :))]
+   end function momenta_of
+
+   !> Rates of the gaps, whose gradients are those of the first nodes of conditions and of others.
+   pure function rates_of(set, v) result(rate)
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in) :: v(:, :)
+      real(wp) :: rate(3)
+      integer :: k
+
+      do k = 1, 3
+         associate (item => set%item(k))
+            rate(k) = sum(item%c(:, :item%n_node)*v(:, item%node(:item%n_node)))
+         end associate
+      end do
+   end function rates_of
+
+   subroutine test_change(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k
+
+      do k = 1, 2
+         call look_at_change(k == 2, error)
+         if (allocated(error)) return
+      end do
+   end subroutine test_change
+
+   subroutine look_at_change(is_clamped, error)
+      logical, intent(in) :: is_clamped
+      type(error_t), allocatable, intent(out) :: error
+      type(system_t) :: system
+      type(constraint_set_t) :: set
+      type(velocity_update_t) :: update
+      type(rate_jump_t) :: jump
+      real(wp), allocatable :: v(:, :), v0(:, :), x(:, :)
+
+      call begin(system, set, v, x, is_clamped, error)
+      if (allocated(error)) return
+      v0 = v
+      jump%row = [1, 3]
+      jump%rate = rates_of(set, v)
+      jump%rate = jump%rate([1, 3])
+      jump%change = -[0.5_wp, 0.25_wp]*jump%rate
+      call velocity_update_change(update, system, set, jump, v, error)
+      if (allocated(error)) return
+      call check_true(error, jump%is_done .and. minval(jump%rate) > 0.0_wp, "bodies part")
+      associate (now => rates_of(set, v))
+         call check_near(error, now([1, 3]), jump%rate + jump%change, tol, 1.0_wp, "rates")
+      end associate
+      call check_near(error, [jump%gained, -jump%lost], spread(energy_of(system, v) &
+         - energy_of(system, v0), 1, 2), tol, 1.0_wp, "energy")
+      if (is_clamped) then
+         call check_near(error, v(:, :5), v0(:, :5), 0.0_wp, 1.0_wp, "what is held")
+      else
+         call check_near(error, momenta_of(system, v, x), momenta_of(system, v0, x), tol, 1.0_wp, &
+            "momenta")
+      end if
+      call velocity_update_free(update)
+   end subroutine look_at_change
+
+   subroutine test_gain(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(system_t) :: system
+      type(constraint_set_t) :: set
+      type(velocity_update_t) :: update
+      type(rate_jump_t) :: jump
+      real(wp), allocatable :: v(:, :), v0(:, :), x(:, :)
+
+      call begin(system, set, v, x, .false., error)
+      if (allocated(error)) return
+      v0 = v
+      jump%row = [1, 2, 3]
+      jump%rate = rates_of(set, v)
+      jump%change = 0.5_wp*jump%rate
+      call velocity_update_change(update, system, set, jump, v, error)
+      if (allocated(error)) return
+      call check_true(error, .not. jump%is_done .and. jump%lost < 0.0_wp, "it would give energy")
+      call check_near(error, v, v0, 0.0_wp, 1.0_wp, "velocities")
+      call velocity_update_free(update)
+   end subroutine test_gain
+
+   !> By the smaller of two jumps; more than there is along the force cannot be taken.
+   subroutine test_push(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: gain(4) = [0.25_wp, -0.01_wp, -100.0_wp, 0.5_wp]
+      integer :: k
+
+      do k = 1, 4
+         call look_at_push(gain(k), k < 4, merge(-1.0_wp, 1.0_wp, k == 2), error)
+         if (allocated(error)) return
+      end do
+   end subroutine test_push
+
+   subroutine look_at_push(gain, is_free, sense, error)
+      real(wp), intent(in) :: gain, sense
+      logical, intent(in) :: is_free
+      type(error_t), allocatable, intent(out) :: error
+      type(system_t) :: system
+      type(constraint_set_t) :: set
+      type(velocity_update_t) :: update
+      real(wp), allocatable :: v(:, :), v0(:, :), x(:, :), force(:, :)
+      real(wp) :: change(2), along(2, 16), p(2, 16)
+      logical :: has_root
+
+      call begin(system, set, v, x, .not. is_free, error)
+      if (allocated(error)) return
+      v0 = v
+      allocate(force, source=0.0_wp*v)
+      force(2, 14:) = sense
+      force(2, 6:10) = -0.6_wp*sense
+      call velocity_update_push(update, system, set, push_t(force, gain), v, has_root, error)
+      if (allocated(error)) return
+      call check_true(error, has_root .eqv. gain > -1.0_wp, "root")
+      change = [energy_of(system, v) - energy_of(system, v0), merge(gain, 0.0_wp, has_root)]
+      call check_near(error, change(1), change(2), tol, 1.0_wp, "energy by " // to_text(gain))
+      along = v - v0
+      if (.not. has_root) then
+         call check_near(error, along, 0.0_wp*along, 0.0_wp, 1.0_wp, "no jump")
+      else if (is_free) then
+         call mass_times(system, along, p)
+         call check_near(error, p, update%part*force, tol, 1.0_wp, "along the force")
+         ! The other root of s b + s^2 a/2 = gain is -b/(a/2) less this one.
+         call check_true(error, abs(update%part) <= abs(update%part + sum(v0*force) &
+            /(0.5_wp*sum(along*force)/update%part)), "the smaller one")
+      end if
+      call velocity_update_free(update)
+   end subroutine look_at_push
+
+   !> M a is the force where nothing is held.
+   subroutine test_accelerate(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(system_t) :: system
+      type(constraint_set_t) :: set
+      type(velocity_update_t) :: update
+      real(wp), allocatable :: v(:, :), x(:, :), force(:, :), a(:, :)
+      real(wp) :: p(2, 16)
+
+      call begin(system, set, v, x, .true., error)
+      if (allocated(error)) return
+      allocate(force, a, mold=v)
+      call shake(force, 1.0_wp)
+      call constraints_select(set, [integer ::])
+      call velocity_update_accelerate(update, system, set, force, v, a, error)
+      if (allocated(error)) return
+      call mass_times(system, a, p)
+      call check_near(error, p(:, 6:), force(:, 6:), tol, 1.0_wp, "forces")
+      call check_near(error, a(:, :5), 0.0_wp*a(:, :5), 0.0_wp, 1.0_wp, "what is held")
+      call velocity_update_free(update)
+   end subroutine test_accelerate
+
+end module test_velocity_pushes
