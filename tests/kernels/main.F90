@@ -97,6 +97,8 @@ program main
    use test_nts_gap, only : collect_nts_gap
    use test_null_space, only : collect_null_space
    use test_numbering, only : collect_numbering
+   use test_outline, only : collect_outline
+   use test_overlap_boxes, only : collect_overlap_boxes
    use test_deck_parameters, only : collect_deck_parameters
    use test_deck_ties, only : collect_deck_ties
    use test_point_function, only : collect_point_function
@@ -230,6 +232,8 @@ program main
    call run("tie_partner", collect_tie_partner)
    call run("tie_balance", collect_tie_balance)
    call run("numbering", collect_numbering)
+   call run("outline", collect_outline)
+   call run("overlap_boxes", collect_overlap_boxes)
    call run("bodies", collect_bodies)
    call run("arcs", collect_arcs)
    call run("linear_rows", collect_linear_rows)

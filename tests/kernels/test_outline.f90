@@ -1,0 +1,176 @@
+!> Outlines of the pieces of a mesh: which edges they have, and how these hang together.
+module test_outline
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_errors, only : error_t
+   use emcon_interactions, only : contact_pair_t
+   use emcon_kinds, only : wp
+   use emcon_outline, only : outline_meets, outline_t
+   use emcon_outline_plane, only : outline_init, outline_links_t
+   use emcon_scene, only : scene_t
+   use small_scenes, only : add_block, add_surface, block_node, block_t, bottom, make_block, &
+      scene_begin, top
+   implicit none
+   private
+   public :: collect_outline
+
+contains
+
+   subroutine collect_outline(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("closed outlines of three pieces", test_pieces), &
+         test_case_t("where outlines meet in a node", test_pinch), &
+         test_case_t("edges of surfaces without elements", test_lone), &
+         test_case_t("a single piece without a pair", test_single)]
+   end subroutine collect_outline
+
+   !> Blocks of 3 x 2, 2 x 1 and 1 x 1 cells of heights 1/2, 1 and 2, of quadrilaterals or not.
+   subroutine make_three(scene, block)
+      type(scene_t), intent(out) :: scene
+      type(block_t), intent(out) :: block(3)
+
+      call scene_begin(scene)
+      call add_block(scene, "CPE4", [3, 2], [0.0_wp, 0.0_wp], [3.0_wp, 1.0_wp], block(1))
+      call add_block(scene, "CPE3", [2, 1], [0.0_wp, 2.0_wp], [6.0_wp, 1.0_wp], block(2))
+      call add_block(scene, "CPE4", [1, 1], [0.0_wp, 4.0_wp], [3.0_wp, 2.0_wp], block(3))
+      call add_surface(scene, "FIRST", block(1), [top])
+      call add_surface(scene, "SECOND", block(2), [bottom])
+      call add_surface(scene, "THIRD", block(3), [bottom])
+      scene%pair = [contact_pair_t(slave=2, master=1), contact_pair_t(slave=2, master=2)]
+   end subroutine make_three
+
+   subroutine test_pieces(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n_edge(3) = [10, 6, 4]
+      real(wp), parameter :: thickness(3) = [0.5_wp, 1.0_wp, 2.0_wp]
+      type(scene_t) :: scene
+      type(block_t) :: block(3)
+      type(outline_t) :: outline
+      type(outline_links_t) :: links
+      integer :: p, i
+
+      call make_three(scene, block)
+      call outline_init(outline, links, scene)
+      call check_equal(error, outline%n_piece, 3, "pieces")
+      call check_equal(error, outline%start, [1, 11, 17, 21], "where they begin")
+      call check_equal(error, [size(outline%facet, 2), size(links%link, 2)], [20, 20], "edges")
+      if (allocated(error)) return
+      do p = 1, 3
+         do i = outline%start(p), outline%start(p + 1) - 1
+            associate (facet => outline%facet(:, i))
+               call check_true(error, all(facet > block(p)%nodes_before) .and. all(facet <= &
+                  block(p)%nodes_before + product(block(p)%n + 1)), "of its block")
+               call check_true(error, has_body_left(scene, facet), "the body to the left")
+               call check_equal(error, outline%facet(1, links%link(2, i)), facet(2), "goes on")
+               call check_equal(error, links%link(1, links%link(2, i)), i, "and back")
+            end associate
+            call check_near(error, outline%thickness(i), thickness(p), 0.0_wp, 1.0_wp, "thickness")
+         end do
+         call check_equal(error, outline%start(p + 1) - outline%start(p), n_edge(p), "its edges")
+      end do
+      call check_true(error, all(links%place == outline%facet), "places")
+      call check_true(error, all(links%host == 0) .and. .not. any(links%is_buried) .and. &
+         .not. any(links%is_profile), "no ties, no profiles")
+      call check_true(error, outline_meets(outline, 1, 2) .and. outline_meets(outline, 2, 1) &
+         .and. outline_meets(outline, 2, 2), "pairs")
+      call check_true(error, .not. (outline_meets(outline, 1, 1) .or. outline_meets(outline, 1, &
+         3) .or. outline_meets(outline, 3, 3)), "no others")
+      call check_true(error, outline%body(1) /= outline%body(2) .and. outline%body(2) &
+         /= outline%body(3), "bodies")
+   end subroutine test_pieces
+
+   !> An edge of a rectangle whose centre is to the left.
+   pure logical function has_body_left(scene, edge)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: edge(2)
+      real(wp) :: along(2), to(2), centre(2)
+      integer :: e
+
+      has_body_left = .false.
+      along = scene%x(:, edge(2)) - scene%x(:, edge(1))
+      do e = 1, size(scene%element%kind)
+         associate (node => pack(scene%element%node(:, e), scene%element%node(:, e) > 0))
+            if (count(node == edge(1)) + count(node == edge(2)) < 2) cycle
+            centre = sum(scene%x(:, node), 2)/real(size(node), wp)
+            to = centre - scene%x(:, edge(1))
+            has_body_left = along(1)*to(2) - along(2)*to(1) > 0.0_wp
+         end associate
+      end do
+   end function has_body_left
+
+   !> Of 2 x 2 cells two, across: in the middle node neither outline goes on.
+   subroutine test_pinch(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(outline_t) :: outline
+      type(outline_links_t) :: links
+      integer :: i, middle
+
+      call make_block(scene, "CPE4", [2, 2], block)
+      middle = block_node(block, 1, 1)
+      scene%element%node = scene%element%node(:, [1, 4])
+      scene%element%kind = scene%element%kind([1, 4])
+      scene%element%section = scene%element%section([1, 4])
+      call add_surface(scene, "SELF", block_t(kind=block%kind, n=[1, 1]), [bottom])
+      scene%pair = [contact_pair_t(slave=1, master=1)]
+      call outline_init(outline, links, scene)
+      call check_equal(error, [outline%n_piece, size(outline%facet, 2)], [1, 8], "edges")
+      do i = 1, size(outline%facet, 2)
+         associate (facet => outline%facet(:, i))
+            call check_true(error, (links%link(1, i) == 0) .eqv. facet(1) == middle, "before")
+            call check_true(error, (links%link(2, i) == 0) .eqv. facet(2) == middle, "after")
+         end associate
+      end do
+   end subroutine test_pinch
+
+   !> A line of two edges over a block, one edge of which the block has as well.
+   subroutine test_lone(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(outline_t) :: outline
+      type(outline_links_t) :: links
+      integer :: k
+
+      do k = 1, 2
+         call make_block(scene, "CPE4", [1, 1], block)
+         scene%x = reshape([scene%x, [0.0_wp, 3.0_wp, 2.0_wp, 3.0_wp, 5.0_wp, 3.0_wp]], [2, 7])
+         call add_surface(scene, "BLOCK", block, [top])
+         call add_surface(scene, "LINE", block, [top])
+         deallocate(scene%surface(2)%element, scene%surface(2)%face)
+         allocate(scene%surface(2)%element(0), scene%surface(2)%face(0))
+         scene%surface(2)%edge = reshape([7, 6, 6, 5, 1, 2], [2, 3])
+         scene%surface(2)%is_profile = k == 2
+         if (k == 2) scene%surface(2)%edge = scene%surface(2)%edge(:, :2)
+         scene%pair = [contact_pair_t(slave=1, master=2)]
+         call outline_init(outline, links, scene)
+         call check_equal(error, [outline%n_piece, size(outline%facet, 2)], [2, 6], "edges")
+         if (allocated(error)) return
+         call check_true(error, all(outline%facet(:, 5:) == reshape([7, 6, 6, 5], [2, 2])), "line")
+         call check_near(error, outline%thickness(5:), [3.0_wp, 2.0_wp], 0.0_wp, 1.0_wp, &
+            "as thick as they are long")
+         call check_equal(error, [links%link(:, 5), links%link(:, 6)], [0, 6, 5, 0], "its ends")
+         call check_true(error, all(links%is_profile(5:) .eqv. k == 2) .and. &
+            .not. any(links%is_profile(:4)), "profile")
+      end do
+   end subroutine test_lone
+
+   subroutine test_single(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(outline_t) :: outline
+      type(outline_links_t) :: links
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      call outline_init(outline, links, scene)
+      call check_equal(error, [outline%n_piece, size(outline%facet, 2)], [0, 0], "nothing can meet")
+      call add_block(scene, "CPE4", [1, 1], [5.0_wp, 0.0_wp], [1.0_wp, 1.0_wp], block)
+      call outline_init(outline, links, scene)
+      call check_equal(error, [outline%n_piece, size(outline%facet, 2)], [2, 10], "two can")
+      call check_true(error, .not. outline_meets(outline, 1, 2), "though no pair brings them")
+   end subroutine test_single
+
+end module test_outline
