@@ -146,7 +146,7 @@ contains
       type(increment_t) :: increment
       integer :: k, i
 
-      part%h = h
+      part%h = 0.125_wp
       part%start%total_time = 2.0_wp
       scene%node%label = [(10*i, i = 1, 6)]
       do k = 1, 2
@@ -160,9 +160,9 @@ contains
          call check_equal(error, march%state%control%n_event, merge(6, 8, k == 1), "counted")
          if (allocated(error)) return
          call check_equal(error, increment%notes%item(increment%notes%n)%text, &
-            "event: contact ends in pair 2 at slave node 40, time 2 to 2.1", "the last one")
+            "event: contact ends in pair 2 at slave node 40, time 2 to 2.125", "the last one")
          if (k == 2) call check_equal(error, increment%notes%item(2)%text, &
-            "event: contact begins in pair 1 at slave node 20, time 2 to 2.1", "the second one")
+            "event: contact begins in pair 1 at slave node 20, time 2 to 2.125", "the second one")
       end do
    end subroutine test_events
 
