@@ -83,6 +83,7 @@ program main
    use test_march_kinds, only : collect_march_kinds
    use test_step_control, only : collect_step_control
    use test_mass_return, only : collect_mass_return
+   use test_massless, only : collect_massless
    use test_midside, only : collect_midside
    use test_mortar, only : collect_mortar
    use test_mortar_pair, only : collect_mortar_pair
@@ -221,6 +222,7 @@ program main
    call run("guards", collect_guards)
    call run("hermite_gap", collect_hermite_gap)
    call run("mass_return", collect_mass_return)
+   call run("massless", collect_massless)
    call run("midside", collect_midside)
    call run("mortar_pair", collect_mortar_pair)
    call run("motion_bound", collect_motion_bound)
