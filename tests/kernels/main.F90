@@ -64,6 +64,7 @@ program main
    use test_host_contact, only : collect_host_contact
    use test_initial_contact, only : collect_initial_contact
    use test_interface, only : collect_interface
+   use test_interlock, only : collect_interlock
    use test_joints, only : collect_joints
    use test_lapack, only : collect_lapack
    use test_judge, only : collect_judge
@@ -214,6 +215,7 @@ program main
    call run("nts_gap", collect_nts_gap)
    call run("nts", collect_nts)
    call run("interface", collect_interface)
+   call run("interlock", collect_interlock)
    call run("joints", collect_joints)
    call run("host_check", collect_host_check)
    call run("host_deck", collect_host_deck)

@@ -77,6 +77,8 @@ contains
       call check_equal(error, reshape(chain%node_edge, [8]), [2, 0, 1, 2, 3, 1, 0, 3], &
          "edges of the nodes")
       call check_equal(error, [chain%part, chain%place], [1, 1, 1, 2, 3, 1], "part and places")
+      call check_equal(error, chain%around_start, [1, 2, 4, 6, 7], "lists of nodes")
+      call check_equal(error, chain%around, [2, 1, 2, 1, 3, 3], "edges around nodes")
       call check_equal(error, chain_distance(chain, 3, 2), 2, "distance")
       call check_true(error, .not. any(chain%is_closed), "open")
       call check_true(error, chain_is_seam(chain, 1, 3) .and. chain_is_seam(chain, 3, 1) .and. &
