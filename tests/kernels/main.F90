@@ -58,6 +58,7 @@ program main
    use test_host_force, only : collect_host_force
    use test_given_space, only : collect_user_space
    use test_host_law, only : collect_host_law
+   use test_host_sizes, only : collect_host_sizes
    use test_guards, only : collect_guards
    use test_hermite_gap, only : collect_hermite_gap
    use test_independent_rows, only : collect_independent_rows
@@ -290,6 +291,7 @@ program main
    call run("stepper_query", collect_stepper_query)
    call run("given_space", collect_user_space)
    call run("host_law", collect_host_law)
+   call run("host_sizes", collect_host_sizes)
    call run("results", collect_results)
 
    if (n_passed + n_failed == 0) then
