@@ -124,6 +124,7 @@ program main
    use test_solid_parts, only : collect_solid_parts
    use test_bending, only : collect_bending
    use test_solvers, only : collect_solvers
+   use test_start_gaps, only : collect_start_gaps
    use test_stepper_free, only : collect_stepper_free
    use test_stepper_query, only : collect_stepper_query
    use test_system, only : collect_system
@@ -172,6 +173,7 @@ program main
    call run("umfpack", collect_umfpack)
 #endif
    call run("solvers", collect_solvers)
+   call run("start_gaps", collect_start_gaps)
 #ifndef EMCON_PERMISSIVE
    call run("diagonal_blocks", collect_diagonal_blocks)
    call run("kept_factor", collect_kept_factor)
