@@ -89,6 +89,7 @@ program main
    use test_midside, only : collect_midside
    use test_mortar, only : collect_mortar
    use test_mortar_pair, only : collect_mortar_pair
+   use test_mortar_stencil, only : collect_mortar_stencil
    use test_motion_bound, only : collect_motion_bound
    use test_pair_forces, only : collect_pair_forces
    use test_penalty_state, only : collect_penalty_state
@@ -230,6 +231,7 @@ program main
    call run("massless", collect_massless)
    call run("midside", collect_midside)
    call run("mortar_pair", collect_mortar_pair)
+   call run("mortar_stencil", collect_mortar_stencil)
    call run("motion_bound", collect_motion_bound)
    call run("pair_forces", collect_pair_forces)
    call run("penalty_state", collect_penalty_state)
