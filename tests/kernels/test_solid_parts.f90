@@ -6,6 +6,7 @@ module test_solid_parts
       corotated_pack_motion_t, corotated_pack_t
    use emcon_corotated_plane, only : corotated_t
    use emcon_element, only : element_geometry_t
+   use emcon_element_plane, only : point_is_regular, point_motion_t
    use emcon_element_pack_plane, only : element_pack_t, pack_gather, pack_motion_t, pack_response_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
@@ -38,7 +39,8 @@ contains
          test_case_t("turns and strains of linear sections", test_small), &
          test_case_t("corotated sections do not turn", test_corotated), &
          test_case_t("turns and strains in space", test_space), &
-         test_case_t("elements that lock", test_locking)]
+         test_case_t("elements that lock", test_locking), &
+         test_case_t("ends of motions that laws answer to", test_regular)]
    end subroutine collect_solid_parts
 
    !> Packs of one to all lanes with nodes by chance, in one to five shares: by their points, in
@@ -341,5 +343,41 @@ contains
       solid%geometry%n_node = 3
       call check_equal(error, strainless_element(solid), 0, "of a triangle")
    end subroutine test_locking
+
+   !> det F > 0, and det C = (1 + 2 E11)(1 + 2 E22) - (2 E12)^2 > 0 where the law knows a volume; of
+   !> both ends of the strain the second one counts. No powers that are infinite.
+   subroutine test_regular(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: far = 2.0_wp*huge(1.0_wp)**0.2_wp
+      real(wp), parameter :: strain(3, 9) = reshape([-0.3_wp, 0.0_wp, 0.0_wp, -0.3_wp, 0.0_wp, &
+         0.0_wp, 0.0_wp, -0.3_wp, 0.0_wp, 0.0_wp, -0.6_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.5_wp, 0.0_wp, &
+         0.0_wp, 0.5_wp, -0.6_wp, 0.0_wp, 0.0_wp, far, 0.0_wp, 0.0_wp, -0.6_wp, -0.6_wp, 0.1_wp], &
+         [3, 9])
+      real(wp), parameter :: change(3, 9) = reshape([-0.1_wp, 0.0_wp, 0.0_wp, -0.3_wp, 0.0_wp, &
+         0.0_wp, 0.0_wp, -0.3_wp, 0.0_wp, 0.0_wp, 0.2_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.4_wp, 0.0_wp, &
+         0.0_wp, 0.6_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.2_wp, 0.2_wp, 0.0_wp], &
+         [3, 9])
+      logical, parameter :: regular(9) = [.true., .false., .false., .true., .true., .false., &
+         .false., .false., .true.]
+      type(point_motion_t) :: point
+      integer :: k
+
+      point%f_end = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
+      do k = 1, 9
+         point%strain = strain(:, k)
+         point%dstrain = change(:, k)
+         call check_true(error, point_is_regular(point, .true.) .eqv. regular(k), "volume " &
+            // to_text(k))
+         call check_true(error, point_is_regular(point, .false.) .eqv. k /= 8, "none " &
+            // to_text(k))
+      end do
+      point%f_end(1, 2) = 2.0_wp
+      point%f_end(2, 1) = 0.4_wp
+      call check_true(error, point_is_regular(point, .true.), "det F of 0.2")
+      point%f_end(2, 1) = 0.6_wp
+      call check_true(error, .not. point_is_regular(point, .false.), "and of -0.2")
+      point%f_end = far*reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
+      call check_true(error, .not. point_is_regular(point, .false.), "too large a one")
+   end subroutine test_regular
 
 end module test_solid_parts

@@ -38,8 +38,8 @@ contains
          call control_accept(control, scale(1.0_wp, control%power), -1.0_wp, .false., least, &
             largest)
          power(k) = control%power
-         if (k < 20) call check_near(error, control%asked, scale(1.0_wp, power(k)), 0.0_wp, 1.0_wp, &
-            "asked for")
+         if (k < 20) call check_near(error, control%asked, scale(1.0_wp, power(k)), 0.0_wp, &
+            1.0_wp, "asked for")
       end do
       call check_equal(error, power, [0, 0, 0, 0, 1, 1, 1, 1, 1, 2, 2, 2, 2, 2, 3, 3, 3, 3, 3, 3, &
          3, 3], "powers")
