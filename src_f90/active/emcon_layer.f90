@@ -21,8 +21,7 @@ module emcon_layer
    use emcon_newton, only : newton_init
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_row
-   use emcon_steps, only : initiation_admissible, load_point, load_t, method_saddle_point, &
-      prescribed_t, step_t
+   use emcon_steps, only : load_point, load_t, method_saddle_point, prescribed_t, step_t
    use emcon_system, only : system_begin_step, system_find_energy, system_init, system_renew, &
       system_respond, system_t
    implicit none
@@ -128,10 +127,7 @@ contains
       associate (own => self%scene%step(1))
          own = step
          own%scheme = scheme_row("STATIC", "")
-         own%contact%initiation = initiation_admissible
          own%contact%method = method_saddle_point
-         own%contact%resolves_overclosure = .false.
-         own%stabilizes = .false.
          call hold_massive(self, model%space%numbering%unknown, own%prescribed)
          own%load = loads_of(self)
       end associate

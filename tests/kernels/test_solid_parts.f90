@@ -371,6 +371,15 @@ contains
          call check_true(error, point_is_regular(point, .false.) .eqv. k /= 8, "none " &
             // to_text(k))
       end do
+      ! What of a volume is round-off of its terms is none.
+      do k = 1, 3
+         point%dstrain = 0.0_wp
+         point%strain = 0.0_wp
+         point%strain(k) = merge(1.0_wp, -0.5_wp, k == 3)*(1.0_wp - 32.0_wp*epsilon(1.0_wp))
+         call check_true(error, .not. point_is_regular(point, .true.), "round-off")
+         point%strain(k) = merge(1.0_wp, -0.5_wp, k == 3)*(1.0_wp - 256.0_wp*epsilon(1.0_wp))
+         call check_true(error, point_is_regular(point, .true.), "hardly any, but some")
+      end do
       point%f_end(1, 2) = 2.0_wp
       point%f_end(2, 1) = 0.4_wp
       call check_true(error, point_is_regular(point, .true.), "det F of 0.2")
