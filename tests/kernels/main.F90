@@ -79,6 +79,7 @@ program main
    use test_loads, only : collect_loads
    use test_march, only : collect_march
    use test_march_check, only : collect_march_check
+   use test_march_commit, only : collect_march_commit
    use test_march_contact, only : collect_march_contact
    use test_march_grid, only : collect_march_grid
    use test_march_size, only : collect_march_size
@@ -281,6 +282,7 @@ program main
    call run("holding", collect_holding)
    call run("march", collect_march)
    call run("march_check", collect_march_check)
+   call run("march_commit", collect_march_commit)
    call run("march_contact", collect_march_contact)
    call run("march_grid", collect_march_grid)
    call run("march_size", collect_march_size)

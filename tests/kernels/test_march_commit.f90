@@ -1,0 +1,248 @@
+!> What follows from a solved step, beside the set, the motion and the forces that it was solved
+!> with: a block thrown aslant, of which contacts slide and stick.
+module test_march_commit
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_constraint, only : condition_force, condition_friction, most_slips
+   use emcon_constraints, only : constraints_dissipated
+   use emcon_contact_law, only : loss_friction
+   use emcon_errors, only : error_t
+   use emcon_friction, only : friction_missed
+   use emcon_kinds, only : dp, wp
+   use emcon_ledger, only : ledger_t
+   use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
+      march_t
+   use emcon_scene, only : scene_t
+   use emcon_stand_off, only : stand_off_add, stand_off_t
+   use emcon_state, only : state_t
+   use emcon_steps, only : initiation_persistent, load_gravity, load_t
+   use emcon_system, only : mass_times
+   use emcon_term, only : role_external, role_internal
+   use small_scenes, only : add_load, add_step, block_t, clamp, make_two_blocks, prescribe
+   implicit none
+   private
+   public :: collect_march_commit
+
+   real(wp), parameter :: eps = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+   !> Forces of the size 100 that balance, summed over nodes.
+   real(wp), parameter :: tol = 1.0e5_wp*eps
+   real(wp), parameter :: h = 0.02_wp
+
+contains
+
+   subroutine collect_march_commit(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("a step with friction", test_step), &
+         test_case_t("works in statics", test_statics)]
+   end subroutine collect_march_commit
+
+   !> The lower block is clamped at its bottom and driven on its right; both have weight.
+   subroutine begin(scene, is_static, march, error)
+      type(scene_t), intent(out) :: scene
+      logical, intent(in) :: is_static
+      type(march_t), intent(inout) :: march
+      type(error_t), allocatable, intent(out) :: error
+      type(block_t) :: lower, upper
+      type(load_t) :: weight
+      integer :: i
+
+      call make_two_blocks(scene, merge(0.0_wp, 0.03_wp, is_static), lower, upper)
+      scene%pair(1)%interaction%friction = 0.3_wp
+      call add_step(scene, is_static, merge(0.25_wp, h, is_static), merge(4, 40, is_static))
+      scene%step(1)%contact%initiation = initiation_persistent
+      call clamp(scene%step(1), [(i, i = 1, 5)])
+      call prescribe(scene%step(1), 10, 1, 0.02_wp)
+      if (is_static) then
+         do i = 14, 16
+            call prescribe(scene%step(1), i, 2, -0.05_wp)
+            call prescribe(scene%step(1), i, 1, 0.02_wp)
+         end do
+      end if
+      weight%kind = load_gravity
+      weight%value = 2.0_wp
+      weight%direction(:2) = [0.0_wp, -1.0_wp]
+      call add_load(scene%step(1), weight)
+      if (.not. is_static) then
+         scene%v0(1, 11:) = 0.3_wp
+         scene%v0(2, 11:) = -1.0_wp
+      end if
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+   end subroutine begin
+
+   subroutine test_step(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(state_t) :: before
+      type(ledger_t) :: books
+      integer :: k, n_seen
+
+      call begin(scene, .false., march, error)
+      if (allocated(error)) return
+      n_seen = 0
+      do k = 1, 40
+         before = march%state
+         books = march%ledger
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         if (increment%n_cut > 0) cycle
+         call check_motion(error, march, before, books)
+         if (.not. allocated(error)) call check_contacts(error, march, before, increment)
+         if (.not. allocated(error)) call check_pairs(error, march)
+         if (allocated(error)) return
+         if (increment%n_active > 0) n_seen = n_seen + 1
+      end do
+      call check_true(error, n_seen > 3, "contact")
+      call march_free(march)
+   end subroutine test_step
+
+   !> u1 = u0 + du, v1 = 2 du/h - v0; loads, reactions and driven inertia work over the way.
+   subroutine check_motion(error, march, before, books)
+      type(error_t), allocatable, intent(inout) :: error
+      type(march_t), intent(in) :: march
+      type(state_t), intent(in) :: before
+      type(ledger_t), intent(in) :: books
+      real(wp), dimension(2, 16) :: change, inertia, rest
+      integer :: i, a
+
+      associate (state => march%state, motion => march%motion)
+         call check_near(error, state%u, before%u + motion%du, 4.0_wp*eps, 1.0_wp, "displacements")
+         do i = 6, 16
+            do a = 1, 2
+               if (i == 10 .and. a == 1) cycle
+               call check_near(error, state%v(a, i), 2.0_wp*motion%du(a, i)/h - before%v(a, i), &
+                  64.0_wp*eps/h, 1.0_wp, "velocities")
+            end do
+         end do
+         ! Balance of all forces over the step, with what supports have to give.
+         change = (2.0_wp*(motion%du + motion%offset)/h - 2.0_wp*before%v)/h
+         call mass_times(march%system, change, inertia)
+         rest = inertia - (march%system%response%part(role_external)%force + state%contact &
+            + state%reaction - internal_of(march))
+         call check_near(error, rest, 0.0_wp*rest, tol, 100.0_wp, "balance")
+         call check_near(error, march%ledger%external_work - books%external_work, &
+            sum(march%system%response%part(role_external)%force*motion%du) &
+            + sum(state%reaction*motion%du) + sum(inertia*motion%offset), tol, 10.0_wp, "work")
+      end associate
+   end subroutine check_motion
+
+   !> The mean internal forces over the last step.
+   pure function internal_of(march) result(force)
+      type(march_t), intent(in) :: march
+      real(wp) :: force(2, 16)
+
+      force = march%system%response%part(role_internal)%force
+   end function internal_of
+
+   !> What acts, with which forces, how it slid, and what of it is told.
+   subroutine check_contacts(error, march, before, increment)
+      type(error_t), allocatable, intent(inout) :: error
+      type(march_t), intent(in) :: march
+      type(state_t), intent(in) :: before
+      type(increment_t), intent(in) :: increment
+      type(stand_off_t) :: stand_off
+      real(wp) :: drag(most_slips), missed, largest
+      logical :: acts(3)
+      integer :: k
+
+      acts = .false.
+      associate (set => march%active%set, now => march%state%contacts, was => before%contacts)
+         do k = 1, set%n
+            associate (id => set%id(k), item => set%item(k))
+               acts(id) = .true.
+               call check_near(error, now%lam(id), set%lam(k), 0.0_wp, 1.0_wp, "multiplier")
+               drag = condition_friction(item, set%lam(k))
+               call check_near(error, [now%drag(1, id), now%slides_along(1, id)], [drag(1), &
+                  march%active%friction%law(id)%status%direction(1)], 0.0_wp, 1.0_wp, "friction")
+               call check_near(error, [now%slip(1, id), now%slip_path(id)], [was%slip(1, id) &
+                  + item%slip(1), was%slip_path(id) + abs(item%slip(1))], 4.0_wp*eps, 1.0_wp, &
+                  "slip")
+            end associate
+         end do
+         call check_true(error, all(now%is_active .eqv. acts), "what acts")
+         do k = 1, 3
+            if (acts(k)) cycle
+            call check_near(error, [now%lam(k), now%drag(1, k), now%slides_along(1, k)], &
+               spread(0.0_wp, 1, 3), 0.0_wp, 1.0_wp, "what does not")
+            call check_near(error, [now%slip(1, k), now%slip_path(k)], [was%slip(1, k), &
+               was%slip_path(k)], 0.0_wp, 1.0_wp, "nor slides")
+         end do
+         call check_equal(error, increment%n_active, count(acts), "number of them")
+         call stand_off_add(stand_off, march%system, set, h)
+         call check_near(error, [increment%stand_off%largest, increment%stand_off%impulse], &
+            [stand_off%largest, stand_off%impulse], tol, 1.0_wp, "air")
+         call friction_missed(march%active%friction, march%system, set, missed, largest)
+         call check_near(error, [increment%law_missed, increment%largest_push], [missed, largest], &
+            0.0_wp, 1.0_wp, "laws")
+      end associate
+   end subroutine check_contacts
+
+   !> Nodal forces are sums over conditions; those of the pair are they.
+   subroutine check_pairs(error, march)
+      type(error_t), allocatable, intent(inout) :: error
+      type(march_t), intent(in) :: march
+      real(wp) :: force(2, 16)
+      integer :: k, i
+
+      force = 0.0_wp
+      associate (set => march%active%set)
+         do k = 1, set%n
+            do i = 1, set%item(k)%n_node
+               associate (node => set%item(k)%node(i))
+                  force(:, node) = force(:, node) + condition_force(set%item(k), set%lam(k), i)
+               end associate
+            end do
+         end do
+      end associate
+      call check_near(error, march%state%contact, force, tol, 10.0_wp, "forces of contact")
+      call check_near(error, march%state%pairs%total(1)%slave(:2), sum(force(:, 11:), 2), tol, &
+         10.0_wp, "of the pair")
+      call check_near(error, march%state%sums%sum(1)%push(:2), h*sum(force(:, 11:), 2), tol, &
+         1.0_wp, "its impulse")
+   end subroutine check_pairs
+
+   !> Forces are linear over a step: what the supports do beside contact and weight is half of both
+   !> ends; friction takes what it dissipates.
+   subroutine test_statics(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(state_t) :: before
+      type(ledger_t) :: books
+      real(wp) :: contact, friction, internal
+      integer :: k, i
+
+      call begin(scene, .true., march, error)
+      if (allocated(error)) return
+      do k = 1, 4
+         before = march%state
+         books = march%ledger
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         if (increment%n_cut > 0) cycle
+         friction = 0.0_wp
+         associate (set => march%active%set, state => march%state, du => march%motion%du)
+            do i = 1, set%n
+               friction = friction + constraints_dissipated(set, i, loss_friction)
+            end do
+            contact = 0.5_wp*sum((before%contact + state%contact)*du)
+            internal = 0.5_wp*sum((before%internal + internal_of(march))*du)
+            call check_near(error, march%ledger%friction - books%friction, friction, tol, 1.0_wp, &
+               "friction")
+            call check_near(error, march%ledger%contact_work - books%contact_work, contact &
+               + friction, tol, 1.0_wp, "work of contact")
+            call check_near(error, march%ledger%external_work - books%external_work, internal &
+               - contact, tol, 10.0_wp, "work")
+            call check_near(error, state%v, 0.0_wp*state%v, 0.0_wp, 1.0_wp, "no velocities")
+         end associate
+         if (allocated(error)) return
+      end do
+      call check_true(error, march%ledger%friction > 0.0_wp, "it slides")
+      call march_free(march)
+   end subroutine test_statics
+
+end module test_march_commit
