@@ -73,6 +73,7 @@ program main
    use test_law_points, only : collect_law_points
    use test_law_space, only : collect_law_space
    use test_law_thin, only : collect_law_thin
+   use test_ledger, only : collect_ledger
    use test_linear_rows, only : collect_linear_rows
    use test_line_search, only : collect_line_search
    use test_links, only : collect_links
@@ -119,6 +120,7 @@ program main
    use test_saddle_point, only : collect_saddle_point
    use test_scheme, only : collect_scheme
    use test_search, only : collect_search
+   use test_self_contact, only : collect_self_contact
    use test_shape, only : collect_shape
    use test_single_elements, only : collect_single_elements
    use test_soft_law, only : collect_soft_law
@@ -204,6 +206,7 @@ program main
    call run("law_points", collect_law_points)
    call run("law_space", collect_law_space)
    call run("law_thin", collect_law_thin)
+   call run("ledger", collect_ledger)
    call run("element", collect_element)
    call run("element_kinds", collect_element_kinds)
    call run("element_axial", collect_element_axial)
@@ -217,6 +220,7 @@ program main
    call run("facets", collect_facets)
    call run("chain", collect_chain)
    call run("search", collect_search)
+   call run("self_contact", collect_self_contact)
    call run("nts_gap", collect_nts_gap)
    call run("nts", collect_nts)
    call run("interface", collect_interface)
