@@ -24,6 +24,7 @@ program main
 #endif
    use test_condition_rows, only : collect_condition_rows
    use test_constraints, only : collect_constraints
+   use test_contact_laws, only : collect_contact_laws
    use test_correction, only : collect_correction
    use test_corotated, only : collect_corotated
    use test_critical_step, only : collect_critical_step
@@ -257,6 +258,7 @@ program main
    call run("rigid_bodies", collect_rigid_bodies)
    call run("condition_rows", collect_condition_rows)
    call run("constraints", collect_constraints)
+   call run("contact_laws", collect_contact_laws)
    call run("independent_rows", collect_independent_rows)
    call run("null_space", collect_null_space)
    call run("saddle_point", collect_saddle_point)
