@@ -4,14 +4,16 @@ module test_massless
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
+   use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
+      march_t
    use emcon_massless, only : massless_bare, massless_find, massless_follow, massless_return, &
       massless_shed
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_t
-   use emcon_steps, only : initiation_massless, initiation_persistent
+   use emcon_steps, only : initiation_massless, initiation_persistent, load_point, load_t
    use emcon_text, only : to_text
    use linear_scenes, only : add_equation
-   use small_scenes, only : add_step, block_t, clamp, make_block, make_two_blocks, shake
+   use small_scenes, only : add_load, add_step, block_t, clamp, make_block, make_two_blocks, shake
    use sparse_samples, only : dense_of
    implicit none
    private
@@ -29,7 +31,8 @@ contains
          test_case_t("elements that would keep none", test_keep), &
          test_case_t("sections without inertia", test_bare), &
          test_case_t("to the others of each element", test_shed), &
-         test_case_t("mass that comes back", test_return)]
+         test_case_t("mass that comes back", test_return), &
+         test_case_t("loads on what has none", test_loads)]
    end subroutine collect_massless
 
    !> The slave surface of two blocks, nodes 11 to 13, by what the scene has.
@@ -231,5 +234,49 @@ contains
       call check_near(error, v, before, 0.0_wp, 1.0_wp, "no others do")
       call check_equal(error, count(has), 1, "one node")
    end subroutine test_return
+
+   !> A block is thrown on a clamped one, forces pull at its massless nodes: as these settle anew
+   !> the forces work on them, and the energy stands.
+   subroutine test_loads(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n_step = 40
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(load_t) :: pull
+      real(wp) :: total, drift
+      integer :: k, n_settled
+
+      call make_two_blocks(scene, 0.0927_wp, lower, upper)
+      call add_step(scene, .false., 0.02_wp, n_step)
+      scene%step(1)%contact%initiation = initiation_massless
+      call clamp(scene%step(1), [(k, k = 1, 5)])
+      scene%v0(1, 11:) = 0.3_wp
+      scene%v0(2, 11:) = -1.0_wp
+      pull%kind = load_point
+      pull%place = 2
+      do k = 11, 13
+         pull%target = k
+         pull%value = 2.0_wp*(k - 9)
+         call add_load(scene%step(1), pull)
+      end do
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      if (allocated(error)) return
+      total = march%ledger%total
+      drift = 0.0_wp
+      n_settled = 0
+      do k = 1, n_step
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         drift = max(drift, abs(march%ledger%total - total))
+         if (.not. march%layer%is_settled) cycle
+         if (abs(march%layer%work) > 1.0e-4_wp) n_settled = n_settled + 1
+      end do
+      call check_true(error, n_settled > 0, "forces work on what settles")
+      call check_near(error, drift, 0.0_wp, 8.0_wp*real(n_step, wp)*tol, total, "energy")
+      call march_free(march)
+   end subroutine test_loads
 
 end module test_massless
