@@ -5,8 +5,8 @@
 
 Each mutant is the library with one small mistake in one line: a relation or a sign turned round, a
 factor halved, a condition left out, an assignment not made. Lines are drawn by chance from those of
-`contact`, `march`, `terms` and `solid` that have changed since the last version; with `--since=`
-and nothing behind it from all. `--try` puts a text of one's own into a line.
+contact, of elements and of steps (`FOLDERS`) that have changed since the last version; with
+`--since=` and nothing behind it from all. `--try` puts a text of one's own into a line.
 
 The kernel suites that run this line (`traced_lines.py` knows) come first, the quickest at their
 head; then the tests of whole runs that do, until one fails. What compiles to the same object means
