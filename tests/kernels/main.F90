@@ -48,6 +48,7 @@ program main
    use test_corner_tops, only : collect_corner_tops
    use test_blocked_contact, only : collect_blocked_contact
    use test_explicit, only : collect_explicit
+   use test_explicit_closed, only : collect_explicit_closed
    use test_facets, only : collect_facets
    use test_first_touch, only : collect_first_touch
    use test_friction, only : collect_friction
@@ -287,6 +288,7 @@ program main
    call run("corner_tops", collect_corner_tops)
    call run("blocked_contact", collect_blocked_contact)
    call run("explicit", collect_explicit)
+   call run("explicit_closed", collect_explicit_closed)
    call run("holding", collect_holding)
    call run("march", collect_march)
    call run("march_check", collect_march_check)
