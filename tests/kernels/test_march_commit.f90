@@ -48,7 +48,7 @@ contains
       integer :: i
 
       call make_two_blocks(scene, merge(0.0_wp, 0.03_wp, is_static), lower, upper)
-      scene%pair(1)%interaction%friction = 0.3_wp
+      scene%pair(1)%interaction%friction = merge(0.05_wp, 0.3_wp, is_static)
       call add_step(scene, is_static, merge(0.25_wp, h, is_static), merge(4, 40, is_static))
       scene%step(1)%contact%initiation = initiation_persistent
       call clamp(scene%step(1), [(i, i = 1, 5)])
@@ -56,13 +56,16 @@ contains
       if (is_static) then
          do i = 14, 16
             call prescribe(scene%step(1), i, 2, -0.05_wp)
-            call prescribe(scene%step(1), i, 1, 0.02_wp)
+            call prescribe(scene%step(1), i, 1, 0.06_wp)
          end do
       end if
       weight%kind = load_gravity
       weight%value = 2.0_wp
       weight%direction(:2) = [0.0_wp, -1.0_wp]
-      call add_load(scene%step(1), weight)
+      do i = 1, size(scene%element%kind)
+         weight%target = i
+         call add_load(scene%step(1), weight)
+      end do
       if (.not. is_static) then
          scene%v0(1, 11:) = 0.3_wp
          scene%v0(2, 11:) = -1.0_wp
