@@ -2,7 +2,7 @@
 !> with: a block thrown aslant, of which contacts slide and stick.
 module test_march_commit
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_constraint, only : condition_force, condition_friction, most_slips
+   use emcon_constraint, only : condition_force, condition_friction, condition_t, most_slips
    use emcon_constraints, only : constraints_dissipated
    use emcon_contact_law, only : loss_friction
    use emcon_errors, only : error_t
@@ -34,7 +34,8 @@ contains
 
       tests = [ &
          test_case_t("a step with friction", test_step), &
-         test_case_t("works in statics", test_statics)]
+         test_case_t("works in statics", test_statics), &
+         test_case_t("impacts that keep a part", test_restitution)]
    end subroutine collect_march_commit
 
    !> The lower block is clamped at its bottom and driven on its right; both have weight.
@@ -247,5 +248,62 @@ contains
       call check_true(error, march%ledger%friction > 0.0_wp, "it slides")
       call march_free(march)
    end subroutine test_statics
+
+   !> Of two free blocks: each gap that was held and opens keeps a part of its rate; what that takes
+   !> is told, momenta stay.
+   subroutine test_restitution(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: kept = 0.25_wp
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(ledger_t) :: start
+      real(wp) :: before, rate, rebound
+      integer :: k, i, n_impact
+
+      call make_two_blocks(scene, 0.03_wp, lower, upper)
+      scene%pair(1)%interaction%restitution = kept
+      call add_step(scene, .false., h, 40)
+      scene%step(1)%contact%initiation = initiation_persistent
+      scene%v0(1, 11:) = 0.3_wp
+      scene%v0(2, 11:) = -1.0_wp
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      if (allocated(error)) return
+      start = march%ledger
+      n_impact = 0
+      do k = 1, 40
+         before = march%ledger%restitution
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         associate (ledger => march%ledger, set => march%active%set, motion => march%motion)
+            call check_near(error, ledger%total + ledger%restitution, start%total, tol, &
+               start%total, "energy")
+            call check_near(error, [ledger%momentum, ledger%angular], [start%momentum, &
+               start%angular], tol, abs(start%momentum(2)), "momenta")
+            call check_true(error, ledger%restitution >= before, "never given back")
+            if (increment%n_cut > 0) cycle
+            do i = 1, set%n
+               rate = rate_of(set%item(i), march%state%v)
+               rebound = rate_of(set%item(i), 2.0_wp*motion%du/h - motion%v0)
+               call check_near(error, rate, merge(kept, 1.0_wp, rebound > 0.0_wp)*rebound, tol, &
+                  1.0_wp, "rate")
+               if (rebound > 0.01_wp) n_impact = n_impact + 1
+            end do
+         end associate
+         if (allocated(error)) return
+      end do
+      call check_true(error, n_impact > 2 .and. march%ledger%restitution > 0.01_wp, "impacts")
+      call march_free(march)
+   end subroutine test_restitution
+
+   !> Of the gap of a condition.
+   pure real(wp) function rate_of(item, v)
+      type(condition_t), intent(in) :: item
+      real(wp), intent(in) :: v(:, :)
+
+      rate_of = sum(item%c(:, :item%n_node)*v(:, item%node(:item%n_node)))
+   end function rate_of
 
 end module test_march_commit
