@@ -2,7 +2,8 @@
 !> follow parabolas.
 module test_mortar_stencil
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_chain_plane, only : chain_init, chain_t, next, previous
+   use emcon_chain_plane, only : chain_init, chain_shorter, chain_shortest, chain_t, &
+      chain_thickness, next, previous
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_mortar_frame, only : frame_t, local_master, n_place, pair_stencil_t, place_after, &
@@ -30,7 +31,8 @@ contains
          test_case_t("masters that are polygons", test_polygon), &
          test_case_t("slaves with averaged normals", test_slave), &
          test_case_t("positions and motions from the first node", test_gather), &
-         test_case_t("edges that face each other", test_faces)]
+         test_case_t("edges that face each other", test_faces), &
+         test_case_t("lengths and thicknesses beside nodes", test_lengths)]
    end subroutine collect_mortar_stencil
 
    subroutine make_chain(chain, scene, error)
@@ -225,5 +227,38 @@ contains
          end do
       end do
    end subroutine test_faces
+
+   !> The shortest edge at each node, the shorter one of each edge and its neighbours, the thickness
+   !> of the element behind; 1 where there is none.
+   subroutine test_lengths(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(chain_t) :: chain
+      real(wp), allocatable :: thickness(:)
+      real(wp) :: length(n)
+      integer :: e, k
+
+      call make_chain(chain, scene, error)
+      if (allocated(error)) return
+      length = place(:n - 1) - place(1:)
+      do k = 0, n
+         associate (i => findloc(chain%node, 2*(n + 1) - k, 1))
+            call check_near(error, chain_shortest(chain, i), minval(length(max(1, k):min(n, k &
+               + 1))), tol, 4.0_wp, "shortest")
+         end associate
+      end do
+      do e = 1, n
+         call check_near(error, chain_shorter(chain, e), [minval(length(max(1, e - 1):e)), &
+            minval(length(e:min(n, e + 1)))], tol, 4.0_wp, "shorter ones")
+      end do
+      scene%section = [scene%section, scene%section]
+      scene%section%thickness = [0.5_wp, 0.25_wp]
+      scene%element%section = [1, 1, 2, 2, 2]
+      chain%element(1) = 0
+      call chain_thickness(chain, scene, thickness)
+      ! From the left to the right: two elements, then three, the last of them unknown.
+      call check_near(error, thickness, [0.5_wp, 0.5_wp, 0.5_wp, 0.25_wp, 0.25_wp, 1.0_wp], &
+         0.0_wp, 1.0_wp, "thickness")
+   end subroutine test_lengths
 
 end module test_mortar_stencil
