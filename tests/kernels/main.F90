@@ -135,6 +135,7 @@ program main
    use test_stepper_free, only : collect_stepper_free
    use test_stepper_query, only : collect_stepper_query
    use test_system, only : collect_system
+   use test_thin_stress, only : collect_thin_stress
    use test_tied_contact, only : collect_tied_contact
    use test_tie, only : collect_tie
    use test_tie_partner, only : collect_tie_partner
@@ -270,6 +271,7 @@ program main
    call run("correction", collect_correction)
    call run("reduction", collect_reduction)
    call run("system", collect_system)
+   call run("thin_stress", collect_thin_stress)
    call run("line_search", collect_line_search)
    call run("name_index", collect_name_index)
    call run("near_laws", collect_near_laws)
