@@ -180,12 +180,15 @@ class Run:
 
 
 class Fields:
-    """The field file: times, `x` (n_node, n_dim) and fields (n_frame, n, n_component)."""
+    """The field file: times, `x` (n_node, n_dim) and fields (n_frame, n, n_component), each of which
+    is read when it is asked for first."""
 
     #: Cells of three dimensions.
     SPACE = (10, 12, 24, 25)
 
     def __init__(self, path):
+        self._path = path
+        self._written = path.stat().st_mtime_ns
         with h5py.File(path, "r") as file:
             root = file["VTKHDF"]
             steps = root["Steps"]
@@ -194,23 +197,29 @@ class Fields:
             self.n_dim = 3 if np.isin(root["Types"][:], self.SPACE).any() else 2
             self.x = root["Points"][:, :self.n_dim]
             self.cells = np.split(root["Connectivity"][:], root["Offsets"][1:-1])
-            self._data = {}
-            for kind in ("PointData", "CellData"):
-                n = len(self.x) if kind == "PointData" else len(self.cells)
-                starts = steps[f"{kind}Offsets"]
-                for name, values in root[kind].items():
-                    # Frames that follow one another are read at once.
-                    first = starts[name][:n_frame]
-                    rows = (first[:, None] + np.arange(n)).ravel()
-                    whole = values[:]
-                    if not np.array_equal(rows, np.arange(len(whole))):
-                        whole = whole[rows]
-                    self._data[name] = whole.reshape(n_frame, n, *whole.shape[1:])
+            self._kind = {name: kind for kind in ("PointData", "CellData") for name in root[kind]}
+        self._data = {}
+
+    def _read(self, name):
+        kind = self._kind[name]
+        assert self._path.stat().st_mtime_ns == self._written, f"{self._path} was written anew"
+        n, n_frame = len(self.x) if kind == "PointData" else len(self.cells), len(self.time)
+        with h5py.File(self._path, "r") as file:
+            root = file["VTKHDF"]
+            first = root["Steps"][f"{kind}Offsets"][name][:n_frame]
+            whole = root[kind][name][:]
+        # Frames that follow one another are read at once.
+        rows = (first[:, None] + np.arange(n)).ravel()
+        if not np.array_equal(rows, np.arange(len(whole))):
+            whole = whole[rows]
+        return whole.reshape(n_frame, n, *whole.shape[1:])
 
     def names(self):
-        return set(self._data)
+        return set(self._kind)
 
     def __getitem__(self, name):
+        if name not in self._data:
+            self._data[name] = self._read(name)
         values = self._data[name]
         is_vector = values.ndim == 3 and values.shape[2] == 3
         return values[..., :self.n_dim] if is_vector else values

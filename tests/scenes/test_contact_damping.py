@@ -208,9 +208,8 @@ def test_a_ring_keeps_momenta_and_pays_for_damping(more, tmp_path):
         obeys(run)
         keeps_momenta(run)
         assert run.history["cuts"].sum() == 0
+        assert run.history["contact_damping_loss"][-1] > 0.1*run.history["kinetic"][0]
     whole, part = (run.history for run in runs)
-    assert whole["contact_damping_loss"][-1] > 0.1*whole["kinetic"][0]
-    assert part["contact_damping_loss"][-1] > 0.01*part["kinetic"][0]
     for name in ("kinetic", "contact_damping_loss", "strain"):
         assert np.allclose(whole[name][:len(part)], part[name], rtol=1e-9, atol=1e-11)
 

@@ -134,6 +134,8 @@ def test_friction_of_a_stepper(sides, tmp_path):
     assert len(pairs) == (2 if sides == "BOTH" else 1)
     assert pairs[0].friction_loss == run.history["pair1_friction_loss"][-1] > 0
     assert all(pair.friction_loss == 0 for pair in pairs[1:])
-    # The sum of all contacts and that of the pair are formed in orders of their own.
+    # The sum of all contacts and that of the pair are formed in orders of their own: two sums of losses
+    # above 0, first over contacts, then over increments, half a rounding for each addition.
     assert lost == run.history["friction_loss"][-1]
-    assert lost == pytest.approx(pairs[0].friction_loss, rel=64*EPS)
+    terms = len(run.history) + run.history["active"].max()
+    assert lost == pytest.approx(pairs[0].friction_loss, rel=terms*EPS)

@@ -56,7 +56,7 @@ def test_one_step_from_the_same_state(pressed, tmp_path, initiation, h):
 @pytest.mark.parametrize("initiation", INITIATIONS)
 def test_histories(tmp_path, initiation):
     first, second = (
-        run_deck(DECK, tmp_path / method, h=0.01, t_end=1, initiation=initiation, method=method)
+        run_deck(DECK, tmp_path / method, h=0.02, t_end=1, initiation=initiation, method=method)
         for method in METHODS
     )
     np.testing.assert_array_equal(first.history["active"], second.history["active"])

@@ -15,7 +15,7 @@ RING = {"h": 0.02, "t_end": 3.0}
 
 
 @pytest.mark.parametrize(("deck", "parameters"), [
-    ("ring", RING), ("ring", {**RING, "formulation": "MORTAR"}), ("two_bodies", {})])
+    ("ring", RING), ("ring", {**RING, "formulation": "MORTAR"}), ("two_bodies", {"h": 0.02, "t_end": 1.2})])
 def test_both_end_at_the_same_step(tmp_path, deck, parameters):
     """Both leave some roundings of a residual in each increment, which the motion carries on."""
     kept, full = (run(deck, kind, tmp_path, **parameters) for kind in ("KEPT", "FULL"))
