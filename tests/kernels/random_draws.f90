@@ -4,7 +4,7 @@ module random_draws
    use emcon_kinds, only : dp, wp
    implicit none
    private
-   public :: draw_random
+   public :: draw_random, signs_of
 
    interface draw_random
       module procedure draw_0, draw_1, draw_2, draw_3
@@ -45,5 +45,19 @@ contains
          call draw_2(values(:, :, k))
       end do
    end subroutine draw_3
+
+   !> For differences along several freedoms at once: 1 or -1 by chance for each `n_way`-th of `n`,
+   !> from the `k`-th on, and 0. Errors of two columns of a derivative cancel by chance alone.
+   function signs_of(n, k, n_way) result(signs)
+      integer, intent(in) :: n, k, n_way             !! 1 <= k <= n_way
+      real(wp) :: signs(n), drawn(n)
+      integer :: i
+
+      call draw_random(drawn)
+      signs = 0.0_wp
+      do i = k, n, n_way
+         signs(i) = merge(1.0_wp, -1.0_wp, drawn(i) > 0.5_wp)
+      end do
+   end function signs_of
 
 end module random_draws

@@ -6,6 +6,7 @@ module test_stepper_query
    use emcon_errors, only : err_analysis, err_input, error_t
    use emcon_kinds, only : dp, wp
    use emcon_march, only : increment_t
+   use emcon_numbering, only : gather_dependent
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_t
    use emcon_stepper_conditions, only : stepper_remove_prescribed
@@ -173,11 +174,7 @@ contains
          ! Each entry is a sum of inertia, of the order of M v/h, and stresses.
          call check_near(error, unknown, 0.0_wp*unknown, 1.0e3_wp*eps, 1.0_wp/drop_h + young, &
             "residual of scene " // to_text(k))
-         ! What is left on nodes of ties is the force of the tie, no reaction.
-         if (k == 1) call check_near(error, nodal - nodal*merge(1.0_wp, 0.0_wp, &
-            stepper%march%system%space%numbering%unknown > 0), after%state%reaction*merge(0.0_wp, &
-            1.0_wp, stepper%march%system%space%numbering%unknown > 0), 1.0e3_wp*eps, &
-            1.0_wp/drop_h + young, "reactions")
+         call check_reactions(stepper, nodal, after%state%reaction, k)
          if (.not. allocated(error) .or. k > 1) call query_null_space(query, p, d, redundant, error)
          if (allocated(error)) return
          call query_multipliers(query, stepper, lam, error)
@@ -187,6 +184,27 @@ contains
          call query_free(query)
          call stepper_close(stepper)
       end subroutine solve
+
+      !> What is left on freedoms that are no unknowns are forces of ties, which act between what is
+      !> tied, and reactions.
+      subroutine check_reactions(stepper, nodal, reaction, k)
+         type(stepper_t), intent(in) :: stepper
+         real(wp), intent(in) :: nodal(:, :), reaction(:, :)
+         integer, intent(in) :: k
+         real(wp) :: free(size(nodal, 1), size(nodal, 2)), gathered(size(nodal, 1), size(nodal, 2))
+
+         associate (numbering => stepper%march%system%space%numbering)
+            free = merge(1.0_wp, 0.0_wp, numbering%unknown > 0)
+            gathered = nodal
+            call gather_dependent(numbering, gathered)
+            call check_near(error, gathered*(1.0_wp - free), reaction, 1.0e3_wp*eps, &
+               1.0_wp/drop_h + young, "reactions of scene " // to_text(k))
+            call check_near(error, sum(gathered, dim=2), sum(nodal, dim=2), 1.0e3_wp*eps, &
+               1.0_wp/drop_h + young, "forces of ties, scene " // to_text(k))
+            call check_true(error, maxval(abs(nodal*(1.0_wp - free))) > 1.0e-3_wp*young, &
+               "there are such forces in scene " // to_text(k))
+         end associate
+      end subroutine check_reactions
 
    end subroutine test_residual
 

@@ -258,7 +258,7 @@ contains
          scene%pair(1)%formulation = formulation(1 + mod(i, 3))
          deallocate(scene%step)
          allocate(scene%step(0))
-         call add_step(scene, .false., 0.02_wp, 40)
+         call add_step(scene, .false., 0.04_wp, 20)
          upper = minval(scene%surface(10)%element)
          upper = minval(scene%element%node(:3, upper))
          scene%x(2, upper:) = scene%x(2, upper:) + 0.02_wp
