@@ -14,7 +14,7 @@ module emcon_sealed_file
    !> Bytes at the start of a file that belong to the seal: the least that HDF5 allows.
    integer, parameter :: seal_size = 512
    character(len=*), parameter :: line_end = achar(10), mark = "EMCON" // line_end
-   integer, parameter :: block_size = 1048576         !! read at a time, a multiple of 4 [byte]
+   integer, parameter :: block_size = 65536           !! read at a time, a multiple of 4 [byte]
 
 contains
 
