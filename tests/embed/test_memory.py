@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from embed_tools import HERE, ROOT, SANITIZED, build, need, run
+from scene_tools import coarse_ring
 from test_interface_c import BAD_CALLS
 from test_space_arrays import deck, flight
 
@@ -17,7 +18,7 @@ DECKS = ROOT/"input_decks"
 #: The programs, and the arguments of each of their runs; {} is a folder to write into.
 RUNS = [
     # models of all formulations, one after the other
-    ("impact.c", DECKS/"ring.inp", *(f"h=0.1\nt_end=0.2\nformulation={formulation}"
+    ("impact.c", "{}/ring.inp", *(f"h=0.1\nt_end=0.2\nformulation={formulation}"
                                      for formulation in ("NODE TO SURFACE", "MORTAR", "SEGMENT"))),
     # arrays of exactly the size that is asked for, of the plane and of space
     ("exact_arrays.c", DECKS/"contact_patch.inp"),
@@ -75,6 +76,7 @@ def all_in_one(folder: Path, env: dict[str, str]) -> list[object]:
     """The program of all programs, and its arguments."""
     (folder/"wrong_contact.c").write_text(BAD_CALLS)
     deck(folder, flight("C3D8"))
+    coarse_ring().write(folder/"ring.inp")
     files = list(dict.fromkeys(name for name, *_ in RUNS))
     sources = [folder/name if (folder/name).exists() else HERE/name for name in files]
     objects = [compiled(source, folder, env) for source in sources]
