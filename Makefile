@@ -396,7 +396,8 @@ extremes: .venv/test.stamp  ## drive everything to its extremes; write the table
 
 SECONDS ?= 600
 soak: .venv/test.stamp  ## seeded fuzzers, SECONDS=600: decks, damaged files, calls, kills; threads
-	$(BUILDING) app lib
+	$(BUILDING) app lib kernels
+	@EMCON_TEST_CASES=10000 $(BUILD)/kernels contact_problem
 	@$(PY) tests/soak/soak.py --seconds $(SECONDS)
 	@EMCON_OPENS=20000 $(PY) -m pytest -q tests/embed/test_threads.py
 

@@ -14,7 +14,7 @@ module emcon_coulomb_law
    implicit none
    private
    public :: coulomb_t, contact_trial_t, slip_status_t, coulomb_trial, coulomb_map, &
-      coulomb_violation, is_same_status
+      coulomb_status, coulomb_violation, is_same_status
    public :: contact_open, contact_sticks, contact_slides, contact_free, contact_rests, &
       slip_rounding
 
@@ -158,6 +158,17 @@ contains
       if (rest%length > 0.0_wp) next = held_first(was, next, rest)
       if (is_undecided(was, rest, drag, most, unsure)) next = was
    end function coulomb_trial
+
+   !> How the law holds where it does.
+   pure type(slip_status_t) function coulomb_status(at, mu, stiffness) result(status)
+      type(contact_trial_t), intent(in) :: at
+      real(wp), intent(in) :: mu, stiffness          !! as in `coulomb_trial`
+
+      status = slip_status_t(contact_open)
+      if (.not. at%lam - stiffness*at%gap > 0.0_wp) return
+      status = status_of(remainder_of(at%tau + stiffness*at%slip, stiffness*at%slip_target), &
+         mu*(at%lam - stiffness*at%gap))
+   end function coulomb_status
 
    !> How the law holds where the trial leaves `rest`.
    pure type(slip_status_t) function status_of(rest, most) result(status)

@@ -23,6 +23,7 @@ program main
    use test_supernodal, only : collect_supernodal
 #endif
    use test_condition_rows, only : collect_condition_rows
+   use test_contact_problem, only : collect_contact_problem
    use test_constraints, only : collect_constraints
    use test_contact_laws, only : collect_contact_laws
    use test_correction, only : collect_correction
@@ -261,6 +262,7 @@ program main
    call run("rigidity", collect_rigidity)
    call run("rigid_bodies", collect_rigid_bodies)
    call run("condition_rows", collect_condition_rows)
+   call run("contact_problem", collect_contact_problem)
    call run("constraints", collect_constraints)
    call run("contact_laws", collect_contact_laws)
    call run("independent_rows", collect_independent_rows)

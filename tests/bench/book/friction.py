@@ -2,6 +2,7 @@
 holds, the ring on a free block."""
 
 import math
+import os
 import re
 import subprocess
 
@@ -258,15 +259,19 @@ def report_held(started, _):
 
 
 def start_random(runs):
-    return runs.pool.submit(subprocess.run, [PROGRAM.with_name("kernels"), "friction"],
-                            capture_output=True, text=True, check=True)
+    return runs.pool.submit(subprocess.run, [PROGRAM.with_name("kernels"), "contact_problem"],
+                            capture_output=True, text=True, check=True,
+                            env={**os.environ, "EMCON_TEST_CASES": "10000"})
 
 
 def report_random(started, _):
-    found = re.search(r"(\d+) problems, (\d+) not by trials alone, law missed by (\S+)",
-                      started.result().stdout)
-    return table(["problems", "solved", "by Lemke's method", "law"],
-                 [(found[1], found[1], found[2], size(float(found[3])))])
+    rows = re.findall(r"^   (\d) slips, ([a-z ]+?)(, targets)?: (\d+) of (\d+) not solved, (\d+) not by"
+                      r" trials alone, (\S+) trials each, law missed by (\S+)",
+                      started.result().stdout, re.MULTILINE)
+    return table(["slips", "W", "targets", "problems", "not solved", "not by trials alone",
+                  "trials", "law"],
+                 [(slips, kind, "yes" if leads else "no", n, missed, turned, trials,
+                   size(float(law))) for slips, kind, leads, missed, n, turned, trials, law in rows])
 
 
 # ---- ring ---------------------------------------------------------------------------------------

@@ -1,0 +1,426 @@
+!> Contacts that are linear in their forces, of five kinds: of elastic bodies, with and without a
+!> skew part, nearly singular, with rows that follow from others, and of one rigid body; without
+!> slips, in the plane and in space, with and without slips that lead somewhere.
+module test_contact_problem
+   use, intrinsic :: iso_fortran_env, only : output_unit
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_constraint, only : most_slips
+   use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
+      contact_problem_missed, contact_problem_solve, contact_problem_status, contact_problem_t
+   use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
+      contact_sticks, contact_trial_t, coulomb_violation, slip_status_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_lapack, only : dense_solve
+   use emcon_single_contact, only : single_contact_solve, single_contact_t, single_contact_trial
+   use emcon_text, only : to_text
+   use random_draws, only : draw_random
+   implicit none
+   private
+   public :: collect_contact_problem
+
+   real(wp), parameter :: eps = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+   integer, parameter :: definite = 1, unsymmetric = 2, nearly = 3, redundant = 4, rigid = 5
+   character(len=*), parameter :: kind_name(5) = [character(len=16) :: "definite", "unsymmetric", &
+      "nearly singular", "redundant", "one rigid body"]
+
+contains
+
+   subroutine collect_contact_problem(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("one contact by hand", test_by_hand), &
+         test_case_t("one contact at random: the law is met", test_one), &
+         test_case_t("the plane is space with one slip held", test_plane_in_space), &
+         test_case_t("frames that are turned", test_turned), &
+         test_case_t("the only one of all sets that obeys the law", test_all_sets), &
+         test_case_t("random problems of all kinds", test_kinds)]
+   end subroutine collect_contact_problem
+
+   !> Two units of compliance along the normal, one along the slip; gap -2 without forces: lam = 1.
+   subroutine test_by_hand(error)
+      type(error_t), allocatable, intent(out) :: error
+
+      call check_one(error, 0.0_wp, 0.0_wp, 0.5_wp, 0.0_wp, "at rest")
+      call check_one(error, 0.25_wp, 0.0_wp, 0.5_wp, 0.25_wp, "sticks")
+      call check_one(error, 2.0_wp, 0.0_wp, 0.5_wp, 0.5_wp, "slides")
+      call check_one(error, -2.0_wp, 0.0_wp, 0.5_wp, -0.5_wp, "slides back")
+      call check_one(error, 2.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, "without friction")
+      call check_one(error, 1.0_wp, 0.75_wp, 0.5_wp, 0.25_wp, "sticks where slip leads to")
+      call check_one(error, 2.0_wp, 0.75_wp, 0.5_wp, 0.5_wp, "slides past that")
+      call check_one(error, 0.5_wp, 0.75_wp, 0.5_wp, 0.0_wp, "free on the way")
+      call check_one(error, -0.25_wp, 0.75_wp, 0.5_wp, -0.25_wp, "rests")
+      call check_one(error, -2.0_wp, 0.75_wp, 0.5_wp, -0.5_wp, "slides from there")
+   end subroutine test_by_hand
+
+   !> Slip `slip` without forces, that leads to `lead`, takes friction `tau`.
+   subroutine check_one(error, slip, lead, mu, tau, name)
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp), intent(in) :: slip, lead, mu, tau
+      character(len=*), intent(in) :: name
+      type(single_contact_t) :: place
+      integer :: n_slip
+
+      do n_slip = 1, 2
+         place = single_contact_t()
+         place%n_slip = n_slip
+         place%w(0, 0) = 2.0_wp
+         place%w(1, 1) = 1.0_wp
+         place%w(2, 2) = 1.0_wp
+         place%free = [-2.0_wp, 0.0_wp, 0.0_wp]
+         place%free(n_slip) = -slip
+         place%slip_target(n_slip) = lead
+         place%mu = mu
+         call check_near(error, single_contact_solve(place), [1.0_wp, merge(tau, 0.0_wp, &
+            n_slip == 1), merge(tau, 0.0_wp, n_slip == 2)], 8.0_wp*epsilon(1.0_wp), 1.0_wp, name)
+      end do
+      place%free(0) = 0.5_wp
+      call check_near(error, single_contact_solve(place), spread(0.0_wp, 1, 3), 0.0_wp, 1.0_wp, &
+         name // ", open")
+   end subroutine check_one
+
+   !> Any coefficient, coupling and target: the law by what the forces lead to.
+   subroutine test_one(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(single_contact_t) :: place
+      real(wp) :: a(0:2, 0:2), u(7), force(0:most_slips), missed
+      integer :: i, k
+
+      do i = 1, 2000
+         place = single_contact_t()
+         place%n_slip = mod(i, 3)
+         call draw_normal(a)
+         call draw_random(u)
+         associate (s => place%n_slip)
+            place%w(:s, :s) = matmul(a(:s, :), transpose(a(:s, :)))
+            do k = 0, s
+               place%w(k, k) = place%w(k, k) + 0.05_wp
+            end do
+            place%free(:s) = 2.0_wp*u(:1 + s) - 1.0_wp
+            if (mod(i, 2) == 0) place%slip_target(:s) = u(4:3 + s) - 0.5_wp
+         end associate
+         place%mu = 2.0_wp*u(7)
+         place%stiffness = 1.0_wp/place%w(0, 0)
+         force = single_contact_solve(place)
+         missed = coulomb_violation(single_contact_trial(place, force), place%mu, place%stiffness)
+         ! Of a solve with W, whose condition is below some 1e3.
+         call check_true(error, missed <= 1.0e4_wp*epsilon(1.0_wp)*max(1.0_wp, force(0)), &
+            "case " // to_text(i) // ": missed by " // to_text(missed, 3))
+      end do
+   end subroutine test_one
+
+   !> A second slip that nothing moves changes nothing.
+   subroutine test_plane_in_space(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_problem_t) :: plane, space
+      type(contact_effort_t) :: effort
+      real(wp), allocatable :: in_plane(:, :), in_space(:, :)
+      integer, allocatable :: kept(:)
+      integer :: i, k, n
+      logical :: is_solved
+
+      do i = 1, 50
+         call make_problem(plane, 1, merge(definite, unsymmetric, mod(i, 2) == 0), mod(i, 3) == 0)
+         n = size(plane%mu)
+         plane%mu = 0.3_wp*plane%mu
+         call contact_problem_create(space, 2, n)
+         kept = [(3*(k - 1) + [1, 2], k = 1, n)]
+         do k = 1, n
+            space%w(3*k, 3*k) = 1.0_wp
+         end do
+         space%w(kept, kept) = plane%w
+         space%free(:1, :) = plane%free
+         space%slip_target(1, :) = plane%slip_target(1, :)
+         space%mu = plane%mu
+         call solve(plane, in_plane, effort, is_solved)
+         call check_true(error, is_solved, "plane")
+         call solve(space, in_space, effort, is_solved)
+         call check_true(error, is_solved, "space")
+         if (allocated(error)) return
+         call check_near(error, in_space(:1, :), in_plane, 1.0e6_wp*eps, maxval(in_plane), "forces")
+         call check_near(error, in_space(2, :), 0.0_wp*in_space(2, :), 1.0e6_wp*eps, &
+            maxval(in_plane), "nothing across")
+      end do
+   end subroutine test_plane_in_space
+
+   !> Tangents that are turned turn friction with them.
+   subroutine test_turned(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_problem_t) :: problem
+      type(contact_effort_t) :: effort
+      real(wp), allocatable :: turn(:, :), force(:, :), turned(:, :)
+      real(wp) :: angle
+      integer :: i, k, n
+      logical :: is_solved
+
+      do i = 1, 50
+         call make_problem(problem, 2, merge(definite, unsymmetric, mod(i, 2) == 0), mod(i, 3) == 0)
+         problem%mu = 0.3_wp*problem%mu
+         n = size(problem%mu)
+         if (allocated(turn)) deallocate(turn)
+         allocate(turn(3*n, 3*n), source=0.0_wp)
+         call solve(problem, force, effort, is_solved)
+         call check_true(error, is_solved, "as drawn")
+         if (allocated(error)) return
+         do k = 1, n
+            call draw_random(angle)
+            angle = 8.0_wp*angle
+            turn(3*k - 2, 3*k - 2) = 1.0_wp
+            turn(3*k - 1:3*k, 3*k - 1) = [cos(angle), sin(angle)]
+            turn(3*k - 1:3*k, 3*k) = [-sin(angle), cos(angle)]
+            problem%slip_target(:, k) = matmul(turn(3*k - 1:3*k, 3*k - 1:3*k), &
+               problem%slip_target(:, k))
+         end do
+         problem%w = matmul(turn, matmul(problem%w, transpose(turn)))
+         problem%free = reshape(matmul(turn, reshape(problem%free, [3*n])), [3, n])
+         call solve(problem, turned, effort, is_solved)
+         call check_true(error, is_solved, "turned")
+         if (allocated(error)) return
+         call check_near(error, reshape(turned, [3*n]), matmul(turn, reshape(force, [3*n])), &
+            1.0e6_wp*eps, maxval(abs(force)), "forces")
+      end do
+   end subroutine test_turned
+
+   !> In the plane each contact is open, sticks or slides to either side: of all 4^n sets those that
+   !> obey the law are looked for by another way, a linear solve of each. With small coefficients
+   !> there is one.
+   subroutine test_all_sets(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_problem_t) :: problem
+      type(contact_effort_t) :: effort
+      type(slip_status_t) :: status
+      real(wp), allocatable :: force(:, :), expected(:, :)
+      integer :: i, k, n, set, n_found, code
+      logical :: is_solved, obeys
+
+      do i = 1, 100
+         call make_problem(problem, 1, definite, .false., 1 + mod(i, 4))
+         problem%mu = 0.2_wp*problem%mu
+         n = size(problem%mu)
+         call solve(problem, force, effort, is_solved)
+         call check_true(error, is_solved, "solved")
+         if (allocated(error)) return
+         n_found = 0
+         do set = 0, 4**n - 1
+            call solve_in_set(problem, set, expected, obeys)
+            if (.not. obeys) cycle
+            n_found = n_found + 1
+            call check_near(error, force, expected, 1.0e6_wp*eps, maxval(abs(expected)), "forces")
+            do k = 1, n
+               code = mod(set/4**(k - 1), 4)
+               status = contact_problem_status(problem, force, k)
+               call check_equal(error, status%kind, merge(contact_open, merge(contact_sticks, &
+                  contact_slides, code == 1), code == 0), "status")
+            end do
+         end do
+         call check_equal(error, n_found, 1, "solutions of case " // to_text(i))
+      end do
+   end subroutine test_all_sets
+
+   !> Forces where contact k is as digit k of `set` to the base 4 says: open, sticks, slides on,
+   !> slides back.
+   subroutine solve_in_set(problem, set, force, obeys)
+      type(contact_problem_t), intent(in) :: problem
+      integer, intent(in) :: set
+      real(wp), allocatable, intent(out) :: force(:, :)
+      logical, intent(out) :: obeys
+      real(dp), dimension(size(problem%w, 1), size(problem%w, 1)) :: a
+      real(dp), dimension(size(problem%w, 1), 1) :: b, x
+      real(wp) :: motion(0:1, size(problem%mu)), side
+      integer :: i, n, code
+      logical :: is_singular
+
+      n = size(problem%mu)
+      a = real(problem%w, dp)
+      b(:, 1) = real(reshape(-problem%free, [2*n]), dp)
+      do i = 1, n
+         code = mod(set/4**(i - 1), 4)
+         if (code == 0) call put(2*i - 1, 0.0_wp)
+         if (code /= 1) call put(2*i, merge(0.0_wp, real(5 - 2*code, wp)*problem%mu(i), code == 0))
+      end do
+      call dense_solve(a, b, x, is_singular)
+      force = reshape(real(x(:, 1), wp), [2, n])
+      motion = problem%free + reshape(matmul(problem%w, reshape(force, [2*n])), [2, n])
+      obeys = .not. is_singular
+      do i = 1, n
+         code = mod(set/4**(i - 1), 4)
+         side = real(5 - 2*code, wp)
+         if (code == 0) obeys = obeys .and. motion(0, i) >= 0.0_wp
+         if (code > 0) obeys = obeys .and. force(1, i) >= 0.0_wp
+         if (code == 1) obeys = obeys .and. abs(force(2, i)) <= problem%mu(i)*force(1, i)
+         if (code > 1) obeys = obeys .and. -side*motion(1, i) >= 0.0_wp
+      end do
+
+   contains
+
+      !> Row `k` says that force `k` is `part` of the push before it.
+      subroutine put(k, part)
+         integer, intent(in) :: k
+         real(wp), intent(in) :: part
+
+         a(k, :) = 0.0_dp
+         a(k, k) = 1.0_dp
+         if (mod(k, 2) == 0) a(k, k - 1) = -real(part, dp)
+         b(k, 1) = 0.0_dp
+      end subroutine put
+
+   end subroutine solve_in_set
+
+   !> All that are well posed are solved, and of the others at most one of a thousand is not; the
+   !> law is met by each solution as it was asked for. EMCON_TEST_CASES: how many of a kind.
+   subroutine test_kinds(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_problem_t) :: problem
+      type(contact_effort_t) :: effort
+      real(wp), allocatable :: force(:, :)
+      integer :: n_case, n_slip, kind, lead, i, n_missed, n_turned, n_trial
+      real(wp) :: worst
+      logical :: is_solved
+
+      n_case = asked_cases(60)
+      do n_slip = 0, 2
+         do kind = definite, rigid
+            do lead = 0, min(n_slip, 1)
+               n_missed = 0
+               n_turned = 0
+               n_trial = 0
+               worst = 0.0_wp
+               do i = 1, n_case
+                  call make_problem(problem, n_slip, kind, lead == 1)
+                  call solve(problem, force, effort, is_solved)
+                  n_trial = n_trial + effort%n_trial
+                  if (effort%n_sweep > 0) n_turned = n_turned + 1
+                  if (.not. is_solved) then
+                     n_missed = n_missed + 1
+                  else if (effort%n_pivot == 0) then
+                     worst = max(worst, contact_problem_missed(problem, force))
+                  end if
+               end do
+               if (n_case > 1000) write(output_unit, "(a)") "   " // to_text(n_slip) // " slips, " &
+                  // trim(kind_name(kind)) // trim(merge(", targets", "         ", lead == 1)) &
+                  // ": " // to_text(n_missed) // " of " // to_text(n_case) // " not solved, " &
+                  // to_text(n_turned) // " not by trials alone, " &
+                  // to_text(real(n_trial, wp)/n_case, 2) // " trials each, law missed by " &
+                  // to_text(worst, 2)
+               call check_true(error, worst < 1.0e6_wp*eps, "law: " // trim(kind_name(kind)))
+               call check_true(error, n_missed <= merge(0, n_case, kind <= unsymmetric)/1000, &
+                  "solved: " // trim(kind_name(kind)))
+               call check_true(error, n_turned <= n_case/4, "by trials: " // trim(kind_name(kind)))
+            end do
+         end do
+      end do
+   end subroutine test_kinds
+
+   integer function asked_cases(otherwise) result(n)
+      integer, intent(in) :: otherwise
+      character(len=12) :: text
+      integer :: status
+
+      call get_environment_variable("EMCON_TEST_CASES", text, status=status)
+      n = otherwise
+      if (status == 0) read(text, *) n
+   end function asked_cases
+
+   !> From forces of 0.
+   subroutine solve(problem, force, effort, is_solved)
+      type(contact_problem_t), intent(in) :: problem
+      real(wp), allocatable, intent(out) :: force(:, :)
+      type(contact_effort_t), intent(out) :: effort
+      logical, intent(out) :: is_solved
+
+      allocate(force(0:problem%n_slip, size(problem%mu)), source=0.0_wp)
+      call contact_problem_solve(problem, force, effort, is_solved)
+   end subroutine solve
+
+   !> 1 to 12 contacts, or `asked`, with coefficients up to 1.
+   subroutine make_problem(problem, n_slip, kind, leads, asked)
+      type(contact_problem_t), intent(out) :: problem
+      integer, intent(in) :: n_slip, kind
+      logical, intent(in) :: leads                   !! slips have targets
+      integer, intent(in), optional :: asked
+      real(wp), allocatable :: a(:, :), skew(:, :)
+      real(wp) :: u
+      integer :: n, m, i, rank
+
+      call draw_random(u)
+      n = 1 + min(11, int(12.0_wp*u))
+      if (present(asked)) n = asked
+      m = (1 + n_slip)*n
+      call contact_problem_create(problem, n_slip, n)
+      rank = m
+      if (kind == nearly) rank = max(1, m - 2)
+      if (kind == redundant) rank = max(2, m/2)
+      if (kind == rigid) rank = merge(6, 3, n_slip == 2)
+      allocate(a(m, rank), skew(m, m))
+      call draw_normal(a)
+      if (kind == rigid) call make_rigid(a, n_slip, n)
+      problem%w = matmul(a, transpose(a))/merge(1, m, kind == rigid)
+      do i = 1, m
+         if (kind <= unsymmetric) problem%w(i, i) = problem%w(i, i) + 0.05_wp
+         if (kind == nearly) problem%w(i, i) = problem%w(i, i) + 5.0e5_wp*eps
+      end do
+      if (kind == unsymmetric) then
+         call draw_normal(skew)
+         problem%w = problem%w + 0.05_wp/sqrt(real(m, wp))*(skew - transpose(skew))
+      end if
+      problem%free = reshape(normals(m), shape(problem%free))
+      ! Some motion opens all: it is none of a wedge.
+      if (kind > unsymmetric) problem%free = reshape(matmul(a, normals(rank)), shape(problem%free))
+      call draw_random(problem%mu)
+      if (leads) problem%slip_target = reshape(normals(n_slip*n), shape(problem%slip_target))
+   end subroutine make_problem
+
+   !> Rows of normals and tangents of random places of a body of mass and inertia 1.
+   subroutine make_rigid(a, n_slip, n)
+      real(wp), intent(inout) :: a(:, :)             !! ((1 + n_slip) n, 3 in the plane, 6 in space)
+      integer, intent(in) :: n_slip, n
+      real(wp) :: frame(3, 0:2), place(3), arm(3)
+      integer :: i, k
+      logical :: is_plane
+
+      is_plane = n_slip < 2
+      do i = 1, n
+         place = normals(3)
+         frame(:, 0) = normals(3)
+         if (is_plane) place(3) = 0.0_wp
+         if (is_plane) frame(3, 0) = 0.0_wp
+         frame(:, 0) = frame(:, 0)/norm2(frame(:, 0))
+         frame(:, 2) = [0.0_wp, 0.0_wp, 1.0_wp]
+         frame(:, 1) = cross(frame(:, 2), frame(:, 0))
+         frame(:, 1) = frame(:, 1)/norm2(frame(:, 1))
+         frame(:, 2) = cross(frame(:, 0), frame(:, 1))
+         do k = 0, n_slip
+            arm = cross(place, frame(:, k))
+            if (is_plane) a((1 + n_slip)*(i - 1) + 1 + k, :) = [frame(:2, k), arm(3)]
+            if (.not. is_plane) a((1 + n_slip)*(i - 1) + 1 + k, :) = [frame(:, k), arm]
+         end do
+      end do
+   end subroutine make_rigid
+
+   pure function cross(a, b) result(c)
+      real(wp), intent(in) :: a(3), b(3)
+      real(wp) :: c(3)
+
+      c = a([2, 3, 1])*b([3, 1, 2]) - a([3, 1, 2])*b([2, 3, 1])
+   end function cross
+
+   function normals(n) result(x)
+      integer, intent(in) :: n
+      real(wp) :: x(n), column(n, 1)
+
+      call draw_normal(column)
+      x = column(:, 1)
+   end function normals
+
+   !> Of a normal distribution (Box and Muller).
+   subroutine draw_normal(x)
+      real(wp), intent(out) :: x(:, :)
+      real(wp), dimension(size(x, 1), size(x, 2)) :: u, v
+
+      call draw_random(u)
+      call draw_random(v)
+      x = sqrt(-2.0_wp*log(1.0_wp - u))*cos(8.0_wp*atan(1.0_wp)*v)
+   end subroutine draw_normal
+
+end module test_contact_problem
