@@ -82,6 +82,7 @@ program main
    use test_line_search, only : collect_line_search
    use test_links, only : collect_links
    use test_loads, only : collect_loads
+   use test_press_face, only : collect_press_face
    use test_march, only : collect_march
    use test_march_check, only : collect_march_check
    use test_march_commit, only : collect_march_commit
@@ -258,6 +259,7 @@ program main
    call run("arcs", collect_arcs)
    call run("linear_rows", collect_linear_rows)
    call run("loads", collect_loads)
+   call run("press_face", collect_press_face)
    call run("rigid_motion", collect_rigid_motion)
    call run("rigidity", collect_rigidity)
    call run("rigid_bodies", collect_rigid_bodies)
