@@ -9,7 +9,7 @@ module test_near_laws
    use emcon_interactions, only : contact_damping_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
-   use emcon_near_laws, only : near_laws_are_none, near_laws_begin_step, near_laws_restart, &
+   use emcon_near_laws, only : near_laws_are_none, near_laws_begin_step, &
       near_laws_select, near_laws_t, near_laws_update
    use emcon_scene, only : scene_t
    use emcon_system, only : system_t
@@ -90,8 +90,6 @@ contains
       acts(3) = .true.
       call near_laws_update(laws, system, 1, acts, grows)
       call check_true(error, grows .and. laws%is_near(3), "one more")
-      call near_laws_restart(laws)
-      call check_true(error, .not. any(laws%is_near), "none in the next increment")
       call open(given, reach, .true., system, laws)
       call check_true(error, near_laws_are_none(laws, system%contact(1)%contact), "in statics")
       call open(given, -1.0_wp, .false., system, laws)
