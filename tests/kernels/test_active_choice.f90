@@ -547,6 +547,8 @@ contains
       active%is_dropped = .true.
       active%is_put_off = .true.
       active%is_let_go = .true.
+      active%near_laws%is_on = .true.
+      active%near_laws%is_near = active%is_let_go
    end subroutine soil
 
    pure logical function is_clean(active)
@@ -555,7 +557,7 @@ contains
       is_clean = all([active%n_newton, active%n_tried, active%n_stale, active%n_early, &
          active%penalty%n_augmentation] == 0) .and. .not. any([active%only_adds, &
          active%has_cycled, active%one_by_one, active%comes_and_goes, active%is_dropped, &
-         active%is_put_off, active%is_let_go])
+         active%is_put_off, active%is_let_go, active%near_laws%is_near])
    end function is_clean
 
    !> Surfaces 1 apart at a look as the nodes had gone 0.5: each of two sides may have closed by
