@@ -33,7 +33,7 @@ contains
          explicit%residual = system%response%residual
          call pick_unknowns(system%space%numbering, explicit%residual, residual)
          explicit%v1 = self%end_state%v
-         call end_velocities(self, explicit%v1)
+         call end_velocities(system, self%motion, explicit%v1)
          if (explicit%is_free) then
             explicit%mu = [real(wp) ::]
             call add_to_dofs(system%space%numbering, residual/explicit%mass, -0.5_wp*h, &

@@ -54,7 +54,8 @@ contains
          system%response%residual = system%response%residual - self%newton%contact
          call gather_dependent(system%space%numbering, system%response%residual)
          call book_stabilization(self, increment)
-         where (system%space%numbering%unknown > 0) system%response%residual = 0.0_wp
+         system%response%residual = merge(0.0_wp, system%response%residual, &
+            system%space%numbering%unknown > 0)
          state%reaction = system%response%residual/(1.0_wp + self%motion%evaluation%start_weight)
          if (set%n_permanent > 0) call constraints_force(set, set%n_permanent + 1, &
             self%newton%contact)
@@ -63,7 +64,7 @@ contains
             call explicit_commit(self, h, error)
             if (allocated(error)) return
          else
-            call end_velocities(self, self%end_state%v)
+            call end_velocities(system, self%motion, self%end_state%v)
             call book_work(self)
          end if
          call march_past_keep(self, h)
@@ -118,16 +119,19 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: h                  !! > 0 [T]
-      real(wp) :: lag, place(size(scene%x, 1), size(scene%x, 2))
+      real(wp) :: lag
 
       associate (state => self%state, system => self%system, explicit => self%explicit)
          if (.not. self%active%penalty%is_at_ends) then
             lag = 1.0_wp - evaluation_contact_place(self%motion%evaluation)
-            place = state%u
-            ! Forces act where nodes without mass were before their balance.
-            if (self%layer%is_settled) place = state%u + (self%motion%du - self%end_state%du)
-            call pair_record_measure(state%pairs, system, self%active%set, scene%x, place, &
-               self%motion%du, lag)
+            if (self%layer%is_settled) then
+               ! Forces act where nodes without mass were before their balance.
+               call pair_record_measure(state%pairs, system, self%active%set, scene%x, state%u &
+                  + (self%motion%du - self%end_state%du), self%motion%du, lag)
+            else
+               call pair_record_measure(state%pairs, system, self%active%set, scene%x, state%u, &
+                  self%motion%du, lag)
+            end if
             call pair_sums_add(state%sums, system, self%active%set, self%motion, h)
             call record_jumps(self, scene, h)
             return

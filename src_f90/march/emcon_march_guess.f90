@@ -5,6 +5,7 @@ module emcon_march_guess
    use emcon_kinds, only : wp
    use emcon_march_past, only : march_past_take
    use emcon_march_types, only : march_t
+   use emcon_motion, only : motion_t
    use emcon_numbering, only : spread_dependent
    use emcon_prescribed, only : prescribed_motion
    use emcon_scene, only : scene_t
@@ -65,21 +66,20 @@ contains
    end subroutine march_guess
 
    !> The velocities at the end of the solved step; those that are prescribed stand.
-   subroutine end_velocities(self, v)
-      type(march_t), intent(in) :: self
+   subroutine end_velocities(system, motion, v)
+      type(system_t), intent(in) :: system
+      type(motion_t), intent(in) :: motion                   !! of the step
       real(wp), intent(inout), contiguous :: v(:, :)         !! (n_dim, n_node) [L/T]
       integer :: i, a
 
-      associate (motion => self%motion, unknown => self%system%space%numbering%unknown)
-         do i = 1, size(v, 2)
-            do a = 1, size(v, 1)
-               if (.not. unknown(a, i) > 0) cycle
-               v(a, i) = evaluation_velocity(motion%evaluation, motion%v0(a, i), motion%du(a, i))
-               if (allocated(motion%v_past)) v(a, i) = v(a, i) + motion%v_past(a, i)
-            end do
+      do i = 1, size(v, 2)
+         do a = 1, size(v, 1)
+            if (.not. system%space%numbering%unknown(a, i) > 0) cycle
+            v(a, i) = evaluation_velocity(motion%evaluation, motion%v0(a, i), motion%du(a, i))
+            if (allocated(motion%v_past)) v(a, i) = v(a, i) + motion%v_past(a, i)
          end do
-      end associate
-      call follow_links(self%system, v)
+      end do
+      call follow_links(system, v)
    end subroutine end_velocities
 
    !> Let dependent entries of a motion follow the others, also where `numbering` does not know

@@ -1,5 +1,6 @@
 !> The air across which contact forces act: what the constraints hold open.
 module emcon_stand_off
+   use emcon_constraint, only : condition_t
    use emcon_constraints, only : constraint_index, constraint_set_t
    use emcon_kinds, only : wp
    use emcon_system, only : system_t
@@ -25,28 +26,40 @@ contains
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(in) :: h                  !! [T]
-      real(wp) :: force(set%n), gap
-      integer :: k, pair, i, first
+      real(wp) :: force, largest, gap
+      integer :: k, pair, i
 
-      first = set%n_permanent + 1
-      do k = first, set%n
-         associate (item => set%item(k))
-            associate (total => sum(item%g(:, :item%n_slave), dim=2))
-               force(k) = abs(set%lam(k))*sqrt(dot_product(total, total))   ! norm2 knows the units
-            end associate
-         end associate
+      largest = 0.0_wp
+      do k = set%n_permanent + 1, set%n
+         largest = max(largest, push_of(set%item(k), set%lam(k)))
       end do
-      do k = first, set%n
-         if (force(k) <= least_force*maxval(force(first:))) cycle
+      do k = set%n_permanent + 1, set%n
+         force = push_of(set%item(k), set%lam(k))
+         if (force <= least_force*largest) cycle
          call constraint_index(system, set%id(k), pair, i)
          associate (state => system%contact(pair)%contact%state(i))
             gap = max(0.0_wp, state%gap1)/state%size
          end associate
          self%largest = max(self%largest, gap)
-         self%impulse = self%impulse + force(k)*h
-         self%impulse_gap = self%impulse_gap + force(k)*h*gap
+         self%impulse = self%impulse + force*h
+         self%impulse_gap = self%impulse_gap + force*h*gap
       end do
    end subroutine stand_off_add
+
+   !> The force on the slave nodes of a contact together [M L/T^2].
+   pure real(wp) function push_of(item, lam)
+      type(condition_t), intent(in) :: item
+      real(wp), intent(in) :: lam                !! its multiplier
+      real(wp) :: total
+      integer :: d
+
+      ! By squares: norm2 knows the units.
+      total = 0.0_wp
+      do d = 1, size(item%g, 1)
+         total = total + sum(item%g(d, :item%n_slave))**2
+      end do
+      push_of = abs(lam)*sqrt(total)
+   end function push_of
 
    !> Mean gap, weighted by the impulses that went across it.
    pure real(wp) function stand_off_mean(self)
