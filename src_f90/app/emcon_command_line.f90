@@ -9,6 +9,10 @@ module emcon_command_line
    private
    public :: command_t, command_read, usage
 
+   !> Commands that are made in Python, beside those of the program.
+   character(len=*), parameter :: of_package(6) = [character(len=7) :: "plot", "animate", &
+      "compare", "summary", "mesh", "study"]
+
    type :: command_t
       character(len=:), allocatable :: verb      !! run, check, restart, version or help
       character(len=:), allocatable :: path
@@ -80,6 +84,9 @@ contains
       call nearest_word(self%path, verb, near)
       if (n_plain == 1 .and. (word == "run" .or. word == "check" .or. word == "restart")) then
          self%verb = word
+      else if (n_plain == 1 .and. any(word == of_package)) then
+         self%fault = "'" // word // "' is a command of the Python package: python -m emcon " &
+            // word
       else if (len(self%path) == 0) then
          self%path = word
       else

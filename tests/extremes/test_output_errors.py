@@ -10,6 +10,7 @@ import time
 
 import h5py
 import pytest
+from emcon.__main__ import _COMMANDS as COMMANDS
 from scene_tools import DECKS, PROGRAM, Run, assert_no_crash, emcon, root_user, run_deck
 
 DECK = DECKS / "ring.inp"
@@ -78,6 +79,8 @@ def test_code_2(tmp_path, arguments):
         ([DECK, "--set", "hh=1"], "did you mean H? (known: H=0.01"),
         (["restart", "no_such.rst.h5"], "no_such.rst.h5: there is no such file"),
         ([DECK, "--output", "--quiet"], "--output needs a value"),
+        *(([verb, "run"], f"a command of the Python package: python -m emcon {verb}")
+          for verb in COMMANDS),
     ],
 )
 def test_a_slip_is_told_with_what_is_known(tmp_path, arguments, words):
