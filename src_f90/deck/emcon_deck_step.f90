@@ -41,6 +41,9 @@ module emcon_deck_step
    private
    public :: read_steps
 
+   !> Increments of a step are counted in default integers, those that are cut too.
+   real(wp), parameter :: most_increments = 0.5_wp*huge(1)
+
 contains
 
    !> All steps, after the model has been read.
@@ -286,20 +289,27 @@ contains
       type(data_t), intent(inout) :: data
       real(wp), intent(in) :: value(4)             !! h, duration, h_min, h_max
 
-      if (value(1) <= 0.0_wp) then
-         call data_error(reader, data, "the increment " // to_text(value(1)) // " is not positive")
-      else if (value(2) <= 0.0_wp) then
-         call data_error(reader, data, "the duration " // to_text(value(2)) // " is not positive")
-      else if (value(2) < value(1)) then
-         call data_error(reader, data, "the duration " // to_text(value(2)) &
-            // " is less than the increment " // to_text(value(1)))
-      else if (value(3) < 0.0_wp .or. value(3) > value(1)) then
-         call data_error(reader, data, "the least increment " // to_text(value(3)) &
-            // " must lie between 0 and the increment " // to_text(value(1)))
-      else if (value(4) < 0.0_wp .or. (value(4) > 0.0_wp .and. value(4) < value(1))) then
-         call data_error(reader, data, "the largest increment " // to_text(value(4)) &
-            // " is less than the increment " // to_text(value(1)))
-      end if
+      associate (h => value(1), duration => value(2), least => value(3), most => value(4))
+         if (h <= 0.0_wp) then
+            call data_error(reader, data, "the increment " // to_text(h) // " is not positive")
+         else if (duration <= 0.0_wp) then
+            call data_error(reader, data, "the duration " // to_text(duration) &
+               // " is not positive")
+         else if (duration < h) then
+            call data_error(reader, data, "the duration " // to_text(duration) &
+               // " is less than the increment " // to_text(h))
+         else if (duration > most_increments*h) then
+            call data_error(reader, data, "the duration " // to_text(duration) // " is more than " &
+               // to_text(most_increments) // " increments of " // to_text(h) &
+               // ", which cannot be counted: give a larger first increment")
+         else if (least < 0.0_wp .or. least > h) then
+            call data_error(reader, data, "the least increment " // to_text(least) &
+               // " must lie between 0 and the increment " // to_text(h))
+         else if (most < 0.0_wp .or. (most > 0.0_wp .and. most < h)) then
+            call data_error(reader, data, "the largest increment " // to_text(most) &
+               // " is less than the increment " // to_text(h))
+         end if
+      end associate
    end subroutine check_times
 
    subroutine read_newton(reader, card, step)
