@@ -296,8 +296,9 @@ contains
 
       self%n_tried = self%n_tried + 1
       self%tried(:, self%n_tried) = self%is_active
-      if (self%set%n_condition == 0 .and. .not. (any(self%is_active) .or. self%near_laws%is_on)) &
-         return
+      if (self%set%n_condition == 0 .and. .not. self%near_laws%is_on) then
+         if (.not. any(self%is_active)) return
+      end if
       is_known = .false.
       if (present(is_measured)) is_known = is_measured
       if (.not. is_known) call measure_all(self, system, motion)

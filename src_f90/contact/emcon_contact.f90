@@ -337,8 +337,9 @@ contains
          call find_normals(item)
          return
       end if
-      if (.not. evaluation_is_equilibrium(motion%evaluation) .or. any(item%has_friction)) &
+      if (.not. evaluation_is_equilibrium(motion%evaluation) .or. any(item%has_friction)) then
          call self%evaluate(wanted, motion%x, motion%u0, motion%du, target, item)
+      end if
       if (.not. (evaluation_is_equilibrium(motion%evaluation) &
          .or. motion%evaluation%pushes_at_end)) then
          call find_normals(item)

@@ -252,8 +252,9 @@ contains
       call polygon_stencil(stencil, self%master, self%node(i), edge, &
          self%rounding*[1.0_wp, top], x, u0)
       ! Guards watch the mesh.
-      if (.not. (self%step%is_sharp .or. self%meets_statics .or. self%slack > 0.0_wp)) &
+      if (.not. (self%step%is_sharp .or. self%meets_statics .or. self%slack > 0.0_wp)) then
          call corner_tops(self%slave, self%chain_node(i), self%master, edge, x, u0, stencil)
+      end if
       stencil%goes_around = self%offset > 0.0_wp
       associate (n => stencil%n, before => stencil%before, after => stencil%after)
          if (after > 0) then

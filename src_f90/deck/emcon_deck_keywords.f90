@@ -180,8 +180,9 @@ contains
       integer :: i
 
       do i = 1, size(refusals)
-         if (index("," // squeezed(refusals(i)%names) // ",", "," // name // ",") > 0) &
+         if (index("," // squeezed(refusals(i)%names) // ",", "," // name // ",") > 0) then
             refusal = refusals(i)
+         end if
       end do
    end function refusal_of
 

@@ -205,8 +205,9 @@ contains
       call phase_enter(self%system%phases, phase_restitution, left)
       call jumps_begin(self%end_state%jump)
       has_inertia = evaluation_has_inertia(self%motion%evaluation)
-      if (step_initiation(scene%step(self%state%clock%i_step)) == initiation_velocity_update) &
+      if (step_initiation(scene%step(self%state%clock%i_step)) == initiation_velocity_update) then
          call restore_energy(self, notes, error)
+      end if
       if (has_inertia .and. self%active%set%n > self%active%set%n_permanent &
          .and. .not. allocated(error)) call restitution_take(self, notes, error)
       if (has_inertia) call quasi_static_move(self, h)
@@ -238,8 +239,9 @@ contains
             state%contacts%is_active(set%id(k)) = .true.
             state%contacts%lam(set%id(k)) = set%lam(k)
             ! What has opened stores nothing that a later step could give back.
-            if (set%penalty%is_on .and. set%penalty%is_stored .and. k > set%n_permanent) &
+            if (set%penalty%is_on .and. set%penalty%is_stored .and. k > set%n_permanent) then
                state%contacts%is_active(set%id(k)) = set%law(k)%row%closure() < 0.0_wp
+            end if
             if (size(state%contacts%drag) > 0) call keep_slip(self, k)
          end do
          if (.not. layer%is_settled) return

@@ -26,8 +26,9 @@ contains
       if (.not. goes_on(-1)) one = at(2)
       if (.not. goes_on(1)) other = at(-1)
       curvature = 0.0_wp
-      if ((one > 0.0_wp .and. other > 0.0_wp) .or. (one < 0.0_wp .and. other < 0.0_wp)) &
+      if ((one > 0.0_wp .and. other > 0.0_wp) .or. (one < 0.0_wp .and. other < 0.0_wp)) then
          curvature = 2.0_wp/(1.0_wp/one + 1.0_wp/other)
+      end if
 
    contains
 

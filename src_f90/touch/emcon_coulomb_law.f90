@@ -240,8 +240,9 @@ contains
       case (contact_free)
          is_undecided = at_start .or. at_tip
       case (contact_slides)
-         if (rest%length > 0.0_wp .and. .not. dot_product(was%direction, rest%along) > 0.0_wp) &
+         if (rest%length > 0.0_wp .and. .not. dot_product(was%direction, rest%along) > 0.0_wp) then
             tip = drag
+         end if
          if (is_across(was, rest)) tip = rest%over
          is_undecided = norm2(tip - most*was%direction) <= unsure
       case default

@@ -128,8 +128,9 @@ contains
                push = sum(march%state%contact(:, 11:), 2)
                call check_true(error, abs(push(1)) <= mu*push(2) + tol*march%ledger%total, &
                   "the law, formulation " // to_text(formulation))
-               if (push(2) > 0.0_wp .and. abs(push(1) + mu*push(2)) <= sqrt(eps)*push(2)) &
+               if (push(2) > 0.0_wp .and. abs(push(1) + mu*push(2)) <= sqrt(eps)*push(2)) then
                   n_slide = n_slide + 1
+               end if
                if (allocated(error)) return
             end do
             call check_true(error, n_slide > 0, "it slides, formulation " // to_text(formulation))

@@ -574,8 +574,9 @@ contains
             ! Where bounds bend third derivatives grow by 1/width^2: what steps and round-off leave
             ! grows alike, by width^(-2/3).
             step = eps**(1.0_wp/3.0_wp)
-            if (meets_bend(kind, stencil, x0) .or. meets_bend(kind, stencil, x0 + dx)) &
+            if (meets_bend(kind, stencil, x0) .or. meets_bend(kind, stencil, x0 + dx)) then
                step = step*end_rounding**(2.0_wp/3.0_wp)
+            end if
             do j = 1, 2*n_place
                way = reshape([(merge(step, 0.0_wp, k == j), k = 1, 2*n_place)], [2, n_place])
                call evaluate(kind, stencil, x0, dx + way, up)

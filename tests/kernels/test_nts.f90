@@ -114,7 +114,8 @@ contains
 
    contains
 
-      !> The shortest way by which the second square leaves the first, over directions a degree apart.
+      !> The shortest way by which the second square leaves the first, over directions a degree
+      !> apart.
       pure real(wp) function least_way_out(x) result(way)
          real(wp), intent(in) :: x(:, :)         !! (2, 8), four nodes of each
          real(wp) :: direction(2)
@@ -123,7 +124,8 @@ contains
          way = huge(way)
          do i = 0, 359
             direction = [cos(i*acos(-1.0_wp)/180.0_wp), sin(i*acos(-1.0_wp)/180.0_wp)]
-            way = min(way, maxval(matmul(direction, x(:, :4))) - minval(matmul(direction, x(:, 5:))))
+            way = min(way, maxval(matmul(direction, x(:, :4))) &
+               - minval(matmul(direction, x(:, 5:))))
          end do
       end function least_way_out
 
@@ -341,8 +343,9 @@ contains
          call nts%begin_step(scene%x, u, du)
          do i = 1, nts%n_constraint
             call nts_nearest(all, i, scene%x, u, 0.0_wp*u, gap, is_over)
-            if (distance(all%node(i), all%master%facet(:, all%edge(i))) > 2.0_wp*length_of(du)) &
+            if (distance(all%node(i), all%master%facet(:, all%edge(i))) > 2.0_wp*length_of(du)) then
                cycle
+            end if
             n_near = n_near + 1
             if (nts%edge(i) /= all%edge(i)) call check_near(error, &
                distance(nts%node(i), nts%master%facet(:, max(1, nts%edge(i)))), &
