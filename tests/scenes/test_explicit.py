@@ -112,6 +112,41 @@ def test_second_order(tmp_path):
     assert 3.8 < change[1]/change[2] < 4.2, change
 
 
+def test_work_where_a_prescribed_velocity_jumps(tmp_path):
+    """An end driven to and fro: books close to the second order of the step, as the mass of driven
+    nodes takes what its velocities say, and the energy is that of a bar of the same steps in numpy."""
+    cells, size, way = (6, 1), (1.0, 0.1), 0.05
+    deck = block(cells, size, nu=0.0, **LINEAR, model="*AMPLITUDE, NAME=A\n0, 0, 0.1, 1, 0.2, 0",
+                 step=f"*BOUNDARY\nALL, 2\n*BOUNDARY, AMPLITUDE=A\n1, 1, 1, {way}\n8, 1, 1, {way}")
+    off = []
+    for n in (100, 200):
+        run = run_deck(deck, tmp_path/str(n), h=0.2/n, t_end=0.2)
+        history = run.history
+        energy = history["kinetic"] + history["strain"]
+        off += [np.abs(energy - history["external_work"]).max()/energy.max()]
+    assert 3.5 < off[0]/off[1] < 4.5
+    assert off[1] < 1e-3
+    # The bar: masses and springs, the driven one left out of the equations.
+    m = np.full(cells[0] + 1, DENSITY*size[1]*size[0]/cells[0])
+    m[[0, -1]] /= 2
+    k, h = YOUNG*size[1]*cells[0]/size[0], 0.2/n
+    u, v = np.zeros(len(m)), np.zeros(len(m))
+
+    def push(u):
+        stretch = np.diff(u)
+        return k*(np.r_[stretch, 0] - np.r_[0, stretch])
+
+    for i in range(n):
+        v += h/2*push(u)/m
+        u += h*v
+        u[0] = way*(1 - abs((i + 1)*h/0.1 - 1))
+        v += h/2*push(u)/m
+        v[0] = way/0.1*(1 if (i + 1)*h < 0.1 - h/2 else -1)
+    assert history["strain"][-1] == pytest.approx(k*np.sum(np.diff(u)**2)/2, rel=1e-9)
+    assert history["external_work"][-1] == pytest.approx(
+        k*np.sum(np.diff(u)**2)/2 + np.sum(m*v*v)/2, rel=2*off[1])
+
+
 def test_momenta_stay(tmp_path):
     """Forces are gradients where they push: linear and angular momentum stay to round-off."""
     deck = block((6, 4), velocity=swing, step=LAST)
