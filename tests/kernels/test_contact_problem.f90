@@ -23,6 +23,8 @@ module test_contact_problem
    integer, parameter :: definite = 1, unsymmetric = 2, nearly = 3, redundant = 4, rigid = 5
    character(len=*), parameter :: kind_name(5) = [character(len=16) :: "definite", "unsymmetric", &
       "nearly singular", "redundant", "one rigid body"]
+   !> Of a thousand.
+   integer, parameter :: most_missed(5) = [0, 0, 5, 1, 1]
 
 contains
 
@@ -267,8 +269,9 @@ contains
 
    end subroutine solve_in_set
 
-   !> All that are well posed are solved, and of the others at most one of a thousand is not; the
-   !> law is met by each solution as it was asked for. EMCON_TEST_CASES: how many of a kind.
+   !> All that are well posed are solved, and of the others at most one of a thousand is not, of
+   !> those that are nearly singular five; the law is met by each solution as it was asked for.
+   !> EMCON_TEST_CASES: how many of a kind.
    subroutine test_kinds(error)
       type(error_t), allocatable, intent(out) :: error
       type(contact_problem_t) :: problem
@@ -304,7 +307,7 @@ contains
                   // to_text(real(n_trial, wp)/n_case, 2) // " trials each, law missed by " &
                   // to_text(worst, 2)
                call check_true(error, worst < 1.0e6_wp*eps, "law: " // trim(kind_name(kind)))
-               call check_true(error, n_missed <= merge(0, n_case, kind <= unsymmetric)/1000, &
+               call check_true(error, n_missed <= (n_case*most_missed(kind))/1000, &
                   "solved: " // trim(kind_name(kind)))
                call check_true(error, n_turned <= n_case/4, "by trials: " // trim(kind_name(kind)))
             end do
