@@ -344,6 +344,8 @@ def test_no_flight_through_a_body(tmp_path, swap, choice):
     # By the first increment, cut or not, masses of 1 and 4 part, no faster than the block has come.
     parts = momentum_of(run, 1)[1:, 1] - momentum_of(run, 0)[1:, 1]/4
     assert (parts > 0).all() and (parts <= 10*(1 + EPSILON)).all()
+    # It came with a momentum of -10, and is thrown back or stopped.
+    assert (momentum_of(run, 1)[1:, 1] > -1).all()
 
 
 # ---- several pairs ------------------------------------------------------------------------------

@@ -162,15 +162,15 @@ def factorisations(run):
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
 def test_a_stiff_penalty_costs_what_exact_contact_does(formulation, tmp_path):
     """Its multipliers are unknowns on their way, so that no iterate is pushed by what its gaps
-    happen to be. The step to exact contact is as large as that to a softer one: some two times, and
-    half an order of magnitude at most, as the rounding of BLAS moves such counts."""
+    happen to be. The step to exact contact is as large as that to a softer one: some two times (119
+    and 120 for 57, as BLAS rounds), and a half of one more."""
     flight = {"formulation": formulation, "t_end": 1.0}          # of which half is free
     exact = run_deck(discs(ONE), tmp_path/"exact", **flight)
     for factor in (1, 10, 100):
         _, run = attempt(soft(discs(ONE), f"FACTOR={factor}"), tmp_path/str(factor), (),
                          {"method": PENALTY, **flight})
         assert run.history["active"].max() > 1
-        assert factorisations(run) < math.sqrt(10)*factorisations(exact), factor
+        assert factorisations(run) < 2.5*factorisations(exact), factor
 
 
 @pytest.mark.parametrize("smoothing", ["NONE", "HERMITE"])
