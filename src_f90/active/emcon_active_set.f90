@@ -47,6 +47,8 @@ module emcon_active_set
    end type skip_until_t
 
    type :: active_set_t
+      !> Which contacts act, stick and slide is a part of Newton's method: emcon_contact_rounds
+      logical :: is_one_problem = .false.
       logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start,
       logical, allocatable :: closes(:)          !! (n_constraint) but here: its node has no mass
       logical :: has_impacts = .true.            !! what closes arrives with a velocity

@@ -14,6 +14,7 @@ module emcon_active_set_solve
       step_not_held
    use emcon_active_set_update, only : active_set_advance, active_set_leave, active_set_narrow, &
       most_early
+   use emcon_contact_rounds, only : contact_rounds_solve
    use emcon_contact_support, only : contact_support_complete, contact_support_find_free
    use emcon_errors, only : error_t
    use emcon_friction, only : friction_holds, friction_idle, friction_keep
@@ -45,6 +46,10 @@ contains
       logical :: is_done, is_measured
       integer :: left
 
+      if (self%is_one_problem) then
+         call contact_rounds_solve(self, system, newton, motion, status, error)
+         return
+      end if
       self%first = motion%du
       self%driven = newton%driven
       is_measured = .false.

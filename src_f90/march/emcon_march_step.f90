@@ -1,7 +1,7 @@
 !> One step in time: first guess, solution, the judge's look at it, and what follows from it.
 module emcon_march_step
-   use emcon_active_set, only : active_set_begin, step_done, step_overlaps, step_refused, &
-      step_unbalanced
+   use emcon_active_set, only : active_set_begin, step_diverged, step_done, step_overlaps, &
+      step_refused, step_singular, step_unbalanced
    use emcon_active_set_solve, only : active_set_solve
    use emcon_amplitudes, only : find_amplitude_value
    use emcon_blocked_contact, only : blocked_contact_text
@@ -125,7 +125,11 @@ contains
             self%motion, status, error)
          if (allocated(error)) return
          increment%n_newton = increment%n_newton + self%active%n_newton
-         if (status /= step_refused .or. self%active%n_newton > 0) exit
+         if (self%active%is_one_problem) then
+            if (.not. any(status == [step_refused, step_diverged, step_singular])) exit
+         else
+            if (status /= step_refused .or. self%active%n_newton > 0) exit
+         end if
       end do
    end subroutine solve
 

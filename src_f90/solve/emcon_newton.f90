@@ -35,6 +35,7 @@ module emcon_newton
    implicit none
    private
    public :: newton_t, newton_init, newton_solve, interrupt_interface
+   public :: newton_check_interrupt, newton_pick_residual, newton_measure_forces
    public :: newton_converged, newton_refused, newton_diverged, newton_singular, newton_redundant, &
       newton_early
 
@@ -150,7 +151,7 @@ contains
       is_done = .true.
       is_fit = .true.
       do
-         call check_interrupt(self, status, error)
+         call newton_check_interrupt(self, status, error)
          if (.not. allocated(error)) call evaluate_damped(self, system, set, motion, &
             .not. self%correction%kept%is_made, status, error)
          if (allocated(error)) return
@@ -246,7 +247,7 @@ contains
       is_driven = any(abs(self%driven) > 0.0_wp) .and. size(self%residual) > 0
       if (is_driven) motion%du = motion%du - self%driven
       do
-         call check_interrupt(self, status, error)
+         call newton_check_interrupt(self, status, error)
          if (allocated(error)) return
          has_tangent = is_driven .or. .not. convergence_nears_end(self%convergence)
          call evaluate_damped(self, system, set, motion, has_tangent, status, error)
@@ -333,7 +334,7 @@ contains
    end subroutine search
 
    !> An error if the user has asked to stop: an increment may take thousands of iterations.
-   subroutine check_interrupt(self, status, error)
+   subroutine newton_check_interrupt(self, status, error)
       type(newton_t), intent(in) :: self
       integer, intent(out) :: status
       type(error_t), allocatable, intent(out) :: error
@@ -345,7 +346,7 @@ contains
       end if
       if (allocated(error) .or. .not. associated(self%is_interrupted)) return
       if (self%is_interrupted()) call raise(error, err_interrupt, "interrupted in an increment")
-   end subroutine check_interrupt
+   end subroutine newton_check_interrupt
 
    !> Has the last correction moved something out of all proportion?
    pure logical function is_too_far(self, x)
@@ -495,22 +496,12 @@ contains
       logical, intent(out) :: is_rounding        !! nothing but round-off is left
       integer :: k, left
 
-      call pick_residual(self, system, set)
+      call newton_pick_residual(self, system, set)
       call phase_enter(system%phases, phase_eliminate, left)
       call correction_multipliers(self%correction, system, set, self%residual)
       call constraints_take_hold(set)
       call phase_leave(system%phases, left)
-      if (system%response%with_sizes) then
-         call constraints_force(set, 1, self%contact, system%response%magnitude)
-         call take_sizes(self, system)
-      else
-         call constraints_force(set, 1, self%contact)
-      end if
-      if (set%n_condition > 0) then
-         call vector_sum(size(self%left), system%response%residual, -1.0_wp, self%contact, &
-            self%left)
-         call pick_unknowns(system%space%numbering, self%left, self%residual)
-      end if
+      call newton_measure_forces(self, system, set)
       norm = relative_size(self%residual, self%forces)
       defect = 0.0_wp
       do k = 1, set%n_row
@@ -524,8 +515,28 @@ contains
       if (.not. self%is_idle) is_rounding = is_rounding .and. norm <= most_rounding
    end subroutine measure
 
+   !> The residual with the forces of the set as they are, and where the sizes of forces are measured
+   !> what it is to be measured by.
+   subroutine newton_measure_forces(self, system, set)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system    !! it has responded
+      type(constraint_set_t), intent(in) :: set  !! evaluated
+
+      if (system%response%with_sizes) then
+         call constraints_force(set, 1, self%contact, system%response%magnitude)
+         call take_sizes(self, system)
+      else
+         call constraints_force(set, 1, self%contact)
+      end if
+      if (set%n_condition > 0) then
+         call vector_sum(size(self%left), system%response%residual, -1.0_wp, self%contact, &
+            self%left)
+         call pick_unknowns(system%space%numbering, self%left, self%residual)
+      end if
+   end subroutine newton_measure_forces
+
    !> The residual without the forces of rows, which those of laws beside them are a part of.
-   subroutine pick_residual(self, system, set)
+   subroutine newton_pick_residual(self, system, set)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
@@ -539,7 +550,7 @@ contains
       end if
       call vector_sum(size(self%left), system%response%residual, -1.0_wp, self%contact, self%left)
       call pick_unknowns(system%space%numbering, self%left, self%residual)
-   end subroutine pick_residual
+   end subroutine newton_pick_residual
 
    !> What multipliers under way lack is measured as the residual is.
    subroutine measure_lack(self, system, set, norm, is_rounding)

@@ -17,7 +17,7 @@ module emcon_contact_problem
    implicit none
    private
    public :: contact_problem_t, contact_effort_t, contact_problem_create, contact_problem_solve, &
-      contact_problem_missed, contact_problem_status
+      contact_problem_missed, contact_problem_status, contact_problem_stiffness
 
    !> Trials of all places at once at first, and when their turn comes again; sweeps in the first
    !> turn, twice as many in each that follows; turns.
@@ -92,14 +92,15 @@ contains
    end function has_compliance
 
    !> The stiffness by which a miss of the law is a force: of contact `i` by itself [M/T^2].
-   pure real(wp) function stiffness_of(self, i) result(stiffness)
+   pure real(wp) function contact_problem_stiffness(self, i) &
+      result(stiffness)
       type(contact_problem_t), intent(in) :: self
       integer, intent(in) :: i
       integer :: k, m
 
       m = 1 + self%n_slip
       stiffness = m/sum([(self%w(k, k), k = m*(i - 1) + 1, m*i)])
-   end function stiffness_of
+   end function contact_problem_stiffness
 
    !> In which way the law holds at contact `i`.
    pure type(slip_status_t) function contact_problem_status(self, force, i) result(status)
@@ -107,7 +108,8 @@ contains
       real(wp), intent(in) :: force(0:, :)           !! (0:n_slip, n) of a solution [M L/T^2]
       integer, intent(in) :: i                       !! 1 to n
 
-      status = coulomb_status(trial_of(self, force, i), self%mu(i), stiffness_of(self, i))
+      status = coulomb_status(trial_of(self, force, i), self%mu(i), &
+         contact_problem_stiffness(self, i))
    end function contact_problem_status
 
    !> Forces, gap and slips of contact `i`.
@@ -164,7 +166,7 @@ contains
 
       m = 1 + self%n_slip
       do i = 1, size(self%mu)
-         stiffness = stiffness_of(self, i)
+         stiffness = contact_problem_stiffness(self, i)
          call coulomb_map(trial_of(self, force, i), self%mu(i), stiffness, mapped, by)
          defect(:, i) = force(:, i) - mapped(:self%n_slip)
          if (.not. present(slope)) cycle
@@ -199,7 +201,8 @@ contains
          call natural_map(self, trial, defect, slope)
          now = maxval(abs(defect))
          is_solved = now <= met*maxval(abs(trial))
-         if (is_solved .or. i == most) exit
+         ! A start that is near is made exact.
+         if ((is_solved .and. (i > 0 .or. .not. now > 0.0_wp)) .or. i == most) exit
          n_trial = n_trial + 1
          call dense_solve(slope, reshape(real(-defect, dp), [size(force), 1]), x, is_singular)
          if (is_singular) exit
@@ -242,7 +245,7 @@ contains
             end associate
             place%slip_target(:self%n_slip) = self%slip_target(:, i)
             place%mu = self%mu(i)
-            place%stiffness = stiffness_of(self, i)
+            place%stiffness = contact_problem_stiffness(self, i)
             new = single_contact_solve(place)
             force(:, i) = new(:self%n_slip)
          end do

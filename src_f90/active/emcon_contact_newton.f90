@@ -1,0 +1,449 @@
+!> Newton's method for a step in which contacts act, stick and slide as their laws say.
+!>
+!> All candidates are rows of the set, of their gaps and of their slips. Each iterate linearises
+!> residual, gaps and slips, condenses these to the contacts, and solves what is left exactly: the
+!> problem of emcon_contact_problem. Which contacts act is so found on the way, and once it stands
+!> the method converges as Newton's does. The end is told by the laws, not by the set: where rows
+!> follow from others motions stand while forces still trade. Source: docs/theory.md, eq. (14i).
+module emcon_contact_newton
+   use emcon_condensation, only : condensation_free, condensation_make, condensation_t
+   use emcon_constraint, only : condition_rate
+   use emcon_constraint_rows, only : constraints_rows
+   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_force, &
+      constraints_take_hold
+   use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
+      contact_problem_solve, contact_problem_status, contact_problem_stiffness, contact_problem_t
+   use emcon_convergence, only : convergence_begin, round_off
+   use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
+      contact_trial_t, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use emcon_lane_sums, only : relative_size
+   use emcon_motion, only : motion_evaluate, motion_t
+   use emcon_newton, only : newton_check_interrupt, newton_converged, newton_diverged, &
+      newton_measure_forces, newton_pick_residual, newton_refused, newton_singular, newton_t
+   use emcon_numbering, only : add_to_dofs, pick_unknowns
+   use emcon_phases, only : phase_eliminate, phase_enter, phase_factorise, phase_gaps, phase_leave
+   use emcon_system, only : system_respond, system_tangent_times, system_t
+   implicit none
+   private
+   public :: contact_newton_solve
+
+   !> Iterates of a solve at most, and halvings of a correction that no forces are found after.
+   integer, parameter :: most_iterates = 40, most_halvings = 6
+   !> Parts of a correction that are tried, each half of the one before; the gain that is enough,
+   !> and the size below which none is looked for.
+   integer, parameter :: most_parts = 4
+   real(wp), parameter :: enough = 0.9_wp, no_search = 1.0e-7_wp
+   !> After so many iterates without half of the best size the curvature of contacts is left out of
+   !> the tangent for as many, and so on in turn.
+   integer, parameter :: stall_turn = 7
+   !> Once it is within the tolerance an iterate that leaves more than this part is the last.
+   real(wp), parameter :: polish_gain = 0.3_wp
+
+   !> One solve.
+   type :: solve_t
+      type(condensation_t) :: condensation
+      type(contact_problem_t) :: problem
+      real(wp), allocatable :: mu(:)             !! (n) of the normal force
+      real(wp), allocatable :: force(:, :)       !! (0:n_slip, n) of the contacts [M L/T^2]
+      type(slip_status_t), allocatable :: status(:)      !! (n) in which way the law is to hold
+      real(wp), allocatable :: old(:), new(:)    !! (n_row) multipliers about a correction
+      real(wp) :: size = huge(1.0_wp)            !! relative residual, and what contacts miss
+      real(wp) :: best = huge(1.0_wp), last = huge(1.0_wp)
+      logical :: is_rounding = .false.           !! nothing but round-off is left
+      integer :: n_stall = 0
+   end type solve_t
+
+contains
+
+   !> Solve for `motion%du`; on entry a first guess, with the multipliers of `set`, which has rows of
+   !> all slips. `law` is left as it holds at the end.
+   subroutine contact_newton_solve(newton, system, set, law, motion, status, error)
+      type(newton_t), intent(inout) :: newton
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(inout) :: set
+      type(coulomb_t), intent(inout) :: law(:)   !! (contacts of `set`) mu = 0: no friction
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status             !! one of the `newton_` codes
+      type(error_t), allocatable, intent(out) :: error
+      type(solve_t) :: self
+      integer :: k
+
+      call begin(self, newton, system, set, law)
+      call iterate(self, newton, system, set, motion, status, error)
+      call condensation_free(self%condensation)
+      if (allocated(error) .or. status /= newton_converged) return
+      do k = 1, size(law)
+         law(k)%status = self%status(k)
+      end do
+   end subroutine contact_newton_solve
+
+   !> Nothing is known yet but the multipliers to start from.
+   subroutine begin(self, newton, system, set, law)
+      type(solve_t), intent(inout) :: self
+      type(newton_t), intent(inout) :: newton
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      type(coulomb_t), intent(in) :: law(:)
+      integer :: k, n_slip
+
+      call convergence_begin(newton%convergence)
+      newton%n_solve = 0
+      n_slip = size(system%space%numbering%unknown, 1) - 1
+      call contact_problem_create(self%problem, n_slip, size(law))
+      do k = 1, size(law)
+         self%problem%slip_target(:, k) = law(k)%slip_target(:n_slip)
+      end do
+      self%mu = law%mu
+      self%problem%mu = law%mu
+      allocate(self%force(0:n_slip, size(law)), source=0.0_wp)
+      allocate(self%status(size(law)))
+      allocate(self%old(set%n_row), self%new(set%n_row))
+   end subroutine begin
+
+   subroutine iterate(self, newton, system, set, motion, status, error)
+      type(solve_t), intent(inout) :: self
+      type(newton_t), intent(inout) :: newton
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(inout) :: set
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status             !! one of the `newton_` codes
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_driven
+      integer :: i
+
+      is_driven = any(abs(newton%driven) > 0.0_wp)
+      if (is_driven) motion%du = motion%du - newton%driven
+      do i = 0, most_iterates
+         call newton_check_interrupt(newton, status, error)
+         if (allocated(error)) return
+         call measure_damped(self, newton, system, set, motion, status, error)
+         if (allocated(error) .or. status /= newton_converged) return
+         if (i > 0 .and. is_done(self, newton)) return
+         status = newton_diverged
+         if (i == most_iterates .or. .not. self%size < huge(self%size)) return
+         call count_stall(self)
+         if (is_driven) call add_driven(newton, system, set, motion)
+         call condense(self, newton, system, set, status, error)
+         if (allocated(error) .or. status /= newton_converged) return
+         call correct(self, newton, system, set)
+         if (i > 0 .and. .not. is_driven .and. self%size > no_search) call search(self, newton, &
+            system, set, motion, error)
+         if (i == 0 .or. is_driven .or. .not. self%size > no_search) call take(self, newton, &
+            system, set, motion, 1.0_wp)
+         if (allocated(error)) return
+         if (is_driven) motion%du = motion%du + newton%driven
+         is_driven = .false.
+      end do
+   end subroutine iterate
+
+   !> Is the step solved?
+   pure logical function is_done(self, newton)
+      type(solve_t), intent(in) :: self
+      type(newton_t), intent(in) :: newton
+
+      associate (tolerance => newton%convergence%tolerance)
+         is_done = self%is_rounding .or. self%size <= round_off
+         if (is_done .or. self%size > tolerance) return
+         is_done = .not. newton%convergence%polishes .or. self%size > polish_gain*self%last
+      end associate
+   end function is_done
+
+   !> How long ago was the last clear gain?
+   subroutine count_stall(self)
+      type(solve_t), intent(inout) :: self
+
+      self%n_stall = self%n_stall + 1
+      if (self%size < 0.5_wp*self%best) self%n_stall = 0
+      self%best = min(self%best, self%size)
+      self%last = self%size
+   end subroutine count_stall
+
+   !> Residual and rows at the motion; the last correction is halved as long as there are none.
+   subroutine measure_damped(self, newton, system, set, motion, status, error)
+      type(solve_t), intent(inout) :: self
+      type(newton_t), intent(inout) :: newton
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(inout) :: set
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      do i = 0, most_halvings
+         call measure(self, newton, system, set, motion, .true., status, error)
+         if (allocated(error) .or. status == newton_converged) exit
+         if (newton%n_solve == 0) return
+         newton%dq = 0.5_wp*newton%dq
+         call add_to_dofs(system%space%numbering, newton%dq, -1.0_wp, motion%du)
+      end do
+      if (allocated(error)) return
+      newton%convergence%last = self%size
+      associate (convergence => newton%convergence)
+         convergence%n_history = min(convergence%n_history + 1, size(convergence%history))
+         convergence%history(convergence%n_history) = self%size
+      end associate
+   end subroutine measure_damped
+
+   !> What is left at the motion: of forces over their sizes, of gaps and slips that are held over
+   !> edges, of the law over the largest push.
+   subroutine measure(self, newton, system, set, motion, with_tangent, status, error)
+      type(solve_t), intent(inout) :: self
+      type(newton_t), intent(inout) :: newton
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(inout) :: set
+      type(motion_t), intent(inout) :: motion
+      logical, intent(in) :: with_tangent        !! and with second derivatives
+      integer, intent(out) :: status             !! refused: there are no forces
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: defect, missed
+      integer :: left
+
+      status = newton_refused
+      self%size = huge(self%size)
+      call motion_evaluate(motion)
+      call system_respond(system, motion, with_tangent, .true.)
+      if (allocated(system%response%failure)) allocate(error, source=system%response%failure)
+      if (allocated(error) .or. allocated(system%response%refusal)) return
+      status = newton_converged
+      call phase_enter(system%phases, phase_gaps, left)
+      call constraints_take_hold(set)
+      call constraints_evaluate(set, system, motion, .not. with_tangent)
+      call constraints_rows(set, system%space%numbering)
+      call phase_leave(system%phases, left)
+      call newton_measure_forces(newton, system, set)
+      call find_defect(self, set, defect)
+      call find_missed(self, set, missed)
+      self%size = max(relative_size(newton%residual, newton%forces), defect, missed)
+      self%is_rounding = relative_size(newton%residual, newton%rounding) <= round_off &
+         .and. defect <= round_off .and. missed <= newton%convergence%tolerance
+   end subroutine measure
+
+   !> What rows that are to hold are off by at worst, and by how much those are closed that are not,
+   !> over edges.
+   subroutine find_defect(self, set, defect)
+      type(solve_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(out) :: defect
+      type(slip_status_t) :: status
+      real(wp) :: off
+      integer :: k
+
+      defect = 0.0_wp
+      do k = 1, set%n_row
+         off = abs(set%defect(k))
+         associate (condition => set%condition(k), slip => set%slip(k))
+            if (condition > set%n_permanent) then
+               status = self%status(condition - set%n_permanent)
+               if (slip == 0 .and. status%kind == contact_open) off = max(0.0_wp, -set%defect(k))
+               if (slip > 0 .and. status%kind == contact_rests) off &
+                  = abs(set%item(condition)%slip(slip))
+               if (slip > 0 .and. any(status%kind == [contact_open, contact_free, &
+                  contact_slides])) off = 0.0_wp
+            end if
+            defect = max(defect, off/set%item(condition)%size)
+         end associate
+      end do
+   end subroutine find_defect
+
+   !> How far the forces that there are miss the laws with the gaps and slips that there are, over
+   !> the largest of them, in the stiffness of the last condensation; 0 before there is one.
+   subroutine find_missed(self, set, missed)
+      type(solve_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(out) :: missed
+      type(contact_trial_t) :: at
+      real(wp), dimension(0:self%problem%n_slip, size(self%status)) :: force, defect
+      real(wp) :: stiffness
+      integer :: k
+
+      missed = 0.0_wp
+      if (.not. allocated(self%condensation%w)) return
+      call gather(set, set%lam, force)
+      call gather(set, set%defect, defect)
+      associate (n_slip => self%problem%n_slip, first => set%n_permanent)
+         do k = 1, size(self%status)
+            stiffness = contact_problem_stiffness(self%problem, k)
+            at%rounding = slip_rounding*set%item(first + k)%size
+            at%lam = force(0, k)
+            at%gap = defect(0, k)
+            if (abs(at%gap) <= at%rounding) at%gap = 0.0_wp
+            at%tau(:n_slip) = force(1:, k)
+            at%slip_target(:n_slip) = self%problem%slip_target(:, k)
+            at%slip(:n_slip) = at%slip_target(:n_slip) - defect(1:, k)
+            missed = max(missed, coulomb_violation(at, self%mu(k)*set%item(first + k)%normal, &
+               stiffness))
+         end do
+      end associate
+      if (missed > 0.0_wp) missed = missed/max(maxval(abs(force)), tiny(missed))
+   end subroutine find_missed
+
+   !> Values of the rows of contacts, contact by contact; 0 where there is no row.
+   pure subroutine gather(set, of_row, of_contact)
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in) :: of_row(:)          !! (n_row)
+      real(wp), intent(inout) :: of_contact(0:, :)       !! (0:n_slip, n)
+      integer :: k
+
+      of_contact = 0.0_wp
+      do k = set%n_permanent + 1, set%n_row
+         of_contact(set%slip(k), set%condition(k) - set%n_permanent) = of_row(k)
+      end do
+   end subroutine gather
+
+   !> The first correction meets prescribed motion by the tangent at its start.
+   subroutine add_driven(newton, system, set, motion)
+      type(newton_t), intent(inout) :: newton
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(inout) :: set
+      type(motion_t), intent(in) :: motion
+      integer :: k
+
+      call system_tangent_times(system, motion, newton%driven, newton%left)
+      call pick_unknowns(system%space%numbering, newton%left, newton%scale)
+      newton%residual = newton%residual + newton%scale
+      do k = 1, set%n_row
+         set%defect(k) = set%defect(k) + condition_rate(set%item(set%condition(k)), &
+            newton%driven, set%slip(k))
+      end do
+   end subroutine add_driven
+
+   !> The contacts in their multipliers alone, and those that obey the laws there.
+   subroutine condense(self, newton, system, set, status, error)
+      type(solve_t), intent(inout) :: self
+      type(newton_t), intent(inout) :: newton
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(inout) :: set
+      integer, intent(out) :: status             !! one of the `newton_` codes
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_effort_t) :: effort
+      logical :: is_solved, has_curvature
+      integer :: left, k
+
+      has_curvature = mod(self%n_stall/stall_turn, 2) == 0
+      call phase_enter(system%phases, phase_factorise, left)
+      call newton_pick_residual(newton, system, set)
+      call condensation_make(self%condensation, system, set, newton%correction, newton%residual, &
+         has_curvature, error)
+      call phase_leave(system%phases, phase_eliminate)
+      system%phases%n_factorisation = system%phases%n_factorisation + 1
+      newton%convergence%n_iteration = newton%convergence%n_iteration + 1
+      status = newton_singular
+      if (allocated(error) .or. self%condensation%is_singular) return
+      call lay_out(self, set)
+      call gather(set, set%lam, self%force)
+      call contact_problem_solve(self%problem, self%force, effort, is_solved)
+      status = merge(newton_converged, newton_diverged, is_solved)
+      do k = 1, merge(size(self%status), 0, is_solved)
+         self%status(k) = contact_problem_status(self%problem, self%force, k)
+      end do
+      call phase_leave(system%phases, left)
+   end subroutine condense
+
+   !> The problem of the contacts as it was condensed. Without friction a contact has no slips to
+   !> solve for: any one by itself.
+   subroutine lay_out(self, set)
+      type(solve_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+      integer :: k, i, m
+
+      m = 1 + self%problem%n_slip
+      associate (problem => self%problem, first => set%n_permanent, w => self%condensation%w)
+         problem%w = 0.0_wp
+         problem%free = 0.0_wp
+         do k = 1, size(w, 1)
+            associate (at => m*(set%condition(first + k) - first - 1) + 1 + set%slip(first + k))
+               do i = 1, size(w, 1)
+                  problem%w(m*(set%condition(first + i) - first - 1) + 1 + set%slip(first + i), at) &
+                     = w(i, k)
+               end do
+            end associate
+            problem%free(set%slip(first + k), set%condition(first + k) - first) &
+               = self%condensation%free(k)
+         end do
+         problem%free(1:, :) = problem%free(1:, :) - problem%slip_target
+         do k = 1, size(self%status)
+            associate (item => set%item(first + k), at => m*(k - 1) + 1)
+               problem%mu(k) = self%mu(k)*item%normal
+               do i = 1, merge(0, m - 1, item%has_friction)
+                  problem%w(at + i, at + i) = problem%w(at, at)
+                  problem%free(i, k) = 0.0_wp
+               end do
+            end associate
+         end do
+      end associate
+   end subroutine lay_out
+
+   !> The correction of the unknowns, and the multipliers after it.
+   subroutine correct(self, newton, system, set)
+      type(solve_t), intent(inout) :: self
+      type(newton_t), intent(inout) :: newton
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(in) :: set
+      integer :: k
+
+      self%old = set%lam
+      associate (first => set%n_permanent, condensation => self%condensation)
+         do k = first + 1, set%n_row
+            self%new(k) = self%force(set%slip(k), set%condition(k) - first)
+         end do
+         newton%dq = condensation%motion(:, 0) &
+            + matmul(condensation%motion(:, 1:), self%new(first + 1:))
+         self%new(:first) = condensation%permanent(:, 0) &
+            + matmul(condensation%permanent(:, 1:), self%new(first + 1:))
+      end associate
+      newton%n_solve = newton%n_solve + 1
+      system%phases%n_solve = system%phases%n_solve + 1
+   end subroutine correct
+
+   !> Of parts of the correction take the first that gains, or that which leaves least.
+   subroutine search(self, newton, system, set, motion, error)
+      type(solve_t), intent(inout) :: self
+      type(newton_t), intent(inout) :: newton
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(inout) :: set
+      type(motion_t), intent(inout) :: motion
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: before, part, best_part, least, start(size(motion%du, 1), size(motion%du, 2))
+      integer :: i, status
+
+      before = self%size
+      start = motion%du
+      least = huge(least)
+      part = 1.0_wp
+      best_part = 1.0_wp
+      do i = 0, most_parts
+         motion%du = start
+         call take(self, newton, system, set, motion, part)
+         call measure(self, newton, system, set, motion, .false., status, error)
+         if (allocated(error)) return
+         if (self%size < least) then
+            least = self%size
+            best_part = part
+         end if
+         if (self%size < enough*before .or. i == most_parts) exit
+         part = 0.5_wp*part
+      end do
+      if (abs(part - best_part) > 0.0_wp) then
+         motion%du = start
+         call take(self, newton, system, set, motion, best_part)
+      end if
+      newton%dq = best_part*newton%dq
+      self%size = before
+   end subroutine search
+
+   !> Go a part of the way to what the condensed step has as its solution.
+   subroutine take(self, newton, system, set, motion, part)
+      type(solve_t), intent(in) :: self
+      type(newton_t), intent(in) :: newton
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(inout) :: set
+      type(motion_t), intent(inout) :: motion
+      real(wp), intent(in) :: part
+
+      call add_to_dofs(system%space%numbering, newton%dq, part, motion%du)
+      set%lam = self%old + part*(self%new - self%old)
+   end subroutine take
+
+end module emcon_contact_newton

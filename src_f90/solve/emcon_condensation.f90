@@ -1,0 +1,165 @@
+!> A step linearised where it is, in the multipliers of its contacts alone.
+!>
+!> With the tangent A, the directions F of forces and the gradients G of the values of rows, the
+!> unknowns follow dq = A^-1 (F^T lam - r), and the rows G dq + defect = free + W lam. Rows that
+!> always hold are eliminated first: their multipliers follow. Source: docs/theory.md, eq. (14i).
+module emcon_condensation
+   use emcon_constraint_rows, only : constraints_add_curvature, constraints_merge_pattern
+   use emcon_constraints, only : constraint_set_t
+   use emcon_correction, only : correction_t
+   use emcon_csr, only : csr_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_lapack, only : dense_solve
+   use emcon_solver_registry, only : solver_create
+   use emcon_sparse_solver, only : matrix_general, sparse_solver_t
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: condensation_t, condensation_make, condensation_free
+
+   type :: condensation_t
+      logical :: is_singular = .true.            !! something moves freely: nothing is known
+      integer :: n_permanent = 0                 !! rows that always hold, the first ones
+      !> (n_unknown, 0:rows) what moves without multipliers (0), and by one of each contact row
+      real(wp), allocatable :: motion(:, :)
+      real(wp), allocatable :: free(:)           !! (rows) values without multipliers [L]
+      real(wp), allocatable :: w(:, :)           !! (rows, rows) and what they gain by them [T^2/M]
+      !> (n_permanent, 0:rows) multipliers of what always holds, as `motion`
+      real(wp), allocatable :: permanent(:, :)
+      class(sparse_solver_t), allocatable, private :: solver
+      type(csr_t), private :: tangent
+   end type condensation_t
+
+contains
+
+   !> Factorise the tangent and find out what forces of the rows of `set` move.
+   subroutine condensation_make(self, system, set, correction, residual, has_curvature, error)
+      type(condensation_t), intent(inout) :: self        !! keeps its orderings
+      type(system_t), intent(in) :: system               !! with the tangent of its terms
+      type(constraint_set_t), intent(in) :: set          !! evaluated, with rows
+      type(correction_t), intent(in) :: correction       !! by the solver of which
+      real(wp), intent(in) :: residual(:)                !! (n_unknown) without forces of rows
+      logical, intent(in) :: has_curvature               !! the tangent has that of the rows
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), allocatable :: held(:, :)                ! (n_unknown, n_permanent) by those rows
+      real(wp) :: force(size(residual))
+      integer :: k
+
+      self%n_permanent = set%n_permanent
+      call factorise(self, system, set, correction, has_curvature, error)
+      if (allocated(error) .or. self%is_singular) return
+      if (allocated(self%motion)) deallocate(self%motion, self%free, self%w)
+      associate (n => size(residual), first => set%n_permanent)
+         allocate(held(n, first), self%motion(n, 0:set%n_row - first))
+         force = -residual
+         call self%solver%solve(force, self%motion(:, 0), error)
+         do k = 1, set%n_row
+            if (allocated(error)) return
+            call spread_row(set%force_rows, k, force)
+            if (k <= first) call self%solver%solve(force, held(:, k), error)
+            if (k > first) call self%solver%solve(force, self%motion(:, k - first), error)
+         end do
+         if (allocated(error)) return
+         call eliminate(self, set, held)
+         if (self%is_singular) return
+         self%free = set%defect(first + 1:set%n_row) + rates(set, first + 1, set%n_row, &
+            self%motion(:, 0))
+         allocate(self%w(set%n_row - first, set%n_row - first))
+         do k = 1, size(self%free)
+            self%w(:, k) = rates(set, first + 1, set%n_row, self%motion(:, k))
+         end do
+      end associate
+   end subroutine condensation_make
+
+   !> The tangent of the terms, of laws, and of rows as far as it is wanted.
+   subroutine factorise(self, system, set, correction, has_curvature, error)
+      type(condensation_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      type(correction_t), intent(in) :: correction
+      logical, intent(in) :: has_curvature
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: slot(:)
+      integer :: k
+
+      call constraints_merge_pattern(set, system%matrix, self%tangent, slot)
+      do k = 1, size(slot)
+         self%tangent%value(slot(k)) = system%matrix%value(k)
+      end do
+      if (has_curvature) call constraints_add_curvature(set, system%space%numbering, self%tangent)
+      if (.not. allocated(self%solver)) call solver_create(correction%choice, matrix_general, &
+         self%solver, correction%user)
+      call self%solver%analyse(self%tangent, error)
+      if (.not. allocated(error)) call self%solver%factorise(self%tangent%value, error)
+      if (.not. allocated(error)) self%is_singular = self%solver%is_singular
+   end subroutine factorise
+
+   !> Let the rows that always hold do so.
+   subroutine eliminate(self, set, held)
+      type(condensation_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in) :: held(:, :)                 !! (n_unknown, n_permanent)
+      real(dp), allocatable :: matrix(:, :), rate(:, :), lam(:, :)
+      integer :: k
+
+      associate (n => self%n_permanent, last => ubound(self%motion, 2))
+         allocate(matrix(n, n), rate(n, last + 1), lam(n, last + 1))
+         if (n > 0) then
+            do k = 1, n
+               matrix(:, k) = real(rates(set, 1, n, held(:, k)), dp)
+            end do
+            do k = 0, last
+               rate(:, k + 1) = real(rates(set, 1, n, self%motion(:, k)), dp)
+            end do
+            rate(:, 1) = rate(:, 1) + real(set%defect(:n), dp)
+            call dense_solve(matrix, rate, lam, self%is_singular)
+            if (self%is_singular) return
+            self%motion = self%motion - matmul(held, real(lam, wp))
+         end if
+         if (allocated(self%permanent)) deallocate(self%permanent)
+         allocate(self%permanent(n, 0:last))
+         self%permanent = -real(lam, wp)
+      end associate
+   end subroutine eliminate
+
+   !> The force of row `k` by a multiplier of 1.
+   pure subroutine spread_row(rows, k, force)
+      type(csr_t), intent(in) :: rows
+      integer, intent(in) :: k
+      real(wp), intent(out) :: force(:)                  !! (n_unknown)
+      integer :: i
+
+      force = 0.0_wp
+      do i = rows%row_start(k) + 1, rows%row_start(k + 1)
+         force(rows%column(i) + 1) = real(rows%value(i), wp)
+      end do
+   end subroutine spread_row
+
+   !> What the rows `first` to `last` gain over a motion.
+   pure function rates(set, first, last, motion) result(rate)
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(in) :: first, last
+      real(wp), intent(in) :: motion(:)                  !! (n_unknown) [L]
+      real(wp) :: rate(last - first + 1)
+      integer :: i, k
+
+      rate = 0.0_wp
+      associate (rows => set%gap_rows)
+         do k = first, last
+            do i = rows%row_start(k) + 1, rows%row_start(k + 1)
+               rate(k - first + 1) = rate(k - first + 1) &
+                  + real(rows%value(i), wp)*motion(rows%column(i) + 1)
+            end do
+         end do
+      end associate
+   end function rates
+
+   !> Free what the solver holds.
+   subroutine condensation_free(self)
+      type(condensation_t), intent(inout) :: self
+
+      if (allocated(self%solver)) call self%solver%free()
+   end subroutine condensation_free
+
+end module emcon_condensation
