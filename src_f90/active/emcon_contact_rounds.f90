@@ -8,22 +8,26 @@ module emcon_contact_rounds
    use emcon_active_set, only : active_set_pass, active_set_select, active_set_t, &
       active_set_update_gaps, step_done, step_too_far
    use emcon_active_set_update, only : begins_unseen, gap_to_hold, look_at_active, look_at_open, &
-      most_stale
+      most_stale, noise_at
    use emcon_contact_newton, only : contact_newton_solve
    use emcon_constraint_rows, only : constraints_rows
-   use emcon_constraints, only : constraints_evaluate
+   use emcon_constraints, only : constraint_index, constraints_evaluate
    use emcon_coulomb_law, only : contact_open, coulomb_t, slip_status_t
    use emcon_errors, only : error_t
-   use emcon_friction, only : friction_close, most_lagged, most_shift
+   use emcon_friction, only : friction_close, friction_keep, friction_missed, most_lagged, &
+      most_shift
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_near_laws, only : near_laws_are_none, near_laws_update
-   use emcon_newton, only : newton_converged, newton_measure_forces, newton_solve, newton_t
+   use emcon_newton, only : newton_converged, newton_early, newton_measure_forces, newton_solve, newton_t
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_system, only : system_respond, system_t
    implicit none
    private
    public :: contact_rounds_solve
+
+   !> By so much of the largest push friction may miss its law: what a solve leaves.
+   real(wp), parameter :: least_missed = 1.0e4_wp*epsilon(1.0_wp)
 
    !> Who takes part.
    type :: candidates_t
@@ -48,7 +52,14 @@ contains
 
       allocate(candidates%takes_part, source=self%is_active)
       allocate(candidates%has_left(size(self%is_active)), source=.false.)
-      is_measured = .false.
+      call predict(self, system, newton, motion, is_measured, status, error)
+      if (allocated(error)) return
+      if (is_measured) then
+         call phase_enter(system%phases, phase_gaps, left)
+         call look(self, system, motion, candidates, grows, status)
+         call phase_leave(system%phases, left)
+         if (status /= step_done .or. .not. grows) return
+      end if
       do
          call phase_enter(system%phases, phase_gaps, left)
          call select_all(self, system, motion, candidates, is_measured)
@@ -69,6 +80,57 @@ contains
          is_measured = .true.
       end do
    end subroutine contact_rounds_solve
+
+   !> Try what acted at the start of the step, in the ways of then, by the null space or as the deck
+   !> asks: in most steps nothing else acts. Where the step ends so `is_solved`; else `motion` has
+   !> come nearer, or is the first guess again.
+   subroutine predict(self, system, newton, motion, is_solved, status, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      logical, intent(out) :: is_solved
+      integer, intent(out) :: status             !! one of the `newton_` codes
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: first(size(motion%du, 1), size(motion%du, 2))
+      integer :: left
+
+      first = motion%du
+      call phase_enter(system%phases, phase_gaps, left)
+      call active_set_select(self, system, motion)
+      call phase_leave(system%phases, left)
+      newton%looks_early = .true.
+      call newton_solve(newton, system, self%set, motion, status, error)
+      newton%looks_early = .false.
+      self%n_newton = self%n_newton + newton%convergence%n_iteration
+      is_solved = .false.
+      if (allocated(error)) return
+      if (.not. any(status == [newton_converged, newton_early])) then
+         motion%du = first
+         return
+      end if
+      newton%driven = 0.0_wp                     ! the prescribed motion is in `motion` now
+      self%lam(self%set%id(:self%set%n)) = self%set%lam(:self%set%n)
+      call friction_keep(self%friction, self%set)
+      if (status == newton_converged) is_solved = obeys_laws(self, system)
+   end subroutine predict
+
+   !> Do all contacts of the set push, and is friction as its law says?
+   pure logical function obeys_laws(self, system)
+      type(active_set_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      real(wp) :: missed, largest
+      integer :: k, pair, i
+
+      obeys_laws = .true.
+      do k = self%set%n_permanent + 1, self%set%n
+         call constraint_index(system, self%set%id(k), pair, i)
+         obeys_laws = obeys_laws .and. self%set%lam(k) >= -noise_at(self, system, &
+            system%contact(pair)%contact%node(i))
+      end do
+      call friction_missed(self%friction, system, self%set, missed, largest)
+      obeys_laws = obeys_laws .and. missed <= least_missed*largest
+   end function obeys_laws
 
    !> All candidates act for now, and hold their slips.
    subroutine select_all(self, system, motion, candidates, is_measured)
