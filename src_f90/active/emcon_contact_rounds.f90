@@ -1,31 +1,41 @@
-!> A step as one problem of its contacts: which of them take part, round by round.
+!> A step as one problem of its contacts: which of them take part, and how it is solved.
 !>
-!> Candidates are what acted at the start of the step and what closes in it. With all of them the
-!> step is solved by emcon_contact_newton; then gaps are measured for the motion that came out, and
-!> what closes beside them joins. Candidates only grow within a step, but for those that lose their
-!> surface, which do not come back; so rounds end. Source: docs/theory.md, section 6.
+!> Candidates are what acted at the start of the step and what closes in it; they only grow within a
+!> step, but for those that lose their surface, which do not come back. First sets of them are tried
+!> by the null space, beginning with what acted before: in most steps nothing else acts. What is
+!> found is checked: all that acts pushes, friction obeys its law, no candidate closes. Where it does
+!> not, the contacts are condensed by the kept factor, and their problem tells the next set. Where
+!> there is no such factor, or no set stands, emcon_contact_newton solves the step with all
+!> candidates. Source: docs/theory.md, section 6.
 module emcon_contact_rounds
    use emcon_active_set, only : active_set_pass, active_set_select, active_set_t, &
       active_set_update_gaps, step_done, step_too_far
-   use emcon_active_set_update, only : begins_unseen, gap_to_hold, look_at_active, look_at_open, &
-      most_stale, noise_at
-   use emcon_contact_newton, only : contact_newton_solve
+   use emcon_active_set_update, only : begins_unseen, gap_noise, gap_to_hold, look_at_active, &
+      look_at_open, most_stale, noise_at
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraints_evaluate
+   use emcon_contact, only : contact_t
+   use emcon_contact_newton, only : contact_newton_solve
+   use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
+      contact_problem_solve, contact_problem_status, contact_problem_t
    use emcon_coulomb_law, only : contact_open, coulomb_t, slip_status_t
    use emcon_errors, only : error_t
    use emcon_friction, only : friction_close, friction_keep, friction_missed, most_lagged, &
       most_shift
+   use emcon_kept_factor, only : kept_factor_condense, kept_factor_has_room
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_near_laws, only : near_laws_are_none, near_laws_update
-   use emcon_newton, only : newton_converged, newton_early, newton_measure_forces, newton_solve, newton_t
+   use emcon_newton, only : newton_converged, newton_early, newton_measure_forces, &
+      newton_pick_residual, newton_redundant, newton_solve, newton_t
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_system, only : system_respond, system_t
    implicit none
    private
    public :: contact_rounds_solve
 
+   !> Sets that are tried by the null space in one step at most.
+   integer, parameter :: most_tried = 6
    !> By so much of the largest push friction may miss its law: what a solve leaves.
    real(wp), parameter :: least_missed = 1.0e4_wp*epsilon(1.0_wp)
 
@@ -33,6 +43,8 @@ module emcon_contact_rounds
    type :: candidates_t
       logical, allocatable :: takes_part(:)      !! (n_constraint)
       logical, allocatable :: has_left(:)        !! (n_constraint) it lost its surface
+      logical :: is_measured = .false.           !! gaps are known for the motion that there is
+      logical :: have_changed = .false.          !! or one closes: solve the step again
    end type candidates_t
 
 contains
@@ -46,74 +58,132 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       type(candidates_t) :: candidates
-      type(coulomb_t), allocatable :: law(:)
-      logical :: grows, is_measured
-      integer :: left
+      logical :: is_done
 
       allocate(candidates%takes_part, source=self%is_active)
       allocate(candidates%has_left(size(self%is_active)), source=.false.)
-      call predict(self, system, newton, motion, is_measured, status, error)
-      if (allocated(error)) return
-      if (is_measured) then
-         call phase_enter(system%phases, phase_gaps, left)
-         call look(self, system, motion, candidates, grows, status)
-         call phase_leave(system%phases, left)
-         if (status /= step_done .or. .not. grows) return
-      end if
-      do
-         call phase_enter(system%phases, phase_gaps, left)
-         call select_all(self, system, motion, candidates, is_measured)
-         call phase_leave(system%phases, left)
-         call solve(self, system, newton, motion, law, status, error)
-         if (allocated(error) .or. status /= newton_converged) return
-         newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
-         self%n_newton = self%n_newton + newton%convergence%n_iteration
-         call keep(self, law)
-         ! Before stencils are chosen anew: the step was solved with these.
-         call finish(self, system, newton, motion, error)
-         if (allocated(error)) return
-         call phase_enter(system%phases, phase_gaps, left)
-         call look(self, system, motion, candidates, grows, status)
-         call phase_leave(system%phases, left)
-         if (status /= step_done) return
-         if (.not. grows) return
-         is_measured = .true.
-      end do
+      call solve_by_sets(self, system, newton, motion, candidates, is_done, status, error)
+      if (is_done .or. allocated(error)) return
+      call solve_with_all(self, system, newton, motion, candidates, status, error)
    end subroutine contact_rounds_solve
 
-   !> Try what acted at the start of the step, in the ways of then, by the null space or as the deck
-   !> asks: in most steps nothing else acts. Where the step ends so `is_solved`; else `motion` has
-   !> come nearer, or is the first guess again.
-   subroutine predict(self, system, newton, motion, is_solved, status, error)
+   !> Try sets of candidates by the null space, or as the deck asks; `is_done` unless none stands:
+   !> then `motion` has come nearer, or is the first guess.
+   subroutine solve_by_sets(self, system, newton, motion, candidates, is_done, status, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
-      logical, intent(out) :: is_solved
-      integer, intent(out) :: status             !! one of the `newton_` codes
+      type(candidates_t), intent(inout) :: candidates
+      logical, intent(out) :: is_done
+      integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: first(size(motion%du, 1), size(motion%du, 2))
-      integer :: left
+      logical :: goes_on
+      integer :: i
 
       first = motion%du
+      is_done = .false.
+      do i = 1, most_tried
+         call solve_set(self, system, newton, motion, candidates, status, error)
+         if (allocated(error)) return
+         if (status == newton_redundant) then
+            call leave_out(self, newton%correction%redundant, goes_on)
+            if (goes_on) cycle
+            return
+         else if (.not. any(status == [newton_converged, newton_early])) then
+            motion%du = first
+            candidates%is_measured = .false.
+            return
+         end if
+         newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
+         self%lam(self%set%id(:self%set%n)) = self%set%lam(:self%set%n)
+         call friction_keep(self%friction, self%set)
+         is_done = status == newton_converged
+         if (is_done) is_done = obeys_laws(self, system)
+         call look(self, system, motion, candidates, status)
+         is_done = is_done .and. (status /= step_done .or. .not. candidates%have_changed)
+         if (is_done .or. status /= step_done) return
+         call choose(self, system, newton, motion, candidates, goes_on, error)
+         if (allocated(error) .or. .not. goes_on) return
+      end do
+   end subroutine solve_by_sets
+
+   !> Solve with what acts.
+   subroutine solve_set(self, system, newton, motion, candidates, status, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      type(candidates_t), intent(in) :: candidates
+      integer, intent(out) :: status             !! one of the `newton_` codes
+      type(error_t), allocatable, intent(out) :: error
+      integer :: left
+
       call phase_enter(system%phases, phase_gaps, left)
-      call active_set_select(self, system, motion)
+      self%n_tried = 0
+      call active_set_select(self, system, motion, candidates%is_measured)
       call phase_leave(system%phases, left)
       newton%looks_early = .true.
       call newton_solve(newton, system, self%set, motion, status, error)
       newton%looks_early = .false.
       self%n_newton = self%n_newton + newton%convergence%n_iteration
-      is_solved = .false.
-      if (allocated(error)) return
-      if (.not. any(status == [newton_converged, newton_early])) then
-         motion%du = first
-         return
-      end if
-      newton%driven = 0.0_wp                     ! the prescribed motion is in `motion` now
-      self%lam(self%set%id(:self%set%n)) = self%set%lam(:self%set%n)
-      call friction_keep(self%friction, self%set)
-      if (status == newton_converged) is_solved = obeys_laws(self, system)
-   end subroutine predict
+   end subroutine solve_set
+
+   !> What follows from others waits: rows of gaps do. `goes_on` if these are all.
+   pure subroutine leave_out(self, redundant, goes_on)
+      type(active_set_t), intent(inout) :: self
+      integer, intent(in) :: redundant(:)        !! (any) rows of the set, from 1
+      logical, intent(out) :: goes_on
+
+      goes_on = all(redundant <= self%set%n)
+      if (goes_on) self%is_active(self%set%id(redundant)) = .false.
+   end subroutine leave_out
+
+   !> The set that obeys the laws where the step is linearised by the kept factor; `goes_on` if that
+   !> is there, and the set another one.
+   subroutine choose(self, system, newton, motion, candidates, goes_on, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      type(candidates_t), intent(in) :: candidates
+      logical, intent(out) :: goes_on
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_problem_t) :: problem
+      type(contact_effort_t) :: effort
+      real(wp), allocatable :: force(:, :)
+      logical :: before(size(self%is_active))
+      integer :: k
+
+      before = self%is_active
+      goes_on = newton%factor_policy%is_allowed .and. newton%correction%kept%is_made
+      if (.not. goes_on) return
+      call select_all(self, system, motion, candidates)
+      associate (set => self%set)
+         goes_on = set%n_permanent == 0 .and. set%n > 0 .and. set%n_condition == set%n .and. &
+            kept_factor_has_room(newton%correction%kept, set%n, size(system%matrix%column))
+         if (.not. goes_on) return
+         call constraints_evaluate(set, system, motion, .true.)
+         call constraints_rows(set, system%space%numbering)
+         call newton_pick_residual(newton, system, set)
+         call contact_problem_create(problem, 0, set%n)
+         allocate(force(0:0, set%n))
+         call kept_factor_condense(newton%correction%kept, set, newton%residual, problem%w, &
+            problem%free(0, :), error)
+         if (allocated(error)) return
+         force(0, :) = set%lam(:set%n)
+         call contact_problem_solve(problem, force, effort, goes_on)
+         if (.not. goes_on) return
+         self%lam(set%id) = force(0, :)
+         do k = 1, set%n
+            associate (status => contact_problem_status(problem, force, k))
+               self%is_active(set%id(k)) = status%kind /= contact_open
+            end associate
+         end do
+      end associate
+      goes_on = any(before .neqv. self%is_active)
+   end subroutine choose
 
    !> Do all contacts of the set push, and is friction as its law says?
    pure logical function obeys_laws(self, system)
@@ -132,40 +202,56 @@ contains
       obeys_laws = obeys_laws .and. missed <= least_missed*largest
    end function obeys_laws
 
-   !> All candidates act for now, and hold their slips.
-   subroutine select_all(self, system, motion, candidates, is_measured)
-      type(active_set_t), intent(inout) :: self
-      type(system_t), intent(inout) :: system
-      type(motion_t), intent(in) :: motion
-      type(candidates_t), intent(in) :: candidates
-      logical, intent(in) :: is_measured         !! gaps are known for this motion
-
-      self%is_active = candidates%takes_part
-      if (self%friction%is_on) self%friction%law%status = slip_status_t()
-      self%n_tried = 0
-      call active_set_select(self, system, motion, is_measured)
-   end subroutine select_all
-
-   !> Solve with all candidates; `law` as it holds at each contact of the set.
-   subroutine solve(self, system, newton, motion, law, status, error)
+   !> Solve with all candidates until none joins them.
+   subroutine solve_with_all(self, system, newton, motion, candidates, status, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
-      type(coulomb_t), allocatable, intent(out) :: law(:)    !! (contacts of the set)
-      integer, intent(out) :: status             !! one of the `newton_` codes
+      type(candidates_t), intent(inout) :: candidates
+      integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
+      type(coulomb_t), allocatable :: law(:)     ! (contacts of the set)
 
-      associate (set => self%set)
-         allocate(law(set%n - set%n_permanent))
-         if (self%friction%is_on) law = self%friction%law(set%id(set%n_permanent + 1:set%n))
-         if (size(law) == 0) then
-            call newton_solve(newton, system, set, motion, status, error)
-         else
-            call contact_newton_solve(newton, system, set, law, motion, status, error)
-         end if
-      end associate
-   end subroutine solve
+      do
+         call select_all(self, system, motion, candidates)
+         associate (set => self%set)
+            if (allocated(law)) deallocate(law)
+            allocate(law(set%n - set%n_permanent))
+            if (self%friction%is_on) law = self%friction%law(set%id(set%n_permanent + 1:set%n))
+            if (size(law) == 0) then
+               call newton_solve(newton, system, set, motion, status, error)
+            else
+               call contact_newton_solve(newton, system, set, law, motion, status, error)
+            end if
+         end associate
+         self%n_newton = self%n_newton + newton%convergence%n_iteration
+         if (allocated(error) .or. status /= newton_converged) return
+         newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
+         call keep(self, law)
+         ! Before stencils are chosen anew: the step was solved with these.
+         call finish(self, system, newton, motion, error)
+         if (allocated(error)) return
+         call look(self, system, motion, candidates, status)
+         if (status /= step_done .or. .not. candidates%have_changed) return
+      end do
+   end subroutine solve_with_all
+
+   !> All candidates act for now, and hold their slips.
+   subroutine select_all(self, system, motion, candidates)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      type(candidates_t), intent(in) :: candidates
+      integer :: left
+
+      call phase_enter(system%phases, phase_gaps, left)
+      self%is_active = candidates%takes_part
+      if (self%friction%is_on) self%friction%law%status = slip_status_t()
+      self%n_tried = 0
+      call active_set_select(self, system, motion, candidates%is_measured)
+      call phase_leave(system%phases, left)
+   end subroutine select_all
 
    !> Multipliers and ways of the candidates: what is not open acts.
    subroutine keep(self, law)
@@ -175,9 +261,7 @@ contains
 
       associate (set => self%set, friction => self%friction)
          self%lam(set%id(:set%n)) = set%lam(:set%n)
-         do k = set%n + 1, set%n_row
-            friction%tau(set%slip(k), set%id(set%condition(k))) = set%lam(k)
-         end do
+         call friction_keep(friction, set)
          do k = 1, size(law)
             associate (id => set%id(set%n_permanent + k))
                self%is_active(id) = law(k)%status%kind /= contact_open
@@ -186,91 +270,6 @@ contains
          end do
       end associate
    end subroutine keep
-
-   !> Measure all gaps for the motion. Who joins, who has lost its surface, which stencils were
-   !> chosen for another motion?
-   subroutine look(self, system, motion, candidates, grows, status)
-      type(active_set_t), intent(inout) :: self
-      type(system_t), intent(inout) :: system
-      type(motion_t), intent(in) :: motion
-      type(candidates_t), intent(inout) :: candidates
-      logical, intent(out) :: grows              !! solve the step again
-      integer, intent(out) :: status             !! one of the `step_` codes
-      integer :: pair, k
-
-      status = step_done
-      grows = .false.
-      self%is_stale = .false.
-      self%friction%lags = .false.
-      k = self%set%n_permanent
-      call active_set_pass(self, system, motion)
-      do pair = 1, size(system%contact)
-         associate (contact => system%contact(pair)%contact, &
-               first => system%first_constraint(pair) + 1, &
-               last => system%first_constraint(pair + 1))
-            if (self%skip_until(pair)%passes .and. .not. any(candidates%takes_part(first:last))) &
-               cycle
-            call active_set_update_gaps(self, system, pair, motion, motion%du)
-            if (.not. near_laws_are_none(self%near_laws, contact)) call near_laws_update( &
-               self%near_laws, system, pair, self%is_active, grows)
-            call look_at_pair(self, system, pair, motion, candidates, k, grows, status)
-         end associate
-      end do
-      if (status /= step_done) return
-      if (self%is_stale) then
-         self%n_stale = self%n_stale + 1
-         if (self%n_stale > most_stale) status = step_too_far
-      else if (self%friction%lags .and. .not. grows) then
-         self%friction%n_lagged = self%friction%n_lagged + 1
-         grows = self%friction%n_lagged <= most_lagged
-      end if
-      grows = grows .or. self%is_stale
-   end subroutine look
-
-   !> The conditions of one contact.
-   subroutine look_at_pair(self, system, pair, motion, candidates, k, grows, status)
-      type(active_set_t), intent(inout) :: self
-      type(system_t), intent(inout) :: system
-      integer, intent(in) :: pair
-      type(motion_t), intent(in) :: motion
-      type(candidates_t), intent(inout) :: candidates
-      integer, intent(inout) :: k                !! places of the set that were looked at
-      logical, intent(inout) :: grows
-      integer, intent(inout) :: status
-      logical :: closes
-      integer :: i, id
-
-      associate (contact => system%contact(pair)%contact, part => candidates%takes_part, &
-            has_left => candidates%has_left, friction => self%friction)
-         do i = 1, contact%n_constraint
-            id = system%first_constraint(pair) + i
-            if (part(id)) then
-               if (self%is_active(id)) k = k + 1
-               if (contact%state(i)%is_leaving) then
-                  part(id) = .false.
-                  has_left(id) = .true.
-                  grows = .true.
-               else if (self%is_active(id)) then
-                  call look_at_active(self, contact, i, k, motion, status)
-                  if (.not. friction%is_on) cycle
-                  if (friction%law(id)%mu > 0.0_wp) friction%lags = friction%lags .or. &
-                     contact%state(i)%slip_shift > most_shift
-               end if
-            else if (.not. has_left(id)) then
-               call look_at_open(self, contact, i, id, closes, status)
-               ! What the pairs take in may hold the bodies away from their guards.
-               if (.not. closes .or. (contact%slack > 0.0_wp .and. grows)) cycle
-               if (begins_unseen(self, contact, i, motion)) status = step_too_far
-               if (friction%is_on) call friction_close(friction, system, pair, i, motion, &
-                  contact%state(i)%gap1 - gap_to_hold(self, contact%state(i), id), &
-                  .not. self%is_candidate(id))
-               part(id) = .true.
-               self%is_candidate(id) = .true.
-               grows = .true.
-            end if
-         end do
-      end associate
-   end subroutine look_at_pair
 
    !> Leave set, rows and forces as the laws hold at the end.
    subroutine finish(self, system, newton, motion, error)
@@ -291,5 +290,123 @@ contains
       call newton_measure_forces(newton, system, self%set)
       newton%correction%fell_back = .false.
    end subroutine finish
+
+   !> Measure all gaps for the motion. Who joins, who has lost its surface, who closes although it
+   !> does not act, which stencils were chosen for another motion?
+   subroutine look(self, system, motion, candidates, status)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      type(candidates_t), intent(inout) :: candidates
+      integer, intent(out) :: status             !! one of the `step_` codes
+      integer :: pair, k, left
+
+      call phase_enter(system%phases, phase_gaps, left)
+      status = step_done
+      candidates%have_changed = .false.
+      candidates%is_measured = .true.
+      self%is_stale = .false.
+      self%friction%lags = .false.
+      k = self%set%n_permanent
+      call active_set_pass(self, system, motion)
+      do pair = 1, size(system%contact)
+         associate (first => system%first_constraint(pair) + 1, &
+               last => system%first_constraint(pair + 1))
+            if (self%skip_until(pair)%passes .and. .not. any(candidates%takes_part(first:last))) &
+               cycle
+            call active_set_update_gaps(self, system, pair, motion, motion%du)
+            if (.not. near_laws_are_none(self%near_laws, system%contact(pair)%contact)) &
+               call near_laws_update(self%near_laws, system, pair, self%is_active, &
+               candidates%have_changed)
+            call look_at_pair(self, system, pair, motion, candidates, k, status)
+         end associate
+      end do
+      call phase_leave(system%phases, left)
+      if (status /= step_done) return
+      if (self%is_stale) then
+         self%n_stale = self%n_stale + 1
+         if (self%n_stale > most_stale) status = step_too_far
+         candidates%have_changed = .true.
+      else if (self%friction%lags .and. .not. candidates%have_changed) then
+         self%friction%n_lagged = self%friction%n_lagged + 1
+         candidates%have_changed = self%friction%n_lagged <= most_lagged
+      end if
+   end subroutine look
+
+   !> The conditions of one contact.
+   subroutine look_at_pair(self, system, pair, motion, candidates, k, status)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      integer, intent(in) :: pair
+      type(motion_t), intent(in) :: motion
+      type(candidates_t), intent(inout) :: candidates
+      integer, intent(inout) :: k                !! places of the set that were looked at
+      integer, intent(inout) :: status
+      logical :: acts
+      integer :: i, id
+
+      associate (contact => system%contact(pair)%contact, friction => self%friction)
+         do i = 1, contact%n_constraint
+            id = system%first_constraint(pair) + i
+            if (.not. candidates%takes_part(id)) then
+               if (.not. candidates%has_left(id)) call join(self, system, pair, i, motion, &
+                  candidates, status)
+               cycle
+            end if
+            acts = self%is_active(id)
+            if (acts) k = k + 1
+            if (contact%state(i)%is_leaving) then
+               candidates%takes_part(id) = .false.
+               candidates%has_left(id) = .true.
+               self%is_active(id) = .false.
+               candidates%have_changed = .true.
+            else if (acts) then
+               call look_at_active(self, contact, i, k, motion, status)
+               if (.not. friction%is_on) cycle
+               if (friction%law(id)%mu > 0.0_wp) friction%lags = friction%lags .or. &
+                  contact%state(i)%slip_shift > most_shift
+            else
+               candidates%have_changed = candidates%have_changed .or. &
+                  has_closed(self, contact, i, id)
+            end if
+         end do
+      end associate
+   end subroutine look_at_pair
+
+   !> Has the `i`-th constraint of `contact`, a candidate that does not act, closed below its gap?
+   pure logical function has_closed(self, contact, i, id)
+      type(active_set_t), intent(in) :: self
+      class(contact_t), intent(in) :: contact
+      integer, intent(in) :: i, id
+
+      associate (gap => contact%state(i))
+         has_closed = gap%is_near .and. gap%is_over .and. &
+            gap%gap1 - gap_to_hold(self, gap, id) < -gap_noise*gap%size
+      end associate
+   end function has_closed
+
+   !> Does the `i`-th constraint of a pair, which is no candidate, close?
+   subroutine join(self, system, pair, i, motion, candidates, status)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      integer, intent(in) :: pair, i
+      type(motion_t), intent(in) :: motion
+      type(candidates_t), intent(inout) :: candidates
+      integer, intent(inout) :: status           !! a failure where it cannot
+      logical :: closes
+
+      associate (contact => system%contact(pair)%contact, id => system%first_constraint(pair) + i)
+         call look_at_open(self, contact, i, id, closes, status)
+         ! What the pairs take in may hold the bodies away from their guards.
+         if (.not. closes .or. (contact%slack > 0.0_wp .and. candidates%have_changed)) return
+         if (begins_unseen(self, contact, i, motion)) status = step_too_far
+         if (self%friction%is_on) call friction_close(self%friction, system, pair, i, motion, &
+            contact%state(i)%gap1 - gap_to_hold(self, contact%state(i), id), &
+            .not. self%is_candidate(id))
+         candidates%takes_part(id) = .true.
+         candidates%have_changed = .true.
+         self%is_candidate(id) = .true.
+      end associate
+   end subroutine join
 
 end module emcon_contact_rounds

@@ -25,7 +25,7 @@ module emcon_kept_factor
    public :: kept_factor_t, kept_factor_set_up, kept_factor_renew, kept_factor_take, &
       kept_factor_look, kept_factor_serves, kept_factor_correct, kept_factor_forget, &
       kept_factor_free, kept_factor_is_possible, kept_factor_has_room, kept_factor_multipliers, &
-      kept_factor_reach
+      kept_factor_reach, kept_factor_condense
 
    !> The stiffness that a constraint has by its curvature may be so large a part of that of the
    !> unknowns it stands on: at a kink, which has as much as one likes, no kept factor converges.
@@ -145,10 +145,53 @@ contains
       type(constraint_set_t), intent(in) :: set
       logical, intent(out) :: is_fit             !! there is a factor, and one of W^T W, not t
       type(error_t), allocatable, intent(out) :: error
-      integer :: k, n
 
       is_fit = self%is_made .and. kept_factor_has_room(self, set%n, self%n_slot)
       if (.not. is_fit) return
+      call reach_rows(self, set, error)
+      if (allocated(error)) return
+      if (set%penalty%is_on) then
+         self%product = self%l
+         self%compliance = spread(0.0_dp, 1, set%n)
+         call add_penalty(self, set, is_fit)
+      else
+         call dense_cholesky(self%l, is_fit)
+      end if
+   end subroutine kept_factor_take
+
+   !> The constraints of `set` in their multipliers alone, by the factor there is: their values after
+   !> a correction are free + w lam.
+   subroutine kept_factor_condense(self, set, residual, w, free, error)
+      type(kept_factor_t), intent(inout) :: self         !! with a factor that has room for the set
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in), contiguous :: residual(:)    !! (n_unknown) without contact forces
+      real(wp), intent(out) :: w(:, :)                   !! (n, n) [T^2/M]
+      real(wp), intent(out) :: free(:)                   !! (n) [L]
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k, j
+
+      call reach_rows(self, set, error)
+      if (allocated(error)) return
+      self%x = -real(residual, dp)
+      call blocks_solve(self%blocks, .false., self%x, self%y, error)
+      if (allocated(error)) return
+      do k = 1, set%n
+         w(k:, k) = real(self%blocks%scale*self%l(k:, k), wp)
+         w(k, k:) = w(k:, k)
+         free(k) = set%defect(k)
+         do j = self%start(k) + 1, self%start(k + 1)
+            free(k) = free(k) + real(self%blocks%scale*self%w(j)*self%y(self%index(j) + 1), wp)
+         end do
+      end do
+   end subroutine kept_factor_condense
+
+   !> W of the constraints at their present gradients, and W^T W.
+   subroutine reach_rows(self, set, error)
+      type(kept_factor_t), intent(inout) :: self         !! with a factor
+      type(constraint_set_t), intent(in) :: set
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k, n
+
       if (allocated(self%l)) then
          if (size(self%mu) /= set%n) deallocate(self%l, self%mu, self%start, self%bend)
       end if
@@ -167,14 +210,7 @@ contains
       end do
       self%n_forward = self%n_forward + set%n
       call fill_products(self)
-      if (set%penalty%is_on) then
-         self%product = self%l
-         self%compliance = spread(0.0_dp, 1, set%n)
-         call add_penalty(self, set, is_fit)
-      else
-         call dense_cholesky(self%l, is_fit)
-      end if
-   end subroutine kept_factor_take
+   end subroutine reach_rows
 
    !> Factorise W^T W with the compliance of contacts that give way, for their present slopes: none
    !> without slope pushes, and all are soft enough for the factor.
