@@ -79,12 +79,14 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: first(size(motion%du, 1), size(motion%du, 2))
-      logical :: goes_on
+      logical :: goes_on, is_new, is_early
       integer :: i
 
       first = motion%du
       is_done = .false.
+      is_new = .true.
       do i = 1, most_tried
+         newton%looks_early = is_new
          call solve_set(self, system, newton, motion, candidates, status, error)
          if (allocated(error)) return
          if (status == newton_redundant) then
@@ -96,16 +98,19 @@ contains
             candidates%is_measured = .false.
             return
          end if
+         is_early = status == newton_early
          newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
          self%lam(self%set%id(:self%set%n)) = self%set%lam(:self%set%n)
          call friction_keep(self%friction, self%set)
-         is_done = status == newton_converged
+         is_done = .not. is_early
          if (is_done) is_done = obeys_laws(self, system)
          call look(self, system, motion, candidates, status)
          is_done = is_done .and. (status /= step_done .or. .not. candidates%have_changed)
          if (is_done .or. status /= step_done) return
-         call choose(self, system, newton, motion, candidates, goes_on, error)
+         call choose(self, system, newton, motion, candidates, is_new, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
+         ! The same set again, which was left before its end: to the end this time.
+         if (.not. is_new .and. .not. is_early) return
       end do
    end subroutine solve_by_sets
 
@@ -124,9 +129,7 @@ contains
       self%n_tried = 0
       call active_set_select(self, system, motion, candidates%is_measured)
       call phase_leave(system%phases, left)
-      newton%looks_early = .true.
       call newton_solve(newton, system, self%set, motion, status, error)
-      newton%looks_early = .false.
       self%n_newton = self%n_newton + newton%convergence%n_iteration
    end subroutine solve_set
 
@@ -140,15 +143,15 @@ contains
       if (goes_on) self%is_active(self%set%id(redundant)) = .false.
    end subroutine leave_out
 
-   !> The set that obeys the laws where the step is linearised by the kept factor; `goes_on` if that
-   !> is there, and the set another one.
-   subroutine choose(self, system, newton, motion, candidates, goes_on, error)
+   !> The set that obeys the laws where the step is linearised by the kept factor.
+   subroutine choose(self, system, newton, motion, candidates, is_new, goes_on, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
       type(candidates_t), intent(in) :: candidates
-      logical, intent(out) :: goes_on
+      logical, intent(out) :: is_new             !! another one acts than before
+      logical, intent(out) :: goes_on            !! there is such a factor, and such a set
       type(error_t), allocatable, intent(out) :: error
       type(contact_problem_t) :: problem
       type(contact_effort_t) :: effort
@@ -157,6 +160,7 @@ contains
       integer :: k
 
       before = self%is_active
+      is_new = .false.
       goes_on = newton%factor_policy%is_allowed .and. newton%correction%kept%is_made
       if (.not. goes_on) return
       call select_all(self, system, motion, candidates)
@@ -182,7 +186,7 @@ contains
             end associate
          end do
       end associate
-      goes_on = any(before .neqv. self%is_active)
+      is_new = any(before .neqv. self%is_active)
    end subroutine choose
 
    !> Do all contacts of the set push, and is friction as its law says?
