@@ -109,8 +109,8 @@ contains
          if (is_done .or. status /= step_done) return
          call choose(self, system, newton, motion, candidates, is_new, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
-         ! The same set again, which was left before its end: to the end this time.
-         if (.not. is_new .and. .not. is_early) return
+         ! The same set again: where it was left before its end, or has other stencils.
+         if (.not. (is_new .or. is_early .or. self%is_stale)) return
       end do
    end subroutine solve_by_sets
 
@@ -155,6 +155,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(contact_problem_t) :: problem
       type(contact_effort_t) :: effort
+      type(slip_status_t) :: status
       real(wp), allocatable :: force(:, :)
       logical :: before(size(self%is_active))
       integer :: k
@@ -181,9 +182,8 @@ contains
          if (.not. goes_on) return
          self%lam(set%id) = force(0, :)
          do k = 1, set%n
-            associate (status => contact_problem_status(problem, force, k))
-               self%is_active(set%id(k)) = status%kind /= contact_open
-            end associate
+            status = contact_problem_status(problem, force, k)
+            self%is_active(set%id(k)) = status%kind /= contact_open
          end do
       end associate
       is_new = any(before .neqv. self%is_active)
