@@ -57,8 +57,8 @@ module emcon_contact_newton
 
 contains
 
-   !> Solve for `motion%du`; on entry a first guess, with the multipliers of `set`, which has rows of
-   !> all slips. `law` is left as it holds at the end.
+   !> Solve for `motion%du`; on entry a first guess, with the multipliers of `set`, which has rows
+   !> of all slips. `law` is left as it holds at the end.
    subroutine contact_newton_solve(newton, system, set, law, motion, status, error)
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
@@ -143,11 +143,10 @@ contains
       type(solve_t), intent(in) :: self
       type(newton_t), intent(in) :: newton
 
-      associate (tolerance => newton%convergence%tolerance)
-         is_done = self%is_rounding .or. self%size <= round_off
-         if (is_done .or. self%size > tolerance) return
-         is_done = .not. newton%convergence%polishes .or. self%size > polish_gain*self%last
-      end associate
+      is_done = self%size <= round_off
+      if (is_done) return
+      is_done = self%is_rounding .or. self%size <= newton%convergence%tolerance
+      if (newton%convergence%polishes) is_done = is_done .and. self%size > polish_gain*self%last
    end function is_done
 
    !> How long ago was the last clear gain?
@@ -346,19 +345,15 @@ contains
    subroutine lay_out(self, set)
       type(solve_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
-      integer :: k, i, m
+      integer :: k, i, m, place(set%n_row - set%n_permanent)
 
       m = 1 + self%problem%n_slip
       associate (problem => self%problem, first => set%n_permanent, w => self%condensation%w)
          problem%w = 0.0_wp
          problem%free = 0.0_wp
+         place = m*(set%condition(first + 1:) - first - 1) + 1 + set%slip(first + 1:)
          do k = 1, size(w, 1)
-            associate (at => m*(set%condition(first + k) - first - 1) + 1 + set%slip(first + k))
-               do i = 1, size(w, 1)
-                  problem%w(m*(set%condition(first + i) - first - 1) + 1 + set%slip(first + i), at) &
-                     = w(i, k)
-               end do
-            end associate
+            problem%w(place, place(k)) = w(:, k)
             problem%free(set%slip(first + k), set%condition(first + k) - first) &
                = self%condensation%free(k)
          end do

@@ -515,8 +515,8 @@ contains
       if (.not. self%is_idle) is_rounding = is_rounding .and. norm <= most_rounding
    end subroutine measure
 
-   !> The residual with the forces of the set as they are, and where the sizes of forces are measured
-   !> what it is to be measured by.
+   !> The residual with the forces of the set as they are, and what it is to be measured by where
+   !> the sizes of forces are known.
    subroutine newton_measure_forces(self, system, set)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system    !! it has responded
