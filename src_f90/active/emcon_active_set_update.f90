@@ -217,7 +217,7 @@ contains
       integer, intent(in) :: id
 
       gap_to_hold = self%left(1)*self%overclosure(id) + gap%closed
-      if (self%holds_gap) gap_to_hold = gap%gap0
+      if (self%holds_gap .and. .not. self%closes(id)) gap_to_hold = gap%gap0
    end function gap_to_hold
 
    !> Is it contact `id` that is to change alone? What pulls most goes first, then what is deepest

@@ -9,7 +9,7 @@
 !> candidates. Source: docs/theory.md, section 6.
 module emcon_contact_rounds
    use emcon_active_set, only : active_set_pass, active_set_select, active_set_t, &
-      active_set_update_gaps, step_done, step_too_far
+      active_set_update_gaps, step_cycling, step_done, step_too_far
    use emcon_active_set_update, only : begins_unseen, gap_noise, gap_to_hold, look_at_active, &
       look_at_open, most_stale, noise_at
    use emcon_constraint_rows, only : constraints_rows
@@ -36,6 +36,8 @@ module emcon_contact_rounds
 
    !> Sets that are tried by the null space in one step at most.
    integer, parameter :: most_tried = 6
+   !> And rounds with all candidates.
+   integer, parameter :: most_rounds = 40
    !> By so much of the largest push friction may miss its law: what a solve leaves.
    real(wp), parameter :: least_missed = 1.0e4_wp*epsilon(1.0_wp)
 
@@ -44,7 +46,8 @@ module emcon_contact_rounds
       logical, allocatable :: takes_part(:)      !! (n_constraint)
       logical, allocatable :: has_left(:)        !! (n_constraint) it lost its surface
       logical :: is_measured = .false.           !! gaps are known for the motion that there is
-      logical :: have_changed = .false.          !! or one closes: solve the step again
+      logical :: have_changed = .false.          !! solve the step again
+      logical :: one_closes = .false.            !! that does not act
    end type candidates_t
 
 contains
@@ -105,7 +108,8 @@ contains
          is_done = .not. is_early
          if (is_done) is_done = obeys_laws(self, system)
          call look(self, system, motion, candidates, status)
-         is_done = is_done .and. (status /= step_done .or. .not. candidates%have_changed)
+         is_done = is_done .and. (status /= step_done .or. &
+            .not. (candidates%have_changed .or. candidates%one_closes))
          if (is_done .or. status /= step_done) return
          call choose(self, system, newton, motion, candidates, is_new, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
@@ -216,8 +220,9 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       type(coulomb_t), allocatable :: law(:)     ! (contacts of the set)
+      integer :: i
 
-      do
+      do i = 1, most_rounds
          call select_all(self, system, motion, candidates)
          associate (set => self%set)
             if (allocated(law)) deallocate(law)
@@ -239,6 +244,7 @@ contains
          call look(self, system, motion, candidates, status)
          if (status /= step_done .or. .not. candidates%have_changed) return
       end do
+      status = step_cycling
    end subroutine solve_with_all
 
    !> All candidates act for now, and hold their slips.
@@ -308,6 +314,7 @@ contains
       call phase_enter(system%phases, phase_gaps, left)
       status = step_done
       candidates%have_changed = .false.
+      candidates%one_closes = .false.
       candidates%is_measured = .true.
       self%is_stale = .false.
       self%friction%lags = .false.
@@ -370,8 +377,7 @@ contains
                if (friction%law(id)%mu > 0.0_wp) friction%lags = friction%lags .or. &
                   contact%state(i)%slip_shift > most_shift
             else
-               candidates%have_changed = candidates%have_changed .or. &
-                  has_closed(self, contact, i, id)
+               candidates%one_closes = candidates%one_closes .or. has_closed(self, contact, i, id)
             end if
          end do
       end associate

@@ -108,40 +108,36 @@ contains
       real(wp), intent(in) :: force(0:, :)           !! (0:n_slip, n) of a solution [M L/T^2]
       integer, intent(in) :: i                       !! 1 to n
 
-      status = coulomb_status(trial_of(self, force, i), self%mu(i), &
+      real(wp) :: motion(0:self%n_slip, size(self%mu))
+
+      motion = motion_of(self, force)
+      status = coulomb_status(trial_of(self, force(:, i), motion(:, i), i), self%mu(i), &
          contact_problem_stiffness(self, i))
    end function contact_problem_status
 
    !> Forces, gap and slips of contact `i`.
-   pure type(contact_trial_t) function trial_of(self, force, i) result(at)
+   pure type(contact_trial_t) function trial_of(self, force, motion, i) result(at)
       type(contact_problem_t), intent(in) :: self
-      real(wp), intent(in) :: force(0:, :)           !! (0:n_slip, n) [M L/T^2]
+      real(wp), intent(in) :: force(0:)              !! (0:n_slip) [M L/T^2]
+      real(wp), intent(in) :: motion(0:)             !! (0:n_slip) gap, slips the other way [L]
       integer, intent(in) :: i
-      real(wp) :: motion(0:self%n_slip)
 
-      motion = motion_of(self, force, i)
       associate (s => self%n_slip)
-         at%lam = force(0, i)
+         at%lam = force(0)
          at%gap = motion(0)
-         at%tau(:s) = force(1:, i)
+         at%tau(:s) = force(1:)
          at%slip(:s) = -motion(1:)
          at%slip_target(:s) = self%slip_target(:, i)
       end associate
    end function trial_of
 
-   !> Gap and slips, the other way round, of contact `i` [L].
-   pure function motion_of(self, force, i) result(motion)
+   !> Gaps, and slips the other way round [L].
+   pure function motion_of(self, force) result(motion)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(in) :: force(0:, :)           !! (0:n_slip, n) [M L/T^2]
-      integer, intent(in) :: i
-      real(wp) :: motion(0:self%n_slip)
-      integer :: k, m
+      real(wp) :: motion(0:self%n_slip, size(self%mu))
 
-      m = 1 + self%n_slip
-      motion = self%free(:, i)
-      do k = 1, size(self%mu)
-         motion = motion + matmul(self%w(m*(i - 1) + 1:m*i, m*(k - 1) + 1:m*k), force(:, k))
-      end do
+      motion = self%free + reshape(matmul(self%w, reshape(force, [size(force)])), shape(force))
    end function motion_of
 
    !> How far the law is missed at its worst contact, over the largest force; 0: no force at all.
@@ -161,13 +157,16 @@ contains
       real(wp), intent(in) :: force(0:, :)           !! (0:n_slip, n) [M L/T^2]
       real(wp), intent(out) :: defect(0:, :)         !! (0:n_slip, n) [M L/T^2]
       real(dp), intent(out), optional :: slope(:, :) !! of `defect` by `force`, proximal
-      real(wp) :: mapped(0:most_slips), by(0:most_slips, 0:most_slips), stiffness
+      real(wp) :: mapped(0:most_slips), by(0:most_slips, 0:most_slips), stiffness, &
+         motion(0:self%n_slip, size(self%mu))
       integer :: i, k, m
 
       m = 1 + self%n_slip
+      motion = motion_of(self, force)
       do i = 1, size(self%mu)
          stiffness = contact_problem_stiffness(self, i)
-         call coulomb_map(trial_of(self, force, i), self%mu(i), stiffness, mapped, by)
+         call coulomb_map(trial_of(self, force(:, i), motion(:, i), i), self%mu(i), stiffness, &
+            mapped, by)
          defect(:, i) = force(:, i) - mapped(:self%n_slip)
          if (.not. present(slope)) cycle
          associate (row => m*(i - 1) + 1)
@@ -229,7 +228,7 @@ contains
       integer, intent(inout) :: n_sweep              !! counted on
       logical, intent(out) :: is_solved
       type(single_contact_t) :: place
-      real(wp) :: new(0:most_slips)
+      real(wp) :: new(0:most_slips), motion(0:self%n_slip, size(self%mu)), change(0:self%n_slip)
       integer :: i, m, sweep
 
       m = 1 + self%n_slip
@@ -237,22 +236,37 @@ contains
       is_solved = .false.
       do sweep = 1, most
          n_sweep = n_sweep + 1
+         motion = motion_of(self, force)
          do i = 1, size(self%mu)
             associate (row => m*(i - 1) + 1)
                place%w(:self%n_slip, :self%n_slip) = self%w(row:m*i, row:m*i)
-               place%free(:self%n_slip) = motion_of(self, force, i) &
-                  - matmul(self%w(row:m*i, row:m*i), force(:, i))
+               place%free(:self%n_slip) = motion(:, i) - matmul(self%w(row:m*i, row:m*i), &
+                  force(:, i))
+               place%slip_target(:self%n_slip) = self%slip_target(:, i)
+               place%mu = self%mu(i)
+               place%stiffness = contact_problem_stiffness(self, i)
+               new = single_contact_solve(place)
+               change = new(:self%n_slip) - force(:, i)
+               force(:, i) = new(:self%n_slip)
+               call add_motion(self%w(:, row:m*i), change, motion)
             end associate
-            place%slip_target(:self%n_slip) = self%slip_target(:, i)
-            place%mu = self%mu(i)
-            place%stiffness = contact_problem_stiffness(self, i)
-            new = single_contact_solve(place)
-            force(:, i) = new(:self%n_slip)
          end do
          is_solved = contact_problem_missed(self, force) <= met
          if (is_solved) exit
       end do
    end subroutine solve_by_sweeps
+
+   !> What the forces of one contact more move.
+   pure subroutine add_motion(w, change, motion)
+      real(wp), intent(in), contiguous :: w(:, :)    !! columns of W
+      real(wp), intent(in) :: change(:)              !! [M L/T^2]
+      real(wp), intent(inout) :: motion(size(w, 1))  !! [L]
+      integer :: k
+
+      do k = 1, size(change)
+         motion = motion + change(k)*w(:, k)
+      end do
+   end subroutine add_motion
 
    !> In the plane, by complementary pivoting over (lam, tau+, tau-, mu lam - |tau|), with slips
    !> from a: what is free before that, or rests, is for others to find.
