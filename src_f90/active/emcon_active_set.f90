@@ -306,6 +306,8 @@ contains
       if (.not. is_known) call measure_all(self, system, motion)
       if (self%near_laws%is_on) then
          call find_near(self, system)
+         ! What may open in the solve itself has one law all through the step.
+         self%near_laws%is_held = merge(self%is_candidate, self%is_active, self%is_one_problem)
          call constraints_select(self%set, places_of(self%is_active), &
             places_of(self%near_laws%is_near .and. .not. self%is_active))
          call near_laws_select(self%near_laws, system, self%set)

@@ -46,12 +46,15 @@ contains
       logical :: is_done, is_measured
       integer :: left
 
-      if (self%is_one_problem) then
-         call contact_rounds_solve(self, system, newton, motion, status, error)
-         return
-      end if
       self%first = motion%du
       self%driven = newton%driven
+      is_done = .not. self%is_one_problem .or. self%support%is_needed
+      do while (.not. is_done)
+         call contact_rounds_solve(self, system, newton, motion, status, error)
+         if (allocated(error) .or. status == step_done) return
+         call begin_sharp(self, system, newton, motion, is_done)
+         if (is_done) return
+      end do
       is_measured = .false.
       do
          call phase_enter(system%phases, phase_gaps, left)

@@ -53,6 +53,7 @@ module emcon_contact_newton
       real(wp) :: best = huge(1.0_wp), last = huge(1.0_wp)
       logical :: is_rounding = .false.           !! nothing but round-off is left
       integer :: n_stall = 0
+      logical :: is_searching = .false.          !! no tangent is wanted
    end type solve_t
 
 contains
@@ -128,10 +129,11 @@ contains
          call condense(self, newton, system, set, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          call correct(self, newton, system, set)
-         if (i > 0 .and. .not. is_driven .and. self%size > no_search) call search(self, newton, &
-            system, set, motion, error)
-         if (i == 0 .or. is_driven .or. .not. self%size > no_search) call take(self, newton, &
-            system, set, motion, 1.0_wp)
+         if (i > 0 .and. .not. is_driven .and. self%size > no_search) then
+            call search(self, newton, system, set, motion, error)
+         else
+            call take(self, newton, system, set, motion, 1.0_wp)
+         end if
          if (allocated(error)) return
          if (is_driven) motion%du = motion%du + newton%driven
          is_driven = .false.
@@ -171,7 +173,7 @@ contains
       integer :: i
 
       do i = 0, most_halvings
-         call measure(self, newton, system, set, motion, .true., status, error)
+         call measure(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status == newton_converged) exit
          if (newton%n_solve == 0) return
          newton%dq = 0.5_wp*newton%dq
@@ -187,13 +189,12 @@ contains
 
    !> What is left at the motion: of forces over their sizes, of gaps and slips that are held over
    !> edges, of the law over the largest push.
-   subroutine measure(self, newton, system, set, motion, with_tangent, status, error)
+   subroutine measure(self, newton, system, set, motion, status, error)
       type(solve_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
       type(motion_t), intent(inout) :: motion
-      logical, intent(in) :: with_tangent        !! and with second derivatives
       integer, intent(out) :: status             !! refused: there are no forces
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: defect, missed
@@ -202,13 +203,13 @@ contains
       status = newton_refused
       self%size = huge(self%size)
       call motion_evaluate(motion)
-      call system_respond(system, motion, with_tangent, .true.)
+      call system_respond(system, motion, .not. self%is_searching, .true.)
       if (allocated(system%response%failure)) allocate(error, source=system%response%failure)
       if (allocated(error) .or. allocated(system%response%refusal)) return
       status = newton_converged
       call phase_enter(system%phases, phase_gaps, left)
       call constraints_take_hold(set)
-      call constraints_evaluate(set, system, motion, .not. with_tangent)
+      call constraints_evaluate(set, system, motion, self%is_searching)
       call constraints_rows(set, system%space%numbering)
       call phase_leave(system%phases, left)
       call newton_measure_forces(newton, system, set)
@@ -318,7 +319,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(contact_effort_t) :: effort
       logical :: is_solved, has_curvature
-      integer :: left, k
+      integer :: left
 
       has_curvature = mod(self%n_stall/stall_turn, 2) == 0
       call phase_enter(system%phases, phase_factorise, left)
@@ -334,9 +335,7 @@ contains
       call gather(set, set%lam, self%force)
       call contact_problem_solve(self%problem, self%force, effort, is_solved)
       status = merge(newton_converged, newton_diverged, is_solved)
-      do k = 1, merge(size(self%status), 0, is_solved)
-         self%status(k) = contact_problem_status(self%problem, self%force, k)
-      end do
+      if (is_solved) self%status = contact_problem_status(self%problem, self%force)
       call phase_leave(system%phases, left)
    end subroutine condense
 
@@ -404,6 +403,7 @@ contains
       integer :: i, status
 
       before = self%size
+      self%is_searching = .true.
       start = motion%du
       least = huge(least)
       part = 1.0_wp
@@ -411,7 +411,7 @@ contains
       do i = 0, most_parts
          motion%du = start
          call take(self, newton, system, set, motion, part)
-         call measure(self, newton, system, set, motion, .false., status, error)
+         call measure(self, newton, system, set, motion, status, error)
          if (allocated(error)) return
          if (self%size < least) then
             least = self%size
@@ -425,7 +425,7 @@ contains
          call take(self, newton, system, set, motion, best_part)
       end if
       newton%dq = best_part*newton%dq
-      self%size = before
+      self%is_searching = .false.
    end subroutine search
 
    !> Go a part of the way to what the condensed step has as its solution.

@@ -3,8 +3,8 @@
 !> Candidates are what acted at the start of the step and what closes in it; they only grow within a
 !> step, but for those that lose their surface, which do not come back. First sets of them are tried
 !> by the null space, beginning with what acted before: in most steps nothing else acts. What is
-!> found is checked: all that acts pushes, friction obeys its law, no candidate closes. Where it does
-!> not, the contacts are condensed by the kept factor, and their problem tells the next set. Where
+!> found is checked: all that acts pushes, friction obeys its law, no candidate closes. Where that
+!> fails the contacts are condensed by the kept factor, and their problem tells the next set. Where
 !> there is no such factor, or no set stands, emcon_contact_newton solves the step with all
 !> candidates. Source: docs/theory.md, section 6.
 module emcon_contact_rounds
@@ -47,7 +47,9 @@ module emcon_contact_rounds
       logical, allocatable :: has_left(:)        !! (n_constraint) it lost its surface
       logical :: is_measured = .false.           !! gaps are known for the motion that there is
       logical :: have_changed = .false.          !! solve the step again
+      logical :: is_settled = .false.            !! the step is solved, or cannot be
       logical :: one_closes = .false.            !! that does not act
+      logical :: is_new_set = .false.            !! others act than in the set before
    end type candidates_t
 
 contains
@@ -61,35 +63,32 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       type(candidates_t) :: candidates
-      logical :: is_done
 
       allocate(candidates%takes_part, source=self%is_active)
       allocate(candidates%has_left(size(self%is_active)), source=.false.)
-      call solve_by_sets(self, system, newton, motion, candidates, is_done, status, error)
-      if (is_done .or. allocated(error)) return
+      call solve_by_sets(self, system, newton, motion, candidates, status, error)
+      if (candidates%is_settled .or. allocated(error)) return
       call solve_with_all(self, system, newton, motion, candidates, status, error)
    end subroutine contact_rounds_solve
 
-   !> Try sets of candidates by the null space, or as the deck asks; `is_done` unless none stands:
-   !> then `motion` has come nearer, or is the first guess.
-   subroutine solve_by_sets(self, system, newton, motion, candidates, is_done, status, error)
+   !> Try sets of candidates by the null space; that settles it unless none stands: then `motion`
+   !> has come nearer, or is the first guess.
+   subroutine solve_by_sets(self, system, newton, motion, candidates, status, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
       type(candidates_t), intent(inout) :: candidates
-      logical, intent(out) :: is_done
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: first(size(motion%du, 1), size(motion%du, 2))
-      logical :: goes_on, is_new, is_early
+      logical :: goes_on, is_early, obeys
       integer :: i
 
       first = motion%du
-      is_done = .false.
-      is_new = .true.
+      candidates%is_new_set = .true.
       do i = 1, most_tried
-         newton%looks_early = is_new
+         newton%looks_early = candidates%is_new_set
          call solve_set(self, system, newton, motion, candidates, status, error)
          if (allocated(error)) return
          if (status == newton_redundant) then
@@ -105,16 +104,16 @@ contains
          newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
          self%lam(self%set%id(:self%set%n)) = self%set%lam(:self%set%n)
          call friction_keep(self%friction, self%set)
-         is_done = .not. is_early
-         if (is_done) is_done = obeys_laws(self, system)
+         obeys = .not. is_early
+         if (obeys) obeys = obeys_laws(self, system)
          call look(self, system, motion, candidates, status)
-         is_done = is_done .and. (status /= step_done .or. &
+         candidates%is_settled = obeys .and. (status /= step_done .or. &
             .not. (candidates%have_changed .or. candidates%one_closes))
-         if (is_done .or. status /= step_done) return
-         call choose(self, system, newton, motion, candidates, is_new, goes_on, error)
+         if (candidates%is_settled .or. status /= step_done) return
+         call choose(self, system, newton, motion, candidates, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
          ! The same set again: where it was left before its end, or has other stencils.
-         if (.not. (is_new .or. is_early .or. self%is_stale)) return
+         if (.not. (candidates%is_new_set .or. is_early .or. self%is_stale)) return
       end do
    end subroutine solve_by_sets
 
@@ -148,24 +147,22 @@ contains
    end subroutine leave_out
 
    !> The set that obeys the laws where the step is linearised by the kept factor.
-   subroutine choose(self, system, newton, motion, candidates, is_new, goes_on, error)
+   subroutine choose(self, system, newton, motion, candidates, goes_on, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
-      type(candidates_t), intent(in) :: candidates
-      logical, intent(out) :: is_new             !! another one acts than before
+      type(candidates_t), intent(inout) :: candidates
       logical, intent(out) :: goes_on            !! there is such a factor, and such a set
       type(error_t), allocatable, intent(out) :: error
       type(contact_problem_t) :: problem
       type(contact_effort_t) :: effort
-      type(slip_status_t) :: status
+      type(slip_status_t), allocatable :: status(:)
       real(wp), allocatable :: force(:, :)
       logical :: before(size(self%is_active))
-      integer :: k
 
       before = self%is_active
-      is_new = .false.
+      candidates%is_new_set = .false.
       goes_on = newton%factor_policy%is_allowed .and. newton%correction%kept%is_made
       if (.not. goes_on) return
       call select_all(self, system, motion, candidates)
@@ -185,12 +182,10 @@ contains
          call contact_problem_solve(problem, force, effort, goes_on)
          if (.not. goes_on) return
          self%lam(set%id) = force(0, :)
-         do k = 1, set%n
-            status = contact_problem_status(problem, force, k)
-            self%is_active(set%id(k)) = status%kind /= contact_open
-         end do
+         status = contact_problem_status(problem, force)
+         self%is_active(set%id) = status%kind /= contact_open
       end associate
-      is_new = any(before .neqv. self%is_active)
+      candidates%is_new_set = any(before .neqv. self%is_active)
    end subroutine choose
 
    !> Do all contacts of the set push, and is friction as its law says?

@@ -158,8 +158,8 @@ contains
          friction%tau(:problem%n_slip, id) = force(1:, :)
          friction%is_idle(id) = .false.
          friction%is_needed(id) = .false.
+         status = contact_problem_status(problem, force)
          do i = 1, size(id)
-            status(i) = contact_problem_status(problem, force, i)
             if (status(i)%kind /= contact_open) friction%law(id(i))%status = status(i)
          end do
          self%is_active(id) = status%kind /= contact_open

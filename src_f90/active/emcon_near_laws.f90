@@ -24,6 +24,7 @@ module emcon_near_laws
       real(wp), allocatable :: area(:)           !! (n_constraint) of contacts that have [L^2]
       !> (n_constraint) they act in this increment; there are only more as it is solved
       logical, allocatable :: is_near(:)
+      logical, allocatable :: is_held(:)         !! (n_constraint) contact holds them, or may
    end type near_laws_t
 
 contains
@@ -43,7 +44,8 @@ contains
       self%is_on = self%is_on .and. step_is_dynamic(step)
       if (.not. self%is_on) return
       allocate(self%area(system%n_constraint), source=0.0_wp)
-      allocate(self%is_near(system%n_constraint), source=.false.)
+      allocate(self%is_near(system%n_constraint), self%is_held(system%n_constraint), &
+         source=.false.)
       do k = 1, size(system%contact)
          associate (contact => system%contact(k)%contact, before => system%first_constraint(k))
             if (contact_laws_reach(contact%laws) < 0.0_wp) cycle
@@ -124,7 +126,7 @@ contains
             if (j > set%n) set%target(j) = contact%state(i)%gap0
             place = contact_place_t(area=self%area(set%id(j)), share=contact%share(i), &
                gap=contact%state(i)%gap0, is_closed=touches(contact, i) .or. &
-               (j <= set%n .and. .not. contact%step%is_penalty))
+               (self%is_held(set%id(j)) .and. .not. contact%step%is_penalty))
             call contact_laws_begin(set%law(j), contact%laws, place)
             item%has_friction = item%has_friction .or. contact_laws_rub(set%law(j))
          end associate

@@ -314,8 +314,7 @@ contains
 
       active%puts_off = .true.
       active%has_rigid = has_rigid
-      active%is_one_problem = step%contact%method == method_complementarity .and. &
-         step_is_dynamic(step)
+      active%is_one_problem = step%contact%method == method_complementarity
       call active_set_suit(active, step)
       active%holds_gap = any(step_initiation(step) == [initiation_persistent, &
          initiation_massless]) .and. step%contact%method /= method_penalty

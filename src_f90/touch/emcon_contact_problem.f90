@@ -68,9 +68,8 @@ contains
       logical, intent(out) :: is_solved              !! else `force` is as near as it came
       integer :: turn
 
-      is_solved = has_compliance(self)
-      if (.not. is_solved) return
       call solve_by_trials(self, force, first_trials, effort%n_trial, is_solved)
+      if (is_solved .or. .not. has_compliance(self)) return
       do turn = 1, most_turns
          if (is_solved) return
          call solve_by_sweeps(self, force, first_sweeps*2**(turn - 1), effort%n_sweep, is_solved)
@@ -92,27 +91,28 @@ contains
    end function has_compliance
 
    !> The stiffness by which a miss of the law is a force: of contact `i` by itself [M/T^2].
-   pure real(wp) function contact_problem_stiffness(self, i) &
-      result(stiffness)
+   pure real(wp) function contact_problem_stiffness(self, i) result(stiffness)
       type(contact_problem_t), intent(in) :: self
       integer, intent(in) :: i
       integer :: k, m
 
       m = 1 + self%n_slip
-      stiffness = m/sum([(self%w(k, k), k = m*(i - 1) + 1, m*i)])
+      stiffness = m/max(sum([(abs(self%w(k, k)), k = m*(i - 1) + 1, m*i)]), tiny(stiffness))
    end function contact_problem_stiffness
 
-   !> In which way the law holds at contact `i`.
-   pure type(slip_status_t) function contact_problem_status(self, force, i) result(status)
+   !> In which ways the law holds at the contacts.
+   pure function contact_problem_status(self, force) result(status)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(in) :: force(0:, :)           !! (0:n_slip, n) of a solution [M L/T^2]
-      integer, intent(in) :: i                       !! 1 to n
-
+      type(slip_status_t) :: status(size(self%mu))
       real(wp) :: motion(0:self%n_slip, size(self%mu))
+      integer :: i
 
       motion = motion_of(self, force)
-      status = coulomb_status(trial_of(self, force(:, i), motion(:, i), i), self%mu(i), &
-         contact_problem_stiffness(self, i))
+      do i = 1, size(status)
+         status(i) = coulomb_status(trial_of(self, force(:, i), motion(:, i), i), self%mu(i), &
+            contact_problem_stiffness(self, i))
+      end do
    end function contact_problem_status
 
    !> Forces, gap and slips of contact `i`.

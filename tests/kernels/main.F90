@@ -22,6 +22,7 @@ program main
    use test_cholmod, only : collect_cholmod
    use test_supernodal, only : collect_supernodal
 #endif
+   use test_condensation, only : collect_condensation
    use test_condition_rows, only : collect_condition_rows
    use test_contact_problem, only : collect_contact_problem
    use test_constraints, only : collect_constraints
@@ -263,6 +264,7 @@ program main
    call run("rigid_motion", collect_rigid_motion)
    call run("rigidity", collect_rigidity)
    call run("rigid_bodies", collect_rigid_bodies)
+   call run("condensation", collect_condensation)
    call run("condition_rows", collect_condition_rows)
    call run("contact_problem", collect_contact_problem)
    call run("constraints", collect_constraints)

@@ -3,9 +3,9 @@ module test_kept_factor
    use check, only : check_near, check_true, test_case_t
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_errors, only : error_t
-   use emcon_kept_factor, only : kept_factor_correct, kept_factor_free, kept_factor_has_room, &
-      kept_factor_look, kept_factor_multipliers, kept_factor_renew, kept_factor_serves, &
-      kept_factor_set_up, kept_factor_t, kept_factor_take
+   use emcon_kept_factor, only : kept_factor_condense, kept_factor_correct, kept_factor_free, &
+      kept_factor_has_room, kept_factor_look, kept_factor_multipliers, kept_factor_renew, &
+      kept_factor_serves, kept_factor_set_up, kept_factor_t, kept_factor_take
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_solver_registry, only : solver_default
@@ -24,6 +24,7 @@ contains
          test_case_t("the correction of the saddle point", test_correction), &
          test_case_t("no correction where nothing is left", test_fixed_point), &
          test_case_t("multipliers of contacts that give way are unknowns too", test_soft), &
+         test_case_t("constraints in their multipliers alone", test_condense), &
          test_case_t("no factor of a pattern that is not symmetric", test_pattern), &
          test_case_t("no factor of what is not definite", test_indefinite), &
          test_case_t("strong curvature is told", test_curvature), &
@@ -125,6 +126,31 @@ contains
       call check_near(error, mu, real(-x(n + 1:, 1), wp), tol_dp, maxval(abs(mu)), "mu")
       call kept_factor_free(kept)
    end subroutine test_soft
+
+   !> Values after a correction with any multipliers: defect + G dq, K dq = G^T lam - r, by LAPACK.
+   subroutine test_condense(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(kept_factor_t) :: kept
+      real(dp), allocatable :: k(:, :), g(:, :), rhs(:, :), x(:, :)
+      real(wp), allocatable :: w(:, :), free(:)
+      logical :: is_fit, is_singular
+
+      call prepare(problem, kept, is_fit, error)
+      if (allocated(error)) return
+      associate (set => problem%set, n => problem%numbering%n_unknown)
+         allocate(w(set%n, set%n), free(set%n), rhs(n, 1), x(n, 1))
+         call kept_factor_condense(kept, set, problem%residual, w, free, error)
+         if (allocated(error)) return
+         k = 0.5_dp*(dense_of(problem%base) + transpose(dense_of(problem%base)))
+         g = dense_of(set%gap_rows)
+         rhs(:, 1) = matmul(real(set%lam, dp), g) - real(problem%residual, dp)
+         call dense_solve(k, rhs, x, is_singular)
+         call check_near(error, free + matmul(w, set%lam(:set%n)), set%defect(:set%n) &
+            + real(matmul(g, x(:, 1)), wp), tol_dp, 1.0_wp + maxval(abs(w)), "values")
+      end associate
+      call kept_factor_free(kept)
+   end subroutine test_condense
 
    subroutine test_pattern(error)
       type(error_t), allocatable, intent(out) :: error

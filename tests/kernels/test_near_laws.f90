@@ -139,6 +139,7 @@ contains
          system%contact(1)%contact%step%is_penalty = k == 2
          if (k == 3) system%contact(1)%contact%state(2)%gap0 = 0.0_wp
          laws%is_near = [.true., .true., .false.]
+         laws%is_held = [.true., .false., .true.]
          laws%area = [1.0_wp, 2.0_wp, 3.0_wp]
          call constraints_select(set, [1, 3], [2])
          set%target = [7.0_wp, 8.0_wp, 9.0_wp]

@@ -1,0 +1,106 @@
+!> A step in the multipliers of its contacts alone, beside the whole linear system.
+module test_condensation
+   use check, only : check_near, check_true, test_case_t
+   use emcon_condensation, only : condensation_free, condensation_make, condensation_t
+   use emcon_correction, only : correction_free, correction_reset, correction_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_lapack, only : dense_solve
+   use emcon_solver_registry, only : solver_default
+   use emcon_steps, only : method_null_space
+   use emcon_system, only : system_t
+   use random_constraints, only : make_problem, make_rows, problem_t, tol_dp
+   use sparse_samples, only : dense_of
+   implicit none
+   private
+   public :: collect_condensation
+
+contains
+
+   subroutine collect_condensation(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("motion and values by any multipliers", test_motion), &
+         test_case_t("what moves freely is told", test_free)]
+   end subroutine collect_condensation
+
+   !> N dq = F^T lam - r with the rows that always hold at 0 after it, whose multipliers are
+   !> unknowns too: by LAPACK, for none, two and all but one of such rows, with curvature and without.
+   subroutine test_motion(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(system_t) :: system
+      type(correction_t) :: correction
+      type(condensation_t) :: condensation
+      real(dp), allocatable :: full(:, :), rhs(:, :), x(:, :), force(:, :), gap(:, :)
+      real(wp), allocatable :: lam(:)
+      integer :: n, m, case
+      logical :: is_singular
+
+      call make_problem(problem)
+      call make_rows(problem)
+      system%space%numbering = problem%numbering
+      system%matrix = problem%base
+      call correction_reset(correction, method_null_space, solver_default)
+      n = problem%numbering%n_unknown
+      associate (set => problem%set)
+         force = dense_of(set%force_rows)
+         gap = dense_of(set%gap_rows)
+         do case = 0, 5
+            m = min(set%n - 1, 2*(case/2))
+            if (case > 3) m = set%n - 1
+            set%n_permanent = m
+            call condensation_make(condensation, system, set, correction, problem%residual, &
+               mod(case, 2) == 0, error)
+            if (allocated(error)) return
+            lam = set%lam(m + 1:set%n)
+            allocate(full(n + m, n + m), rhs(n + m, 1), x(n + m, 1), source=0.0_dp)
+            full(:n, :n) = dense_of(problem%base)
+            if (mod(case, 2) == 0) full(:n, :n) = dense_of(problem%matrix)
+            full(:n, n + 1:) = -transpose(force(:m, :))
+            full(n + 1:, :n) = gap(:m, :)
+            rhs(:n, 1) = matmul(real(lam, dp), force(m + 1:, :)) - real(problem%residual, dp)
+            rhs(n + 1:, 1) = -real(set%defect(:m), dp)
+            call dense_solve(full, rhs, x, is_singular)
+            associate (move => condensation%motion, permanent => condensation%permanent)
+               call check_near(error, move(:, 0) + matmul(move(:, 1:), lam), real(x(:n, 1), wp), &
+                  tol_dp, maxval(abs(real(x, wp))), "motion")
+               if (.not. allocated(error)) call check_near(error, permanent(:, 0) &
+                  + matmul(permanent(:, 1:), lam), real(x(n + 1:, 1), wp), tol_dp, &
+                  maxval(abs(real(x, wp))), "multipliers of what always holds")
+            end associate
+            if (allocated(error)) return
+            call check_near(error, condensation%free + matmul(condensation%w, lam), &
+               set%defect(m + 1:) + real(matmul(gap(m + 1:, :), x(:n, 1)), wp), tol_dp, &
+               maxval(abs(real(x, wp))), "values")
+            if (allocated(error)) return
+            deallocate(full, rhs, x)
+         end do
+      end associate
+      call condensation_free(condensation)
+      call correction_free(correction)
+   end subroutine test_motion
+
+   subroutine test_free(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(system_t) :: system
+      type(correction_t) :: correction
+      type(condensation_t) :: condensation
+
+      call make_problem(problem)
+      call make_rows(problem)
+      system%space%numbering = problem%numbering
+      system%matrix = problem%base
+      system%matrix%value = 0.0_dp
+      call correction_reset(correction, method_null_space, solver_default)
+      call condensation_make(condensation, system, problem%set, correction, problem%residual, &
+         .false., error)
+      if (allocated(error)) return
+      call check_true(error, condensation%is_singular, "it is singular")
+      call condensation_free(condensation)
+      call correction_free(correction)
+   end subroutine test_free
+
+end module test_condensation

@@ -1,0 +1,83 @@
+"""`*CONSTRAINT METHOD, TYPE=COMPLEMENTARITY`: what acts, sticks and slides is found in Newton's method."""
+
+import math
+
+import numpy as np
+import plain_scenes
+import pytest
+from friction_scenes import (
+    arch,
+    arch_needs,
+    balance,
+    block_on_floor,
+    pressed_round,
+    stack_on_slope,
+)
+from plain_scenes import BOTH, ONE
+from scene_tools import run_deck
+
+NODES = "NODE TO SURFACE"
+
+
+def obeys(run):
+    """The laws hold, the energy balance closes, friction takes."""
+    assert run.verdict["verdict"] == "good" and balance(run.history) < 1e-12
+    if "law_violation" in run.verdict:
+        assert run.verdict["law_violation"] <= 1e-10
+
+
+@pytest.mark.parametrize("formulation", [NODES, "MORTAR"])
+def test_one_solution(formulation, tmp_path):
+    """Damped, a block that slides has one motion: that of the other methods, but for round-off."""
+    deck = block_on_floor(0.01, 0.4, 0.3, v0=2.0, eta=2e-3)
+    runs = [run_deck(deck, tmp_path / method.replace(" ", "_"), formulation=formulation, method=method)
+            for method in ("NULL SPACE", "COMPLEMENTARITY")]
+    for run in runs:
+        obeys(run)
+    u = [run.fields()["displacement"] for run in runs]
+    assert np.abs(u[1] - u[0]).max() < 1e-11*np.abs(u[0]).max()
+
+
+@pytest.mark.parametrize("mu", [0.15, 0.25])
+def test_a_stack(mu, tmp_path):
+    """Nodes on nodes, held from both sides: rows that follow from others. No increment is cut, and
+    what is held to stay does."""
+    run = run_deck(stack_on_slope(mu, -math.atan(0.2), sides=BOTH), tmp_path, formulation=NODES,
+                   method="COMPLEMENTARITY")
+    obeys(run)
+    assert run.history["cuts"].sum() == 0
+    moved = np.abs(run.fields()["displacement"][-1]).max()
+    assert (moved > 0.02) == (mu < 0.2)
+
+
+@pytest.mark.parametrize("part", [0.8, 6.0])
+def test_an_arch(part, tmp_path):
+    run = run_deck(arch(part*arch_needs(), BOTH, t_end=0.2), tmp_path, formulation=NODES,
+                   method="COMPLEMENTARITY")
+    obeys(run)
+    assert run.history["cuts"].sum() == 0
+
+
+@pytest.mark.parametrize(("scene", "sides", "formulation"), [
+    ("comb", BOTH, NODES), ("tower", BOTH, NODES), ("pile", BOTH, NODES), ("bowl", ONE, "MORTAR")])
+def test_fewer_cuts(scene, sides, formulation, tmp_path):
+    """No more increments are cut than by sets that are tried one after the other."""
+    deck = (plain_scenes.SCENES.get(scene) or getattr(plain_scenes, scene))().deck(sides)
+    cuts = []
+    for method in ("NULL SPACE", "COMPLEMENTARITY"):
+        run = run_deck(deck, tmp_path / method.replace(" ", "_"), formulation=formulation, method=method)
+        obeys(run)
+        cuts.append(run.history["cuts"].sum())
+    assert cuts[1] <= cuts[0]/3
+
+
+def test_statics(tmp_path):
+    """A round body that is pressed on and rubs: the state of equilibrium of the other methods, to the
+    part of an edge, all shorter than 4, by which stencils may be those of another motion."""
+    deck, _ = pressed_round(32, layers=6)
+    u = []
+    for method in ("NULL SPACE", "COMPLEMENTARITY"):
+        run = run_deck(deck, tmp_path / method.replace(" ", "_"), method=method)
+        assert run.verdict["verdict"] == "good"
+        u.append(run.fields()["displacement"])
+    assert np.abs(u[1] - u[0]).max() < 4*np.sqrt(np.finfo(float).eps)
