@@ -173,8 +173,8 @@ contains
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact)
             contact%step%is_sharp = .false.
-            contact%step%pushes_at_end = evaluation_is_equilibrium(motion%evaluation) &
-               .or. motion%evaluation%pushes_at_end
+            contact%step%is_static = evaluation_is_equilibrium(motion%evaluation)
+            contact%step%pushes_at_end = contact%step%is_static .or. motion%evaluation%pushes_at_end
          end associate
       end do
       call active_set_restart(self, system, motion)

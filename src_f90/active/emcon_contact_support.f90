@@ -10,7 +10,7 @@ module emcon_contact_support
    use emcon_first_touch_plane, only : touch_time
    use emcon_free_motions, only : find_assemblies, find_free_motions
    use emcon_contact_support_gaps, only : gaps_evaluate, gaps_keep_closed, gaps_measure, &
-      gaps_nearest, gaps_next_to_close, gaps_that_can_act, in_the_way
+      gaps_nearest, gaps_next_to_close, gaps_that_can_act, gaps_that_leave, in_the_way
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_numbering, only : add_to_dofs
@@ -117,6 +117,7 @@ contains
       do round = 1, 6*system%space%n_body + size(is_active)
          call motion_evaluate(motion)
          call gaps_measure(system, motion)
+         is_active = is_active .and. .not. gaps_that_leave(system)
          call look_at_contacts(self, system, scene, motion, is_active, look)
          call find_free(look, free)
          if (size(free) == 0) exit

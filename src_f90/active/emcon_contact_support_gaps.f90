@@ -10,8 +10,8 @@ module emcon_contact_support_gaps
    use emcon_system, only : system_t
    implicit none
    private
-   public :: gaps_measure, gaps_evaluate, gaps_that_can_act, gaps_next_to_close, gaps_nearest, &
-      gaps_keep_closed
+   public :: gaps_measure, gaps_evaluate, gaps_that_can_act, gaps_that_leave, gaps_next_to_close, &
+      gaps_nearest, gaps_keep_closed
    public :: in_the_way
 
    !> Contacts that close at the same time, by this fraction of an edge, are taken in together.
@@ -73,6 +73,21 @@ contains
          end associate
       end do
    end function gaps_that_can_act
+
+   !> Contacts that have lost their surface at the end of the motion that was measured.
+   pure function gaps_that_leave(system) result(is_leaving)
+      type(system_t), intent(in) :: system
+      logical :: is_leaving(system%n_constraint)
+      integer :: pair
+
+      is_leaving = .false.
+      do pair = 1, size(system%contact)
+         associate (contact => system%contact(pair)%contact)
+            is_leaving(system%first_constraint(pair) + 1:system%first_constraint(pair + 1)) = &
+               contact%state%is_leaving
+         end associate
+      end do
+   end function gaps_that_leave
 
    !> Of the contacts `set` those that close first on a way, and when; huge if none does.
    pure subroutine gaps_next_to_close(set, direction, time, is_next)

@@ -44,6 +44,7 @@ module emcon_contact
    type :: contact_step_t
       logical :: is_sharp = .false.                   !! convex corners are not rounded
       logical :: pushes_at_end = .false.              !! forces act at its end, else all over it
+      logical :: is_static = .false.                  !! it seeks a state of rest
       logical :: has_compliance = .false.             !! by a penalty, or augmented
       logical :: is_penalty = .false.                 !! it stores what it takes: a penalty
    end type contact_step_t

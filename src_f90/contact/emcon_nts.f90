@@ -15,7 +15,7 @@ module emcon_nts
       smoothing_hermite, smoothing_none, interaction_t
    use emcon_kinds, only : wp
    use emcon_nts_choice, only : choice_covers, choice_init, update_candidates, choice_make, &
-      choice_settle, choice_take_nearer, nts_choice_t
+      choice_pushes_aside, choice_settle, choice_take_nearer, nts_choice_t
    use emcon_nts_constraint, only : polygon_constraint, smooth_constraint
    use emcon_nts_gap_value, only : nts_gap_value
    use emcon_nts_stencil, only : most_nodes, polygon_slip, stencil_gather, stencil_length
@@ -265,6 +265,9 @@ contains
          state%is_over = is_over(state, start%xi, xi1, [stencil%before > 0, stencil%after > 0])
       end associate
       state%is_covered = .true.
+      if (state%gap1 > end_tol*state%size) return
+      state%is_leaving = choice_pushes_aside(self, i, x, u0, du)
+      state%is_over = state%is_over .and. .not. state%is_leaving
    end function polygon_state
 
    !> Gap of constraint `i` over its polygon after the motion `du`, and the projection on its edge.

@@ -5,6 +5,7 @@
 module emcon_nts_choice
    use emcon_chain_plane, only : chain_init, chain_shortest, chain_t, chain_thickness, next, &
       previous
+   use emcon_common_normal_plane, only : is_pushed_aside
    use emcon_contact, only : contact_t
    use emcon_corner_tops_plane, only : corner_tops
    use emcon_errors, only : error_t
@@ -23,7 +24,7 @@ module emcon_nts_choice
    private
    public :: nts_choice_t
    public :: choice_init, update_candidates, choice_make, choice_take_nearer, choice_settle, &
-      choice_covers
+      choice_covers, choice_pushes_aside
 
    type, abstract, extends(contact_t) :: nts_choice_t
       type(chain_t) :: slave
@@ -39,8 +40,8 @@ module emcon_nts_choice
       integer, allocatable :: near_item(:)            !! (n_constraint) its place in that list
       integer :: n_sifted = 0                         !! the list that was last sifted
       integer, allocatable :: edge(:)                 !! (n_constraint) master edge; 0: none near
-      integer, allocatable :: other(:)                !! (n_constraint) the other one at a corner
-                                                      !! that the node stands over; 0: none
+      integer, allocatable :: other(:)                !! (n_constraint) the other one where the
+                                                      !! node stands over two; 0: none
       type(polygon_stencil_t), allocatable :: polygon(:, :)   !! (2, n_constraint) over these
       logical, allocatable :: is_corner(:)            !! (n_edge) the smoothed master has one at its
                                                       !! first node
@@ -273,21 +274,33 @@ contains
       end associate
    end subroutine stencil_of
 
-   !> Is `edge` or one of its neighbours the nearest after the motion `du`, rather than the edges
-   !> after next?
-   pure logical function choice_covers(self, i, edge, x, u0, du)
+   !> Does the surface push the node of constraint `i`, as a state of rest, along what is no normal
+   !> of both? Where nodes of both surfaces are held, another constraint is there for it.
+   pure logical function choice_pushes_aside(self, i, x, u0, du) result(is_aside)
       class(nts_choice_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
-      integer, intent(in) :: edge                !! of the master
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node) [L]
+
+      is_aside = self%step%is_static .and. self%both_sides
+      if (is_aside) is_aside = is_pushed_aside(self%slave, self%chain_node(i), &
+         self%polygon(1, i), x, u0, du)
+   end function choice_pushes_aside
+
+   !> Is edge `middle` or one of its neighbours the nearest after the motion `du`, rather than the
+   !> edges after next?
+   pure logical function choice_covers(self, i, middle, x, u0, du)
+      class(nts_choice_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      integer, intent(in) :: middle              !! of the master
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)        !! (2, n_node) [L]
       real(wp), intent(in), contiguous, optional :: du(:, :)       !! (2, n_node); none: 0 [L]
       real(wp) :: inside, outside
       integer :: e, k, side
 
-      inside = distance_of(edge)
+      inside = distance_of(middle)
       outside = huge(outside)
       do side = 1, 2
-         e = edge
+         e = middle
          do k = 1, 2
             e = merge(self%master%neighbour(previous, e), self%master%neighbour(next, e), side == 1)
             if (e == 0) exit

@@ -47,6 +47,7 @@ program main
    use test_velocity_jumps, only : collect_velocity_jumps
    use test_velocity_pushes, only : collect_velocity_pushes
    use test_near_list, only : collect_near_list
+   use test_common_normal, only : collect_common_normal
    use test_corner_tops, only : collect_corner_tops
    use test_blocked_contact, only : collect_blocked_contact
    use test_explicit, only : collect_explicit
@@ -293,6 +294,7 @@ program main
    call run("velocity_jumps", collect_velocity_jumps)
    call run("velocity_pushes", collect_velocity_pushes)
    call run("near_list", collect_near_list)
+   call run("common_normal", collect_common_normal)
    call run("corner_tops", collect_corner_tops)
    call run("blocked_contact", collect_blocked_contact)
    call run("explicit", collect_explicit)
