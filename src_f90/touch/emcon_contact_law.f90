@@ -45,13 +45,13 @@ module emcon_contact_law
    end type contact_place_t
 
    type, abstract :: contact_law_t
-      logical :: acts_near = .false.             !! on what is near, whether its row holds or not
-      real(wp) :: reach = 0.0_wp                 !! the gap up to which it does, >= 0 [L]
+      real(wp) :: reach = 0.0_wp                 !! the gap up to which it acts, >= 0 [L]
       logical :: has_friction = .false.          !! it has forces along the surface
       integer :: loss = loss_damping             !! the kind of loss that it dissipates by
    contains
       procedure(respond_interface), deferred :: respond
       procedure :: take
+      procedure :: acts_near
       procedure :: begin
       procedure :: push_on
       procedure :: stored
@@ -100,6 +100,14 @@ contains
 
       acts = .false.
    end subroutine take
+
+   !> Beside the rows: does it act on all that is near, whether a row holds or not? Unless
+   !> overridden, as by laws that parts of a step ask by themselves: friction and restitution.
+   pure logical function acts_near(self)
+      class(contact_law_t), intent(in) :: self
+
+      acts_near = .true.
+   end function acts_near
 
    !> Told before each solve of a step; nothing to do unless overridden.
    pure subroutine begin(self, place)
@@ -187,7 +195,7 @@ contains
 
       if (.not. allocated(of_pair%beside)) return
       do i = 1, size(of_pair%beside)
-         if (.not. of_pair%beside(i)%law%acts_near) cycle
+         if (.not. of_pair%beside(i)%law%acts_near()) cycle
          call contact_laws_add(self, of_pair%beside(i)%law)
          call self%beside(size(self%beside))%law%begin(place)
       end do
@@ -239,7 +247,7 @@ contains
       if (.not. allocated(self%beside)) return
       do i = 1, size(self%beside)
          associate (law => self%beside(i)%law)
-            if (law%acts_near) reach = max(reach, law%reach)
+            if (law%acts_near()) reach = max(reach, law%reach)
          end associate
       end do
    end function contact_laws_reach

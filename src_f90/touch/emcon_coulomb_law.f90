@@ -51,6 +51,7 @@ module emcon_coulomb_law
       procedure :: take => coulomb_take
       procedure :: respond => coulomb_respond
       procedure :: dissipated => coulomb_dissipated
+      procedure :: acts_near => coulomb_acts_near
       procedure :: holds_slip
       procedure :: slip_held
       procedure :: leads_to
@@ -78,6 +79,13 @@ contains
       self%loss = loss_friction
       acts = self%mu > 0.0_wp
    end subroutine coulomb_take
+
+   !> It is asked with the row of its condition.
+   pure logical function coulomb_acts_near(self) result(acts_near)
+      class(coulomb_t), intent(in) :: self
+
+      acts_near = .false.
+   end function coulomb_acts_near
 
    !> Where it slides friction is a part of the push; what sticks is for rows of slips.
    pure subroutine coulomb_respond(self, at, response)

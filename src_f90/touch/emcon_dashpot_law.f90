@@ -36,7 +36,6 @@ contains
       logical, intent(out) :: acts               !! the deck asks for it
 
       self%coefficients = surface%damping
-      self%acts_near = .true.
       self%reach = surface%damping%clearance
       self%has_friction = surface%damping%tangent > 0.0_wp
       acts = self%coefficients%coefficient > 0.0_wp

@@ -15,6 +15,7 @@ module emcon_restitution_law
       procedure :: take
       procedure :: respond
       procedure :: rate_change
+      procedure :: acts_near
    end type restitution_t
 
 contains
@@ -28,6 +29,13 @@ contains
       self%part = surface%restitution
       acts = self%part < 1.0_wp
    end subroutine take
+
+   !> It is asked at the end of a step.
+   pure logical function acts_near(self)
+      class(restitution_t), intent(in) :: self
+
+      acts_near = .false.
+   end function acts_near
 
    !> Over a step there is no force.
    pure subroutine respond(self, at, response)

@@ -21,6 +21,11 @@ module test_contact_laws
 
    real(wp), parameter :: tol = 16.0_wp*epsilon(1.0_wp)
 
+   type, extends(contact_law_t) :: plain_t
+   contains
+      procedure :: respond => plain_respond
+   end type plain_t
+
 contains
 
    subroutine collect_contact_laws(tests)
@@ -29,9 +34,33 @@ contains
       tests = [ &
          test_case_t("laws that a deck asks for", test_asked), &
          test_case_t("copies of a pair's laws", test_begin), &
+         test_case_t("a law that says no more", test_plain), &
          test_case_t("forces and losses in sum", test_respond), &
          test_case_t("rates that impacts change", test_rates)]
    end subroutine collect_contact_laws
+
+   !> A new law says nothing but what it responds, and acts wherever it is near.
+   subroutine test_plain(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_laws_t) :: of_pair, laws
+      type(contact_response_t) :: response
+
+      call contact_laws_add(of_pair, plain_t())
+      call check_near(error, contact_laws_reach(of_pair), 0.0_wp, 0.0_wp, 1.0_wp, "at contact")
+      call contact_laws_begin(laws, of_pair, contact_place_t())
+      call check_true(error, allocated(laws%beside), "it acts")
+      if (allocated(error)) return
+      call contact_laws_respond(laws, contact_values_t(), response)
+      call check_near(error, response%lam, 7.0_wp, 0.0_wp, 1.0_wp, "its force")
+   end subroutine test_plain
+
+   pure subroutine plain_respond(self, at, response)
+      class(plain_t), intent(inout) :: self
+      type(contact_values_t), intent(in) :: at
+      type(contact_response_t), intent(inout) :: response
+
+      response%lam = 7.0_wp
+   end subroutine plain_respond
 
    !> Friction, damping and restitution, where there is any of them; a law for each method.
    subroutine test_asked(error)
@@ -77,9 +106,9 @@ contains
       call contact_laws_begin(laws, of_pair, contact_place_t())
       call check_true(error, .not. allocated(laws%beside), "nothing to copy")
       call contact_laws_add(of_pair, coulomb_t(mu=0.5_wp))
-      call contact_laws_add(of_pair, dashpot_t(acts_near=.true., reach=0.25_wp))
-      call contact_laws_add(of_pair, dashpot_t(acts_near=.true., reach=0.75_wp))
-      call contact_laws_add(of_pair, dashpot_t(reach=5.0_wp))
+      call contact_laws_add(of_pair, dashpot_t(reach=0.25_wp))
+      call contact_laws_add(of_pair, dashpot_t(reach=0.75_wp))
+      call contact_laws_add(of_pair, restitution_t(reach=5.0_wp))
       call contact_laws_add(laws, coulomb_t(mu=0.1_wp))
       call contact_laws_begin(laws, of_pair, contact_place_t(area=3.0_wp, share=0.5_wp, &
          gap=0.1_wp, is_closed=.true.))

@@ -45,7 +45,7 @@ contains
       type(block_t) :: block
 
       call open_given_contact(system, active, motion, reshape(given, [size(given), 1]), 0, &
-         dashpot_t(acts_near=.true., reach=of_law, has_friction=.true., &
+         dashpot_t(reach=of_law, has_friction=.true., &
          coefficients=contact_damping_t(1.0_wp, 0.5_wp)))
       call make_block(scene, "CPE4", [1, 1], block)
       call add_step(scene, is_static, 1.0_wp, 1)
