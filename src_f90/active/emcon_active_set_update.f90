@@ -4,7 +4,7 @@ module emcon_active_set_update
    use emcon_active_set, only : active_set_update_gaps, active_set_pass, active_set_t, most_sets, &
       step_cycling, step_done, step_stands_off, step_too_far, touch_tol
    use emcon_constraints, only : constraint_index, constraints_gives_back
-   use emcon_contact, only : contact_t, max_penetration_on_entry, gap_state_t
+   use emcon_contact, only : contact_t, gap_ratio, gap_state_t, max_penetration_on_entry
    use emcon_near_laws, only : near_laws_are_none, near_laws_update
    use emcon_coulomb_law, only : slip_status_t
    use emcon_friction, only : friction_close, friction_holds, friction_is_same, friction_turn, &
@@ -270,7 +270,7 @@ contains
          ! A new contact may not be held at a larger distance than the deck allows.
          is_new = self%set%is_kept(k) .and. .not. self%was_active(self%set%id(k))
          if (is_new .and. self%gap_tolerance > 0.0_wp &
-            .and. gap%gap0 > self%gap_tolerance*gap%size) status = step_stands_off
+            .and. gap_ratio(gap, gap%gap0) > self%gap_tolerance) status = step_stands_off
          held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
          if (self%set%penalty%is_on) held = held + contact%mean_gap(i, self%set%penalty%left(k))
          self%is_stale = self%is_stale .or. &

@@ -13,7 +13,7 @@ module emcon_contact
    implicit none
    private
    public :: contact_t, contact_box_t, contact_step_t, gap_state_t
-   public :: max_penetration_on_entry
+   public :: max_penetration_on_entry, gap_ratio
 
    !> Corners of master surfaces are rounded over these fractions of an edge: with and without a
    !> static step among those to come.
@@ -33,7 +33,8 @@ module emcon_contact
       logical :: is_covered = .true.                  !! see `covers`
       real(wp) :: gap0 = 0.0_wp                       !! mean gap Phi/W [L]
       real(wp) :: gap1 = 0.0_wp
-      real(wp) :: size = 0.0_wp
+      real(wp) :: size = 0.0_wp                       !! edge that gaps are measured against [L]
+      real(wp) :: other_size = huge(1.0_wp)           !! shortest of the other side there, if known
       real(wp) :: closed = 0.0_wp                     !! the gap at which it acts, < 0: a guard [L]
       !> So much of friction goes to another node by the last choice of stencils than by the one
       !> before, 0 to 1
@@ -149,6 +150,14 @@ module emcon_contact
    end interface
 
 contains
+
+   !> A gap by the shorter edge of both sides: how far apart they are as each of them sees it.
+   pure real(wp) function gap_ratio(state, gap)
+      type(gap_state_t), intent(in) :: state
+      real(wp), intent(in) :: gap                !! [L]
+
+      gap_ratio = gap/min(state%size, state%other_size)
+   end function gap_ratio
 
    !> Set up for steps some of which are static, or none; before `configure`.
    pure subroutine suit_steps(self, meets_statics)

@@ -157,11 +157,11 @@ contains
    !> where the step begins, or where it is expected to end of what is covered there first.
    pure subroutine integrated_gap_sagittas(self)
       class(integrated_gap_t), intent(inout) :: self
-      real(wp) :: rise(0:1), area(0:1)
+      real(wp) :: rise(0:1), area(0:1), other_size
       integer :: i, k
 
       do i = 1, self%n_constraint
-         call add_shares(self, i, rise, area)
+         call add_shares(self, i, rise, area, other_size)
          self%sagitta(i) = 0.0_wp
          do k = 1, 0, -1
             if (area(k) >= least_cover*self%whole(i)) self%sagitta(i) = rise(k)/area(k)
@@ -169,19 +169,25 @@ contains
       end do
    end subroutine integrated_gap_sagittas
 
-   !> The integral of gaps, and the area that is covered, over both edges at the node.
-   pure subroutine add_shares(self, i, gap, area)
+   !> The integral of gaps, and the area that is covered, over both edges at the node; the shortest
+   !> edge of the other side there.
+   pure subroutine add_shares(self, i, gap, area, size)
       class(integrated_gap_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(out) :: gap(0:1), area(0:1)   !! at start and end [L^3], [L^2]
+      real(wp), intent(out) :: size              !! huge where nothing is covered [L]
       real(wp) :: part_gap(0:1), part_area(0:1)
       integer :: k
 
       gap = 0.0_wp
       area = 0.0_wp
+      size = huge(size)
       do k = 1, 2
          if (self%node_edge(k, i) == 0) cycle
-         call form_share(self%form(self%node_edge(k, i)), 3 - k, self%is_dual, part_gap, part_area)
+         associate (form => self%form(self%node_edge(k, i)))
+            call form_share(form, 3 - k, self%is_dual, part_gap, part_area)
+            size = min(size, form%other_size)
+         end associate
          gap = gap + part_gap
          area = area + part_area
       end do
@@ -210,7 +216,7 @@ contains
 
       call self%measure_edges(x, u0, du)
       do i = 1, self%n_constraint
-         call add_shares(self, i, gap, area)
+         call add_shares(self, i, gap, area, self%state(i)%other_size)
          associate (state => self%state(i))
             ! What stores energy is followed as long as there is any to give back.
             least = least_cover*self%whole(i)

@@ -365,8 +365,10 @@ contains
 
       do e = 1, self%slave%n_facet
          self%form(e)%ahead = 0.0_wp
-         associate (value => self%form(e)%value, ahead => self%form(e)%ahead)
+         associate (value => self%form(e)%value, ahead => self%form(e)%ahead, &
+               other_size => self%form(e)%other_size)
             value = 0.0_wp
+            other_size = huge(other_size)
             do k = self%start(e), self%start(e + 1) - 1
                call stencil_gather(self%pair(k), x, u0, du, local, dlocal)
                do i = 0, 1
@@ -374,6 +376,8 @@ contains
                   part(:, i) = moments_of(self, e, k, frame(i), .false.)
                end do
                value = value + part
+               if (any(part(moment_cover, :) > 0.0_wp)) other_size = min(other_size, &
+                  self%master%size(self%pair(k)%edge))
                if (part(moment_cover, 0) > 0.0_wp .or. .not. part(moment_cover, 1) > 0.0_wp) cycle
                ! On the line of the master edge, in the middle of what it comes to cover.
                call frame_hit(frame(0), self%pair(k), &

@@ -223,6 +223,7 @@ contains
             stencil%rounding, state%gap0, start%xi, stencil%goes_around)
          state%gap0 = state%gap0 - self%offset - self%sagitta(i)
          state%size = stencil_length(x, stencil%node)
+         state%other_size = self%own_size(i)
          if (allocated(self%own_slack)) state%closed = -min(state%size, self%own_size(i)) &
             *merge(self%slack, self%own_slack(self%chain_node(i)), self%step%has_compliance)
          state%is_near = .true.
@@ -329,6 +330,7 @@ contains
          state%gap0 = state%gap0 - self%offset
          state%gap1 = state%gap1 - self%offset
          state%size = stencil_length(x, node)
+         state%other_size = self%own_size(i)
          state%is_near = .true.
          state%is_over = is_over(state, xi0, xi1, curve%node([2, 5]) > 0 .and. &
             (curve%has_neighbour .or. .not. curve%is_corner([3, 4])))

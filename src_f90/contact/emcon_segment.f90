@@ -218,11 +218,14 @@ contains
                i => self%end_node(:, e))
             value = 0.0_wp
             w = weights([is_over(self, i(1)), is_over(self, i(2))])
+            self%form(e)%other_size = huge(1.0_wp)
             if (all(w <= 0.0_wp)) cycle
             a = (x(:, node(2)) - x(:, node(1))) + (u0(:, node(2)) - u0(:, node(1)))
             b = a + (du(:, node(2)) - du(:, node(1)))
             length = [sqrt(dot_product(a, a)), sqrt(dot_product(b, b))]
             do k = 1, 2
+               if (is_over(self, i(k))) self%form(e)%other_size = &
+                  min(self%form(e)%other_size, self%nts%state(i(k))%size)
                associate (gap => [self%nts%state(i(k))%gap0, self%nts%state(i(k))%gap1])
                   value(moment_gap, :) = value(moment_gap, :) + w(moment_gap, k)*length*gap
                   value(moment_gap_xi, :) = value(moment_gap_xi, :) + w(moment_gap_xi, k)*length*gap

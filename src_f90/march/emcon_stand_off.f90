@@ -2,6 +2,7 @@
 module emcon_stand_off
    use emcon_constraint, only : condition_t
    use emcon_constraints, only : constraint_index, constraint_set_t
+   use emcon_contact, only : gap_ratio
    use emcon_kinds, only : wp
    use emcon_system, only : system_t
    implicit none
@@ -11,7 +12,7 @@ module emcon_stand_off
    !> Forces below this fraction of the largest one of the step are round-off.
    real(wp), parameter :: least_force = sqrt(epsilon(1.0_wp))
 
-   !> Gaps are fractions of the edge that they are measured over, 0 where closed.
+   !> Gaps are fractions of the shorter edge of both sides, 0 where closed.
    type :: stand_off_t
       real(wp) :: largest = 0.0_wp
       real(wp) :: impulse = 0.0_wp               !! sum of force times duration [M L/T]
@@ -38,7 +39,7 @@ contains
          if (force <= least_force*largest) cycle
          call constraint_index(system, set%id(k), pair, i)
          associate (state => system%contact(pair)%contact%state(i))
-            gap = max(0.0_wp, state%gap1)/state%size
+            gap = gap_ratio(state, max(0.0_wp, state%gap1))
          end associate
          self%largest = max(self%largest, gap)
          self%impulse = self%impulse + force*h

@@ -450,7 +450,8 @@ contains
          associate (state => march%system%contact(k)%contact%state(set%id(i) &
                - march%system%first_constraint(k)), item => set%item(i))
             state%gap1 = 0.1_wp*real(i - 2, wp)
-            gap(i) = max(0.0_wp, state%gap1)/state%size
+            if (mod(i, 2) == 0) state%other_size = 0.25_wp*state%size
+            gap(i) = max(0.0_wp, state%gap1)/min(state%size, state%other_size)
             force(i) = abs(set%lam(i))*norm2(sum(item%g(:, :item%n_slave), 2))
          end associate
       end do

@@ -143,6 +143,20 @@ def test_air_is_half_an_edge_at_most(tmp_path, h, left):
     assert found["verdict"] == "good"
 
 
+@pytest.mark.parametrize("width, pair", [
+    (100, "FOOT, TOP"), (100, "TOP, FOOT"), (1e4, "FOOT, TOP"),
+    (100, ", SIDES=ONE\nFOOT, TOP"), (10, ", TYPE=SEGMENT\nTOP, FOOT"), (10, ", TYPE=MORTAR\nTOP, FOOT"),
+    (100, ", TYPE=MORTAR\nFOOT, TOP")])
+def test_air_is_measured_in_the_smaller_edge(tmp_path, width, pair):
+    """A floor of one wide face is no measure for a block of 1: on either side, by all kinds."""
+    deck = thrown(8)
+    deck.replace("\nFOOT, TOP", pair if pair.startswith(",") else f"\n{pair}")
+    deck.move_nodes(lambda label, x, y: (x if label > 4 else 0.5 + width*(x - 0.5), y))
+    found = run_deck(deck, tmp_path).verdict
+    assert found["stand_off"] == pytest.approx(0.3, rel=1e-6)
+    assert found["verdict"] == "good"
+
+
 @pytest.mark.parametrize("h, verdict, told", [(0.4, "good", 0), (5, "good", 1), (8, "bad", 0)])
 def test_air_that_holds_a_block(tmp_path, h, verdict, told):
     """Thrown at 1 from a height of 5.3: what is left of it where the step of contact begins."""
