@@ -282,7 +282,8 @@ contains
          i_equal = index(part, "=")
          option(n)%has_value = i_equal > 0
          if (i_equal == 0) i_equal = len(part) + 1
-         option(n)%name = squeezed(part(:i_equal - 1))
+         option(n)%typed = stripped(part(:i_equal - 1), blanks)
+         option(n)%name = squeezed(option(n)%typed)
          option(n)%value = stripped(part(i_equal + 1:), blanks)
       end do
       option = option(:n)
@@ -302,7 +303,7 @@ contains
             mark = parameter_mark(parameters, option%name)
             if (is_neutral(parameters, option%name, option%value)) cycle
             if (mark == mark_none) then
-               fault = "unknown parameter " // quoted(option%name) &
+               fault = "unknown parameter " // quoted(option%typed) &
                   // suggestion(option%name, parameter_names(parameters))
                reader%doubt%names = .true.
             else if (mark == mark_unsupported) then

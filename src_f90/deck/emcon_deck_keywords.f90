@@ -141,7 +141,7 @@ module emcon_deck_keywords
          "EXPANSION,CONDUCTIVITY,SPECIFIC HEAT,PHYSICAL CONSTANTS,TEMPERATURE,DFLUX,FILM," &
          // "RADIATE,HEAT TRANSFER"), &
       refusal_t("use *SOLID SECTION", "UEL PROPERTY"), &
-      refusal_t("only plane strain solids are read", &
+      refusal_t("bodies are solids; forces, potentials and masses of others a program may give", &
          "SHELL SECTION,BEAM SECTION,MEMBRANE SECTION,SPRING,DASHPOT,MASS"), &
       refusal_t("use *CONTACT PAIR", "GAP"), &
       refusal_t("list what touches by *CONTACT INCLUSIONS", "CONTACT EXCLUSIONS"), &

@@ -23,6 +23,7 @@ module emcon_deck_reader
    !> One parameter of a card.
    type :: option_t
       character(len=:), allocatable :: name        !! upper case, without blanks
+      character(len=:), allocatable :: typed       !! the name as it stands in the deck
       character(len=:), allocatable :: value       !! as typed
       logical :: has_value = .false.
    end type option_t
@@ -194,7 +195,7 @@ contains
       name = option_name(card, option)
       if (name == "") then
          reader%doubt%names = .true.
-         call card_error(reader, card, option // "= is missing")
+         if (.not. has_option(card, option)) call card_error(reader, card, option // "= is missing")
       else if (len(name) > max_name) then
          call card_error(reader, card, option // "=" // quoted(name) // " is longer than " &
             // to_text(max_name) // " characters")

@@ -110,6 +110,13 @@ contains
          end if
          card = reader%card(i)
          call need_name(reader, card, trim(builder%keyword), name)
+         if (verify(name, "0123456789") == 0 .and. name /= "") then
+            call card_error(reader, card, trim(builder%keyword) // "=" // name // " is a whole " // &
+               "number, which elsewhere is the label of one " // trim(builder%what) // &
+               "; begin names with a letter")
+            reader%doubt%names = .true.
+            cycle
+         end if
          if (name == "") cycle
          call find_or_add(builder, name, card, i_set)
          if (card%name == maker) then

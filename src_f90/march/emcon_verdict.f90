@@ -21,7 +21,7 @@ module emcon_verdict
    use emcon_small_range, only : small_limit, small_range_init, small_range_t, small_range_widen
    use emcon_solid, only : solid_t
    use emcon_stand_off, only : stand_off_mean, stand_off_t
-   use emcon_steps, only : most_stand_off
+   use emcon_steps, only : initiation_massless, most_stand_off, step_initiation
    use emcon_term_registry, only : terms_solid
    use emcon_text, only : note_add, notes_t, to_text
    implicit none
@@ -81,6 +81,7 @@ module emcon_verdict
       real(wp) :: unconverged = 0.0_wp           !! largest residual accepted above the tolerance
       real(wp) :: unconverged_time = 0.0_wp      !! [T]
       type(stand_off_t) :: stand_off
+      logical :: has_massless = .false.          !! in some step, contact has taken masses away
       type(nodal_pull_t) :: nodal_pull
       type(small_range_t) :: small               !! what linear sections have met
       real(wp) :: law_missed = 0.0_wp            !! of contact and friction, at most [M L/T^2]
@@ -163,6 +164,8 @@ contains
       if (increment%n_held > 0) self%count%held = self%count%held + 1
       self%count%most_held = max(self%count%most_held, increment%n_held)
       associate (state => march%state)
+         self%has_massless = self%has_massless .or. &
+            step_initiation(scene%step(state%clock%i_step)) == initiation_massless
          self%law_missed = max(self%law_missed, increment%law_missed)
          self%largest_push = max(self%largest_push, increment%largest_push)
          call scatter_follow(self%scatter, state%sums%sum, &
@@ -335,8 +338,14 @@ contains
       character(len=:), allocatable, intent(out) :: text   !! a sentence
 
       text = "contact forces act across gaps, " // to_text(stand_off_mean(self%stand_off), 2) // &
-         " of an edge in the mean over the impulse: smaller increments, GAP TOLERANCE, or " // &
-         "TYPE=ADMISSIBLE or MASSLESS of *CONTACT INITIATION close them"
+         " of an edge in the mean over the impulse: smaller increments, "
+      ! Where masses are taken away it is between nodes that have kept theirs.
+      if (self%has_massless) then
+         text = text // "or TYPE=ADMISSIBLE of *CONTACT INITIATION, close them"
+      else
+         text = text // "GAP TOLERANCE, or TYPE=ADMISSIBLE or MASSLESS of *CONTACT INITIATION " // &
+            "close them"
+      end if
    end subroutine stand_off_text
 
    !> Where bodies are, what contact forces act across, and how far linear sections have turned.

@@ -197,7 +197,8 @@ contains
       call check_sides(scene, reversed(pair), contact, noise, "slave", error)
    end subroutine check_slave_sides
 
-   !> Slave nodes are all behind the master surface: its normals point away from them.
+   !> Slave nodes are all behind the master surface: its normals point away from them. Or they are
+   !> within its pad only, deeper than any overlap that a step may begin with.
    subroutine check_sides(scene, pair, contact, noise, title, error)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
@@ -205,20 +206,29 @@ contains
       real(wp), intent(in) :: noise              !! of coordinates [L]
       character(len=*), intent(in) :: title      !! what the deck calls the master of `pair`
       type(error_t), allocatable, intent(out) :: error
-      integer :: i, stride, n_over, n_behind
+      integer :: i, stride, n_over, n_behind, n_within
       real(wp) :: gap
       logical :: is_over
 
       stride = max(1, contact%n/most_samples)
       n_over = 0
       n_behind = 0
+      n_within = 0
       do i = 1, contact%n, stride
          call contact%nearest(i, scene, gap, is_over)
          if (.not. is_over) cycle
          n_over = n_over + 1
-         if (is_behind(scene, contact, i, gap, noise)) n_behind = n_behind + 1
+         if (.not. is_behind(scene, contact, i, gap, noise)) cycle
+         n_behind = n_behind + 1
+         if (.not. is_behind(scene, contact, i, gap + pair%interaction%offset, noise)) n_within = &
+            n_within + 1
       end do
-      if (n_over > 0 .and. n_behind == n_over) then
+      if (n_behind == n_over .and. n_within > 0) then
+         call raise(error, err_input, where_text(scene, pair%origin) // ": error: PAD THICKNESS=" &
+            // to_text(pair%interaction%offset, 9) // " is more than what lies between surfaces " &
+            // scene%surface(pair%slave)%name // " and " // scene%surface(pair%master)%name // &
+            ", by too much for a step to begin with; take a thinner pad, or move them apart")
+      else if (n_over > 0 .and. n_behind == n_over) then
          call raise(error, err_input, where_text(scene, pair%origin) // ": error: the normals of " &
             // title // " surface " // scene%surface(pair%master)%name // " point away from " // &
             "surface " // scene%surface(pair%slave)%name // "; check the face labels")

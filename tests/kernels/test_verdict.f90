@@ -143,6 +143,11 @@ contains
       end do
       call verdict_line(verdict, line)
       call check_true(error, index(line, "MASSLESS") > 0, line)
+      verdict%has_massless = .true.
+      call verdict_end(verdict)
+      call verdict_line(verdict, line)
+      call check_true(error, index(line, "TYPE=ADMISSIBLE") > 0 .and. index(line, "MASSLESS") == 0, &
+         line)
    end subroutine test_air
 
    subroutine test_turned(error)
