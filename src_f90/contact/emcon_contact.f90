@@ -87,6 +87,7 @@ module emcon_contact
       procedure :: has_looked
       procedure :: own_area
       procedure :: share
+      procedure :: narrow
       procedure :: mean_gap
       ! To be called, with the displacements of nodes:
       procedure, non_overridable :: begin_step
@@ -208,6 +209,13 @@ contains
       share = 1.0_wp
    end function share
 
+   !> Take off the areas at x + u of constraints what they do not press on; nothing unless overridden.
+   pure subroutine narrow(self, x, u, area)
+      class(contact_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+      real(wp), intent(inout) :: area(:)         !! (n_constraint) [L^2]
+   end subroutine narrow
+
    !> The gap at the end of the step, as in `state`, of constraint `i` whose value there is `gap`.
    pure real(wp) function mean_gap(self, i, gap)
       class(contact_t), intent(in) :: self
@@ -324,8 +332,10 @@ contains
 
       if (self%midside%n == 0) then
          call self%area_points(x, u, of_multiplier, length)
+         call self%narrow(x, u, of_multiplier)
       else
          call self%area_points(x, midside_points(self%midside, u), of_multiplier, length)
+         call self%narrow(x, midside_points(self%midside, u), of_multiplier)
       end if
    end subroutine area
 

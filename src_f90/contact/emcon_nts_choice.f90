@@ -3,8 +3,8 @@
 !>
 !> Source: docs/theory.md, section 4.
 module emcon_nts_choice
-   use emcon_chain_plane, only : chain_init, chain_shortest, chain_t, chain_thickness, next, &
-      previous
+   use emcon_chain_plane, only : chain_init, chain_share, chain_shortest, chain_t, &
+      chain_thickness, next, previous
    use emcon_common_normal_plane, only : is_pushed_aside
    use emcon_contact, only : contact_t
    use emcon_corner_tops_plane, only : corner_tops
@@ -20,11 +20,16 @@ module emcon_nts_choice
    use emcon_self_contact_plane, only : self_contact_is_apart
    use emcon_touch_rule_plane, only : touch_rule_allows, touch_rule_init, touch_rule_may, &
       touch_rule_sees, touch_rule_t
+   use emcon_vectors_plane, only : between
    implicit none
    private
    public :: nts_choice_t
    public :: choice_init, update_candidates, choice_make, choice_take_nearer, choice_settle, &
       choice_covers, choice_pushes_aside
+
+   !> Nodes of both surfaces that are nearer than this, per edge, are at one place; and shares that
+   !> differ by less are alike.
+   real(wp), parameter :: at_node = 1.0e-3_wp
 
    type, abstract, extends(contact_t) :: nts_choice_t
       type(chain_t) :: slave
@@ -46,6 +51,8 @@ module emcon_nts_choice
       logical, allocatable :: is_corner(:)            !! (n_edge) the smoothed master has one at its
                                                       !! first node
       type(smooth_stencil_t), allocatable :: smooth(:)   !! (n_constraint) only if smoothed
+   contains
+      procedure :: narrow => choice_narrow
    end type nts_choice_t
 
 contains
@@ -240,9 +247,9 @@ contains
 
    !> Nodes over the polygon: slave node, edge, and what is there before and after that may keep the
    !> node out.
-   pure subroutine stencil_of(self, i, edge, x, u0, stencil)
+   pure subroutine stencil_of(self, i, middle, x, u0, stencil)
       class(nts_choice_t), intent(in) :: self
-      integer, intent(in) :: i, edge
+      integer, intent(in) :: i, middle           !! constraint, edge of the master
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
       type(polygon_stencil_t), intent(out) :: stencil
       real(wp) :: top
@@ -250,22 +257,22 @@ contains
       ! At rest a node may stand on a top for long.
       top = merge(2.0_wp, 1.0_wp, self%meets_statics)
       if (self%step%is_sharp) top = 0.0_wp
-      call polygon_stencil(stencil, self%master, self%node(i), edge, &
+      call polygon_stencil(stencil, self%master, self%node(i), middle, &
          self%rounding*[1.0_wp, top], x, u0)
       ! Guards watch the mesh.
       if (.not. (self%step%is_sharp .or. self%meets_statics .or. self%slack > 0.0_wp)) then
-         call corner_tops(self%slave, self%chain_node(i), self%master, edge, x, u0, stencil)
+         call corner_tops(self%slave, self%chain_node(i), self%master, middle, x, u0, stencil)
       end if
       stencil%goes_around = self%offset > 0.0_wp
       associate (n => stencil%n, before => stencil%before, after => stencil%after)
          if (after > 0) then
-            if (.not. bears(self, i, self%master%neighbour(next, edge), x, u0)) then
+            if (.not. bears(self, i, self%master%neighbour(next, middle), x, u0)) then
                n = n - 1
                after = 0
             end if
          end if
          if (before == 0) return
-         if (bears(self, i, self%master%neighbour(previous, edge), x, u0)) return
+         if (bears(self, i, self%master%neighbour(previous, middle), x, u0)) return
          n = n - 1
          before = 0
          if (after == 0) return
@@ -285,6 +292,28 @@ contains
       if (is_aside) is_aside = is_pushed_aside(self%slave, self%chain_node(i), &
          self%polygon(1, i), x, u0, du)
    end function choice_pushes_aside
+
+   !> Where nodes of both surfaces stand on each other one push presses both: on what belongs to the
+   !> node of the finer one, whichever of the two it is the constraint of.
+   pure subroutine choice_narrow(self, x, u, area)
+      class(nts_choice_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
+      real(wp), intent(inout) :: area(:)         !! (n_constraint) of the slave surface [L^2]
+      real(wp) :: part
+      integer :: i, k
+
+      if (.not. self%both_sides) return
+      do i = 1, self%n_constraint
+         if (.not. self%state(i)%is_near) cycle
+         do k = 1, 2
+            if (norm2(between(x, u, self%node(i), self%polygon(1, i)%node(1 + k))) &
+               > at_node*self%state(i)%size) cycle
+            part = chain_share(self%master, self%master%corner(k, self%edge(i))) &
+               /chain_share(self%slave, self%chain_node(i))
+            if (part < 1.0_wp - at_node) area(i) = part*area(i)
+         end do
+      end do
+   end subroutine choice_narrow
 
    !> Is edge `middle` or one of its neighbours the nearest after the motion `du`, rather than the
    !> edges after next?

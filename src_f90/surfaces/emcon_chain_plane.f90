@@ -15,7 +15,7 @@ module emcon_chain_plane
    implicit none
    private
    public :: chain_t, chain_init, chain_number, chain_shorter, chain_shortest, chain_thickness, &
-      chain_tributary, chain_distance, chain_is_seam, chain_touches, chain_corners, &
+      chain_tributary, chain_share, chain_distance, chain_is_seam, chain_touches, chain_corners, &
       chain_crossing, previous, next
 
    !> The sides of an edge, for `neighbour`.
@@ -192,6 +192,18 @@ contains
          end do
       end do
    end subroutine chain_tributary
+
+   !> The same of node `k` in the reference.
+   pure real(wp) function chain_share(self, k) result(length)
+      type(chain_t), intent(in) :: self
+      integer, intent(in) :: k                   !! index into `node`
+      integer :: j
+
+      length = 0.0_wp
+      do j = 1, 2
+         if (self%node_edge(j, k) > 0) length = length + 0.5_wp*self%size(self%node_edge(j, k))
+      end do
+   end function chain_share
 
    !> At either end of edge `e` the shorter one of the two edges there, in the reference.
    pure function chain_shorter(self, e) result(length)

@@ -454,3 +454,61 @@ def test_contact_output_without_contact(tmp_path):
     assert "there is no *CONTACT PAIR: nothing will be written" in run.errors
     with h5py.File(run.file(".h5"), "r") as file:
         assert "CONTACT" not in file.get("sets", {})
+
+
+STACK = """*NODE
+1, 0., 0.
+2, 0.5, 0.
+3, 1., 0.
+4, 0., 1.
+5, 0.5, 1.
+6, 1., 1.
+11, -3., -1.
+12, 0.5, -1.
+13, 4., -1.
+14, -3., 0.
+15, 0.5, 0.
+16, 4., 0.
+*ELEMENT, TYPE=CPE4, ELSET=BLOCK
+1, 1, 2, 5, 4
+2, 2, 3, 6, 5
+*ELEMENT, TYPE=CPE4, ELSET=FLOOR
+11, 11, 12, 15, 14
+12, 12, 13, 16, 15
+*NSET, NSET=HELD, GENERATE
+11, 16
+*SURFACE, NAME=FOOT
+BLOCK, S1
+*SURFACE, NAME=TOP
+FLOOR, S3
+*MATERIAL, NAME=M
+*ELASTIC
+1000., 0.
+*SOLID SECTION, ELSET=BLOCK, MATERIAL=M
+*SOLID SECTION, ELSET=FLOOR, MATERIAL=M
+*SURFACE INTERACTION, NAME=I
+*CONTACT PAIR, INTERACTION=I
+{pair}
+*BOUNDARY
+HELD, 1, 2
+2, 1
+5, 1
+*STEP
+*STATIC
+1., 1.
+*DLOAD
+BLOCK, P3, 8.
+*CONTACT PRINT
+CSTR
+*END STEP
+"""
+
+
+@pytest.mark.parametrize("pair", ["FOOT, TOP", "TOP, FOOT"])
+def test_pressure_where_nodes_of_both_sides_meet(pair, tmp_path):
+    """Whichever of both nodes the constraint belongs to, what is pressed is the block's side."""
+    values, _, _ = by_constraint(run_deck(Deck(STACK.format(pair=pair)), tmp_path), "CSTR")
+    pressure, acts = values[-1][..., 0], values[-1][..., 1] > 0
+    assert acts.sum() >= 3
+    # Newton's method ends at 1e-10 of the forces.
+    np.testing.assert_allclose(pressure[acts], 8.0, rtol=1e-9)
