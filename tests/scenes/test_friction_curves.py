@@ -26,15 +26,16 @@ def test_a_bead_on_a_track(pad, tmp_path):
     assert error[-1] < (0.01/(1 - pad))**2 + (np.pi/64)**2/2
 
 
-@pytest.mark.parametrize(("smoothing", "more", "fit"),
-                         [("HERMITE", NODES, 0.02), ("NONE", NODES, 0.02),
-                          ("NONE", {"formulation": "SEGMENT"}, 0.02),
-                          ("NONE", {"formulation": "MORTAR"}, 0.005)])
-def test_a_hub_turned_in_a_sleeve(smoothing, more, fit, tmp_path):
+@pytest.mark.parametrize(("smoothing", "more"), [("HERMITE", NODES), ("NONE", NODES),
+                                                 ("NONE", {"formulation": "SEGMENT"}),
+                                                 ("NONE", {"formulation": "MORTAR"})])
+def test_a_hub_turned_in_a_sleeve(smoothing, more, tmp_path):
     """The torque is mu N times the radius, but for the arm of an edge, shorter by half of its tilt
     squared; over a smoothed hub better than that order from mesh to mesh. Single nodes push aside by
     their place on an edge: by the moments of their forces, which act along the edges as they are in
-    the middle of an increment, of 0.01 radians."""
+    the middle of an increment, of 0.01 radians. Means of gaps push by a pressure that varies as
+    the edges of both dip into their arcs, by that part of the fit, at an arm of up to half an edge."""
+    fit, mu = 0.0125 if more["formulation"] == "MORTAR" else 0.02, 0.3
     cells = BUSHES[:2] if smoothing == "HERMITE" else BUSHES[1:2]
     error = []
     for around, edges in cells:
@@ -46,7 +47,8 @@ def test_a_hub_turned_in_a_sleeve(smoothing, more, fit, tmp_path):
         assert len(torque) >= 8
         error.append(np.abs(torque - 1).max())
         if more["formulation"] == "MORTAR":
-            assert error[-1] < 3*tilt**2
+            dips = tilt**2/2 + (np.pi/around)**2/2
+            assert error[-1] < tilt**2/2 + dips/fit*tilt/(2*mu)
         elif smoothing == "NONE":
             assert np.abs(torque - moments).max() < 0.005*tilt
         else:
