@@ -182,8 +182,8 @@ def test_the_contact_of_the_bar_is_measured(tmp_path: Path) -> None:
     assert smooth["rigid_energy_1"] == pytest.approx(p**2/20, rel=1e-10)
     assert smooth["rigid_energy_1"] + smooth["vibration"] == pytest.approx(
         -100*smooth["position_1_y"], rel=1e-10)
-    # held where it was at 0.99, when the next increment would have met the floor; edges of 0.2
-    assert found["0.03", "PERSISTENT"]["stand_off"] == pytest.approx((5 - 5*0.99**2)/0.2, rel=1e-8)
+    # held where it was at 0.99, when the next increment would have met the floor; its edge is 1
+    assert found["0.03", "PERSISTENT"]["stand_off"] == pytest.approx(5 - 5*0.99**2, rel=1e-8)
 
 
 def test_each_treatment_has_its_own_limit(tmp_path: Path) -> None:
