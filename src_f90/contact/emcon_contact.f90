@@ -209,7 +209,8 @@ contains
       share = 1.0_wp
    end function share
 
-   !> Take off the areas at x + u of constraints what they do not press on; nothing unless overridden.
+   !> Take off the areas at x + u of constraints what they do not press on; nothing unless
+   !> overridden.
    pure subroutine narrow(self, x, u, area)
       class(contact_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]

@@ -21,7 +21,7 @@ module emcon_edge_moments
       real(wp) :: value(n_moment, 0:1) = 0.0_wp  !! the moments at both ends of the step
       !> Lowest gap at the start, on the line of the master edge, of what only the end covers [L].
       real(wp) :: ahead = 0.0_wp
-      real(wp) :: other_size = huge(1.0_wp)      !! shortest master edge that covers a part of it [L]
+      real(wp) :: other_size = huge(1.0_wp)      !! shortest master edge that covers some of it [L]
       integer :: n_node = 0
       integer :: n_slave = 0                     !! they come first, the edge's own two before
       integer, allocatable :: node(:)            !! (>= n_node)

@@ -111,8 +111,8 @@ contains
          card = reader%card(i)
          call need_name(reader, card, trim(builder%keyword), name)
          if (verify(name, "0123456789") == 0 .and. name /= "") then
-            call card_error(reader, card, trim(builder%keyword) // "=" // name // " is a whole " // &
-               "number, which elsewhere is the label of one " // trim(builder%what) // &
+            call card_error(reader, card, trim(builder%keyword) // "=" // name // " is a whole " &
+               // "number, which elsewhere is the label of one " // trim(builder%what) // &
                "; begin names with a letter")
             reader%doubt%names = .true.
             cycle

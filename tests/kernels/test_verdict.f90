@@ -146,8 +146,8 @@ contains
       verdict%has_massless = .true.
       call verdict_end(verdict)
       call verdict_line(verdict, line)
-      call check_true(error, index(line, "TYPE=ADMISSIBLE") > 0 .and. index(line, "MASSLESS") == 0, &
-         line)
+      call check_true(error, index(line, "TYPE=ADMISSIBLE") > 0 &
+         .and. index(line, "MASSLESS") == 0, line)
    end subroutine test_air
 
    subroutine test_turned(error)
