@@ -145,6 +145,10 @@ VECTOR ?= $(if $(shell grep -m1 -o -w avx2 /proc/cpuinfo 2> /dev/null),-march=x8
 LIBS = $(HDF5_LIBS) $(UMFPACK_LIBS) $(MUMPS_LIBS) $(LAPACK_LIBS)
 # Of the compiler: threads.
 THREAD_LIBS := -lgomp
+# Programs: HDF5 from its archives where .ci/setup has found them, unless the caller names another. BLAS
+# first: most of what is looked up at a start is its own kernels. And last, for archives that call it.
+APP_LIBS = $(LAPACK_LIBS) $(if $(filter file,$(origin HDF5_LIBS)),$(HDF5_APP_LIBS),$(HDF5_LIBS)) \
+	$(UMFPACK_LIBS) $(MUMPS_LIBS) $(LAPACK_LIBS) $(THREAD_LIBS)
 
 # Flags of a release by the build tags of sources, `! build: lanes`: module_order.py reads them.
 
@@ -184,6 +188,7 @@ FLAGS := $(COMPILER) $(FCOMPILE) $(VECTOR) $(CCOMPILE) $(LIBS)
 READ := $(SRC) $(INC)
 $(eval $(call stored,$(BUILD)/flags.txt,FLAGS))
 $(eval $(call stored,$(BUILD)/sources.txt,READ))
+$(eval $(call stored,$(BUILD)/libs.txt,APP_LIBS))
 $(foreach tag,$(TAGS),$(eval $(call stored,$(BUILD)/flags_$(tag).txt,FFLAGS_OF_$(tag))))
 
 $(BUILD)/order.mk: src_f90/module_order.py $(SRC) $(INC) $(BUILD)/sources.txt Makefile
@@ -231,9 +236,9 @@ $(BUILD)/$(SHARED): $(LIB_OBJ) $(if $(MADE),$(SYMBOLS))
 		$(SHOWN) $(LIBS) $(THREAD_LIBS)
 	$(Q)ln -sf $(@F) $(BUILD)/libemcon.so
 
-$(BUILD)/emcon: $(APP_OBJ) $(BUILD)/libemcon.a
+$(BUILD)/emcon: $(APP_OBJ) $(BUILD)/libemcon.a $(BUILD)/libs.txt
 	@echo "  LINK  $@"
-	$(Q)$(FC) $(LDFLAGS_$(MODE)) -o $@ $^ $(LIBS) $(THREAD_LIBS)
+	$(Q)$(FC) $(LDFLAGS_$(MODE)) -o $@ $(filter %.o %.a,$^) $(APP_LIBS)
 
 # `private`: what is made on the way keeps its own flags.
 $(TAGGED_threads:%=$(O)/%.o): private FFLAGS_ALL += -fopenmp
@@ -255,9 +260,9 @@ $(KERNEL_OBJ) &: FORCE
 FORCE:
 endif
 
-$(BUILD)/kernels: $(KERNEL_OBJ) $(BUILD)/libemcon.a
+$(BUILD)/kernels: $(KERNEL_OBJ) $(BUILD)/libemcon.a $(BUILD)/libs.txt
 	@echo "  LINK  $@"
-	$(Q)$(FC) $(LDFLAGS_$(MODE)) -o $@ $^ $(LIBS) $(THREAD_LIBS)
+	$(Q)$(FC) $(LDFLAGS_$(MODE)) -o $@ $(filter %.o %.a,$^) $(APP_LIBS)
 
 lib: $(BUILD)/libemcon.a $(BUILD)/$(SHARED)  ## the library, build/release/libemcon.{a,so}
 app: $(BUILD)/emcon  ## the program, build/release/emcon

@@ -231,3 +231,20 @@ def test_a_dry_run_ends_and_makes_nothing(tmp_path):
     module.unlink()
     assert "emcon_low" in tree.make("--dry-run", "lib")
     assert not module.exists()
+
+
+@pytest.mark.parametrize("named", [(), ("HDF5_LIBS=-L/mine -lhdf5_of_mine",)], ids=["found", "named"])
+def test_hdf5_of_programs_is_that_of_its_archives_or_the_one_named(named, tmp_path):
+    """Each start would load all that a shared one needs; the library has the shared one."""
+    tree = Tree(tmp_path)
+    config = tmp_path / "build/config.mk"
+    config.write_text(re.sub(r"^HDF5_APP_LIBS := .*", "HDF5_APP_LIBS := -lhdf5_archive", config.read_text(),
+                             flags=re.M))  # fmt: skip
+    text = tree.run("--dry-run", "lib", "kernels", *named).stdout.replace("\\\n", " ")
+    (program,), (library,) = (re.findall(rf"^.* -o build/release/{name} .*$", text, re.M)
+                              for name in ("kernels", r"libemcon\.so\.\S+"))
+    if named:
+        assert all(" -L/mine -lhdf5_of_mine " in line and "archive" not in line for line in (program, library))
+    else:
+        assert " -lhdf5_archive " in program and " -lhdf5_fortran " not in program
+        assert " -lhdf5_fortran " in library and "archive" not in library
