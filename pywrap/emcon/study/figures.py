@@ -22,6 +22,10 @@ from .report import Study, candidates, shown_measures
 _COLOURS = ("#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9", "#000000")
 _MARKS = "os^Dv<>"
 _PER_ROW = 3
+#: Inches: of a row of panels; beside, above and below a panel, for its labels; of the title of the
+#: figure, and of a row of the legend.
+_ROW, _LEFT, _RIGHT, _ABOVE, _BELOW, _TITLE, _LEGEND = 3.3, 0.8, 0.25, 0.3, 0.5, 0.35, 0.2
+_PER_LEGEND_ROW = 4
 
 
 def write_figures(study: Study, folder: Path) -> list[Path]:
@@ -43,19 +47,32 @@ def write_figures(study: Study, folder: Path) -> list[Path]:
 
 def _write(study: Study, reference: Reference, names: Sequence[str],
            drawer: Callable[[Axes, Study, Reference, str], None], path: Path) -> None:
-    rows = math.ceil(len(names)/_PER_ROW)
-    with matplotlib.rc_context(STYLE):
-        figure = Figure(figsize=(WIDTH, 3.3*rows + 0.7), layout="constrained")
-        panels = figure.subplots(rows, _PER_ROW, squeeze=False).ravel()
+    with matplotlib.rc_context(STYLE | {"axes.titley": 1.0}):    # where it is: nothing is measured for it
+        figure = Figure()
+        panels = figure.subplots(math.ceil(len(names)/_PER_ROW), _PER_ROW, squeeze=False).ravel()
         for axes, name in zip(panels, names):
             drawer(axes, study, reference, name)
         for axes in panels[len(names):]:
             axes.set_axis_off()
         handles, labels = panels[0].get_legend_handles_labels()
-        figure.legend(handles, labels, loc="outside lower center", ncols=4, frameon=False,
+        figure.legend(handles, labels, loc="lower center", ncols=_PER_LEGEND_ROW, frameon=False,
                       fontsize=9)
-        figure.suptitle(f"errors against {reference.kind}: {reference.title}", fontsize=10)
+        title = f"errors against {reference.kind}: {reference.title}"
+        _arrange(figure, math.ceil(len(names)/_PER_ROW), math.ceil(len(labels)/_PER_LEGEND_ROW), title)
         figure.savefig(path, dpi=RESOLUTION)
+
+
+def _arrange(figure: Figure, rows: int, legend_rows: int, title: str) -> None:
+    """Panels of one size, with fixed room for their labels: to measure each label, as the layouts of
+    matplotlib do, takes longer than all the rest."""
+    legend = _LEGEND*(legend_rows + 1)
+    height = _ROW*rows + _TITLE + legend
+    wide, high = WIDTH/_PER_ROW - _LEFT - _RIGHT, _ROW - _ABOVE - _BELOW
+    figure.set_size_inches(WIDTH, height)
+    figure.subplots_adjust(left=_LEFT/WIDTH, right=1.0 - _RIGHT/WIDTH, wspace=(_LEFT + _RIGHT)/wide,
+                           bottom=(legend + _BELOW)/height, top=1.0 - (_TITLE + _ABOVE)/height,
+                           hspace=(_ABOVE + _BELOW)/high)
+    figure.suptitle(title, fontsize=10, y=1.0 - 0.5*_TITLE/height, va="center")
 
 
 def _points(reference: Reference, runs: Sequence[Run], name: str) -> list[tuple[Run, float]]:
