@@ -205,7 +205,7 @@ contains
       card%name = squeezed(text(2:i_comma - 1))
       call split_options(text(i_comma:), card%option)
       i = find_keyword(card%name)
-      refusal = refusal_of(card%name)
+      if (i == 0) refusal = refusal_of(card%name)
       if (refusal%reason /= "") then
          call refuse_unsupported(reader, card, refusal)
       else if (i == 0) then
