@@ -317,7 +317,7 @@ $(PYTHON_INCLUDE)/Python.h:
 
 $(P)/%.o: $(P)/%.c $(P)/include.txt $(PYTHON_INCLUDE)/Python.h $(BUILD)/flags.txt
 	@echo "  CC    $<"
-	$(Q)$(CC) -O2 -g -fPIC -I$(PYTHON_INCLUDE) -I$(BORDER) @$(P)/include.txt $(CFLAGS) -c $< -o $@
+	$(Q)$(CC) -O1 -g1 -fPIC -I$(PYTHON_INCLUDE) -I$(BORDER) @$(P)/include.txt $(CFLAGS) -c $< -o $@
 
 $(P)/_core$(EXT_SUFFIX): $(addprefix $(P)/,_coremodule.o fortranobject.o) $(BUILD)/$(SHARED)
 	@echo "  LINK  $@"
