@@ -48,13 +48,10 @@ contains
 
       self%first = motion%du
       self%driven = newton%driven
-      is_done = .not. self%is_one_problem .or. self%support%is_needed
-      do while (.not. is_done)
-         call contact_rounds_solve(self, system, newton, motion, status, error)
-         if (allocated(error) .or. status == step_done) return
-         call begin_sharp(self, system, newton, motion, is_done)
-         if (is_done) return
-      end do
+      if (self%is_one_problem .and. .not. self%support%is_needed) then
+         call solve_as_one(self, system, newton, motion, status, error)
+         return
+      end if
       is_measured = .false.
       do
          call phase_enter(system%phases, phase_gaps, left)
@@ -102,6 +99,24 @@ contains
          if (is_done) return
       end do
    end subroutine active_set_solve
+
+   !> The step as one problem of its contacts; where that fails with sharp corners, if possible.
+   subroutine solve_as_one(self, system, newton, motion, status, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status             !! one of the `step_` codes
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_done
+
+      is_done = .false.
+      do while (.not. is_done)
+         call contact_rounds_solve(self, system, newton, motion, status, error)
+         if (allocated(error) .or. status == step_done) return
+         call begin_sharp(self, system, newton, motion, is_done)
+      end do
+   end subroutine solve_as_one
 
    !> Is a body free to move with the set that solves the step?
    subroutine look_for_free(self, system, scene, motion, status)

@@ -16,7 +16,8 @@ module emcon_active_set_update
    implicit none
    private
    public :: active_set_advance, active_set_leave, active_set_narrow
-   public :: look_at_active, look_at_open, begins_unseen, gap_to_hold, gap_noise, noise_at, most_stale
+   public :: look_at_active, look_at_open, begins_unseen, gap_to_hold, gap_noise, noise_at, &
+      most_stale
 
    !> Penetration and tension below these multiples of epsilon are round-off.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
@@ -214,7 +215,7 @@ contains
    pure real(wp) function gap_to_hold(self, gap, id)
       type(active_set_t), intent(in) :: self
       type(gap_state_t), intent(in) :: gap
-      integer, intent(in) :: id
+      integer, intent(in) :: id                  !! number over all pairs
 
       gap_to_hold = self%left(1)*self%overclosure(id) + gap%closed
       if (self%holds_gap .and. .not. self%closes(id)) gap_to_hold = gap%gap0
@@ -259,9 +260,9 @@ contains
       type(active_set_t), intent(inout) :: self
       class(contact_t), intent(in) :: contact
       integer, intent(in) :: i                   !! its number in `contact`
-      integer, intent(in) :: k
+      integer, intent(in) :: k                   !! and in the set
       type(motion_t), intent(in) :: motion       !! that was last measured
-      integer, intent(inout) :: status
+      integer, intent(inout) :: status           !! one of the `step_` codes: left, or a failure
       real(wp) :: held
       logical :: is_new
 
@@ -326,9 +327,9 @@ contains
    pure subroutine look_at_open(self, contact, i, id, closes, status)
       type(active_set_t), intent(in) :: self
       class(contact_t), intent(in) :: contact
-      integer, intent(in) :: i, id
-      logical, intent(out) :: closes
-      integer, intent(inout) :: status
+      integer, intent(in) :: i, id               !! in `contact`, and over all pairs
+      logical, intent(out) :: closes             !! it is to be taken in
+      integer, intent(inout) :: status           !! one of the `step_` codes: left, or a failure
       real(wp) :: allowed(0:1)
 
       closes = .false.
@@ -378,7 +379,7 @@ contains
    pure logical function begins_unseen(self, contact, i, motion)
       type(active_set_t), intent(in) :: self
       class(contact_t), intent(in) :: contact
-      integer, intent(in) :: i
+      integer, intent(in) :: i                   !! number in `contact`
       type(motion_t), intent(in) :: motion       !! that was last measured
 
       associate (gap => contact%state(i))

@@ -321,7 +321,7 @@ contains
       logical :: is_solved, has_curvature
       integer :: left
 
-      has_curvature = mod(self%n_stall/stall_turn, 2) == 0
+      has_curvature = .not. btest(self%n_stall/stall_turn, 0)
       call phase_enter(system%phases, phase_factorise, left)
       call newton_pick_residual(newton, system, set)
       call condensation_make(self%condensation, system, set, newton%correction, newton%residual, &

@@ -44,6 +44,7 @@ module emcon_contact_rounds
    !> Who takes part.
    type :: candidates_t
       logical, allocatable :: takes_part(:)      !! (n_constraint)
+      logical, allocatable :: acts(:)            !! (n_constraint) of these, in the present set
       logical, allocatable :: has_left(:)        !! (n_constraint) it lost its surface
       logical :: is_measured = .false.           !! gaps are known for the motion that there is
       logical :: have_changed = .false.          !! solve the step again
@@ -64,8 +65,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(candidates_t) :: candidates
 
-      allocate(candidates%takes_part, source=self%is_active)
-      allocate(candidates%has_left(size(self%is_active)), source=.false.)
+      allocate(candidates%takes_part(system%n_constraint), candidates%acts(system%n_constraint), &
+         candidates%has_left(system%n_constraint), source=.false.)
       call solve_by_sets(self, system, newton, motion, candidates, status, error)
       if (candidates%is_settled .or. allocated(error)) return
       call solve_with_all(self, system, newton, motion, candidates, status, error)
@@ -123,7 +124,7 @@ contains
       type(system_t), intent(inout) :: system
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
-      type(candidates_t), intent(in) :: candidates
+      type(candidates_t), intent(inout) :: candidates
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
       integer :: left
@@ -131,6 +132,9 @@ contains
       call phase_enter(system%phases, phase_gaps, left)
       self%n_tried = 0
       call active_set_select(self, system, motion, candidates%is_measured)
+      candidates%acts = .false.
+      candidates%acts(self%set%id(:self%set%n)) = .true.
+      candidates%takes_part = candidates%takes_part .or. candidates%acts
       call phase_leave(system%phases, left)
       call newton_solve(newton, system, self%set, motion, status, error)
       self%n_newton = self%n_newton + newton%convergence%n_iteration
@@ -159,9 +163,9 @@ contains
       type(contact_effort_t) :: effort
       type(slip_status_t), allocatable :: status(:)
       real(wp), allocatable :: force(:, :)
-      logical :: before(size(self%is_active))
+      logical :: before(size(candidates%acts))
 
-      before = self%is_active
+      before = candidates%acts
       candidates%is_new_set = .false.
       goes_on = newton%factor_policy%is_allowed .and. newton%correction%kept%is_made
       if (.not. goes_on) return
@@ -183,9 +187,10 @@ contains
          if (.not. goes_on) return
          self%lam(set%id) = force(0, :)
          status = contact_problem_status(problem, force)
-         self%is_active(set%id) = status%kind /= contact_open
+         candidates%acts(set%id) = status%kind /= contact_open
       end associate
-      candidates%is_new_set = any(before .neqv. self%is_active)
+      self%is_active = candidates%acts
+      candidates%is_new_set = any(before .neqv. candidates%acts)
    end subroutine choose
 
    !> Do all contacts of the set push, and is friction as its law says?
@@ -232,7 +237,7 @@ contains
          self%n_newton = self%n_newton + newton%convergence%n_iteration
          if (allocated(error) .or. status /= newton_converged) return
          newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
-         call keep(self, law)
+         call keep(self, law, candidates)
          ! Before stencils are chosen anew: the step was solved with these.
          call finish(self, system, newton, motion, error)
          if (allocated(error)) return
@@ -259,21 +264,24 @@ contains
    end subroutine select_all
 
    !> Multipliers and ways of the candidates: what is not open acts.
-   subroutine keep(self, law)
+   subroutine keep(self, law, candidates)
       type(active_set_t), intent(inout) :: self
       type(coulomb_t), intent(in) :: law(:)      !! (contacts of the set)
+      type(candidates_t), intent(inout) :: candidates
       integer :: k
 
       associate (set => self%set, friction => self%friction)
          self%lam(set%id(:set%n)) = set%lam(:set%n)
          call friction_keep(friction, set)
+         candidates%acts = candidates%takes_part
          do k = 1, size(law)
             associate (id => set%id(set%n_permanent + k))
-               self%is_active(id) = law(k)%status%kind /= contact_open
-               if (friction%is_on .and. self%is_active(id)) friction%law(id)%status = law(k)%status
+               candidates%acts(id) = law(k)%status%kind /= contact_open
+               if (friction%is_on .and. candidates%acts(id)) friction%law(id)%status = law(k)%status
             end associate
          end do
       end associate
+      self%is_active = candidates%acts
    end subroutine keep
 
    !> Leave set, rows and forces as the laws hold at the end.
@@ -322,7 +330,7 @@ contains
                cycle
             call active_set_update_gaps(self, system, pair, motion, motion%du)
             if (.not. near_laws_are_none(self%near_laws, system%contact(pair)%contact)) &
-               call near_laws_update(self%near_laws, system, pair, self%is_active, &
+               call near_laws_update(self%near_laws, system, pair, candidates%acts, &
                candidates%have_changed)
             call look_at_pair(self, system, pair, motion, candidates, k, status)
          end associate
@@ -359,11 +367,12 @@ contains
                   candidates, status)
                cycle
             end if
-            acts = self%is_active(id)
+            acts = candidates%acts(id)
             if (acts) k = k + 1
             if (contact%state(i)%is_leaving) then
                candidates%takes_part(id) = .false.
                candidates%has_left(id) = .true.
+               candidates%acts(id) = .false.
                self%is_active(id) = .false.
                candidates%have_changed = .true.
             else if (acts) then

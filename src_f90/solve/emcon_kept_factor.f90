@@ -159,8 +159,8 @@ contains
       end if
    end subroutine kept_factor_take
 
-   !> The constraints of `set` in their multipliers alone, by the factor there is: their values after
-   !> a correction are free + w lam.
+   !> The constraints of `set` in their multipliers alone, by the factor there is: their values
+   !> after a correction are free + w lam.
    subroutine kept_factor_condense(self, set, residual, w, free, error)
       type(kept_factor_t), intent(inout) :: self         !! with a factor that has room for the set
       type(constraint_set_t), intent(in) :: set

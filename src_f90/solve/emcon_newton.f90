@@ -336,7 +336,7 @@ contains
    !> An error if the user has asked to stop: an increment may take thousands of iterations.
    subroutine newton_check_interrupt(self, status, error)
       type(newton_t), intent(in) :: self
-      integer, intent(out) :: status
+      integer, intent(out) :: status             !! diverged
       type(error_t), allocatable, intent(out) :: error
 
       status = newton_diverged

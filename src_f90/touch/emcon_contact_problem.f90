@@ -93,7 +93,7 @@ contains
    !> The stiffness by which a miss of the law is a force: of contact `i` by itself [M/T^2].
    pure real(wp) function contact_problem_stiffness(self, i) result(stiffness)
       type(contact_problem_t), intent(in) :: self
-      integer, intent(in) :: i
+      integer, intent(in) :: i                       !! 1 to n
       integer :: k, m
 
       m = 1 + self%n_slip
