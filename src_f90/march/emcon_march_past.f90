@@ -45,7 +45,6 @@ contains
          place = motion_of(evaluation_at_end, scene%x, state%u, at_rest(scene%x), state%v)
          place%evaluation%load_instant = start
          call system_loads(self%system, place, state%history%load)
-         state%history%h_before = 0.0_wp
          state%history%has_past = .true.
          if (row%is_accelerated) call accelerate(self, place, error)
       end associate

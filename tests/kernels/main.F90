@@ -26,6 +26,8 @@ program main
    use test_condition_rows, only : collect_condition_rows
    use test_contact_problem, only : collect_contact_problem
    use test_constraints, only : collect_constraints
+   use test_contact_states, only : collect_contact_states
+   use test_step_begin, only : collect_step_begin
    use test_contact_laws, only : collect_contact_laws
    use test_correction, only : collect_correction
    use test_corotated, only : collect_corotated
@@ -139,6 +141,7 @@ program main
    use test_stepper_free, only : collect_stepper_free
    use test_stepper_query, only : collect_stepper_query
    use test_system, only : collect_system
+   use test_system_kinds, only : collect_system_kinds
    use test_thin_stress, only : collect_thin_stress
    use test_tied_contact, only : collect_tied_contact
    use test_tie, only : collect_tie
@@ -186,6 +189,8 @@ program main
 #endif
    call run("solvers", collect_solvers)
    call run("start_gaps", collect_start_gaps)
+   call run("contact_states", collect_contact_states)
+   call run("step_begin", collect_step_begin)
 #ifndef EMCON_PERMISSIVE
    call run("diagonal_blocks", collect_diagonal_blocks)
    call run("kept_factor", collect_kept_factor)
@@ -278,6 +283,7 @@ program main
    call run("correction", collect_correction)
    call run("reduction", collect_reduction)
    call run("system", collect_system)
+   call run("system_kinds", collect_system_kinds)
    call run("thin_stress", collect_thin_stress)
    call run("line_search", collect_line_search)
    call run("name_index", collect_name_index)

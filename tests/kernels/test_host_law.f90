@@ -1,5 +1,6 @@
 !> Materials whose strain energy a program gives, against laws of ours that are the same.
 module test_host_law
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_nan
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_deck_source, only : deck_source_t
    use emcon_dgrad_series, only : log1p_excess, log1p_of
@@ -446,8 +447,10 @@ contains
    subroutine test_outside(error)
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: refused
-      type(stepper_t) :: stepper
+      type(stepper_t), target :: stepper
       type(increment_t) :: increment
+      type(solid_t), pointer :: solid
+      real(wp) :: stress(6, 4)
 
       call open_pull(stepper, 0.38_wp, point_outside, error)
       do while (.not. allocated(error) .and. stepper%march%state%clock%n_grid < 3)
@@ -461,6 +464,11 @@ contains
       call check_true(error, stepper%march%state%u(1, 2) > 0.3_wp, "parts of it succeeded")
       call check_true(error, stepper%march%state%u(1, 2) < sqrt(1.0_wp + 2.0_wp*0.38_wp) - 1.0_wp, &
          "what succeeded is inside")
+      solid => terms_solid(stepper%march%system%term)
+      call nodal_stress(solid, stepper%march%state%u, .true., stress)
+      call check_true(error, .not. any(ieee_is_nan(stress)), "stress inside")
+      call nodal_stress(solid, 2.0_wp*stepper%march%state%u, .true., stress)
+      call check_true(error, all(ieee_is_nan(stress(1, :))), "no stress outside")
       call stepper_close(stepper)
    end subroutine test_outside
 

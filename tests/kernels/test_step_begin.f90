@@ -1,0 +1,100 @@
+!> A step of the deck begins with displacements and velocities alone: what a march does in its second
+!> step is what one does that starts there.
+module test_step_begin
+   use check, only : check_near, check_true, test_case_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
+      march_t
+   use emcon_scene, only : scene_t
+   use emcon_scheme, only : scheme_row_t
+   use emcon_scheme_registry, only : n_scheme_row, scheme_row
+   use small_scenes, only : add_step, block_t, clamp, make_block, prescribe, shake
+   implicit none
+   private
+   public :: collect_step_begin
+
+   real(wp), parameter :: tol = 1.0e3_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+   real(wp), parameter :: h = 0.01_wp
+
+contains
+
+   subroutine collect_step_begin(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("as a march that starts there, by all schemes", test_schemes)]
+   end subroutine collect_step_begin
+
+   !> A block that is held at its left and pulled at its right, in two steps of `n` increments; the
+   !> second one is of another size.
+   subroutine make_pulled(scene, row, n)
+      type(scene_t), intent(out) :: scene
+      type(scheme_row_t), intent(in) :: row
+      integer, intent(in) :: n
+      type(block_t) :: block
+      integer :: k
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      call shake(scene%v0, 0.5_wp)
+      scene%v0(:, [1, 4]) = 0.0_wp
+      do k = 1, 2
+         call add_step(scene, .not. row%has_inertia, h*(1.0_wp - 0.25_wp*k), n)
+         scene%step(k)%scheme = row
+         call clamp(scene%step(k), [1, 4])
+         if (.not. row%has_inertia) call prescribe(scene%step(k), 3, 1, 0.1_wp*k)
+      end do
+   end subroutine make_pulled
+
+   subroutine test_schemes(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scheme_row_t) :: row
+      integer :: k
+
+      do k = 1, n_scheme_row()
+         row = scheme_row(k)
+         call compare(row, error)
+         if (allocated(error)) return
+      end do
+   end subroutine test_schemes
+
+   !> Three increments of the first step and three of the second one, beside three from there.
+   subroutine compare(row, error)
+      type(scheme_row_t), intent(in) :: row
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene, later
+      type(march_t) :: march, new
+      type(increment_t) :: increment
+      integer :: k
+
+      call make_pulled(scene, row, 3)
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      do k = 1, 3
+         if (.not. allocated(error)) call march_increment(march, scene, increment, error)
+      end do
+      if (allocated(error)) return
+      later = scene
+      later%u0 = march%state%u
+      later%v0 = march%state%v
+      later%step = scene%step(2:)
+      call march_init(new, later, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 2, error)
+      if (.not. allocated(error)) call march_begin_step(new, later, 1, error)
+      do k = 1, 3
+         if (.not. allocated(error)) call march_increment(march, scene, increment, error)
+         if (.not. allocated(error)) call march_increment(new, later, increment, error)
+         if (allocated(error)) return
+         associate (name => trim(row%card) // " " // trim(row%word))
+            call check_near(error, march%state%u, new%state%u, tol, 1.0_wp, "u, " // name)
+            call check_near(error, h*march%state%v, h*new%state%v, tol, 1.0_wp, "v, " // name)
+            call check_near(error, march%state%reaction, new%state%reaction, tol/h, 1.0_wp, &
+               "reactions, " // name)
+         end associate
+      end do
+      call check_true(error, norm2(new%state%u - later%u0) > 1.0e-3_wp, "it moves")
+      call march_free(march)
+      call march_free(new)
+   end subroutine compare
+
+end module test_step_begin

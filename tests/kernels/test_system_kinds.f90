@@ -1,0 +1,143 @@
+!> The matrix of the system against differences of its forces, for sections of every kinematics,
+!> with dependent freedoms, damping, follower loads and mean dilatation.
+module test_system_kinds
+   use check, only : check_near, check_true, test_case_t
+   use emcon_csr, only : csr_multiply
+   use emcon_errors, only : error_t
+   use emcon_evaluation, only : instant_t, evaluation_t
+   use emcon_kinds, only : dp, wp
+   use emcon_materials, only : kinematics_corotated, kinematics_nonlinear
+   use emcon_motion, only : motion_of
+   use emcon_numbering, only : add_to_dofs, pick_unknowns, spread_dependent
+   use emcon_scene, only : scene_t
+   use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
+   use emcon_scheme_static, only : scheme_static_t
+   use emcon_steps, only : load_pressure, load_t
+   use emcon_system, only : system_begin_step, system_init, system_respond, system_t
+   use emcon_text, only : to_text
+   use linear_scenes, only : add_equation, add_tie_by_hand
+   use random_draws, only : draw_random
+   use small_scenes, only : add_block, add_load, add_step, block_t, clamp, make_block, shake, young
+   implicit none
+   private
+   public :: collect_system_kinds
+
+contains
+
+   subroutine collect_system_kinds(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("tangents of all kinds of sections", test_kinds)]
+   end subroutine collect_system_kinds
+
+   !> Two blocks of three cells, of quadrilaterals and of triangles; with links nodes of the second
+   !> one hang on nodes of the first one by a tie, and one node on another by an equation.
+   subroutine make_linked(scene, kind, has_links, is_static, beta)
+      type(scene_t), intent(out) :: scene
+      integer, intent(in) :: kind                !! of kinematics
+      logical, intent(in) :: has_links, is_static
+      real(wp), intent(in) :: beta
+      type(block_t) :: block
+      type(load_t) :: load
+
+      call make_block(scene, "CPE4", [3, 1], block)
+      call add_block(scene, "CPE3", [2, 1], [0.5_wp, 1.0_wp], [2.0_wp, 1.0_wp], block)
+      scene%section(1)%kinematics = kind
+      scene%material(1)%alpha = merge(0.0_wp, 3.0_wp, is_static)
+      scene%material(1)%beta = beta
+      call add_step(scene, is_static, 0.25_wp, 4)
+      call clamp(scene%step(1), [1])
+      load%kind = load_pressure
+      load%target = 2
+      load%place = 1
+      load%value = 0.3_wp*young
+      call add_load(scene%step(1), load)
+      if (.not. has_links) return
+      call add_tie_by_hand(scene, [9, 10, 11], reshape([5, 6, 6, 7, 7, 8], [2, 3]), &
+         spread([0.5_wp, 0.5_wp], 2, 3), [0.5_wp, 1.0_wp, 0.5_wp])
+      call add_equation(scene, [13, 12, 4], [1, 1, 2], [2.0_wp, -1.0_wp, 0.5_wp])
+   end subroutine make_linked
+
+   !> In statics, in dynamics with drag by mass, and with that by strains, whose derivative is complete
+   !> where nothing moves.
+   subroutine test_kinds(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scheme_energy_momentum_t) :: dynamic
+      type(scheme_static_t) :: static
+      type(scene_t) :: scene
+      type(evaluation_t) :: evaluation
+      integer :: kind, link, way
+
+      do kind = kinematics_nonlinear, kinematics_corotated
+         do link = 0, 1
+            do way = 1, 3
+               evaluation = dynamic%evaluation(instant_t(0.5_wp, 0.5_wp), 0.25_wp)
+               if (way == 1) evaluation = static%evaluation(instant_t(0.5_wp, 0.5_wp), 0.25_wp)
+               call make_linked(scene, kind, link == 1, way == 1, merge(0.02_wp, 0.0_wp, way == 3))
+               call check_tangent(error, scene, evaluation, merge(0.0_wp, 0.1_wp, way == 3), &
+                  "kinematics " // to_text(kind) // ", links " // to_text(link) // ", way " &
+                  // to_text(way))
+               if (allocated(error)) return
+            end do
+         end do
+      end do
+   end subroutine test_kinds
+
+   !> Along random ways of all unknowns, against central differences of step eps^(1/3): error a
+   !> multiple of eps^(2/3). Forces on dependent freedoms go to those that they hang on.
+   subroutine check_tangent(error, scene, evaluation, motion_size, what)
+      type(error_t), allocatable, intent(inout) :: error
+      type(scene_t), intent(in) :: scene
+      type(evaluation_t), intent(in) :: evaluation
+      real(wp), intent(in) :: motion_size        !! [L]
+      character(len=*), intent(in) :: what
+      type(system_t) :: system
+      real(wp), allocatable :: u0(:, :), v0(:, :), du(:, :), way(:, :)
+      real(wp), allocatable :: x(:), up(:), down(:), product(:)
+      real(wp), parameter :: rounding = real(epsilon(1.0_dp), wp)   ! of the matrix
+      real(wp) :: step
+      integer :: k, n
+
+      call system_init(system, scene, error)
+      if (.not. allocated(error)) call system_begin_step(system, scene, 1, error)
+      if (allocated(error)) return
+      n = system%space%numbering%n_unknown
+      allocate(u0, v0, du, way, mold=scene%x)
+      allocate(x(n), up(n), down(n), product(n))
+      call shake(u0, 0.1_wp)
+      call shake(v0, 1.0_wp)
+      call shake(du, motion_size)
+      if (any(system%space%linear%is_used)) then
+         call spread_dependent(system%space%linked, u0)
+         call spread_dependent(system%space%linked, v0)
+         call spread_dependent(system%space%linked, du)
+      end if
+      step = epsilon(1.0_wp)**(1.0_wp/3.0_wp)
+      do k = 1, 2
+         call draw_random(x)
+         x = x - 0.5_wp
+         way = 0.0_wp
+         call add_to_dofs(system%space%numbering, x, 1.0_wp, way)
+         call system_respond(system, motion_of(evaluation, scene%x, u0, du, v0), .true.)
+         call csr_multiply(system%matrix, x, product)
+         call force(du + step*way, up)
+         call force(du - step*way, down)
+         call check_near(error, product, (up - down)/(2.0_wp*step), max(300.0_wp*step**2, &
+            64.0_wp*rounding), 10.0_wp*young, what)
+         call check_true(error, norm2(product) > 0.1_wp*young, "a stiffness")
+      end do
+
+   contains
+
+      subroutine force(du, on_unknowns)
+         real(wp), intent(in) :: du(:, :)
+         real(wp), intent(out) :: on_unknowns(:)
+
+         call system_respond(system, motion_of(evaluation, scene%x, u0, du, v0), .false.)
+         call pick_unknowns(system%space%numbering, system%response%residual, on_unknowns)
+      end subroutine force
+
+   end subroutine check_tangent
+
+end module test_system_kinds
