@@ -7,8 +7,9 @@ module test_contact_states
    use emcon_errors, only : error_t
    use emcon_hermite, only : hermite_stencil_t
    use emcon_hermite_gap_value, only : hermite_begin
-   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, formulation_nts, &
-      formulation_segment, multiplier_dual, multiplier_standard, normal_edge, normal_nodal, smoothing_hermite
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
+      formulation_nts, formulation_segment, multiplier_dual, multiplier_standard, normal_edge, &
+      normal_nodal, smoothing_hermite
    use emcon_kinds, only : wp
    use emcon_midside_plane, only : midside_points, midside_stretch
    use emcon_scene, only : scene_t
@@ -98,15 +99,15 @@ contains
             call check_true(error, t >= -tol .and. t <= 1.0_wp + tol, "on the edge")
             nearest = norm2(from + t*edge - x(:, 1))
             do j = 0, 20
-               call check_true(error, norm2(from + 0.05_wp*j*edge - x(:, 1)) >= nearest*(1.0_wp - tol), &
-                  "no nearer point, piece " // to_text(k))
+               call check_true(error, norm2(from + 0.05_wp*j*edge - x(:, 1)) >= nearest &
+                  *(1.0_wp - tol), "no nearer point, piece " // to_text(k))
             end do
          end do
       end do
    end subroutine test_places
 
-   !> A hub that turns into its place within the step has, where it was off the end of the sleeve, the
-   !> sagittas of that place: as one that stands there.
+   !> A hub that turns into its place within the step has, where it was off the end of the sleeve,
+   !> the sagittas of that place: as one that stands there.
    subroutine test_arcs_met(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene

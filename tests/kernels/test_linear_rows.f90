@@ -2,12 +2,16 @@
 module test_linear_rows
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_errors, only : error_t
+   use emcon_constraint, only : condition_t
+   use emcon_evaluation, only : evaluation_t
    use emcon_kinds, only : wp
+   use emcon_linear_conditions, only : linear_conditions_init, linear_conditions_t
    use emcon_linear_rows, only : linear_rows_init, linear_rows_t
+   use emcon_motion, only : motion_of
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
-   use linear_scenes, only : add_equation, add_tie_by_hand
-   use small_scenes, only : block_t, make_block
+   use linear_scenes, only : add_equation, add_tie_by_hand, make_random_rows, put_row
+   use small_scenes, only : block_t, make_block, shake
    implicit none
    private
    public :: collect_linear_rows
@@ -23,7 +27,8 @@ contains
       tests = [ &
          test_case_t("candidates", test_candidates), &
          test_case_t("rows of a tie", test_rows), &
-         test_case_t("equations", test_equations)]
+         test_case_t("equations", test_equations), &
+         test_case_t("conditions of rows", test_conditions)]
    end subroutine collect_linear_rows
 
    !> A block of 4 x 1 cells whose upper nodes 6..10 follow the lower ones 1..5, a tie of nonsense
@@ -97,5 +102,49 @@ contains
       call linear_rows_init(linear, scene)
       call check_row(error, linear, 3, [3, 8], [-0.25_wp, 0.5_wp])
    end subroutine test_equations
+
+   !> Values, and gradients by freedoms, of rows in any order: each node once, the own one first.
+   subroutine test_conditions(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(linear_rows_t) :: rows
+      type(linear_conditions_t) :: conditions
+      type(condition_t) :: item(3)
+      real(wp) :: x(2, 30), u0(2, 30), du(2, 30), g(2, 30), expected(60)
+      integer :: wanted(3), pass, k, i
+
+      call make_random_rows(rows)
+      call put_row(rows, 21, [3, 4, 21, 22], [0.25_wp, -0.5_wp, 1.0_wp, 2.0_wp])
+      call linear_conditions_init(conditions, rows)
+      call check_equal(error, conditions%n_constraint, rows%n, "one each")
+      do pass = 1, 2
+         wanted = merge([1, 3, 9], [2, 6, 8], pass == 1)
+         x = 0.0_wp
+         call shake(u0, 1.0_wp)
+         call shake(du, 1.0_wp)
+         call conditions%linearise(wanted, motion_of(evaluation_t(), x, u0, du), &
+            spread(0.0_wp, 1, 3), item)
+         do k = 1, 3
+            expected = 0.0_wp
+            do i = rows%start(wanted(k)) + 1, rows%start(wanted(k) + 1)
+               expected(rows%dof(i)) = expected(rows%dof(i)) + rows%weight(i)
+            end do
+            associate (n => item(k)%n_node, one => item(k))
+               call check_equal(error, one%node(1), (rows%own(wanted(k)) + 1)/2, "own node")
+               call check_equal(error, one%n_slave, 1, "slave nodes")
+               g = 0.0_wp
+               g(:, one%node(:n)) = one%g(:, :n)
+               call check_near(error, reshape(g, [60]), expected, tol, 1.0_wp, "gradient")
+               call check_near(error, one%c(:, :n), one%g(:, :n), 0.0_wp, 1.0_wp, "at the end")
+               do i = 1, n
+                  call check_equal(error, count(one%node(:n) == one%node(i)), 1, "once each")
+               end do
+               call check_near(error, [one%gap0, one%dgap, one%gap1], &
+                  [sum(expected*reshape(u0, [60])), sum(expected*reshape(du, [60])), &
+                  sum(expected*reshape(u0 + du, [60]))], 4.0_wp*tol, 4.0_wp, "values")
+               call check_near(error, one%size, rows%size(wanted(k)), 0.0_wp, 1.0_wp, "size")
+            end associate
+         end do
+      end do
+   end subroutine test_conditions
 
 end module test_linear_rows

@@ -1,5 +1,5 @@
-!> A step of the deck begins with displacements and velocities alone: what a march does in its second
-!> step is what one does that starts there.
+!> A step of the deck begins with displacements and velocities alone: what a march does in its
+!> second step is what one does that starts there.
 module test_step_begin
    use check, only : check_near, check_true, test_case_t
    use emcon_errors, only : error_t
