@@ -91,6 +91,7 @@ program main
    use test_march_check, only : collect_march_check
    use test_march_commit, only : collect_march_commit
    use test_march_contact, only : collect_march_contact
+   use test_march_impulse, only : collect_march_impulse
    use test_march_grid, only : collect_march_grid
    use test_march_size, only : collect_march_size
    use test_march_kinds, only : collect_march_kinds
@@ -311,6 +312,7 @@ program main
    call run("march_commit", collect_march_commit)
    call run("march_contact", collect_march_contact)
    call run("march_grid", collect_march_grid)
+   call run("march_impulse", collect_march_impulse)
    call run("march_size", collect_march_size)
    call run("march_kinds", collect_march_kinds)
    call run("step_control", collect_step_control)

@@ -1,15 +1,17 @@
 !> What contacts say of themselves beside their gaps: whether stencils hold, how far apart surfaces
 !> are, arcs that are met within a step, places that are fixed as it begins.
 module test_contact_states
-   use check, only : check_near, check_true, test_case_t
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t
    use emcon_contact_registry, only : new_contact
    use emcon_errors, only : error_t
    use emcon_hermite, only : hermite_stencil_t
    use emcon_hermite_gap_value, only : hermite_begin
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
-      formulation_nts, formulation_segment, multiplier_dual, multiplier_standard, normal_edge, &
-      normal_nodal, smoothing_hermite
+      formulation_nts, formulation_segment, integration_elements, integration_segments, &
+      multiplier_dual, multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, &
+      smoothing_none
    use emcon_kinds, only : wp
    use emcon_midside_plane, only : midside_points, midside_stretch
    use emcon_scene, only : scene_t
@@ -17,7 +19,7 @@ module test_contact_states
    use midside_scenes, only : make_curved_rows
    use random_draws, only : draw_random
    use ring_scenes, only : make_rings
-   use small_scenes, only : block_t, make_two_blocks
+   use small_scenes, only : block_t, make_two_blocks, shake
    implicit none
    private
    public :: collect_contact_states
@@ -25,6 +27,8 @@ module test_contact_states
    real(wp), parameter :: tol = 64.0_wp*epsilon(1.0_wp)
    integer, parameter :: formulations(3) = [formulation_nts, formulation_segment, &
       formulation_mortar]
+   !> Kinds of contact: see `make_kind`.
+   integer, parameter :: n_kind = 19
 
 contains
 
@@ -35,7 +39,8 @@ contains
          test_case_t("a smoothed stencil holds up to the edge beside", test_smooth_covers), &
          test_case_t("where pieces of a curve are looked for", test_places), &
          test_case_t("arcs that are met within the step", test_arcs_met), &
-         test_case_t("surfaces stay apart as far as is said", test_clearance)]
+         test_case_t("surfaces stay apart as far as is said", test_clearance), &
+         test_case_t("in other units of length", test_units)]
    end subroutine collect_contact_states
 
    !> Over a bulge, at the far node of the edge beside the chosen one: the polygon's edges there are
@@ -185,5 +190,85 @@ contains
          deallocate(contact)
       end do
    end subroutine test_clearance
+
+   !> Formulation `k`, 1 to n_kind: nodes over polygons and smoothed, segments, mortar of all kinds.
+   subroutine make_kind(scene, k, contact, error)
+      type(scene_t), intent(inout) :: scene
+      integer, intent(in) :: k
+      class(contact_t), allocatable, intent(out) :: contact
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_options_t) :: options
+
+      scene%pair(1)%formulation = formulations(max(1, min(3, k - 1)))
+      scene%pair(1)%interaction%friction = 0.2_wp
+      options%smoothing = merge(smoothing_hermite, smoothing_none, k == 2 .or. (k > 3 .and. &
+         btest(k, 0)))
+      options%multiplier = merge(multiplier_dual, multiplier_standard, btest(k, 1))
+      options%normal = merge(normal_edge, normal_nodal, btest(k, 2))
+      options%integration = merge(integration_elements, integration_segments, btest(k, 3))
+      call new_contact(scene, scene%pair(1), contact, error)
+      if (allocated(error)) return
+      call contact%suit_steps(.false.)
+      call contact%configure(scene%x, options)
+   end subroutine make_kind
+
+   !> All lengths are multiplied by a power of 2: gaps, slips and sizes are to the last bit,
+   !> gradients stay, second derivatives are divided by it.
+   subroutine test_units(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: unit(2) = 2.0_wp**[-20, 20]
+      type(scene_t) :: scene, other
+      type(block_t) :: lower, upper
+      class(contact_t), allocatable :: contact, scaled
+      type(condition_t) :: item(3), item_scaled(3)
+      real(wp), allocatable :: u(:, :), du(:, :)
+      real(wp) :: gaps(3, 3)
+      integer :: k, i, j
+
+      do k = 1, n_kind
+         call make_two_blocks(scene, 0.02_wp, lower, upper)
+         allocate(u, du, mold=scene%x)
+         call shake(u, 0.05_wp)
+         call shake(du, 0.05_wp)
+         call make_kind(scene, k, contact, error)
+         if (allocated(error)) return
+         call contact%begin_step(scene%x, u, du)
+         call contact%measure(scene%x, u, du)
+         gaps = reshape([contact%state%gap0, contact%state%gap1, contact%state%size], [3, 3])
+         item%has_friction = .true.
+         call contact%evaluate([1, 2, 3], scene%x, u, du, spread(0.0_wp, 1, 3), item)
+         do j = 1, size(unit)
+            other = scene
+            other%x = unit(j)*scene%x
+            call make_kind(other, k, scaled, error)
+            if (allocated(error)) return
+            call scaled%begin_step(other%x, unit(j)*u, unit(j)*du)
+            call scaled%measure(other%x, unit(j)*u, unit(j)*du)
+            associate (name => "kind " // to_text(k) // ", unit " // to_text(j))
+               call check_near(error, reshape([scaled%state%gap0, scaled%state%gap1, &
+                  scaled%state%size], [3, 3]), unit(j)*gaps, 0.0_wp, 1.0_wp, "gaps, " // name)
+               item_scaled%has_friction = .true.
+               call scaled%evaluate([1, 2, 3], other%x, unit(j)*u, unit(j)*du, &
+                  spread(0.0_wp, 1, 3), item_scaled)
+               do i = 1, 3
+                  associate (a => item(i), b => item_scaled(i), m => item(i)%n_node)
+                     call check_equal(error, b%node(:b%n_node), a%node(:m), "nodes, " // name)
+                     call check_near(error, b%g(:, :m), a%g(:, :m), 0.0_wp, 1.0_wp, "g, " // name)
+                     call check_near(error, b%c(:, :m), a%c(:, :m), 0.0_wp, 1.0_wp, "c, " // name)
+                     call check_near(error, unit(j)*b%h(:2*m, :2*m), a%h(:2*m, :2*m), 0.0_wp, &
+                        1.0_wp, "h, " // name)
+                     call check_near(error, b%slip, unit(j)*a%slip, 0.0_wp, 1.0_wp, "slip, " &
+                        // name)
+                     call check_near(error, b%t(:, :m, 1), a%t(:, :m, 1), 0.0_wp, 1.0_wp, "t, " &
+                        // name)
+                  end associate
+               end do
+            end associate
+            if (allocated(error)) return
+            deallocate(scaled)
+         end do
+         deallocate(contact, u, du)
+      end do
+   end subroutine test_units
 
 end module test_contact_states

@@ -6,6 +6,8 @@ module test_critical_step
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_lumped_mass, only : lumped_mass
+   use emcon_text, only : to_text
+   use random_draws, only : draw_random
    implicit none
    private
    public :: collect_critical_step
@@ -19,6 +21,7 @@ contains
 
       tests = [ &
          test_case_t("largest eigenvalue of a chain", test_chain), &
+         test_case_t("largest eigenvalue by its vector", test_random_chain), &
          test_case_t("frequency of an element", test_frequency), &
          test_case_t("mass at nodes", test_lumped)]
    end subroutine collect_critical_step
@@ -37,6 +40,29 @@ contains
             scale*(2.0_wp + 2.0_wp*cos(pi/real(n + 1, wp))), 16.0_wp*eps, scale, "largest")
       end do
    end subroutine test_chain
+
+   !> With positive y and T y = z y, signs beside the diagonal aside, z is the largest one.
+   subroutine test_random_chain(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: diagonal(20), beside(19), y(20), around(20), largest
+      integer :: i, n
+
+      do i = 1, 60
+         n = 1 + mod(i, 20)
+         call draw_random(y)
+         call draw_random(beside)
+         call draw_random(largest)
+         y = 0.1_wp + y
+         beside = 10.0_wp*(beside - 0.5_wp)
+         largest = 10.0_wp*(largest - 0.5_wp)
+         around = 0.0_wp
+         around(:n - 1) = abs(beside(:n - 1))*y(2:n)
+         around(2:n) = around(2:n) + abs(beside(:n - 1))*y(:n - 1)
+         diagonal = largest - around/y
+         call check_near(error, tridiagonal_largest(diagonal(:n), beside(:n - 1)), largest, &
+            64.0_wp*eps, maxval(abs(diagonal(:n))) + 10.0_wp, "largest of " // to_text(n))
+      end do
+   end subroutine test_random_chain
 
    !> A rod between masses m1, m2: w^2 = k/m1 + k/m2, once; the bound is as sharp as m^(-1/64) is.
    subroutine test_frequency(error)

@@ -46,11 +46,13 @@ def sources(folders):
 
 
 def places(program, files):
-    """Addresses of `program` in rising order, each with what stands there: (file, line)."""
+    """Addresses of `program` in rising order, each with what stands there: (file, line).
+
+    A loop may be entered behind where its line begins: all addresses count, not beginnings alone."""
     table = subprocess.run(["objdump", "--dwarf=decodedline", "-w", program], cwd=ROOT, check=True,
                            capture_output=True, text=True).stdout
     found = {}
-    for row in re.finditer(r"^(\w+\.f90) +(\d+) +0x([0-9a-f]+) .*x$", table, re.M):
+    for row in re.finditer(r"^(\w+\.f90) +(\d+) +0x([0-9a-f]+)", table, re.M):
         if row[1] in files:
             found.setdefault(int(row[3], 16), (files[row[1]], int(row[2])))
     return sorted(found.items())
