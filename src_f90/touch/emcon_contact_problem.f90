@@ -17,7 +17,8 @@ module emcon_contact_problem
    implicit none
    private
    public :: contact_problem_t, contact_effort_t, contact_problem_create, contact_problem_solve, &
-      contact_problem_missed, contact_problem_status, contact_problem_stiffness
+      contact_problem_missed, contact_problem_status, contact_problem_stiffness, &
+      contact_problem_pivot
 
    !> Trials of all places at once at first, and when their turn comes again; sweeps in the first
    !> turn, twice as many in each that follows; turns.
@@ -77,7 +78,7 @@ contains
          call solve_by_trials(self, force, more_trials, effort%n_trial, is_solved)
       end do
       is_solved = contact_problem_missed(self, force) <= nearly_met
-      if (.not. is_solved .and. self%n_slip == 1) call solve_by_pivots(self, force, &
+      if (.not. is_solved .and. self%n_slip == 1) call contact_problem_pivot(self, force, &
          effort%n_pivot, is_solved)
    end subroutine contact_problem_solve
 
@@ -270,7 +271,7 @@ contains
 
    !> In the plane, by complementary pivoting over (lam, tau+, tau-, mu lam - |tau|), with slips
    !> from a: what is free before that, or rests, is for others to find.
-   subroutine solve_by_pivots(self, force, n_pivot, is_solved)
+   subroutine contact_problem_pivot(self, force, n_pivot, is_solved)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: force(0:, :)        !! (0:1, n) [M L/T^2]
       integer, intent(out) :: n_pivot
@@ -302,6 +303,6 @@ contains
       z = (unit/length)*z
       force(0, :) = z(:n)
       force(1, :) = z(n + 1:2*n) - z(2*n + 1:3*n)
-   end subroutine solve_by_pivots
+   end subroutine contact_problem_pivot
 
 end module emcon_contact_problem

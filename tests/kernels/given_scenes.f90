@@ -17,7 +17,7 @@ module given_scenes
    use small_scenes, only : add_step, scene_begin
    implicit none
    private
-   public :: make_line, lump, open_given, open_both, run_conserving, given_eps
+   public :: keep_elements, make_line, lump, open_given, open_both, run_conserving, given_eps
 
    !> The solvers compute in double precision, whatever the state is.
    real(wp), parameter :: given_eps = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))

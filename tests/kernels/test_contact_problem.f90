@@ -6,7 +6,8 @@ module test_contact_problem
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_constraint, only : most_slips
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
-      contact_problem_missed, contact_problem_solve, contact_problem_status, contact_problem_t
+      contact_problem_missed, contact_problem_pivot, contact_problem_solve, &
+      contact_problem_status, contact_problem_t
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
       contact_sticks, contact_trial_t, coulomb_violation, slip_status_t
    use emcon_errors, only : error_t
@@ -37,6 +38,7 @@ contains
          test_case_t("the plane is space with one slip held", test_plane_in_space), &
          test_case_t("frames that are turned", test_turned), &
          test_case_t("the only one of all sets that obeys the law", test_all_sets), &
+         test_case_t("by pivots as by trials", test_pivots), &
          test_case_t("random problems of all kinds", test_kinds)]
    end subroutine collect_contact_problem
 
@@ -183,6 +185,31 @@ contains
             1.0e6_wp*eps, maxval(abs(force)), "forces")
       end do
    end subroutine test_turned
+
+   !> Small coefficients: there is one solution. Pivots take slips from what they lead to.
+   subroutine test_pivots(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_problem_t) :: problem
+      type(contact_effort_t) :: effort
+      real(wp), allocatable :: force(:, :), pivoted(:, :)
+      integer :: i, n_pivot
+      logical :: is_solved
+
+      do i = 1, 40
+         call make_problem(problem, 1, merge(definite, unsymmetric, mod(i, 2) == 0), .false.)
+         problem%mu = 0.2_wp*problem%mu
+         problem%w = 4.0_wp**mod(i, 5)*problem%w
+         call solve(problem, force, effort, is_solved)
+         call check_true(error, is_solved, "by trials")
+         if (allocated(error)) return
+         allocate(pivoted, source=-1.0_wp - force)
+         call contact_problem_pivot(problem, pivoted, n_pivot, is_solved)
+         call check_true(error, is_solved .and. n_pivot > 0, "by pivots")
+         call check_near(error, pivoted, force, 1.0e6_wp*eps, maxval(abs(force)) &
+            + maxval(abs(problem%free))/maxval(abs(problem%w)), "forces")
+         deallocate(pivoted)
+      end do
+   end subroutine test_pivots
 
    !> In the plane each contact is open, sticks or slides to either side: of all 4^n sets those that
    !> obey the law are looked for by another way, a linear solve of each. With small coefficients

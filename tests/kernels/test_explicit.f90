@@ -1,11 +1,11 @@
 !> Explicit steps: the critical step beside dense matrices, what closed penalties stiffen, and steps
 !> of a block that penalties stop, whose pushes and momenta have closed forms.
 module test_explicit
-   use check, only : check_equal, check_near, check_true, test_case_t
+   use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_condition_nodes, only : condition_resize
    use emcon_constraints, only : constraint_set_t, constraints_select
    use emcon_critical_step, only : critical_bound, critical_sharp
-   use emcon_errors, only : error_t
+   use emcon_errors, only : err_analysis, error_t
    use emcon_explicit_penalty, only : explicit_penalty_widen
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_eigen
@@ -42,7 +42,8 @@ contains
          test_case_t("critical step, by dense matrices", test_critical), &
          test_case_t("stiffness of closed pairs at nodes", test_limit), &
          test_case_t("contacts that stiffen more than any before", test_widen), &
-         test_case_t("a block that penalties stop", test_drop)]
+         test_case_t("a block that penalties stop", test_drop), &
+         test_case_t("the element that ends the run is named", test_squeezed)]
    end subroutine collect_explicit
 
    !> The upper block falls on the lower one, which is clamped or free; central differences.
@@ -276,5 +277,39 @@ contains
       call check_near(error, march%ledger%total, total, 0.02_wp, total, "energy")
       call march_free(march)
    end subroutine test_drop
+
+   !> Two free blocks: at rest element 1 is the narrowest, but the upper block, of which element 5 is
+   !> narrower, is squeezed until the step is too long.
+   subroutine test_squeezed(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: stopped
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(block_t) :: lower, upper
+      integer :: k
+
+      call make_two_blocks(scene, 5.0_wp, lower, upper)
+      scene%pair = scene%pair(:0)
+      call add_step(scene, .false., h, 100)
+      scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+      scene%x(1, [2, 7]) = scene%x(1, [2, 7]) - 0.1_wp
+      scene%x(1, [11, 14]) = scene%x(1, [11, 14]) + 0.05_wp
+      scene%v0(2, 11:13) = 3.0_wp
+      scene%v0(2, 14:16) = -3.0_wp
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      if (allocated(error)) return
+      ! Just below what the blocks at rest allow.
+      scene%step(1)%time%h = 0.99_wp*march%state%explicit%critical_h
+      call march_begin_step(march, scene, 1, error)
+      do k = 1, 100
+         if (allocated(error) .or. allocated(stopped)) exit
+         call march_increment(march, scene, increment, stopped)
+      end do
+      if (allocated(error)) return
+      call check_error(error, stopped, err_analysis, "(the fastest element is 5)", "squeezed")
+      call march_free(march)
+   end subroutine test_squeezed
 
 end module test_explicit

@@ -17,6 +17,7 @@ module test_penalty_state
    use emcon_term_registry, only : terms_mass_rows
    use emcon_text, only : to_text
    use given_contact, only : open_given_contact
+   use given_scenes, only : keep_elements
    use small_scenes, only : add_step, block_t, clamp, make_two_blocks
    implicit none
    private
@@ -32,6 +33,7 @@ contains
 
       tests = [ &
          test_case_t("stiffness of a step", test_stiffness), &
+         test_case_t("stiffness of the other side", test_opposite), &
          test_case_t("laws of a set", test_laws), &
          test_case_t("what is stored and left", test_stored), &
          test_case_t("pushed back until it is closed", test_augment), &
@@ -103,6 +105,42 @@ contains
       end associate
       call march_free(march)
    end subroutine check_stiffness
+
+   !> Nothing elastic stands on the first slave surface: that of the same pair seen from its other
+   !> side counts, of other pairs none.
+   subroutine test_opposite(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(march_t) :: march
+      type(penalty_state_t) :: state
+      real(wp), allocatable :: inner(:)
+      real(wp) :: area(3)
+      integer :: i
+
+      call make_two_blocks(scene, 0.1_wp, lower, upper)
+      call add_step(scene, .false., h, 1)
+      call keep_elements(scene, [.true., .true., .true., .true., .false., .false.])
+      scene%pair = [scene%pair, scene%pair, scene%pair]
+      scene%pair(2:3)%slave = 1
+      scene%pair(2:3)%master = 2
+      scene%step(1)%contact%method = method_penalty
+      scene%step(1)%contact%penalty%factor = 0.5_wp
+      call march_init(march, scene, error)
+      if (allocated(error)) return
+      march%system%contact(2)%of_pair = -1
+      allocate(inner(size(scene%x, 2)), source=0.0_wp)
+      do i = 1, size(march%system%term)
+         call march%system%term(i)%term%add_stiffness(inner)
+      end do
+      call penalty_begin_step(state, march%system, scene, scene%step(1), error)
+      if (allocated(error)) return
+      call march%system%contact(1)%contact%own_area(scene%x, area)
+      call check_near(error, state%stiffness(:3), 0.5_wp*sum(inner(6:10))/2.0_wp*area, tol, &
+         sum(inner), "stiffness")
+      call check_near(error, sum(area), 2.0_wp, tol, 1.0_wp, "area")
+      call march_free(march)
+   end subroutine test_opposite
 
    !> Three contacts, of which the first and the last act.
    subroutine open(system, state, active, method)

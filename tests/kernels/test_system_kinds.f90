@@ -59,8 +59,8 @@ contains
       call add_equation(scene, [13, 12, 4], [1, 1, 2], [2.0_wp, -1.0_wp, 0.5_wp])
    end subroutine make_linked
 
-   !> In statics, in dynamics with drag by mass, and with that by strains, whose derivative is complete
-   !> where nothing moves.
+   !> In statics, in dynamics with drag by mass, and with that by strains, whose derivative is
+   !> complete where nothing moves.
    subroutine test_kinds(error)
       type(error_t), allocatable, intent(out) :: error
       type(scheme_energy_momentum_t) :: dynamic
