@@ -278,8 +278,8 @@ contains
       call march_free(march)
    end subroutine test_drop
 
-   !> Two free blocks: at rest element 1 is the narrowest, but the upper block, of which element 5 is
-   !> narrower, is squeezed until the step is too long.
+   !> Two free blocks: at rest element 1 is the narrowest, but the upper block, of which element 5
+   !> is narrower, is squeezed until the step is too long.
    subroutine test_squeezed(error)
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: stopped

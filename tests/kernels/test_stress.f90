@@ -1,0 +1,345 @@
+!> Stress that is told of elements that stretch and turn as a whole: that of their forces, by the
+!> virial of a hexahedron, for every kind of element, law and kinematics.
+module test_stress
+   use check, only : check_near, test_case_t
+   use emcon_diagnostics, only : diagnostics_t
+   use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_at_end
+   use emcon_kinds, only : wp
+   use emcon_motion, only : motion_of
+   use emcon_solid, only : solid_t
+   use emcon_stepper, only : stepper_build, stepper_close, stepper_read_source, stepper_t
+   use emcon_stress, only : element_means, nodal_stress, von_mises
+   use emcon_system, only : system_respond
+   use emcon_term, only : role_internal
+   use emcon_term_registry, only : terms_solid
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: collect_stress
+
+   !> Solves of elements with modes inside, and stresses of the size 100.
+   real(wp), parameter :: tol = 1.0e4_wp*epsilon(1.0_wp), stress_size = 100.0_wp
+   integer, parameter :: most_nodes = 20, n_law = 6
+   character(len=28), parameter :: law_card(n_law) = [character(len=28) :: "*ELASTIC", &
+      "*HYPERELASTIC, NEO HOOKE", "*HYPERELASTIC, COUPLED NEO H", "*HYPERELASTIC, MOONEY-RIVLIN", &
+      "*HYPERELASTIC, YEOH", "*HYPERELASTIC, OGDEN, N=2"]
+   character(len=40), parameter :: law_data(n_law) = [character(len=40) :: "100., 0.3", &
+      "20., 0.05", "100., 0.3", "15., 5., 0.05", "20., 3., 2., 0.05, 0.02, 0.01", &
+      "20., 2.5, 10., -2., 0.05, 0.02"]
+   !> In the plane: strain, stress; rings; in space.
+   character(len=6), parameter :: plane(7) = [character(len=6) :: "CPE3", "CPE4", "CPE4H", &
+      "CPE4I", "CPE6", "CPE8", "CPE8R"], thin(5) = [character(len=6) :: "CPS3", "CPS4", "CPS4I", &
+      "CPS6", "CPS8"], ring(5) = [character(len=6) :: "CAX3", "CAX4", "CAX6", "CAX8", "CAX8R"], &
+      space(6) = [character(len=6) :: "C3D4", "C3D8H", "C3D8I", "C3D10", "C3D20", "C3D20R"]
+   real(wp), parameter :: one(3, 3) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
+      0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
+
+contains
+
+   subroutine collect_stress(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("all elements and laws, large strains", test_large), &
+         test_case_t("small strains, and in frames that turn", test_small), &
+         test_case_t("von Mises", test_von_mises)]
+   end subroutine collect_stress
+
+   ! ---- one element ----------------------------------------------------------------------------
+
+   !> Places of the nodes; rings are at radii from 2 on.
+   pure subroutine place_nodes(kind, n_dim, n, x)
+      character(len=*), intent(in) :: kind
+      integer, intent(out) :: n_dim, n
+      real(wp), intent(out) :: x(3, most_nodes)
+      integer, parameter :: of_plane(2, 4) = reshape([1, 2, 2, 3, 3, 4, 4, 1], [2, 4]), &
+         of_tetrahedron(2, 6) = reshape([1, 2, 2, 3, 3, 1, 1, 4, 2, 4, 3, 4], [2, 6]), &
+         of_hexahedron(2, 12) = reshape([1, 2, 2, 3, 3, 4, 4, 1, 5, 6, 6, 7, 7, 8, 8, 5, 1, 5, &
+         2, 6, 3, 7, 4, 8], [2, 12])
+      integer :: n_corner, ends(2), i
+
+      x = 0.0_wp
+      n_dim = merge(3, 2, kind(:3) == "C3D")
+      read(kind(4:), "(i1)") n
+      if (kind(4:5) == "10" .or. kind(4:5) == "20") read(kind(4:5), "(i2)") n
+      x(:2, :4) = reshape([0.0_wp, 0.0_wp, 1.2_wp, 0.1_wp, 1.1_wp, 0.9_wp, -0.1_wp, 1.0_wp], [2, 4])
+      if (kind(:3) == "CAX") x(1, :4) = x(1, :4) + 2.0_wp
+      n_corner = merge(3, 4, n == 3 .or. n == 6)
+      if (n_dim == 3 .and. (n == 8 .or. n == 20)) then
+         n_corner = 8
+         x(:2, 5:8) = x(:2, :4) + 0.1_wp
+         x(3, 5:8) = [1.0_wp, 1.1_wp, 0.9_wp, 1.05_wp]
+      else if (n_dim == 3) then
+         x(:, 4) = [0.2_wp, 0.3_wp, 0.9_wp]
+      end if
+      do i = n_corner + 1, n
+         if (n_dim == 2) ends = of_plane(:, i - n_corner)
+         if (n_corner == 3 .and. i == n) ends = [3, 1]
+         if (n == 10) ends = of_tetrahedron(:, i - n_corner)
+         if (n == 20) ends = of_hexahedron(:, i - n_corner)
+         x(:, i) = 0.5_wp*(x(:, ends(1)) + x(:, ends(2)))
+      end do
+   end subroutine place_nodes
+
+   !> A model of one element that nothing holds.
+   subroutine open_one(kind, law, kinematics, stepper, error)
+      character(len=*), intent(in) :: kind, kinematics
+      integer, intent(in) :: law
+      type(stepper_t), intent(inout) :: stepper
+      type(error_t), allocatable, intent(out) :: error
+      type(diagnostics_t) :: diagnostics
+      character(len=100) :: line(60)
+      real(wp) :: x(3, most_nodes)
+      integer :: n_dim, n, m, i
+
+      call place_nodes(kind, n_dim, n, x)
+      line(1) = "*NODE"
+      do i = 1, n
+         write(line(1 + i), "(i0, 3(', ', es24.16))") i, x(:n_dim, i)
+      end do
+      m = n + 1
+      call add("*ELEMENT, TYPE=" // trim(kind) // ", ELSET=B")
+      m = m + 1
+      write(line(m), "(i0, 15(', ', i0))") 1, [(i, i = 1, min(n, 15))]
+      if (n > 15) then
+         line(m) = trim(line(m)) // ","
+         m = m + 1
+         write(line(m), "(i0, 15(', ', i0))") [(i, i = 16, n)]
+      end if
+      call add("*MATERIAL, NAME=M")
+      call add(trim(law_card(law)) // merge("OOKE", "    ", law == 3))
+      call add(law_data(law))
+      call add("*DENSITY")
+      call add("1.")
+      call add("*SOLID SECTION, ELSET=B, MATERIAL=M, KINEMATICS=" // kinematics)
+      if (n_dim == 2 .and. kind(:3) /= "CAX") call add("0.5")
+      call add("*STEP, NLGEOM")
+      call add("*DYNAMIC, DIRECT")
+      call add("0.1, 1.")
+      call add("*END STEP")
+      allocate(stepper%source%line(m), stepper%source%file_name(1), stepper%override(0))
+      stepper%source%file_name(1)%text = "one.inp"
+      do i = 1, m
+         stepper%source%line(i)%text = trim(line(i))
+      end do
+      allocate(stepper%source%file(m), source=1)
+      stepper%source%number = [(i, i = 1, m)]
+      diagnostics%file_name = stepper%source%file_name
+      call stepper_read_source(stepper, diagnostics, error)
+      if (.not. allocated(error)) call stepper_build(stepper, error)
+
+   contains
+
+      subroutine add(text)
+         character(len=*), intent(in) :: text
+
+         m = m + 1
+         line(m) = text
+      end subroutine add
+
+   end subroutine open_one
+
+   !> Where the nodes are moved to by `grad` x, but for a ring's first direction.
+   pure function moved(grad, x) result(u)
+      real(wp), intent(in) :: grad(3, 3), x(:, :)
+      real(wp) :: u(size(x, 1), size(x, 2))
+
+      u = matmul(grad(:size(x, 1), :size(x, 1)), x)
+   end function moved
+
+   !> Sum of force times place over the volume: Cauchy stress, or without `is_large` that of small
+   !> strains.
+   subroutine virial(stepper, grad, is_large, stress)
+      type(stepper_t), intent(inout), target :: stepper
+      real(wp), intent(in) :: grad(3, 3)
+      logical, intent(in) :: is_large
+      real(wp), intent(out) :: stress(3, 3)
+      type(solid_t), pointer :: solid
+      real(wp), dimension(6, 1) :: mean, strain
+      real(wp) :: volume(1), change
+      real(wp), allocatable :: u(:, :), place(:, :)
+
+      solid => terms_solid(stepper%march%system%term)
+      associate (x => stepper%scene%x, system => stepper%march%system)
+         u = moved(grad, x)
+         call system_respond(system, motion_of(evaluation_at_end, x, u, 0.0_wp*u), .false.)
+         call element_means(solid, u, .true., mean, strain, volume)
+         place = x
+         if (is_large) place = x + u
+         change = 1.0_wp
+         if (is_large) change = determinant(one + grad)
+         stress = matmul(system%response%part(role_internal)%force, transpose(place)) &
+            /(volume(1)*change)
+      end associate
+   end subroutine virial
+
+   pure real(wp) function determinant(f)
+      real(wp), intent(in) :: f(3, 3)
+
+      determinant = f(1, 1)*(f(2, 2)*f(3, 3) - f(2, 3)*f(3, 2)) - f(1, 2)*(f(2, 1)*f(3, 3) &
+         - f(2, 3)*f(3, 1)) + f(1, 3)*(f(2, 1)*f(3, 2) - f(2, 2)*f(3, 1))
+   end function determinant
+
+   !> (xx, yy, zz, xy, yz, xz)
+   pure function in_list(stress) result(list)
+      real(wp), intent(in) :: stress(3, 3)
+      real(wp) :: list(6)
+
+      list = [stress(1, 1), stress(2, 2), stress(3, 3), stress(1, 2), stress(2, 3), stress(1, 3)]
+   end function in_list
+
+   !> At all nodes, and as means of the element, with its strain and volume.
+   subroutine check_stress(error, stepper, grad, expected, what)
+      type(error_t), allocatable, intent(inout) :: error
+      type(stepper_t), intent(inout), target :: stepper
+      real(wp), intent(in) :: grad(3, 3), expected(3, 3)
+      character(len=*), intent(in) :: what
+      type(solid_t), pointer :: solid
+      real(wp), allocatable :: u(:, :), stress(:, :)
+      real(wp) :: mean(6, 1), strain(6, 1), volume(1)
+      integer :: i
+
+      solid => terms_solid(stepper%march%system%term)
+      u = moved(grad, stepper%scene%x)
+      allocate(stress(6, size(u, 2)))
+      call nodal_stress(solid, u, .true., stress)
+      do i = 1, size(u, 2)
+         call check_near(error, stress(:, i), in_list(expected), tol, stress_size, what // ", node")
+      end do
+      call element_means(solid, u, .true., mean, strain, volume)
+      call check_near(error, mean(:, 1), in_list(expected), tol, stress_size, what // ", mean")
+   end subroutine check_stress
+
+   ! ---- tests ----------------------------------------------------------------------------------
+
+   subroutine test_large(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(stepper_t) :: reference
+      integer :: law, k
+      real(wp), parameter :: grad(3, 3) = reshape([0.2_wp, 0.15_wp, -0.1_wp, -0.25_wp, -0.1_wp, &
+         0.05_wp, 0.12_wp, -0.08_wp, 0.1_wp], [3, 3])
+      real(wp), dimension(3, 3) :: flat, round, free
+
+      flat = 0.0_wp
+      flat(:2, :2) = grad(:2, :2)
+      ! A ring stays one: the radius grows by a factor.
+      round = 0.0_wp
+      round(:2, 1) = grad(:2, 1)
+      round(2, 2) = grad(2, 2)
+      round(3, 3) = grad(1, 1)
+      do law = 1, n_law
+         call open_one("C3D8", law, "NONLINEAR", reference, error)
+         do k = 1, size(space)
+            if (.not. allocated(error)) call compare(space(k), grad, grad)
+         end do
+         do k = 1, size(plane)
+            if (.not. allocated(error)) call compare(plane(k), flat, flat)
+         end do
+         do k = 1, size(ring)
+            if (.not. allocated(error)) call compare(ring(k), round, round)
+         end do
+         if (allocated(error)) return
+         ! Ogden's law is not known in plane stress.
+         if (law < n_law) then
+            free = free_across(flat)
+            do k = 1, size(thin)
+               if (.not. allocated(error)) call compare(thin(k), flat, free)
+            end do
+         end if
+         call stepper_close(reference)
+         block
+            type(stepper_t) :: next
+
+            reference = next
+         end block
+      end do
+
+   contains
+
+      subroutine compare(kind, own, whole)
+         character(len=*), intent(in) :: kind
+         real(wp), intent(in) :: own(3, 3), whole(3, 3)
+         type(stepper_t) :: stepper
+         real(wp) :: expected(3, 3)
+
+         call virial(reference, whole, .true., expected)
+         call open_one(kind, law, "NONLINEAR", stepper, error)
+         if (allocated(error)) return
+         call check_stress(error, stepper, own, expected, trim(kind) // ", law " // to_text(law))
+         call stepper_close(stepper)
+      end subroutine compare
+
+      !> The stretch across at which no stress is there, by halving.
+      function free_across(flat) result(whole)
+         real(wp), intent(in) :: flat(3, 3)
+         real(wp) :: whole(3, 3), low, high, stress(3, 3)
+         integer :: i
+
+         whole = flat
+         low = -0.5_wp
+         high = 0.5_wp
+         do i = 1, digits(low) + 2
+            whole(3, 3) = 0.5_wp*(low + high)
+            call virial(reference, whole, .true., stress)
+            if (stress(3, 3) > 0.0_wp) high = whole(3, 3)
+            if (.not. stress(3, 3) > 0.0_wp) low = whole(3, 3)
+         end do
+      end function free_across
+
+   end subroutine test_large
+
+   !> Small strains of a gradient of any size, and the same strain in a frame that has turned.
+   subroutine test_small(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: strain(3, 3) = reshape([0.2_wp, 0.05_wp, 0.0_wp, 0.05_wp, -0.1_wp, &
+         0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], [3, 3])
+      real(wp), parameter :: turn(3, 3) = reshape([0.6_wp, 0.8_wp, 0.0_wp, -0.8_wp, 0.6_wp, &
+         0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [3, 3])
+      type(stepper_t) :: reference
+      real(wp) :: stress(3, 3)
+      integer :: k
+
+      call open_one("C3D8", 2, "LINEAR", reference, error)
+      if (allocated(error)) return
+      call virial(reference, strain, .false., stress)
+      do k = 1, size(plane)
+         if (.not. allocated(error)) call compare("LINEAR", strain, stress)
+         if (.not. allocated(error)) call compare("COROTATED", matmul(turn, one + strain) - one, &
+            matmul(turn, matmul(stress, transpose(turn))))
+      end do
+      call stepper_close(reference)
+
+   contains
+
+      subroutine compare(kinematics, grad, expected)
+         character(len=*), intent(in) :: kinematics
+         real(wp), intent(in) :: grad(3, 3), expected(3, 3)
+         type(stepper_t) :: stepper
+
+         call open_one(plane(k), 2, kinematics, stepper, error)
+         if (allocated(error)) return
+         call check_stress(error, stepper, grad, expected, trim(plane(k)) // ", " // kinematics)
+         call stepper_close(stepper)
+      end subroutine compare
+
+   end subroutine test_small
+
+   !> Of one shear, one pull, and of a pressure that adds nothing.
+   subroutine test_von_mises(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k
+      real(wp) :: s(6)
+
+      do k = 1, 3
+         s = -7.0_wp*[1.0_wp, 1.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+         call check_near(error, von_mises(s), 0.0_wp, 0.0_wp, 1.0_wp, "pressure")
+         s(k) = s(k) + 2.0_wp
+         call check_near(error, von_mises(s), 2.0_wp, tol, 1.0_wp, "pull")
+         s(k) = s(k) - 2.0_wp
+         s(3 + k) = -2.0_wp
+         call check_near(error, von_mises(s), 2.0_wp*sqrt(3.0_wp), tol, 1.0_wp, "shear")
+      end do
+   end subroutine test_von_mises
+
+end module test_stress
