@@ -1,9 +1,10 @@
-/* Which places of a program a run passes: line_trace PLACES OUT PROGRAM ARGUMENTS...
+/* Which lines of a program a run passes: line_trace PLACES OUT PROGRAM ARGUMENTS...
  *
- * PLACES holds addresses as the linker has given them, eight bytes each. At each of them the first
- * byte of the instruction becomes a breakpoint, which is taken away as it is met: the program runs
- * at its own speed but for the first time at a place. One line is added to OUT: what the variable
- * PYTEST_CURRENT_TEST says, the processor time in seconds and a bit for each place, in hexadecimal.
+ * PLACES holds addresses as the linker has given them, in rising order, each with the number of its
+ * line from 0 on, eight bytes each. At an address the first byte of the instruction becomes a
+ * breakpoint; as one is met all of its line are taken away: the program runs at its own speed but
+ * for the first time in a line. One line is added to OUT: what the variable
+ * PYTEST_CURRENT_TEST says, the processor time in seconds and a bit for each line, in hexadecimal.
  * The exit code is that of the program; signals are handed on to it. For x86-64 under Linux. */
 #define _GNU_SOURCE
 #include <errno.h>
@@ -26,10 +27,12 @@ enum { BREAK = 0xcc };
 static pid_t child;
 
 struct places {
-	size_t count;
+	size_t count, lines;
 	uint64_t *address;	/* rising */
+	uint64_t *line;
+	size_t *next;		/* the next one of the line, around */
 	unsigned char *byte;	/* what stood there */
-	unsigned char *is_met;
+	unsigned char *is_met;	/* (lines) */
 };
 
 static void fail(const char *what)
@@ -47,20 +50,45 @@ static void hand_on(int number)
 
 static struct places read_places(const char *name)
 {
-	struct places p;
+	struct places p = {0};
 	struct stat about;
+	uint64_t *pair;
+	size_t k, *last;
 	FILE *file = fopen(name, "rb");
 
 	if (!file || fstat(fileno(file), &about))
 		fail(name);
-	p.count = (size_t)about.st_size/sizeof(uint64_t);
-	p.address = malloc(p.count*sizeof(uint64_t) + 1);
+	p.count = (size_t)about.st_size/(2*sizeof(uint64_t));
+	pair = malloc(2*p.count*sizeof *pair + 1);
+	p.address = malloc(p.count*sizeof *p.address + 1);
+	p.line = malloc(p.count*sizeof *p.line + 1);
+	p.next = malloc(p.count*sizeof *p.next + 1);
 	p.byte = calloc(p.count + 1, 1);
-	p.is_met = calloc(p.count + 1, 1);
-	if (!p.address || !p.byte || !p.is_met
-	    || fread(p.address, sizeof(uint64_t), p.count, file) != p.count)
+	if (!pair || !p.address || !p.line || !p.next || !p.byte
+	    || fread(pair, 2*sizeof *pair, p.count, file) != p.count)
 		fail(name);
 	fclose(file);
+	for (k = 0; k < p.count; k++) {
+		p.address[k] = pair[2*k];
+		p.line[k] = pair[2*k + 1];
+		if (p.line[k] >= p.lines)
+			p.lines = p.line[k] + 1;
+	}
+	free(pair);
+	p.is_met = calloc(p.lines + 1, 1);
+	last = malloc(p.lines*sizeof *last + 1);
+	if (!p.is_met || !last)
+		fail(name);
+	for (k = 0; k < p.lines; k++)
+		last[k] = p.count;
+	for (k = 0; k < p.count; k++) {
+		size_t *before = &last[p.line[k]];
+		p.next[k] = *before < p.count ? p.next[*before] : k;
+		if (*before < p.count)
+			p.next[*before] = k;
+		*before = k;
+	}
+	free(last);
 	return p;
 }
 
@@ -127,20 +155,24 @@ static int is_at_place(struct places *p, uint64_t base, int memory, pid_t thread
 {
 	size_t at = offsetof(struct user, regs.rip);
 	uint64_t after = (uint64_t)ptrace(PTRACE_PEEKUSER, thread, at, NULL);
-	size_t k = find(p, after - 1 - base);
+	size_t k = find(p, after - 1 - base), j = k;
 
 	if (k == p->count)
 		return 0;
-	if (!p->is_met[k] && pwrite(memory, &p->byte[k], 1, (off_t)(after - 1)) != 1)
-		fail("taking a breakpoint away");
-	p->is_met[k] = 1;
+	if (!p->is_met[p->line[k]])
+		do {
+			if (pwrite(memory, &p->byte[j], 1, (off_t)(base + p->address[j])) != 1)
+				fail("taking a breakpoint away");
+			j = p->next[j];
+		} while (j != k);
+	p->is_met[p->line[k]] = 1;
 	return ptrace(PTRACE_POKEUSER, thread, at, after - 1) == 0;
 }
 
 static void report(const struct places *p, const char *name, const struct rusage *used)
 {
 	const char *test = getenv("PYTEST_CURRENT_TEST");
-	size_t k, room = 2*(p->count/8 + 1) + strlen(test ? test : "") + 64;
+	size_t k, room = 2*(p->lines/8 + 1) + strlen(test ? test : "") + 64;
 	char *text = malloc(room);
 	int n, file = open(name, O_WRONLY | O_CREAT | O_APPEND, 0666);
 
@@ -149,9 +181,9 @@ static void report(const struct places *p, const char *name, const struct rusage
 	n = sprintf(text, "%s\t%.3f\t", test ? test : "",
 		    (double)(used->ru_utime.tv_sec + used->ru_stime.tv_sec)
 		    + 1e-6*(double)(used->ru_utime.tv_usec + used->ru_stime.tv_usec));
-	for (k = 0; k < p->count; k += 4) {
+	for (k = 0; k < p->lines; k += 4) {
 		unsigned bits = 0, j;
-		for (j = 0; j < 4 && k + j < p->count; j++)
+		for (j = 0; j < 4 && k + j < p->lines; j++)
 			bits |= (unsigned)p->is_met[k + j] << j;
 		text[n++] = "0123456789abcdef"[bits];
 	}

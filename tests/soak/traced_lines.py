@@ -65,11 +65,13 @@ class Tracer:
         folder.mkdir(parents=True, exist_ok=True)
         self.program = ROOT / program
         told = places(self.program, files)
-        self.place = [where for _, where in told]
+        self.place = sorted({where for _, where in told})
+        number = {where: k for k, where in enumerate(self.place)}
         name = f"{self.program.name}_{os.getpid()}"
         self.tool, self.table, self.out = (folder / f"{name}.{part}" for part in (
             "tracer", "places", "out"))
-        self.table.write_bytes(b"".join(struct.pack("=Q", address) for address, _ in told))
+        self.table.write_bytes(b"".join(struct.pack("=QQ", address, number[where])
+                                        for address, where in told))
         subprocess.run(["cc", "-std=c99", "-O2", pathlib.Path(__file__).parent / "line_trace.c",
                         "-o", self.tool], check=True)
 
