@@ -6,10 +6,12 @@ module test_loads
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_prescribed, only : prescribed_motion
+   use emcon_moment_load_plane, only : add_moment, add_moment_stiffness
    use emcon_motion, only : motion_of
    use emcon_evaluation, only : instant_t, evaluation_t
    use emcon_scene, only : scene_t
-   use emcon_steps, only : load_gravity, load_point, load_pressure, load_t, prescribed_t
+   use emcon_steps, only : load_centrifugal, load_gravity, load_point, load_pressure, load_t, &
+      prescribed_t
    use emcon_system, only : system_begin_step, system_init, system_loads, system_t
    use emcon_term, only : response_begin, role_external
    use small_scenes, only : add_load, add_step, add_surface, block_t, bottom, clamp, left, &
@@ -32,6 +34,8 @@ contains
          test_case_t("pressure all around: no force, no moment", test_closed), &
          test_case_t("pressure stiffness", test_stiffness), &
          test_case_t("gravity sums to the weight", test_gravity), &
+         test_case_t("bodies that turn about an axis", test_centrifugal), &
+         test_case_t("a moment is a couple", test_moment), &
          test_case_t("amplitudes in step and total time", test_amplitude), &
          test_case_t("ramp of a static step", test_ramp), &
          test_case_t("prescribed motion", test_motion)]
@@ -219,6 +223,99 @@ contains
       call check_near(error, sum(force, dim=2), 0.25_wp*2.0_wp*4.0_wp*10.0_wp*[0.6_wp, -0.8_wp], &
          tol, 20.0_wp, "weight of density 1/4, thickness 2, area 4")
    end subroutine test_gravity
+
+   !> About an axis across the plane and one in it, of direction (0.6, 0.8): the resultant is that of
+   !> the mass in its centre, and about the axis there is no moment.
+   subroutine test_centrifugal(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: point(2) = [0.5_wp, -1.0_wp], square = 3.0_wp
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(system_t) :: system
+      type(load_t) :: load(8)
+      real(wp) :: u(2, 9), force(2, 9), arm(2, 9), expected(2)
+      integer :: e, k
+
+      do k = 1, 2
+         call make_block(scene, "CPE3", [2, 2], block)
+         call shake(u, 0.2_wp)
+         scene%x(:, 5) = scene%x(:, 5) + u(:, 5)
+         scene%material(1)%density = 0.25_wp
+         scene%section(1)%thickness = 2.0_wp
+         do e = 1, 8
+            load(e)%kind = load_centrifugal
+            load(e)%target = e
+            load(e)%value = square
+            load(e)%point(:2) = point
+            load(e)%direction = merge([0.0_wp, 0.0_wp, 1.0_wp], [0.6_wp, 0.8_wp, 0.0_wp], k == 1)
+         end do
+         call prepare(scene, .false., .true., load, system, error)
+         if (allocated(error)) return
+         call forces(system, scene, instant_t(), u, force)
+         ! The centre of the square of area 4 is at (1, 1).
+         expected = [1.0_wp, 1.0_wp] - point
+         if (k == 2) expected = expected - dot_product([0.6_wp, 0.8_wp], expected) &
+            *[0.6_wp, 0.8_wp]
+         call check_near(error, sum(force, 2), 0.25_wp*2.0_wp*4.0_wp*square*expected, tol, 20.0_wp, &
+            "resultant")
+         arm = scene%x - spread(point, 2, 9)
+         if (k == 1) call check_near(error, sum(arm(1, :)*force(2, :) - arm(2, :)*force(1, :)), &
+            0.0_wp, tol, 40.0_wp, "moment")
+         if (k == 2) call check_near(error, matmul([0.6_wp, 0.8_wp], force), spread(0.0_wp, 1, 9), &
+            tol, 20.0_wp, "nothing along the axis")
+      end do
+   end subroutine test_centrifugal
+
+   !> Two forces across what is between their nodes; their derivative by differences, second order
+   !> in a step of eps^(1/3).
+   subroutine test_moment(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: step = epsilon(1.0_wp)**(1.0_wp/3.0_wp), moment = -1.5_wp
+      integer, parameter :: node(2) = [3, 1]
+      real(wp), dimension(2, 3) :: x, u, force, low, high
+      real(dp) :: value(8), side(8)
+      real(wp) :: arm(2), row(4)
+      integer :: slot(4, 4), i, j, a, b
+
+      call shake(x, 1.0_wp)
+      x(:, 1) = x(:, 3) + [0.7_wp, 0.4_wp]
+      call shake(u, 0.2_wp)
+      force = 2.0_wp
+      call add_moment(node, moment, x, u, force)
+      force = force - 2.0_wp
+      arm = x(:, 1) + u(:, 1) - x(:, 3) - u(:, 3)
+      call check_near(error, sum(force, 2), [0.0_wp, 0.0_wp], tol, 2.0_wp, "no resultant")
+      call check_near(error, arm(1)*force(2, 1) - arm(2)*force(1, 1), moment, tol, 2.0_wp, "moment")
+      call check_near(error, dot_product(arm, force(:, 1)), 0.0_wp, tol, 2.0_wp, "across")
+      call check_near(error, force(:, 2), [0.0_wp, 0.0_wp], tol, 1.0_wp, "no other node")
+      ! Half of the entries are of the side.
+      slot = reshape([(merge(i, -i, i <= 8), i = 1, 16)], [4, 4])
+      where (slot < 0) slot = slot + 8
+      value = 0.0_dp
+      side = 0.0_dp
+      call add_moment_stiffness(x(:, node) + u(:, node), moment, slot, value, side)
+      do j = 1, 2
+         do b = 1, 2
+            low = 0.0_wp
+            high = 0.0_wp
+            u(b, node(j)) = u(b, node(j)) - step
+            call add_moment(node, moment, x, u, low)
+            u(b, node(j)) = u(b, node(j)) + 2.0_wp*step
+            call add_moment(node, moment, x, u, high)
+            u(b, node(j)) = u(b, node(j)) - step
+            do i = 1, 2
+               do a = 1, 2
+                  associate (k => slot(a + 2*(i - 1), b + 2*(j - 1)))
+                     if (k > 0) row(a + 2*(i - 1)) = real(value(k), wp)
+                     if (k < 0) row(a + 2*(i - 1)) = real(side(-k), wp)
+                  end associate
+               end do
+            end do
+            call check_near(error, row, reshape(low(:, node) - high(:, node), [4])/(2.0_wp*step), &
+               max(100.0_wp*step**2, tol_dp), 10.0_wp, "less than their derivative")
+         end do
+      end do
+   end subroutine test_moment
 
    !> (1, 0), (2, 4), (3, 2): constant outside; one load sees step time, the other total time.
    subroutine test_amplitude(error)

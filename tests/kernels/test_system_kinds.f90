@@ -7,13 +7,14 @@ module test_system_kinds
    use emcon_evaluation, only : instant_t, evaluation_t
    use emcon_kinds, only : dp, wp
    use emcon_materials, only : kinematics_corotated, kinematics_nonlinear
-   use emcon_motion, only : motion_of
+   use emcon_motion, only : motion_of, motion_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns, spread_dependent
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_scheme_static, only : scheme_static_t
    use emcon_steps, only : load_pressure, load_t
-   use emcon_system, only : system_begin_step, system_init, system_respond, system_t
+   use emcon_system, only : system_begin_step, system_init, system_renew, system_respond, &
+      system_t, system_tangent_times
    use emcon_text, only : to_text
    use linear_scenes, only : add_equation, add_tie_by_hand
    use random_draws, only : draw_random
@@ -93,7 +94,9 @@ contains
       real(wp), intent(in) :: motion_size        !! [L]
       character(len=*), intent(in) :: what
       type(system_t) :: system
-      real(wp), allocatable :: u0(:, :), v0(:, :), du(:, :), way(:, :)
+      type(scene_t) :: bare
+      type(motion_t) :: motion
+      real(wp), allocatable :: u0(:, :), v0(:, :), du(:, :), way(:, :), image(:, :)
       real(wp), allocatable :: x(:), up(:), down(:), product(:)
       real(wp), parameter :: rounding = real(epsilon(1.0_dp), wp)   ! of the matrix
       real(wp) :: step
@@ -103,7 +106,7 @@ contains
       if (.not. allocated(error)) call system_begin_step(system, scene, 1, error)
       if (allocated(error)) return
       n = system%space%numbering%n_unknown
-      allocate(u0, v0, du, way, mold=scene%x)
+      allocate(u0, v0, du, way, image, mold=scene%x)
       allocate(x(n), up(n), down(n), product(n))
       call shake(u0, 0.1_wp)
       call shake(v0, 1.0_wp)
@@ -127,6 +130,18 @@ contains
             64.0_wp*rounding), 10.0_wp*young, what)
          call check_true(error, norm2(product) > 0.1_wp*young, "a stiffness")
       end do
+      ! Products leave out what loads and damped materials have of the matrix.
+      if (scene%material(1)%alpha > 0.0_wp) return
+      bare = scene
+      bare%step(1)%load = bare%step(1)%load(:0)
+      call system_renew(system, bare)
+      motion = motion_of(evaluation, scene%x, u0, du, v0)
+      call system_respond(system, motion, .true.)
+      call csr_multiply(system%matrix, x, product)
+      call system_tangent_times(system, motion, way, image)
+      call pick_unknowns(system%space%numbering, image, up)
+      call check_near(error, up, product, 64.0_wp*max(epsilon(1.0_wp), rounding), 10.0_wp*young, &
+         "product, " // what)
 
    contains
 
