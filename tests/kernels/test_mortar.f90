@@ -13,10 +13,12 @@ module test_mortar
    use emcon_kinds, only : wp
    use emcon_mortar, only : mortar_init, mortar_t
    use emcon_mortar_choice, only : pair_comes_near
-   use emcon_mortar_frame, only : moment_cover, moment_gap
+   use emcon_mortar_frame, only : end_rounding, moment_cover, moment_gap
    use emcon_motion, only : motion_init, motion_evaluate, motion_t
    use emcon_scene, only : scene_t
+   use emcon_slip_point, only : slip_list_t
    use emcon_text, only : to_text
+   use random_draws, only : draw_random
    use small_scenes, only : add_block, add_surface, bend_scene, block_node, block_t, bottom, left, &
       make_two_blocks, right, scene_begin, shake, top
    implicit none
@@ -53,7 +55,8 @@ contains
          test_case_t("surfaces that look the same way", test_same_way), &
          test_case_t("nothing within reach", test_apart), &
          test_case_t("edges whose boxes come near on the way", test_near), &
-         test_case_t("slip is kept from step to step", test_slip_share)]
+         test_case_t("slip is kept from step to step", test_slip_share), &
+         test_case_t("points of slip fill what is covered", test_slip_points)]
    end subroutine collect_mortar
 
    ! ---- scenes ---------------------------------------------------------------------------------
@@ -885,5 +888,57 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_slip_share
+
+   !> Flat edges of length 1 over others, all covered, that slide by up to 3/2 past nodes on both
+   !> sides: weights are integrals of the multiplier over the edges of a node. What two edges cover
+   !> at the start and at the end fills each edge in the mean, too.
+   subroutine test_slip_points(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n_edge(3) = [1, 2, 1]
+      type(scene_t) :: scene
+      type(mortar_t) :: mortar
+      type(slip_list_t) :: list
+      real(wp), allocatable :: u(:, :), du(:, :)
+      real(wp) :: way, share, own
+      integer :: i, k, j, node
+
+      do i = 1, n_combination
+         if (.not. btest(i, 0)) cycle            ! Gauss points of whole edges
+         do k = 1, 6
+            call make(0.05_wp, 0.0_wp, 0.0_wp, i, scene, mortar, error)
+            if (allocated(error)) return
+            mortar%step%pushes_at_end = mod(k, 3) == 0
+            call contact_laws_of_surface(interaction_t(friction=0.5_wp), mortar%laws)
+            call draw_random(way)
+            u = 0.0_wp*scene%x
+            du = u
+            u(1, 11:) = 0.8_wp*(way - 0.5_wp)
+            du(1, 11:) = 1.6_wp*(0.5_wp - way)
+            call mortar%begin_step(scene%x, u, du)
+            do node = 1, 3
+               if (allocated(list%point)) deallocate(list%point)
+               allocate(list%point(0))
+               call mortar%choose_slip(node, scene%x, u, du, list)
+               associate (weight => list%point%weight)
+                  ! Of a node's own shape function 1/2 on each edge; dual: the same.
+                  call check_near(error, sum(weight), 0.5_wp*n_edge(node), end_rounding, &
+                     1.0_wp, "sum" // text_of(i, k))
+                  ! The mean of the own shape function under its multiplier: 1/3, dual 1/2.
+                  own = 0.0_wp
+                  do j = 1, size(weight)
+                     associate (point => list%point(j))
+                        own = own + point%weight*sum(point%share(:2), &
+                           mask=point%node(:2) == mortar%node(node))
+                     end associate
+                  end do
+                  share = merge(0.5_wp, 1.0_wp/3.0_wp, mortar%is_dual)
+                  call check_near(error, own, share*n_edge(node), end_rounding, 1.0_wp, &
+                     "own share" // text_of(i, k))
+               end associate
+            end do
+            if (allocated(error)) return
+         end do
+      end do
+   end subroutine test_slip_points
 
 end module test_mortar
