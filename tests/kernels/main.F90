@@ -65,6 +65,7 @@ program main
    use test_host_deck, only : collect_host_deck
    use test_host_force, only : collect_host_force
    use test_given_space, only : collect_user_space
+   use test_host_lists, only : collect_host_lists
    use test_host_law, only : collect_host_law
    use test_host_sizes, only : collect_host_sizes
    use test_guards, only : collect_guards
@@ -327,6 +328,7 @@ program main
    call run("stepper_query", collect_stepper_query)
    call run("given_space", collect_user_space)
    call run("host_law", collect_host_law)
+   call run("host_lists", collect_host_lists)
    call run("host_sizes", collect_host_sizes)
    call run("results", collect_results)
 

@@ -5,7 +5,7 @@ module test_host_contact
    use emcon_contact, only : contact_t, gap_state_t
    use emcon_contact_registry, only : new_contact
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_host, only : host_add_contact, host_t
+   use emcon_host, only : host_add_contact, host_find_contact, host_t
    use emcon_host_contact, only : host_contact_t
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_user
@@ -41,7 +41,8 @@ contains
          test_case_t("what is left out is filled in", test_set_up), &
          test_case_t("faults are told with the pair", test_faults), &
          test_case_t("gaps at the start", test_start), &
-         test_case_t("no outlines in space", test_outlines)]
+         test_case_t("no outlines in space", test_outlines), &
+         test_case_t("formulations by pairs", test_list)]
    end subroutine collect_host_contact
 
    subroutine set_up(self, scene, pair, error)
@@ -198,5 +199,28 @@ contains
       call new_overlap_query(scene, query)
       call check_true(error, .not. allocated(query), "none in space")
    end subroutine test_outlines
+
+   !> Given in any order, each stays with its pair.
+   subroutine test_list(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: pair(3) = [5, 2, 3]
+      character(len=12), parameter :: fault(3) = ["fifth ", "second", "third "]
+      type(host_t) :: given
+      integer :: k
+
+      call check_equal(error, host_find_contact(given, 2), 0, "nothing yet")
+      do k = 1, size(pair)
+         call host_add_contact(given, pair(k), floor_t(fault=fault(k)))
+      end do
+      call check_equal(error, [(host_find_contact(given, k), k = 1, 5)], [0, 2, 3, 0, 1], "found")
+      do k = 1, size(pair)
+         select type (contact => given%contact(k)%contact)
+         type is (floor_t)
+            call check_equal(error, trim(contact%fault), trim(fault(k)), "its formulation")
+         class default
+            call check_true(error, .false., "a formulation of its own kind")
+         end select
+      end do
+   end subroutine test_list
 
 end module test_host_contact

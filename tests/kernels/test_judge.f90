@@ -434,6 +434,10 @@ contains
       call make_scene(scene, [0.0_wp, 0.75_wp], [4.0_wp, 1.0_wp], [1, 1], .false.)
       call judged(scene, overlap)
       call check_near(error, overlap%depth, 0.25_wp, 4.0_wp*eps, 1.0_wp, "in line")
+      ! The bottom of the upper block rises by 0.4: it counts by its middle.
+      scene%x(2, 11:12) = [0.5_wp, 0.9_wp]
+      call judged(scene, overlap)
+      call check_near(error, overlap%depth, 0.3_wp, 4.0_wp*eps, 1.0_wp, "aslant")
       call make_scene(scene, [0.0_wp, 1.0_wp], [4.0_wp, 1.0_wp], [1, 1], .false.)
       call judged(scene, overlap)
       call check_equal(error, overlap%node, 0, "on top")
