@@ -15,6 +15,7 @@ module test_system_kinds
    use emcon_steps, only : load_pressure, load_t
    use emcon_system, only : system_begin_step, system_init, system_renew, system_respond, &
       system_t, system_tangent_times
+   use emcon_term, only : role_internal
    use emcon_text, only : to_text
    use linear_scenes, only : add_equation, add_tie_by_hand
    use random_draws, only : draw_random
@@ -29,7 +30,8 @@ contains
       type(test_case_t), allocatable, intent(out) :: tests(:)
 
       tests = [ &
-         test_case_t("tangents of all kinds of sections", test_kinds)]
+         test_case_t("tangents of all kinds of sections", test_kinds), &
+         test_case_t("far from its place", test_far)]
    end subroutine collect_system_kinds
 
    !> Two blocks of three cells, of quadrilaterals and of triangles; with links nodes of the second
@@ -130,6 +132,7 @@ contains
             64.0_wp*rounding), 10.0_wp*young, what)
          call check_true(error, norm2(product) > 0.1_wp*young, "a stiffness")
       end do
+      call check_sizes(error, system, what)
       ! Products leave out what loads and damped materials have of the matrix.
       if (scene%material(1)%alpha > 0.0_wp) return
       bare = scene
@@ -154,5 +157,67 @@ contains
       end subroutine force
 
    end subroutine check_tangent
+
+   !> Sizes of forces are sums of parts before these cancel: no less than the forces, and of the same
+   !> order where displacements are of the size of strains.
+   subroutine check_sizes(error, system, what)
+      type(error_t), allocatable, intent(inout) :: error
+      type(system_t), intent(in) :: system
+      character(len=*), intent(in) :: what
+      real(wp), parameter :: tol = 64.0_wp*epsilon(1.0_wp)
+      integer :: k
+
+      associate (response => system%response)
+         do k = 1, size(response%part)
+            associate (part => response%part(k))
+               call check_true(error, all(part%magnitude >= abs(part%force)*(1.0_wp - tol)), &
+                  "sizes of role " // to_text(k) // ", " // what)
+               call check_true(error, sum(part%magnitude) <= 40.0_wp*sum(abs(part%force)), &
+                  "of the same order, role " // to_text(k) // ", " // what)
+            end associate
+         end do
+         call check_near(error, response%magnitude, response%part(1)%magnitude &
+            + response%part(2)%magnitude + response%part(3)%magnitude, tol, 100.0_wp*young, &
+            "all, " // what)
+         call check_true(error, all(response%rounding >= 0.0_wp) .and. &
+            sum(response%rounding) > 0.01_wp*young, "rounding of displacements, " // what)
+      end associate
+   end subroutine check_sizes
+
+   !> Far from its place a body has no forces but for what displacements are rounded by, and these
+   !> are told, per unit of the rounding.
+   subroutine test_far(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: way = 1.0_wp/sqrt(epsilon(1.0_wp))
+      type(scheme_static_t) :: static
+      type(scene_t) :: scene
+      type(system_t) :: system
+      type(evaluation_t) :: evaluation
+      real(wp), allocatable :: u0(:, :), du(:, :)
+      integer :: kind, link
+
+      evaluation = static%evaluation(instant_t(0.5_wp, 0.5_wp), 0.25_wp)
+      do kind = kinematics_nonlinear, kinematics_corotated
+         do link = 0, 1
+            call make_linked(scene, kind, .false., .true., 0.0_wp)
+            call system_init(system, scene, error)
+            if (.not. allocated(error)) call system_begin_step(system, scene, 1, error)
+            if (allocated(error)) return
+            allocate(u0, du, source=0.0_wp*scene%x)
+            ! No number of few bits.
+            u0(1, :) = way/3.0_wp
+            if (link == 1) du(2, :) = way/7.0_wp
+            call system_respond(system, motion_of(evaluation, scene%x, u0, du), .false.)
+            associate (force => system%response%part(role_internal)%force, &
+                  rounding => system%response%rounding)
+               call check_true(error, all(abs(force) <= 4.0_wp*epsilon(1.0_wp)*rounding), &
+                  "forces, kinematics " // to_text(kind))
+               call check_true(error, all(rounding(:, :8) > 0.1_wp*young*way) .and. &
+                  all(rounding < 100.0_wp*young*way), "rounding, kinematics " // to_text(kind))
+            end associate
+            deallocate(u0, du)
+         end do
+      end do
+   end subroutine test_far
 
 end module test_system_kinds
