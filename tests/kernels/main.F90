@@ -93,6 +93,7 @@ program main
    use test_march_commit, only : collect_march_commit
    use test_march_contact, only : collect_march_contact
    use test_march_impulse, only : collect_march_impulse
+   use test_march_guess, only : collect_march_guess
    use test_march_grid, only : collect_march_grid
    use test_march_size, only : collect_march_size
    use test_march_kinds, only : collect_march_kinds
@@ -315,6 +316,7 @@ program main
    call run("march_commit", collect_march_commit)
    call run("march_contact", collect_march_contact)
    call run("march_grid", collect_march_grid)
+   call run("march_guess", collect_march_guess)
    call run("march_impulse", collect_march_impulse)
    call run("march_size", collect_march_size)
    call run("march_kinds", collect_march_kinds)

@@ -224,8 +224,8 @@ contains
          tol, 20.0_wp, "weight of density 1/4, thickness 2, area 4")
    end subroutine test_gravity
 
-   !> About an axis across the plane and one in it, of direction (0.6, 0.8): the resultant is that of
-   !> the mass in its centre, and about the axis there is no moment.
+   !> About an axis across the plane and one in it, of direction (0.6, 0.8): the resultant is that
+   !> of the mass in its centre, and about the axis there is no moment.
    subroutine test_centrifugal(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: point(2) = [0.5_wp, -1.0_wp], square = 3.0_wp
@@ -256,8 +256,8 @@ contains
          expected = [1.0_wp, 1.0_wp] - point
          if (k == 2) expected = expected - dot_product([0.6_wp, 0.8_wp], expected) &
             *[0.6_wp, 0.8_wp]
-         call check_near(error, sum(force, 2), 0.25_wp*2.0_wp*4.0_wp*square*expected, tol, 20.0_wp, &
-            "resultant")
+         call check_near(error, sum(force, 2), 0.25_wp*2.0_wp*4.0_wp*square*expected, tol, &
+            20.0_wp, "resultant")
          arm = scene%x - spread(point, 2, 9)
          if (k == 1) call check_near(error, sum(arm(1, :)*force(2, :) - arm(2, :)*force(1, :)), &
             0.0_wp, tol, 40.0_wp, "moment")

@@ -158,8 +158,8 @@ contains
 
    end subroutine check_tangent
 
-   !> Sizes of forces are sums of parts before these cancel: no less than the forces, and of the same
-   !> order where displacements are of the size of strains.
+   !> Sizes of forces are sums of parts before these cancel: no less than the forces, and of the
+   !> same order where displacements are of the size of strains.
    subroutine check_sizes(error, system, what)
       type(error_t), allocatable, intent(inout) :: error
       type(system_t), intent(in) :: system
