@@ -132,6 +132,7 @@ program main
    use test_saddle_point, only : collect_saddle_point
    use test_scheme, only : collect_scheme
    use test_search, only : collect_search
+   use test_segment, only : collect_segment
    use test_self_contact, only : collect_self_contact
    use test_shape, only : collect_shape
    use test_single_elements, only : collect_single_elements
@@ -239,6 +240,7 @@ program main
    call run("facets", collect_facets)
    call run("chain", collect_chain)
    call run("search", collect_search)
+   call run("segment", collect_segment)
    call run("self_contact", collect_self_contact)
    call run("nts_gap", collect_nts_gap)
    call run("nts", collect_nts)

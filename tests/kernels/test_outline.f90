@@ -2,11 +2,15 @@
 module test_outline
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_errors, only : error_t
-   use emcon_interactions, only : contact_pair_t
+   use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite
    use emcon_kinds, only : wp
    use emcon_outline, only : outline_meets, outline_t
+   use emcon_outline_curves_plane, only : outline_curves_init, outline_curves_overlap, &
+      outline_curves_t
    use emcon_outline_plane, only : outline_init, outline_links_t
    use emcon_scene, only : scene_t
+   use emcon_text, only : to_text
+   use ring_scenes, only : make_rings
    use small_scenes, only : add_block, add_surface, block_node, block_t, bottom, make_block, &
       scene_begin, top
    implicit none
@@ -22,7 +26,8 @@ contains
          test_case_t("closed outlines of three pieces", test_pieces), &
          test_case_t("where outlines meet in a node", test_pinch), &
          test_case_t("edges of surfaces without elements", test_lone), &
-         test_case_t("a single piece without a pair", test_single)]
+         test_case_t("a single piece without a pair", test_single), &
+         test_case_t("curves of unequal edges rise as their circle", test_curves)]
    end subroutine collect_outline
 
    !> Blocks of 3 x 2, 2 x 1 and 1 x 1 cells of heights 1/2, 1 and 2, of quadrilaterals or not.
@@ -172,5 +177,49 @@ contains
       call check_equal(error, [outline%n_piece, size(outline%facet, 2)], [2, 10], "two can")
       call check_true(error, .not. outline_meets(outline, 1, 2), "though no pair brings them")
    end subroutine test_single
+
+   !> Smoothed edges of the inside of a quarter of a ring lie behind by s (1 - s) L^2/(2 R), but for
+   !> the fourth order, and by the difference of neighbours' lengths. An edge beside itself counts
+   !> twice.
+   subroutine test_curves(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: radius = 2.0_wp
+      type(scene_t) :: scene
+      type(outline_t) :: outline
+      type(outline_links_t) :: links
+      type(outline_curves_t) :: curves
+      type(contact_options_t) :: options
+      real(wp), allocatable :: still(:, :)
+      real(wp) :: length, share, overlap
+      integer :: e, k, n_seen
+
+      call make_rings(scene, [8, 20], 0.0_wp, .false.)
+      ! Every second node of the sleeve's inside, nodes 19 to 39, goes on by a third of an edge.
+      scene%x(:, 20:38:2) = 0.3_wp*scene%x(:, 21:39:2) + 0.7_wp*scene%x(:, 20:38:2)
+      do k = 20, 38, 2
+         scene%x(:, k) = scene%x(:, k)*(radius/norm2(scene%x(:, k)))
+      end do
+      options%smoothing = smoothing_hermite
+      call outline_init(outline, links, scene)
+      call outline_curves_init(curves, outline, links, scene, options)
+      allocate(still, source=0.0_wp*scene%x)
+      n_seen = 0
+      do e = 1, size(outline%facet, 2)
+         associate (a => scene%x(:, outline%facet(1, e)), b => scene%x(:, outline%facet(2, e)))
+            if (curves%number(e) == 0) cycle
+            ! Ends of the surface bend half as much.
+            if (min(a(1), b(1), a(2), b(2)) < 0.05_wp*radius) cycle
+            n_seen = n_seen + 1
+            length = norm2(b - a)
+            do k = 1, 3
+               share = 0.25_wp*k
+               overlap = outline_curves_overlap(curves, e, e, [share, share], scene%x, still)
+               call check_near(error, overlap, share*(1.0_wp - share)*length**2/radius, &
+                  0.05_wp, length**2/(4.0_wp*radius), "rise at " // to_text(share, 3))
+            end do
+         end associate
+      end do
+      call check_true(error, n_seen == 18, "smoothed edges: " // to_text(n_seen))
+   end subroutine test_curves
 
 end module test_outline
