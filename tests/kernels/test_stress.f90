@@ -1,19 +1,20 @@
 !> Stress that is told of elements that stretch and turn as a whole: that of their forces, by the
 !> virial of a hexahedron, for every kind of element, law and kinematics.
 module test_stress
-   use check, only : check_near, test_case_t
+   use check, only : check_near, check_true, test_case_t
    use emcon_diagnostics, only : diagnostics_t
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_at_end
    use emcon_kinds, only : wp
-   use emcon_motion, only : motion_of
+   use emcon_motion, only : motion_of, motion_t
    use emcon_solid, only : solid_t
    use emcon_stepper, only : stepper_build, stepper_close, stepper_read_source, stepper_t
    use emcon_stress, only : element_means, nodal_stress, von_mises
-   use emcon_system, only : system_respond
+   use emcon_system, only : system_find_energy, system_respond, system_tangent_times
    use emcon_term, only : role_internal
    use emcon_term_registry, only : terms_solid
    use emcon_text, only : to_text
+   use small_scenes, only : shake
    implicit none
    private
    public :: collect_stress
@@ -209,7 +210,71 @@ contains
       end do
       call element_means(solid, u, .true., mean, strain, volume)
       call check_near(error, mean(:, 1), in_list(expected), tol, stress_size, what // ", mean")
+      call check_sizes(error, stepper, u, what)
+      call check_derivatives(error, stepper, u, what)
    end subroutine check_stress
+
+   !> The energy changes by the forces and these by the tangent, along a random way: differences of
+   !> second order in a step of eps^(1/3).
+   subroutine check_derivatives(error, stepper, u, what)
+      type(error_t), allocatable, intent(inout) :: error
+      type(stepper_t), intent(inout) :: stepper
+      real(wp), intent(in), contiguous :: u(:, :)
+      character(len=*), intent(in) :: what
+      real(wp), parameter :: step = epsilon(1.0_wp)**(1.0_wp/3.0_wp)
+      real(wp), dimension(size(u, 1), size(u, 2)) :: way, product, force
+      real(wp), dimension(size(u, 1), size(u, 2), -1:1) :: forces
+      real(wp) :: energy(-1:1)
+      integer :: i
+
+      call shake(way, 1.0_wp)
+      associate (system => stepper%march%system)
+         do i = -1, 1
+            call system_respond(system, motion_at(i*step), .false.)
+            forces(:, :, i) = system%response%part(role_internal)%force
+            call system_find_energy(system, motion_at(i*step))
+            energy(i) = sum(system%response%energy)
+         end do
+         call system_respond(system, motion_at(0.0_wp), .true.)
+         call system_tangent_times(system, motion_at(0.0_wp), way, product)
+      end associate
+      force = forces(:, :, 0)
+      call check_near(error, (energy(1) - energy(-1))/(2.0_wp*step), sum(force*way), &
+         1.0e3_wp*step**2, stress_size + maxval(abs(force)), what // ", energy")
+      call check_near(error, (forces(:, :, 1) - forces(:, :, -1))/(2.0_wp*step), product, &
+         1.0e3_wp*step**2, stress_size + maxval(abs(product)), what // ", tangent")
+
+   contains
+
+      type(motion_t) function motion_at(share) result(motion)
+         real(wp), intent(in) :: share
+
+         motion = motion_of(evaluation_at_end, stepper%scene%x, u, share*way)
+      end function motion_at
+
+   end subroutine check_derivatives
+
+   !> Sizes of forces are sums of their parts before these cancel; what displacements are rounded by
+   !> makes forces of that size by the stiffness of the element.
+   subroutine check_sizes(error, stepper, u, what)
+      type(error_t), allocatable, intent(inout) :: error
+      type(stepper_t), intent(inout) :: stepper
+      real(wp), intent(in), contiguous :: u(:, :)
+      character(len=*), intent(in) :: what
+
+      associate (system => stepper%march%system, response => stepper%march%system%response)
+         call system_respond(system, motion_of(evaluation_at_end, stepper%scene%x, u, 0.0_wp*u), &
+            .false.)
+         associate (part => response%part(role_internal))
+            call check_true(error, all(part%magnitude >= abs(part%force)*(1.0_wp - tol)), &
+               what // ", sizes")
+            call check_true(error, sum(part%magnitude) <= 40.0_wp*sum(abs(part%force)), &
+               what // ", of the same order")
+         end associate
+         call check_true(error, all(response%rounding > 0.0_wp) .and. &
+            all(response%rounding < 1.0e3_wp*stress_size), what // ", rounding")
+      end associate
+   end subroutine check_sizes
 
    ! ---- tests ----------------------------------------------------------------------------------
 
