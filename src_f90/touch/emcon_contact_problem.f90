@@ -274,8 +274,8 @@ contains
    subroutine contact_problem_pivot(self, force, n_pivot, is_solved)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: force(0:, :)        !! (0:1, n) [M L/T^2]
-      integer, intent(out) :: n_pivot
-      logical, intent(out) :: is_solved
+      integer, intent(out) :: n_pivot                !! pivots that were taken
+      logical, intent(out) :: is_solved              !! else `force` is as it was
       real(wp), dimension(4*size(self%mu), 4*size(self%mu)) :: m
       real(wp), dimension(4*size(self%mu)) :: q, z
       real(wp) :: unit, length
