@@ -11,6 +11,7 @@ module test_mass_return
    use emcon_scene, only : scene_t
    use emcon_steps, only : initiation_massless
    use emcon_system, only : mass_times
+   use emcon_text, only : to_text
    use small_scenes, only : add_step, block_t, make_two_blocks
    implicit none
    private
@@ -22,6 +23,8 @@ module test_mass_return
    integer, parameter :: n_node = 16
    !> Nodes without mass: the slave surface, as one side of two is enough.
    integer, parameter :: surface(3) = [11, 12, 13]
+   !> Failures of increments before masses come back.
+   integer, parameter :: return_after = 3
 
 contains
 
@@ -30,7 +33,8 @@ contains
 
       tests = [ &
          test_case_t("which nodes are to blame", test_troubled), &
-         test_case_t("a body in flight notices nothing", test_flight)]
+         test_case_t("a body in flight notices nothing", test_flight), &
+         test_case_t("after some failures in a row", test_failures)]
    end subroutine collect_mass_return
 
    !> A block of mass 2 that flies over one of mass 4, far above it; both are free.
@@ -135,5 +139,45 @@ contains
       end do
       call march_free(march)
    end subroutine test_flight
+
+   !> Increments on the grid and by the error: what cannot be solved is tried shorter, then masses
+   !> come back.
+   subroutine test_failures(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: stopped
+      type(scene_t) :: scene
+      type(increment_t) :: increment
+      integer :: k, i, n_told
+
+      do k = 1, 2
+         block
+            type(march_t) :: march
+
+            call begin(scene, march, error)
+            if (allocated(error)) return
+            if (k == 2) then
+               scene%step(1)%time%is_direct = .false.
+               scene%step(1)%time%tolerance = 0.1_wp
+            end if
+            ! A single iteration for a large motion.
+            scene%step(1)%solution%newton_maximum = 1
+            march%state%v(1, 14:16) = 30.0_wp
+            call march_begin_step(march, scene, 1, error)
+            if (allocated(error)) return
+            call march_increment(march, scene, increment, stopped)
+            n_told = 0
+            do i = 1, increment%notes%n
+               if (index(increment%notes%item(i)%text, "contact nodes take their mass back") > 0) &
+                  n_told = n_told + 1
+               if (n_told == 0) call check_true(error, i <= return_after, "after few failures")
+            end do
+            call check_true(error, n_told == 1, "masses come back, kind " // to_text(k) // ": " &
+               // to_text(n_told))
+            call check_true(error, .not. any(march%layer%is_massless), "all of them")
+            call march_free(march)
+         end block
+         if (allocated(error)) return
+      end do
+   end subroutine test_failures
 
 end module test_mass_return
