@@ -2,6 +2,7 @@
 !> second step is what one does that starts there.
 module test_step_begin
    use check, only : check_near, check_true, test_case_t
+   use emcon_amplitudes, only : amplitude_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
@@ -9,7 +10,8 @@ module test_step_begin
    use emcon_scene, only : scene_t
    use emcon_scheme, only : scheme_row_t
    use emcon_scheme_registry, only : n_scheme_row, scheme_row
-   use small_scenes, only : add_step, block_t, clamp, make_block, prescribe, shake
+   use small_scenes, only : add_step, block_t, clamp, make_block, make_two_blocks, prescribe, &
+      shake
    implicit none
    private
    public :: collect_step_begin
@@ -23,7 +25,8 @@ contains
       type(test_case_t), allocatable, intent(out) :: tests(:)
 
       tests = [ &
-         test_case_t("as a march that starts there, by all schemes", test_schemes)]
+         test_case_t("as a march that starts there, by all schemes", test_schemes), &
+         test_case_t("what overlaps as it begins goes over the step", test_overclosure)]
    end subroutine collect_step_begin
 
    !> A block that is held at its left and pulled at its right, in two steps of `n` increments; the
@@ -96,5 +99,42 @@ contains
       call march_free(march)
       call march_free(new)
    end subroutine compare
+
+   !> Held blocks that overlap by 1/20: gaps rise to 0 over the step, or by an amplitude.
+   subroutine test_overclosure(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: depth = 0.05_wp
+      real(wp), parameter :: left(5, 0:1) = reshape([1.0_wp, 0.75_wp, 0.5_wp, 0.25_wp, 0.0_wp, &
+         1.0_wp, 0.5_wp, 0.375_wp, 0.25_wp, 0.25_wp], [5, 2])
+      type(scene_t) :: scene
+      type(increment_t) :: increment
+      type(block_t) :: lower, upper
+      integer :: k, i
+
+      do k = 0, 1
+         call make_two_blocks(scene, -depth, lower, upper)
+         call add_step(scene, .true., 0.25_wp, 4)
+         call clamp(scene%step(1), [(i, i = 1, 5), 14, 15, 16])
+         scene%amplitude = [amplitude_t(name="LEFT", time=[0.0_wp, 0.25_wp, 0.75_wp], &
+            value=[1.0_wp, 0.5_wp, 0.25_wp])]
+         scene%step(1)%contact%resolves_overclosure = .true.
+         scene%step(1)%contact%overclosure_amplitude = k
+         block
+            type(march_t) :: march
+
+            call march_init(march, scene, error)
+            if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+            do i = 1, 4
+               if (allocated(error)) return
+               call march_increment(march, scene, increment, error)
+               if (allocated(error)) return
+               call check_near(error, march%active%left, left(i:i + 1, k), tol, 1.0_wp, "left")
+               call check_near(error, march%system%contact(1)%contact%state%gap1, &
+                  spread(-depth*left(i + 1, k), 1, 3), 1.0e-6_wp, 1.0_wp, "gaps")
+            end do
+            call march_free(march)
+         end block
+      end do
+   end subroutine test_overclosure
 
 end module test_step_begin

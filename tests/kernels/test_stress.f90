@@ -44,6 +44,7 @@ contains
       tests = [ &
          test_case_t("all elements and laws, large strains", test_large), &
          test_case_t("small strains, and in frames that turn", test_small), &
+         test_case_t("where motions end tells what is inverted, not their way", test_ends), &
          test_case_t("von Mises", test_von_mises)]
    end subroutine collect_stress
 
@@ -389,6 +390,61 @@ contains
       end subroutine compare
 
    end subroutine test_small
+
+   !> Random motions, many of them too large, made in one step and found as they are.
+   subroutine test_ends(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k
+
+      do k = 1, size(plane)
+         if (.not. allocated(error)) call look_at(plane(k))
+      end do
+      do k = 1, size(thin)
+         if (.not. allocated(error)) call look_at(thin(k))
+      end do
+      do k = 1, size(ring)
+         if (.not. allocated(error)) call look_at(ring(k))
+      end do
+      do k = 1, size(space)
+         if (.not. allocated(error)) call look_at(space(k))
+      end do
+
+   contains
+
+      subroutine look_at(kind)
+         character(len=*), intent(in) :: kind
+         type(stepper_t) :: stepper
+         real(wp), allocatable :: u(:, :), still(:, :)
+         real(wp) :: energy
+         logical :: is_inverted
+         integer :: i, n_inverted
+
+         call open_one(kind, 2, "NONLINEAR", stepper, error)
+         if (allocated(error)) return
+         n_inverted = 0
+         allocate(u, still, source=0.0_wp*stepper%scene%x)
+         associate (system => stepper%march%system, x => stepper%scene%x, &
+               response => stepper%march%system%response)
+            do i = 1, 30
+               call shake(u, 0.05_wp*i)
+               call system_respond(system, motion_of(evaluation_at_end, x, still, u), .false.)
+               is_inverted = allocated(response%refusal)
+               if (is_inverted) n_inverted = n_inverted + 1
+               energy = sum(response%energy)
+               call system_respond(system, motion_of(evaluation_at_end, x, u, still), .false.)
+               call check_true(error, is_inverted .eqv. allocated(response%refusal), &
+                  trim(kind) // ", motion " // to_text(i))
+               if (is_inverted .or. allocated(error)) cycle
+               call check_near(error, energy, sum(response%energy), tol, stress_size + energy, &
+                  trim(kind) // ", energy of motion " // to_text(i))
+            end do
+         end associate
+         call check_true(error, n_inverted > 1 .and. n_inverted < 30, trim(kind) // ": of 30 " &
+            // to_text(n_inverted))
+         call stepper_close(stepper)
+      end subroutine look_at
+
+   end subroutine test_ends
 
    !> Of one shear, one pull, and of a pressure that adds nothing.
    subroutine test_von_mises(error)
