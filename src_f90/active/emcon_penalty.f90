@@ -191,7 +191,7 @@ contains
 
       first = set%n_permanent + 1
       pulls = self%augments .and. set%n >= first
-      if (pulls) pulls = minval(set%lam(first:set%n)) < -pull*maxval(abs(set%lam(first:set%n)))
+      if (pulls) pulls = minval(set%lam(first:set%n)) < -pull*maxval(set%lam(first:set%n))
    end function penalty_pulls
 
    !> What the contacts of `set` store at the end of the step [M L^2/T^2].

@@ -247,7 +247,6 @@ contains
          if (.not. stands_on(self, x, self%outline%facet(side, e), other)) return
       end do
       found = overlap
-      found%depth = max(aligned, overlap%depth)
       call try_place(self, x, e, 0.5_wp, other, found, reach)
       if (found%depth > max(aligned, overlap%depth)) overlap = found
    end subroutine try_middle
