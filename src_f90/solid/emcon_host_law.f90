@@ -79,7 +79,7 @@ contains
             // to_text(n_strain))
       end if
       if (allocated(error)) return
-      allocate(law%energy%weight(n_strain), source=1.0_wp)     ! |E|^2: axes do not matter
+      law%energy%weight = spread(1.0_wp, 1, n_strain)          ! |E|^2: axes do not matter
       law%energy%weight(scene%n_dim + 1:) = 0.5_wp
    end subroutine host_law_take
 

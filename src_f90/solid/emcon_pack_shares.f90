@@ -122,13 +122,11 @@ contains
       real(wp), intent(in) :: largest(n_lane)    !! displacement [L]
       logical, intent(in) :: with_tangent        !! `part` has one
 
-      associate (n => size(self%force, 3), n_dim => size(self%force, 2))
+      associate (n => size(self%force, 3))
          self%force = part%force(:, :, :n)
          if (part%with_sizes) self%magnitude = part%magnitude(:, :, :n)
          if (part%with_sizes) self%largest = largest
-         if (.not. with_tangent) return
-         if (.not. allocated(self%tangent)) allocate(self%tangent(n_lane, n_dim, n, n_dim, n))
-         self%tangent = part%tangent(:, :, :n, :, :n)
+         if (with_tangent) self%tangent = part%tangent(:, :, :n, :, :n)
       end associate
    end subroutine border_keep
 

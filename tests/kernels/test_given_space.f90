@@ -4,14 +4,24 @@ module test_given_space
    use emcon_element_space, only : space_element_hold, space_element_init, space_element_respond, &
       space_element_t, space_motion_t, space_part_t
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_t
    use emcon_user_space, only : user_space_hold, user_space_respond, user_space_strain
    use emcon_host_law, only : host_points_make_room, host_points_t
    use emcon_kinds, only : wp
    use emcon_law, only : lame_constants, law_t
    use emcon_law_registry, only : law_create, law_linear
+   use emcon_motion, only : motion_of, motion_t
    use emcon_point_function, only : point_function_t, point_gradient, point_ok
    use emcon_shape, only : m => max_element_nodes
    use emcon_shape_hexahedron_space, only : shape_hexahedron_t
+   use emcon_solid, only : solid_t
+   use emcon_stepper, only : stepper_build, stepper_close, stepper_t
+   use emcon_stepper_user, only : stepper_give_law
+   use emcon_stress, only : nodal_stress
+   use emcon_system, only : system_find_energy, system_respond, system_tangent_times
+   use emcon_term, only : role_internal
+   use emcon_term_registry, only : terms_solid
+   use one_element, only : law_given, read_one
    use small_scenes, only : poisson, shake, young
    implicit none
    private
@@ -44,7 +54,8 @@ contains
       tests = [ &
          test_case_t("forces and tangents of our own law", test_forces), &
          test_case_t("stress of our own law", test_stress), &
-         test_case_t("an inverted element is told", test_inverted)]
+         test_case_t("an inverted element is told", test_inverted), &
+         test_case_t("models of one element", test_models)]
    end subroutine collect_user_space
 
    subroutine evaluate(self, z, wants_hessian, value, gradient, hessian, status)
@@ -59,9 +70,11 @@ contains
 
       status = point_ok
       do i = 1, size(z, 2)
-         gradient(:, i) = matmul(self%moduli, z(:, i))
-         value(i) = 0.5_wp*dot_product(z(:, i), gradient(:, i))
-         if (wants_hessian) hessian(:, :, i) = self%moduli
+         associate (moduli => self%moduli(:size(z, 1), :size(z, 1)))
+            gradient(:, i) = matmul(moduli, z(:, i))
+            value(i) = 0.5_wp*dot_product(z(:, i), gradient(:, i))
+            if (wants_hessian) hessian(:, :, i) = moduli
+         end associate
       end do
    end subroutine evaluate
 
@@ -154,5 +167,92 @@ contains
       call answer(sample, motion, is_inverted)
       call check_true(error, is_inverted, "inverted")
    end subroutine test_inverted
+
+   !> Forces, energies, products with the tangent and stress as those of a model with our own law,
+   !> in space and in the plane; what is inverted is refused by both.
+   subroutine test_models(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=5), parameter :: kind(4) = ["C3D8 ", "C3D10", "C3D4 ", "CPE4 "]
+      type(sample_t) :: sample
+      integer :: k
+
+      call make_sample(sample, error)
+      do k = 1, size(kind)
+         if (.not. allocated(error)) call compare_models(trim(kind(k)), sample%given, error)
+      end do
+   end subroutine test_models
+
+   subroutine compare_models(kind, given, error)
+      character(len=*), intent(in) :: kind
+      type(quadratic_t), intent(in) :: given
+      type(error_t), allocatable, intent(out) :: error
+      !> Strains of the plane among those of space.
+      integer, parameter :: in_plane(3) = [1, 2, 4]
+      type(stepper_t), target :: own, other
+      type(quadratic_t) :: law
+      real(wp), allocatable :: u0(:, :), du(:, :)
+      integer :: k
+
+      law = given
+      if (kind(:3) == "CPE") then
+         law%n_variable = 3
+         law%weight = given%weight(in_plane)
+         law%moduli(:3, :3) = given%moduli(in_plane, in_plane)
+      end if
+      call read_one(kind, 1, "NONLINEAR", own, error)
+      if (.not. allocated(error)) call stepper_build(own, error)
+      if (.not. allocated(error)) call read_one(kind, law_given, "NONLINEAR", other, error)
+      if (.not. allocated(error)) call stepper_give_law(other, "M", law, error)
+      if (.not. allocated(error)) call stepper_build(other, error)
+      if (allocated(error)) return
+      allocate(u0, du, source=0.0_wp*own%scene%x)
+      do k = 1, 8
+         call shake(u0, 0.1_wp)
+         call shake(du, 0.05_wp*k)
+         call compare_at(kind, own, other, u0, du, error)
+         if (allocated(error)) return
+      end do
+      call stepper_close(own)
+      call stepper_close(other)
+   end subroutine compare_models
+
+   subroutine compare_at(kind, own, other, u0, du, error)
+      character(len=*), intent(in) :: kind
+      type(stepper_t), intent(inout), target :: own, other
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      type(error_t), allocatable, intent(inout) :: error
+      type(solid_t), pointer :: solid
+      real(wp), dimension(size(du, 1), size(du, 2), 2) :: product
+      real(wp) :: stress(6, size(du, 2), 2)
+      type(motion_t) :: motion
+      integer :: k
+
+      associate (one => own%march%system, two => other%march%system, x => own%scene%x)
+         motion = motion_of(evaluation_t(), x, u0, du)
+         call system_respond(one, motion, .true.)
+         call system_respond(two, motion, .true.)
+         call check_true(error, allocated(one%response%refusal) .eqv. &
+            allocated(two%response%refusal), kind // ": refused by both")
+         if (allocated(one%response%refusal)) return
+         call check_near(error, two%response%part(role_internal)%force, &
+            one%response%part(role_internal)%force, tol, young, kind // ": forces")
+         call system_tangent_times(one, motion, du, product(:, :, 1))
+         call system_tangent_times(two, motion, du, product(:, :, 2))
+         call check_near(error, product(:, :, 2), product(:, :, 1), tol, 10.0_wp*young, &
+            kind // ": products")
+         call system_find_energy(one, motion)
+         call system_find_energy(two, motion)
+         call check_near(error, sum(two%response%energy), sum(one%response%energy), tol, young, &
+            kind // ": energy")
+         do k = 1, 2
+            if (k == 1) solid => terms_solid(one%term)
+            if (k == 2) solid => terms_solid(two%term)
+            call nodal_stress(solid, u0, .true., stress(:, :, k))
+         end do
+      end associate
+      ! In the plane the stress across is not known of a given law.
+      if (size(du, 1) == 2) stress(3, :, :) = 0.0_wp
+      call check_near(error, stress(:, :, 2), stress(:, :, 1), tol, young, kind // ": stress")
+   end subroutine compare_at
 
 end module test_given_space
