@@ -43,15 +43,28 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      logical :: is_done, is_measured
-      integer :: left
 
       self%first = motion%du
       self%driven = newton%driven
       if (self%is_one_problem .and. .not. self%support%is_needed) then
          call solve_as_one(self, system, newton, motion, status, error)
-         return
+      else
+         call solve_set_by_set(self, system, scene, newton, motion, status, error)
       end if
+   end subroutine active_set_solve
+
+   !> One set after the other, until one stands.
+   subroutine solve_set_by_set(self, system, scene, newton, motion, status, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status             !! one of the `step_` codes
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_done, is_measured
+      integer :: left
+
       is_measured = .false.
       do
          call phase_enter(system%phases, phase_gaps, left)
@@ -98,7 +111,7 @@ contains
          if (status == step_cycling) call begin_sharp(self, system, newton, motion, is_done)
          if (is_done) return
       end do
-   end subroutine active_set_solve
+   end subroutine solve_set_by_set
 
    !> The step as one problem of its contacts; where that fails with sharp corners, if possible.
    subroutine solve_as_one(self, system, newton, motion, status, error)

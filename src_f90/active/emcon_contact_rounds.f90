@@ -147,7 +147,8 @@ contains
       logical, intent(out) :: goes_on
 
       goes_on = all(redundant <= self%set%n)
-      if (goes_on) self%is_active(self%set%id(redundant)) = .false.
+      if (.not. goes_on) return
+      self%is_active(self%set%id(redundant)) = .false.
    end subroutine leave_out
 
    !> The set that obeys the laws where the step is linearised by the kept factor.
