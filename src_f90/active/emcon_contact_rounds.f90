@@ -148,7 +148,9 @@ contains
 
       goes_on = all(redundant <= self%set%n)
       if (.not. goes_on) return
-      self%is_active(self%set%id(redundant)) = .false.
+      associate (id => self%set%id(redundant))
+         self%is_active(id) = .false.
+      end associate
    end subroutine leave_out
 
    !> The set that obeys the laws where the step is linearised by the kept factor.
