@@ -145,12 +145,12 @@ contains
       type(active_set_t), intent(inout) :: self
       integer, intent(in) :: redundant(:)        !! (any) rows of the set, from 1
       logical, intent(out) :: goes_on
+      integer :: id(size(redundant))
 
       goes_on = all(redundant <= self%set%n)
       if (.not. goes_on) return
-      associate (id => self%set%id(redundant))
-         self%is_active(id) = .false.
-      end associate
+      id = self%set%id(redundant)
+      self%is_active(id) = .false.
    end subroutine leave_out
 
    !> The set that obeys the laws where the step is linearised by the kept factor.
