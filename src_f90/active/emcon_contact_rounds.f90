@@ -93,7 +93,7 @@ contains
          call solve_set(self, system, newton, motion, candidates, status, error)
          if (allocated(error)) return
          if (status == newton_redundant) then
-            call leave_out(self, newton%correction%redundant, goes_on)
+            call leave_out(self, newton%correction%redundant, candidates, goes_on)
             if (goes_on) cycle
             return
          else if (.not. any(status == [newton_converged, newton_early])) then
@@ -140,17 +140,22 @@ contains
       self%n_newton = self%n_newton + newton%convergence%n_iteration
    end subroutine solve_set
 
-   !> What follows from others waits: rows of gaps do. `goes_on` if these are all.
-   pure subroutine leave_out(self, redundant, goes_on)
+   !> What follows from others waits: rows of gaps do, and of what always holds for the whole step.
+   !> `goes_on` if these are all.
+   pure subroutine leave_out(self, redundant, candidates, goes_on)
       type(active_set_t), intent(inout) :: self
       integer, intent(in) :: redundant(:)        !! (any) rows of the set, from 1
+      type(candidates_t), intent(inout) :: candidates
       logical, intent(out) :: goes_on
-      integer :: id(size(redundant))
+      integer :: k, id
 
       goes_on = all(redundant <= self%set%n)
-      if (.not. goes_on) return
-      id = self%set%id(redundant)
-      self%is_active(id) = .false.
+      do k = 1, size(redundant)
+         if (redundant(k) > self%set%n) cycle
+         id = self%set%id(redundant(k))
+         if (redundant(k) <= self%set%n_permanent) candidates%takes_part(id) = .false.
+         self%is_active(id) = .false.
+      end do
    end subroutine leave_out
 
    !> The set that obeys the laws where the step is linearised by the kept factor.
