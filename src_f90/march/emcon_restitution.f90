@@ -25,7 +25,7 @@ contains
       type(notes_t), intent(inout) :: notes      !! for the log
       type(error_t), allocatable, intent(out) :: error
       type(rate_jump_t) :: jump
-      real(wp) :: lam(self%active%set%n)
+      real(wp), allocatable :: lam(:)
 
       if (self%active%set%n == self%active%set%n_permanent .or. .not. is_asked(self)) return
       call find_impacts(self, jump)
@@ -42,7 +42,7 @@ contains
          ledger%external_work = ledger%external_work + (jump%gained + jump%lost)
          ledger%contact_work = ledger%contact_work - jump%lost
          ledger%restitution = ledger%restitution + jump%lost
-         lam = 0.0_wp
+         allocate(lam(set%n), source=0.0_wp)
          lam(jump%row) = jump%impulse
          call jumps_add(self%end_state%jump, set, lam)
       end associate

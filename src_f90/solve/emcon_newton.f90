@@ -100,6 +100,7 @@ contains
       allocate(self%residual(n_unknown), self%scale(n_unknown), self%dq(n_unknown), &
          self%direction(n_unknown))
       allocate(self%contact, self%left, self%driven, mold=x)
+      self%dq = 0.0_wp
       self%contact = 0.0_wp
       self%left = 0.0_wp
       self%driven = 0.0_wp

@@ -98,7 +98,7 @@ contains
       character(len=*), intent(in) :: what
       type(solid_t), pointer :: solid
       real(wp), allocatable :: u(:, :), stress(:, :)
-      real(wp) :: mean(6, 1), strain(6, 1), volume(1)
+      real(wp) :: mean(6, 1), strain(3*size(stepper%scene%x, 1) - 3, 1), volume(1)
       integer :: i
 
       solid => terms_solid(stepper%march%system%term)
