@@ -30,7 +30,7 @@ from scene_tools import CRASH, PROGRAM, ROOT, Run, overrides
 PATIENCE = 30.0
 
 
-def judge_seed(seed, folder, patience=PATIENCE):
+def judge_seed(seed, folder, patience=PATIENCE, **parameters):
     """Run the case of a seed: what the program says, and what is wrong with it."""
     case = draw_case(seed)
     folder.mkdir(parents=True, exist_ok=True)
@@ -39,7 +39,7 @@ def judge_seed(seed, folder, patience=PATIENCE):
     began = time.monotonic()
     try:
         done = subprocess.run([PROGRAM, deck, "--quiet", "--output", folder,
-                               *overrides(case.parameters)], capture_output=True, text=True,
+                               *overrides(case.parameters | parameters)], capture_output=True, text=True,
                               timeout=patience)
     except subprocess.TimeoutExpired:
         return result | {"verdict": "stopped", "why": "time limit", "seconds": patience}
@@ -54,7 +54,7 @@ def judge_seed(seed, folder, patience=PATIENCE):
     if verdict["verdict"] == "not completed":
         return result | {"verdict": "stopped", "why": verdict["message"]}
     cut = run.history["cuts"] > 0
-    return result | {"verdict": verdict["verdict"], "reasons": verdict["reasons"],
+    return result | {"cuts": int(run.history["cuts"].sum()), "verdict": verdict["verdict"], "reasons": verdict["reasons"],
                      "warnings": verdict["warnings"], "penetration": verdict["penetration"],
                      "faults": faults(case, run.fields(), cut)}
 
@@ -82,6 +82,7 @@ def table(results):
     wrong = [r for r in results if r["verdict"] == "good" and r["faults"]]
     right = [r for r in results if r["verdict"] == "bad" and not r["faults"]]
     bad = [r for r in results if r["verdict"] == "bad"]
+    lines.append(f"increments cut: {sum(r.get('cuts', 0) for r in results)}")
     lines.append(f"wrong and called good: {len(wrong)}")
     lines += [f"  seed {r['seed']}: {'; '.join(r['faults'].values())}" for r in wrong]
     lines.append(f"called bad: {len(bad)}, {100*len(bad)/max(1, len(results)):.1f} %; "
@@ -104,6 +105,7 @@ def main():
     parser.add_argument("--folder", type=pathlib.Path, default=ROOT / "build" / "soak")
     parser.add_argument("--jobs", type=int, choices=(1, 2), default=1)
     parser.add_argument("--again", action="store_true", help="begin anew")
+    parser.add_argument("--method", help="of *CONSTRAINT METHOD, in place of that of the decks")
     parser.add_argument("--keep", action="store_true", help="keep the files of all runs")
     options = parser.parse_args()
     options.folder.mkdir(parents=True, exist_ok=True)
@@ -114,10 +116,11 @@ def main():
     if kept.exists():
         known = {r["seed"]: r for r in map(json.loads, kept.read_text().splitlines())}
     seeds = range(options.seeds[0], options.seeds[1] + 1)
+    parameters = {"method": options.method} if options.method else {}
 
     def one(seed):
         folder = options.folder / str(seed)
-        result = judge_seed(seed, folder)
+        result = judge_seed(seed, folder, **parameters)
         is_fine = result["verdict"] == "good" and not result["faults"]
         if is_fine and not options.keep:
             shutil.rmtree(folder)
