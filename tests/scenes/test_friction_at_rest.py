@@ -58,10 +58,7 @@ def test_an_arch(part, sides, formulation, tmp_path):
     if part > 1:
         assert run.verdict["verdict"] == "good"
         assert u[-1] < 2e-3 and u[-1] < 1.05*u[len(u)//2]
-        assert run.history["cuts"].sum() < 10
-        if part < 2:                                   # sets come back: they are found, not cut
-            told = run.file(".log").read_text().count("laws were solved for the step linearised")
-            assert told > 0 and run.history["cuts"].sum() <= 2
+        assert run.history["cuts"].sum() <= 2          # sets that come back are found, not cut
     else:
         assert u[-1] > 0.05 and u[-1] > 3*u[len(u)//2]
 
