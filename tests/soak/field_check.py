@@ -246,6 +246,9 @@ class Check:
         the gap is off its mean, which is half of the edge times the tangent of the angle between the
         surfaces at most. And the pressure of dual multipliers, which is linear on an edge, from 2p-q
         to 2q-p with p and q at its nodes, pulls where that is negative.
+
+        A node of the other side that goes from one edge to the next in a step rubs along both: of
+        its friction the vertex between them may have all, whatever it has of the push.
         """
         if not np.abs(self.contact).max() > 0:
             return
@@ -267,9 +270,28 @@ class Check:
                     continue
                 if self.has_means and size[i]*np.sin(min(off, np.pi/2)) <= self.of_means(k, i):
                     continue
+                if size[i]*np.sin(min(off, np.pi/2)) <= self.of_passing(k, i, body_of_node):
+                    continue
                 self.tell("push", off, f"the force on node {i} (from 0) at time "
                           f"{self.fields.time[k]:.6g} is {np.degrees(off):.3g} degrees out of "
                           f"the cone, {size[i]/largest:.2e} of the largest")
+
+    def of_passing(self, k, i, body_of_node):
+        """The friction of the nodes of other bodies that pass node `i` in the step to frame `k`."""
+        own = body_of_node[int(i)]
+        edge = self.bodies.edge[self.bodies.body_of_edge == own]
+        others = [n for n, body in body_of_node.items()
+                  if body != own and np.any(self.contact[k][n])]
+        if not others:
+            return 0.0
+        nearest = []
+        for frame in (k - 1, k):
+            x = self.solid.x + self.u[frame]
+            nearest.append([edge[np.argmin(overlap.to_edges(x[n][None], x[edge[:, 0]],
+                                                            x[edge[:, 1]])[0])] for n in others])
+        passes = [not np.array_equal(a, b) and (i in a or i in b)
+                  for a, b in zip(*nearest, strict=True)]
+        return self.scene.friction*np.linalg.norm(self.contact[k][others][passes], axis=1).sum()
 
     def of_means(self, k, i):
         """How far out of the cone means of gaps may push node `i` in the step to frame `k`: by the
