@@ -85,12 +85,14 @@ program main
    use test_ledger, only : collect_ledger
    use test_linear_rows, only : collect_linear_rows
    use test_line_search, only : collect_line_search
+   use test_linked_elements, only : collect_linked_elements
    use test_links, only : collect_links
    use test_loads, only : collect_loads
    use test_press_face, only : collect_press_face
    use test_march, only : collect_march
    use test_march_check, only : collect_march_check
    use test_march_commit, only : collect_march_commit
+   use test_march_control, only : collect_march_control
    use test_march_contact, only : collect_march_contact
    use test_march_impulse, only : collect_march_impulse
    use test_march_guess, only : collect_march_guess
@@ -100,6 +102,7 @@ program main
    use test_step_control, only : collect_step_control
    use test_mass_return, only : collect_mass_return
    use test_massless, only : collect_massless
+   use test_massless_start, only : collect_massless_start
    use test_midside, only : collect_midside
    use test_mortar, only : collect_mortar
    use test_mortar_pair, only : collect_mortar_pair
@@ -124,6 +127,7 @@ program main
    use test_results, only : collect_results
    use test_rigid_motion, only : collect_rigid_motion
    use test_rigidity, only : collect_rigidity
+   use test_rigid_pushes, only : collect_rigid_pushes
    use test_rigid_bodies, only : collect_rigid_bodies
    use test_row_elimination, only : collect_row_elimination
    use test_row_order, only : collect_row_order
@@ -140,6 +144,7 @@ program main
    use test_soft_law, only : collect_soft_law
    use test_solid, only : collect_solid
    use test_solid_parts, only : collect_solid_parts
+   use test_solid_threads, only : collect_solid_threads
    use test_bending, only : collect_bending
    use test_solvers, only : collect_solvers
    use test_start_gaps, only : collect_start_gaps
@@ -236,6 +241,7 @@ program main
    call run("stress", collect_stress)
    call run("solid", collect_solid)
    call run("solid_parts", collect_solid_parts)
+   call run("solid_threads", collect_solid_threads)
    call run("bending", collect_bending)
    call run("facets", collect_facets)
    call run("chain", collect_chain)
@@ -255,6 +261,7 @@ program main
    call run("hermite_gap", collect_hermite_gap)
    call run("mass_return", collect_mass_return)
    call run("massless", collect_massless)
+   call run("massless_start", collect_massless_start)
    call run("midside", collect_midside)
    call run("mortar_pair", collect_mortar_pair)
    call run("mortar_stencil", collect_mortar_stencil)
@@ -276,6 +283,7 @@ program main
    call run("press_face", collect_press_face)
    call run("rigid_motion", collect_rigid_motion)
    call run("rigidity", collect_rigidity)
+   call run("rigid_pushes", collect_rigid_pushes)
    call run("rigid_bodies", collect_rigid_bodies)
    call run("condensation", collect_condensation)
    call run("condition_rows", collect_condition_rows)
@@ -291,6 +299,7 @@ program main
    call run("reduction", collect_reduction)
    call run("system", collect_system)
    call run("system_kinds", collect_system_kinds)
+   call run("linked_elements", collect_linked_elements)
    call run("thin_stress", collect_thin_stress)
    call run("line_search", collect_line_search)
    call run("name_index", collect_name_index)
@@ -316,6 +325,7 @@ program main
    call run("march", collect_march)
    call run("march_check", collect_march_check)
    call run("march_commit", collect_march_commit)
+   call run("march_control", collect_march_control)
    call run("march_contact", collect_march_contact)
    call run("march_grid", collect_march_grid)
    call run("march_guess", collect_march_guess)

@@ -56,11 +56,13 @@ contains
    end subroutine place_nodes
 
    !> Read the deck of one element that nothing holds; its material is M.
-   subroutine read_one(kind, law, kinematics, stepper, error)
+   subroutine read_one(kind, law, kinematics, stepper, error, of_model, of_step)
       character(len=*), intent(in) :: kind, kinematics
       integer, intent(in) :: law
       type(stepper_t), intent(inout) :: stepper
       type(error_t), allocatable, intent(out) :: error
+      !> Further lines: behind the density of the material, and behind the step's duration
+      character(len=*), intent(in), optional :: of_model(:), of_step(:)
       type(diagnostics_t) :: diagnostics
       character(len=100) :: line(60)
       real(wp) :: x(3, most_nodes)
@@ -85,11 +87,13 @@ contains
       call add(law_data(law))
       call add("*DENSITY")
       call add("1.")
+      if (present(of_model)) call add_all(of_model)
       call add("*SOLID SECTION, ELSET=B, MATERIAL=M, KINEMATICS=" // kinematics)
       if (n_dim == 2 .and. kind(:3) /= "CAX") call add("0.5")
       call add("*STEP, NLGEOM")
       call add("*DYNAMIC, DIRECT")
       call add("0.1, 1.")
+      if (present(of_step)) call add_all(of_step)
       call add("*END STEP")
       allocate(stepper%source%line(m), stepper%source%file_name(1), stepper%override(0))
       stepper%source%file_name(1)%text = "one.inp"
@@ -109,6 +113,15 @@ contains
          m = m + 1
          line(m) = text
       end subroutine add
+
+      subroutine add_all(text)
+         character(len=*), intent(in) :: text(:)
+         integer :: k
+
+         do k = 1, size(text)
+            call add(text(k))
+         end do
+      end subroutine add_all
 
    end subroutine read_one
 

@@ -1,0 +1,193 @@
+!> Increments that follow the error: what they add up to, how they are counted, where they end.
+module test_march_control
+   use check, only : check_equal, check_error, check_near, check_true, test_case_t
+   use emcon_errors, only : err_analysis, error_t
+   use emcon_kinds, only : dp, wp
+   use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
+      march_is_done, march_t
+   use emcon_scene, only : scene_t
+   use emcon_step_control, only : why_error, why_newton
+   use emcon_text, only : to_text
+   use small_scenes, only : add_step, block_t, make_block
+   implicit none
+   private
+   public :: collect_march_control
+
+   real(wp), parameter :: eps = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+   real(wp), parameter :: h = 0.125_wp
+   integer, parameter :: n = 8
+
+contains
+
+   subroutine collect_march_control(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("sizes, times and counts of a stretched block that spins", test_counts), &
+         test_case_t("solves that take long", test_slow), &
+         test_case_t("no smaller increment is allowed", test_least), &
+         test_case_t("the smallest one fails", test_failure)]
+   end subroutine collect_march_control
+
+   subroutine make_spin(scene, tolerance, maximum)
+      type(scene_t), intent(out) :: scene
+      real(wp), intent(in) :: tolerance
+      integer, intent(in) :: maximum             !! iterations
+      type(block_t) :: block
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      call add_step(scene, .false., h, n)
+      scene%step(1)%time%is_direct = .false.
+      scene%step(1)%time%tolerance = tolerance
+      scene%step(1)%solution%newton_maximum = maximum
+      scene%v0(1, :) = -2.0_wp*scene%x(2, :) + 0.5_wp*scene%x(1, :)
+      scene%v0(2, :) = 2.0_wp*scene%x(1, :)
+   end subroutine make_spin
+
+   subroutine begin(scene, march, error)
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(inout) :: march
+      type(error_t), allocatable, intent(out) :: error
+
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+   end subroutine begin
+
+   !> Each increment is what time goes on by, all of it done, a power of two of that of the deck,
+   !> the first one two of these; the energy stays, and each solve that was given up is counted.
+   subroutine test_counts(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: tolerance(2) = [1.0_wp, 1.0e-4_wp]
+      type(scene_t) :: scene
+      integer :: k
+
+      do k = 1, 2
+         call make_spin(scene, tolerance(k), 60)
+         call run()
+         if (allocated(error)) return
+      end do
+
+   contains
+
+      subroutine run()
+         type(march_t) :: march
+         type(increment_t) :: increment
+         real(wp) :: before, total, part
+         integer :: n_increment, n_cut
+
+         call begin(scene, march, error)
+         if (allocated(error)) return
+         total = march%ledger%total
+         n_increment = 0
+         n_cut = 0
+         do while (.not. march_is_done(march))
+            before = march%state%clock%time
+            call march_increment(march, scene, increment, error)
+            if (allocated(error)) return
+            n_increment = n_increment + 1
+            n_cut = n_cut + increment%n_cut
+            call check_near(error, [increment%h, increment%done], spread(march%state%clock%time &
+               - before, 1, 2), 16.0_wp*eps, 1.0_wp, "size")
+            call check_near(error, march%state%clock%step_time, march%state%clock%time, &
+               0.0_wp, 1.0_wp, "time of the step")
+            part = increment%h/h
+            if (n_increment == 1) part = 0.5_wp*part
+            call check_near(error, fraction(part), 0.5_wp, 16.0_wp*eps, 1.0_wp, "power of two")
+            call check_near(error, march%ledger%total, total, 1.0e3_wp*eps, total, "energy")
+         end do
+         associate (control => march%state%control)
+            call check_near(error, march%state%clock%time, n*h, 0.0_wp, 1.0_wp, "end")
+            call check_equal(error, sum(control%n_size), n_increment + 1, "sizes, first twice")
+            call check_equal(error, control%n_less(why_error), n_cut, "given up")
+            call check_equal(error, sum(control%n_less), n_cut, "for nothing else")
+            call check_equal(error, control%n_over, 0, "all as asked for")
+            call check_true(error, n_cut > 0 .eqv. k == 2, "cuts: " // to_text(n_cut))
+            call check_true(error, (n_increment > n) .eqv. k == 2, "of " // to_text(n_increment))
+         end associate
+         call march_free(march)
+      end subroutine run
+
+   end subroutine test_counts
+
+   !> More than half of the iterations allowed: the next increments are shorter if the error counts.
+   subroutine test_slow(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      integer :: k
+
+      do k = 1, 3
+         call make_spin(scene, merge(0.0_wp, 1.0_wp, k == 3), merge(20, 5, k == 1))
+         if (k == 3) scene%step(1)%time%event_fraction = 0.01_wp
+         call run()
+         if (allocated(error)) return
+      end do
+
+   contains
+
+      subroutine run()
+         type(march_t) :: march
+         type(increment_t) :: increment
+         integer :: i
+
+         call begin(scene, march, error)
+         if (allocated(error)) return
+         do i = 1, 4
+            call march_increment(march, scene, increment, error)
+            if (allocated(error)) return
+         end do
+         call check_true(error, march%state%control%n_less(why_newton) > 0 .eqv. k == 2, &
+            "slow ones " // to_text(march%state%control%n_less(why_newton)))
+         call check_true(error, increment%h < h .eqv. k == 2, "size")
+         call march_free(march)
+      end subroutine run
+
+   end subroutine test_slow
+
+   !> With the increment of the deck as the smallest each is taken as it is, and told.
+   subroutine test_least(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+      integer :: i
+
+      call make_spin(scene, 1.0e-6_wp, 20)
+      scene%step(1)%time%h_min = h
+      call begin(scene, march, error)
+      if (allocated(error)) return
+      do i = 1, n
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         call check_near(error, [increment%h, march%state%clock%time], [h, i*h], 0.0_wp, 1.0_wp, &
+            "increment " // to_text(i))
+         call check_equal(error, increment%n_cut, 0, "cuts")
+      end do
+      call check_true(error, march_is_done(march), "all are done")
+      call check_equal(error, march%state%control%n_size(0), n, "sizes")
+      call check_true(error, march%state%control%n_over > n - 3, "with too large an error")
+      call march_free(march)
+   end subroutine test_least
+
+   !> One iteration never suffices: every size is tried once, and the state is left as it was.
+   subroutine test_failure(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: raised
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+
+      call make_spin(scene, 1.0e-2_wp, 1)
+      scene%step(1)%time%h_min = 0.125_wp*h
+      call begin(scene, march, error)
+      if (allocated(error)) return
+      call march_increment(march, scene, increment, raised)
+      call check_error(error, raised, err_analysis, "with h = 0.015625, the smallest allowed, " &
+         // "Newton's method does not converge", "failure")
+      call check_near(error, march%state%u, scene%u0, 0.0_wp, 1.0_wp, "displacements")
+      call check_near(error, march%state%v, scene%v0, 0.0_wp, 1.0_wp, "velocities")
+      call check_near(error, [march%state%clock%time, march%state%clock%step_time], [0.0_wp, &
+         0.0_wp], 0.0_wp, 1.0_wp, "time")
+      call march_free(march)
+   end subroutine test_failure
+
+end module test_march_control

@@ -1,0 +1,179 @@
+!> Velocities of a rigid body that is pushed and turns, against Newton's and Euler's laws.
+module test_rigid_pushes
+   use check, only : check_near, check_true, test_case_t
+   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_select
+   use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_at_end
+   use emcon_kinds, only : dp, wp
+   use emcon_motion, only : motion_of
+   use emcon_numbering, only : numbering_init, numbering_t
+   use emcon_rigid_bodies, only : rigid_frame_choose
+   use emcon_rigidity, only : rigidity_init, rigidity_t
+   use emcon_scene, only : scene_t
+   use emcon_steps, only : prescribed_t
+   use emcon_system, only : system_begin_step, system_init, system_t
+   use emcon_text, only : to_text
+   use emcon_velocity_update, only : push_t, velocity_update_accelerate, velocity_update_free, &
+      velocity_update_push, velocity_update_t
+   use small_scenes, only : add_step, block_t, make_block, shake
+   implicit none
+   private
+   public :: collect_rigid_pushes
+
+   real(wp), parameter :: tol = 1.0e3_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+   integer, parameter :: n = 15
+   !> Of a rectangle of 4 x 2 with density 1.
+   real(wp), parameter :: mass = 8.0_wp, inertia = mass*20.0_wp/12.0_wp, center(2) = [2.0_wp, &
+      1.0_wp]
+
+   !> A body that turns, forces on its nodes.
+   type :: body_t
+      type(scene_t) :: scene
+      type(system_t) :: system
+      type(constraint_set_t) :: held
+      type(velocity_update_t) :: update
+      real(wp) :: arm(2, n) = 0.0_wp, v(2, n) = 0.0_wp, force(2, n) = 0.0_wp
+      real(wp) :: total(2) = 0.0_wp, moment = 0.0_wp   !! of the forces
+   end type body_t
+
+   real(wp), parameter :: velocity(2) = [0.75_wp, -0.5_wp], spin = 1.5_wp
+
+contains
+
+   subroutine collect_rigid_pushes(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("forces accelerate a body that turns", test_accelerate), &
+         test_case_t("a push gives an energy and leaves the shape", test_push), &
+         test_case_t("what prescribed nodes leave of a shape", test_idle)]
+   end subroutine collect_rigid_pushes
+
+   !> All nodes of a block are one body, about its first node.
+   subroutine make_rigid(scene)
+      type(scene_t), intent(out) :: scene
+      type(block_t) :: block
+      integer :: i
+
+      call make_block(scene, "CPE4", [4, 2], block)
+      deallocate(scene%rigid)
+      allocate(scene%rigid(1))
+      associate (body => scene%rigid(1))
+         body%name = "BLOCK"
+         body%reference = 1
+         body%element = [(i, i = 1, 8)]
+         body%node = [(i, i = 1, n)]
+         call rigid_frame_choose(scene%x, body%node, body%reference, body%frame)
+      end associate
+      call add_step(scene, .false., 0.1_wp, 1)
+   end subroutine make_rigid
+
+   subroutine begin(body, error)
+      type(body_t), intent(inout) :: body
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k
+
+      call make_rigid(body%scene)
+      associate (system => body%system)
+         call system_init(system, body%scene, error)
+         if (.not. allocated(error)) call system_begin_step(system, body%scene, 1, error)
+         if (allocated(error)) return
+         call constraints_select(body%held, pack([(k, k = 1, size(system%acts))], system%acts))
+         call constraints_evaluate(body%held, system, motion_of(evaluation_at_end, body%scene%x, &
+            0.0_wp*body%scene%x, 0.0_wp*body%scene%x))
+      end associate
+      body%arm = body%scene%x - spread(center, 2, n)
+      body%v = rigid_field(body%arm, velocity, spin)
+      call shake(body%force, 1.0_wp)
+      body%total = sum(body%force, 2)
+      body%moment = sum(body%arm(1, :)*body%force(2, :) - body%arm(2, :)*body%force(1, :))
+
+   end subroutine begin
+
+   pure function rigid_field(arm, velocity, spin) result(v)
+      real(wp), intent(in) :: arm(2, n), velocity(2), spin
+      real(wp) :: v(2, n)
+
+      v(1, :) = velocity(1) - spin*arm(2, :)
+      v(2, :) = velocity(2) + spin*arm(1, :)
+   end function rigid_field
+
+   !> Forces and their moment, and towards the centre what turns on a circle.
+   subroutine test_accelerate(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(body_t) :: body
+      real(wp) :: acceleration(2, n)
+
+      call begin(body, error)
+      if (allocated(error)) return
+      call velocity_update_accelerate(body%update, body%system, body%held, body%force, body%v, &
+         acceleration, error)
+      if (allocated(error)) return
+      call check_near(error, acceleration, rigid_field(body%arm, body%total/mass, &
+         body%moment/inertia) - spin**2*body%arm, tol, 10.0_wp, "acceleration")
+      call velocity_update_free(body%update)
+   end subroutine test_accelerate
+
+   !> Along the impulses s b + s^2 a/2 is the energy, with b and a of the body as a whole.
+   subroutine test_push(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: gain(3) = [0.5_wp, -0.001_wp, -1.0e3_wp]
+      type(body_t) :: body
+      real(wp) :: v(2, n), a, b, root(2), part
+      logical :: has_root
+      integer :: k
+
+      call begin(body, error)
+      if (allocated(error)) return
+      a = sum(body%total**2)/mass + body%moment**2/inertia
+      b = dot_product(body%total, velocity) + body%moment*spin
+      do k = 1, size(gain)
+         v = body%v
+         call velocity_update_push(body%update, body%system, body%held, push_t(body%force, &
+            gain(k)), v, has_root, error)
+         if (allocated(error)) return
+         call check_true(error, has_root .eqv. b**2 + 2.0_wp*a*gain(k) >= 0.0_wp, "root " &
+            // to_text(k))
+         part = 0.0_wp
+         if (has_root) then
+            root = (-b + [1.0_wp, -1.0_wp]*sqrt(b**2 + 2.0_wp*a*gain(k)))/a
+            part = root(minloc(abs(root), 1))
+         end if
+         call check_near(error, v, rigid_field(body%arm, velocity + part*body%total/mass, spin &
+            + part*body%moment/inertia), tol, 10.0_wp, "velocities, push " // to_text(k))
+      end do
+      call velocity_update_free(body%update)
+   end subroutine test_push
+
+   !> A distance is not held between nodes that are prescribed in both directions: of the three the
+   !> one between the first two, or none.
+   subroutine test_idle(error)
+      type(error_t), allocatable, intent(out) :: error
+      logical, parameter :: expected(3, 0:4) = reshape([.false., .false., .false., .false., &
+         .false., .false., .false., .false., .false., .true., .false., .false., .true., .true., &
+         .true.], [3, 5])
+      !> Freedoms of the first nodes of the frame that are prescribed.
+      integer, parameter :: n_given(0:4) = [0, 2, 3, 4, 6]
+      type(scene_t) :: scene
+      type(rigidity_t) :: rigidity
+      type(numbering_t) :: numbering
+      type(prescribed_t) :: given(6)
+      logical :: is_alive(2, n), is_idle(3)
+      integer :: i
+
+      call make_rigid(scene)
+      call rigidity_init(rigidity, scene%rigid)
+      do i = 1, 6
+         given(i)%node = scene%rigid(1)%frame(ishft(i + 1, -1))
+         given(i)%dof = 2 - mod(i, 2)
+      end do
+      is_alive = .true.
+      do i = 0, 4
+         call numbering_init(numbering, is_alive, given(:n_given(i)))
+         call rigidity%find_idle(numbering, is_idle)
+         call check_true(error, all(is_idle .eqv. expected(:, i)), to_text(n_given(i)) &
+            // " are given")
+      end do
+   end subroutine test_idle
+
+end module test_rigid_pushes
