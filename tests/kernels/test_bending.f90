@@ -27,6 +27,7 @@ contains
 
       tests = [ &
          test_case_t("a beam of quadrilaterals in closed form", test_beam), &
+         test_case_t("a beam of parallelograms in closed form", test_slanted), &
          test_case_t("whichever way it lies and turns", test_turned), &
          test_case_t("body by body", test_bodies)]
    end subroutine collect_bending
@@ -95,6 +96,37 @@ contains
       call check_near(error, [bending%strain, bending%missed], [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, &
          "at rest")
    end subroutine test_beam
+
+   !> Cells whose sides across lean by the shift 2 c over the thickness. With -1 < p, q < 1 along the
+   !> sides what nodes take of a plate is k p q (-a b/4, a c/2), in place of it strains along alone.
+   subroutine test_slanted(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: mu = young/(2.0_wp*(1.0_wp + poisson))
+      real(wp), parameter :: lambda = 2.0_wp*mu*poisson/(1.0_wp - 2.0_wp*poisson)
+      real(wp), parameter :: c = 0.1_wp, ratio = lambda/(lambda + 2.0_wp*mu)
+      !> Mean squares, per square of the curvature: the strain across that is too much, and shear.
+      real(wp), parameter :: across = ((a*c/b)**2 + (2.0_wp*c**2/b + 0.5_wp*ratio*b)**2)/3.0_wp, &
+         shear = (0.25_wp*a**2 + 4.0_wp*c**2)/3.0_wp
+      type(scene_t) :: scene
+      type(bending_t) :: bending
+      real(wp), allocatable :: u(:, :)
+      integer :: k
+      real(wp) :: angle
+
+      do k = 0, 3
+         angle = 0.7_wp*k
+         call make_beam(scene, "CPE4", 1, 0.0_wp, 0.0_wp, u)
+         scene%x(1, :) = scene%x(1, :) + (2.0_wp*c/b)*scene%x(2, :)
+         u(1, :) = -curvature*scene%x(1, :)*scene%x(2, :)
+         u(2, :) = 0.5_wp*curvature*scene%x(1, :)**2
+         scene%x = matmul(rotation(angle), scene%x)
+         u = matmul(rotation(angle), u)
+         call measure(scene, u, .false., bending, error)
+         if (allocated(error)) return
+         call check_near(error, bending%missed, [0.5_wp*(lessened*curvature)**2*n*a*b &
+            *((lambda + 2.0_wp*mu)*across + mu*shear)], tol, bending%missed(1), "missed")
+      end do
+   end subroutine test_slanted
 
    !> Energies do not change as the beam lies another way, nor, with large rotations, as it turns.
    subroutine test_turned(error)

@@ -4,11 +4,14 @@ module test_verdict_follow
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t, march_free
+   use emcon_materials, only : kinematics_linear
    use emcon_overlap_query, only : overlap_t
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_t
    use emcon_text, only : note_add, notes_t, to_text
-   use emcon_verdict, only : verdict_update
+   use emcon_verdict, only : verdict_end, verdict_update
+   use kind_rows, only : law_code
+   use small_scenes, only : add_step, block_t, make_block
    use stepper_scenes, only : make_drop, open_scene
    implicit none
    private
@@ -25,7 +28,8 @@ contains
          test_case_t("the most, and when", test_most), &
          test_case_t("counts and sums", test_counts), &
          test_case_t("the deepest overlap, of a pair or of none", test_overlap), &
-         test_case_t("warnings that differ", test_warnings)]
+         test_case_t("warnings that differ", test_warnings), &
+         test_case_t("linear sections that turn", test_turning)]
    end subroutine collect_verdict_follow
 
    subroutine open(stepper, error)
@@ -157,5 +161,44 @@ contains
          // to_text(20 - before), "the last one")
       call march_free(stepper%march)
    end subroutine test_warnings
+
+   !> A linear block that turns more and more, and back: told once, when it is no more small, and
+   !> what makes the run bad is the largest rotation.
+   subroutine test_turning(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: sine(5) = [0.04_wp, 0.06_wp, 0.15_wp, 0.25_wp, 0.01_wp]
+      integer, parameter :: n_told(5) = [0, 1, 1, 1, 1], n_reason(5) = [0, 0, 0, 1, 1]
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      type(scene_t) :: scene
+      type(block_t) :: block
+      integer :: k
+
+      call make_block(scene, "CPE4", [1, 1], block)
+      scene%section(1)%kinematics = kinematics_linear
+      scene%material(1)%law = law_code("linear")
+      scene%material(1)%constant = [100.0_wp, 0.3_wp]
+      call add_step(scene, .false., 0.1_wp, 10)
+      call open_scene(stepper, scene, error)
+      if (allocated(error)) return
+      associate (verdict => stepper%verdict, u => stepper%march%state%u, x => scene%x)
+         do k = 1, 5
+            ! The skew part is the sine; strains, 1 - cos, are smaller.
+            u(1, :) = (sqrt(1.0_wp - sine(k)**2) - 1.0_wp)*x(1, :) - sine(k)*x(2, :)
+            u(2, :) = sine(k)*x(1, :) + (sqrt(1.0_wp - sine(k)**2) - 1.0_wp)*x(2, :)
+            call follow(stepper, real(k, wp), increment)
+            call check_equal(error, verdict%warnings%n, n_told(k), "told by " // to_text(k))
+            call verdict_end(verdict)
+            call check_equal(error, verdict%reasons%n, n_reason(k), "reasons at " // to_text(k))
+         end do
+         if (allocated(error)) return
+         call check_true(error, index(verdict%warnings%item(1)%text, "section ALL is linear") == 1 &
+            .and. index(verdict%warnings%item(1)%text, "from time 2 on") > 0, &
+            verdict%warnings%item(1)%text)
+         call check_true(error, index(verdict%reasons%item(1)%text, "rotate by 0.25 rad") > 0, &
+            verdict%reasons%item(1)%text)
+      end associate
+      call march_free(stepper%march)
+   end subroutine test_turning
 
 end module test_verdict_follow
