@@ -172,11 +172,13 @@ def lines_of_file(file, folders):
 
 
 class Code:
-    """Which lines have code of their own; that of others is part of what stands before them."""
+    """Which lines have code of their own; that of others is part of what stands before them. Of the
+    library: the program leaves out what only host programs call."""
 
     def __init__(self, folders):
         self.lines = collections.defaultdict(list)
-        for file, line in sorted({where for _, where in places(RELEASE / "emcon", sources(folders))}):
+        library = places(RELEASE / "libemcon.so", sources(folders))
+        for file, line in sorted({where for _, where in library}):
             self.lines[file].append(line)
 
     def passing(self, tests, file, numbers):
