@@ -47,7 +47,6 @@ contains
       part%force(:, :self%n_node) = 0.0_wp
       part%magnitude(:, :self%n_node) = 0.0_wp
       if (with_tangent) part%tangent(:, :self%n_node, :, :self%n_node) = 0.0_wp
-      part%is_inverted = .false.
       do k = 1, self%n_gp
          call place_point(self, k, motion, point)
          part%is_inverted = .not. is_regular(point, law%has_volume)

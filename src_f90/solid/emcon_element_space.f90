@@ -164,7 +164,6 @@ contains
       part%force(:, :n) = 0.0_wp
       part%magnitude(:, :n) = 0.0_wp
       if (with_tangent) part%tangent(:, :n, :, :n) = 0.0_wp
-      part%is_inverted = .false.
    end subroutine space_part_clear
 
    !> Cauchy stress and strain at the points of an element that does not move.
