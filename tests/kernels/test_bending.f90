@@ -97,8 +97,8 @@ contains
          "at rest")
    end subroutine test_beam
 
-   !> Cells whose sides across lean by the shift 2 c over the thickness. With -1 < p, q < 1 along the
-   !> sides what nodes take of a plate is k p q (-a b/4, a c/2), in place of it strains along alone.
+   !> Cells whose sides across lean by the shift 2 c over the thickness. With -1 < p, q < 1 along
+   !> the sides nodes take k p q (-a b/4, a c/2) of a plate, which strains along itself alone.
    subroutine test_slanted(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: mu = young/(2.0_wp*(1.0_wp + poisson))

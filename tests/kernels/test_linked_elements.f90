@@ -10,8 +10,11 @@ module test_linked_elements
    use emcon_numbering, only : add_to_dofs, pick_unknowns, spread_dependent
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
+   use emcon_solid, only : solid_t
    use emcon_stepper, only : stepper_build, stepper_close, stepper_t
-   use emcon_system, only : system_renew, system_respond, system_tangent_times, system_t
+   use emcon_system, only : mass_times, system_renew, system_respond, system_tangent_times, system_t
+   use emcon_term, only : role_external, role_inertia
+   use emcon_term_registry, only : terms_solid
    use one_element, only : read_one
    use random_draws, only : draw_random
    use small_scenes, only : shake
@@ -104,7 +107,7 @@ contains
    !> error is a multiple of its square; without loads and damping products are those of the matrix.
    subroutine check_tangent(error, system, scene, evaluation, is_damped, what)
       type(error_t), allocatable, intent(inout) :: error
-      type(system_t), intent(inout) :: system
+      type(system_t), intent(inout), target :: system
       type(scene_t), intent(in) :: scene
       type(evaluation_t), intent(in) :: evaluation
       logical, intent(in) :: is_damped
@@ -124,6 +127,7 @@ contains
       call draw_random(x)
       x = x - 0.5_wp
       way = 0.0_wp
+      call check_sizes(error, system, motion_at(0.0_wp), what)
       call system_respond(system, motion_at(0.0_wp), .true.)
       do k = 1, 2
          way = 0.0_wp
@@ -166,5 +170,48 @@ contains
       end subroutine forces
 
    end subroutine check_tangent
+
+   !> What forces are made of: of inertia M times the sizes of both parts of the rate, of loads the
+   !> forces; what displacements are rounded by is the largest one in the element, or what was
+   !> computed for it, times a stiffness of the node.
+   subroutine check_sizes(error, system, motion, what)
+      type(error_t), allocatable, intent(inout) :: error
+      type(system_t), intent(inout), target :: system
+      type(motion_t), intent(in) :: motion
+      character(len=*), intent(in) :: what
+      real(wp), parameter :: tol = 256.0_wp*epsilon(1.0_wp)
+      type(solid_t), pointer :: solid
+      real(wp), dimension(size(motion%x, 1), size(motion%x, 2)) :: inertia, apart, rounding_of
+      real(wp) :: largest
+      integer :: i, j
+
+      solid => terms_solid(system%term)
+      call system_respond(system, motion, .false.)
+      associate (response => system%response, evaluation => motion%evaluation)
+         call mass_times(system, abs(evaluation%rate*motion%du) &
+            + abs(evaluation%v_weight*motion%v0), inertia)
+         call check_near(error, response%part(role_inertia)%magnitude, &
+            evaluation%mass_scale*inertia, tol, force_size, what // ": sizes of inertia")
+         call check_near(error, response%part(role_external)%magnitude, &
+            abs(response%part(role_external)%force), tol, force_size, what // ": of loads")
+         do i = 1, size(apart, 2)
+            largest = maxval(motion%computed)
+            do j = 1, size(apart, 2)
+               if (solid%trait%is_linear(1)) then
+                  apart(:, j) = motion%from(:, j) - motion%from(:, i) + 0.5_wp*(motion%by(:, j) &
+                     - motion%by(:, i))
+               else
+                  apart(:, j) = motion%from(:, j) + motion%by(:, j)
+                  if (.not. solid%is_axial) apart(:, j) = apart(:, j) - motion%from(:, 1) &
+                     - motion%by(:, 1)
+               end if
+               largest = max(largest, maxval(abs(apart(:, j))))
+            end do
+            rounding_of(:, i) = largest*solid%stiffness(i, 1)
+         end do
+         call check_near(error, response%rounding, rounding_of, tol, maxval(rounding_of), &
+            what // ": rounding")
+      end associate
+   end subroutine check_sizes
 
 end module test_linked_elements

@@ -35,6 +35,7 @@ contains
       tests = [ &
          test_case_t("a step with friction", test_step), &
          test_case_t("works in statics", test_statics), &
+         test_case_t("friction above what one contact bears", test_limit), &
          test_case_t("impacts that keep a part", test_restitution)]
    end subroutine collect_march_commit
 
@@ -248,6 +249,50 @@ contains
       call check_true(error, march%ledger%friction > 0.0_wp, "it slides")
       call march_free(march)
    end subroutine test_statics
+
+   !> Told once, of pairs whose coefficient is above their limit: far above it, or below.
+   subroutine test_limit(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: mu(2) = [0.3_wp, 1.0e4_wp]
+      type(scene_t) :: scene
+      integer :: k
+
+      do k = 1, 2
+         if (.not. allocated(error)) call look_at()
+      end do
+
+   contains
+
+      subroutine look_at()
+         type(march_t) :: march
+         type(increment_t) :: increment
+         integer :: i, j, n_told, n_touch
+
+         call begin(scene, .false., march, error)
+         if (allocated(error)) return
+         call march_free(march)
+         march = march_t()
+         scene%pair(1)%interaction%friction = mu(k)
+         call march_init(march, scene, error)
+         if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+         if (allocated(error)) return
+         n_told = 0
+         n_touch = 0
+         do i = 1, 8
+            call march_increment(march, scene, increment, error)
+            if (allocated(error)) return
+            if (increment%n_active > 0) n_touch = n_touch + 1
+            do j = 1, increment%notes%n
+               if (index(increment%notes%item(j)%text, "by itself has one solution") > 0) n_told &
+                  = n_told + 1
+            end do
+         end do
+         call check_true(error, n_touch > 1, "contact")
+         call check_equal(error, n_told, k - 1, "told")
+         call march_free(march)
+      end subroutine look_at
+
+   end subroutine test_limit
 
    !> Of two free blocks: each gap that was held and opens keeps a part of its rate; what that takes
    !> is told, momenta stay.

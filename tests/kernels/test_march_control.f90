@@ -7,8 +7,10 @@ module test_march_control
       march_is_done, march_t
    use emcon_scene, only : scene_t
    use emcon_step_control, only : why_error, why_newton
+   use emcon_steps, only : initiation_persistent
+   use emcon_system, only : mass_times
    use emcon_text, only : to_text
-   use small_scenes, only : add_step, block_t, make_block
+   use small_scenes, only : add_step, block_t, clamp, make_block, make_two_blocks
    implicit none
    private
    public :: collect_march_control
@@ -24,6 +26,7 @@ contains
 
       tests = [ &
          test_case_t("sizes, times and counts of a stretched block that spins", test_counts), &
+         test_case_t("the error of increments, by their forces", test_error), &
          test_case_t("solves that take long", test_slow), &
          test_case_t("no smaller increment is allowed", test_least), &
          test_case_t("the smallest one fails", test_failure)]
@@ -108,6 +111,88 @@ contains
       end subroutine run
 
    end subroutine test_counts
+
+   !> A block thrown on another, both elastic: of each increment the error by its mean forces and
+   !> velocities and those of the increments before, and what contact adds where it changes.
+   subroutine test_error(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: constant = 1.0_wp/12.0_wp, tolerance = 10.0_wp
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(march_t) :: march
+      type(increment_t) :: increment
+      real(wp), dimension(2, 16) :: mass, v, u, force, push, mean, change, last_force, last_push, &
+         last_mean, rate, last_rate
+      real(wp) :: size, last_size, last_span, span, kinetic, smooth, whole, expected
+      logical :: was_active(3)
+      integer :: i, n_changed
+
+      call make_two_blocks(scene, 0.05_wp, lower, upper)
+      call add_step(scene, .false., 0.02_wp, 40)
+      scene%step(1)%contact%initiation = initiation_persistent
+      scene%step(1)%time%is_direct = .false.
+      scene%step(1)%time%tolerance = tolerance
+      call clamp(scene%step(1), [(i, i = 1, 5)])
+      scene%v0(1, 11:) = 0.3_wp
+      scene%v0(2, 11:) = -1.0_wp - 0.1_wp*scene%x(2, 11:)
+      call begin(scene, march, error)
+      if (allocated(error)) return
+      v = 1.0_wp
+      call mass_times(march%system, v, mass)
+      mass(:, :5) = 0.0_wp
+      kinetic = march%ledger%kinetic
+      n_changed = 0
+      last_rate = 0.0_wp
+      last_span = 0.0_wp
+      do i = 1, 14
+         v = march%state%v
+         u = march%state%u
+         was_active = march%state%contacts%is_active(:3)
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         kinetic = max(kinetic, march%ledger%kinetic)
+         size = increment%h
+         mean = (march%state%u - u)/size
+         push = march%state%contact
+         change = (march%state%v - v)/size
+         call mass_times(march%system, change, force)
+         force = force - push
+         if (i > 2) then
+            span = 0.5_wp*(size + last_size)
+            rate = (mean - last_mean)/span
+            if (i > 3) then
+               change = 2.0_wp*(rate - last_rate)/(span + last_span)
+               smooth = error_of(force - last_force)
+               whole = error_of(force - last_force + push - last_push)
+               expected = smooth
+               if (any(was_active .neqv. march%state%contacts%is_active(:3))) then
+                  n_changed = n_changed + 1
+                  expected = max(smooth, whole*sqrt(smooth/constant))
+               end if
+               call check_near(error, march%step_check%ratio, expected/tolerance, &
+                  1.0e7_wp*eps, 1.0_wp, "error of increment " // to_text(i))
+            end if
+            last_rate = rate
+            last_span = span
+         end if
+         last_size = size
+         last_mean = mean
+         last_force = force
+         last_push = push
+      end do
+      call check_true(error, n_changed > 0, "contact begins")
+      call march_free(march)
+
+   contains
+
+      real(wp) function error_of(change_of_force)
+         real(wp), intent(in) :: change_of_force(:, :)
+
+         error_of = constant*size**2*sqrt(sum(mass*min(abs(change_of_force &
+            /(max(mass, tiny(1.0_wp))*span)), abs(change))**2, mass > 0.0_wp)/(2.0_wp*kinetic))
+      end function error_of
+
+   end subroutine test_error
 
    !> More than half of the iterations allowed: the next increments are shorter if the error counts.
    subroutine test_slow(error)

@@ -116,6 +116,11 @@ contains
       ! What is no more so is excused no longer.
       call overlap_check_excuse(judge, scene%x, du, overlap)
       call check_equal(error, [judge%excused%first, judge%excused%second], [1, 3], "anew")
+      ! The third block is in the first one, and touches the second one.
+      call make_scene(scene, [0.75_wp, 1.0_wp], [1.75_wp, 0.25_wp])
+      call overlap_check_init(judge, scene)
+      call overlap_check_excuse(judge, scene%x, rest, overlap)
+      call check_equal(error, [judge%excused%first, judge%excused%second], [1, 3], "that alone")
    end subroutine test_excused
 
    !> The second block falls through the first one and ends behind it, or beside it.

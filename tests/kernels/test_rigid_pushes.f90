@@ -3,11 +3,13 @@ module test_rigid_pushes
    use check, only : check_near, check_true, test_case_t
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_select
    use emcon_errors, only : error_t
-   use emcon_evaluation, only : evaluation_at_end
+   use emcon_evaluation, only : evaluation_at_end, evaluation_t
    use emcon_kinds, only : dp, wp
-   use emcon_motion, only : motion_of
+   use emcon_motion, only : motion_of, motion_t
    use emcon_numbering, only : numbering_init, numbering_t
    use emcon_rigid_bodies, only : rigid_frame_choose
+   use emcon_rigid_rotation, only : rigid_rotation_init, rigid_rotation_measure, &
+      rigid_rotation_spin, rigid_rotation_t
    use emcon_rigidity, only : rigidity_init, rigidity_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : prescribed_t
@@ -46,7 +48,8 @@ contains
       tests = [ &
          test_case_t("forces accelerate a body that turns", test_accelerate), &
          test_case_t("a push gives an energy and leaves the shape", test_push), &
-         test_case_t("what prescribed nodes leave of a shape", test_idle)]
+         test_case_t("what prescribed nodes leave of a shape", test_idle), &
+         test_case_t("angle, moment of reactions and spin", test_rotation)]
    end subroutine collect_rigid_pushes
 
    !> All nodes of a block are one body, about its first node.
@@ -175,5 +178,55 @@ contains
             // " are given")
       end do
    end subroutine test_idle
+
+   !> Turned before and over a step; reactions on the frame and on arms act where loads do.
+   subroutine test_rotation(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: before = 0.75_wp, by = -0.5_wp
+      integer, parameter :: arm(2) = [7, 9]
+      type(scene_t) :: scene
+      type(rigid_rotation_t) :: rotation
+      type(motion_t) :: motion
+      real(wp), dimension(2, n) :: u0, du, reaction, v
+      real(wp) :: place(2), moment
+      integer :: k, i
+
+      call make_rigid(scene)
+      u0 = turned(before, scene%x) - scene%x
+      du = turned(before + by, scene%x) - scene%x - u0
+      call shake(reaction, 1.0_wp)
+      motion = motion_of(evaluation_t(is_gradient=.true., load_place=0.5_wp), scene%x, u0, du)
+      do k = 1, 2
+         if (k == 2) scene%rigid(1)%arm = arm
+         call rigid_rotation_init(rotation, scene%rigid, scene%x, u0)
+         call check_near(error, rotation%angle, [before], tol, 1.0_wp, "angle")
+         rotation%moment = 5.0_wp
+         call rigid_rotation_measure(rotation, scene%rigid, motion, reaction)
+         call check_near(error, rotation%angle, [before + by], tol, 1.0_wp, "it turns")
+         moment = 0.0_wp
+         associate (frame => scene%rigid(1)%frame)
+            do i = 2, 3
+               place = scene%x(:, frame(i)) + u0(:, frame(i)) + 0.5_wp*du(:, frame(i)) &
+                  - (scene%x(:, frame(1)) + u0(:, frame(1)) + 0.5_wp*du(:, frame(1)))
+               moment = moment + place(1)*reaction(2, frame(i)) - place(2)*reaction(1, frame(i))
+               if (k == 2) moment = moment + place(1)*reaction(2, arm(i - 1)) &
+                  - place(2)*reaction(1, arm(i - 1))
+            end do
+         end associate
+         call check_near(error, rotation%moment, [moment], tol, 4.0_wp, "moment")
+      end do
+      v = rigid_field(scene%x + u0, velocity, spin)
+      call check_near(error, rigid_rotation_spin(scene%rigid(1), scene%x, u0, v), spin, tol, &
+         1.0_wp, "spin")
+   end subroutine test_rotation
+
+   !> The places `x`, turned about the origin.
+   pure function turned(angle, x) result(place)
+      real(wp), intent(in) :: angle, x(2, n)
+      real(wp) :: place(2, n)
+
+      place(1, :) = cos(angle)*x(1, :) - sin(angle)*x(2, :)
+      place(2, :) = sin(angle)*x(1, :) + cos(angle)*x(2, :)
+   end function turned
 
 end module test_rigid_pushes

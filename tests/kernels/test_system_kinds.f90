@@ -4,9 +4,9 @@ module test_system_kinds
    use check, only : check_near, check_true, test_case_t
    use emcon_csr, only : csr_multiply
    use emcon_errors, only : error_t
-   use emcon_evaluation, only : instant_t, evaluation_t
+   use emcon_evaluation, only : evaluation_at_end, evaluation_t, instant_t
    use emcon_kinds, only : dp, wp
-   use emcon_materials, only : kinematics_corotated, kinematics_nonlinear
+   use emcon_materials, only : kinematics_corotated, kinematics_linear, kinematics_nonlinear
    use emcon_motion, only : motion_of, motion_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns, spread_dependent
    use emcon_scene, only : scene_t
@@ -17,6 +17,7 @@ module test_system_kinds
       system_t, system_tangent_times
    use emcon_term, only : role_internal
    use emcon_text, only : to_text
+   use kind_rows, only : law_code
    use linear_scenes, only : add_equation, add_tie_by_hand
    use random_draws, only : draw_random
    use small_scenes, only : add_block, add_load, add_step, block_t, clamp, make_block, shake, young
@@ -31,6 +32,7 @@ contains
 
       tests = [ &
          test_case_t("tangents of all kinds of sections", test_kinds), &
+         test_case_t("which matrices are symmetric", test_symmetric), &
          test_case_t("far from its place", test_far)]
    end subroutine collect_system_kinds
 
@@ -183,6 +185,58 @@ contains
             sum(response%rounding) > 0.01_wp*young, "rounding of displacements, " // what)
       end associate
    end subroutine check_sizes
+
+   !> Of quadratic energies and at the end of a step, unless a pressure follows. A block of one
+   !> section, another one that is LINEAR or not; the laws and NLGEOM of both.
+   subroutine test_symmetric(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scheme_energy_momentum_t) :: dynamic
+      type(scene_t) :: scene
+      type(system_t) :: system
+      type(block_t) :: block
+      type(load_t) :: load
+      logical :: is_quadratic, nlgeom, follows, is_end
+      integer :: case, kind
+      real(wp), parameter :: u(2, 12) = 0.0_wp
+
+      do case = 0, 31
+         nlgeom = btest(case, 0)
+         is_quadratic = btest(case, 1)
+         follows = btest(case, 2)
+         is_end = btest(case, 3)
+         kind = merge(kinematics_linear, kinematics_nonlinear, btest(case, 4))
+         call make_block(scene, "CPE4", [2, 1], block)
+         call add_block(scene, "CPE4", [2, 1], [4.0_wp, 0.0_wp], [2.0_wp, 1.0_wp], block)
+         scene%section = [scene%section, scene%section]
+         scene%material = [scene%material, scene%material]
+         scene%section%material = [1, 2]
+         scene%element%section = [1, 1, 2, 2]
+         scene%section(2)%kinematics = kind
+         if (is_quadratic) then
+            scene%material(1)%law = law_code("linear")
+            scene%material(1)%constant = [young, 0.3_wp]
+         end if
+         call add_step(scene, .false., 0.25_wp, 4)
+         scene%step(1)%nlgeom = nlgeom
+         load%kind = load_pressure
+         load%target = 1
+         load%place = 1
+         load%value = 1.0_wp
+         if (follows) call add_load(scene%step(1), load)
+         call system_init(system, scene, error)
+         if (.not. allocated(error)) call system_begin_step(system, scene, 1, error)
+         if (allocated(error)) return
+         if (is_end) then
+            call system_respond(system, motion_of(evaluation_at_end, scene%x, u, u), .true.)
+         else
+            call system_respond(system, motion_of(dynamic%evaluation(instant_t(), 0.25_wp), &
+               scene%x, u, u), .true.)
+         end if
+         call check_true(error, system%is_symmetric .eqv. (.not. (follows .and. nlgeom) .and. &
+            (is_end .or. (is_quadratic .and. .not. nlgeom .and. kind == kinematics_linear))), &
+            "case " // to_text(case))
+      end do
+   end subroutine test_symmetric
 
    !> Far from its place a body has no forces but for what displacements are rounded by, and these
    !> are told, per unit of the rounding.

@@ -29,7 +29,8 @@ contains
          test_case_t("counts and sums", test_counts), &
          test_case_t("the deepest overlap, of a pair or of none", test_overlap), &
          test_case_t("warnings that differ", test_warnings), &
-         test_case_t("linear sections that turn", test_turning)]
+         test_case_t("linear sections that turn", test_turning), &
+         test_case_t("a bent body is told once, at the end of a step", test_bent)]
    end subroutine collect_verdict_follow
 
    subroutine open(stepper, error)
@@ -200,5 +201,39 @@ contains
       end associate
       call march_free(stepper%march)
    end subroutine test_turning
+
+   !> A row of quadrilaterals that is bent misses more than half of its energy, whatever the bend.
+   subroutine test_bent(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: bend(4) = [0.01_wp, 0.0_wp, 0.01_wp, 0.02_wp]
+      integer, parameter :: n_kept(4) = [1, 1, 2, 2]
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      type(scene_t) :: scene
+      type(block_t) :: block
+      integer :: k
+
+      call make_block(scene, "CPE4", [5, 1], block)
+      call add_step(scene, .false., 0.1_wp, 10)
+      call open_scene(stepper, scene, error)
+      if (allocated(error)) return
+      call note_add(increment%warnings, "another one")
+      associate (verdict => stepper%verdict, march => stepper%march, x => scene%x)
+         do k = 1, 4
+            if (k > 1) march%state%clock%n_grid = 10
+            march%state%u(1, :) = -bend(k)*x(1, :)*(x(2, :) - 0.5_wp)
+            march%state%u(2, :) = 0.5_wp*bend(k)*x(1, :)**2
+            call follow(stepper, real(k, wp), increment)
+            call check_equal(error, verdict%warnings%n, n_kept(k), "kept after " // to_text(k))
+            call check_equal(error, verdict%n_warning, k + merge(1, 0, k > 2), "all")
+         end do
+         if (allocated(error)) return
+         call check_true(error, index(verdict%warnings%item(2)%text, &
+            "the body of element 1 is bent and made of linear elements, too stiff by about ") == 1 &
+            .and. index(verdict%warnings%item(2)%text, " %; take CPE4I, CPE6 or CPE8R") > 0, &
+            verdict%warnings%item(2)%text)
+      end associate
+      call march_free(stepper%march)
+   end subroutine test_bent
 
 end module test_verdict_follow
