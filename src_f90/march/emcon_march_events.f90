@@ -1,6 +1,8 @@
 !> Contacts that begin and end in a solved step, and when.
 module emcon_march_events
    use emcon_active_set, only : step_passes_event
+   use emcon_constraint, only : condition_rate
+   use emcon_constraints, only : constraint_index
    use emcon_kinds, only : wp
    use emcon_march_types, only : increment_t, march_t, part_t
    use emcon_scene, only : scene_t
@@ -76,25 +78,25 @@ contains
       real(wp), intent(in) :: h                  !! > 0 [T]
       logical, intent(in) :: is_event(:)         !! (n_constraint)
       real(wp), intent(out) :: part              !! 0..1
-      real(wp) :: change
-      integer :: k, i
+      real(wp) :: change, open
+      integer :: k, i, pair
 
       part = 1.0_wp
       if (any(is_event .and. self%active%was_active)) part = 0.5_wp
       associate (set => self%active%set)
          do k = set%n_permanent + 1, set%n
             if (.not. is_event(set%id(k))) cycle
-            associate (item => set%item(k))
-               change = 0.0_wp
-               do i = 1, item%n_node
-                  change = change + h*dot_product(item%c(:, i), self%motion%v0(:, item%node(i)))
-               end do
-               if (-change > item%gap0) then
-                  part = min(part, max(0.0_wp, -item%gap0/change))
-               else
-                  part = min(part, 0.5_wp)
-               end if
+            change = h*condition_rate(set%item(k), self%motion%v0)
+            ! Not that of the condition, which may hold the gap of the start.
+            call constraint_index(self%system, set%id(k), pair, i)
+            associate (gap => self%system%contact(pair)%contact%state(i))
+               open = gap%gap0 - gap%closed
             end associate
+            if (-change > open) then
+               part = min(part, max(0.0_wp, -open/change))
+            else
+               part = min(part, 0.5_wp)
+            end if
          end do
       end associate
    end subroutine find_first

@@ -123,9 +123,15 @@ contains
             call condition_resize(set%item(k), 2)
             set%item(k)%node = [set%id(k), 1]
             set%item(k)%c = reshape([0.0_wp, 1.0_wp, 1.0_wp, 0.0_wp], [2, 2])
-            set%item(k)%gap0 = gap
+            set%item(k)%gap0 = 0.0_wp            ! it holds the gap of the start
          end do
       end associate
+      do k = 1, size(march%system%contact)
+         associate (state => march%system%contact(k)%contact%state)
+            state%closed = 0.125_wp
+            state%gap0 = gap + state%closed
+         end associate
+      end do
       march%motion%v0 = 0.0_wp
       march%motion%v0(1, 1) = 0.25_wp*rate
       march%motion%v0(2, 2) = 0.75_wp*rate

@@ -5,12 +5,14 @@ module test_march_control
    use emcon_kinds, only : dp, wp
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_is_done, march_t
+   use emcon_rigid_bodies, only : rigid_frame_choose
    use emcon_scene, only : scene_t
-   use emcon_step_control, only : why_error, why_newton
+   use emcon_step_control, only : why_error, why_event, why_newton
    use emcon_steps, only : initiation_persistent
    use emcon_system, only : mass_times
    use emcon_text, only : to_text
-   use small_scenes, only : add_step, block_t, clamp, make_block, make_two_blocks
+   use small_scenes, only : add_block, add_step, block_t, clamp, make_block, make_two_blocks, &
+      prescribe
    implicit none
    private
    public :: collect_march_control
@@ -27,6 +29,8 @@ contains
       tests = [ &
          test_case_t("sizes, times and counts of a stretched block that spins", test_counts), &
          test_case_t("the error of increments, by their forces", test_error), &
+         test_case_t("masses that errors are weighed by", test_masses), &
+         test_case_t("an event is found by the velocities", test_event), &
          test_case_t("solves that take long", test_slow), &
          test_case_t("no smaller increment is allowed", test_least), &
          test_case_t("the smallest one fails", test_failure)]
@@ -193,6 +197,81 @@ contains
       end function error_of
 
    end subroutine test_error
+
+   !> Sums of rows where nodes move freely; none of supports and of a rigid body.
+   subroutine test_masses(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: cell = 0.25_wp, row(12) = cell*[1.0_wp, 2.0_wp, 1.0_wp, 1.0_wp, 2.0_wp, &
+         1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(march_t) :: march
+      real(wp) :: expected(2, 12)
+      integer :: i
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      call add_block(scene, "CPE4", [2, 1], [4.0_wp, 0.0_wp], [2.0_wp, 1.0_wp], block)
+      deallocate(scene%rigid)
+      allocate(scene%rigid(1))
+      associate (body => scene%rigid(1))
+         body%name = "SECOND"
+         body%reference = 7
+         body%element = [3, 4]
+         body%node = [(i, i = 7, 12)]
+         call rigid_frame_choose(scene%x, body%node, body%reference, body%frame)
+      end associate
+      call add_step(scene, .false., h, n)
+      scene%step(1)%time%is_direct = .false.
+      scene%step(1)%time%tolerance = 1.0_wp
+      call prescribe(scene%step(1), 1, 2, 0.0_wp)
+      call begin(scene, march, error)
+      if (allocated(error)) return
+      expected = spread(row, 1, 2)
+      expected(2, 1) = 0.0_wp
+      call check_near(error, march%step_check%estimate%mass, expected, 64.0_wp*eps, 1.0_wp, "masses")
+      call march_free(march)
+   end subroutine test_masses
+
+   !> A block falls flat on another one, after two and a half increments. The first try that passes
+   !> that tells where it is: an increment ends just before. The next one is a window long; shares
+   !> below a sixteenth are not tried at once.
+   subroutine test_event(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: size = 0.02_wp, at = 0.05_wp, window = 0.01_wp
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(march_t) :: march
+      type(increment_t) :: increment
+      real(wp) :: before
+      integer :: i, n_told
+
+      call make_two_blocks(scene, at, lower, upper)
+      call add_step(scene, .false., size, 10)
+      scene%step(1)%contact%initiation = initiation_persistent
+      scene%step(1)%time%is_direct = .false.
+      scene%step(1)%time%event_fraction = window
+      scene%v0(2, 11:) = -1.0_wp
+      call begin(scene, march, error)
+      if (allocated(error)) return
+      n_told = 0
+      do while (n_told == 0 .and. march%state%clock%time < 2.0_wp*at)
+         before = march%state%clock%time
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         do i = 1, increment%notes%n
+            if (index(increment%notes%item(i)%text, "event: contact begins in pair 1") == 1) &
+               n_told = n_told + 1
+         end do
+         if (n_told > 0) exit
+         call check_true(error, march%state%clock%time <= at, "none is passed")
+      end do
+      call check_equal(error, [n_told, march%state%control%n_event], [3, 3], "nodes that meet")
+      call check_true(error, before <= at .and. march%state%clock%time >= at .and. &
+         increment%h <= window*size, "when, within " // to_text(increment%h))
+      call check_equal(error, [march%state%control%n_less(why_event), increment%n_cut], [3, 2], &
+         "tries that passed it")
+      call march_free(march)
+   end subroutine test_event
 
    !> More than half of the iterations allowed: the next increments are shorter if the error counts.
    subroutine test_slow(error)
