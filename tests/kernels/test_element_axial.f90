@@ -46,7 +46,8 @@ contains
          test_case_t("a motion along the axis costs nothing", test_along), &
          test_case_t("rank", test_rank), &
          test_case_t("mass and centre are those of the ring", test_mass), &
-         test_case_t("pressure: work on a closed section, tangent", test_pressure)]
+         test_case_t("pressure: work on a closed section, tangent", test_pressure), &
+         test_case_t("pressure on an edge of any form: force along the axis", test_edge)]
    end subroutine collect_element_axial
 
    !> The corners moved, nodes between them in the middle, then moved by up to a quarter of `bend`.
@@ -389,5 +390,31 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_pressure
+
+   !> p pi (r_b^2 - r_a^2), however it is bent between; on the places of the start or those that the
+   !> displacements lead to.
+   subroutine test_edge(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: p = 0.7_wp
+      real(wp) :: x(2, 4), u(2, 4), at(2, 4), force(2, 4)
+      integer, parameter :: edge(3) = [4, 1, 3]
+      logical :: follows
+      integer :: k, n
+
+      do k = 1, 8
+         n = merge(2, 3, btest(k, 0))
+         follows = btest(k, 1)
+         call shake(x, 0.5_wp)
+         call shake(u, 0.5_wp)
+         x(1, :) = x(1, :) + 2.0_wp
+         at = x
+         if (follows) at = x + u
+         force = 0.0_wp
+         call press_ring(edge(:n), p, x, u, follows, force)
+         call check_near(error, sum(force(2, :)), 0.5_wp*two_pi*p*(at(1, 1)**2 &
+            - at(1, 4)**2), tol, two_pi, "edge " // to_text(k))
+         call check_near(error, force(:, 2), [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "another node")
+      end do
+   end subroutine test_edge
 
 end module test_element_axial

@@ -43,6 +43,7 @@ contains
          test_case_t("stiffness of closed pairs at nodes", test_limit), &
          test_case_t("contacts that stiffen more than any before", test_widen), &
          test_case_t("a block that penalties stop", test_drop), &
+         test_case_t("closed contacts are met in a step", test_met), &
          test_case_t("the element that ends the run is named", test_squeezed)]
    end subroutine collect_explicit
 
@@ -277,6 +278,38 @@ contains
       call check_near(error, march%ledger%total, total, 0.02_wp, total, "energy")
       call march_free(march)
    end subroutine test_drop
+
+   !> As if no contact had been seen closed: the first ones lead to the critical step with them,
+   !> above the bound for all that could close, below that of the blocks alone.
+   subroutine test_met(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+      real(wp) :: bound, alone
+      integer :: k
+      logical :: is_closed
+
+      call begin(scene, .true., march, error)
+      if (allocated(error)) return
+      bound = march%state%explicit%critical_h
+      march%explicit%met = 0.0_wp
+      is_closed = .false.
+      do k = 1, 10
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         ! What is closed at the end of an increment is so at the start of the next one.
+         if (is_closed) exit
+         call check_near(error, march%explicit%met, spread(0.0_wp, 1, 16), 0.0_wp, 1.0_wp, "none")
+         is_closed = increment%n_active > 0
+      end do
+      call check_true(error, is_closed .and. all(march%explicit%met(slave) > 0.0_wp), "met")
+      call critical_sharp(march%system, march%explicit%place, spread(0.0_wp, 1, 16), alone, error)
+      if (allocated(error)) return
+      call check_true(error, march%state%explicit%critical_h > bound .and. &
+         march%state%explicit%critical_h < alone, "the critical step")
+      call march_free(march)
+   end subroutine test_met
 
    !> Two free blocks: at rest element 1 is the narrowest, but the upper block, of which element 5
    !> is narrower, is squeezed until the step is too long.

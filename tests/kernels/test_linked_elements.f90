@@ -171,9 +171,9 @@ contains
 
    end subroutine check_tangent
 
-   !> What forces are made of: of inertia M times the sizes of both parts of the rate, of loads the
-   !> forces; what displacements are rounded by is the largest one in the element, or what was
-   !> computed for it, times a stiffness of the node.
+   !> Masses of nodes are sums of rows. What forces are made of: of inertia M times the sizes of
+   !> both parts of the rate, of loads the forces; what displacements are rounded by is the largest one in
+   !> the element, or what was computed for it, times a stiffness of the node.
    subroutine check_sizes(error, system, motion, what)
       type(error_t), allocatable, intent(inout) :: error
       type(system_t), intent(inout), target :: system
@@ -194,6 +194,9 @@ contains
             evaluation%mass_scale*inertia, tol, force_size, what // ": sizes of inertia")
          call check_near(error, response%part(role_external)%magnitude, &
             abs(response%part(role_external)%force), tol, force_size, what // ": of loads")
+         call check_near(error, solid%mass%of_volume(:size(apart, 2), 1), &
+            sum(solid%mass%consistent(:size(apart, 2), :size(apart, 2), 1), 2), tol, 1.0_wp, &
+            what // ": mass at nodes")
          do i = 1, size(apart, 2)
             largest = maxval(motion%computed)
             do j = 1, size(apart, 2)

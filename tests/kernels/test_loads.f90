@@ -9,6 +9,7 @@ module test_loads
    use emcon_moment_load_plane, only : add_moment, add_moment_stiffness
    use emcon_motion, only : motion_of
    use emcon_evaluation, only : instant_t, evaluation_t
+   use emcon_pressure_plane, only : add_pressure
    use emcon_scene, only : scene_t
    use emcon_steps, only : load_centrifugal, load_gravity, load_point, load_pressure, load_t, &
       prescribed_t
@@ -32,6 +33,7 @@ contains
          test_case_t("pressure follows the edge", test_pressure), &
          test_case_t("pressure without nlgeom stays", test_dead_pressure), &
          test_case_t("pressure all around: no force, no moment", test_closed), &
+         test_case_t("pressure on an edge of any form", test_edge), &
          test_case_t("pressure stiffness", test_stiffness), &
          test_case_t("gravity sums to the weight", test_gravity), &
          test_case_t("bodies that turn about an axis", test_centrifugal), &
@@ -152,6 +154,33 @@ contains
             tol, 20.0_wp, name(k) // ": moment")
       end do
    end subroutine test_closed
+
+   !> However an edge is bent between its ends a and b: the force is that of the chord, its moment
+   !> about the origin p (b^2 - a^2)/2.
+   subroutine test_edge(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: p = 0.7_wp
+      integer, parameter :: edge(3) = [4, 1, 3]
+      real(wp), dimension(2, 4) :: x, u, at, force
+      logical :: follows
+      integer :: k
+
+      do k = 0, 3
+         follows = btest(k, 1)
+         call shake(x, 1.0_wp)
+         call shake(u, 1.0_wp)
+         at = x
+         if (follows) at = x + u
+         force = 0.0_wp
+         call add_pressure(edge(:merge(2, 3, btest(k, 0))), p, x, u, follows, force)
+         associate (chord => at(:, 1) - at(:, 4))
+            call check_near(error, sum(force, 2), p*[-chord(2), chord(1)], tol, 1.0_wp, "force")
+         end associate
+         call check_near(error, sum(at(1, :)*force(2, :) - at(2, :)*force(1, :)), &
+            0.5_wp*p*(sum(at(:, 1)**2) - sum(at(:, 4)**2)), tol, 1.0_wp, "moment")
+         call check_near(error, force(:, 2), [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "another node")
+      end do
+   end subroutine test_edge
 
    !> The force is linear in u, so a difference of any step is its derivative.
    subroutine test_stiffness(error)

@@ -2,22 +2,27 @@
 module test_rigid_pushes
    use check, only : check_near, check_true, test_case_t
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_select
+   use emcon_csr, only : csr_multiply
    use emcon_errors, only : error_t
-   use emcon_evaluation, only : evaluation_at_end, evaluation_t
+   use emcon_evaluation, only : evaluation_at_end, evaluation_t, instant_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_of, motion_t
-   use emcon_numbering, only : numbering_init, numbering_t
+   use emcon_numbering, only : add_to_dofs, numbering_init, numbering_t, pick_unknowns, &
+      spread_dependent
    use emcon_rigid_bodies, only : rigid_frame_choose
    use emcon_rigid_rotation, only : rigid_rotation_init, rigid_rotation_measure, &
       rigid_rotation_spin, rigid_rotation_t
    use emcon_rigidity, only : rigidity_init, rigidity_t
    use emcon_scene, only : scene_t
-   use emcon_steps, only : prescribed_t
-   use emcon_system, only : system_begin_step, system_init, system_t
+   use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
+   use emcon_steps, only : load_moment, load_t, prescribed_t
+   use emcon_system, only : system_begin_step, system_init, system_respond, system_t
+   use emcon_term, only : role_external
    use emcon_text, only : to_text
    use emcon_velocity_update, only : push_t, velocity_update_accelerate, velocity_update_free, &
       velocity_update_push, velocity_update_t
-   use small_scenes, only : add_step, block_t, make_block, shake
+   use random_draws, only : draw_random
+   use small_scenes, only : add_load, add_step, block_t, make_block, shake
    implicit none
    private
    public :: collect_rigid_pushes
@@ -49,7 +54,8 @@ contains
          test_case_t("forces accelerate a body that turns", test_accelerate), &
          test_case_t("a push gives an energy and leaves the shape", test_push), &
          test_case_t("what prescribed nodes leave of a shape", test_idle), &
-         test_case_t("angle, moment of reactions and spin", test_rotation)]
+         test_case_t("angle, moment of reactions and spin", test_rotation), &
+         test_case_t("a moment turns a body and does not move it", test_moment)]
    end subroutine collect_rigid_pushes
 
    !> All nodes of a block are one body, about its first node.
@@ -219,6 +225,69 @@ contains
       call check_near(error, rigid_rotation_spin(scene%rigid(1), scene%x, u0, v), spin, tol, &
          1.0_wp, "spin")
    end subroutine test_rotation
+
+   !> Two moments on one body, at once and by an amplitude: a couple of the sum at any place, whose
+   !> change with the place is in the matrix.
+   subroutine test_moment(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: step = epsilon(1.0_wp)**(1.0_wp/3.0_wp), value(2) = [3.0_wp, -0.5_wp]
+      type(scheme_energy_momentum_t) :: scheme
+      type(scene_t) :: scene
+      type(system_t) :: system
+      type(load_t) :: load
+      real(wp), dimension(2, n) :: u0, du, way, place
+      real(wp), allocatable :: x(:), product(:), up(:), down(:)
+      integer :: k
+
+      way = 0.0_wp
+      call make_rigid(scene)
+      deallocate(scene%amplitude)
+      allocate(scene%amplitude(1))
+      scene%amplitude(1)%time = [0.0_wp, 1.0_wp]
+      scene%amplitude(1)%value = [0.0_wp, 20.0_wp]
+      load%kind = load_moment
+      load%target = 1
+      do k = 1, 2
+         load%value = value(k)
+         load%amplitude = k - 1
+         call add_load(scene%step(1), load)
+      end do
+      call system_init(system, scene, error)
+      if (.not. allocated(error)) call system_begin_step(system, scene, 1, error)
+      if (allocated(error)) return
+      u0 = turned(0.5_wp, scene%x) - scene%x
+      call shake(du, 0.1_wp)
+      call spread_dependent(system%space%numbering, du)
+      call system_respond(system, motion_at(0.0_wp), .true.)
+      ! In the middle of the step, at 0.05, the second one is there in full.
+      associate (force => system%response%part(role_external)%force)
+         place = scene%x + u0 + 0.5_wp*du
+         call check_near(error, sum(force, 2), [0.0_wp, 0.0_wp], tol, 1.0_wp, "no force")
+         call check_near(error, sum(place(1, :)*force(2, :) - place(2, :)*force(1, :)), &
+            sum(value), tol, 10.0_wp, "moment")
+      end associate
+      allocate(x(system%space%numbering%n_unknown))
+      allocate(product, up, down, mold=x)
+      call draw_random(x)
+      way = 0.0_wp
+      call add_to_dofs(system%space%numbering, x, 1.0_wp, way)
+      call csr_multiply(system%matrix, x, product)
+      call system_respond(system, motion_at(step), .false.)
+      call pick_unknowns(system%space%numbering, system%response%residual, up)
+      call system_respond(system, motion_at(-step), .false.)
+      call pick_unknowns(system%space%numbering, system%response%residual, down)
+      call check_near(error, (up - down)/(2.0_wp*step), product, max(1.0e3_wp*step**2, tol), &
+         maxval(abs(product)), "tangent")
+
+   contains
+
+      type(motion_t) function motion_at(share) result(motion)
+         real(wp), intent(in) :: share
+
+         motion = motion_of(scheme%evaluation(instant_t(), 0.1_wp), scene%x, u0, du + share*way)
+      end function motion_at
+
+   end subroutine test_moment
 
    !> The places `x`, turned about the origin.
    pure function turned(angle, x) result(place)

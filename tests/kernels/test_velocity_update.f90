@@ -9,7 +9,7 @@ module test_velocity_update
    use emcon_scene, only : scene_t
    use emcon_system, only : mass_times, system_begin_step, system_init, system_t
    use emcon_velocity_update, only : velocity_update_apply, velocity_update_free, velocity_update_t
-   use small_scenes, only : add_step, block_t, make_two_blocks, shake
+   use small_scenes, only : add_step, block_t, clamp, make_two_blocks, shake
    implicit none
    private
    public :: collect_velocity_update
@@ -25,28 +25,32 @@ contains
          test_case_t("restores while bodies part", test_parting), &
          test_case_t("restores while bodies approach", test_approaching), &
          test_case_t("no jump without a loss", test_no_loss), &
-         test_case_t("no jump without contact", test_no_contact)]
+         test_case_t("no jump without contact", test_no_contact), &
+         test_case_t("no jump of what is prescribed", test_prescribed)]
    end subroutine collect_velocity_update
 
    !> A step that closes the gaps of 1/8 under multipliers `lam`, then the jump on top of random
    !> velocities and a relative one of `speed`, > 0: parting.
-   subroutine jump(lam, speed, gain, lost, change, error)
+   subroutine jump(lam, speed, gain, lost, change, error, is_held)
       real(wp), intent(in) :: lam, speed
       real(wp), intent(out) :: gain              !! of kinetic energy
       real(wp), intent(out) :: lost              !! work of the multipliers, taken from the bodies
       real(wp), intent(out) :: change(3)         !! of px, py, lz
       type(error_t), allocatable, intent(out) :: error
+      logical, intent(in), optional :: is_held   !! nodes of both surfaces are prescribed
       type(scene_t) :: scene
       type(block_t) :: lower, upper
       type(system_t) :: system
       type(constraint_set_t) :: set
       type(velocity_update_t) :: update
+      integer :: i
       real(wp), allocatable :: u0(:, :), v0(:, :), v1(:, :), du(:, :), p0(:, :), p1(:, :), x1(:, :)
       real(wp) :: restored
       logical :: has_root
 
       call make_two_blocks(scene, 0.125_wp, lower, upper)
       call add_step(scene, .false., 0.1_wp, 1)
+      if (present(is_held)) call clamp(scene%step(1), [(i, i = 6, 13)])
       call system_init(system, scene, error)
       if (allocated(error)) return
       call system_begin_step(system, scene, 1, error)
@@ -71,6 +75,7 @@ contains
          - x1(2, :)*(p1(1, :) - p0(1, :)))]
       call velocity_update_free(update)
       call check_near(error, gain, restored, tol, 10.0_wp, "gain and what is said of it")
+      call check_true(error, has_root .neqv. present(is_held), "a way to give it back")
    end subroutine jump
 
    subroutine test_parting(error)
@@ -113,5 +118,14 @@ contains
       if (allocated(error)) return
       call check_near(error, [gain, change], spread(0.0_wp, 1, 4), 0.0_wp, 1.0_wp, "no jump")
    end subroutine test_no_contact
+
+   subroutine test_prescribed(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: gain, lost, change(3)
+
+      call jump(1.0_wp, 2.0_wp, gain, lost, change, error, is_held=.true.)
+      if (allocated(error)) return
+      call check_near(error, [gain, change], spread(0.0_wp, 1, 4), 0.0_wp, 1.0_wp, "no jump")
+   end subroutine test_prescribed
 
 end module test_velocity_update
