@@ -172,8 +172,8 @@ contains
    end subroutine check_tangent
 
    !> Masses of nodes are sums of rows. What forces are made of: of inertia M times the sizes of
-   !> both parts of the rate, of loads the forces; what displacements are rounded by is the largest one in
-   !> the element, or what was computed for it, times a stiffness of the node.
+   !> both parts of the rate, of loads the forces; what displacements are rounded by is the largest
+   !> one in the element, or what was computed for it, times a stiffness of the node.
    subroutine check_sizes(error, system, motion, what)
       type(error_t), allocatable, intent(inout) :: error
       type(system_t), intent(inout), target :: system

@@ -201,8 +201,8 @@ contains
    !> Sums of rows where nodes move freely; none of supports and of a rigid body.
    subroutine test_masses(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: cell = 0.25_wp, row(12) = cell*[1.0_wp, 2.0_wp, 1.0_wp, 1.0_wp, 2.0_wp, &
-         1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
+      real(wp), parameter :: row(12) = 0.25_wp*[1.0_wp, 2.0_wp, 1.0_wp, 1.0_wp, 2.0_wp, 1.0_wp, &
+         0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp]
       type(scene_t) :: scene
       type(block_t) :: block
       type(march_t) :: march
@@ -228,7 +228,7 @@ contains
       if (allocated(error)) return
       expected = spread(row, 1, 2)
       expected(2, 1) = 0.0_wp
-      call check_near(error, march%step_check%estimate%mass, expected, 64.0_wp*eps, 1.0_wp, "masses")
+      call check_near(error, march%step_check%estimate%mass, expected, 64.0_wp*eps, 1.0_wp, "mass")
       call march_free(march)
    end subroutine test_masses
 
