@@ -230,10 +230,13 @@ contains
       logical, intent(out) :: is_solved
       type(single_contact_t) :: place
       real(wp) :: new(0:most_slips), motion(0:self%n_slip, size(self%mu)), change(0:self%n_slip)
+      real(wp) :: endless                            ! forces that grow from sweep to sweep
       integer :: i, m, sweep
 
       m = 1 + self%n_slip
       place%n_slip = self%n_slip
+      endless = maxval([(contact_problem_stiffness(self, i), i = 1, size(self%mu))]) &
+         *maxval(abs(self%free))/epsilon(endless)**2
       is_solved = .false.
       do sweep = 1, most
          n_sweep = n_sweep + 1
@@ -253,7 +256,7 @@ contains
             end associate
          end do
          is_solved = contact_problem_missed(self, force) <= met
-         if (is_solved) exit
+         if (is_solved .or. maxval(abs(force)) > endless) exit
       end do
    end subroutine solve_by_sweeps
 

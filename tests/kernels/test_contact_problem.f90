@@ -39,6 +39,7 @@ contains
          test_case_t("frames that are turned", test_turned), &
          test_case_t("the only one of all sets that obeys the law", test_all_sets), &
          test_case_t("by pivots as by trials", test_pivots), &
+         test_case_t("what has no solution is told", test_no_solution), &
          test_case_t("random problems of all kinds", test_kinds)]
    end subroutine collect_contact_problem
 
@@ -185,6 +186,43 @@ contains
             1.0e6_wp*eps, maxval(abs(force)), "forces")
       end do
    end subroutine test_turned
+
+   !> Two contacts each of which closes the other by more than itself opens, without friction or
+   !> beside it; one whose friction closes it so; and what nothing moves: all are closed by 1
+   !> without forces, and there is no solution.
+   subroutine test_no_solution(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_problem_t) :: problem
+      type(contact_effort_t) :: effort
+      real(wp), allocatable :: force(:, :)
+      integer :: n_slip, k, s
+      logical :: is_solved
+
+      do n_slip = 0, 2
+         do k = 1, merge(2, 3, n_slip == 0)
+            call contact_problem_create(problem, n_slip, 2)
+            problem%free(0, :) = -1.0_wp
+            problem%mu = 0.5_wp
+            do s = 1, size(problem%w, 1)
+               problem%w(s, s) = 1.0_wp
+            end do
+            associate (m => 1 + n_slip)
+               if (k == 1) problem%w([1, 1 + m], [1 + m, 1]) = reshape([-2.0_wp, 1.0_wp, 1.0_wp, &
+                  -2.0_wp], [2, 2])
+               if (k == 2) problem%w([1, 1 + m], [1, 1 + m]) = 0.0_wp
+               if (k == 3) problem%w([1, 2], [2, 1]) = reshape([5.0_wp, 1.0_wp, 1.0_wp, 5.0_wp], &
+                  [2, 2])
+            end associate
+            call solve(problem, force, effort, is_solved)
+            associate (what => to_text(n_slip) // " slips, case " // to_text(k))
+               call check_true(error, .not. is_solved, what)
+               call check_true(error, (effort%n_sweep > 0) .neqv. k == 2, what // ": sweeps")
+               call check_true(error, (effort%n_pivot > 0) .eqv. (n_slip == 1 .and. k /= 2), &
+                  what // ": pivots")
+            end associate
+         end do
+      end do
+   end subroutine test_no_solution
 
    !> Small coefficients: there is one solution. Pivots take slips from what they lead to.
    subroutine test_pivots(error)
