@@ -287,7 +287,6 @@ contains
       call active_set_solve(self%active, self%system, self%scene, self%newton, self%motion, &
          status, error)
       if (status /= step_done .or. allocated(error)) return
-      if (.not. any(self%active%is_dropped .and. .not. stays)) return
       if (any(have_closed(self) .and. .not. stays)) status = step_too_far
    end subroutine balance
 
