@@ -385,6 +385,9 @@ contains
                candidates%have_changed = .true.
             else if (acts) then
                call look_at_active(self, contact, i, k, motion, status)
+               if (.not. self%was_active(id)) then
+                  if (begins_unseen(self, contact, i, motion)) status = step_too_far
+               end if
                if (.not. friction%is_on) cycle
                if (friction%law(id)%mu > 0.0_wp) friction%lags = friction%lags .or. &
                   contact%state(i)%slip_shift > most_shift
@@ -421,7 +424,6 @@ contains
          call look_at_open(self, contact, i, id, closes, status)
          ! What the pairs take in may hold the bodies away from their guards.
          if (.not. closes .or. (contact%slack > 0.0_wp .and. candidates%have_changed)) return
-         if (begins_unseen(self, contact, i, motion)) status = step_too_far
          if (self%friction%is_on) call friction_close(self%friction, system, pair, i, motion, &
             contact%state(i)%gap1 - gap_to_hold(self, contact%state(i), id), &
             .not. self%is_candidate(id))

@@ -25,6 +25,7 @@ program main
    use test_condensation, only : collect_condensation
    use test_condition_rows, only : collect_condition_rows
    use test_contact_problem, only : collect_contact_problem
+   use test_contact_rounds, only : collect_contact_rounds
    use test_constraints, only : collect_constraints
    use test_contact_states, only : collect_contact_states
    use test_step_begin, only : collect_step_begin
@@ -289,6 +290,7 @@ program main
    call run("condensation", collect_condensation)
    call run("condition_rows", collect_condition_rows)
    call run("contact_problem", collect_contact_problem)
+   call run("contact_rounds", collect_contact_rounds)
    call run("constraints", collect_constraints)
    call run("contact_laws", collect_contact_laws)
    call run("independent_rows", collect_independent_rows)

@@ -1,0 +1,496 @@
+!> A step as one problem of its contacts, on a block over a flat floor: what comes out balances and
+!> obeys the laws, from wherever it is begun; and who takes part, by what contacts tell.
+module test_contact_rounds
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_active_set, only : active_set_begin, active_set_init, active_set_t, step_done, &
+      step_stands_off, step_too_far, touch_tol
+   use emcon_active_set_solve, only : active_set_solve
+   use emcon_contact_law, only : contact_laws_add
+   use emcon_correction, only : correction_free, correction_reset
+   use emcon_coulomb_law, only : contact_slides, contact_sticks, coulomb_t
+   use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_displacement, instant_t
+   use emcon_factor_base, only : factor_base_t
+   use emcon_factor_policy, only : factor_policy_step
+   use emcon_friction, only : most_lagged
+   use emcon_kinds, only : dp, wp
+   use emcon_motion, only : motion_evaluate, motion_init, motion_t
+   use emcon_newton, only : newton_init, newton_t
+   use emcon_scene, only : scene_t
+   use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
+   use emcon_solver_registry, only : solver_default
+   use emcon_state, only : state_t
+   use emcon_steps, only : method_null_space
+   use emcon_system, only : system_begin_step, system_init, system_respond, system_t
+   use emcon_text, only : to_text
+   use floor_contact, only : floor_contact_t, floor_make
+   use random_draws, only : draw_random
+   use small_scenes, only : add_step, block_t, make_block, prescribe, shake
+   implicit none
+   private
+   public :: collect_contact_rounds
+
+   real(wp), parameter :: eps = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+   !> What Newton's method leaves of a step, by stiffness over inertia.
+   real(wp), parameter :: tol = 1.0e5_wp*eps
+   real(wp), parameter :: h = 0.05_wp
+
+   !> A block of two elements, nodes 1 to 3 of which are over a floor, and its step.
+   type :: case_t
+      type(scene_t) :: scene
+      type(system_t) :: system
+      type(active_set_t) :: active
+      type(newton_t) :: newton
+      type(motion_t) :: motion
+      type(state_t) :: state
+      type(floor_contact_t), allocatable :: floor(:)     !! to be given
+      real(wp) :: mu = 0.0_wp
+      logical :: is_one_problem = .true.
+      logical :: keeps_factor = .false.
+      logical :: holds_gap = .false.             !! of the start
+      logical, allocatable :: was_active(:)      !! contacts; not allocated: none
+      real(wp) :: way = 0.0_wp                   !! prescribed of node 6, sideways [L]
+      real(wp) :: slides_along = 0.0_wp          !! what slid before
+      integer :: status = 0
+   end type case_t
+
+contains
+
+   subroutine collect_contact_rounds(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("what is found balances and obeys the laws", test_laws), &
+         test_case_t("as set by set", test_set_by_set), &
+         test_case_t("rows that follow from others", test_redundant), &
+         test_case_t("what has lost its surface does not come back", test_left), &
+         test_case_t("friction that acts elsewhere", test_lagged), &
+         test_case_t("stencils of another motion", test_stale), &
+         test_case_t("what cannot begin", test_begins), &
+         test_case_t("a guard waits for the pairs", test_guard)]
+   end subroutine collect_contact_rounds
+
+   !> A block in the air, not quite straight, that falls with a velocity of 1 and slides.
+   subroutine make_case(self, slide)
+      type(case_t), intent(inout) :: self
+      real(wp), intent(in) :: slide              !! [L/T]
+      type(block_t) :: block
+
+      call make_block(self%scene, "CPE4", [2, 1], block)
+      call add_step(self%scene, .false., h, 1)
+      call shake(self%scene%u0, 0.02_wp)
+      call shake(self%scene%v0, 0.2_wp)
+      self%scene%v0(1, :) = self%scene%v0(1, :) + slide
+      self%scene%v0(2, :) = self%scene%v0(2, :) - 1.0_wp
+   end subroutine make_case
+
+   !> Solve the step over `floor`.
+   subroutine solve(self, error)
+      type(case_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+      type(scheme_energy_momentum_t) :: scheme
+      type(factor_base_t) :: base
+      integer :: n
+      logical :: is_lost
+
+      if (abs(self%way) > 0.0_wp) call prescribe(self%scene%step(1), 6, 1, self%way)
+      call system_init(self%system, self%scene, error)
+      if (.not. allocated(error)) call system_begin_step(self%system, self%scene, 1, error)
+      if (allocated(error)) return
+      call put_floor(self)
+      n = self%system%n_constraint
+      call active_set_init(self%active, self%system)
+      self%active%is_one_problem = self%is_one_problem
+      self%active%holds_gap = self%holds_gap
+      self%active%puts_off = .true.
+      call newton_init(self%newton, self%system%space%numbering%n_unknown, self%scene%x, &
+         1.0e3_wp*epsilon(1.0_wp), 30)
+      call correction_reset(self%newton%correction, method_null_space, solver_default)
+      self%newton%factor_policy%is_allowed = self%keeps_factor
+      call factor_policy_step(self%newton%factor_policy, self%newton%correction, base, &
+         instant_t(), h, 0, is_lost)
+      call motion_init(self%motion, self%scene%x)
+      self%motion%evaluation = scheme%evaluation(instant_t(), h)
+      self%motion%u0 = self%scene%u0
+      self%motion%v0 = self%scene%v0
+      self%motion%du = h*self%scene%v0
+      if (abs(self%way) > 0.0_wp) then
+         self%newton%driven(1, 6) = self%way - self%motion%u0(1, 6) - self%motion%du(1, 6)
+         self%motion%du(1, 6) = self%way - self%motion%u0(1, 6)
+      end if
+      associate (contacts => self%state%contacts)
+         allocate(contacts%is_active(n), source=.false.)
+         if (allocated(self%was_active)) contacts%is_active = self%was_active
+         allocate(contacts%lam(n), contacts%closure(n), source=0.0_wp)
+         allocate(contacts%slides_along(1, n), source=self%slides_along)
+         allocate(contacts%drag(1, n), source=0.0_wp)
+      end associate
+      call active_set_begin(self%active, self%system, self%motion, self%state)
+      call active_set_solve(self%active, self%system, self%scene, self%newton, self%motion, &
+         self%status, error)
+      call correction_free(self%newton%correction)
+   end subroutine solve
+
+   !> The contacts of the system are those of `floor`, all with friction.
+   subroutine put_floor(self)
+      type(case_t), intent(inout) :: self
+      integer :: k
+
+      associate (system => self%system)
+         deallocate(system%contact, system%first_constraint)
+         allocate(system%contact(size(self%floor)), &
+            system%first_constraint(size(self%floor) + 1))
+         system%first_constraint = 0
+         system%n_pair = count(.not. self%floor%slack > 0.0_wp)
+         do k = 1, size(self%floor)
+            if (self%mu > 0.0_wp) call contact_laws_add(self%floor(k)%laws, coulomb_t(mu=self%mu))
+            allocate(system%contact(k)%contact, source=self%floor(k))
+            system%contact(k)%of_pair = k
+            system%n_constraint = system%n_constraint + self%floor(k)%n_constraint
+            system%first_constraint(k + 1) = system%n_constraint
+         end do
+      end associate
+   end subroutine put_floor
+
+   !> Without the forces of contact the residual of free nodes is what contacts push and rub with;
+   !> what acts holds its gap and pushes, what does not is open, and friction is as Coulomb has it.
+   subroutine check_laws(self, what, error)
+      type(case_t), intent(inout) :: self
+      character(len=*), intent(in) :: what
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp), allocatable :: left(:, :), lam(:), tau(:), gap0(:), gap1(:), held(:), lead(:), s(:)
+      real(wp) :: scale
+      integer :: k, pair, i, n
+
+      if (allocated(error)) return
+      n = self%system%n_constraint
+      allocate(lam(n), tau(n), gap0(n), gap1(n), held(n), lead(n), s(n), source=0.0_wp)
+      call check_equal(error, self%status, step_done, what // ": status")
+      if (allocated(error)) return
+      associate (active => self%active, set => self%active%set, system => self%system, &
+            motion => self%motion)
+         call check_true(error, all(active%is_active(set%id(:set%n))) .and. &
+            count(active%is_active) == set%n, what // ": the set is what acts")
+         lam(set%id(:set%n)) = set%lam(:set%n)
+         do k = 1, set%n
+            tau(set%id(k)) = merge(self%mu*set%lam(k), 0.0_wp, self%mu > 0.0_wp)
+            if (self%mu > 0.0_wp) tau(set%id(k)) = tau(set%id(k)) &
+               *active%friction%law(set%id(k))%status%direction(1)
+         end do
+         do k = set%n + 1, set%n_row
+            tau(set%id(set%condition(k))) = set%lam(k)
+         end do
+         call motion_evaluate(motion)
+         call system_respond(system, motion, .false., .true.)
+         left = system%response%residual
+         scale = maxval(system%response%magnitude)
+         k = 0
+         do pair = 1, size(system%contact)
+            associate (floor => self%floor(pair))
+               do i = 1, floor%n_constraint
+                  k = k + 1
+                  associate (node => floor%node(i))
+                     left(:, node) = left(:, node) - [-tau(k), lam(k)]
+                     gap0(k) = motion%x(2, node) + motion%u0(2, node) - floor%height(i)
+                     gap1(k) = gap0(k) + motion%du(2, node)
+                     s(k) = motion%du(1, node)
+                     held(k) = merge(gap0(k), floor%closed, self%holds_gap .and. &
+                        active%is_candidate(k))
+                     ! What slip leads to: with the velocity along the floor at an end of 0.
+                     if (active%is_candidate(k)) lead(k) = evaluation_displacement( &
+                        motion%evaluation, motion%v0(1, node), 0.0_wp)
+                     if (floor%leaves(i)) held(k) = -huge(scale)
+                  end associate
+               end do
+            end associate
+         end do
+         where (system%space%numbering%unknown == 0) left = 0.0_wp
+         call check_near(error, left, 0.0_wp*left, tol, scale, what // ": balance")
+         call check_near(error, pack(gap1, active%is_active), pack(held, active%is_active), &
+            tol, 1.0_wp, what // ": gaps")
+         call check_true(error, all(gap1 >= held - tol), what // ": what does not act is open")
+         call check_true(error, all(lam >= -tol*scale), what // ": pushes")
+         call check_true(error, all(abs(tau) <= self%mu*lam + tol*scale), what // ": friction")
+      end associate
+      if (self%mu > 0.0_wp) call check_friction(self, what, lam, tau, s, lead, scale, error)
+   end subroutine check_laws
+
+   !> Friction is mu lam against slip, where that lies off the segment from 0 to what it leads to.
+   subroutine check_friction(self, what, lam, tau, s, lead, scale, error)
+      type(case_t), intent(in) :: self
+      character(len=*), intent(in) :: what
+      real(wp), intent(in) :: lam(:), tau(:), s(:), lead(:), scale
+      type(error_t), allocatable, intent(inout) :: error
+      integer :: k
+      real(wp) :: low, high
+
+      do k = 1, size(lam)
+         if (.not. self%active%is_active(k)) cycle
+         low = min(0.0_wp, lead(k))
+         high = max(0.0_wp, lead(k))
+         if (s(k) > high + tol) call check_near(error, tau(k), self%mu*lam(k), tol, scale, &
+            what // ": slides on")
+         if (s(k) < low - tol) call check_near(error, tau(k), -self%mu*lam(k), tol, scale, &
+            what // ": slides back")
+         if (s(k) > low + tol .and. s(k) < high - tol) call check_near(error, tau(k), 0.0_wp, tol, &
+            scale, what // ": free")
+         if (abs(s(k) - high) <= tol .and. high > 2.0_wp*tol) call check_true(error, &
+            tau(k) >= -tol*scale, what // ": it does not drive")
+         if (abs(s(k) - low) <= tol .and. low < -2.0_wp*tol) call check_true(error, &
+            tau(k) <= tol*scale, what // ": it does not drive back")
+      end do
+   end subroutine check_friction
+
+   !> Some contacts act as the step begins, some near by close in it, others do not; with and
+   !> without friction, a motion that is prescribed, gaps that are held and a factor that is kept.
+   subroutine test_laws(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: u(7)
+      integer :: i, n_open, n_stick, n_slide, n_act
+
+      n_open = 0
+      n_stick = 0
+      n_slide = 0
+      n_act = 0
+      do i = 0, 63
+         block
+            type(case_t) :: self
+            logical :: acted(3)
+
+            call draw_random(u)
+            call make_case(self, 3.0_wp*u(1) - 1.5_wp)
+            self%mu = merge(0.0_wp, 0.6_wp*u(2), mod(i, 2) == 0)
+            self%holds_gap = mod(i/2, 2) == 1
+            self%keeps_factor = mod(i/4, 2) == 0
+            if (mod(i/8, 2) == 1) self%way = 0.1_wp*(u(3) - 0.5_wp)
+            self%slides_along = real(mod(i/2, 3) - 1, wp)
+            acted = u(4:6) > 0.6_wp
+            self%was_active = acted
+            allocate(self%floor(1))
+            call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3) - merge(0.0_wp, &
+               0.1_wp*u(4:6), acted))
+            ! It may rise on one side.
+            if (u(7) > 0.5_wp) self%scene%v0(2, :) = self%scene%v0(2, :) + self%scene%x(1, :)
+            call solve(self, error)
+            call check_laws(self, "case " // to_text(i), error)
+            if (allocated(error)) return
+            associate (active => self%active)
+               n_open = n_open + count(active%is_candidate .and. .not. active%is_active)
+               n_act = n_act + count(active%is_active)
+               if (.not. active%friction%is_on) cycle
+               n_stick = n_stick + count(active%is_active .and. active%friction%law%status%kind &
+                  == contact_sticks)
+               n_slide = n_slide + count(active%is_active .and. active%friction%law%status%kind &
+                  == contact_slides)
+            end associate
+         end block
+      end do
+      call check_true(error, min(n_open, n_stick, n_slide, n_act) > 5, "of " // to_text(n_act) // &
+         " that act " // to_text(n_stick) // " stick, " // to_text(n_slide) // " slide; " // &
+         to_text(n_open) // " open")
+   end subroutine test_laws
+
+   !> There is one solution: the other method finds it too.
+   subroutine test_set_by_set(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: u(3), start(2, 6), velocity(2, 6), du(2, 6)
+      integer :: i, k, n_newton
+
+      do i = 1, 12
+         call draw_random(u)
+         do k = 1, 3
+            block
+               type(case_t) :: self
+
+               call make_case(self, 1.0_wp)
+               if (k > 1) self%scene%u0 = start
+               if (k > 1) self%scene%v0 = velocity
+               start = self%scene%u0
+               velocity = self%scene%v0
+               self%is_one_problem = k > 1
+               self%keeps_factor = k > 2
+               allocate(self%floor(1))
+               call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3) - 0.08_wp*u)
+               call solve(self, error)
+               call check_laws(self, "case " // to_text(i), error)
+               if (allocated(error)) return
+               if (k == 1) du = self%motion%du
+               call check_near(error, self%motion%du, du, tol, 1.0_wp, "motion " // to_text(i))
+               ! One solve without contacts, and one with all.
+               if (k == 1) n_newton = self%active%n_newton
+               if (k == 2) call check_true(error, self%active%n_newton <= n_newton + 4, &
+                  "iterations " // to_text(self%active%n_newton) // " for " // to_text(n_newton))
+            end block
+         end do
+      end do
+   end subroutine test_set_by_set
+
+   !> Two contacts at one node, as corners have them: both may push, their sum is what counts.
+   subroutine test_redundant(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      do i = 0, 7
+         block
+            type(case_t) :: self
+
+            call make_case(self, 0.5_wp)
+            if (mod(i, 2) == 1) self%mu = 0.3_wp
+            self%keeps_factor = mod(i/2, 2) == 1
+            if (i > 3) self%was_active = [.true., .true., .true., .true., .true., .true.]
+            allocate(self%floor(2))
+            call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3) &
+               - merge(0.0_wp, 0.02_wp, i > 3))
+            call floor_make(self%floor(2), [1, 2, 3], self%floor(1)%height)
+            call solve(self, error)
+            call check_laws(self, "case " // to_text(i), error)
+            if (allocated(error)) return
+         end block
+      end do
+   end subroutine test_redundant
+
+   !> Node 2 closes, but its surface ends: it is let through, the others act.
+   subroutine test_left(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      do i = 0, 3
+         block
+            type(case_t) :: self
+
+            call make_case(self, 0.5_wp)
+            if (mod(i, 2) == 1) self%mu = 0.3_wp
+            if (i > 1) self%was_active = [.true., .true., .true.]
+            allocate(self%floor(1))
+            call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3) - merge(0.0_wp, &
+               0.01_wp, i > 1))
+            self%floor(1)%leaves(2) = .true.
+            call solve(self, error)
+            call check_laws(self, "case " // to_text(i), error)
+            if (allocated(error)) return
+            call check_true(error, all(self%active%is_active .eqv. [.true., .false., .true.]), &
+               "what acts")
+         end block
+      end do
+   end subroutine test_left
+
+   !> The step is solved again while friction acts elsewhere, so often at most.
+   subroutine test_lagged(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: most_of(0:3) = [0, 1, most_lagged + 1, 0]
+      integer :: k, n_solve(0:3)
+
+      do k = 0, 3
+         block
+            type(case_t) :: self
+
+            call make_case(self, 0.5_wp)
+            self%scene%v0(1, :) = 0.5_wp
+            self%scene%v0(2, :) = -1.0_wp
+            self%scene%u0 = 0.0_wp
+            self%mu = 0.3_wp
+            self%was_active = [.true., .true., .true.]
+            self%holds_gap = .true.
+            allocate(self%floor(1))
+            call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3))
+            self%floor(1)%shift = merge(1.0_wp, 1.0e-3_wp, k > 0)
+            ! Looks: as the step begins, and after each solve.
+            if (k == 1) self%floor(1)%until = 2
+            if (k == 3) self%mu = 0.0_wp
+            call solve(self, error)
+            call check_laws(self, "lag " // to_text(k), error)
+            if (allocated(error)) return
+            n_solve(k) = self%system%contact(1)%contact%n_look - 1
+            call check_equal(error, self%active%friction%n_lagged, most_of(k), "lagged")
+            if (allocated(error)) return
+         end block
+      end do
+      call check_equal(error, n_solve(2) - n_solve(0), most_lagged, "solved again so often")
+      call check_equal(error, n_solve(1) - n_solve(0), 1, "solved again once")
+   end subroutine test_lagged
+
+   !> Gaps that come out other than they were held are solved for again, three times; what does not
+   !> act does not matter.
+   subroutine test_stale(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k
+
+      do k = 0, 5
+         block
+            type(case_t) :: self
+
+            call make_case(self, 0.5_wp)
+            self%scene%v0(2, :) = merge(1.0_wp, -1.0_wp, k == 5)
+            self%was_active = [k < 5, k < 5, k < 5]
+            self%holds_gap = .true.
+            allocate(self%floor(1))
+            call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3))
+            self%floor(1)%drift = 2.0_wp*touch_tol
+            self%floor(1)%until = 1 + k
+            call solve(self, error)
+            if (allocated(error)) return
+            if (k < 4 .or. k == 5) call check_laws(self, "stale " // to_text(k), error)
+            call check_equal(error, self%status, merge(step_too_far, step_done, k == 4), "status")
+            call check_equal(error, self%active%n_stale, merge(0, k, k == 5), "solved again")
+            if (allocated(error)) return
+         end block
+      end do
+   end subroutine test_stale
+
+   !> Contacts whose stencils were chosen for another motion, from gaps that are too large for a
+   !> step with impacts, and above those that the deck allows to be held.
+   subroutine test_begins(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: expected(0:5) = [step_done, step_too_far, step_too_far, step_too_far, &
+         step_stands_off, step_done]
+      integer :: k
+
+      do k = 0, 5
+         block
+            type(case_t) :: self
+
+            call make_case(self, 0.5_wp)
+            allocate(self%floor(1))
+            call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3) - 0.01_wp)
+            if (k == 1) self%floor(1)%is_seen(2) = .false.
+            if (k == 2) self%was_active = [.true., .true., .true.]
+            if (k == 2) self%floor(1)%is_seen(2) = .false.
+            if (k == 3) self%floor(1)%max_gap_on_entry = 0.005_wp
+            if (k > 3) self%active%gap_tolerance = merge(0.005_wp, 0.02_wp, k == 4)
+            self%holds_gap = k > 3
+            call solve(self, error)
+            if (allocated(error)) return
+            call check_equal(error, self%status, expected(k), "status of case " // to_text(k))
+            if (expected(k) == step_done) call check_laws(self, "case " // to_text(k), error)
+            if (allocated(error)) return
+         end block
+      end do
+   end subroutine test_begins
+
+   !> Pairs and guards would be closed without contact; the pairs hold the block off the guards,
+   !> which act where no pair does.
+   subroutine test_guard(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k
+
+      do k = 0, 1
+         block
+            type(case_t) :: self
+
+            call make_case(self, 0.5_wp)
+            allocate(self%floor(2))
+            call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3) - merge(0.001_wp, &
+               1.0_wp, k == 0))
+            call floor_make(self%floor(2), [1, 2, 3], self%scene%u0(2, :3) - 0.001_wp)
+            self%floor(2)%slack = 0.01_wp
+            self%floor(2)%closed = -0.01_wp
+            call solve(self, error)
+            call check_laws(self, "case " // to_text(k), error)
+            if (allocated(error)) return
+            call check_true(error, all(self%active%is_candidate .eqv. [k == 0, k == 0, k == 0, &
+               k == 1, k == 1, k == 1]), "who takes part")
+         end block
+      end do
+   end subroutine test_guard
+
+end module test_contact_rounds
