@@ -107,6 +107,7 @@ program main
    use test_massless_start, only : collect_massless_start
    use test_midside, only : collect_midside
    use test_mortar, only : collect_mortar
+   use test_mortar_choice, only : collect_mortar_choice
    use test_mortar_pair, only : collect_mortar_pair
    use test_mortar_stencil, only : collect_mortar_stencil
    use test_motion_bound, only : collect_motion_bound
@@ -271,6 +272,7 @@ program main
    call run("pair_forces", collect_pair_forces)
    call run("penalty_state", collect_penalty_state)
    call run("mortar", collect_mortar)
+   call run("mortar_choice", collect_mortar_choice)
    call run("damped", collect_damped)
    call run("tie", collect_tie)
    call run("tie_partner", collect_tie_partner)
