@@ -25,7 +25,7 @@ KEPT = ROOT / "build" / "mutants"
 FILES = [f"scenes/test_{name}.py" for name in (
     "contact_output", "scene_report", "contact_scenes", "friction", "massless", "rigid", "verdict",
     "segments", "restitution", "explicit", "midside", "head_on", "corners", "increments",
-    "surface_pressure", "linear", "contact_damping", "friction_at_rest")]
+    "surface_pressure", "linear", "contact_damping", "friction_at_rest", "complementarity")]
 #: CPU time that a single test of these may take [s]; what takes longer is left out.
 DEAREST = 10
 
