@@ -9,8 +9,7 @@ module emcon_contact_newton
    use emcon_condensation, only : condensation_free, condensation_make, condensation_t
    use emcon_constraint, only : condition_rate
    use emcon_constraint_rows, only : constraints_rows
-   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_force, &
-      constraints_take_hold
+   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_take_hold
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
       contact_problem_solve, contact_problem_status, contact_problem_stiffness, contact_problem_t
    use emcon_convergence, only : convergence_begin, round_off

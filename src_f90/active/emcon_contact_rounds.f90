@@ -82,11 +82,12 @@ contains
       type(candidates_t), intent(inout) :: candidates
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: first(size(motion%du, 1), size(motion%du, 2))
+      real(wp), dimension(size(motion%du, 1), size(motion%du, 2)) :: first, driven
       logical :: goes_on, is_early, obeys
       integer :: i
 
       first = motion%du
+      driven = newton%driven
       candidates%is_new_set = .true.
       do i = 1, most_tried
          newton%looks_early = candidates%is_new_set
@@ -98,6 +99,7 @@ contains
             return
          else if (.not. any(status == [newton_converged, newton_early])) then
             motion%du = first
+            newton%driven = driven
             candidates%is_measured = .false.
             return
          end if
@@ -230,6 +232,7 @@ contains
       type(coulomb_t), allocatable :: law(:)     ! (contacts of the set)
       integer :: i
 
+      newton%looks_early = .false.
       do i = 1, most_rounds
          call select_all(self, system, motion, candidates)
          associate (set => self%set)
