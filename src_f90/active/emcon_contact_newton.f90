@@ -37,6 +37,8 @@ module emcon_contact_newton
    !> After so many iterates without half of the best size the curvature of contacts is left out of
    !> the tangent for as many, and so on in turn.
    integer, parameter :: stall_turn = 7
+   !> Parts of its W by which a row gives way where the condensed problem has no solution, in turn.
+   real(wp), parameter :: softer(*) = [1.0e-7_wp, 1.0e-5_wp, 1.0e-3_wp]
    !> Once it is within the tolerance an iterate that leaves more than this part is the last.
    real(wp), parameter :: polish_gain = 0.3_wp
 
@@ -318,7 +320,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(contact_effort_t) :: effort
       logical :: is_solved, has_curvature
-      integer :: left
+      integer :: left, k
 
       has_curvature = .not. btest(self%n_stall/stall_turn, 0)
       call phase_enter(system%phases, phase_factorise, left)
@@ -333,6 +335,13 @@ contains
       call lay_out(self, set)
       call gather(set, set%lam, self%force)
       call contact_problem_solve(self%problem, self%force, effort, is_solved)
+      do k = 1, size(softer)
+         if (is_solved) exit
+         call lay_out(self, set)
+         call gather(set, set%lam, self%force)
+         call soften(self, softer(k))
+         call contact_problem_solve(self%problem, self%force, effort, is_solved)
+      end do
       status = merge(newton_converged, newton_diverged, is_solved)
       if (is_solved) self%status = contact_problem_status(self%problem, self%force)
       call phase_leave(system%phases, left)
@@ -367,6 +376,24 @@ contains
          end do
       end associate
    end subroutine lay_out
+
+   !> Each row gives way by this part of its own W about the forces of the iterate before: what has
+   !> no solution as it is linearised comes nearer by it, and where forces stand it changes nothing.
+   pure subroutine soften(self, part)
+      type(solve_t), intent(inout) :: self
+      real(wp), intent(in) :: part
+      integer :: i, k, row
+
+      do k = 1, size(self%status)
+         do i = 0, self%problem%n_slip
+            row = (1 + self%problem%n_slip)*(k - 1) + 1 + i
+            associate (w => self%problem%w(row, row))
+               self%problem%free(i, k) = self%problem%free(i, k) - part*abs(w)*self%force(i, k)
+               w = w + part*abs(w)
+            end associate
+         end do
+      end do
+   end subroutine soften
 
    !> The correction of the unknowns, and the multipliers after it.
    subroutine correct(self, newton, system, set)

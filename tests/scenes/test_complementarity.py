@@ -71,6 +71,17 @@ def test_fewer_cuts(scene, sides, formulation, tmp_path):
     assert cuts[1] <= cuts[0]/3
 
 
+@pytest.mark.parametrize("scene", ["pile", "comb"])
+def test_gaps_that_close_to_nothing(scene, tmp_path):
+    """Contacts of both sides that say nearly the same, with targets that do not: the problem that is
+    condensed far from the solution has none of its own."""
+    deck = (plain_scenes.SCENES.get(scene) or getattr(plain_scenes, scene))().deck(BOTH)
+    run = run_deck(deck, tmp_path, formulation=NODES, initiation="ADMISSIBLE",
+                   method="COMPLEMENTARITY")
+    obeys(run)
+    assert run.history["cuts"].sum() <= 6
+
+
 def test_statics(tmp_path):
     """A round body that is pressed on and rubs: the state of equilibrium of the other methods, to the
     part of an edge, all shorter than 4, by which stencils may be those of another motion."""
