@@ -56,6 +56,7 @@ module emcon_active_set
       logical :: puts_off = .false.              !! what follows from others nearly waits
       logical :: has_rigid = .false.             !! bodies that few contacts hold: what follows from
                                                  !! others waits, then the set changes one by one
+      real(wp) :: largest_move = huge(1.0_wp)    !! of a correction in statics [L]
       real(wp) :: gap_tolerance = 0.0_wp         !! largest new stand-off per edge; 0: any
       type(constraint_set_t) :: set
       logical, allocatable :: is_active(:)       !! (n_constraint)
@@ -138,6 +139,10 @@ contains
       integer :: pair
 
       self%overclosure = 0.0_wp
+      self%largest_move = huge(1.0_wp)
+      do pair = 1, size(system%contact)
+         self%largest_move = min(self%largest_move, system%contact(pair)%contact%own_edge(x))
+      end do
       if (.not. is_meant) return
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact, &

@@ -13,7 +13,7 @@ module emcon_active_set_solve
       active_set_restart, active_set_select, active_set_t, step_cycling, step_done, step_loose, &
       step_not_held
    use emcon_active_set_update, only : active_set_advance, active_set_leave, active_set_narrow, &
-      most_early
+      find_grips, most_early
    use emcon_contact_rounds, only : contact_rounds_solve
    use emcon_contact_support, only : contact_support_complete, contact_support_find_free
    use emcon_errors, only : error_t
@@ -27,7 +27,7 @@ module emcon_active_set_solve
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_scene, only : scene_t
    use emcon_penalty, only : most_augmentations, penalty_augment, penalty_pulls
-   use emcon_system, only : system_t
+   use emcon_system, only : system_stiffen, system_t
    implicit none
    private
    public :: active_set_solve
@@ -46,8 +46,8 @@ contains
 
       self%first = motion%du
       self%driven = newton%driven
-      if (self%is_one_problem .and. .not. self%support%is_needed) then
-         call solve_as_one(self, system, newton, motion, status, error)
+      if (self%is_one_problem) then
+         call solve_as_one(self, system, scene, newton, motion, status, error)
       else
          call solve_set_by_set(self, system, scene, newton, motion, status, error)
       end if
@@ -114,9 +114,10 @@ contains
    end subroutine solve_set_by_set
 
    !> The step as one problem of its contacts; where that fails with sharp corners, if possible.
-   subroutine solve_as_one(self, system, newton, motion, status, error)
+   subroutine solve_as_one(self, system, scene, newton, motion, status, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
@@ -125,8 +126,19 @@ contains
 
       is_done = .false.
       do while (.not. is_done)
+         if (self%support%is_needed) then
+            call hold(self, system, scene, newton%driven, motion)
+            status = step_not_held
+            if (allocated(self%support%text)) return
+            call system_stiffen(system, self%support%hangs)
+         end if
          call contact_rounds_solve(self, system, newton, motion, status, error)
-         if (allocated(error) .or. status == step_done) return
+         if (allocated(error)) return
+         if (status == step_done) then
+            if (self%support%is_needed) call find_grips(self, system)
+            call look_for_free(self, system, scene, motion, status)
+            return
+         end if
          call begin_sharp(self, system, newton, motion, is_done)
       end do
    end subroutine solve_as_one

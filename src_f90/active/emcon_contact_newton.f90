@@ -11,16 +11,19 @@ module emcon_contact_newton
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_take_hold
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
-      contact_problem_solve, contact_problem_status, contact_problem_stiffness, contact_problem_t
-   use emcon_convergence, only : convergence_begin, round_off
+      contact_problem_force, contact_problem_solve, contact_problem_status, contact_problem_stiffness, contact_problem_t
+   use emcon_convergence, only : convergence_begin, most_rounding, round_off
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
       contact_trial_t, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_is_equilibrium
+   use emcon_friction, only : friction_stiffness
    use emcon_kinds, only : wp
    use emcon_lane_sums, only : relative_size
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_newton, only : newton_check_interrupt, newton_converged, newton_diverged, &
-      newton_measure_forces, newton_pick_residual, newton_refused, newton_singular, newton_t
+      newton_early, newton_has_load, newton_measure_forces, newton_pick_residual, newton_refused, &
+      newton_singular, newton_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_phases, only : phase_eliminate, phase_enter, phase_factorise, phase_gaps, phase_leave
    use emcon_system, only : system_respond, system_tangent_times, system_t
@@ -28,8 +31,9 @@ module emcon_contact_newton
    private
    public :: contact_newton_solve
 
-   !> Iterates of a solve at most, and halvings of a correction that no forces are found after.
-   integer, parameter :: most_iterates = 40, most_halvings = 6
+   !> Iterates of a solve at most, by those that a set which stands is given; halvings of a
+   !> correction that no forces are found after.
+   integer, parameter :: more_iterates = 2, most_halvings = 6
    !> Parts of a correction that are tried, each half of the one before; the gain that is enough,
    !> and the size below which none is looked for.
    integer, parameter :: most_parts = 4
@@ -47,13 +51,15 @@ module emcon_contact_newton
       type(condensation_t) :: condensation
       type(contact_problem_t) :: problem
       real(wp), allocatable :: mu(:)             !! (n) of the normal force
-      real(wp), allocatable :: force(:, :)       !! (0:n_slip, n) of the contacts [M L/T^2]
+      real(wp), allocatable :: push(:, :)        !! (0:n_slip, n) of the condensed contacts
+      real(wp), allocatable :: hold(:)           !! (n_row) what rows are held by in it [M/T^2]
       type(slip_status_t), allocatable :: status(:)      !! (n) in which way the law is to hold
       real(wp), allocatable :: old(:), new(:)    !! (n_row) multipliers about a correction
       real(wp) :: size = huge(1.0_wp)            !! relative residual, and what contacts miss
       real(wp) :: best = huge(1.0_wp), last = huge(1.0_wp)
       logical :: is_rounding = .false.           !! nothing but round-off is left
       integer :: n_stall = 0
+      logical :: is_static = .false.             !! nothing has inertia
       logical :: is_searching = .false.          !! no tangent is wanted
    end type solve_t
 
@@ -73,9 +79,10 @@ contains
       integer :: k
 
       call begin(self, newton, system, set, law)
+      self%is_static = evaluation_is_equilibrium(motion%evaluation)
       call iterate(self, newton, system, set, motion, status, error)
       call condensation_free(self%condensation)
-      if (allocated(error) .or. status /= newton_converged) return
+      if (allocated(error) .or. .not. any(status == [newton_converged, newton_early])) return
       do k = 1, size(law)
          law(k)%status = self%status(k)
       end do
@@ -99,7 +106,8 @@ contains
       end do
       self%mu = law%mu
       self%problem%mu = law%mu
-      allocate(self%force(0:n_slip, size(law)), source=0.0_wp)
+      allocate(self%push(0:n_slip, size(law)), source=0.0_wp)
+      allocate(self%hold(set%n_row), source=0.0_wp)
       allocate(self%status(size(law)))
       allocate(self%old(set%n_row), self%new(set%n_row))
    end subroutine begin
@@ -113,8 +121,9 @@ contains
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
       logical :: is_driven
-      integer :: i
+      integer :: i, most_iterates
 
+      most_iterates = more_iterates*newton%convergence%maximum
       is_driven = any(abs(newton%driven) > 0.0_wp)
       if (is_driven) motion%du = motion%du - newton%driven
       do i = 0, most_iterates
@@ -130,6 +139,11 @@ contains
          call condense(self, newton, system, set, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          call correct(self, newton, system, set)
+         if (.not. is_driven .and. goes_far(newton)) then
+            call take(self, newton, system, set, motion, newton%largest_move/maxval(abs(newton%dq)))
+            status = newton_early
+            return
+         end if
          if (i > 0 .and. .not. is_driven .and. self%size > no_search) then
             call search(self, newton, system, set, motion, error)
          else
@@ -140,6 +154,14 @@ contains
          is_driven = .false.
       end do
    end subroutine iterate
+
+   !> Does the correction move something farther than contacts that are no candidates allow?
+   pure logical function goes_far(newton)
+      type(newton_t), intent(in) :: newton
+
+      goes_far = .false.
+      if (size(newton%dq) > 0) goes_far = maxval(abs(newton%dq)) > newton%largest_move
+   end function goes_far
 
    !> Is the step solved?
    pure logical function is_done(self, newton)
@@ -213,12 +235,16 @@ contains
       call constraints_evaluate(set, system, motion, self%is_searching)
       call constraints_rows(set, system%space%numbering)
       call phase_leave(system%phases, left)
+      call newton_pick_residual(newton, system, set)
       call newton_measure_forces(newton, system, set)
       call find_defect(self, set, defect)
-      call find_missed(self, set, missed)
+      call find_missed(self, system, set, missed)
       self%size = max(relative_size(newton%residual, newton%forces), defect, missed)
       self%is_rounding = relative_size(newton%residual, newton%rounding) <= round_off &
          .and. defect <= round_off .and. missed <= newton%convergence%tolerance
+      newton%is_idle = self%is_rounding .and. .not. newton_has_load(system)
+      if (.not. newton%is_idle) self%is_rounding = self%is_rounding .and. &
+         self%size <= most_rounding
    end subroutine measure
 
    !> What rows that are to hold are off by at worst, and by how much those are closed that are not,
@@ -250,8 +276,9 @@ contains
 
    !> How far the forces that there are miss the laws with the gaps and slips that there are, over
    !> the largest of them, in the stiffness of the last condensation; 0 before there is one.
-   subroutine find_missed(self, set, missed)
+   subroutine find_missed(self, system, set, missed)
       type(solve_t), intent(in) :: self
+      type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(out) :: missed
       type(contact_trial_t) :: at
@@ -277,6 +304,8 @@ contains
                stiffness))
          end do
       end associate
+      ! Where nothing is loaded all forces are round-off.
+      if (missed <= round_off*maxval(system%response%rounding)) missed = 0.0_wp
       if (missed > 0.0_wp) missed = missed/max(maxval(abs(force)), tiny(missed))
    end subroutine find_missed
 
@@ -324,28 +353,46 @@ contains
 
       has_curvature = .not. btest(self%n_stall/stall_turn, 0)
       call phase_enter(system%phases, phase_factorise, left)
-      call newton_pick_residual(newton, system, set)
+      call find_hold(self, system, set)
       call condensation_make(self%condensation, system, set, newton%correction, newton%residual, &
-         has_curvature, error)
+         has_curvature, self%hold, error)
       call phase_leave(system%phases, phase_eliminate)
       system%phases%n_factorisation = system%phases%n_factorisation + 1
       newton%convergence%n_iteration = newton%convergence%n_iteration + 1
       status = newton_singular
       if (allocated(error) .or. self%condensation%is_singular) return
       call lay_out(self, set)
-      call gather(set, set%lam, self%force)
-      call contact_problem_solve(self%problem, self%force, effort, is_solved)
+      self%push = 0.0_wp
+      call contact_problem_solve(self%problem, self%push, effort, is_solved)
       do k = 1, size(softer)
          if (is_solved) exit
          call lay_out(self, set)
-         call gather(set, set%lam, self%force)
+         self%push = 0.0_wp
          call soften(self, softer(k))
-         call contact_problem_solve(self%problem, self%force, effort, is_solved)
+         call contact_problem_solve(self%problem, self%push, effort, is_solved)
       end do
       status = merge(newton_converged, newton_diverged, is_solved)
-      if (is_solved) self%status = contact_problem_status(self%problem, self%force)
+      if (is_solved) self%status = contact_problem_status(self%problem, self%push)
       call phase_leave(system%phases, left)
    end subroutine condense
+
+   !> In statics contacts may be all that holds a body: they are held as the tangent is factorised.
+   pure subroutine find_hold(self, system, set)
+      type(solve_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      integer :: k
+
+      associate (problem => self%problem, first => set%n_permanent)
+         do k = 1, size(problem%stiffness)
+            problem%stiffness(k) = friction_stiffness(system, set%item(first + k))
+         end do
+         if (.not. self%is_static) return
+         do k = first + 1, set%n_row
+            self%hold(k) = problem%stiffness(set%condition(k) - first)
+         end do
+      end associate
+   end subroutine find_hold
 
    !> The problem of the contacts as it was condensed. Without friction a contact has no slips to
    !> solve for: any one by itself.
@@ -358,6 +405,10 @@ contains
       associate (problem => self%problem, first => set%n_permanent, w => self%condensation%w)
          problem%w = 0.0_wp
          problem%free = 0.0_wp
+         call gather(set, set%lam, problem%base)
+         call gather(set, self%hold, problem%hold)
+         call gather(set, set%defect, problem%start)
+         problem%start(1:, :) = problem%start(1:, :) - problem%slip_target
          place = m*(set%condition(first + 1:) - first - 1) + 1 + set%slip(first + 1:)
          do k = 1, size(w, 1)
             problem%w(place, place(k)) = w(:, k)
@@ -371,6 +422,7 @@ contains
                do i = 1, merge(0, m - 1, item%has_friction)
                   problem%w(at + i, at + i) = problem%w(at, at)
                   problem%free(i, k) = 0.0_wp
+                  problem%start(i, k) = 0.0_wp
                end do
             end associate
          end do
@@ -387,10 +439,8 @@ contains
       do k = 1, size(self%status)
          do i = 0, self%problem%n_slip
             row = (1 + self%problem%n_slip)*(k - 1) + 1 + i
-            associate (w => self%problem%w(row, row))
-               self%problem%free(i, k) = self%problem%free(i, k) - part*abs(w)*self%force(i, k)
-               w = w + part*abs(w)
-            end associate
+            self%problem%w(row, row) = self%problem%w(row, row) &
+               + part*abs(self%problem%w(row, row))
          end do
       end do
    end subroutine soften
@@ -401,17 +451,19 @@ contains
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(in) :: set
+      real(wp) :: more(set%n_row - set%n_permanent), force(0:self%problem%n_slip, size(self%status))
       integer :: k
 
       self%old = set%lam
+      force = contact_problem_force(self%problem, self%push)
       associate (first => set%n_permanent, condensation => self%condensation)
          do k = first + 1, set%n_row
-            self%new(k) = self%force(set%slip(k), set%condition(k) - first)
+            self%new(k) = force(set%slip(k), set%condition(k) - first)
+            more(k - first) = self%push(set%slip(k), set%condition(k) - first)
          end do
-         newton%dq = condensation%motion(:, 0) &
-            + matmul(condensation%motion(:, 1:), self%new(first + 1:))
-         self%new(:first) = condensation%permanent(:, 0) &
-            + matmul(condensation%permanent(:, 1:), self%new(first + 1:))
+         newton%dq = condensation%motion(:, 0) + matmul(condensation%motion(:, 1:), more)
+         self%new(:first) = self%old(:first) + condensation%permanent(:, 0) &
+            + matmul(condensation%permanent(:, 1:), more)
       end associate
       newton%n_solve = newton%n_solve + 1
       system%phases%n_solve = system%phases%n_solve + 1

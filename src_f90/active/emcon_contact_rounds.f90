@@ -25,6 +25,7 @@ module emcon_contact_rounds
    use emcon_kept_factor, only : kept_factor_condense, kept_factor_has_room
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_evaluate, motion_t
+   use emcon_motion_bound, only : largest_motion
    use emcon_near_laws, only : near_laws_are_none, near_laws_update
    use emcon_newton, only : newton_converged, newton_early, newton_measure_forces, &
       newton_pick_residual, newton_redundant, newton_solve, newton_t
@@ -37,7 +38,7 @@ module emcon_contact_rounds
    !> Sets that are tried by the null space in one step at most.
    integer, parameter :: most_tried = 6
    !> And rounds with all candidates.
-   integer, parameter :: most_rounds = 40
+   integer, parameter :: most_rounds = 100
    !> By so much of the largest push friction may miss its law: what a solve leaves.
    real(wp), parameter :: least_missed = 1.0e4_wp*epsilon(1.0_wp)
 
@@ -67,8 +68,12 @@ contains
 
       allocate(candidates%takes_part(system%n_constraint), candidates%acts(system%n_constraint), &
          candidates%has_left(system%n_constraint), source=.false.)
-      call solve_by_sets(self, system, newton, motion, candidates, status, error)
-      if (candidates%is_settled .or. allocated(error)) return
+      if (self%support%is_needed) then
+         candidates%takes_part = self%is_active
+      else
+         call solve_by_sets(self, system, newton, motion, candidates, status, error)
+         if (candidates%is_settled .or. allocated(error) .or. size(system%contact) == 0) return
+      end if
       call solve_with_all(self, system, newton, motion, candidates, status, error)
    end subroutine contact_rounds_solve
 
@@ -101,6 +106,12 @@ contains
             motion%du = first
             newton%driven = driven
             candidates%is_measured = .false.
+            return
+         end if
+ 
+         if (largest_motion(motion%du - first) > self%largest_move .and. .not. self%has_impacts) then
+            motion%du = first
+            newton%driven = driven
             return
          end if
          is_early = status == newton_early
@@ -233,20 +244,30 @@ contains
       integer :: i
 
       newton%looks_early = .false.
+      newton%largest_move = huge(1.0_wp)
+      if (.not. self%has_impacts) newton%largest_move = self%largest_move
       do i = 1, most_rounds
          call select_all(self, system, motion, candidates)
          associate (set => self%set)
             if (allocated(law)) deallocate(law)
             allocate(law(set%n - set%n_permanent))
             if (self%friction%is_on) law = self%friction%law(set%id(set%n_permanent + 1:set%n))
-            if (size(law) == 0) then
+            if (size(law) == 0 .and. self%has_impacts) then
                call newton_solve(newton, system, set, motion, status, error)
             else
                call contact_newton_solve(newton, system, set, law, motion, status, error)
             end if
          end associate
          self%n_newton = self%n_newton + newton%convergence%n_iteration
-         if (allocated(error) .or. status /= newton_converged) return
+         if (allocated(error)) return
+         if (status == newton_early) then
+            newton%driven = 0.0_wp
+            call keep(self, law, candidates)
+            call look(self, system, motion, candidates, status)
+            if (status /= step_done) return
+            cycle
+         end if
+         if (status /= newton_converged) return
          newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
          call keep(self, law, candidates)
          ! Before stencils are chosen anew: the step was solved with these.
@@ -288,6 +309,9 @@ contains
          do k = 1, size(law)
             associate (id => set%id(set%n_permanent + k))
                candidates%acts(id) = law(k)%status%kind /= contact_open
+               ! What touches holds a body that nothing pushes.
+               if (self%support%is_needed) candidates%acts(id) = candidates%acts(id) .or. &
+                  abs(set%defect(set%n_permanent + k)) <= gap_noise*set%item(set%n_permanent + k)%size
                if (friction%is_on .and. candidates%acts(id)) friction%law(id)%status = law(k)%status
             end associate
          end do

@@ -6,6 +6,7 @@
 !> it has pulled. The active set lets go of what turns out to pull. What is left at the end is
 !> told; with STABILIZE a motion that no load works on may be. Source: docs/theory.md, section 6.
 module emcon_contact_support
+   use emcon_constraint, only : condition_rate
    use emcon_constraints, only : constraint_set_t
    use emcon_first_touch_plane, only : touch_time
    use emcon_free_motions, only : find_assemblies, find_free_motions
@@ -34,6 +35,7 @@ module emcon_contact_support
       real(wp) :: tolerance = 0.0_wp             !! loads below this part of all are none
       type(mechanism_rows_t) :: supports             !! prescribed freedoms, ties and equations
       logical, allocatable :: is_loose(:)        !! (n_body) it has a motion that nothing holds
+      logical, allocatable :: hangs(:)           !! (n_body) supports alone leave it one
       logical :: is_pushed = .false.             !! a load works on what `text` tells of
       character(len=:), allocatable :: text      !! what nothing holds; not allocated: all is held
       character(len=:), allocatable :: told      !! whose motion the user has been told of
@@ -73,13 +75,14 @@ contains
       real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node)
       type(overlap_query_t) :: look
       type(free_t), allocatable :: free(:)
+      integer :: i
 
       associate (step => scene%step(system%i_step))
          self%tolerance = step%solution%newton_tolerance
          self%stabilizes = step%stabilizes
          call mechanism_rows_find(system, step%prescribed, self%supports)
       end associate
-      allocate(self%is_loose(system%space%n_body), source=.false.)
+      allocate(self%is_loose(system%space%n_body), self%hangs(system%space%n_body), source=.false.)
       allocate(self%has_pulled(system%n_constraint), self%grips(system%n_constraint), &
          source=.false.)
       allocate(self%brought(system%n_constraint), source=0.0_wp)
@@ -87,6 +90,9 @@ contains
       call take_look(self, system, scene, u, look)
       call find_free(look, free)
       self%is_needed = size(free) > 0
+      do i = 1, size(free)
+         self%hangs(pack(free(i)%member, free(i)%member <= system%space%n_body)) = .true.
+      end do
    end subroutine contact_support_begin
 
    !> Forget what an attempt at a step has found.
@@ -291,7 +297,7 @@ contains
       type(contact_support_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(scene_t), intent(in) :: scene
-      type(motion_t), intent(in) :: motion
+      type(motion_t), intent(inout) :: motion
       type(mechanisms_t), intent(in) :: bodies
       type(free_t), intent(in) :: free
       logical, intent(inout) :: is_active(:)
@@ -304,8 +310,31 @@ contains
       if (free%is_loaded) call gaps_keep_closed(set, is_next)
       if (.not. any(is_next)) return
       call note_brought(self, system, scene, bodies, free, set, is_next)
+      call bring(system, bodies, free, set, is_next, motion%du)
       is_active = is_active .or. is_next
    end subroutine take_nearest
+
+   !> Move the bodies of an assembly along what is left of their motions, until the nearest of the
+   !> contacts that are taken in touches.
+   subroutine bring(system, bodies, free, set, is_next, du)
+      type(system_t), intent(in) :: system
+      type(mechanisms_t), intent(in) :: bodies
+      type(free_t), intent(in) :: free
+      type(constraint_set_t), intent(in) :: set
+      logical, intent(in) :: is_next(:)          !! (n_constraint)
+      real(wp), intent(inout), contiguous :: du(:, :)
+      real(wp) :: direction(size(du, 1), size(du, 2)), rate(size(free%z, 2))
+      integer :: j, k
+
+      k = minloc(set%target(:set%n), 1, is_next(set%id(:set%n)))
+      if (.not. set%target(k) > in_the_way*set%item(k)%size) return
+      do j = 1, size(rate)
+         call mechanism_field(bodies, free%member, free%z(:, j), direction)
+         rate(j) = condition_rate(set%item(k), direction)
+      end do
+      call mechanism_field(bodies, free%member, matmul(free%z, real(rate, dp)), direction)
+      call move(system, direction, -set%target(k)/sum(rate**2), du)
+   end subroutine bring
 
    !> Remember contacts that are closed over a gap with no load to close it.
    subroutine note_brought(self, system, scene, bodies, free, set, is_next)

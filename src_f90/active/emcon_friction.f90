@@ -21,7 +21,7 @@ module emcon_friction
    private
    public :: friction_t, friction_init, friction_begin, friction_select, friction_idle, &
       friction_keep, friction_turn, friction_close, friction_missed, friction_holds, &
-      friction_is_same
+      friction_is_same, friction_stiffness
 
    !> So much of the friction of a contact may act on another node than its push, and a step is
    !> solved again so often at most for more.
@@ -232,7 +232,7 @@ contains
       associate (id => set%id(k), item => set%item(k), lam => set%lam(k), &
             law => self%law(set%id(k)))
          if (.not. law%mu > 0.0_wp) return
-         stiffness = stiffness_at(system, item)
+         stiffness = friction_stiffness(system, item)
          tie = tied*largest_push(set)
          at = contact_trial_t(item%normal*lam, 0.0_wp, condition_friction(item, lam), item%slip, &
             law%slip_target, slip_rounding*item%size)
@@ -305,7 +305,7 @@ contains
             if (item%is_mean) push = condition_normal(item)*push
             at = contact_trial_t(push, set%defect(k), condition_friction(item, set%lam(k)), &
                item%slip, law%slip_target, slip_rounding*item%size)
-            missed = max(missed, coulomb_violation(at, law%mu, stiffness_at(system, item)))
+            missed = max(missed, coulomb_violation(at, law%mu, friction_stiffness(system, item)))
          end associate
       end do
    end subroutine friction_missed
@@ -320,7 +320,7 @@ contains
 
    !> The mean stiffness of the system at the slave node of a condition: of its unknowns, or those
    !> that it follows. Where it is held and has none, that at the next node of the condition.
-   pure real(wp) function stiffness_at(system, item) result(stiffness)
+   pure real(wp) function friction_stiffness(system, item) result(stiffness)
       type(system_t), intent(in) :: system
       type(condition_t), intent(in) :: item
       integer :: a, k, t, n, place
@@ -342,6 +342,6 @@ contains
          end do
       end associate
       if (n > 0) stiffness = stiffness/n
-   end function stiffness_at
+   end function friction_stiffness
 
 end module emcon_friction

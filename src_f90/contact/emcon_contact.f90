@@ -86,6 +86,7 @@ module emcon_contact
       procedure :: linearise
       procedure :: has_looked
       procedure :: own_area
+      procedure :: own_edge
       procedure :: share
       procedure :: narrow
       procedure :: mean_gap
@@ -188,6 +189,19 @@ contains
       self%clearance = clearance
       self%n_look = 1 + mod(self%n_look, huge(self%n_look) - 1)
    end subroutine has_looked
+
+   !> The mean edge of the slave side in the reference configuration; huge where it has none.
+   pure real(wp) function own_edge(self, x) result(edge)
+      class(contact_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :)    !! (n_dim, n_node) reference positions [L]
+      real(wp), dimension(self%n_constraint) :: area, length
+      real(wp) :: u(size(x, 1), size(x, 2))
+
+      u = 0.0_wp
+      call self%area_points(x, u, area, length)
+      edge = huge(edge)
+      if (sum(length) > 0.0_wp) edge = sum(length)/self%n_constraint
+   end function own_edge
 
    !> Area that belongs to each constraint in the reference configuration.
    pure subroutine own_area(self, x, area)

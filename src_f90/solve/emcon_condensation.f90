@@ -1,13 +1,14 @@
 !> A step linearised where it is, in the multipliers of its contacts alone.
 !>
-!> With the tangent A, the directions F of forces and the gradients G of the values of rows, the
-!> unknowns follow dq = A^-1 (F^T lam - r), and the rows G dq + defect = free + W lam. Rows that
-!> always hold are eliminated first: their multipliers follow. Source: docs/theory.md, eq. (14i).
+!> With the tangent A, the residual r, the directions F of forces and the gradients G of the values
+!> of rows, the unknowns follow dq = A^-1 (F^T y - r), and the rows G dq + defect = free + W y. With
+!> c F^T G in A, of rows that hold what nothing else does, multipliers gain y - c G dq, else y.
+!> Rows that always hold are eliminated first: their multipliers follow. Source: docs/theory.md, eq. (14i).
 module emcon_condensation
    use emcon_constraint_rows, only : constraints_add_curvature, constraints_merge_pattern
    use emcon_constraints, only : constraint_set_t
    use emcon_correction, only : correction_t
-   use emcon_csr, only : csr_t
+   use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
@@ -21,9 +22,9 @@ module emcon_condensation
    type :: condensation_t
       logical :: is_singular = .true.            !! something moves freely: nothing is known
       integer :: n_permanent = 0                 !! rows that always hold, the first ones
-      !> (n_unknown, 0:rows) what moves without multipliers (0), and by one of each contact row
+      !> (n_unknown, 0:rows) what moves by no other multipliers (0), and by one more of each row
       real(wp), allocatable :: motion(:, :)
-      real(wp), allocatable :: free(:)           !! (rows) values without multipliers [L]
+      real(wp), allocatable :: free(:)           !! (rows) values by no other multipliers [L]
       real(wp), allocatable :: w(:, :)           !! (rows, rows) and what they gain by them [T^2/M]
       !> (n_permanent, 0:rows) multipliers of what always holds, as `motion`
       real(wp), allocatable :: permanent(:, :)
@@ -34,20 +35,22 @@ module emcon_condensation
 contains
 
    !> Factorise the tangent and find out what forces of the rows of `set` move.
-   subroutine condensation_make(self, system, set, correction, residual, has_curvature, error)
+   subroutine condensation_make(self, system, set, correction, residual, has_curvature, hold, error)
       type(condensation_t), intent(inout) :: self        !! keeps its orderings
       type(system_t), intent(in) :: system               !! with the tangent of its terms
       type(constraint_set_t), intent(in) :: set          !! evaluated, with rows
       type(correction_t), intent(in) :: correction       !! by the solver of which
-      real(wp), intent(in) :: residual(:)                !! (n_unknown) without forces of rows
+      real(wp), intent(in) :: residual(:)                !! (n_unknown)
       logical, intent(in) :: has_curvature               !! the tangent has that of the rows
+      real(wp), intent(in) :: hold(:)                    !! (rows) c: stiffness of each in A [M/T^2]
       type(error_t), allocatable, intent(out) :: error
       real(wp), allocatable :: held(:, :)                ! (n_unknown, n_permanent) by those rows
       real(wp) :: force(size(residual))
       integer :: k
 
       self%n_permanent = set%n_permanent
-      call factorise(self, system, set, correction, has_curvature, error)
+      call assemble(self, system, set, has_curvature, hold)
+      call factorise(self, correction, error)
       if (allocated(error) .or. self%is_singular) return
       if (allocated(self%motion)) deallocate(self%motion, self%free, self%w)
       associate (n => size(residual), first => set%n_permanent)
@@ -73,13 +76,12 @@ contains
    end subroutine condensation_make
 
    !> The tangent of the terms, of laws, and of rows as far as it is wanted.
-   subroutine factorise(self, system, set, correction, has_curvature, error)
+   subroutine assemble(self, system, set, has_curvature, hold)
       type(condensation_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
-      type(correction_t), intent(in) :: correction
       logical, intent(in) :: has_curvature
-      type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(in) :: hold(:)
       integer, allocatable :: slot(:)
       integer :: k
 
@@ -88,6 +90,35 @@ contains
          self%tangent%value(slot(k)) = system%matrix%value(k)
       end do
       if (has_curvature) call constraints_add_curvature(set, system%space%numbering, self%tangent)
+      do k = set%n_permanent + 1, set%n_row
+         if (hold(k) > 0.0_wp) call hold_row(set, k, hold(k), self%tangent)
+      end do
+   end subroutine assemble
+
+   !> Row `k` pushes back by `hold` times what it gains.
+   pure subroutine hold_row(set, k, hold, tangent)
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(in) :: k
+      real(wp), intent(in) :: hold
+      type(csr_t), intent(inout) :: tangent
+      integer :: i, j, place
+
+      associate (force => set%force_rows, gap => set%gap_rows)
+         do i = force%row_start(k) + 1, force%row_start(k + 1)
+            do j = gap%row_start(k) + 1, gap%row_start(k + 1)
+               place = csr_find(tangent, force%column(i) + 1, gap%column(j) + 1)
+               if (place > 0) tangent%value(place) = tangent%value(place) &
+                  + real(hold, dp)*force%value(i)*gap%value(j)
+            end do
+         end do
+      end associate
+   end subroutine hold_row
+
+   subroutine factorise(self, correction, error)
+      type(condensation_t), intent(inout) :: self
+      type(correction_t), intent(in) :: correction
+      type(error_t), allocatable, intent(out) :: error
+
       if (.not. allocated(self%solver)) call solver_create(correction%choice, matrix_general, &
          self%solver, correction%user)
       call self%solver%analyse(self%tangent, error)

@@ -35,7 +35,7 @@ module emcon_newton
    implicit none
    private
    public :: newton_t, newton_init, newton_solve, interrupt_interface
-   public :: newton_check_interrupt, newton_pick_residual, newton_measure_forces
+   public :: newton_has_load, newton_check_interrupt, newton_pick_residual, newton_measure_forces
    public :: newton_converged, newton_refused, newton_diverged, newton_singular, newton_redundant, &
       newton_early
 
@@ -81,6 +81,7 @@ module emcon_newton
       type(factor_policy_t) :: factor_policy     !! of a factor over steps
       logical :: looks_early = .false.           !! in the next solve: may it end as `newton_early`?
       logical :: is_idle = .false.               !! no load: all forces are round-off
+      real(wp) :: largest_move = huge(1.0_wp)    !! of a correction that contacts stand beside [L]
    end type newton_t
 
 contains
@@ -512,7 +513,7 @@ contains
          .and. defect <= round_off
       if (set%penalty%is_under_way) call measure_lack(self, system, set, norm, is_rounding)
       ! A body that moves as a rigid one has no forces to compare its round-off with.
-      self%is_idle = is_rounding .and. .not. has_load(system)
+      self%is_idle = is_rounding .and. .not. newton_has_load(system)
       if (.not. self%is_idle) is_rounding = is_rounding .and. norm <= most_rounding
    end subroutine measure
 
@@ -580,13 +581,13 @@ contains
    end subroutine take_sizes
 
    !> Is there any force but those of elements and contact?
-   pure logical function has_load(system)
+   pure logical function newton_has_load(system)
       type(system_t), intent(in) :: system
 
       associate (part => system%response%part)
-         has_load = any(abs(part(role_external)%force) > 0.0_wp) &
+         newton_has_load = any(abs(part(role_external)%force) > 0.0_wp) &
             .or. any(abs(part(role_inertia)%force) > 0.0_wp)
       end associate
-   end function has_load
+   end function newton_has_load
 
 end module emcon_newton

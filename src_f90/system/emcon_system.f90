@@ -360,6 +360,8 @@ contains
             call self%term(k)%term%add_stiffness(stiffness)
          end do
       end if
+      ! What does not deform is moved as what does.
+      where (.not. stiffness > 0.0_wp) stiffness = maxval(stiffness)
       do i = 1, size(stiffness)
          if (self%space%body(i) == 0) cycle
          if (.not. is_loose(self%space%body(i))) stiffness(i) = 0.0_wp

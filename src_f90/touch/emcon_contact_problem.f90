@@ -1,12 +1,13 @@
 !> Places of contact whose gaps and slips are linear in their forces: which act, stick and slide.
 !>
-!> [g; -s] = free + W [lam; tau], contact by contact, with Coulomb's law at each. By Newton's method
-!> for the natural map of all of them at once, which is a trial of the law at every place; where
-!> that does not come to an end place by place, each exactly, until nothing changes (Gauss and
-!> Seidel), which needs no inverse, so that contacts that follow from others do no harm; the two
-!> take turns. Last, in the plane, by the method of Lemke for (lam, tau+, tau-, rest of the cone),
-!> whose matrix is copositive. Where W is positive definite there is a solution for any coefficient.
-!> Source: docs/theory.md, eq. (14i).
+!> With y, by which all of them push, [g; -s] = free + W y and [lam; tau] = base + y - c ([g; -s] -
+!> start), contact by contact, with Coulomb's law at each; c is 0, or what the surfaces were held by
+!> as W was found where nothing else holds bodies. By Newton's method for the natural map of all of
+!> them at once, which is a trial of the law at every place; where that does not come to an end
+!> place by place, each exactly, until nothing changes (Gauss and Seidel), which needs no inverse,
+!> so that contacts that follow from others do no harm; the two take turns. Last, in the plane, by
+!> the method of Lemke for (lam, tau+, tau-, rest of the cone), whose matrix is copositive. Where W
+!> is positive definite there is a solution for any coefficient. Source: docs/theory.md, eq. (14i).
 module emcon_contact_problem
    use emcon_constraint, only : most_slips
    use emcon_coulomb_law, only : contact_trial_t, coulomb_map, coulomb_status, slip_status_t
@@ -17,8 +18,8 @@ module emcon_contact_problem
    implicit none
    private
    public :: contact_problem_t, contact_effort_t, contact_problem_create, contact_problem_solve, &
-      contact_problem_missed, contact_problem_status, contact_problem_stiffness, &
-      contact_problem_pivot
+      contact_problem_force, contact_problem_missed, contact_problem_status, &
+      contact_problem_stiffness, contact_problem_pivot
 
    !> Trials of all places at once at first, and when their turn comes again; sweeps in the first
    !> turn, twice as many in each that follows; turns.
@@ -31,6 +32,10 @@ module emcon_contact_problem
    !> singular, and what moves nothing may be missed by more.
    real(wp), parameter :: met = 1.0e4_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp)), &
       nearly_met = 50.0_wp*met
+   !> What gives way with nothing but contact to hold it does so by this part of c.
+   real(dp), parameter :: freely = sqrt(epsilon(1.0_dp))
+   !> What a sum of W and forces rounds, per sum of their sizes.
+   real(wp), parameter :: rounded = 16.0_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
    !> W of Newton's method is stiffer by this part of its diagonal: its solutions are the same, and
    !> where W is singular it has steps.
    real(wp), parameter :: proximal = 1.0e3_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
@@ -38,9 +43,15 @@ module emcon_contact_problem
    type :: contact_problem_t
       integer :: n_slip = 0                          !! of each contact, n_dim - 1
       real(wp), allocatable :: w(:, :)               !! W, ((1 + n_slip) n, the same) [T^2/M]
-      real(wp), allocatable :: free(:, :)            !! (0:n_slip, n) g and -s without forces [L]
+      real(wp), allocatable :: free(:, :)            !! (0:n_slip, n) g and -s without y [L]
+      !> (0:n_slip, n) forces that y counts from: near the solution, what is soft keeps its digits
+      real(wp), allocatable :: base(:, :)
+      real(wp), allocatable :: hold(:, :)            !! (0:n_slip, n) c [M/T^2]
+      real(wp), allocatable :: start(:, :)           !! (0:n_slip, n) g and -s that c counts from
       real(wp), allocatable :: slip_target(:, :)     !! (n_slip, n) a [L]
       real(wp), allocatable :: mu(:)                 !! (n) >= 0
+      !> (n) of what a contact pushes at, where W knows how bodies move, too; 0: 1/W [M/T^2]
+      real(wp), allocatable :: stiffness(:)
    end type contact_problem_t
 
    !> What a solution has cost.
@@ -58,29 +69,106 @@ contains
 
       self%n_slip = n_slip
       allocate(self%w((1 + n_slip)*n, (1 + n_slip)*n), self%free(0:n_slip, n), &
-         self%slip_target(n_slip, n), self%mu(n), source=0.0_wp)
+         self%base(0:n_slip, n), &
+         self%start(0:n_slip, n), self%hold(0:n_slip, n), self%slip_target(n_slip, n), self%mu(n), self%stiffness(n), source=0.0_wp)
    end subroutine contact_problem_create
 
    !> Forces that obey the law at all contacts.
-   subroutine contact_problem_solve(self, force, effort, is_solved)
+   subroutine contact_problem_solve(self, push, effort, is_solved)
       type(contact_problem_t), intent(in) :: self
-      real(wp), intent(inout) :: force(0:, :)        !! (0:n_slip, n) start, solution [M L/T^2]
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) start, solution: y [M L/T^2]
       type(contact_effort_t), intent(out) :: effort
-      logical, intent(out) :: is_solved              !! else `force` is as near as it came
+      logical, intent(out) :: is_solved              !! else `push` is as near as it came
+      type(contact_problem_t) :: apart
       integer :: turn
 
-      call solve_by_trials(self, force, first_trials, effort%n_trial, is_solved)
+      is_solved = size(self%mu) == 0
+      if (is_solved) return
+      call solve_by_trials(self, push, first_trials, effort%n_trial, is_solved)
       if (is_solved .or. .not. has_compliance(self)) return
       do turn = 1, most_turns
+         call solve_by_sweeps(self, push, first_sweeps*2**(turn - 1), effort%n_sweep, is_solved)
          if (is_solved) return
-         call solve_by_sweeps(self, force, first_sweeps*2**(turn - 1), effort%n_sweep, is_solved)
+         call solve_by_trials(self, push, more_trials, effort%n_trial, is_solved)
          if (is_solved) return
-         call solve_by_trials(self, force, more_trials, effort%n_trial, is_solved)
       end do
-      is_solved = contact_problem_missed(self, force) <= nearly_met
-      if (.not. is_solved .and. self%n_slip == 1) call contact_problem_pivot(self, force, &
-         effort%n_pivot, is_solved)
+      is_solved = contact_problem_missed(self, push) <= nearly_met
+      if (is_solved .or. self%n_slip /= 1) return
+      if (.not. any(self%hold > 0.0_wp)) then
+         call contact_problem_pivot(self, push, effort%n_pivot, is_solved)
+         return
+      end if
+      call let_go(self, apart)
+      call contact_problem_pivot(apart, push, effort%n_pivot, is_solved)
+      if (.not. is_solved) return
+      call take_back(self, push)
+      call solve_by_trials(self, push, more_trials, effort%n_trial, is_solved)
    end subroutine contact_problem_solve
+
+   !> The same places without what holds them: what moves freely is held by round-off's root of it.
+   subroutine let_go(self, apart)
+      type(contact_problem_t), intent(in) :: self
+      type(contact_problem_t), intent(out) :: apart
+      real(dp), dimension(size(self%w, 1), size(self%w, 1)) :: yields, w
+      logical :: is_singular
+
+      apart = self
+      apart%hold = 0.0_wp
+      apart%base = force_of(self, 0.0_wp*self%free, self%free)
+      call find_yield(self, yields)
+      call dense_solve(transpose(yields), real(transpose(self%w), dp), w, is_singular)
+      apart%w = real(transpose(w), wp)
+   end subroutine let_go
+
+   !> What y of the places as they are held leads to the forces of those that are not.
+   subroutine take_back(self, push)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) [M L/T^2]
+      real(dp) :: yields(size(push), size(push)), y(size(push), 1)
+      logical :: is_singular
+
+      call find_yield(self, yields)
+      call dense_solve(yields, reshape(real(push, dp), [size(push), 1]), y, is_singular)
+      push = reshape(real(y(:, 1), wp), shape(push))
+   end subroutine take_back
+
+   !> What forces gain by y: 1 - c W, and a little more so that it has an inverse.
+   pure subroutine find_yield(self, yields)
+      type(contact_problem_t), intent(in) :: self
+      real(dp), intent(out) :: yields(:, :)
+      integer :: i, k, m
+
+      m = 1 + self%n_slip
+      do i = 1, size(self%mu)
+         do k = 0, self%n_slip
+            associate (row => m*(i - 1) + 1 + k)
+               yields(row, :) = -real(self%hold(k, i)*self%w(row, :), dp)
+            end associate
+         end do
+      end do
+      do k = 1, size(yields, 1)
+         yields(k, k) = yields(k, k) + 1.0_dp + freely
+      end do
+   end subroutine find_yield
+
+   !> Forces [M L/T^2].
+   pure function force_of(self, push, motion) result(force)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
+      real(wp), intent(in) :: motion(0:, :)          !! (0:n_slip, n) it leads to [L]
+      real(wp) :: force(0:self%n_slip, size(self%mu))
+
+      force = self%base + push - self%hold*(motion - self%start)
+   end function force_of
+
+   !> The forces of y [M L/T^2].
+   pure function contact_problem_force(self, push) result(force)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
+      real(wp) :: force(0:self%n_slip, size(self%mu))
+
+      force = force_of(self, push, motion_of(self, push))
+   end function contact_problem_force
 
    !> Does each gap open when it is pushed?
    pure logical function has_compliance(self)
@@ -91,25 +179,34 @@ contains
          > 0.0_wp, i = 1, size(self%mu))])
    end function has_compliance
 
-   !> The stiffness by which a miss of the law is a force: of contact `i` by itself [M/T^2].
+   !> The stiffness by which a miss of the law at contact `i` is a force [M/T^2].
    pure real(wp) function contact_problem_stiffness(self, i) result(stiffness)
       type(contact_problem_t), intent(in) :: self
       integer, intent(in) :: i                       !! 1 to n
+
+      stiffness = max(self%stiffness(i), own_stiffness(self, i))
+   end function contact_problem_stiffness
+
+   !> How stiff contact `i` is by itself [M/T^2].
+   pure real(wp) function own_stiffness(self, i) result(stiffness)
+      type(contact_problem_t), intent(in) :: self
+      integer, intent(in) :: i
       integer :: k, m
 
       m = 1 + self%n_slip
       stiffness = m/max(sum([(abs(self%w(k, k)), k = m*(i - 1) + 1, m*i)]), tiny(stiffness))
-   end function contact_problem_stiffness
+   end function own_stiffness
 
    !> In which ways the law holds at the contacts.
-   pure function contact_problem_status(self, force) result(status)
+   pure function contact_problem_status(self, push) result(status)
       type(contact_problem_t), intent(in) :: self
-      real(wp), intent(in) :: force(0:, :)           !! (0:n_slip, n) of a solution [M L/T^2]
+      real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) of a solution [M L/T^2]
       type(slip_status_t) :: status(size(self%mu))
-      real(wp) :: motion(0:self%n_slip, size(self%mu))
+      real(wp), dimension(0:self%n_slip, size(self%mu)) :: motion, force
       integer :: i
 
-      motion = motion_of(self, force)
+      motion = motion_of(self, push)
+      force = force_of(self, push, motion)
       do i = 1, size(status)
          status(i) = coulomb_status(trial_of(self, force(:, i), motion(:, i), i), self%mu(i), &
             contact_problem_stiffness(self, i))
@@ -133,37 +230,59 @@ contains
    end function trial_of
 
    !> Gaps, and slips the other way round [L].
-   pure function motion_of(self, force) result(motion)
+   pure function motion_of(self, push) result(motion)
       type(contact_problem_t), intent(in) :: self
-      real(wp), intent(in) :: force(0:, :)           !! (0:n_slip, n) [M L/T^2]
+      real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
       real(wp) :: motion(0:self%n_slip, size(self%mu))
 
-      motion = self%free + reshape(matmul(self%w, reshape(force, [size(force)])), shape(force))
+      motion = self%free + reshape(matmul(self%w, reshape(push, [size(push)])), shape(push))
    end function motion_of
 
    !> How far the law is missed at its worst contact, over the largest force; 0: no force at all.
-   pure real(wp) function contact_problem_missed(self, force) result(missed)
+   pure real(wp) function contact_problem_missed(self, push) result(missed)
       type(contact_problem_t), intent(in) :: self
-      real(wp), intent(in) :: force(0:, :)           !! (0:n_slip, n) [M L/T^2]
+      real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
       real(wp) :: defect(0:self%n_slip, size(self%mu))
 
-      call natural_map(self, force, defect)
-      missed = maxval(abs(defect))
-      if (missed > 0.0_wp) missed = missed/max(maxval(abs(force)), tiny(missed))
+      call natural_map(self, push, defect)
+      missed = missed_by(self, push, defect)
+      if (missed > 0.0_wp) missed = missed/max(maxval(abs(contact_problem_force(self, push))), &
+         tiny(missed))
    end function contact_problem_missed
 
-   !> Forces less those that the natural map makes of them.
-   pure subroutine natural_map(self, force, defect, slope)
+   !> The same of a natural map that is known, as a force [M L/T^2]. What W rounds is no miss: where
+   !> bodies move nearly freely large motions cancel.
+   pure real(wp) function missed_by(self, push, defect) result(missed)
       type(contact_problem_t), intent(in) :: self
-      real(wp), intent(in) :: force(0:, :)           !! (0:n_slip, n) [M L/T^2]
+      real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
+      real(wp), intent(in) :: defect(0:, :)          !! (0:n_slip, n) [M L/T^2]
+      real(wp) :: moved(0:self%n_slip, size(self%mu))
+      integer :: i
+
+      missed = 0.0_wp
+      if (.not. maxval(abs(defect)) > 0.0_wp) return
+      moved = abs(self%free) + reshape(matmul(abs(self%w), reshape(abs(push), [size(push)])), &
+         shape(push))
+      do i = 1, size(self%mu)
+         missed = max(missed, maxval(abs(defect(:, i)) - rounded*moved(:, i) &
+            *contact_problem_stiffness(self, i)))
+      end do
+   end function missed_by
+
+   !> Forces less those that the natural map makes of them.
+   pure subroutine natural_map(self, push, defect, slope)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
       real(wp), intent(out) :: defect(0:, :)         !! (0:n_slip, n) [M L/T^2]
-      real(dp), intent(out), optional :: slope(:, :) !! of `defect` by `force`, proximal
+      real(dp), intent(out), optional :: slope(:, :) !! of `defect` by y, proximal
+      real(wp), dimension(0:self%n_slip, size(self%mu)) :: motion, force
       real(wp) :: mapped(0:most_slips), by(0:most_slips, 0:most_slips), stiffness, &
-         motion(0:self%n_slip, size(self%mu))
+         gain(0:self%n_slip, 0:self%n_slip)
       integer :: i, k, m
 
       m = 1 + self%n_slip
-      motion = motion_of(self, force)
+      motion = motion_of(self, push)
+      force = force_of(self, push, motion)
       do i = 1, size(self%mu)
          stiffness = contact_problem_stiffness(self, i)
          call coulomb_map(trial_of(self, force(:, i), motion(:, i), i), self%mu(i), stiffness, &
@@ -171,8 +290,11 @@ contains
          defect(:, i) = force(:, i) - mapped(:self%n_slip)
          if (.not. present(slope)) cycle
          associate (row => m*(i - 1) + 1)
-            slope(row:m*i, :) = real(stiffness*matmul(by(:self%n_slip, :self%n_slip), &
-               self%w(row:m*i, :)), dp)
+            do k = 0, self%n_slip
+               gain(:, k) = (stiffness + self%hold(k, i))*by(:self%n_slip, k)
+               gain(k, k) = gain(k, k) - self%hold(k, i)
+            end do
+            slope(row:m*i, :) = real(matmul(gain, self%w(row:m*i, :)), dp)
             do k = 0, self%n_slip
                slope(row:m*i, row + k) = slope(row:m*i, row + k) + real(by(:self%n_slip, k) &
                   *(stiffness*proximal*self%w(row + k, row + k) - 1.0_wp), dp)
@@ -182,29 +304,29 @@ contains
       end do
    end subroutine natural_map
 
-   !> By Newton's method for the natural map. `force` stays as it was if that does not end.
-   subroutine solve_by_trials(self, force, most, n_trial, is_solved)
+   !> By Newton's method for the natural map. `push` stays as it was if that does not end.
+   subroutine solve_by_trials(self, push, most, n_trial, is_solved)
       type(contact_problem_t), intent(in) :: self
-      real(wp), intent(inout) :: force(0:, :)        !! (0:n_slip, n) [M L/T^2]
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
       integer, intent(in) :: most                    !! trials
       integer, intent(inout) :: n_trial              !! counted on
       logical, intent(out) :: is_solved
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: trial, defect, new, step
-      real(dp) :: slope(size(force), size(force)), x(size(force), 1)
-      real(wp) :: part, before, now
+      real(dp) :: slope(size(push), size(push)), x(size(push), 1)
+      real(wp) :: part, before
       integer :: i, halving
       logical :: is_singular
 
-      trial = force
+      trial = push
       is_solved = .false.
       do i = 0, most
          call natural_map(self, trial, defect, slope)
-         now = maxval(abs(defect))
-         is_solved = now <= met*maxval(abs(trial))
+         is_solved = missed_by(self, trial, defect) <= met*maxval(abs(contact_problem_force(self, &
+            trial)))
          ! A start that is near is made exact.
-         if ((is_solved .and. (i > 0 .or. .not. now > 0.0_wp)) .or. i == most) exit
+         if ((is_solved .and. (i > 0 .or. .not. maxval(abs(defect)) > 0.0_wp)) .or. i == most) exit
          n_trial = n_trial + 1
-         call dense_solve(slope, reshape(real(-defect, dp), [size(force), 1]), x, is_singular)
+         call dense_solve(slope, reshape(real(-defect, dp), [size(push), 1]), x, is_singular)
          if (is_singular) exit
          step = reshape(real(x(:, 1), wp), shape(step))
          before = norm2(defect)
@@ -218,47 +340,77 @@ contains
          if (.not. norm2(defect) < huge(before)) exit
          trial = new
       end do
-      if (is_solved) force = trial
+      if (is_solved) push = trial
    end subroutine solve_by_trials
 
-   !> Contact by contact, each exactly with the forces of the others, over and over.
-   subroutine solve_by_sweeps(self, force, most, n_sweep, is_solved)
+   !> Contact by contact, each exactly with the pushes of the others, over and over.
+   subroutine solve_by_sweeps(self, push, most, n_sweep, is_solved)
       type(contact_problem_t), intent(in) :: self
-      real(wp), intent(inout) :: force(0:, :)        !! (0:n_slip, n) [M L/T^2]
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
       integer, intent(in) :: most                    !! sweeps
       integer, intent(inout) :: n_sweep              !! counted on
       logical, intent(out) :: is_solved
       type(single_contact_t) :: place
-      real(wp) :: new(0:most_slips), motion(0:self%n_slip, size(self%mu)), change(0:self%n_slip)
+      real(wp) :: new(0:most_slips), motion(0:self%n_slip, size(self%mu))
+      real(wp), dimension(0:self%n_slip) :: force, change
+      real(dp) :: yields(0:self%n_slip, 0:self%n_slip, size(self%mu))    ! y by forces
       real(wp) :: endless                            ! forces that grow from sweep to sweep
       integer :: i, m, sweep
 
       m = 1 + self%n_slip
       place%n_slip = self%n_slip
-      endless = maxval([(contact_problem_stiffness(self, i), i = 1, size(self%mu))]) &
+      call find_yields(self, yields)
+      endless = maxval([(own_stiffness(self, i), i = 1, size(self%mu))]) &
          *maxval(abs(self%free))/epsilon(endless)**2
       is_solved = .false.
       do sweep = 1, most
          n_sweep = n_sweep + 1
-         motion = motion_of(self, force)
+         motion = motion_of(self, push)
          do i = 1, size(self%mu)
-            associate (row => m*(i - 1) + 1)
-               place%w(:self%n_slip, :self%n_slip) = self%w(row:m*i, row:m*i)
-               place%free(:self%n_slip) = motion(:, i) - matmul(self%w(row:m*i, row:m*i), &
-                  force(:, i))
+            associate (w => self%w(:, m*(i - 1) + 1:m*i), row => m*(i - 1) + 1)
+               force = self%base(:, i) + push(:, i) - self%hold(:, i)*(motion(:, i) &
+                  - self%start(:, i))
+               place%w(:self%n_slip, :self%n_slip) = matmul(w(row:m*i, :), &
+                  real(yields(:, :, i), wp))
+               place%free(:self%n_slip) = motion(:, i) - matmul(place%w(:self%n_slip, &
+                  :self%n_slip), force)
                place%slip_target(:self%n_slip) = self%slip_target(:, i)
                place%mu = self%mu(i)
-               place%stiffness = contact_problem_stiffness(self, i)
+               place%stiffness = own_stiffness(self, i)
                new = single_contact_solve(place)
-               change = new(:self%n_slip) - force(:, i)
-               force(:, i) = new(:self%n_slip)
-               call add_motion(self%w(:, row:m*i), change, motion)
+               change = matmul(real(yields(:, :, i), wp), new(:self%n_slip) - force)
+               push(:, i) = push(:, i) + change
+               call add_motion(w, change, motion)
             end associate
          end do
-         is_solved = contact_problem_missed(self, force) <= met
-         if (is_solved .or. maxval(abs(force)) > endless) exit
+         is_solved = contact_problem_missed(self, push) <= met
+         if (is_solved .or. maxval(abs(push)) > endless) exit
       end do
    end subroutine solve_by_sweeps
+
+   !> What y of each contact gains by its force, those of the others as they are.
+   subroutine find_yields(self, yields)
+      type(contact_problem_t), intent(in) :: self
+      real(dp), intent(out) :: yields(0:, 0:, :)     !! (0:n_slip, 0:n_slip, n)
+      real(dp), dimension(0:self%n_slip, 0:self%n_slip) :: unit, by
+      integer :: i, k, m
+      logical :: is_singular
+
+      m = 1 + self%n_slip
+      unit = 0.0_dp
+      do k = 0, self%n_slip
+         unit(k, k) = 1.0_dp
+      end do
+      do i = 1, size(self%mu)
+         yields(:, :, i) = unit
+         if (.not. any(self%hold(:, i) > 0.0_wp)) cycle
+         do k = 0, self%n_slip
+            by(k, :) = (1.0_dp + freely)*unit(k, :) - real(self%hold(k, i)*self%w(m*(i - 1) + 1 &
+               + k, m*(i - 1) + 1:m*i), dp)
+         end do
+         call dense_solve(by, unit, yields(:, :, i), is_singular)
+      end do
+   end subroutine find_yields
 
    !> What the forces of one contact more move.
    pure subroutine add_motion(w, change, motion)
@@ -274,27 +426,28 @@ contains
 
    !> In the plane, by complementary pivoting over (lam, tau+, tau-, mu lam - |tau|), with slips
    !> from a: what is free before that, or rests, is for others to find.
-   subroutine contact_problem_pivot(self, force, n_pivot, is_solved)
+   subroutine contact_problem_pivot(self, push, n_pivot, is_solved)
       type(contact_problem_t), intent(in) :: self
-      real(wp), intent(inout) :: force(0:, :)        !! (0:1, n) [M L/T^2]
+      real(wp), intent(inout) :: push(0:, :)         !! (0:1, n) y [M L/T^2]
       integer, intent(out) :: n_pivot                !! pivots that were taken
-      logical, intent(out) :: is_solved              !! else `force` is as it was
+      logical, intent(out) :: is_solved              !! else `push` is as it was
       real(wp), dimension(4*size(self%mu), 4*size(self%mu)) :: m
       real(wp), dimension(4*size(self%mu)) :: q, z
-      real(wp) :: unit, length
+      real(wp) :: unit, length, free(0:1, size(self%mu))
       integer :: i, n
 
       n = size(self%mu)
       ! Forces by the largest stiffness, so that all entries are of one size.
       length = maxval(abs(self%w))
-      unit = max(maxval(abs(self%free)), maxval(abs(self%slip_target)), tiny(unit))
+      free = motion_of(self, -self%base)
+      unit = max(maxval(abs(free)), maxval(abs(self%slip_target)), tiny(unit))
       m = 0.0_wp
       q = 0.0_wp
-      associate (w => self%w/length, slips => self%free(1, :) + self%slip_target(1, :))
+      associate (w => self%w/length, slips => free(1, :) + self%slip_target(1, :))
          m(:n, :3*n) = reshape([w(1::2, 1::2), w(1::2, 2::2), -w(1::2, 2::2)], [n, 3*n])
          m(n + 1:2*n, :3*n) = reshape([w(2::2, 1::2), w(2::2, 2::2), -w(2::2, 2::2)], [n, 3*n])
          m(2*n + 1:3*n, :3*n) = -m(n + 1:2*n, :3*n)
-         q(:3*n) = [self%free(0, :), slips, -slips]/unit
+         q(:3*n) = [free(0, :), slips, -slips]/unit
       end associate
       do i = 1, n
          m([n + i, 2*n + i], 3*n + i) = 1.0_wp
@@ -304,8 +457,8 @@ contains
       call lemke_solve(m, q, z, is_solved, n_pivot)
       if (.not. is_solved) return
       z = (unit/length)*z
-      force(0, :) = z(:n)
-      force(1, :) = z(n + 1:2*n) - z(2*n + 1:3*n)
+      push(0, :) = z(:n) - self%base(0, :)
+      push(1, :) = z(n + 1:2*n) - z(2*n + 1:3*n) - self%base(1, :)
    end subroutine contact_problem_pivot
 
 end module emcon_contact_problem

@@ -34,8 +34,8 @@ contains
       type(correction_t) :: correction
       type(condensation_t) :: condensation
       real(dp), allocatable :: full(:, :), rhs(:, :), x(:, :), force(:, :), gap(:, :)
-      real(wp), allocatable :: lam(:)
-      integer :: n, m, case
+      real(wp), allocatable :: lam(:), hold(:)
+      integer :: n, m, k, case
       logical :: is_singular
 
       call make_problem(problem)
@@ -47,17 +47,22 @@ contains
       associate (set => problem%set)
          force = dense_of(set%force_rows)
          gap = dense_of(set%gap_rows)
-         do case = 0, 5
-            m = min(set%n - 1, 2*(case/2))
-            if (case > 3) m = set%n - 1
+         do case = 0, 7
+            m = min(set%n - 1, 2*(modulo(case, 6)/2))
+            if (any(case == [4, 5])) m = set%n - 1
             set%n_permanent = m
+            hold = 0.0_wp*set%defect
+            if (case > 5) hold = [(real(k, wp), k = 1, size(hold))]
             call condensation_make(condensation, system, set, correction, problem%residual, &
-               mod(case, 2) == 0, error)
+               mod(case, 2) == 0, hold, error)
             if (allocated(error)) return
             lam = set%lam(m + 1:set%n)
             allocate(full(n + m, n + m), rhs(n + m, 1), x(n + m, 1), source=0.0_dp)
             full(:n, :n) = dense_of(problem%base)
             if (mod(case, 2) == 0) full(:n, :n) = dense_of(problem%matrix)
+            do k = m + 1, size(hold)
+               full(:n, :n) = full(:n, :n) + hold(k)*spread(force(k, :), 2, n)*spread(gap(k, :), 1, n)
+            end do
             full(:n, n + 1:) = -transpose(force(:m, :))
             full(n + 1:, :n) = gap(:m, :)
             rhs(:n, 1) = matmul(real(lam, dp), force(m + 1:, :)) - real(problem%residual, dp)
@@ -96,7 +101,7 @@ contains
       system%matrix%value = 0.0_dp
       call correction_reset(correction, method_null_space, solver_default)
       call condensation_make(condensation, system, problem%set, correction, problem%residual, &
-         .false., error)
+         .false., 0.0_wp*problem%set%defect, error)
       if (allocated(error)) return
       call check_true(error, condensation%is_singular, "it is singular")
       call condensation_free(condensation)

@@ -6,7 +6,8 @@ module test_contact_problem
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_constraint, only : most_slips
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
-      contact_problem_missed, contact_problem_pivot, contact_problem_solve, &
+      contact_problem_force, contact_problem_missed, contact_problem_pivot, &
+      contact_problem_solve, &
       contact_problem_status, contact_problem_t
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
       contact_sticks, contact_trial_t, coulomb_violation, slip_status_t
@@ -40,6 +41,8 @@ contains
          test_case_t("the only one of all sets that obeys the law", test_all_sets), &
          test_case_t("by pivots as by trials", test_pivots), &
          test_case_t("what has no solution is told", test_no_solution), &
+         test_case_t("held as W is found: the same forces", test_held), &
+         test_case_t("a body that its contacts alone hold", test_alone), &
          test_case_t("random problems of all kinds", test_kinds)]
    end subroutine collect_contact_problem
 
@@ -379,6 +382,84 @@ contains
          end do
       end do
    end subroutine test_kinds
+
+   !> With c G^T G in the tangent W becomes (1 + W c)^-1 W: where W is definite and mu small the
+   !> forces are the same ones, in the plane by pivots too.
+   subroutine test_held(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_problem_t) :: problem, held
+      type(contact_effort_t) :: effort
+      real(wp), allocatable :: push(:, :), force(:, :)
+      real(dp), allocatable :: unit(:, :), gain(:, :)
+      logical :: is_solved, is_singular
+      integer :: case, n_slip, k, m
+
+      do case = 1, 200
+         n_slip = modulo(case, 3)
+         call make_problem(problem, n_slip, definite, leads=mod(case, 2) == 0)
+         problem%mu = 0.1_wp*problem%mu
+         m = size(problem%free)
+         problem%base = reshape(normals(m), shape(problem%free))
+         call solve(problem, push, effort, is_solved)
+         call check_true(error, is_solved, "solved as it is")
+         if (allocated(error)) return
+         force = contact_problem_force(problem, push)
+         held = problem
+         held%hold = reshape(abs(normals(m)), shape(held%hold))
+         held%start = reshape(normals(m), shape(held%start))
+         allocate(unit(m, m), gain(m, m), source=0.0_dp)
+         do k = 1, m
+            unit(k, k) = 1.0_dp
+         end do
+         call dense_solve(unit + real(problem%w*spread(reshape(held%hold, [m]), 1, m), dp), unit, &
+            gain, is_singular)
+         held%w = real(matmul(gain, real(problem%w, dp)), wp)
+         held%free = held%start + reshape(real(matmul(gain, reshape(real(problem%free &
+            - held%start, dp), [m])), wp), shape(held%free))
+         call solve(held, push, effort, is_solved)
+         call check_true(error, is_solved, "solved as it is held")
+         if (.not. allocated(error)) call check_near(error, reshape(contact_problem_force(held, &
+            push), [m]), reshape(force, [m]), 1.0e6_wp*eps, maxval(abs(held%base) + abs(push)), &
+            "forces")
+         if (allocated(error)) return
+         deallocate(unit, gain)
+      end do
+   end subroutine test_held
+
+   !> Two contacts under a body of weight 1 that nothing else holds, at 1 and 3 from its center on
+   !> both sides: 3/4 and 1/4, and where it stands on one alone, that is under its center, all.
+   subroutine test_alone(error)
+      type(error_t), allocatable, intent(out) :: error
+
+      call check_alone(error, [-1.0_wp, 3.0_wp], [0.75_wp, 0.25_wp])
+      call check_alone(error, [0.0_wp, 2.0_wp], [1.0_wp, 0.0_wp])
+   end subroutine test_alone
+
+   subroutine check_alone(error, at, expected)
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp), intent(in) :: at(2)              !! places along the body
+      real(wp), intent(in) :: expected(2)
+      type(contact_problem_t) :: problem
+      type(contact_effort_t) :: effort
+      real(wp), allocatable :: push(:, :)
+      real(dp) :: g(2, 2), tangent(2, 2), motion(2, 3)
+      logical :: is_solved, is_singular
+
+      if (allocated(error)) return
+      call contact_problem_create(problem, 0, 2)
+      problem%hold = 1.0_wp
+      ! Up and round: gaps gain up + at*round, and the tangent is that of what holds.
+      g = reshape([1.0_dp, 1.0_dp, real(at, dp)], [2, 2])
+      tangent = matmul(transpose(g), g)
+      call dense_solve(tangent, reshape([-1.0_dp, 0.0_dp, transpose(g)], [2, 3]), motion, &
+         is_singular)
+      problem%free(0, :) = real(matmul(g, motion(:, 1)), wp)
+      problem%w = real(matmul(g, motion(:, 2:)), wp)
+      call solve(problem, push, effort, is_solved)
+      call check_true(error, is_solved, "solved")
+      if (.not. allocated(error)) call check_near(error, reshape(contact_problem_force(problem, &
+         push), [2]), expected, 1.0e4_wp*eps, 1.0_wp, "forces")
+   end subroutine check_alone
 
    integer function asked_cases(otherwise) result(n)
       integer, intent(in) :: otherwise

@@ -162,6 +162,7 @@ contains
             ! A single iteration for a large motion.
             scene%step(1)%solution%newton_maximum = 1
             march%state%v(1, 14:16) = 30.0_wp
+            march%state%v(2, 11:16:2) = 40.0_wp
             call march_begin_step(march, scene, 1, error)
             if (allocated(error)) return
             call march_increment(march, scene, increment, stopped)
