@@ -39,12 +39,21 @@ contains
          test_case_t("rates that impacts change", test_rates)]
    end subroutine collect_contact_laws
 
-   !> A new law says nothing but what it responds, and acts wherever it is near.
+   !> A new law says nothing but what it responds, and acts wherever it is near; decks do not know it.
    subroutine test_plain(error)
       type(error_t), allocatable, intent(out) :: error
       type(contact_laws_t) :: of_pair, laws
       type(contact_response_t) :: response
+      type(plain_t) :: law
+      logical :: acts
 
+      call law%take(interaction_t(friction=0.5_wp, restitution=0.5_wp), method_penalty, acts)
+      call law%begin(contact_place_t(area=2.0_wp, closure=-1.0_wp))
+      call law%push_on(3.0_wp)
+      call check_true(error, .not. (acts .or. law%gives_back()), "no deck asks for it")
+      call check_near(error, [law%stored(), law%dissipated(contact_values_t(dgap=-1.0_wp), &
+         contact_response_t(lam=7.0_wp)), law%stiffest(), law%closure(), law%rate_change(2.0_wp)], &
+         spread(0.0_wp, 1, 5), 0.0_wp, 1.0_wp, "what it does not say")
       call contact_laws_add(of_pair, plain_t())
       call check_near(error, contact_laws_reach(of_pair), 0.0_wp, 0.0_wp, 1.0_wp, "at contact")
       call contact_laws_begin(laws, of_pair, contact_place_t())

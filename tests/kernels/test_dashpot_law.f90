@@ -1,9 +1,11 @@
 !> Viscous damping between surfaces: the mean of the coefficient over a way, and its derivative.
 module test_dashpot_law
    use check, only : check_near, check_true, test_case_t
-   use emcon_dashpot_law, only : dashpot_at, dashpot_mean, dashpot_mean_slope
+   use emcon_constraint, only : contact_response_t
+   use emcon_contact_law, only : contact_place_t, contact_values_t
+   use emcon_dashpot_law, only : dashpot_at, dashpot_mean, dashpot_mean_slope, dashpot_t
    use emcon_errors, only : error_t
-   use emcon_interactions, only : contact_damping_t
+   use emcon_interactions, only : contact_damping_t, interaction_t
    use emcon_kinds, only : wp
    implicit none
    private
@@ -28,7 +30,8 @@ contains
          test_case_t("the mean by the way is what the impulse falls by", test_mean), &
          test_case_t("of ways one after the other impulses add up", test_sum), &
          test_case_t("the mean of no way is the coefficient, within its bounds", test_small), &
-         test_case_t("its slope is its derivative", test_slope)]
+         test_case_t("its slope is its derivative", test_slope), &
+         test_case_t("push and drag of a condition", test_respond)]
    end subroutine collect_dashpot_law
 
    !> The integral of the coefficient from 0 to `gap`, by its closed form.
@@ -127,5 +130,86 @@ contains
       call check_near(error, dashpot_mean_slope(laws(2), 0.3_wp, 0.0_wp), -4.0_wp, tol, 1.0_wp, &
          "slope of no way")
    end subroutine test_slope
+
+   !> The impulse over a step takes what its work says, and falls by the derivatives that it gives:
+   !> central differences. Held contact drags by all of mu.
+   subroutine test_respond(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: small = epsilon(1.0_wp)**(1.0_wp/3.0_wp)
+      real(wp), parameter :: frequency = 8.0_wp, area = 0.25_wp*6.0_wp
+      type(contact_damping_t) :: surface
+      type(contact_response_t) :: response
+      type(contact_values_t) :: at
+      type(dashpot_t) :: law
+      real(wp) :: mean
+      integer :: i, j, k, s
+      logical :: is_closed
+
+      surface = laws(2)
+      surface%tangent = 0.125_wp
+      do k = 1, 2
+         is_closed = k == 2
+         do i = 1, size(places)
+            do j = 1, size(places)
+               if (i == j) cycle
+               response = response_of(0.0_wp, 0)
+               at = values(0.0_wp, 0)
+               associate (way => places(j) - places(i))
+                  mean = dashpot_mean(surface, places(i), way)
+                  call check_near(error, response%lam, -area*frequency*mean*way, tol, 100.0_wp, &
+                     "push")
+                  if (is_closed) mean = surface%coefficient
+                  call check_near(error, response%tau, 0.125_wp*area*frequency*mean*at%slip, tol, &
+                     100.0_wp, "drag")
+                  call check_near(error, law%dissipated(at, response), &
+                     dot_product(response%tau, at%slip) - response%lam*way, tol, 100.0_wp, "work")
+                  do s = 0, 2
+                     call check_near(error, response%stiffness(:, s), difference(s), &
+                        64.0_wp*small**2, 100.0_wp/abs(way)**3, "slope")
+                  end do
+               end associate
+            end do
+         end do
+      end do
+
+   contains
+
+      !> The gap goes from one place to another, its end or slip `s` is moved by `more`.
+      pure type(contact_values_t) function values(more, s) result(at)
+         real(wp), intent(in) :: more
+         integer, intent(in) :: s
+
+         at = contact_values_t(dgap=places(j) - places(i), slip=[0.5_wp, -0.25_wp], &
+            frequency=frequency)
+         if (s == 0) at%dgap = at%dgap + more
+         if (s > 0) at%slip(s) = at%slip(s) + more
+      end function values
+
+      type(contact_response_t) function response_of(more, s) result(response)
+         real(wp), intent(in) :: more
+         integer, intent(in) :: s
+         type(dashpot_t) :: law
+         logical :: acts
+
+         call law%take(interaction_t(damping=surface), 0, acts)
+         call law%begin(contact_place_t(area=6.0_wp, share=0.25_wp, gap=places(i), &
+            is_closed=is_closed))
+         call law%respond(values(more, s), response)
+         call check_true(error, acts .and. law%has_friction, "it acts")
+         call check_near(error, law%reach, surface%clearance, 0.0_wp, 1.0_wp, "reach")
+      end function response_of
+
+      !> Of the push, falling, and the drags.
+      function difference(s) result(slope)
+         integer, intent(in) :: s
+         real(wp) :: slope(0:2)
+         type(contact_response_t) :: low, high
+
+         low = response_of(-small, s)
+         high = response_of(small, s)
+         slope = [low%lam - high%lam, high%tau - low%tau]/(2.0_wp*small)
+      end function difference
+
+   end subroutine test_respond
 
 end module test_dashpot_law

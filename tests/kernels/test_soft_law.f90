@@ -2,7 +2,7 @@
 module test_soft_law
    use check, only : check_near, check_true, test_case_t
    use emcon_constraint, only : contact_response_t
-   use emcon_contact_law, only : contact_law_t, contact_values_t
+   use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_penalty_law, only : augmented_t, penalty_t
@@ -26,6 +26,8 @@ contains
          test_case_t("and goes on with it where gaps are found anew", test_follow), &
          test_case_t("its slope is its derivative", test_slope), &
          test_case_t("it never pulls, and has one slope at a gap of 0", test_sign), &
+         test_case_t("what stores nothing pushes by what is left, and pulls", test_left), &
+         test_case_t("on a part of an area, from what the step before has left", test_part), &
          test_case_t("an augmented Lagrangian is linear", test_augmented)]
    end subroutine collect_soft_law
 
@@ -132,6 +134,54 @@ contains
             stiffness, "slopes")
       end do
    end subroutine test_sign
+
+   !> Where multipliers belong to the end of a step.
+   subroutine test_left(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(penalty_t) :: law
+      type(contact_response_t) :: response
+      integer :: k
+
+      law%stiffness = stiffness
+      law%before = -0.5_wp
+      do k = -1, 1
+         call law%respond(contact_values_t(gap0=-0.5_wp, gap1=0.25_wp, dgap=0.75_wp, &
+            left=0.125_wp*k, is_stored=.false.), response)
+         call check_near(error, [response%lam, response%stiffness(0, 0), law%now], &
+            [-0.125_wp*k*stiffness, stiffness, 0.25_wp], 0.0_wp, 1.0_wp, "push, slope and end")
+      end do
+   end subroutine test_left
+
+   !> A part p of the area: what is stored is a function of p times the mean gap, which a step
+   !> leaves to the next one whose part is another. A push-back is by the mean gap itself.
+   subroutine test_part(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_place_t), parameter :: place = contact_place_t(area=7.0_wp, &
+         stiffness=stiffness, share=0.25_wp, closure=-0.125_wp)
+      real(wp), parameter :: left(2) = [0.125_wp, 0.5_wp]
+      type(penalty_t) :: law
+      type(augmented_t) :: augmented
+      type(contact_response_t) :: response
+      integer :: k
+
+      do k = 1, size(left)
+         call law%begin(place)
+         call check_near(error, [law%stiffest(), law%before], [stiffness/16.0_wp, -0.5_wp], 0.0_wp, &
+            1.0_wp, "stiffness and start")
+         response = response_of(law, 0.0_wp, left(k))
+         call check_near(error, law%closure(), 0.25_wp*min(0.0_wp, left(k) - 0.5_wp), 0.0_wp, &
+            1.0_wp, "closure")
+         call check_near(error, law%stored(), 0.5_wp*stiffness*law%closure()**2, 0.0_wp, 1.0_wp, &
+            "stored")
+      end do
+      call augmented%begin(place)
+      call check_near(error, [augmented%stiffest(), augmented%share, augmented%before, &
+         augmented%base], [stiffness, 0.25_wp, -0.5_wp, 0.0_wp], 0.0_wp, 1.0_wp, "pushed back")
+      call augmented%push_on(2.0_wp)
+      response = response_of(augmented, 1.0_wp, 0.5_wp)
+      call check_near(error, [response%lam, augmented%now], [2.0_wp - 0.5_wp*stiffness, 0.5_wp], &
+         0.0_wp, 1.0_wp, "goes on from the multiplier")
+   end subroutine test_part
 
    subroutine test_augmented(error)
       type(error_t), allocatable, intent(out) :: error
