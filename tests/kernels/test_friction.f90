@@ -7,8 +7,8 @@ module test_friction
    use emcon_errors, only : error_t
    use emcon_contact_law, only : contact_values_t, loss_friction
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
-      contact_sticks, contact_trial_t, coulomb_map, coulomb_t, coulomb_trial, coulomb_violation, &
-      is_same_status, slip_status_t
+      contact_sticks, contact_trial_t, coulomb_map, coulomb_status, coulomb_t, coulomb_trial, &
+      coulomb_violation, is_same_status, slip_status_t
    use emcon_interactions, only : interaction_t
    use emcon_kinds, only : wp
    use emcon_lemke, only : lemke_solve
@@ -33,6 +33,8 @@ contains
          test_case_t("trials: where the law holds next", test_trial), &
          test_case_t("violation of the law", test_violation), &
          test_case_t("trials of what is led to a slip", test_led_trial), &
+         test_case_t("trials of one slip, all over the line", test_line), &
+         test_case_t("trials across what is led to a slip", test_across), &
          test_case_t("the law of what is led to a slip", test_led), &
          test_case_t("vectors of slips: the cone, work, and trials that stand", test_vectors), &
          test_case_t("vectors of slips turn with the surface", test_turned), &
@@ -155,6 +157,128 @@ contains
       end function turned
 
    end subroutine test_led_trial
+
+   !> One slip with mu lam = 1 and c = 4, led to c a = 2 or nowhere: wherever the trial lies the
+   !> status is read off the number line, also next to its ends, by exactly as much as is undecided.
+   subroutine test_line(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: ways(6) = [contact_open, contact_sticks, contact_free, contact_rests, &
+         1, -1]
+      real(wp), parameter :: c = 4.0_wp
+      type(contact_trial_t) :: at
+      real(wp) :: p, length, unsure
+      integer :: i, k, side, led, doubt
+
+      do led = 0, 1
+         length = 2.0_wp*led
+         do doubt = 0, 2
+            unsure = 0.125_wp*doubt
+            do side = -1, 1, 2
+               do i = -16, 32
+                  p = 0.125_wp*i
+                  do k = 1, size(ways)
+                     if (led == 0 .and. any(ways(k) == [contact_free, contact_rests])) cycle
+                     ! Half by forces, half by slip; all of the doubt by slip, or by forces.
+                     at = place(2.0_wp, 0.5_wp*side*p, 0.5_wp*side*p/c, side*length/c, &
+                        rounding=merge(unsure/c, 0.0_wp, doubt == 1))
+                     associate (next => coulomb_trial(status_of(turned(ways(k))), at, 0.5_wp, c, &
+                           merge(unsure, 0.0_wp, doubt == 2)))
+                        call check_equal(error, turned(code_of(next)), expected(ways(k)), &
+                           "from " // to_text(ways(k)) // " at " // to_text(p))
+                     end associate
+                     if (allocated(error)) return
+                  end do
+                  call check_equal(error, turned(code_of(coulomb_status(at, 0.5_wp, c))), &
+                     on_graph(), "status")
+               end do
+            end do
+         end do
+      end do
+
+   contains
+
+      pure integer function turned(status)
+         integer, intent(in) :: status
+
+         turned = status
+         if (abs(status) == 1) turned = side*status
+      end function turned
+
+      !> Where the graph of the law has it.
+      pure integer function on_graph() result(way)
+         way = contact_free
+         if (p >= length) way = contact_sticks
+         if (p <= 0.0_wp .and. led == 1) way = contact_rests
+         if (p < -1.0_wp) way = -1
+         if (p > length + 1.0_wp) way = 1
+         if (led == 0 .and. abs(p) <= 1.0_wp) way = contact_sticks
+      end function on_graph
+
+      !> What slides comes to an end first, what is free too; what is in doubt stays.
+      pure integer function expected(was) result(way)
+         integer, intent(in) :: was
+         logical :: stays
+
+         way = on_graph()
+         if (led == 1) then
+            if (was == 1 .and. p < length) way = contact_sticks
+            if (was == -1 .and. p > 0.0_wp) way = contact_rests
+            if (was == contact_free .and. way == 1) way = contact_sticks
+            if (was == contact_free .and. way == -1) way = contact_rests
+         end if
+         stays = .false.
+         select case (was)
+         case (contact_sticks)
+            stays = is_at(length + 1.0_wp) .or. (led == 1 .and. is_at(length)) &
+               .or. (led == 0 .and. is_at(-1.0_wp))
+         case (contact_rests)
+            stays = is_at(0.0_wp) .or. is_at(-1.0_wp)
+         case (contact_free)
+            stays = is_at(0.0_wp) .or. is_at(length)
+         case (1)
+            stays = is_at(length + 1.0_wp)
+         case (-1)
+            stays = is_at(-1.0_wp)
+         end select
+         if (stays) way = was
+      end function expected
+
+      pure logical function is_at(end)
+         real(wp), intent(in) :: end
+
+         is_at = abs(p - end) <= unsure
+      end function is_at
+
+   end subroutine test_line
+
+   !> What slides across the segment, free along it, goes on like that, and stays where it is in
+   !> doubt; a push in doubt keeps what is open open, and what is closed closed.
+   subroutine test_across(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: c = 4.0_wp, up(2) = [0.0_wp, 1.0_wp]
+      real(wp), parameter :: trial(2, 5) = reshape([1.0_wp, 3.0_wp, 1.0_wp, -3.0_wp, 1.0_wp, &
+         0.5_wp, 1.0_wp, 1.25_wp, 1.0_wp, 0.75_wp], [2, 5])
+      type(contact_trial_t) :: at
+      type(slip_status_t) :: was, next, seen(3)
+      integer :: k
+
+      was = slip_status_t(contact_slides, up)
+      do k = 1, size(trial, 2)
+         next = coulomb_trial(was, contact_trial_t(lam=2.0_wp, slip=trial(:, k)/c, &
+            slip_target=[2.0_wp, 0.0_wp]/c), 0.5_wp, c, 0.25_wp)
+         call check_equal(error, next%kind, merge(contact_free, contact_slides, k == 3), "status")
+         call check_near(error, next%direction, merge(-1.0_wp, 1.0_wp, k == 2)*merge(0.0_wp, 1.0_wp, &
+            k == 3)*up, tol, 1.0_wp, "direction")
+      end do
+      do k = -1, 1, 2
+         at = contact_trial_t(lam=0.125_wp*k)
+         seen = [coulomb_trial(slip_status_t(contact_open), at, 0.5_wp, c, 0.25_wp), &
+            coulomb_trial(slip_status_t(contact_sticks), at, 0.5_wp, c, 0.25_wp), &
+            coulomb_trial(slip_status_t(contact_sticks), at, 0.5_wp, c, 0.0_wp)]
+         call check_equal(error, seen%kind, [contact_open, contact_sticks, merge(contact_open, &
+            contact_sticks, k < 0)], "a push in doubt")
+      end do
+   end subroutine test_across
 
    !> Friction on the graph misses nothing and takes work; off it, it is missed by the distance.
    subroutine test_led(error)
