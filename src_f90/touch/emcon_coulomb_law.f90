@@ -183,15 +183,11 @@ contains
       type(remainder_t), intent(in) :: rest
       real(wp), intent(in) :: most                   !! mu lam, >= 0 [M L/T^2]
 
-      if (norm2(rest%over) > most) then
-         status = slip_status_t(contact_slides, rest%over/norm2(rest%over))
-      else if (.not. rest%part < 1.0_wp) then
-         status%kind = contact_sticks
-      else if (rest%part > 0.0_wp) then
-         status%kind = contact_free
-      else
-         status%kind = contact_rests
-      end if
+      status%kind = contact_rests
+      if (rest%part > 0.0_wp) status%kind = contact_free
+      if (.not. rest%part < 1.0_wp) status%kind = contact_sticks
+      if (norm2(rest%over) > most) status = slip_status_t(contact_slides, &
+         rest%over/norm2(rest%over))
    end function status_of
 
    !> What slides or is free holds its slip first, at the end of the segment that it comes to:
@@ -209,11 +205,11 @@ contains
          end = merge(1.0_wp, 0.0_wp, dot_product(was%direction, rest%along) > 0.0_wp)
          if (abs(end - rest%part) <= 0.0_wp) return
       case (contact_free)
-         if (meant%kind /= contact_slides .or. (end > 0.0_wp .and. end < 1.0_wp)) return
+         if (end > 0.0_wp .and. end < 1.0_wp) return
       case default
          return
       end select
-      next = slip_status_t(merge(contact_sticks, contact_rests, end > 0.5_wp))
+      next = slip_status_t(merge(contact_sticks, contact_rests, end > 0.0_wp))
    end function held_first
 
    !> Did it slide across the segment, free along it?
@@ -241,10 +237,10 @@ contains
       at_tip = rest%length > 0.0_wp .and. abs(beyond) <= unsure
       select case (was%kind)
       case (contact_sticks)
-         is_undecided = at_tip .or. (.not. beyond < 0.0_wp .and. abs(norm2(tip) - most) <= unsure)
+         is_undecided = at_tip .or. (.not. beyond < 0.0_wp .and. norm2(tip) - most <= unsure)
       case (contact_rests)
          is_undecided = at_start .or. (.not. along > 0.0_wp .and. rest%length > 0.0_wp .and. &
-            abs(norm2(drag) - most) <= unsure)
+            norm2(drag) - most <= unsure)
       case (contact_free)
          is_undecided = at_start .or. at_tip
       case (contact_slides)

@@ -115,8 +115,9 @@ contains
          coulomb_violation(place(2.0_wp, 1.0_wp, -3.0_wp), 0.5_wp, 1.0_wp), &
          coulomb_violation(place(2.0_wp, 1.5_wp, 0.0_wp), 0.5_wp, 1.0_wp), &
          coulomb_violation(contact_trial_t(gap=-0.25_wp), 0.5_wp, 2.0_wp), &
-         coulomb_violation(place(2.0_wp, 1.0_wp, -3.0_wp, rounding=0.5_wp), 0.5_wp, 1.0_wp)], &
-         [0.0_wp, 2.0_wp, 0.5_wp, 0.5_wp, 1.5_wp], tol, 1.0_wp, "missed")
+         coulomb_violation(place(2.0_wp, 1.0_wp, -3.0_wp, rounding=0.5_wp), 0.5_wp, 1.0_wp), &
+         coulomb_violation(place(2.0_wp, 4.0_wp, 9.0_wp, gap=-0.25_wp), 2.0_wp, 1.0_wp)], &
+         [0.0_wp, 2.0_wp, 0.5_wp, 0.5_wp, 1.5_wp, 0.25_wp], tol, 1.0_wp, "missed")
    end subroutine test_violation
 
    !> Each way, and where it leads to next; what slides or is free holds its slip on the way. The
@@ -177,10 +178,9 @@ contains
                do i = -16, 32
                   p = 0.125_wp*i
                   do k = 1, size(ways)
-                     if (led == 0 .and. any(ways(k) == [contact_free, contact_rests])) cycle
                      ! Half by forces, half by slip; all of the doubt by slip, or by forces.
-                     at = place(2.0_wp, 0.5_wp*side*p, 0.5_wp*side*p/c, side*length/c, &
-                        rounding=merge(unsure/c, 0.0_wp, doubt == 1))
+                     at = place(2.5_wp, 0.5_wp*side*p, 0.5_wp*side*p/c, side*length/c, 0.5_wp/c, &
+                        merge(unsure/c, 0.0_wp, doubt == 1))
                      associate (next => coulomb_trial(status_of(turned(ways(k))), at, 0.5_wp, c, &
                            merge(unsure, 0.0_wp, doubt == 2)))
                         call check_equal(error, turned(code_of(next)), expected(ways(k)), &
@@ -232,9 +232,9 @@ contains
             stays = is_at(length + 1.0_wp) .or. (led == 1 .and. is_at(length)) &
                .or. (led == 0 .and. is_at(-1.0_wp))
          case (contact_rests)
-            stays = is_at(0.0_wp) .or. is_at(-1.0_wp)
+            stays = led == 1 .and. (is_at(0.0_wp) .or. is_at(-1.0_wp))
          case (contact_free)
-            stays = is_at(0.0_wp) .or. is_at(length)
+            stays = led == 1 .and. (is_at(0.0_wp) .or. is_at(length))
          case (1)
             stays = is_at(length + 1.0_wp)
          case (-1)
@@ -264,8 +264,11 @@ contains
 
       was = slip_status_t(contact_slides, up)
       do k = 1, size(trial, 2)
-         next = coulomb_trial(was, contact_trial_t(lam=2.0_wp, slip=trial(:, k)/c, &
-            slip_target=[2.0_wp, 0.0_wp]/c), 0.5_wp, c, 0.25_wp)
+         at = contact_trial_t(lam=2.0_wp, slip=trial(:, k)/c, slip_target=[2.0_wp, 0.0_wp]/c)
+         next = coulomb_trial(slip_status_t(contact_free), at, 0.5_wp, c, 0.25_wp)
+         call check_equal(error, next%kind, merge(contact_slides, contact_free, k < 3 .or. k == 4), &
+            "from where it is free")
+         next = coulomb_trial(was, at, 0.5_wp, c, 0.25_wp)
          call check_equal(error, next%kind, merge(contact_free, contact_slides, k == 3), "status")
          call check_near(error, next%direction, merge(-1.0_wp, 1.0_wp, k == 2)*merge(0.0_wp, 1.0_wp, &
             k == 3)*up, tol, 1.0_wp, "direction")
@@ -462,6 +465,8 @@ contains
       law%status = slip_status_t(contact_rests)
       call check_true(error, law%holds_slip() .and. .not. any(abs(law%slip_held()) > 0.0_wp), &
          "it rests")
+      call law%leads_to([0.8_wp], 0.0_wp)
+      call check_near(error, law%slip_target, [0.4_wp, 0.0_wp], tol, 1.0_wp, "one slip")
       call law%leads_to([0.4_wp, 0.2_wp], 1.0_wp)
       call check_true(error, .not. any(abs(law%slip_target) > 0.0_wp), "rounded")
    end subroutine test_law
