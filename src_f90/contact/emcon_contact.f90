@@ -171,14 +171,12 @@ contains
    end subroutine suit_steps
 
    !> Measure gaps between the arcs that edges stand for, or between edges; after `configure`. A
-   !> formulation that knows of no arcs leaves gaps as they are.
+   !> formulation that knows of no arcs leaves gaps as they are: nothing to do unless overridden.
    pure subroutine follow_arcs(self, x, options, is_wanted)
       class(contact_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :)   !! (n_dim, n_node) reference positions [L]
       type(contact_options_t), intent(in) :: options   !! as `configure` had them
       logical, intent(in) :: is_wanted           !! else between edges
-
-      if (allocated(self%sagitta)) self%sagitta = 0.0_wp
    end subroutine follow_arcs
 
    !> A step has begun; see `clearance`.

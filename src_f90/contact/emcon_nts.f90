@@ -188,11 +188,11 @@ contains
       real(wp), intent(in), contiguous :: du(:, :)   !! (n_dim, n_node) [L]
       integer :: k
 
-      nothing_moves = .true.
+      nothing_moves = .false.
       do k = 1, size(node)
-         nothing_moves = .not. any(abs(du(:, node(k))) > 0.0_wp)
-         if (.not. nothing_moves) return
+         if (any(abs(du(:, node(k))) > 0.0_wp)) return
       end do
+      nothing_moves = .true.
    end function nothing_moves
 
    !> The gap over a polygon in a step without motion: it ends as it began.

@@ -34,11 +34,12 @@ contains
    end subroutine collect_mortar_choice
 
    !> The slave edge from 0 to 1 with the body above it, and master edges that run against it from
-   !> `first` to `last`, `depth` below.
-   subroutine place_edges(first, last, depth, x, slave, master)
+   !> `first` to `last`, `depth` below, there by `fall` deeper.
+   subroutine place_edges(first, last, depth, x, slave, master, fall)
       real(wp), intent(in) :: first(:), last(:), depth(:)
       real(wp), allocatable, intent(out) :: x(:, :)
       type(chain_t), intent(out) :: slave, master
+      real(wp), intent(in), optional :: fall(:)
       integer :: k, n
 
       n = size(first)
@@ -48,6 +49,7 @@ contains
       x(1, first_master + 2::2) = last
       x(2, first_master + 1::2) = -depth
       x(2, first_master + 2::2) = -depth
+      if (present(fall)) x(2, first_master + 2::2) = -depth - fall
       slave%n_facet = 3
       allocate(slave%facet, source=reshape([3, 1, 1, 2, 2, 4], [2, 3]))
       allocate(slave%neighbour, source=reshape([0, 2, 1, 3, 2, 0], [2, 3]))
@@ -185,12 +187,12 @@ contains
 
    !> Up to five edges at random: no two of those kept overlap by more than a hundredth, and what
    !> goes overlaps a nearer one that is kept; before the first one nothing is looked at. Two that
-   !> are joined are both kept.
+   !> are joined are both kept. What counts is the height in the middle of what is covered.
    subroutine test_drop(error)
       type(error_t), allocatable, intent(out) :: error
       type(chain_t) :: slave, master
       type(pair_stencil_t), allocatable :: list(:)
-      real(wp), allocatable :: x(:, :), low(:), high(:), depth(:)
+      real(wp), allocatable :: x(:, :), low(:), high(:), depth(:), fall(:)
       logical, allocatable :: is_kept(:)
       logical :: is_beaten
       integer :: i, j, k, m, n, n_gone
@@ -198,14 +200,18 @@ contains
       n_gone = 0
       do i = 1, 200
          m = 1 + mod(i, 5)
-         allocate(low(m), high(m), depth(m))
+         allocate(low(m), high(m), depth(m), fall(m))
          call draw_random(low)
          call draw_random(high)
          call draw_random(depth)
+         call draw_random(fall)
          low = 1.4_wp*low - 0.3_wp
          high = low + 0.05_wp + 0.6_wp*high
          depth = depth - 0.3_wp
-         call place_edges(high, low, depth, x, slave, master)
+         fall = 0.4_wp*(high - low)*(fall - 0.5_wp)
+         call place_edges(high, low, depth, x, slave, master, fall)
+         depth = depth + fall*(high - 0.5_wp*(max(0.0_wp, min(1.0_wp, low)) + max(0.0_wp, &
+            min(1.0_wp, high))))/(high - low)
          list = [pair_stencil_t(), pairs_of(slave, master, .false.)]
          if (m > 1 .and. mod(i, 3) == 0) then
             master%neighbour(next, 1) = 2
@@ -230,7 +236,7 @@ contains
                " of case " // to_text(i))
          end do
          n_gone = n_gone + count(.not. is_kept)
-         deallocate(low, high, depth, is_kept)
+         deallocate(low, high, depth, fall, is_kept)
       end do
       call check_true(error, n_gone > 100, "gone: " // to_text(n_gone))
    end subroutine test_drop
@@ -267,6 +273,7 @@ contains
       end do
       call look_at_end(slave, master, point, x, error)
       if (.not. allocated(error)) call look_at_joint(error)
+      if (.not. allocated(error)) call look_at_node(error)
    end subroutine test_seen
 
    !> The last edge alone, which moves by 1: from there on it is seen up to 0.5.
@@ -288,23 +295,44 @@ contains
       end do
    end subroutine look_at_end
 
-   !> Two edges that a joint 0.1 wide parts, and two that nothing joins.
+   !> Two edges that a joint 0.1 wide parts, and two that nothing joins; past
+   !> their other ends they are not seen.
    subroutine look_at_joint(error)
       type(error_t), allocatable, intent(inout) :: error
       type(chain_t) :: slave, master
       type(pair_stencil_t) :: pair(2)
       real(wp), allocatable :: x(:, :)
-      integer :: seen(2, 3), i
+      integer :: seen(2, 4), i
 
       do i = 0, 1
          call place_edges([1.1_wp, 0.5_wp], [0.6_wp, 0.2_wp], [0.1_wp, 0.1_wp], x, slave, master)
          if (i == 1) master%neighbour = reshape([0, 2, 1, 0], [2, 2])
          pair = pairs_of(slave, master, .false.)
-         call pairs_seen(pair, master, [0.1_wp, 0.55_wp, 0.7_wp], x, 0.0_wp*x, 0.0_wp*x, seen)
-         call check_equal(error, seen(1, :), [0, i, 1], "over a joint")
+         call pairs_seen(pair, master, [0.1_wp, 0.15_wp, 0.55_wp, 0.7_wp], x, 0.0_wp*x, 0.0_wp*x, seen)
+         call check_equal(error, seen(1, :), [0, 0, i, 1], "over a joint")
          call check_true(error, all(seen(2, :) == 0), "none beside")
       end do
    end subroutine look_at_joint
+
+   !> A point that looks at the end of an edge as the step begins has no other one beside it, though
+   !> one comes there in the step.
+   subroutine look_at_node(error)
+      type(error_t), allocatable, intent(inout) :: error
+      type(chain_t) :: slave, master
+      type(pair_stencil_t) :: pair(2)
+      real(wp), allocatable :: x(:, :), du(:, :)
+      integer :: seen(2, 1)
+
+      call place_edges([1.0_wp, 0.25_wp], [0.5_wp, 0.0_wp], [0.1_wp, 0.1_wp], x, slave, master)
+      allocate(du, source=0.0_wp*x)
+      du(1, first_master + 3:) = 0.25_wp
+      pair = pairs_of(slave, master, .false.)
+      call pairs_seen(pair, master, [0.5_wp], x, 0.0_wp*x, du, seen)
+      call check_equal(error, seen(:, 1), [1, 0], "one that comes later")
+      du(1, first_master + 1:) = 0.25_wp
+      call pairs_seen(pair, master, [0.25_wp], x, du, 0.0_wp*du, seen)
+      call check_equal(error, seen(:, 1), [2, 0], "from where the step begins")
+   end subroutine look_at_node
 
    subroutine test_append(error)
       type(error_t), allocatable, intent(out) :: error
