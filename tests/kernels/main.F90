@@ -119,6 +119,7 @@ program main
    use test_node_potential, only : collect_node_potential
    use test_nts, only : collect_nts
    use test_nts_gap, only : collect_nts_gap
+   use test_nts_choice, only : collect_nts_choice
    use test_nts_states, only : collect_nts_states
    use test_null_space, only : collect_null_space
    use test_numbering, only : collect_numbering
@@ -253,6 +254,7 @@ program main
    call run("segment", collect_segment)
    call run("self_contact", collect_self_contact)
    call run("nts_gap", collect_nts_gap)
+   call run("nts_choice", collect_nts_choice)
    call run("nts_states", collect_nts_states)
    call run("nts", collect_nts)
    call run("interface", collect_interface)
