@@ -265,7 +265,6 @@ contains
       associate (stencil => self%polygon(1, i))
          state%is_over = is_over(state, start%xi, xi1, [stencil%before > 0, stencil%after > 0])
       end associate
-      state%is_covered = .true.
       if (state%gap1 > end_tol*state%size) return
       state%is_leaving = choice_pushes_aside(self, i, x, u0, du)
       state%is_over = state%is_over .and. .not. state%is_leaving

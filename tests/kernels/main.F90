@@ -121,6 +121,7 @@ program main
    use test_nts_gap, only : collect_nts_gap
    use test_nts_choice, only : collect_nts_choice
    use test_nts_states, only : collect_nts_states
+   use test_nts_stencil, only : collect_nts_stencil
    use test_null_space, only : collect_null_space
    use test_numbering, only : collect_numbering
    use test_outline, only : collect_outline
@@ -256,6 +257,7 @@ program main
    call run("nts_gap", collect_nts_gap)
    call run("nts_choice", collect_nts_choice)
    call run("nts_states", collect_nts_states)
+   call run("nts_stencil", collect_nts_stencil)
    call run("nts", collect_nts)
    call run("interface", collect_interface)
    call run("interlock", collect_interlock)

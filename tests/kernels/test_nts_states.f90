@@ -33,6 +33,9 @@ contains
          test_case_t("slips of conditions, over polygons and curves", test_slip), &
          test_case_t("over the ends of a surface", test_ends), &
          test_case_t("a curve holds up to the edge after next", test_covers), &
+         test_case_t("a curve that turns holds up to its bisector", test_turns), &
+         test_case_t("what a step reaches is chosen, from one start", test_reach), &
+         test_case_t("statics: a corner pushes nodes of flat sides aside", test_leaving), &
          test_case_t("guards", test_guard), &
          test_case_t("one push on both nodes acts on the finer side's area", test_narrow)]
    end subroutine collect_nts_states
@@ -218,6 +221,102 @@ contains
          deallocate(u, du)
       end do
    end subroutine test_covers
+
+   !> In the sector of a convex vertex at the far end of the edge next to the node's: all edges there
+   !> are as near, a curve ends there unless a corner comes before. From either side.
+   subroutine test_turns(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: smoothing(2) = [smoothing_none, smoothing_hermite]
+      real(wp), parameter :: bent(2, 2) = reshape([0.75_wp, -0.5_wp, 1.5_wp, -1.0_wp], [2, 2])
+      type(scene_t) :: scene
+      type(nts_t) :: nts
+      real(wp), allocatable :: u(:, :), du(:, :)
+      real(wp) :: vertex
+      integer :: kind, side, own, corner
+
+      do kind = 1, 2
+         do corner = 0, 1
+            do side = -1, 1, 2
+               call begin(scene, smoothing(kind), 0.0_wp, nts, error)
+               if (allocated(error)) return
+               allocate(u, du, source=0.0_wp*scene%x)
+               own = 2 - side
+               vertex = merge(1.0_wp, 0.0_wp, side == 1)
+               ! Master nodes 6 to 10 from the left, edge 1 from the last one on.
+               if (side == 1) u(:, 10) = [vertex + bent(1, 1), bent(2, 1)] - scene%x(:, 10)
+               if (side == -1) u(:, 7) = [vertex - bent(1, 1), bent(2, 1)] - scene%x(:, 7)
+               if (side == -1) u(:, 6) = [vertex - bent(1, 2), bent(2, 2)] - scene%x(:, 6)
+               if (kind == 2) nts%is_corner(2:3) = [side == -1, side == 1] .and. corner == 1
+               du(:, nts%node(own)) = [vertex + 0.2_wp*side, 0.5_wp] - scene%x(:, nts%node(own))
+               call nts%begin_step(scene%x, u, du)
+               call nts%measure(scene%x, u, du)
+               call check_true(error, nts%covers(own, scene%x, u, du) .eqv. (kind == 1 .or. &
+                  corner == 1), "kind " // to_text(kind) // ", corner " // to_text(corner) // &
+                  ", side " // to_text(side))
+               deallocate(u, du)
+            end do
+         end do
+      end do
+   end subroutine test_turns
+
+   !> A step that reaches farther begins where one that does not began, and once more the first.
+   subroutine test_reach(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(nts_t) :: nts
+      integer :: step
+
+      call make_two_blocks(scene, 4.0_wp, lower, upper)
+      call nts_init(nts, scene, scene%pair(1), error)
+      if (allocated(error)) return
+      do step = 1, 3
+         nts%reach = 0.0_wp
+         call nts%begin_step(scene%x, scene%u0, merge(1.0_wp, 0.0_wp, step == 2) &
+            *spread([0.0_wp, 4.0_wp], 2, size(scene%x, 2)))
+         call check_equal(error, nts%edge, merge([3, 2, 1], [0, 0, 0], step == 2), "step " &
+            // to_text(step))
+      end do
+   end subroutine test_reach
+
+   !> The corner of a block lies under a flat bottom at a node of that, closed or nearly so: in
+   !> statics with both sides held it is the corner's constraint that holds, else the node's.
+   subroutine test_leaving(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: edge = 4.0_wp
+      real(wp), parameter :: up(3) = [0.0_wp, 0.1_wp, 2.0_wp]*end_tol*edge
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(nts_t) :: nts
+      real(wp), allocatable :: u(:, :)
+      integer :: own, k, i
+      logical :: leaves
+
+      call scene_begin(scene)
+      call add_block(scene, "CPE4", [1, 1], [0.0_wp, -edge], [edge, edge], lower)
+      call add_block(scene, "CPE4", [2, 1], [0.0_wp, 0.0_wp], [2.0_wp, 1.0_wp]*edge, upper)
+      call add_surface(scene, "LOWER", lower, [bottom, right, top, left])
+      call add_surface(scene, "UPPER", upper, [bottom])
+      allocate(u, source=0.0_wp*scene%x)
+      do i = 0, 3
+         call nts_init(nts, scene, contact_pair_t(slave=2, master=1, both_sides=btest(i, 0)), error)
+         if (allocated(error)) return
+         call nts%suit_steps(.true.)
+         nts%step%is_static = btest(i, 1)
+         own = findloc(nts%node, 6, 1)
+         do k = 1, size(up)
+            u(1, 5:) = -edge*(1.0_wp + 0.1_wp*end_tol)   ! just past the corner
+            u(2, 5:) = up(k)
+            call nts%begin_step(scene%x, u, 0.0_wp*u)
+            ! What does not move at all leaves nowhere.
+            call nts%measure(scene%x, u, epsilon(1.0_wp)*scene%x)
+            leaves = i == 3 .and. k < 3
+            call check_true(error, (nts%state(own)%is_leaving .eqv. leaves) .and. &
+               (nts%state(own)%is_over .neqv. leaves) .and. nts%state(own)%is_near, "case " &
+               // to_text(i) // ", gap " // to_text(k))
+         end do
+      end do
+   end subroutine test_leaving
 
    !> Guards take nothing out of the bodies, watch the mesh, and act from so far inside: ends and
    !> corners from nearly the surface on, unless contact gives way. Friction stays with them.
