@@ -108,6 +108,7 @@ program main
    use test_midside, only : collect_midside
    use test_mortar, only : collect_mortar
    use test_mortar_choice, only : collect_mortar_choice
+   use test_mortar_frame, only : collect_mortar_frame
    use test_mortar_pair, only : collect_mortar_pair
    use test_mortar_stencil, only : collect_mortar_stencil
    use test_motion_bound, only : collect_motion_bound
@@ -272,6 +273,7 @@ program main
    call run("massless", collect_massless)
    call run("massless_start", collect_massless_start)
    call run("midside", collect_midside)
+   call run("mortar_frame", collect_mortar_frame)
    call run("mortar_pair", collect_mortar_pair)
    call run("mortar_stencil", collect_mortar_stencil)
    call run("motion_bound", collect_motion_bound)
