@@ -10,11 +10,12 @@ module test_judge
    use emcon_overlap_check, only : overlap_check_init, overlap_check_smooth, overlap_check_step, &
       overlap_check_t, overlap_t
    use emcon_scene, only : scene_t
-   use emcon_text, only : notes_t
+   use emcon_text, only : notes_t, to_text
    use emcon_ties, only : ties_prepare
    use ring_scenes, only : make_rings
+   use random_draws, only : draw_random
    use small_scenes, only : add_block, add_surface, block_node, block_t, bottom, left, right, &
-      scene_begin, top
+      scene_begin, shake, top
    implicit none
    private
    public :: collect_judge
@@ -41,7 +42,8 @@ contains
          test_case_t("a dent is no arc", test_dent), &
          test_case_t("an edge of a profile counts as what is in it", test_profile), &
          test_case_t("bodies that no pair brings together", test_no_pair), &
-         test_case_t("a block in its twin, no node of either inside", test_in_line)]
+         test_case_t("a block in its twin, no node of either inside", test_in_line), &
+         test_case_t("bent blocks anywhere, against a look at all sides", test_anywhere)]
    end subroutine collect_judge
 
    !> Block 1 on [0, 4] x [0, 1] of 4 x 1 elements, top the master; block 2 of `n` elements on
@@ -442,5 +444,115 @@ contains
       call judged(scene, overlap)
       call check_equal(error, overlap%node, 0, "on top")
    end subroutine test_in_line
+
+   !> Blocks of bent sides thrown on each other: of all nodes of both, and of the middles of all parts
+   !> of sides between crossings, the deepest one in the other block by the side that is nearest.
+   subroutine test_anywhere(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: tol = 4096.0_wp*eps
+      type(scene_t) :: scene
+      type(overlap_t) :: overlap
+      real(wp) :: side(2, 9), u(3), depth, deepest(2), longest
+      integer, parameter :: node(9) = 10 + [1, 2, 3, 6, 9, 8, 7, 4, 1]
+      integer :: case, n_deep
+
+      n_deep = 0
+      do case = 1, 300
+         call make_scene(scene, [0.0_wp, 0.0_wp], [2.0_wp, 2.0_wp], [2, 2], .false.)
+         call draw_random(u)
+         call shake(side, 0.2_wp)
+         scene%x(:, 11:) = scene%x(:, 11:) + side - 1.0_wp
+         associate (c => cos(8.0_wp*u(1)), s => sin(8.0_wp*u(1)))
+            scene%x(:, 11:) = matmul(reshape([c, s, -s, c], [2, 2]), scene%x(:, 11:))
+         end associate
+         scene%x(1, 11:) = scene%x(1, 11:) + 6.0_wp*u(2) - 1.0_wp
+         scene%x(2, 11:) = scene%x(2, 11:) + 2.5_wp*u(3) - 1.0_wp
+         call judged(scene, overlap)
+         call compare()
+         if (allocated(error)) return
+      end do
+      call check_true(error, n_deep > 100, "overlaps: " // to_text(n_deep))
+
+   contains
+
+      subroutine compare()
+         integer, parameter :: base(10) = [1, 2, 3, 4, 5, 10, 9, 8, 7, 6]
+         real(wp) :: lower(2, 11), upper(2, 9)
+         integer :: i
+
+         lower = scene%x(:, [base, 1])
+         upper = scene%x(:, node)
+         longest = max(maxval(norm2(lower(:, 2:) - lower(:, :10), 1)), &
+            maxval(norm2(upper(:, 2:) - upper(:, :8), 1)))
+         deepest = 0.0_wp
+         depth = 0.0_wp
+         do i = 1, 10
+            call look_along(lower(:, i:i + 1), upper)
+         end do
+         do i = 1, 8
+            call look_along(upper(:, i:i + 1), lower)
+         end do
+         if (depth > 0.99_wp*longest) return     ! deeper than is looked for
+         if (deepest(1) > 1.0e-3_wp) n_deep = n_deep + 1
+         call check_near(error, max(0.0_wp, overlap%depth), max(deepest(1), min(deepest(2), &
+            overlap%depth)), tol, 1.0_wp, "case " // to_text(case))
+      end subroutine compare
+
+      !> The ends of an edge, and the middles of its parts.
+      subroutine look_along(edge, other)
+         real(wp), intent(in) :: edge(2, 2), other(:, :)
+         real(wp) :: cut(size(other, 2) + 1), s, t, det, a(2), b(2), c(2)
+         integer :: i, j, n
+
+         n = 1
+         cut(1) = 0.0_wp
+         a = edge(:, 2) - edge(:, 1)
+         do i = 1, size(other, 2) - 1
+            b = other(:, i + 1) - other(:, i)
+            c = other(:, i) - edge(:, 1)
+            det = a(1)*b(2) - a(2)*b(1)
+            s = (c(1)*b(2) - c(2)*b(1))/det
+            t = (c(1)*a(2) - c(2)*a(1))/det
+            if (min(s, t) <= 0.0_wp .or. max(s, t) >= 1.0_wp) cycle
+            j = count(cut(:n) <= s)
+            cut(j + 2:n + 1) = cut(j + 1:n)
+            cut(j + 1) = s
+            n = n + 1
+         end do
+         cut(n + 1) = 1.0_wp
+         call look_at(edge(:, 1), other)
+         do i = 1, n
+            if (n > 1) call look_at(edge(:, 1) + 0.5_wp*(cut(i) + cut(i + 1))*a, other)
+         end do
+      end subroutine look_along
+
+      !> A point by the sides of the other block, counter-clockwise, the first one twice.
+      subroutine look_at(point, other)
+         real(wp), intent(in) :: point(2), other(:, :)
+         real(wp) :: a(2), b(2), least, length(2), turn, distance
+         integer :: i
+
+         least = huge(least)
+         length = 1.0_wp
+         turn = 0.0_wp
+         do i = 1, size(other, 2) - 1
+            a = other(:, i) - point
+            b = other(:, i + 1) - point
+            turn = turn + atan2(a(1)*b(2) - a(2)*b(1), dot_product(a, b))
+            distance = norm2(a + min(1.0_wp, max(0.0_wp, dot_product(-a, b - a) &
+               /dot_product(b - a, b - a)))*(b - a))
+            ! At a node of a dent there are two nearest ones.
+            if (abs(distance - least) <= 16.0_wp*eps) length = [max(length(1), norm2(b - a)), &
+               min(length(2), norm2(b - a))]
+            if (distance >= least - 16.0_wp*eps) cycle
+            least = distance
+            length = norm2(b - a)
+         end do
+         if (turn < 1.0_wp) return
+         depth = max(depth, least)
+         deepest = max(deepest, least/length)
+      end subroutine look_at
+
+   end subroutine test_anywhere
 
 end module test_judge
