@@ -257,8 +257,7 @@ contains
             list(n) = slip_point(self%pair(k)%node(:local_master(1) + 1), xi(n), part)
          end do
       end do
-      theta = 0.0_wp
-      if (self%is_dual) theta = sum(list(:n)%weight)**2
+      theta = merge(sum(list(:n)%weight)**2, 0.0_wp, self%is_dual)
       do i = 1, n
          part = merge(1.0_wp - xi(i), xi(i), side == 1) &
             + merge(1.0_wp, -1.0_wp, side == 1)*theta*(1.0_wp - 2.0_wp*xi(i))
@@ -290,7 +289,6 @@ contains
          call frame_init(frame, self%pair(k), local + j*dlocal)
          call frame_cover(frame, first(j), last(j))
       end do
-      last = max(first, last)
       bound = [(1.0_wp - at)*first(0) + at*first(1), (1.0_wp - at)*last(0) + at*last(1)]
    end function segment_of
 

@@ -215,6 +215,7 @@ contains
       class(contact_t), allocatable :: contact, chords
       type(contact_options_t) :: options
       real(wp) :: largest
+      real(wp), allocatable :: u(:, :)
       integer :: k, side, formulation
 
       do k = 1, 6
@@ -231,6 +232,14 @@ contains
          call make(scene, k, .true., contact, error)
          if (.not. allocated(error)) call make(scene, k, .false., chords, error)
          if (allocated(error)) return
+         ! Nothing rises over what is far away.
+         u = 0.0_wp*scene%u0
+         u(1, contact%node) = 50.0_wp
+         contact%reach = 0.0_wp
+         call contact%begin_step(scene%x, u, 0.0_wp*u)
+         if (allocated(contact%sagitta)) call check_near(error, contact%sagitta, &
+            0.0_wp*contact%sagitta, 0.0_wp, 1.0_wp, "far away")
+         contact%reach = 0.0_wp
          call choose(k, formulation, options)
          call contact%follow_arcs(scene%x, options, .false.)
          call contact%begin_step(scene%x, scene%u0, 0.0_wp*scene%u0)

@@ -43,7 +43,8 @@ contains
          test_case_t("an edge of a profile counts as what is in it", test_profile), &
          test_case_t("bodies that no pair brings together", test_no_pair), &
          test_case_t("a block in its twin, no node of either inside", test_in_line), &
-         test_case_t("bent blocks anywhere, against a look at all sides", test_anywhere)]
+         test_case_t("bent blocks anywhere, against a look at all sides", test_anywhere), &
+         test_case_t("a U whose legs cross, as two bodies", test_legs)]
    end subroutine collect_judge
 
    !> Block 1 on [0, 4] x [0, 1] of 4 x 1 elements, top the master; block 2 of `n` elements on
@@ -467,6 +468,7 @@ contains
          end associate
          scene%x(1, 11:) = scene%x(1, 11:) + 6.0_wp*u(2) - 1.0_wp
          scene%x(2, 11:) = scene%x(2, 11:) + 2.5_wp*u(3) - 1.0_wp
+         scene%x = 0.25_wp**mod(case, 4)*scene%x
          call judged(scene, overlap)
          call compare()
          if (allocated(error)) return
@@ -554,5 +556,59 @@ contains
       end subroutine look_at
 
    end subroutine test_anywhere
+
+   !> One leg of a U leans into the other one, by up to 2/5 with its corner: what is found in the one
+   !> piece is what is found between two that are the legs, in the order of the strip or against it.
+   subroutine test_legs(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: outer(2, 0:9) = reshape([0.0_wp, 3.0_wp, 0.0_wp, 2.0_wp, 0.0_wp, &
+         1.0_wp, 0.0_wp, -1.0_wp, 1.0_wp, -1.0_wp, 2.0_wp, -1.0_wp, 3.0_wp, -1.0_wp, 3.0_wp, &
+         1.0_wp, 3.0_wp, 2.0_wp, 3.0_wp, 3.0_wp], [2, 10])
+      real(wp), parameter :: inner(2, 0:9) = reshape([1.0_wp, 3.0_wp, 1.0_wp, 2.0_wp, 1.0_wp, &
+         1.0_wp, 1.0_wp, 0.0_wp, 1.25_wp, 0.0_wp, 1.75_wp, 0.0_wp, 2.0_wp, 0.0_wp, 2.0_wp, &
+         1.0_wp, 2.0_wp, 2.0_wp, 2.0_wp, 3.0_wp], [2, 10])
+      type(scene_t) :: scene, legs
+      type(overlap_t) :: overlap, expected
+      type(block_t) :: block, other
+      real(wp) :: at(2, 0:9, 2), draw(2, 20), u, lean
+      integer :: case, first, n_deep
+
+      n_deep = 0
+      do case = 1, 100
+         call shake(draw, 0.1_wp)
+         draw(1, :) = 0.0_wp                     ! legs are straight: sides that wave may be arcs
+         at(:, :, 1) = outer
+         at(:, :, 2) = inner
+         at = at + reshape(draw, [2, 10, 2])
+         call draw_random(u)
+         lean = asin((0.9_wp + 0.5_wp*u)/3.0_wp)
+         first = merge(7, 0, mod(case, 2) == 0)
+         associate (c => cos(lean), s => merge(sin(lean), -sin(lean), first == 7), &
+               base => merge(2.5_wp, 0.5_wp, first == 7))
+            at(1, first:first + 2, :) = at(1, first:first + 2, :) - base
+            at(:, first:first + 2, :) = reshape(matmul(reshape([c, s, -s, c], [2, 2]), &
+               reshape(at(:, first:first + 2, :), [2, 6])), [2, 3, 2])
+            at(1, first:first + 2, :) = at(1, first:first + 2, :) + base
+         end associate
+         call scene_begin(scene)
+         call add_block(scene, "CPE4", [9, 1], [0.0_wp, 0.0_wp], [9.0_wp, 1.0_wp], block)
+         call add_surface(scene, "ALL", block, [bottom, right, top, left])
+         scene%pair = [contact_pair_t(slave=1, master=1)]
+         scene%x = reshape(at, [2, 20])
+         call judged(scene, overlap)
+         call scene_begin(legs)
+         call add_block(legs, "CPE4", [3, 1], [0.0_wp, 0.0_wp], [3.0_wp, 1.0_wp], block)
+         call add_block(legs, "CPE4", [3, 1], [9.0_wp, 0.0_wp], [3.0_wp, 1.0_wp], other)
+         call add_surface(legs, "ONE", block, [top])
+         call add_surface(legs, "OTHER", other, [top])
+         legs%pair = [contact_pair_t(slave=1, master=2)]
+         legs%x = reshape([at(:, :3, 1), at(:, :3, 2), at(:, 6:, 1), at(:, 6:, 2)], [2, 16])
+         call judged(legs, expected)
+         if (expected%depth > 1.0e-3_wp) n_deep = n_deep + 1
+         call check_near(error, max(0.0_wp, overlap%depth), max(0.0_wp, expected%depth), 64.0_wp*eps, &
+            1.0_wp, "case " // to_text(case))
+      end do
+      call check_true(error, n_deep > 40 .and. n_deep < 100, "overlaps: " // to_text(n_deep))
+   end subroutine test_legs
 
 end module test_judge

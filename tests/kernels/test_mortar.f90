@@ -56,7 +56,10 @@ contains
          test_case_t("nothing within reach", test_apart), &
          test_case_t("edges whose boxes come near on the way", test_near), &
          test_case_t("slip is kept from step to step", test_slip_share), &
-         test_case_t("points of slip fill what is covered", test_slip_points)]
+         test_case_t("points of slip fill what is covered", test_slip_points), &
+         test_case_t("before anything is measured", test_before), &
+         test_case_t("what comes over the master, and what leaves it", test_come_and_go), &
+         test_case_t("slip of what is covered at one end alone, or not at all", test_slip_beside)]
    end subroutine collect_mortar
 
    ! ---- scenes ---------------------------------------------------------------------------------
@@ -940,5 +943,137 @@ contains
          end do
       end do
    end subroutine test_slip_points
+
+   !> The first slave node over the master or beside it, at the start and at the end: it acts where it
+   !> ends over it, a penalty as long as it began there too. What comes from behind is told: by more
+   !> than a twentieth of its edges.
+   subroutine test_come_and_go(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: gap(4) = [0.25_wp, -0.04_wp, -0.06_wp, -0.25_wp]
+      type(scene_t) :: scene
+      type(mortar_t) :: mortar
+      real(wp), allocatable :: u(:, :), du(:, :)
+      integer :: i, k, m
+      logical :: is_in(0:1), is_over
+
+      do i = 1, n_combination
+         if (.not. btest(i, 0)) cycle            ! Gauss points look at the same edges all along
+         do k = 1, size(gap)
+            call make(gap(k), 0.0_wp, 0.0_wp, i, scene, mortar, error)
+            if (allocated(error)) return
+            do m = 0, 7
+               is_in = [btest(m, 0), btest(m, 1)]
+               u = 0.0_wp*scene%x
+               du = u
+               u(1, 11:) = merge(1.1_wp, 2.1_wp, is_in(0)) - scene%x(1, 11)
+               du(1, 11:) = merge(1.1_wp, 2.1_wp, is_in(1)) - scene%x(1, 11) - u(1, 11)
+               mortar%step%is_penalty = btest(m, 2)
+               is_over = is_in(1) .or. (is_in(0) .and. btest(m, 2))
+               call mortar%begin_step(scene%x, u, du)
+               call mortar%measure(scene%x, u, du)
+               associate (state => mortar%state(1))
+                  ! Some of the layers behind count as the back of a thin body.
+                  if (is_in(0) .and. k == 4) cycle
+                  call check_true(error, all([state%is_near, state%is_over, state%is_leaving, &
+                     state%is_arriving] .eqv. [any(is_in), is_over, .not. is_over, &
+                     .not. is_in(0)]), "case " // to_text(m) // text_of(i, k))
+                  call check_true(error, state%was_open .eqv. (is_in(0) .or. .not. is_in(1) .or. &
+                     k < 3), "open, case " // to_text(m) // text_of(i, k))
+                  call check_near(error, [state%gap0, state%gap1], merge(gap(k), 0.0_wp, is_in), &
+                     tol, 1.0_wp, "gaps, case " // to_text(m) // text_of(i, k))
+               end associate
+            end do
+         end do
+      end do
+   end subroutine test_come_and_go
+
+   !> Constraints count with all of their lengths, and have no mean gap where nothing is covered.
+   subroutine test_before(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(mortar_t) :: mortar
+      real(wp), dimension(3) :: area, length, own
+      real(wp), allocatable :: u(:, :)
+      integer :: i
+
+      call make(0.25_wp, 0.0_wp, 0.0_wp, 1, scene, mortar, error)
+      if (allocated(error)) return
+      call check_near(error, [(mortar%share(i), i = 1, 3)], [1.0_wp, 1.0_wp, 1.0_wp], 0.0_wp, &
+         1.0_wp, "shares")
+      call mortar%own_area(scene%x, own)
+      call mortar%area(scene%x, scene%u0, area, length)
+      call check_near(error, own, [0.5_wp, 1.0_wp, 0.5_wp], tol, 1.0_wp, "areas")
+      call check_near(error, [area, length], [own, spread(0.0_wp, 1, 3)], 0.0_wp, 1.0_wp, &
+         "areas of multipliers")
+      call check_near(error, mortar%mean_gap(2, 3.0_wp), 0.0_wp, 0.0_wp, 1.0_wp, "mean gap")
+      ! Half of the last edge covers nothing.
+      u = 0.0_wp*scene%x
+      u(1, 11:) = 2.0_wp - scene%x(1, 13) + 0.5_wp
+      call mortar%begin_step(scene%x, u, 0.0_wp*u)
+      call mortar%measure(scene%x, u, 0.0_wp*u)
+      call check_near(error, [(mortar%mean_gap(i, 0.25_wp), i = 1, 2)], [0.25_wp, 0.25_wp], tol, &
+         1.0_wp, "as much as at the start")
+   end subroutine test_before
+
+   !> A slave that leaves the master in the step slides by what it covers at the start; what is
+   !> beside the master, but near, by its own motion; what is far by nothing.
+   subroutine test_slip_beside(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(mortar_t) :: mortar
+      type(slip_list_t) :: list, still
+      real(wp), allocatable :: u(:, :), du(:, :)
+      integer :: i, node
+
+      do i = 1, n_combination
+         call make(0.05_wp, 0.0_wp, 0.0_wp, i, scene, mortar, error)
+         if (allocated(error)) return
+         call contact_laws_of_surface(interaction_t(friction=0.5_wp), mortar%laws)
+         u = 0.0_wp*scene%x
+         du = u
+         ! The first edge of the slave from 3/2 to 5/2 over an end at 2, then past that.
+         u(1, 11:) = 1.5_wp - scene%x(1, 11)
+         du(1, 11:) = 1.0_wp
+         mortar%step%pushes_at_end = .true.
+         call mortar%begin_step(scene%x, u, du)
+         do node = 1, 2
+            call choose(mortar, node, du, list)
+            call choose(mortar, node, 0.0_wp*du, still)
+            call check_true(error, size(list%point) > 0, "covered at the start")
+            call check_near(error, list%point%weight, still%point%weight, tol, 1.0_wp, "weights")
+         end do
+         ! Beside the end by a tenth.
+         u(1, 11:) = 2.1_wp - scene%x(1, 11)
+         du(:, 11:) = spread([0.05_wp, 0.01_wp], 2, size(u, 2) - 10)
+         call mortar%begin_step(scene%x, u, du)
+         do node = 1, 3
+            call choose(mortar, node, du, list)
+            call check_equal(error, size(list%point), merge(1, 0, node < 3), "beside, node " &
+               // to_text(node))
+            if (allocated(error)) return
+            if (node == 3) cycle
+            call check_near(error, [list%point(1)%weight, sum(list%point(1)%share(:2), &
+               mask=list%point(1)%node(:2) == mortar%node(node))], [1.0_wp, 1.0_wp], tol, 1.0_wp, &
+               "its own place")
+            call check_near(error, abs(mortar%slip(node, scene%x, u, du)), [0.05_wp], tol, 1.0_wp, &
+               "its way")
+         end do
+         call check_near(error, mortar%slip(3, scene%x, u, du), [0.0_wp], 0.0_wp, 1.0_wp, "far")
+      end do
+
+   contains
+
+      subroutine choose(mortar, node, du, list)
+         type(mortar_t), intent(in) :: mortar
+         integer, intent(in) :: node
+         real(wp), intent(in) :: du(:, :)
+         type(slip_list_t), intent(inout) :: list
+
+         if (allocated(list%point)) deallocate(list%point)
+         allocate(list%point(0))
+         call mortar%choose_slip(node, scene%x, u, du, list)
+      end subroutine choose
+
+   end subroutine test_slip_beside
 
 end module test_mortar
