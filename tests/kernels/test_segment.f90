@@ -24,6 +24,7 @@ contains
 
       tests = [ &
          test_case_t("gaps over a flat surface", test_gaps), &
+         test_case_t("stencils that hold", test_covers), &
          test_case_t("slips", test_slips)]
    end subroutine collect_segment
 
@@ -46,10 +47,11 @@ contains
       call contact_laws_of_surface(interaction_t(friction=0.5_wp), segment%laws)
    end subroutine make
 
-   !> Where the last node, at x = 1.125 + way, is over the surface, which ends at 2, and where not.
+   !> Where the last node, at x = 1.125 + way, is over the surface, which ends at 2, and where not, or
+   !> where the first one, at -0.875 + way, is not.
    subroutine test_gaps(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: way(2) = [0.3_wp, 1.1_wp]
+      real(wp), parameter :: way(3) = [0.3_wp, 1.1_wp, -1.4_wp]
       type(scene_t) :: scene
       type(segment_t) :: segment
       real(wp), allocatable :: u(:, :), du(:, :), place(:, :)
@@ -57,7 +59,7 @@ contains
       integer :: k, w, i, at
 
       do k = 1, 2
-         do w = 1, 2
+         do w = 1, 3
             call make(way(w), k, scene, segment, error)
             if (allocated(error)) return
             allocate(u, du, source=0.0_wp*scene%x)
@@ -82,9 +84,11 @@ contains
                   ! What is left of the edge past the end belongs to its first node.
                   if (w == 2) expected(2, :) = (a*(2.0_wp*gap(2, :) + gap(1, :))/3.0_wp &
                      + b*gap(2, :))/(a + b)
+                  if (w == 3) expected(2, :) = (b*(2.0_wp*gap(2, :) + gap(3, :))/3.0_wp &
+                     + a*gap(2, :))/(a + b)
                end if
             end associate
-            do i = 1, merge(3, 2, w == 1)
+            do i = merge(2, 1, w == 3), merge(2, 3, w == 2)
                ! In the order of the surface, which may be the other way round.
                associate (state => segment%state(findloc(segment%node, 10 + i, 1)))
                   call check_near(error, [state%gap0, state%gap1], expected(i, :), tol, 1.0_wp, &
@@ -98,6 +102,37 @@ contains
          end do
       end do
    end subroutine test_gaps
+
+   !> Stencils of the nodes at all ends of its edges hold, or not.
+   subroutine test_covers(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: way(4) = [-0.125_wp, 1.75_wp, 2.25_wp, 3.25_wp]
+      type(scene_t) :: scene
+      type(segment_t) :: segment
+      real(wp), allocatable :: du(:, :)
+      logical :: holds(3), expected(3)
+      integer :: k, i, seen(0:1)
+
+      call make(-0.5_wp, 1, scene, segment, error)
+      if (allocated(error)) return
+      allocate(du, source=0.0_wp*scene%x)
+      seen = 0
+      call segment%begin_step(scene%x, scene%u0, du)
+      do k = 1, size(way)
+         ! The nodes do not go as far as each other.
+         du(1, 11:13) = way(k)*[1.0_wp, 0.75_wp, 0.25_wp]
+         call segment%measure(scene%x, scene%u0, du)
+         holds = [(segment%nts%covers(findloc(segment%nts%node, 10 + i, 1), scene%x, scene%u0, du), &
+            i = 1, 3)]
+         expected = [all(holds(:2)), all(holds), all(holds(2:))]
+         do i = 1, 3
+            call check_true(error, segment%covers(findloc(segment%node, 10 + i, 1), scene%x, &
+               scene%u0, du) .eqv. expected(i), "node " // to_text(i) // ", way " // to_text(k))
+            seen(merge(1, 0, expected(i))) = seen(merge(1, 0, expected(i))) + 1
+         end do
+      end do
+      call check_true(error, all(seen > 2), "both")
+   end subroutine test_covers
 
    !> The parts of the slips of nodes in that of a constraint, with the sum 1.
    subroutine test_slips(error)
