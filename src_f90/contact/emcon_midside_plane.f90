@@ -189,7 +189,7 @@ contains
                                                  !! which it is; 0: of none
       integer, intent(out) :: list(:)            !! (>= n) nodes
       integer, intent(out) :: place(:, :)        !! (3, n_node of `item`) in `list`: of each node,
-                                                 !! and of the ends of its side, or 0
+                                                 !! and of the ends of its side if it has one
       integer, intent(out) :: n, n_slave
       integer :: i
 
@@ -197,7 +197,6 @@ contains
       call append(self, item, number, 1, item%n_slave, list, n)
       n_slave = n
       call append(self, item, number, item%n_slave + 1, item%n_node, list, n)
-      place = 0
       do i = 1, item%n_node
          place(1, i) = findloc(list(:n), item%node(i), 1)
          if (number(i) == 0) cycle

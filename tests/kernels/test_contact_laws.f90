@@ -39,7 +39,8 @@ contains
          test_case_t("rates that impacts change", test_rates)]
    end subroutine collect_contact_laws
 
-   !> A new law says nothing but what it responds, and acts wherever it is near; decks do not know it.
+   !> A new law says nothing but what it responds, and acts wherever it is near; decks do not know
+   !> it.
    subroutine test_plain(error)
       type(error_t), allocatable, intent(out) :: error
       type(contact_laws_t) :: of_pair, laws

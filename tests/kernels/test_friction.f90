@@ -266,12 +266,12 @@ contains
       do k = 1, size(trial, 2)
          at = contact_trial_t(lam=2.0_wp, slip=trial(:, k)/c, slip_target=[2.0_wp, 0.0_wp]/c)
          next = coulomb_trial(slip_status_t(contact_free), at, 0.5_wp, c, 0.25_wp)
-         call check_equal(error, next%kind, merge(contact_slides, contact_free, k < 3 .or. k == 4), &
-            "from where it is free")
+         call check_equal(error, next%kind, merge(contact_slides, contact_free, &
+            k < 3 .or. k == 4), "from where it is free")
          next = coulomb_trial(was, at, 0.5_wp, c, 0.25_wp)
          call check_equal(error, next%kind, merge(contact_free, contact_slides, k == 3), "status")
-         call check_near(error, next%direction, merge(-1.0_wp, 1.0_wp, k == 2)*merge(0.0_wp, 1.0_wp, &
-            k == 3)*up, tol, 1.0_wp, "direction")
+         call check_near(error, next%direction, merge(-1.0_wp, 1.0_wp, k == 2)*merge(0.0_wp, &
+            1.0_wp, k == 3)*up, tol, 1.0_wp, "direction")
       end do
       do k = -1, 1, 2
          at = contact_trial_t(lam=0.125_wp*k)

@@ -9,6 +9,7 @@ module test_judge
    use emcon_mesh, only : surface_t
    use emcon_overlap_check, only : overlap_check_init, overlap_check_smooth, overlap_check_step, &
       overlap_check_t, overlap_t
+   use emcon_overlap_query, only : overlap_names
    use emcon_scene, only : scene_t
    use emcon_text, only : notes_t, to_text
    use emcon_ties, only : ties_prepare
@@ -118,6 +119,8 @@ contains
          call check_near(error, overlap%depth, 0.25_wp, 8.0_wp*eps, 1.0_wp, "depth")
          call check_true(error, any(overlap%node == [7, 8]), "node")
          call check_equal(error, overlap%facet(:2), [11, 12], "edge")
+         call check_true(error, all(overlap_names(overlap, [overlap%node, 11, 12, 10]) .eqv. &
+            [.true., .true., .true., .false.]), "nodes that it is told of")
       end do
    end subroutine test_corner
 
@@ -446,8 +449,9 @@ contains
       call check_equal(error, overlap%node, 0, "on top")
    end subroutine test_in_line
 
-   !> Blocks of bent sides thrown on each other: of all nodes of both, and of the middles of all parts
-   !> of sides between crossings, the deepest one in the other block by the side that is nearest.
+   !> Blocks of bent sides thrown on each other: of all nodes of both, and of the middles of all
+   !> parts of sides between crossings, the deepest one in the other block by the side that is
+   !> nearest.
    subroutine test_anywhere(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: tol = 4096.0_wp*eps
@@ -557,8 +561,9 @@ contains
 
    end subroutine test_anywhere
 
-   !> One leg of a U leans into the other one, by up to 2/5 with its corner: what is found in the one
-   !> piece is what is found between two that are the legs, in the order of the strip or against it.
+   !> One leg of a U leans into the other one, by up to 2/5 with its corner: what is found in the
+   !> one piece is what is found between two that are the legs, in the order of the strip or against
+   !> it.
    subroutine test_legs(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: outer(2, 0:9) = reshape([0.0_wp, 3.0_wp, 0.0_wp, 2.0_wp, 0.0_wp, &
@@ -605,8 +610,8 @@ contains
          legs%x = reshape([at(:, :3, 1), at(:, :3, 2), at(:, 6:, 1), at(:, 6:, 2)], [2, 16])
          call judged(legs, expected)
          if (expected%depth > 1.0e-3_wp) n_deep = n_deep + 1
-         call check_near(error, max(0.0_wp, overlap%depth), max(0.0_wp, expected%depth), 64.0_wp*eps, &
-            1.0_wp, "case " // to_text(case))
+         call check_near(error, max(0.0_wp, overlap%depth), max(0.0_wp, expected%depth), &
+            64.0_wp*eps, 1.0_wp, "case " // to_text(case))
       end do
       call check_true(error, n_deep > 40 .and. n_deep < 100, "overlaps: " // to_text(n_deep))
    end subroutine test_legs

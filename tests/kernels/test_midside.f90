@@ -205,13 +205,30 @@ contains
             call check_directions("gap " // to_text(k), item(i)%g(:, :m), item(i)%dgap)
             call check_directions("slip " // to_text(k), item(i)%t(:, :m, 1), item(i)%slip(1))
             call check_true(error, abs(item(i)%slip(1)) > 0.0_wp, "it slides")
+            call check_near(error, contact%slip(i, scene%x, scene%u0, du), item(i)%slip(:1), tol, &
+               1.0_wp, "its slip, " // to_text(k))
          end do
          call check_near(error, contact%state%gap1 - contact%state%gap0, [(contact%mean_gap(i, &
             item(i)%gap1) - item(i)%gap0, i = 1, size(item))], tol, 1.0_wp, "as measured")
+         call check_areas()
          deallocate(item)
       end do
 
    contains
+
+      !> Areas are those of the contact points, less what these do not press on.
+      subroutine check_areas()
+         real(wp), dimension(size(item)) :: area, length, of_points, length_of_points
+
+         call contact%area(scene%x, scene%u0 + du, area, length)
+         associate (point => midside_points(contact%midside, scene%u0 + du))
+            call contact%area_points(scene%x, point, of_points, length_of_points)
+            call contact%narrow(scene%x, point, of_points)
+         end associate
+         call check_near(error, [area, length], [of_points, length_of_points], 0.0_wp, 1.0_wp, &
+            "areas, " // to_text(k))
+         call check_true(error, minval(area) > 0.0_wp, "there are areas")
+      end subroutine check_areas
 
       subroutine check_directions(what, g, change)
          character(len=*), intent(in) :: what

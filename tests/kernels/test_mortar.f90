@@ -944,9 +944,9 @@ contains
       end do
    end subroutine test_slip_points
 
-   !> The first slave node over the master or beside it, at the start and at the end: it acts where it
-   !> ends over it, a penalty as long as it began there too. What comes from behind is told: by more
-   !> than a twentieth of its edges.
+   !> The first slave node over the master or beside it, at the start and at the end: it acts where
+   !> it ends over it, a penalty as long as it began there too. What comes from behind is told: by
+   !> more than a twentieth of its edges.
    subroutine test_come_and_go(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: gap(4) = [0.25_wp, -0.04_wp, -0.06_wp, -0.25_wp]

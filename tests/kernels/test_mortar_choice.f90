@@ -308,7 +308,8 @@ contains
          call place_edges([1.1_wp, 0.5_wp], [0.6_wp, 0.2_wp], [0.1_wp, 0.1_wp], x, slave, master)
          if (i == 1) master%neighbour = reshape([0, 2, 1, 0], [2, 2])
          pair = pairs_of(slave, master, .false.)
-         call pairs_seen(pair, master, [0.1_wp, 0.15_wp, 0.55_wp, 0.7_wp], x, 0.0_wp*x, 0.0_wp*x, seen)
+         call pairs_seen(pair, master, [0.1_wp, 0.15_wp, 0.55_wp, 0.7_wp], x, 0.0_wp*x, 0.0_wp*x, &
+            seen)
          call check_equal(error, seen(1, :), [0, 0, i, 1], "over a joint")
          call check_true(error, all(seen(2, :) == 0), "none beside")
       end do

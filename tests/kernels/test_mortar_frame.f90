@@ -36,8 +36,8 @@ contains
       type(pair_stencil_t), intent(out) :: stencil
 
       call shake(x, 0.2_wp)
-      x(1, [place_before, place_first, place_last, place_after]) = x(1, [place_before, place_first, &
-         place_last, place_after]) + [-2.0_wp, 0.0_wp, 2.0_wp, 4.0_wp]
+      x(1, [place_before, place_first, place_last, place_after]) = x(1, [place_before, &
+         place_first, place_last, place_after]) + [-2.0_wp, 0.0_wp, 2.0_wp, 4.0_wp]
       x(2, local_master) = x(2, local_master) - 0.5_wp
       x(1, local_master) = x(1, local_master) + [1.75_wp, 0.75_wp, 3.0_wp, -1.0_wp]
       stencil%node = 1
@@ -66,8 +66,9 @@ contains
       cross = a(1)*b(2) - a(2)*b(1)
    end function cross
 
-   !> The place on the master lies on the ray, at the height of the gap; on the curve too, which goes
-   !> on straight past its ends. The ray leans over both edges by the sines of the angles there.
+   !> The place on the master lies on the ray, at the height of the gap; on the curve too, which
+   !> goes on straight past its ends. The ray leans over both edges by the sines of the angles
+   !> there.
    subroutine test_hit(error)
       type(error_t), allocatable, intent(out) :: error
       type(pair_stencil_t) :: stencil
@@ -81,8 +82,8 @@ contains
          call make_pair(x, stencil)
          stencil%is_smooth = mod(case, 2) == 0
          ! Values at both ends, and slopes by nodes on both sides, which fall together.
-         stencil%shape = reshape([1.0_wp, -0.9_wp, 0.0_wp, -0.1_wp, 0.0_wp, 0.9_wp, 0.0_wp, 0.1_wp, &
-            0.0_wp, -0.05_wp, 0.1_wp, -0.05_wp, 0.0_wp, 0.05_wp, -0.1_wp, 0.05_wp], [4, 4])
+         stencil%shape = reshape([1.0_wp, -0.9_wp, 0.0_wp, -0.1_wp, 0.0_wp, 0.9_wp, 0.0_wp, &
+            0.1_wp, 0.0_wp, -0.05_wp, 0.1_wp, -0.05_wp, 0.0_wp, 0.05_wp, -0.1_wp, 0.05_wp], [4, 4])
          call draw_random(xi)
          call frame_init(frame, stencil, x)
          call frame_hit(frame, stencil, xi, eta, gap)
@@ -131,8 +132,8 @@ contains
             s = frame_project(frame, k)
             call look(x, stencil, max(0.0_wp, min(1.0_wp, s)), at, t)
             at = at + (s - max(0.0_wp, min(1.0_wp, s)))*edge
-            call check_near(error, dot_product(x(:, local_master(k)) - at, t), 0.0_wp, tol, 4.0_wp, &
-               "node " // to_text(k) // " of case " // to_text(case))
+            call check_near(error, dot_product(x(:, local_master(k)) - at, t), 0.0_wp, tol, &
+               4.0_wp, "node " // to_text(k) // " of case " // to_text(case))
             associate (where => merge(1, merge(2, 3, s <= 1.0_wp), s < 0.0_wp))
                seen(where) = seen(where) + 1
             end associate
@@ -169,11 +170,11 @@ contains
          at = x(:, place_first) + s*(x(:, place_last) - x(:, place_first))
          associate (z => rounded_clip(s, end_rounding))
             call look(x, stencil, z, beside, t)
-            call check_near(error, dot_product(x(:, local_master(1)) - at, t), 0.0_wp, tol, 4.0_wp, &
-               "case " // to_text(case))
+            call check_near(error, dot_product(x(:, local_master(1)) - at, t), 0.0_wp, tol, &
+               4.0_wp, "case " // to_text(case))
             call frame_cover(frame, low, high)
-            call check_near(error, [low, high], [rounded_clip(frame_meet(frame, 2), end_rounding), z], &
-               0.0_wp, 1.0_wp, "what is covered")
+            call check_near(error, [low, high], [rounded_clip(frame_meet(frame, 2), &
+               end_rounding), z], 0.0_wp, 1.0_wp, "what is covered")
             if (abs(z - s) > 0.0_wp .and. z > 0.0_wp .and. z < 1.0_wp) n_within = n_within + 1
          end associate
          if (allocated(error)) return
@@ -230,8 +231,8 @@ contains
       stencil%weight = 1.0_wp
       stencil%n_master = 4
       stencil%is_smooth = .true.
-      stencil%shape = reshape([((merge(1.0_wp, 0.0_wp, k == mod(case, 5)), case = 0, 3), k = 0, 3)], &
-         [4, 4])
+      stencil%shape = reshape([((merge(1.0_wp, 0.0_wp, k == mod(case, 5)), case = 0, 3), k = 0, &
+         3)], [4, 4])
       x = 0.0_wp
       x(1, place_last) = 1.0_wp
       do case = 1, 400

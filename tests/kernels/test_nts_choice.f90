@@ -158,8 +158,9 @@ contains
          "gaps")
    end subroutine test_twins
 
-   !> A bottom over the top of a block of one, two or three edges: the neighbours on the top are part
-   !> of the gap, its sides are not; nor are they for a curve, which is told what to do at corners.
+   !> A bottom over the top of a block of one, two or three edges: the neighbours on the top are
+   !> part of the gap, its sides are not; nor are they for a curve, which is told what to do at
+   !> corners.
    subroutine test_stencils(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene

@@ -19,7 +19,8 @@ module test_nts_states
    public :: collect_nts_states
 
    real(wp), parameter :: tol = 64.0_wp*epsilon(1.0_wp), end_tol = 1.0e-3_wp
-   !> Of `make_two_blocks`: where its slave nodes stand, on a surface from -2 to 2; the master nodes.
+   !> Of `make_two_blocks`: where its slave nodes stand, on a surface from -2 to 2; the master
+   !> nodes.
    real(wp), parameter :: at(3) = [-0.875_wp, 0.125_wp, 1.125_wp]
    integer, parameter :: first_upper = 11
 
@@ -86,8 +87,8 @@ contains
                   associate (state => nts%state(i), name => "kind " // to_text(kind) // &
                         ", motion " // to_text(m))
                      call check_true(error, state%is_near .and. state%is_over, name)
-                     call check_near(error, [state%gap0, state%gap1], [item(1)%gap0, item(1)%gap1], &
-                        16.0_wp*tol, 1.0_wp, "gaps, " // name)
+                     call check_near(error, [state%gap0, state%gap1], [item(1)%gap0, &
+                        item(1)%gap1], 16.0_wp*tol, 1.0_wp, "gaps, " // name)
                      if (m > 2) call check_near(error, state%gap1, state%gap0, merge(0.0_wp, &
                         16.0_wp*tol, kind == 1), 1.0_wp, "at rest, " // name)
                      call check_near(error, [state%size, state%other_size], [1.0_wp, 1.0_wp], tol, &
@@ -108,9 +109,9 @@ contains
       integer, parameter :: smoothing(2) = [smoothing_none, smoothing_hermite]
       type(scene_t) :: scene
       type(nts_t) :: nts
-      type(condition_t) :: item(1)
+      type(condition_t) :: item(1), first(1)
       real(wp), allocatable :: u(:, :), du(:, :)
-      integer :: k, i, kind
+      integer :: k, i, n, kind
 
       do kind = 1, 2
          call begin(scene, smoothing(kind), 0.0_wp, nts, error)
@@ -127,6 +128,14 @@ contains
                call nts%evaluate([i], scene%x, u, du, [0.0_wp], item)
                call check_near(error, nts%slip(i, scene%x, u, du), item(1)%slip(:1), 16.0_wp*tol, &
                   1.0_wp, "slip, kind " // to_text(kind))
+               first%has_friction = .true.
+               first%leaves_second = .true.
+               call nts%evaluate([i], scene%x, u, du, [0.0_wp], first)
+               n = item(1)%n_node
+               call check_near(error, [first(1)%gap1, first(1)%slip(1), first(1)%g(:, :n), &
+                  first(1)%t(:, :n, 1), first(1)%t1(:, :n, 1)], [item(1)%gap1, item(1)%slip(1), &
+                  item(1)%g(:, :n), item(1)%t(:, :n, 1), item(1)%t1(:, :n, 1)], 0.0_wp, 1.0_wp, &
+                  "bits without second derivatives")
                ! The master runs from the right to the left.
                if (k == 0) call check_near(error, abs(item(1)%slip(1)), 0.125_wp, 16.0_wp*tol, &
                   1.0_wp, "way")
@@ -178,7 +187,8 @@ contains
                   end select
                   call nts%begin_step(scene%x, u, du)
                   call nts%measure(scene%x, u, du)
-                  call check_true(error, nts%state(own)%is_near .and. (nts%state(own)%is_over .eqv. &
+                  call check_true(error, &
+                     nts%state(own)%is_near .and. (nts%state(own)%is_over .eqv. &
                      k < 3), "kind " // to_text(kind) // ", side " // to_text(side) &
                      // ", place " // to_text(k) // ", way " // to_text(way))
                   if (way == 0 .and. kind == 1) call check_true(error, nts%stands_over(own) &
@@ -222,8 +232,8 @@ contains
       end do
    end subroutine test_covers
 
-   !> In the sector of a convex vertex at the far end of the edge next to the node's: all edges there
-   !> are as near, a curve ends there unless a corner comes before. From either side.
+   !> In the sector of a convex vertex at the far end of the edge next to the node's: all edges
+   !> there are as near, a curve ends there unless a corner comes before. From either side.
    subroutine test_turns(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: smoothing(2) = [smoothing_none, smoothing_hermite]

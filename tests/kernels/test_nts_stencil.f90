@@ -161,8 +161,8 @@ contains
                   *merge(1.0_wp, -1.0_wp, from == 1)*way(0.4_wp + 0.5_wp*phi + 0.5_wp*pi))
                expected = merge(3 - from, from, k == 5 .and. cos(phi) < 0.9_wp .and. is_past())
                call check_equal(error, [edge, other], [expected, merge(3 - from, 0, k > 1 .and. &
-                  k < 5 .and. cos(phi) < 0.9_wp)], "bisector, case " // to_text(case) // ", place " &
-                  // to_text(k))
+                  k < 5 .and. cos(phi) < 0.9_wp)], &
+                  "bisector, case " // to_text(case) // ", place " // to_text(k))
             end do
             if (allocated(error)) return
          end do

@@ -47,8 +47,8 @@ contains
       call contact_laws_of_surface(interaction_t(friction=0.5_wp), segment%laws)
    end subroutine make
 
-   !> Where the last node, at x = 1.125 + way, is over the surface, which ends at 2, and where not, or
-   !> where the first one, at -0.875 + way, is not.
+   !> Where the last node, at x = 1.125 + way, is over the surface, which ends at 2, and where not,
+   !> or where the first one, at -0.875 + way, is not.
    subroutine test_gaps(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: way(3) = [0.3_wp, 1.1_wp, -1.4_wp]
@@ -122,8 +122,8 @@ contains
          ! The nodes do not go as far as each other.
          du(1, 11:13) = way(k)*[1.0_wp, 0.75_wp, 0.25_wp]
          call segment%measure(scene%x, scene%u0, du)
-         holds = [(segment%nts%covers(findloc(segment%nts%node, 10 + i, 1), scene%x, scene%u0, du), &
-            i = 1, 3)]
+         holds = [(segment%nts%covers(findloc(segment%nts%node, 10 + i, 1), scene%x, scene%u0, &
+            du), i = 1, 3)]
          expected = [all(holds(:2)), all(holds), all(holds(2:))]
          do i = 1, 3
             call check_true(error, segment%covers(findloc(segment%node, 10 + i, 1), scene%x, &

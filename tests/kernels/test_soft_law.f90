@@ -166,8 +166,8 @@ contains
 
       do k = 1, size(left)
          call law%begin(place)
-         call check_near(error, [law%stiffest(), law%before], [stiffness/16.0_wp, -0.5_wp], 0.0_wp, &
-            1.0_wp, "stiffness and start")
+         call check_near(error, [law%stiffest(), law%before], [stiffness/16.0_wp, -0.5_wp], &
+            0.0_wp, 1.0_wp, "stiffness and start")
          response = response_of(law, 0.0_wp, left(k))
          call check_near(error, law%closure(), 0.25_wp*min(0.0_wp, left(k) - 0.5_wp), 0.0_wp, &
             1.0_wp, "closure")
