@@ -120,6 +120,10 @@ contains
       call set_up(0.0_wp, 0.0_wp, beside, 0.0_wp, x, chain, stencil)
       chain%node_edge(1, 2) = 0
       call check_true(error, is_pushed_aside(chain, 2, stencil, x, 0.0_wp*x, 0.0_wp*x), "end")
+      ! Or stand up from it: it has all normals of the corner.
+      chain%node_edge(:, 2) = [1, 0]
+      call check_true(error, .not. is_pushed_aside(chain, 2, stencil, x, 0.0_wp*x, 0.0_wp*x), &
+         "the other end")
       chain%node_edge(:, 2) = 0
       call check_true(error, .not. is_pushed_aside(chain, 2, stencil, x, 0.0_wp*x, 0.0_wp*x), &
          "without edges")
