@@ -285,6 +285,8 @@ contains
 
       do k = 1, size(bend)
          call make_hollow(scene, bend(k), depth(k), is_reversed(k))
+         scene%x = 0.25_wp**(k - 1)*scene%x
+         scene%u0 = 0.25_wp**(k - 1)*scene%u0
          associate (square => 1.0_wp + bend(k)**2)
             share = 0.5_wp + depth(k)*bend(k)/square
             of_facets = depth(k)/square
