@@ -23,6 +23,7 @@ program main
    use test_supernodal, only : collect_supernodal
 #endif
    use test_condensation, only : collect_condensation
+   use test_condition_nodes, only : collect_condition_nodes
    use test_condition_rows, only : collect_condition_rows
    use test_contact_problem, only : collect_contact_problem
    use test_contact_rounds, only : collect_contact_rounds
@@ -300,6 +301,7 @@ program main
    call run("rigid_pushes", collect_rigid_pushes)
    call run("rigid_bodies", collect_rigid_bodies)
    call run("condensation", collect_condensation)
+   call run("condition_nodes", collect_condition_nodes)
    call run("condition_rows", collect_condition_rows)
    call run("contact_problem", collect_contact_problem)
    call run("contact_rounds", collect_contact_rounds)

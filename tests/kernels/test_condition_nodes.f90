@@ -1,0 +1,93 @@
+!> The nodes of a condition: room for them, and more of them with what is known of the first.
+module test_condition_nodes
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_condition_nodes, only : condition_include, condition_resize, condition_resize_slip, &
+      nodes_append
+   use emcon_constraint, only : condition_t
+   use emcon_errors, only : error_t
+   use emcon_kinds, only : wp
+   use random_draws, only : draw_random
+   implicit none
+   private
+   public :: collect_condition_nodes
+
+contains
+
+   subroutine collect_condition_nodes(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("each node once", test_append), &
+         test_case_t("room that grows, never shrinks", test_resize), &
+         test_case_t("more nodes, by nothing yet", test_include)]
+   end subroutine collect_condition_nodes
+
+   subroutine test_append(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: list(8), n
+
+      list(:2) = [7, 3]
+      n = 2
+      call nodes_append([3, 0, 5, 7, 5, 9], list, n)
+      call check_equal(error, list(:n), [7, 3, 5, 9], "nodes")
+   end subroutine test_append
+
+   subroutine test_resize(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(condition_t) :: item
+      integer, parameter :: n(4) = [2, 3, 1, 3], room(4) = [2, 3, 3, 3]
+      integer :: k
+
+      do k = 1, size(n)
+         call condition_resize(item, n(k))
+         call condition_resize_slip(item)
+         call check_equal(error, [item%n_node, size(item%node), shape(item%g), shape(item%c), &
+            shape(item%h), shape(item%t), shape(item%t1), shape(item%ht)], [n(k), room(k), 2, &
+            room(k), 2, room(k), 2*room(k), 2*room(k), 2, room(k), 1, 2, room(k), 1, 2*room(k), &
+            2*room(k), 1], "sizes")
+         call check_true(error, all(abs(item%t) <= 0.0_wp) .and. all(abs(item%t1) <= 0.0_wp) .and. &
+            all(abs(item%ht) <= 0.0_wp) .and. all(abs(item%slip) <= 0.0_wp), "no slip yet")
+         item%t = 1.0_wp
+         item%t1 = 1.0_wp
+         item%ht = 1.0_wp
+         item%slip = 1.0_wp
+      end do
+   end subroutine test_resize
+
+   !> With room for them or not, and with second derivatives or not.
+   subroutine test_include(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(condition_t), allocatable :: item
+      real(wp) :: g(2, 4), c(2, 4), h(8, 8)
+      integer :: k
+
+      do k = 0, 3
+         allocate(item)
+         if (btest(k, 0)) call condition_resize(item, 6)
+         call condition_resize(item, 2)
+         item%leaves_second = btest(k, 1)
+         item%node(:2) = [7, 3]
+         call draw_random(item%g)
+         call draw_random(item%c)
+         call draw_random(item%h)
+         g = 0.0_wp
+         c = 0.0_wp
+         h = 0.0_wp
+         g(:, :2) = item%g(:, :2)
+         c(:, :2) = item%c(:, :2)
+         if (.not. btest(k, 1)) h(:4, :4) = item%h(:4, :4)
+         call condition_include(item, [3, 0, 5, 9, 5])
+         call check_equal(error, item%n_node, 4, "number")
+         call check_equal(error, item%node(:4), [7, 3, 5, 9], "nodes")
+         if (allocated(error)) return
+         call check_near(error, item%g(:, :4), g, 0.0_wp, 1.0_wp, "discrete gradient")
+         call check_near(error, item%c(:, :4), c, 0.0_wp, 1.0_wp, "gradient")
+         if (.not. btest(k, 1)) call check_near(error, item%h(:8, :8), h, 0.0_wp, 1.0_wp, &
+            "second derivatives")
+         call condition_include(item, [9, 7])
+         call check_near(error, item%g(:, :4), g, 0.0_wp, 1.0_wp, "nothing new")
+         deallocate(item)
+      end do
+   end subroutine test_include
+
+end module test_condition_nodes
