@@ -6,7 +6,7 @@ module test_nts_choice
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, smoothing_hermite
    use emcon_kinds, only : wp
-   use emcon_nts, only : nts_init, nts_t
+   use emcon_nts, only : nts_init, nts_nearest, nts_t
    use emcon_nts_choice, only : choice_covers
    use emcon_nts_stencil, only : edge_distance
    use emcon_scene, only : scene_t
@@ -117,6 +117,8 @@ contains
       type(scene_t) :: scene
       type(block_t) :: block
       type(nts_t) :: nts
+      real(wp) :: gap
+      logical :: is_over
       integer :: step
 
       call make_block(scene, "CPE4", [1, 1], block)
@@ -131,6 +133,9 @@ contains
          call check_equal(error, nts%edge, [0, 0, 0, 0], "edges")
          call check_true(error, (nts%clearance > 0.0_wp) .eqv. step > 1, "step " // to_text(step))
       end do
+      nts%edge = 1                               ! whatever was chosen before
+      call nts_nearest(nts, 1, scene%x, scene%u0, 0.0_wp*scene%x, gap, is_over)
+      call check_true(error, nts%edge(1) == 0 .and. .not. is_over, "none of all edges")
    end subroutine test_alone
 
    !> The second node of a joint comes behind all first ones, with the place and class of its first.

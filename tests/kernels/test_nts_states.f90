@@ -57,8 +57,8 @@ contains
       call nts%configure(scene%x, contact_options_t(smoothing=smoothing))
    end subroutine begin
 
-   !> Stencils are chosen once; then gaps are measured from other starts, where nodes move, rest, or
-   !> move elsewhere alone: each is that of its condition, and from the same start the start's.
+   !> Stencils are chosen once; then gaps are measured there and from other starts, where nodes
+   !> move, rest, or move elsewhere alone, and there once more: each is that of its condition.
    subroutine test_measure(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: smoothing(2) = [smoothing_none, smoothing_hermite]
@@ -75,12 +75,12 @@ contains
          do k = 1, 10
             call shake(u, 0.05_wp)
             call nts%begin_step(scene%x, u, du)
-            do m = 1, 4
+            do m = 1, 5
                call shake(shift, 0.02_wp)
-               if (m == 1) shift = 0.0_wp
+               if (m == 1 .or. m == 5) shift = 0.0_wp
                call shake(du, 0.04_wp)            ! in front of the surface: there offsets go around
-               if (m > 2) du(:, nts%near%node) = 0.0_wp
-               if (m > 3) du = 0.0_wp
+               if (m == 3 .or. m == 4) du(:, nts%near%node) = 0.0_wp
+               if (m == 4) du = 0.0_wp
                call nts%measure(scene%x, u + shift, du)
                do i = 1, 3
                   call nts%evaluate([i], scene%x, u + shift, du, [0.0_wp], item)
@@ -89,8 +89,8 @@ contains
                      call check_true(error, state%is_near .and. state%is_over, name)
                      call check_near(error, [state%gap0, state%gap1], [item(1)%gap0, &
                         item(1)%gap1], 16.0_wp*tol, 1.0_wp, "gaps, " // name)
-                     if (m > 2) call check_near(error, state%gap1, state%gap0, merge(0.0_wp, &
-                        16.0_wp*tol, kind == 1), 1.0_wp, "at rest, " // name)
+                     if (m == 3 .or. m == 4) call check_near(error, state%gap1, state%gap0, &
+                        merge(0.0_wp, 16.0_wp*tol, kind == 1), 1.0_wp, "at rest, " // name)
                      call check_near(error, [state%size, state%other_size], [1.0_wp, 1.0_wp], tol, &
                         1.0_wp, "edges, " // name)
                   end associate
@@ -211,25 +211,44 @@ contains
       type(scene_t) :: scene
       type(nts_t) :: nts
       real(wp), allocatable :: u(:, :), du(:, :)
-      integer :: k, kind
+      integer :: k, kind, side, own
 
       do kind = 1, 2
-         call begin(scene, smoothing(kind), 0.0_wp, nts, error)
-         if (allocated(error)) return
-         allocate(u, du, source=0.0_wp*scene%x)
-         if (kind == 2) nts%is_corner(:2) = .true.
-         do k = 1, size(places, 2)
-            du(:, first_upper) = places(:, k) - scene%x(:, first_upper)
-            ! The last node of the surface, for the first three.
-            u(:, 10) = merge([0.6_wp, 1.0_wp] - scene%x(:, 10), [0.0_wp, 0.0_wp], k < 4)
-            call nts%begin_step(scene%x, u, du)
-            call nts%measure(scene%x, u, du)
-            call check_equal(error, nts%edge(1), 3, "edge at the start")
-            call check_true(error, nts%covers(1, scene%x, u, du) .eqv. holds(k), "kind " &
-               // to_text(kind) // ", place " // to_text(k))
+         do side = -1, 1, 2
+            call begin(scene, smoothing(kind), 0.0_wp, nts, error)
+            if (allocated(error)) return
+            allocate(u, du, source=0.0_wp*scene%x)
+            ! At the foot of the wall.
+            if (kind == 2) nts%is_corner(merge(2, 3, side == 1)) = .true.
+            own = 2 - side
+            do k = 1, size(places, 2)
+               du(:, 10 + own) = mirrored(places(:, k)) - scene%x(:, 10 + own)
+               ! The last node of the surface, or the first two, for the first three.
+               u = 0.0_wp
+               if (k < 4 .and. side == 1) u(:, 10) = [0.6_wp, 1.0_wp] - scene%x(:, 10)
+               if (k < 4 .and. side == -1) u(:, 6:7) = reshape([0.3_wp, 2.0_wp, 0.4_wp, 1.0_wp], &
+                  [2, 2]) - scene%x(:, 6:7)
+               call nts%begin_step(scene%x, u, du)
+               call nts%measure(scene%x, u, du)
+               call check_equal(error, nts%edge(own), own + merge(2, -2, side == 1), &
+                  "edge at the start")
+               call check_true(error, nts%covers(own, scene%x, u, du) .eqv. holds(k), "kind " &
+                  // to_text(kind) // ", side " // to_text(side) // ", place " // to_text(k))
+            end do
+            deallocate(u, du)
          end do
-         deallocate(u, du)
       end do
+
+   contains
+
+      !> As seen from the other end.
+      pure function mirrored(place)
+         real(wp), intent(in) :: place(2)
+         real(wp) :: mirrored(2)
+
+         mirrored = [merge(place(1), 1.0_wp - place(1), side == 1), place(2)]
+      end function mirrored
+
    end subroutine test_covers
 
    !> In the sector of a convex vertex at the far end of the edge next to the node's: all edges
