@@ -7,6 +7,7 @@ module test_chain
    use emcon_contact_registry, only : new_contact
    use emcon_element_registry, only : find_element_row
    use emcon_errors, only : err_input, error_t
+   use emcon_facets, only : facets_rim
    use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts, &
       formulation_segment
    use emcon_kinds, only : dp, wp
@@ -82,6 +83,7 @@ contains
       type(block_t) :: block
       type(chain_t) :: chain
       character(len=4), parameter :: name(2) = ["CPE3", "CPE4"]
+      logical :: is_rim(4)
       integer :: k
 
       do k = 1, 2
@@ -94,6 +96,9 @@ contains
          call check_equal(error, chain%neighbour(2, :), [2, 3, 0], "next")
          call check_equal(error, chain%node, [5, 6, 7, 8], "nodes")
          if (allocated(error)) return
+         is_rim = .true.
+         call facets_rim(chain, is_rim)
+         call check_true(error, all(is_rim .eqv. [.true., .false., .false., .true.]), "rim")
       end do
    end subroutine test_open
 

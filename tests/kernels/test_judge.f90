@@ -153,11 +153,19 @@ contains
       type(scene_t) :: scene
       type(overlap_t) :: overlap
 
-      call make_scene(scene, [1.3_wp, 1.25_wp], [0.5_wp, 0.5_wp], [1, 1], .false.)
-      call judged(scene, overlap, first=11, motion=[0.0_wp, -2.5_wp])
-      call check_true(error, overlap%depth >= 0.25_wp, "seen on the way")
-      call judged(scene, overlap, first=11, motion=[0.0_wp, 2.5_wp])
-      call check_equal(error, overlap%node, 0, "away from it")
+      integer :: k
+
+      do k = 0, 2
+         call make_scene(scene, [1.3_wp, 1.25_wp], [0.5_wp, 0.5_wp], [1, 1], .false.)
+         scene%x = 0.125_wp**k*scene%x
+         call judged(scene, overlap, first=11, motion=0.125_wp**k*[0.0_wp, -2.5_wp])
+         call check_true(error, overlap%depth >= 0.25_wp, "seen on the way")
+         call judged(scene, overlap, first=11, motion=0.125_wp**k*[0.0_wp, 2.5_wp])
+         call check_equal(error, overlap%node, 0, "away from it")
+         ! What goes in by little and out again on its way grazes: by its edges, in any unit.
+         call judged(scene, overlap, first=11, motion=0.125_wp**k*[6.0_wp, -0.02_wp])
+         call check_equal(error, overlap%node, 0, "past it")
+      end do
    end subroutine test_crossed
 
    !> A motion of 2**30 edges for all: rounded by a millionth of an edge, and yet the same.
