@@ -75,8 +75,7 @@ contains
       real(wp), intent(out) :: area(0:1)         !! at start and end [L^2]
       real(wp) :: theta(0:1)
 
-      theta = 0.0_wp
-      if (is_dual) theta = self%value(moment_cover, :)**2
+      theta = merge(self%value(moment_cover, :)**2, 0.0_wp, is_dual)
       gap = share(self%value(moment_gap, :), self%value(moment_gap_xi, :))
       area = share(self%value(moment_area, :), self%value(moment_area_xi, :))
 
