@@ -111,10 +111,7 @@ contains
          if (start <= 0.0_wp .and. now <= 0.0_wp) then
             lam = -0.5_wp*self%stiffness*(start + now)
             slope = 0.5_wp*self%stiffness
-         else if (start >= 0.0_wp .and. now >= 0.0_wp) then
-            lam = 0.0_wp
-            slope = 0.0_wp
-         else
+         else if (.not. (start >= 0.0_wp .and. now >= 0.0_wp)) then
             part = min(start, now)/(-abs(now - start))
             lam = -0.5_wp*self%stiffness*min(start, now)*part
             if (start < 0.0_wp) then
