@@ -11,6 +11,7 @@ module test_arcs
       formulation_segment, integration_elements, integration_segments, multiplier_dual, &
       multiplier_standard, normal_edge, normal_nodal
    use emcon_kinds, only : wp
+   use emcon_mesh, only : surface_t
    use emcon_overclosure, only : overclosure_follow_arcs
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
@@ -32,6 +33,7 @@ contains
 
       tests = [ &
          test_case_t("the circle of the nodes", test_circle), &
+         test_case_t("up to corners", test_corners), &
          test_case_t("flat sides, kinks and waves are no arcs", test_no_arc), &
          test_case_t("gaps between chords of one circle are 0", test_gaps), &
          test_case_t("interference of circles", test_interference), &
@@ -69,6 +71,81 @@ contains
          deallocate(curvature)
       end do
    end subroutine test_circle
+
+   !> What lies behind a corner says nothing about the arc before it, at either end.
+   subroutine test_corners(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n = 9
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(chain_t) :: chain
+      real(wp) :: curvature(n), alone(n), turn
+      integer :: i, first
+
+      do first = 1, n - 3, 2
+         call scene_begin(scene)
+         call add_block(scene, "CPE4", [n, 1], [0.0_wp, 0.0_wp], [9.0_wp, 1.0_wp], block)
+         ! The top runs back, in arcs of four edges with corners between them and the others.
+         do i = 0, n
+            turn = 0.3_wp*modulo(i - first, 4)
+            scene%x(:, 2*n + 2 - i) = [-8.0_wp*((i - first + 40)/4) - 2.0_wp*sin(turn), &
+               2.0_wp*cos(turn) - 0.1_wp*i]
+         end do
+         call add_surface(scene, "TOP", block, [top])
+         call chain_init(chain, scene, scene%surface(1), error)
+         if (allocated(error)) return
+         call arcs_find(chain, scene%x, 30.0_wp, curvature)
+         do i = 1, n
+            alone(i) = curvature_of(i)
+         end do
+         call check_near(error, curvature, alone, tol, 1.0_wp, "corners from " // to_text(first))
+         call check_true(error, any(abs(curvature) > 0.1_wp), "arcs")
+      end do
+
+   contains
+
+      !> Of a chain of those edges alone that no corner parts from edge `e`.
+      real(wp) function curvature_of(e)
+         integer, intent(in) :: e
+         type(surface_t) :: surface
+         type(chain_t) :: part
+         type(error_t), allocatable :: failure
+         real(wp), allocatable :: of_part(:)
+         integer :: low, high, k
+
+         low = e
+         do while (low > 1)
+            if (turns(low - 1)) exit
+            low = low - 1
+         end do
+         high = e
+         do while (high < n)
+            if (turns(high)) exit
+            high = high + 1
+         end do
+         surface%name = "PART"
+         allocate(surface%element(0), surface%face(0))
+         surface%edge = chain%facet(:, low:high)
+         call chain_init(part, scene, surface, failure)
+         if (allocated(failure)) error = failure
+         allocate(of_part(high - low + 1))
+         call arcs_find(part, scene%x, 180.0_wp, of_part)
+         do k = 1, size(of_part)
+            if (part%facet(1, k) == chain%facet(1, e)) curvature_of = of_part(k)
+         end do
+      end function curvature_of
+
+      !> Is there a corner behind edge `k`?
+      logical function turns(k)
+         integer, intent(in) :: k
+         real(wp) :: a(2), b(2)
+
+         a = scene%x(:, chain%facet(2, k)) - scene%x(:, chain%facet(1, k))
+         b = scene%x(:, chain%facet(2, k + 1)) - scene%x(:, chain%facet(1, k + 1))
+         turns = dot_product(a, b) < cos(acos(-1.0_wp)/6.0_wp)*norm2(a)*norm2(b)
+      end function turns
+
+   end subroutine test_corners
 
    !> The arc under nodes on one radius, from inside and outside and however far off.
    subroutine check_height(x, share, curvature, error)

@@ -4,6 +4,7 @@ module test_condition_nodes
    use emcon_condition_nodes, only : condition_include, condition_resize, condition_resize_slip, &
       nodes_append
    use emcon_constraint, only : condition_t
+   use emcon_edge_moments, only : edge_moments_t, form_begin
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use random_draws, only : draw_random
@@ -19,7 +20,8 @@ contains
       tests = [ &
          test_case_t("each node once", test_append), &
          test_case_t("room that grows, never shrinks", test_resize), &
-         test_case_t("more nodes, by nothing yet", test_include)]
+         test_case_t("more nodes, by nothing yet", test_include), &
+         test_case_t("moments of an edge over its nodes, in order", test_moments)]
    end subroutine collect_condition_nodes
 
    subroutine test_append(error)
@@ -89,5 +91,24 @@ contains
          deallocate(item)
       end do
    end subroutine test_include
+
+   !> The edge's own nodes stay first, the others of either side are sorted; room only grows.
+   subroutine test_moments(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: list(6) = [9, 2, 7, 5, 8, 3], n(4) = [4, 6, 3, 6], room(4) = [4, 6, &
+         6, 6]
+      type(edge_moments_t) :: form
+      integer :: k
+
+      do k = 1, size(n)
+         call form_begin(form, list(:n(k)), min(4, n(k)), mod(k, 2) == 0)
+         call check_equal(error, [form%n_node, form%n_slave, size(form%node)], [n(k), min(4, &
+            n(k)), room(k)], "numbers")
+         if (allocated(error)) return
+         if (n(k) == 3) call check_equal(error, form%node(:3), [9, 2, 7], "three")
+         if (n(k) == 4) call check_equal(error, form%node(:4), [9, 2, 5, 7], "four")
+         if (n(k) == 6) call check_equal(error, form%node(:6), [9, 2, 5, 7, 3, 8], "six")
+      end do
+   end subroutine test_moments
 
 end module test_condition_nodes

@@ -45,6 +45,7 @@ contains
          test_case_t("corners: maximum if convex, minimum if concave", test_corner), &
          test_case_t("rounded corners", test_rounded), &
          test_case_t("lost near the centre of curvature", test_focal), &
+         test_case_t("beyond a corner, at the centre of curvature", test_corner_focal), &
          test_case_t("smooth across a master node", test_smooth), &
          test_case_t("neighbouring edges agree", test_neighbours), &
          test_case_t("identity and values", test_identity), &
@@ -269,6 +270,33 @@ contains
       line_gap = ((b(2) - a(2))*(s(1) - a(1)) - (b(1) - a(1))*(s(2) - a(2))) &
          /sqrt(dot_product(b - a, b - a))
    end function line_gap
+
+   !> Behind the corner after the edge a parabola of radius 1/2 whose vertex is at (-1/2, -1/4): at
+   !> its centre the surface behind the corner is left out, below that it counts.
+   subroutine test_corner_focal(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: height(2) = [0.25_wp, 0.0_wp]
+      type(hermite_stencil_t) :: stencil
+      real(wp) :: x(2, 7), s(3), gap
+      logical :: is_found
+      integer :: k
+
+      stencil%node = chain
+      stencil%length = 1.0_wp
+      stencil%is_corner([3, 4]) = .true.
+      x(:, chain) = reshape([3.0_wp, 0.0_wp, 2.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
+         -1.0_wp, 0.0_wp, -2.0_wp, 2.0_wp], [2, 6])
+      do k = 1, size(height)
+         x(:, 1) = [-0.5_wp, height(k)]
+         call hermite_begin(stencil, x, s)
+         call check_true(error, stencil%has_neighbour(1) .and. (stencil%has_neighbour(2) .eqv. &
+            k > 1), "what counts " // to_text(k))
+         call hermite_gap_value(stencil, x, s, gap, is_found)
+         call check_true(error, is_found, "found " // to_text(k))
+         ! The edge goes on as a line; the vertex of the parabola is 1/4 below.
+         call check_near(error, gap, 0.25_wp, tol, 1.0_wp, "gap " // to_text(k))
+      end do
+   end subroutine test_corner_focal
 
    !> Straight on both sides of a corner of up to 120 degrees, seen from either edge.
    subroutine test_corner(error)

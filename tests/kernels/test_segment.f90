@@ -110,6 +110,7 @@ contains
       type(scene_t) :: scene
       type(segment_t) :: segment
       real(wp), allocatable :: du(:, :)
+      real(wp) :: reach
       logical :: holds(3), expected(3)
       integer :: k, i, seen(0:1)
 
@@ -117,6 +118,14 @@ contains
       if (allocated(error)) return
       allocate(du, source=0.0_wp*scene%x)
       seen = 0
+      call segment%begin_step(scene%x, scene%u0, du)
+      reach = segment%reach
+      ! What one step reaches does not count in the next one.
+      call segment%begin_step(scene%x, scene%u0, du + 4.0_wp)
+      call check_true(error, segment%reach > 2.0_wp*reach, "a longer step reaches farther")
+      segment%reach = 0.0_wp
+      call segment%begin_step(scene%x, scene%u0, du)
+      call check_near(error, segment%reach, reach, 0.0_wp, 1.0_wp, "reach")
       call segment%begin_step(scene%x, scene%u0, du)
       do k = 1, size(way)
          ! The nodes do not go as far as each other.

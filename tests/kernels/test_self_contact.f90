@@ -8,6 +8,7 @@ module test_self_contact
    use emcon_self_contact_plane, only : chain_faces, self_contact_is_apart, self_contact_is_meant, &
       self_contact_may_touch
    use emcon_text, only : to_text
+   use random_draws, only : draw_random
    use emcon_touch_rule_plane, only : touch_rule_allows, touch_rule_init, touch_rule_may, &
       touch_rule_sees, touch_rule_t
    use small_scenes, only : add_surface, block_t, make_block, top
@@ -28,6 +29,7 @@ contains
       tests = [ &
          test_case_t("edges that are meant", test_order), &
          test_case_t("edges across a channel", test_across), &
+         test_case_t("faces by their angle, whatever their lengths", test_angle), &
          test_case_t("how deep they may overlap", test_deep), &
          test_case_t("the rule of a chain", test_rule)]
    end subroutine collect_self_contact
@@ -100,6 +102,37 @@ contains
          .not. chain_faces(chain, 4, chain%facet(:, 2), scene%x, 0.0_wp*u), "a corner")
    end subroutine test_across
 
+   !> Two edges that bend at a node, and one that faces them by a cosine of just more or less than
+   !> 1/20.
+   subroutine test_angle(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: scales(3) = [0.01_wp, 1.0_wp, 64.0_wp], cosine(2) = [0.06_wp, 0.04_wp]
+      type(scene_t) :: scene
+      type(chain_t) :: chain
+      real(wp) :: u(5), x(2, n), angle, along
+      integer :: case, k
+
+      call make_channel(scene, chain, error)
+      if (allocated(error)) return
+      do case = 1, 60
+         call draw_random(u)
+         along = 8.0_wp*u(1)
+         x = 0.0_wp
+         associate (size => scales(1 + mod(case, 3))*(0.25_wp + u(2:4)), bend => u(5) - 0.5_wp)
+            ! Unit vectors of both edges are added up: their lengths do not count.
+            x(:, 2) = [3.0_wp, -2.0_wp]
+            x(:, 1) = x(:, 2) - size(1)*[cos(along - bend), sin(along - bend)]
+            x(:, 3) = x(:, 2) + size(2)*[cos(along + bend), sin(along + bend)]
+            do k = 1, 4
+               angle = along + merge(1, -1, k > 2)*acos(-cosine(1 + mod(k, 2)))
+               x(:, 6) = x(:, 5) + size(3)*[cos(angle), sin(angle)]
+               call check_true(error, chain_faces(chain, 2, [5, 6], x, 0.0_wp*x) .eqv. &
+                  mod(k, 2) == 0, "case " // to_text(case) // ", angle " // to_text(k))
+            end do
+         end associate
+      end do
+   end subroutine test_angle
+
    !> A fifth of the node's edges: what is farther behind is on the other side.
    subroutine test_deep(error)
       type(error_t), allocatable, intent(out) :: error
@@ -108,22 +141,25 @@ contains
       logical, parameter :: may(6) = [.true., .true., .false., .true., .false., .true.]
       type(scene_t) :: scene
       type(chain_t) :: chain
-      real(wp) :: u(2, n)
+      real(wp) :: u(2, n), unit
       integer :: k
 
       call make_channel(scene, chain, error)
       if (allocated(error)) return
       do k = 1, 6
+         unit = 0.25_wp**(k - 3)
          u = 0.0_wp
          u(1, 6:) = 1.0_wp + over(k)
          ! The last edge of the left wall is 1 or 2 long: 1 or 1.5 in the mean at node 7.
          u(2, 8) = longer(k) - 1.0_wp
-         call check_true(error, self_contact_may_touch(chain, 7, 2, scene%x, u) .eqv. may(k), &
+         call check_true(error, self_contact_may_touch(chain, 7, 2, unit*scene%x, &
+            unit*u) .eqv. may(k), &
             "over " // to_text(over(k)))
          ! Its end has one edge alone.
          u(2, 8) = 0.0_wp
          u(2, 7) = -0.5_wp*(longer(k) - 1.0_wp)
-         call check_true(error, self_contact_may_touch(chain, 8, 1, scene%x, u) .eqv. may(k), &
+         call check_true(error, self_contact_may_touch(chain, 8, 1, unit*scene%x, &
+            unit*u) .eqv. may(k), &
             "at an end " // to_text(over(k)))
       end do
    end subroutine test_deep
