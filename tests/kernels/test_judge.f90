@@ -145,6 +145,11 @@ contains
       call make_scene(scene, [1.25_wp, -0.25_wp], [0.5_wp, 2.0_wp], [1, 1], .false.)
       call judged(scene, overlap)
       call check_near(error, overlap%depth, 0.5_wp, 4.0_wp*eps, 1.0_wp, "depth")
+      ! Deepest are the sides of the bar, at a third of their way.
+      call make_scene(scene, [1.25_wp, -0.1875_wp], [0.5_wp, 2.0_wp], [1, 1], .false.)
+      call judged(scene, overlap)
+      call check_near(error, overlap%depth, 0.5_wp, 4.0_wp*eps, 1.0_wp, "depth of the sides")
+      call check_true(error, any(overlap%node == [11, 12]), "the lower nodes are nearer")
    end subroutine test_cross
 
    !> From above the base to below it in one step: free at both ends, yet it is seen in the middle.
@@ -152,7 +157,6 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(overlap_t) :: overlap
-
       integer :: k
 
       do k = 0, 2

@@ -320,6 +320,9 @@ contains
       points%size = [0.7_wp, 0.9_wp]
       nodes = points
       call midside_distribute_rows(midside, nodes)
+      call check_equal(error, [size(nodes%node), size(nodes%weight)], nodes%start([3, 3]), &
+         "entries")
+      if (allocated(error)) return
       allocate(x, source=scene%x)
       call midside_places(midside, x)
       call check_true(error, maxval(abs(x - scene%x)) > 1.0e-3_wp, "points off nodes")

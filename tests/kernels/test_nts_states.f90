@@ -66,6 +66,7 @@ contains
       type(nts_t) :: nts
       type(condition_t) :: item(1)
       real(wp), allocatable :: u(:, :), du(:, :), shift(:, :)
+      real(wp) :: gap(3)
       integer :: k, i, m, kind
 
       do kind = 1, 2
@@ -97,6 +98,13 @@ contains
                end do
                if (allocated(error)) return
             end do
+            ! What all nodes move by does not count, however far: these numbers are exact there.
+            call shake(du, 0.04_wp)
+            du = real(nint(2.0_wp**20*du), wp)*2.0_wp**(-20)
+            call nts%measure(scene%x, u, du)
+            gap = nts%state%gap1
+            call nts%measure(scene%x, u, du + 2.0_wp**(digits(1.0_wp) - 23))
+            call check_near(error, nts%state%gap1, gap, 16.0_wp*tol, 1.0_wp, "far away")
             du = 0.0_wp
          end do
          deallocate(u, du, shift)

@@ -184,7 +184,10 @@ class Code:
     def passing(self, tests, file, numbers):
         """Those of `tests` that run one of the lines `numbers`, or what these are part of."""
         known = self.lines[file]
-        seen = [k for k in numbers if k in known]
-        if not seen:
-            seen = known[max(bisect.bisect_left(known, numbers[0]) - 1, 0):][:1]
-        return [test for test in tests if any(k in test.lines.get(file, ()) for k in seen)]
+        before = known[max(bisect.bisect_left(known, numbers[0]) - 1, 0):][:1]
+
+        def all_at(lines):
+            return [test for test in tests if any(k in test.lines.get(file, ()) for k in lines)]
+
+        # Optimised code may stand at the line before alone.
+        return all_at([k for k in numbers if k in known]) or all_at(before)
