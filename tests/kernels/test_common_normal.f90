@@ -81,7 +81,9 @@ contains
             call check_true(error, .not. is_aside(0.0_wp, 0.0_wp, [0.01_wp, 0.0_wp], phi), "far")
             ! By 1/1000 of the shorter edge along the mean of both directions, half of the way here.
             call check_true(error, is_aside(0.0_wp, 0.0_wp, [1.8e-3_wp, 0.0_wp], phi) .and. .not. &
-               is_aside(0.0_wp, 0.0_wp, [2.2e-3_wp, 0.0_wp], phi), "how far")
+               is_aside(0.0_wp, 0.0_wp, [2.2e-3_wp, 0.0_wp], phi) .and. .not. &
+               is_aside(0.0_wp, 0.0_wp, [1.8e-3_wp, 0.4e-3_wp], phi) .and. &
+               is_aside(0.0_wp, 0.0_wp, [1.8e-3_wp, -0.4e-3_wp], phi), "how far")
             ! The block leans forward on its corner: its bottom has no normal of the floor either.
             call check_true(error, is_aside(-0.3_wp, 0.0_wp, [-5.0_wp*delta, 0.0_wp], phi), &
                "under a bottom that leans")
