@@ -329,22 +329,15 @@ contains
       type(moduli_t), intent(in) :: moduli
       real(wp), intent(inout) :: missed          !! [M L^2/T^2]
       real(wp) :: u(size(x, 1), solid%geometry(e)%n_node), height
-      real(wp), dimension(n_axis, n_axis) :: slope, level, onto, across
-      integer :: i, k
+      real(wp), dimension(n_axis, n_axis) :: slope, level
+      integer :: k
 
       call place_on_plate(plate, x(:, solid%node(:size(u, 2), e)), self%center(:, e), u, height)
-      do i = 1, n_axis
-         across(:, i) = plate%normal*plate%normal(i)
-         onto(:, i) = -across(:, i)
-         onto(i, i) = 1.0_wp + onto(i, i)
-      end do
-      associate (geometry => solid%geometry(e), along => components(across))
+      associate (geometry => solid%geometry(e))
          do k = 1, geometry%n_gp
             call gradient_at(solid, e, k, u, slope)
             slope = 0.5_wp*(slope + transpose(slope))
-            level = matmul(onto, matmul(slope, onto))
-            level = level - across*(product_of(moduli%whole, along, components(level)) &
-               /product_of(moduli%whole, along, along))
+            call relax_across(plate, moduli, slope, level)
             if (solid%trait%has_mean(e)) then
                missed = missed + geometry%weight(k)*(work(moduli%rest, components(slope)) &
                   - work(moduli%whole, components(level)))
@@ -352,11 +345,35 @@ contains
                missed = missed + geometry%weight(k)*work(moduli%whole, components(slope - level))
             end if
          end do
+         if (geometry%n_gp > 1) return
          ! One point: the strain of bending, linear over the thickness, is missing as a whole.
-         if (geometry%n_gp == 1) missed = missed + geometry%weight(1)*work(moduli%whole, &
-            components(plate%bend))*height/real((size(x, 1) + 1)*(size(x, 1) + 2), wp)
+         call relax_across(plate, moduli, plate%bend, level)
+         missed = missed + geometry%weight(1)*work(moduli%whole, components(level))*height &
+            /real((size(x, 1) + 1)*(size(x, 1) + 2), wp)
       end associate
    end subroutine add_missed
+
+   !> Of a strain what lies in the plane of a plate, and so much along its normal that there is no
+   !> stress there.
+   pure subroutine relax_across(plate, moduli, strain, level)
+      type(plate_t), intent(in) :: plate
+      type(moduli_t), intent(in) :: moduli
+      real(wp), intent(in) :: strain(n_axis, n_axis)     !! symmetric
+      real(wp), intent(out) :: level(n_axis, n_axis)
+      real(wp), dimension(n_axis, n_axis) :: onto, across
+      integer :: i
+
+      do i = 1, n_axis
+         across(:, i) = plate%normal*plate%normal(i)
+         onto(:, i) = -across(:, i)
+         onto(i, i) = 1.0_wp + onto(i, i)
+      end do
+      level = matmul(onto, matmul(strain, onto))
+      associate (along => components(across))
+         level = level - across*(product_of(moduli%whole, along, components(level)) &
+            /product_of(moduli%whole, along, along))
+      end associate
+   end subroutine relax_across
 
    !> The displacements of a plate at the nodes of an element, u = w n - s grad w; the sum of s^2.
    pure subroutine place_on_plate(plate, x, center, u, height)
