@@ -121,13 +121,12 @@ contains
    !> Largest second derivative at rest, as half of it: what a step of no size has as its tangent.
    subroutine host_rest_stiffness(law, stiffness, error)
       type(host_law_t), intent(in) :: law
-      real(wp), intent(out) :: stiffness         !! [M/(L T^2)]; 0 after an error
+      real(wp), intent(inout) :: stiffness       !! [M/(L T^2)]; not set after an error
       type(error_t), allocatable, intent(out) :: error
       type(point_response_t) :: response
       real(wp) :: rest(law%energy%n_variable, 1)
       integer :: status
 
-      stiffness = 0.0_wp
       rest = 0.0_wp
       call point_gradient(law%energy, rest, rest, .true., response, status)
       if (status == point_ok) then

@@ -183,7 +183,6 @@ contains
 
       do before = 0, solid%geometry(e)%n_gp - 1, n_lane
          n = min(n_lane, solid%geometry(e)%n_gp - before)
-         points%strain = 0.0_wp
          do l = 1, n
             call element_point(solid%geometry(e), before + l, motion, point)
             strain(:3, before + l) = point%strain

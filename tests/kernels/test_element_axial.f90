@@ -121,6 +121,7 @@ contains
       end select
    end subroutine set_law
 
+   !> The response, whatever stands in `part` before.
    subroutine respond(sample, u0, du, with_tangent, part)
       type(sample_t), intent(in) :: sample
       real(wp), intent(in) :: u0(2, m), du(2, m)
@@ -131,7 +132,10 @@ contains
       motion%nlgeom = sample%nlgeom
       motion%from(:2, :m) = u0
       motion%by(:2, :m) = du
-      part = space_part_t()
+      part = space_part_t(energy=1.0_wp, is_inverted=.true.)
+      part%force(:2, :sample%n) = 2.0_wp
+      part%magnitude(:2, :sample%n) = 3.0_wp
+      part%tangent(:2, :sample%n, :2, :sample%n) = merge(4.0_wp, 0.0_wp, with_tangent)
       call axial_element_respond(sample%solid%geometry(1), &
          sample%solid%law(sample%solid%law_of(1))%law, motion, with_tangent, part)
    end subroutine respond

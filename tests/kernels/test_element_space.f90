@@ -145,6 +145,7 @@ contains
       end select
    end subroutine make_shape
 
+   !> The response, whatever stands in `part` before.
    subroutine respond(sample, u0, du, with_tangent, part)
       type(sample_t), intent(in) :: sample
       real(wp), intent(in) :: u0(3, m), du(3, m)
@@ -155,7 +156,10 @@ contains
       motion%nlgeom = sample%nlgeom
       motion%from = u0
       motion%by = du
-      part = space_part_t()
+      part = space_part_t(energy=1.0_wp, is_inverted=.true.)
+      part%force(:, :sample%n) = 2.0_wp
+      part%magnitude(:, :sample%n) = 3.0_wp
+      part%tangent(:, :sample%n, :, :sample%n) = merge(4.0_wp, 0.0_wp, with_tangent)
       if (allocated(sample%rest)) then
          call mean_volume_space_respond(sample%element, sample%law, sample%rest, motion, &
             with_tangent, part)

@@ -5,20 +5,24 @@ module test_explicit
    use emcon_condition_nodes, only : condition_resize
    use emcon_constraints, only : constraint_set_t, constraints_select
    use emcon_critical_step, only : critical_bound, critical_sharp
-   use emcon_errors, only : err_analysis, error_t
+   use emcon_errors, only : err_analysis, err_input, error_t
    use emcon_explicit_penalty, only : explicit_penalty_widen
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_eigen
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
+   use emcon_node_potential, only : node_potential_init, node_potential_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_row
    use emcon_penalty_law, only : penalty_t
+   use emcon_stepper, only : stepper_advance, stepper_close, stepper_t
    use emcon_steps, only : method_penalty
    use emcon_system, only : system_t, system_tangent_times
    use emcon_term_registry, only : terms_mass_values
-   use small_scenes, only : add_step, block_t, clamp, make_two_blocks, shake
+   use given_hosts, only : well_t
+   use given_scenes, only : make_line, open_given
+   use small_scenes, only : add_step, block_t, clamp, make_block, make_two_blocks, shake
    use sparse_samples, only : dense_of
    implicit none
    private
@@ -44,7 +48,10 @@ contains
          test_case_t("contacts that stiffen more than any before", test_widen), &
          test_case_t("a block that penalties stop", test_drop), &
          test_case_t("closed contacts are met in a step", test_met), &
-         test_case_t("the element that ends the run is named", test_squeezed)]
+         test_case_t("the element that ends the run is named", test_squeezed), &
+         test_case_t("central differences in a well, in closed form", test_well), &
+         test_case_t("round a centre: what a potential stores is no growth", test_centre), &
+         test_case_t("what has no mass is told", test_refused)]
    end subroutine collect_explicit
 
    !> The upper block falls on the lower one, which is clamped or free; central differences.
@@ -344,5 +351,106 @@ contains
       call check_error(error, stopped, err_analysis, "(the fastest element is 5)", "squeezed")
       call march_free(march)
    end subroutine test_squeezed
+
+   !> A mass point at (1, 0) with the velocity (0, v) in a well about the origin.
+   subroutine open_well(stepper, well, v, h, n, error)
+      type(stepper_t), intent(inout) :: stepper
+      type(well_t), intent(in) :: well
+      real(wp), intent(in) :: v, h
+      integer, intent(in) :: n                   !! steps
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(node_potential_t) :: potential
+
+      call make_line(scene, 1, .false., h, n)
+      scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+      scene%v0(2, 1) = v
+      call node_potential_init(potential, "WELL", [1], 2, 1, well, error)
+      if (.not. allocated(error)) call open_given(stepper, scene, potential, 1.0_wp, error)
+   end subroutine open_well
+
+   !> x_n+1 - 2 x_n + x_n-1 = -h^2 k x_n: an oscillation of the phase phi in each step, with 2 cos phi
+   !> = 2 - h^2 k. Velocities are differences over two steps.
+   subroutine test_well(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: k = 2.0_wp, v = 0.5_wp, h = 0.3_wp
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      type(well_t) :: well
+      real(wp) :: phi
+      integer :: i
+
+      well%k = k
+      well%n_variable = 2
+      phi = acos(1.0_wp - 0.5_wp*k*h**2)
+      call open_well(stepper, well, v, h, 20, error)
+      if (.not. allocated(error)) call check_near(error, &
+         stepper%march%state%explicit%critical_h, 2.0_wp/sqrt(k), sqrt(eps), 1.0_wp, &
+         "critical step")
+      do i = 1, 20
+         if (allocated(error)) return
+         call stepper_advance(stepper, increment, error)
+         if (allocated(error)) return
+         associate (state => stepper%march%state, ledger => stepper%march%ledger, &
+               x => [cos(i*phi), v*h/sin(phi)*sin(i*phi)], &
+               rate => [-sin(i*phi)*sin(phi)/h, v*cos(i*phi)])
+            call check_near(error, state%u(:, 1), x - [1.0_wp, 0.0_wp], 256.0_wp*eps, 1.0_wp, &
+               "places")
+            call check_near(error, state%v(:, 1), rate, 256.0_wp*eps/h, 1.0_wp, "velocities")
+            call check_near(error, [ledger%kinetic, ledger%potential], 0.5_wp*[sum(rate**2), &
+               k*sum(x**2)], 512.0_wp*eps/h, 1.0_wp, "energies")
+         end associate
+      end do
+      call stepper_close(stepper)
+   end subroutine test_well
+
+   !> On a circle a potential -k/r has twice the kinetic energy, below 0; the momentum about the
+   !> centre stays, as all forces point there.
+   subroutine test_centre(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      type(well_t) :: well
+      integer :: i
+
+      well%is_harmonic = .false.
+      well%n_variable = 2
+      call open_well(stepper, well, 1.0_wp, 0.1_wp, 70, error)
+      do i = 1, 70
+         if (allocated(error)) return
+         call stepper_advance(stepper, increment, error)
+         if (allocated(error)) return
+         call check_near(error, stepper%march%ledger%angular(1), 1.0_wp, 256.0_wp*eps, 1.0_wp, &
+            "momentum about the centre")
+         ! The error of the second order is a few times h^2 of it.
+         call check_near(error, norm2(stepper%march%state%u(:, 1) + [1.0_wp, 0.0_wp]), 1.0_wp, &
+            0.05_wp, 1.0_wp, "radius")
+      end do
+      call stepper_close(stepper)
+   end subroutine test_centre
+
+   !> A block of which the second element has no density: the nodes that are its alone.
+   subroutine test_refused(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: refused
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(march_t) :: march
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      scene%material = [scene%material, scene%material]
+      scene%material(2)%density = 0.0_wp
+      scene%section = [scene%section, scene%section]
+      scene%section(2)%material = 2
+      scene%element%section = [1, 2]
+      call add_step(scene, .false., h, 4)
+      scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+      call march_init(march, scene, error)
+      if (allocated(error)) return
+      call march_begin_step(march, scene, 1, refused)
+      call check_error(error, refused, err_input, "node 3 has no mass: in an explicit step", &
+         "no mass")
+      call march_free(march)
+   end subroutine test_refused
 
 end module test_explicit

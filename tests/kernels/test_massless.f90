@@ -3,6 +3,7 @@ module test_massless
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
+   use emcon_host, only : host_add_force, host_t
    use emcon_kinds, only : dp, wp
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
@@ -11,7 +12,10 @@ module test_massless
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_t
    use emcon_steps, only : initiation_massless, initiation_persistent, load_point, load_t
+   use emcon_term, only : term_box_t
+   use emcon_term_registry, only : terms_create, terms_mass_rows, terms_massless
    use emcon_text, only : to_text
+   use given_hosts, only : chain_host_init, chain_host_t
    use linear_scenes, only : add_equation
    use small_scenes, only : add_load, add_step, block_t, clamp, make_block, make_two_blocks, shake
    use sparse_samples, only : dense_of
@@ -28,6 +32,7 @@ contains
 
       tests = [ &
          test_case_t("nodes that give theirs away", test_find), &
+         test_case_t("nodes that a program gives mass or forces", test_given), &
          test_case_t("elements that would keep none", test_keep), &
          test_case_t("sections without inertia", test_bare), &
          test_case_t("to the others of each element", test_shed), &
@@ -96,6 +101,55 @@ contains
          call add_equation(scene, [13, 16], [1, 1], [1.0_wp, -1.0_wp])
       end select
    end subroutine change
+
+   !> Mass at node 12, forces between 11 and 14, and both: of the slave nodes 11 to 13 the others
+   !> give theirs away. Their elements' mass is then at the massive nodes alone, and none is lost.
+   subroutine test_given(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: extra = 0.5_wp
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(term_box_t), allocatable :: term(:)
+      type(chain_host_t) :: chain
+      logical :: found(16), bare(16), expected(16)
+      real(wp) :: mass(16)
+      integer :: k
+
+      call make_two_blocks(scene, 0.1_wp, lower, upper)
+      call add_step(scene, .false., 0.1_wp, 1)
+      scene%step(1)%contact%initiation = initiation_massless
+      do k = 0, 3
+         expected = .false.
+         expected(11:13) = .true.
+         block
+            type(host_t) :: host
+
+            if (btest(k, 0)) then
+               host%mass%n_row = 16
+               host%mass%n_col = 16
+               host%mass%row_start = [spread(0, 1, 12), spread(1, 1, 5)]
+               host%mass%column = [11]
+               host%mass%value = [real(extra, dp)]
+               expected(12) = .false.
+            end if
+            if (btest(k, 1)) then
+               call chain_host_init(chain, [11, 14], 16, error)
+               if (allocated(error)) return
+               call host_add_force(host, chain)
+               expected(11) = .false.
+            end if
+            call terms_create(scene, term, error, host)
+         end block
+         if (allocated(error)) return
+         call terms_massless(term, found, bare)
+         call check_true(error, all(found .eqv. expected) .and. .not. any(bare), "given " &
+            // to_text(k))
+         call terms_mass_rows(term, mass)
+         call check_true(error, all((mass > 0.0_wp) .neqv. expected), "mass " // to_text(k))
+         call check_near(error, sum(mass), 6.0_wp + merge(extra, 0.0_wp, btest(k, 0)), tol, &
+            6.0_wp, "all of it")
+      end do
+   end subroutine test_given
 
    !> An element all of whose nodes are on the surface keeps its mass; so do nodes that hang on
    !> fewer others than two.

@@ -64,8 +64,8 @@ contains
       call add_equation(scene, [13, 12, 4], [1, 1, 2], [2.0_wp, -1.0_wp, 0.5_wp])
    end subroutine make_linked
 
-   !> In statics, in dynamics with drag by mass, and with that by strains, whose derivative is
-   !> complete where nothing moves.
+   !> In statics, at large and at small strains, in dynamics with drag by mass, and with that by
+   !> strains, whose derivative is complete where nothing moves.
    subroutine test_kinds(error)
       type(error_t), allocatable, intent(out) :: error
       type(scheme_energy_momentum_t) :: dynamic
@@ -76,10 +76,11 @@ contains
 
       do kind = kinematics_nonlinear, kinematics_corotated
          do link = 0, 1
-            do way = 1, 3
+            do way = 0, 3
                evaluation = dynamic%evaluation(instant_t(0.5_wp, 0.5_wp), 0.25_wp)
-               if (way == 1) evaluation = static%evaluation(instant_t(0.5_wp, 0.5_wp), 0.25_wp)
-               call make_linked(scene, kind, link == 1, way == 1, merge(0.02_wp, 0.0_wp, way == 3))
+               if (way <= 1) evaluation = static%evaluation(instant_t(0.5_wp, 0.5_wp), 0.25_wp)
+               call make_linked(scene, kind, link == 1, way <= 1, merge(0.02_wp, 0.0_wp, way == 3))
+               scene%step(1)%nlgeom = way > 0
                call check_tangent(error, scene, evaluation, merge(0.0_wp, 0.1_wp, way == 3), &
                   "kinematics " // to_text(kind) // ", links " // to_text(link) // ", way " &
                   // to_text(way))
