@@ -242,10 +242,7 @@ contains
          call control_refuse(control, real(n, wp)/real(self%grid%n_unit, wp), ratio, &
             why_of(status), self%grid%least_power)
          n = next_units(self, scene, from)
-         do while (n >= before .and. control%power > self%grid%least_power)
-            control%power = control%power - 1
-            n = next_units(self, scene, from)
-         end do
+         ! Sizes that accuracy does not ask for are below the least power.
          if (n >= before) n = max(self%grid%n_least, before/2)
          ! What is no matter of accuracy is over with the increment.
          if (.not. scene%step(self%state%clock%i_step)%time%tolerance > 0.0_wp) control%power = &

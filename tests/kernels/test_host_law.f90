@@ -23,7 +23,7 @@ module test_host_law
    use emcon_stepper_file, only : stepper_load, stepper_save
    use emcon_stepper_user, only : stepper_give_law
    use emcon_stepper_query, only : query_evaluate, query_free, query_t
-   use emcon_stress, only : nodal_stress
+   use emcon_stress, only : element_means, nodal_stress
    use emcon_text, only : string_t, to_text
    use kind_rows, only : law_code
    use small_scenes, only : add_block, add_step, block_t, clamp, make_block, make_two_blocks, &
@@ -60,6 +60,7 @@ contains
          test_case_t("two blocks meet, one of a given law", test_drop), &
          test_case_t("second order to our own law, energy to round-off", test_spin), &
          test_case_t("static stretch, and stress", test_static), &
+         test_case_t("stress beside another material, and where there is none", test_mixed), &
          test_case_t("a query has the given law too", test_query), &
          test_case_t("outside: the step is cut", test_outside), &
          test_case_t("failed: an error, the state stands", test_failed), &
@@ -493,6 +494,53 @@ contains
       call check_near(error, stepper%march%state%u, u, 0.0_wp, 1.0_wp, "displacements")
       call stepper_close(stepper)
    end subroutine test_failed
+
+   !> The second of two elements has the given law: its stress is as by our own law, less that across
+   !> the plane. Beyond what the law answers for there is none, in the first element there is.
+   subroutine test_mixed(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(stepper_t), target :: given, own, short
+      type(solid_t), pointer :: solid
+      type(elastic_t) :: law
+      real(wp), dimension(6, 2) :: stress, expected
+      real(wp) :: strain(3, 2), volume(2), u(2, 6)
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      scene%material = [scene%material, scene%material]
+      scene%material(2)%name = "Other"
+      scene%section = [scene%section, scene%section]
+      scene%section(1)%material = 2
+      scene%section(2)%material = 1
+      scene%element%section = [1, 2]
+      call add_step(scene, .false., 0.1_wp, 1)
+      call open_both(given, own, scene, coupled_neo_hooke(), error)
+      if (allocated(error)) return
+      call shake(u, 0.2_wp)
+      solid => terms_solid(own%march%system%term)
+      call element_means(solid, u, .true., expected, strain, volume)
+      solid => terms_solid(given%march%system%term)
+      call element_means(solid, u, .true., stress, strain, volume)
+      expected(3, 2) = 0.0_wp
+      call check_near(error, stress, expected, 1.0e3_wp*eps, young, "stress")
+      law = elastic_of(coupled_neo_hooke())
+      law%limit = 1.0e-3_wp
+      law%beyond = point_outside
+      short%scene = scene
+      short%scene%material(1)%law = law_user
+      short%is_read = .true.
+      call stepper_give_law(short, "Rubber", law, error)
+      if (.not. allocated(error)) call stepper_build(short, error)
+      if (allocated(error)) return
+      solid => terms_solid(short%march%system%term)
+      call element_means(solid, u, .true., stress, strain, volume)
+      call check_true(error, all(ieee_is_nan(stress([1, 2, 4], 2))), "beyond the law")
+      call check_near(error, stress(:, 1), expected(:, 1), 1.0e3_wp*eps, young, "beside it")
+      call stepper_close(given)
+      call stepper_close(own)
+      call stepper_close(short)
+   end subroutine test_mixed
 
    subroutine test_bad_rest(error)
       type(error_t), allocatable, intent(out) :: error

@@ -1,5 +1,6 @@
 !> Increments that follow the error: what they add up to, how they are counted, where they end.
 module test_march_control
+   use, intrinsic :: iso_fortran_env, only : int64
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_errors, only : err_analysis, error_t
    use emcon_kinds, only : dp, wp
@@ -8,9 +9,12 @@ module test_march_control
    use emcon_rigid_bodies, only : rigid_frame_choose
    use emcon_scene, only : scene_t
    use emcon_step_control, only : why_error, why_event, why_newton
+   use emcon_stepper, only : stepper_advance, stepper_close, stepper_t
    use emcon_steps, only : initiation_persistent
    use emcon_system, only : mass_times
    use emcon_text, only : to_text
+   use given_hosts, only : chain_host_init, chain_host_t
+   use given_scenes, only : make_line, open_given
    use small_scenes, only : add_block, add_step, block_t, clamp, make_block, make_two_blocks, &
       prescribe
    implicit none
@@ -32,8 +36,10 @@ contains
          test_case_t("masses that errors are weighed by", test_masses), &
          test_case_t("an event is found by the velocities", test_event), &
          test_case_t("solves that take long", test_slow), &
+         test_case_t("long increments while bodies are apart", test_apart), &
          test_case_t("no smaller increment is allowed", test_least), &
-         test_case_t("the smallest one fails", test_failure)]
+         test_case_t("the smallest one fails", test_failure), &
+         test_case_t("below all sizes that accuracy asks for", test_far_below)]
    end subroutine collect_march_control
 
    subroutine make_spin(scene, tolerance, maximum)
@@ -307,6 +313,69 @@ contains
 
    end subroutine test_slow
 
+   !> Two blocks fly at each other, and past each other far away: no error, so that increments grow
+   !> at each chance. They are longer than that of the deck while the bodies' boxes, moved by the
+   !> speeds, stay apart: one above the other, or beside it.
+   subroutine test_apart(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: speed(2) = [0.25_wp, 1.0_wp], gap = 8.0_wp
+      integer, parameter :: n_long = 56
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      integer :: k
+
+      do k = 1, 3
+         call make_two_blocks(scene, gap, lower, upper)
+         if (k == 2) scene%x(1, 11:) = scene%x(1, 11:) - 4.5_wp - 1.25_wp*n_long*h
+         if (k == 3) scene%pair = scene%pair(:0)
+         call add_step(scene, .false., h, n_long)
+         scene%step(1)%time%is_direct = .false.
+         scene%step(1)%time%tolerance = 1.0_wp
+         scene%v0(2, :10) = speed(1)
+         scene%v0(2, 11:) = -speed(2)
+         call run()
+         if (allocated(error)) return
+      end do
+
+   contains
+
+      subroutine run()
+         type(march_t) :: march
+         type(increment_t) :: increment
+         real(wp) :: left, size, part
+         integer(int64) :: from
+         integer :: n_held, n_long_ones, i_power
+
+         call begin(scene, march, error)
+         if (allocated(error)) return
+         n_held = 0
+         n_long_ones = 0
+         do while (march%state%clock%time < merge(6.25_wp, n_long*h, k == 1))
+            left = gap - sum(speed)*march%state%clock%time
+            i_power = march%state%control%power
+            do while (k == 1 .and. i_power > 0)
+               if (left > sum(speed)*scale(h, i_power)) exit
+               i_power = i_power - 1
+            end do
+            if (i_power < march%state%control%power) n_held = n_held + 1
+            ! To the next multiple of the size, or the end of the step.
+            from = nint(march%state%clock%time/h, int64)
+            size = real(min(2_int64**i_power - mod(from, 2_int64**i_power), n_long - from), wp)
+            part = march%state%control%h_before
+            call march_increment(march, scene, increment, error)
+            if (allocated(error)) return
+            if (part > 0.0_wp) call check_near(error, increment%h/h, size, 16.0_wp*eps, 1.0_wp, &
+               "size, way " // to_text(k))
+            if (increment%h > 1.5_wp*h) n_long_ones = n_long_ones + 1
+            if (allocated(error)) return
+         end do
+         call check_true(error, n_long_ones > 3 .and. (n_held > 0 .eqv. k == 1), "long ones " &
+            // to_text(n_long_ones) // ", held back " // to_text(n_held))
+         call march_free(march)
+      end subroutine run
+
+   end subroutine test_apart
+
    !> With the increment of the deck as the smallest each is taken as it is, and told.
    subroutine test_least(error)
       type(error_t), allocatable, intent(out) :: error
@@ -353,5 +422,34 @@ contains
          0.0_wp], 0.0_wp, 1.0_wp, "time")
       call march_free(march)
    end subroutine test_failure
+
+   !> A chain that no spring may stretch, and whose ends move apart: without a smallest increment of
+   !> the deck they are halved down to the last level of the grid, each once.
+   subroutine test_far_below(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: raised
+      type(scene_t) :: scene
+      type(stepper_t) :: stepper
+      type(chain_host_t) :: chain
+      type(increment_t) :: increment
+
+      call make_line(scene, 2, .false., h, n)
+      scene%step(1)%time%is_direct = .false.
+      scene%step(1)%time%tolerance = 1.0_wp
+      scene%v0(1, 2) = 1.0_wp
+      call chain_host_init(chain, [1, 2], 2, error)
+      if (allocated(error)) return
+      chain%longest = 0.0_wp
+      call open_given(stepper, scene, chain, 1.0_wp, error)
+      if (allocated(error)) return
+      call stepper_advance(stepper, increment, raised)
+      associate (n_level => stepper%march%grid%n_level)
+         call check_error(error, raised, err_analysis, "with h = " // to_text(scale(h, -n_level)) &
+            // ", the smallest allowed", "failure")
+         ! The first increment is two, of the half each.
+         call check_equal(error, increment%n_cut, n_level, "sizes")
+      end associate
+      call stepper_close(stepper)
+   end subroutine test_far_below
 
 end module test_march_control

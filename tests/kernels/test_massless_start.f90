@@ -2,14 +2,16 @@
 !> and their velocities.
 module test_massless_start
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
+   use emcon_amplitudes, only : amplitude_t
    use emcon_errors, only : err_analysis, error_t
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
    use emcon_scene, only : scene_t
-   use emcon_steps, only : load_point, load_t
+   use emcon_steps, only : initiation_massless, initiation_persistent, load_point, load_t
    use emcon_text, only : to_text
-   use small_scenes, only : add_block, add_load, add_step, block_t, clamp, make_block
+   use small_scenes, only : add_block, add_load, add_step, add_surface, block_t, bottom, clamp, &
+      make_block, make_two_blocks
    implicit none
    private
    public :: collect_massless_start
@@ -23,8 +25,10 @@ contains
 
       tests = [ &
          test_case_t("forces that do not balance are told", test_balance), &
+         test_case_t("loads of the time at which a step begins", test_time), &
          test_case_t("velocities are those of the way", test_velocity), &
-         test_case_t("a free body without mass is refused", test_free)]
+         test_case_t("a free body without mass is refused", test_free), &
+         test_case_t("surfaces that keep their mass are told", test_kept)]
    end subroutine collect_massless_start
 
    !> Three cells in a row, held on the left; nodes 4 and 8 on the right are of the third alone,
@@ -117,6 +121,51 @@ contains
 
    end subroutine test_balance
 
+   !> A load that grows from total time 0.5 on, as the second step begins then or later.
+   subroutine test_time(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      integer :: k
+
+      call make_tip(scene, .false.)
+      call add_step(scene, .false., h, 4)
+      scene%step(2)%prescribed = scene%step(1)%prescribed
+      deallocate(scene%amplitude)
+      allocate(scene%amplitude(1))
+      scene%amplitude(1) = amplitude_t(name="A", time=[0.5_wp, 1.0_wp], value=[0.0_wp, 1.0_wp], &
+         is_total_time=.true.)
+      call pull(scene, 8, 2, 6.0_wp)
+      scene%step(2)%load = scene%step(1)%load
+      scene%step(2)%load%amplitude = 1
+      scene%step(1)%load = scene%step(1)%load(:0)
+      do k = 1, 2
+         call look_at(0.25_wp*(k + 1))
+         if (allocated(error)) return
+      end do
+
+   contains
+
+      subroutine look_at(time)
+         real(wp), intent(in) :: time
+         type(march_t) :: march
+         integer :: i, n_told
+
+         call begin(scene, march, error)
+         if (allocated(error)) return
+         march%state%clock%time = time
+         call march_begin_step(march, scene, 2, error)
+         if (allocated(error)) return
+         n_told = 0
+         do i = 1, march%warnings%n
+            if (index(march%warnings%item(i)%text, "a force of 3 is not balanced at node 8 ") == 1) &
+               n_told = n_told + 1
+         end do
+         call check_equal(error, [n_told, march%warnings%n], spread(k - 1, 1, 2), "told")
+         call march_free(march)
+      end subroutine look_at
+
+   end subroutine test_time
+
    subroutine test_velocity(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -177,5 +226,47 @@ contains
       end subroutine look_at
 
    end subroutine test_free
+
+   !> The upper block's bottom was to give its mass away and is held: told, unless the pair stands
+   !> the other way round too, or keeps contact. A pair of that master with a third body is no help.
+   subroutine test_kept(error)
+      type(error_t), allocatable, intent(out) :: error
+      logical, parameter :: is_told(5) = [.false., .true., .false., .true., .false.]
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper, third
+      integer :: k
+
+      do k = 1, size(is_told)
+         call make_two_blocks(scene, 0.1_wp, lower, upper)
+         call add_block(scene, "CPE4", [2, 1], [-1.0_wp, 4.0_wp], [2.0_wp, 1.0_wp], third)
+         call add_surface(scene, "THIRD", third, [bottom])
+         call add_step(scene, .false., h, 1)
+         scene%step(1)%contact%initiation = initiation_massless
+         if (k > 1) call clamp(scene%step(1), [11, 12, 13])
+         if (k == 3 .or. k == 4) then
+            scene%pair = [scene%pair, scene%pair]
+            scene%pair(2)%slave = 1
+            scene%pair(2)%master = merge(2, 3, k == 3)
+         end if
+         if (k == 5) scene%pair(1)%initiation = initiation_persistent
+         call look_at()
+         if (allocated(error)) return
+      end do
+
+   contains
+
+      subroutine look_at()
+         type(march_t) :: march
+
+         call begin(scene, march, error)
+         if (allocated(error)) return
+         call check_equal(error, march%warnings%n, merge(1, 0, is_told(k)), "told " // to_text(k))
+         if (is_told(k) .and. .not. allocated(error)) call check_true(error, &
+            index(march%warnings%item(1)%text, "the surface UPPER of a contact pair keeps") == 1, &
+            march%warnings%item(1)%text)
+         call march_free(march)
+      end subroutine look_at
+
+   end subroutine test_kept
 
 end module test_massless_start

@@ -1,7 +1,7 @@
 !> A step of the deck begins with displacements and velocities alone: what a march does in its
 !> second step is what one does that starts there.
 module test_step_begin
-   use check, only : check_near, check_true, test_case_t
+   use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_amplitudes, only : amplitude_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
@@ -82,8 +82,27 @@ contains
       later%v0 = march%state%v
       later%step = scene%step(2:)
       call march_init(new, later, error)
+      ! As if increments were of other sizes, and time between two of them.
+      associate (clock => march%state%clock)
+         clock%grid_stride = 4
+         clock%n_easy = 3
+         clock%n_part = 2
+         clock%is_off_grid = .true.
+         march%state%control%power = 2
+      end associate
       if (.not. allocated(error)) call march_begin_step(march, scene, 2, error)
       if (.not. allocated(error)) call march_begin_step(new, later, 1, error)
+      if (allocated(error)) return
+      associate (now => march%state%clock, first => new%state%clock)
+         call check_equal(error, [now%i_step, now%n_grid, now%n_part, now%grid_stride, now%n_easy, &
+            now%n_before, march%state%control%power], [2, first%n_grid, first%n_part, &
+            first%grid_stride, first%n_easy, 3, 0], "counts")
+         call check_true(error, now%is_off_grid .eqv. first%is_off_grid, "on the grid")
+         call check_near(error, [now%start_time, now%step_time], [now%time, first%step_time], &
+            0.0_wp, 1.0_wp, "times")
+         call check_near(error, march%state%explicit%critical_h, new%state%explicit%critical_h, &
+            tol, 1.0_wp, "critical step")
+      end associate
       do k = 1, 3
          if (.not. allocated(error)) call march_increment(march, scene, increment, error)
          if (.not. allocated(error)) call march_increment(new, later, increment, error)
