@@ -17,7 +17,7 @@ contains
       real(wp), intent(in), contiguous :: u(:, :)    !! (n_dim, n_node) displacements [L]
       integer, intent(in), contiguous :: node(:, :)  !! (n, n_element) of elements, then 0
       integer, intent(out) :: element            !! 0: none
-      integer, intent(out) :: digits             !! that are left, >= 0
+      integer, intent(out) :: digits             !! that are left in it, >= 0; 0: no element
       real(wp) :: ratio, most
       integer :: e, n
 

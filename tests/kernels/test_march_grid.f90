@@ -106,25 +106,35 @@ contains
 
    end subroutine test_units
 
-   !> At each point, up to the rounding of a sum, and in the middle of each interval.
+   !> At each point, up to the rounding of a sum, and in the middle of each interval. The last one
+   !> may be so short that its end is nearer to the point before by whole increments.
    subroutine test_set(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(march_t) :: march
-      integer :: i
+      integer :: i, side
 
       call make_step(scene, march, .false.)
       march%state%clock%i_step = 1
       march%state%clock%start_time = 4.0_wp
+      scene%step(1)%time%duration = 1.6875_wp
+      do side = -8, 8, 8
+         call march_set_time(march, scene, 1.6875_wp*(1.0_wp + side*epsilon(1.0_wp)))
+         call check_equal(error, march%state%clock%n_grid, n, "the end")
+         call check_near(error, march%state%clock%step_time, 1.6875_wp, 0.0_wp, 1.0_wp, "its time")
+      end do
+      scene%step(1)%time%duration = time(n)
       associate (clock => march%state%clock)
-         do i = 0, n
-            clock%n_part = 1
-            call march_set_time(march, scene, time(i)*(1.0_wp + 8.0_wp*epsilon(1.0_wp)))
-            call check_equal(error, [clock%n_grid, int(clock%n_part)], [i, 0], "point " &
-               // to_text(i))
-            call check_true(error, .not. clock%is_off_grid, "on the grid")
-            call check_near(error, [clock%step_time, clock%time], [time(i), 4.0_wp + time(i)], &
-               0.0_wp, 1.0_wp, "times")
+         do side = -8, 8, 16
+            do i = 0, n
+               clock%n_part = 1
+               call march_set_time(march, scene, time(i)*(1.0_wp + side*epsilon(1.0_wp)))
+               call check_equal(error, [clock%n_grid, int(clock%n_part)], [i, 0], "point " &
+                  // to_text(i))
+               call check_true(error, .not. clock%is_off_grid, "on the grid")
+               call check_near(error, [clock%step_time, clock%time], [time(i), 4.0_wp + time(i)], &
+                  0.0_wp, 1.0_wp, "times")
+            end do
          end do
          do i = 0, n - 1
             call march_set_time(march, scene, 0.5_wp*(time(i) + time(i + 1)))

@@ -195,7 +195,7 @@ contains
       x = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 1.0_wp, 0.0625_wp], [2, 4])
       u = 0.0_wp
       call far_element_find(x, u, node, element, digits)
-      call check_equal(error, element, 0, "at the origin")
+      call check_equal(error, [element, digits], [0, 0], "at the origin")
       ! A tenth of the digits that are allowed to be lost, for an edge of 1.
       away = 0.1_wp*(10.0_wp**(-least_digits()))/epsilon(1.0_wp)
       u(2, :) = -away
