@@ -1,19 +1,29 @@
 !> Given forces as a term: their derivative, and the sizes that residuals are held against.
 module test_host_sizes
-   use check, only : check_near, check_true, test_case_t
-   use emcon_errors, only : error_t
+   use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
+   use check, only : check_error, check_near, check_true, test_case_t
+   use emcon_errors, only : err_analysis, err_input, error_t
    use emcon_evaluation, only : evaluation_t
+   use emcon_host_force, only : force_response_t, host_failed, host_force_t, host_outside
    use emcon_host_term, only : host_term_init, host_term_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_of, motion_t
    use emcon_scene, only : scene_t
    use emcon_term, only : response_begin, response_init, response_t, role_internal
+   use emcon_text, only : to_text
    use given_hosts, only : chain_host_init, chain_host_t
    use given_scenes, only : make_line
    use small_scenes, only : shake
    implicit none
    private
    public :: collect_host_sizes
+
+   !> A giver whose answers have `what` wrong.
+   type, extends(host_force_t) :: odd_t
+      integer :: what = 0
+   contains
+      procedure :: respond => odd_respond
+   end type odd_t
 
    integer, parameter :: n = 4
    real(wp), parameter :: tol = 64.0_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
@@ -25,7 +35,9 @@ contains
 
       tests = [ &
          test_case_t("tangent by finite differences", test_tangent), &
-         test_case_t("sizes of forces and positions", test_sizes)]
+         test_case_t("sizes of forces and positions", test_sizes), &
+         test_case_t("symmetric as the giver says", test_symmetric), &
+         test_case_t("answers that are none", test_answers)]
    end subroutine collect_host_sizes
 
    !> Springs 2-3, 3-1 and 1-4 along x, and a motion by chance.
@@ -137,5 +149,94 @@ contains
          end associate
       end do
    end subroutine test_sizes
+
+   !> At the end of a motion, and of a step, each by itself.
+   subroutine test_symmetric(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(host_term_t) :: term
+      type(motion_t) :: motion
+      type(response_t) :: response
+      integer :: k
+
+      call begin(term, motion, response, .false., error)
+      if (allocated(error)) return
+      do k = 0, 7
+         term%force%is_symmetric_at_end = btest(k, 0)
+         term%force%is_symmetric_in_steps = btest(k, 1)
+         motion%evaluation%is_gradient = btest(k, 2)
+         call check_true(error, term%is_symmetric(motion) .eqv. btest(k, merge(0, 1, btest(k, &
+            2))), "case " // to_text(k))
+      end do
+   end subroutine test_symmetric
+
+   !> What a giver may answer instead of forces: refused by name, or a failure with its reason. The
+   !> tangent times a way is nothing then.
+   subroutine test_answers(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=56), parameter :: text(7) = [character(len=56) :: &
+         "the energy of the given force ODD is made infinite", &
+         "the tangent of the given force ODD is made infinite", &
+         "ODD is made infinite or NaN at node 20", "ODD is put out of its range", "ODD failed", &
+         "ODD failed: no time", "ODD returned the status 77, which is none"]
+      type(host_term_t) :: term
+      type(motion_t) :: motion
+      type(response_t) :: response
+      type(scene_t) :: scene
+      type(odd_t) :: odd
+      real(wp) :: none(2, n), product(2, n)
+      integer :: k
+
+      call begin(term, motion, response, .false., error)
+      if (allocated(error)) return
+      call make_line(scene, n, .false., 0.1_wp, 1)
+      odd%name = "ODD"
+      odd%pattern = term%force%pattern
+      none = 0.0_wp
+      do k = 1, size(text)
+         odd%what = k
+         if (k == 6) odd%reason = "no time"
+         call host_term_init(term, odd, scene, error)
+         if (allocated(error)) return
+         call response_begin(response)
+         call term%respond(motion, response)
+         if (k <= 4) then
+            call check_true(error, allocated(response%refusal) .and. .not. &
+               allocated(response%failure), "refused")
+            if (allocated(error)) return
+            call check_true(error, index(response%refusal, trim(text(k))) > 0, response%refusal)
+         else
+            call check_error(error, response%failure, merge(err_input, err_analysis, k == 7), &
+               trim(text(k)), "failed")
+         end if
+         call check_near(error, response%part(role_internal)%force, none, 0.0_wp, 1.0_wp, "forces")
+         product = 3.0_wp
+         call term%tangent_times(motion, none + 1.0_wp, product)
+         call check_near(error, product, none + 3.0_wp, 0.0_wp, 1.0_wp, "product")
+      end do
+   end subroutine test_answers
+
+   !> Answers with one thing wrong.
+   subroutine odd_respond(self, u0, du, wants_tangent, response)
+      class(odd_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)
+      logical, intent(in) :: wants_tangent
+      type(force_response_t), intent(inout) :: response
+
+      response%force = 1.0_wp
+      select case (self%what)
+      case (1)
+         response%energy = ieee_value(1.0_wp, ieee_quiet_nan)
+      case (2)
+         if (allocated(response%tangent)) response%tangent(1) = ieee_value(1.0_dp, ieee_quiet_nan)
+      case (3)
+         response%force(2, 2) = ieee_value(1.0_wp, ieee_quiet_nan)
+      case (4)
+         response%status = host_outside
+      case (5, 6)
+         response%status = host_failed
+      case default
+         response%status = 77
+      end select
+   end subroutine odd_respond
 
 end module test_host_sizes

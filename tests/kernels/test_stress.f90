@@ -37,6 +37,7 @@ contains
       tests = [ &
          test_case_t("all elements and laws, large strains", test_large), &
          test_case_t("small strains, and in frames that turn", test_small), &
+         test_case_t("far from where it began", test_far), &
          test_case_t("where motions end tells what is inverted, not their way", test_ends), &
          test_case_t("von Mises", test_von_mises)]
    end subroutine collect_stress
@@ -300,6 +301,46 @@ contains
       end subroutine compare
 
    end subroutine test_small
+
+   !> Displacements of half of the digits and a way that takes the other half: elements in frames and
+   !> those of space see what is between their nodes, of which no digit is lost.
+   subroutine test_far(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: way = 2.0_wp**nint(0.5*digits(1.0_wp)), least = 16.0_wp/way
+      integer :: k
+
+      do k = 1, size(plane)
+         if (.not. allocated(error)) call look_at(plane(k), "COROTATED")
+      end do
+      do k = 1, size(space)
+         if (.not. allocated(error)) call look_at(space(k), "NONLINEAR")
+      end do
+
+   contains
+
+      subroutine look_at(kind, kinematics)
+         character(len=*), intent(in) :: kind, kinematics
+         type(stepper_t), target :: stepper
+         type(solid_t), pointer :: solid
+         real(wp), allocatable :: u(:, :)
+         real(wp) :: near(6, 1), far(6, 1), volume(1)
+         real(wp), allocatable :: strain(:, :)
+
+         call open_one(kind, 2, kinematics, stepper, error)
+         if (allocated(error)) return
+         allocate(u, source=stepper%scene%x)
+         allocate(strain(3*size(u, 1) - 3, 1))
+         call shake(u, 0.05_wp)
+         u = least*anint(u/least)
+         solid => terms_solid(stepper%march%system%term)
+         call element_means(solid, u, .true., near, strain, volume)
+         call element_means(solid, u + way, .true., far, strain, volume)
+         call check_near(error, far, near, 64.0_wp*epsilon(1.0_wp), stress_size, trim(kind))
+         call check_true(error, maxval(abs(near)) > 1.0e-3_wp*stress_size, "stress")
+         call stepper_close(stepper)
+      end subroutine look_at
+
+   end subroutine test_far
 
    !> Random motions, many of them too large, made in one step and found as they are.
    subroutine test_ends(error)

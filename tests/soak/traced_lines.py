@@ -25,7 +25,8 @@ KEPT = ROOT / "build" / "mutants"
 FILES = [f"scenes/test_{name}.py" for name in (
     "contact_output", "scene_report", "contact_scenes", "friction", "massless", "rigid", "verdict",
     "segments", "restitution", "explicit", "midside", "head_on", "corners", "increments",
-    "surface_pressure", "linear", "contact_damping", "friction_at_rest", "complementarity")]
+    "surface_pressure", "linear", "contact_damping", "friction_at_rest", "complementarity", "statics",
+    "quasi_static", "round_bodies", "schemes", "contact_robustness")]
 #: CPU time that a single test of these may take [s]; what takes longer is left out.
 DEAREST = 10
 
