@@ -150,8 +150,6 @@ contains
    end procedure terms_mass_rows
 
    module procedure terms_massless
-      is_massless = .false.
-      without_density = .false.
       select type (part => term(of_inertia)%term)
       type is (inertia_t)
          is_massless = part%is_massless
@@ -198,8 +196,6 @@ contains
       select type (part => term(of_inertia)%term)
       type is (inertia_t)
          call inertia_times(part, field, product)
-      class default
-         product = 0.0_wp
       end select
    end procedure terms_mass_times
 

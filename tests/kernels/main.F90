@@ -67,6 +67,7 @@ program main
    use test_host_check, only : collect_host_check
    use test_host_deck, only : collect_host_deck
    use test_host_force, only : collect_host_force
+   use test_given_kinds, only : collect_given_kinds
    use test_given_space, only : collect_user_space
    use test_host_lists, only : collect_host_lists
    use test_host_law, only : collect_host_law
@@ -358,6 +359,7 @@ program main
    call run("deck_ties", collect_deck_ties)
    call run("stepper_free", collect_stepper_free)
    call run("stepper_query", collect_stepper_query)
+   call run("given_kinds", collect_given_kinds)
    call run("given_space", collect_user_space)
    call run("host_law", collect_host_law)
    call run("host_lists", collect_host_lists)
