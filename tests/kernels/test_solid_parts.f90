@@ -7,7 +7,9 @@ module test_solid_parts
    use emcon_corotated_plane, only : corotated_t
    use emcon_element, only : element_geometry_t
    use emcon_element_plane, only : point_is_regular, point_motion_t
-   use emcon_element_pack_plane, only : element_pack_t, pack_gather, pack_motion_t, pack_response_t
+   use emcon_element_pack_plane, only : element_pack_t, pack_gather, pack_motion_t, &
+      pack_point_check, pack_point_t, pack_response_t
+   use emcon_element_space, only : space_point_is_regular, space_point_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_law, only : n_lane
@@ -40,7 +42,9 @@ contains
          test_case_t("corotated sections do not turn", test_corotated), &
          test_case_t("turns and strains in space", test_space), &
          test_case_t("elements that lock", test_locking), &
-         test_case_t("ends of motions that laws answer to", test_regular)]
+         test_case_t("ends of motions that laws answer to", test_regular), &
+         test_case_t("the same side by side", test_regular_lanes), &
+         test_case_t("the same in space", test_regular_space)]
    end subroutine collect_solid_parts
 
    !> Packs of one to all lanes with nodes by chance, in one to five shares: by their points, in
@@ -371,13 +375,13 @@ contains
          call check_true(error, point_is_regular(point, .false.) .eqv. k /= 8, "none " &
             // to_text(k))
       end do
-      ! What of a volume is round-off of its terms is none.
+      ! What of a volume is round-off of its terms, which are 2 in all, is none: 64 eps of them.
       do k = 1, 3
          point%dstrain = 0.0_wp
          point%strain = 0.0_wp
-         point%strain(k) = merge(1.0_wp, -0.5_wp, k == 3)*(1.0_wp - 32.0_wp*epsilon(1.0_wp))
+         point%strain(k) = no_volume(k, 0.875_wp)
          call check_true(error, .not. point_is_regular(point, .true.), "round-off")
-         point%strain(k) = merge(1.0_wp, -0.5_wp, k == 3)*(1.0_wp - 256.0_wp*epsilon(1.0_wp))
+         point%strain(k) = no_volume(k, 1.125_wp)
          call check_true(error, point_is_regular(point, .true.), "hardly any, but some")
       end do
       point%f_end(1, 2) = 2.0_wp
@@ -388,5 +392,149 @@ contains
       point%f_end = far*reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
       call check_true(error, .not. point_is_regular(point, .false.), "too large a one")
    end subroutine test_regular
+
+   !> A strain of component `k` alone whose volume is `part` of what counts as round-off.
+   pure real(wp) function no_volume(k, part) result(strain)
+      integer, intent(in) :: k
+      real(wp), intent(in) :: part
+
+      if (k == 3) then
+         strain = 1.0_wp - 64.0_wp*part*epsilon(1.0_wp)
+      else
+         strain = -0.5_wp*(1.0_wp - 128.0_wp*part*epsilon(1.0_wp))
+      end if
+   end function no_volume
+
+   !> Ends by chance; ends of which lanes 1 to 7 have one large entry each; ends whose volume is
+   !> round-off in lanes 1 to 3 and hardly any in 4 to 6.
+   subroutine draw_lanes(draw, strain, change, f)
+      integer, intent(in) :: draw                !! 1 to 60
+      real(wp), intent(out) :: strain(n_lane, 3), change(n_lane, 3), f(n_lane, 2, 2)
+      real(wp), parameter :: largest = huge(1.0_wp)**0.2_wp
+      real(wp) :: size(7)
+      integer :: i
+
+      call shake(strain, merge(0.1_wp, 0.7_wp, draw > 20))
+      call shake(change, 0.3_wp)
+      call shake(f(:, :, 1), merge(0.1_wp, 0.8_wp, draw > 20))
+      call shake(f(:, :, 2), merge(0.1_wp, 0.8_wp, draw > 20))
+      f(:, 1, 1) = f(:, 1, 1) + 1.0_wp
+      f(:, 2, 2) = f(:, 2, 2) + 1.0_wp
+      if (draw <= 20) return
+      if (draw <= 40) then
+         call draw_random(size)
+         size = largest*(0.5_wp + size)
+         do i = 1, 3
+            strain(i, i) = size(i)
+         end do
+         f(4, 1, 1) = size(4)
+         f(5, 2, 1) = size(5)
+         f(6, 1, 2) = size(6)
+         f(7, 2, 2) = size(7)
+         return
+      end if
+      strain(:6, :) = 0.0_wp
+      change(:6, :) = 0.0_wp
+      do i = 1, 3
+         strain(i, i) = no_volume(i, 0.875_wp)
+         strain(i + 3, i) = no_volume(i, 1.125_wp)
+      end do
+   end subroutine draw_lanes
+
+   !> Lanes side by side are as one by one; those that are not fit are told, and given strains of
+   !> none to compute with.
+   subroutine test_regular_lanes(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(pack_point_t) :: pack
+      type(pack_response_t) :: response
+      type(point_motion_t) :: point
+      real(wp) :: strain(n_lane, 3), change(n_lane, 3), f(n_lane, 2, 2)
+      logical :: fit, has_volume
+      integer :: draw, l, n_fit
+
+      n_fit = 0
+      do draw = 1, 60
+         has_volume = mod(draw, 2) == 0
+         call draw_lanes(draw, strain, change, f)
+         pack%law%strain = strain
+         pack%law%dstrain = change
+         pack%f_end = f
+         response%is_inverted = .false.
+         call pack_point_check(has_volume, pack, response)
+         do l = 1, n_lane
+            point%strain = strain(l, :)
+            point%dstrain = change(l, :)
+            point%f_end = f(l, :, :)
+            fit = point_is_regular(point, has_volume)
+            if (fit) n_fit = n_fit + 1
+            call check_true(error, fit .neqv. response%is_inverted(l), "draw " // to_text(draw) &
+               // ", lane " // to_text(l))
+            if (.not. fit) point%strain = 0.0_wp
+            if (.not. fit) point%dstrain = 0.0_wp
+            call check_near(error, [pack%law%strain(l, :), pack%law%dstrain(l, :)], &
+               [point%strain, point%dstrain], 0.0_wp, 1.0_wp, "strains")
+         end do
+      end do
+      call check_true(error, n_fit > 60 .and. n_fit < 60*n_lane - 60, "both kinds")
+   end subroutine test_regular_lanes
+
+   !> In space det F > 0, and all leading minors of C, of which diagonal shears and stretches are
+   !> given: no two directions turned inside out together.
+   subroutine test_regular_space(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: far = 2.0_wp*huge(1.0_wp)**0.1_wp
+      integer, parameter :: n = 13
+      real(wp), parameter :: strain(6, n) = reshape([ &
+         -0.4_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
+         -0.6_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
+         -0.6_wp, -0.6_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
+         0.0_wp, -0.6_wp, -0.6_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
+         -0.6_wp, 0.0_wp, -0.6_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
+         0.0_wp, 0.0_wp, -0.6_wp, 1.2_wp, 0.0_wp, 0.0_wp, &
+         0.0_wp, 0.0_wp, 0.0_wp, 0.8_wp, 0.0_wp, 0.0_wp, &
+         0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.2_wp, 0.0_wp, &
+         0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.2_wp, &
+         0.0_wp, 0.0_wp, 0.0_wp, 0.7_wp, 0.7_wp, 0.7_wp, &
+         0.0_wp, 0.0_wp, 0.0_wp, -0.7_wp, 0.7_wp, 0.7_wp, &
+         0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 1.2_wp, 0.0_wp, &
+         far, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], [6, n])
+      ! The last but two: 1 - 3 c^2 + 2 c^3 with c = 0.7, and with c = -0.7 once.
+      logical, parameter :: regular(n) = [.true., .false., .false., .false., .false., .false., &
+         .true., .false., .false., .true., .false., .true., .false.]
+      type(space_point_t) :: point
+      integer :: k
+
+      do k = 1, n
+         point%f_end = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
+            1.0_wp], [3, 3])
+         point%strain = 0.5_wp*strain(:, k)
+         point%dstrain = 0.5_wp*strain(:, k)
+         call check_true(error, space_point_is_regular(point, .true.) .eqv. regular(k), "strain " &
+            // to_text(k))
+         call check_true(error, space_point_is_regular(point, .false.) .eqv. k < n, "without " &
+            // "volume " // to_text(k))
+         if (k == n) exit
+         point%f_end(1, 1) = far
+         call check_true(error, .not. space_point_is_regular(point, .false.), "too large a one")
+         point%f_end(1, 1) = 1.0_wp
+         point%f_end(1, 2:) = [0.5_wp, 0.75_wp]
+         point%f_end(2:, 1) = 0.75_wp
+         call check_true(error, space_point_is_regular(point, .false.), "det F of 1/16")
+         point%f_end(2, 1) = 1.0_wp
+         call check_true(error, .not. space_point_is_regular(point, .false.), "and of -1/16")
+      end do
+      ! Round-off of terms that are 1 + 1 in each row, but for what the shears leave: 64 eps.
+      point%strain = 0.0_wp
+      point%dstrain = 0.0_wp
+      point%f_end = reshape([1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
+         1.0_wp], [3, 3])
+      do k = 4, 6
+         point%strain(k) = 1.0_wp - 112.0_wp*epsilon(1.0_wp)
+         call check_true(error, .not. space_point_is_regular(point, .true.), "round-off")
+         point%strain(k) = 1.0_wp - 144.0_wp*epsilon(1.0_wp)
+         call check_true(error, space_point_is_regular(point, .true.), "hardly any, but some")
+         point%strain(k) = 0.0_wp
+      end do
+   end subroutine test_regular_space
 
 end module test_solid_parts
