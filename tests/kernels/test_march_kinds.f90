@@ -1,6 +1,7 @@
 !> Marches of every kind of increment and element on two blocks: what each of them keeps or takes.
 module test_march_kinds
    use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_constraint, only : condition_rate
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_t
@@ -9,7 +10,9 @@ module test_march_kinds
    use emcon_materials, only : kinematics_corotated, kinematics_linear
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_row
+   use emcon_state, only : state_t
    use emcon_steps, only : events_nodes, events_pairs
+   use emcon_system, only : mass_times
    use emcon_text, only : to_text
    use small_scenes, only : add_step, block_t, clamp, make_block, make_two_blocks, prescribe, &
       shake, young
@@ -330,6 +333,7 @@ contains
       type(march_t) :: march
       type(ledger_t) :: start, before
       type(increment_t) :: increment
+      type(state_t) :: state0
       real(wp) :: push
       integer :: k, n_contact
 
@@ -343,8 +347,10 @@ contains
       n_contact = 0
       do k = 1, 80
          before = march%ledger
+         state0 = march%state
          call march_increment(march, scene, increment, error)
          if (allocated(error)) return
+         call check_pushes(error, march, state0, step)
          associate (state => march%state, ledger => march%ledger)
             push = sum(state%contact(2, 11:))
             call check_true(error, minval(gap_start + state%u(2, 11:13)) >= -tol, "nothing goes in")
@@ -363,5 +369,40 @@ contains
       call check_true(error, march%ledger%momentum(2) > 0.5_wp, "it bounces")
       call march_free(march)
    end subroutine test_explicit_contact
+
+   !> Two pushes, by the forces at the start and at the end of a step; that at the end stops what goes
+   !> on into the other side, by contacts that do not pull.
+   subroutine check_pushes(error, march, before, step)
+      type(error_t), allocatable, intent(inout) :: error
+      type(march_t), intent(in) :: march
+      type(state_t), intent(in) :: before
+      real(wp), intent(in) :: step               !! > 0 [T]
+      real(wp), dimension(2, 16) :: change, inertia, force
+      integer :: i, k
+
+      associate (state => march%state, set => march%active%set, explicit => march%explicit)
+         change = (state%v - before%v)/step
+         call mass_times(march%system, change, inertia)
+         force = state%contact + state%reaction - 0.5_wp*(before%internal + state%internal)
+         call check_near(error, force, inertia, tol, young, "the mean of both")
+         change = 2.0_wp*(state%v - march%motion%du/step)/step
+         call mass_times(march%system, change, inertia)
+         force = explicit%contact - state%internal
+         call check_near(error, inertia(:, 11:), force(:, 11:), tol, young, "at the end")
+         force = 0.0_wp
+         call check_equal(error, size(explicit%mu), set%n, "multipliers")
+         do k = 1, size(explicit%mu)
+            call check_true(error, explicit%mu(k) >= 0.0_wp, "no pull")
+            if (explicit%mu(k) > 0.0_wp) call check_near(error, condition_rate(set%item(k), &
+               state%v), 0.0_wp, tol, 1.0_wp, "what is held")
+            do i = 1, set%item(k)%n_node
+               associate (to => force(:, set%item(k)%node(i)))
+                  to = to + explicit%mu(k)*set%item(k)%c(:, i)
+               end associate
+            end do
+         end do
+         call check_near(error, explicit%contact, force, tol, young, "forces of contact")
+      end associate
+   end subroutine check_pushes
 
 end module test_march_kinds
