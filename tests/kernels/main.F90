@@ -101,6 +101,7 @@ program main
    use test_march_impulse, only : collect_march_impulse
    use test_march_guess, only : collect_march_guess
    use test_march_grid, only : collect_march_grid
+   use test_march_parts, only : collect_march_parts
    use test_march_schemes, only : collect_march_schemes
    use test_march_size, only : collect_march_size
    use test_march_kinds, only : collect_march_kinds
@@ -348,6 +349,7 @@ program main
    call run("march_grid", collect_march_grid)
    call run("march_guess", collect_march_guess)
    call run("march_impulse", collect_march_impulse)
+   call run("march_parts", collect_march_parts)
    call run("march_schemes", collect_march_schemes)
    call run("march_size", collect_march_size)
    call run("march_kinds", collect_march_kinds)

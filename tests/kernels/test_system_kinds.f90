@@ -33,7 +33,8 @@ contains
       tests = [ &
          test_case_t("tangents of all kinds of sections", test_kinds), &
          test_case_t("which matrices are symmetric", test_symmetric), &
-         test_case_t("far from its place", test_far)]
+         test_case_t("far from its place", test_far), &
+         test_case_t("far bodies beside others", test_beside)]
    end subroutine collect_system_kinds
 
    !> Two blocks of three cells, of quadrilaterals and of triangles; with links nodes of the second
@@ -274,5 +275,41 @@ contains
          end do
       end do
    end subroutine test_far
+
+   !> Of two bodies one moves far: the rounding of the other is its own.
+   subroutine test_beside(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: way = 1.0e4_wp
+      type(scheme_static_t) :: static
+      type(scene_t) :: scene
+      type(system_t) :: system
+      type(block_t) :: block
+      real(wp) :: u(2, 12)
+      integer :: kind, far, i
+
+      do kind = kinematics_nonlinear, kinematics_corotated
+         call make_block(scene, "CPE4", [2, 1], block)
+         call add_block(scene, "CPE4", [2, 1], [4.0_wp, 0.0_wp], [2.0_wp, 1.0_wp], block)
+         scene%section(1)%kinematics = kind
+         call add_step(scene, .true., 0.25_wp, 4)
+         call clamp(scene%step(1), [1, 7])
+         call system_init(system, scene, error)
+         if (.not. allocated(error)) call system_begin_step(system, scene, 1, error)
+         if (allocated(error)) return
+         call shake(u, 0.05_wp)
+         do far = 0, 1
+            u(:, 6*far + 1:6*far + 6) = u(:, 6*far + 1:6*far + 6) + way
+            call system_respond(system, motion_of(static%evaluation(instant_t(0.5_wp, 0.5_wp), &
+               0.25_wp), scene%x, u, 0.0_wp*u), .false.)
+            u(:, 6*far + 1:6*far + 6) = u(:, 6*far + 1:6*far + 6) - way
+            do i = 0, 1
+               associate (rounding => system%response%rounding(:, 6*i + 1:6*i + 6))
+                  call check_true(error, all(rounding > 0.1_wp*young*way .eqv. i == far), &
+                     "kinematics " // to_text(kind) // ", body " // to_text(i + 1))
+               end associate
+            end do
+         end do
+      end do
+   end subroutine test_beside
 
 end module test_system_kinds
