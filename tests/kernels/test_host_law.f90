@@ -57,6 +57,7 @@ contains
       tests = [ &
          test_case_t("forces and tangents of our own laws", test_forces), &
          test_case_t("tangent against differences", test_tangent), &
+         test_case_t("far from where it began", test_far), &
          test_case_t("two blocks meet, one of a given law", test_drop), &
          test_case_t("second order to our own law, energy to round-off", test_spin), &
          test_case_t("static stretch, and stress", test_static), &
@@ -494,6 +495,40 @@ contains
       call check_near(error, stepper%march%state%u, u, 0.0_wp, 1.0_wp, "displacements")
       call stepper_close(stepper)
    end subroutine test_failed
+
+   !> A way that takes half of the digits, gone or to go: strains keep the other half.
+   subroutine test_far(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: way = 2.0_wp**nint(0.5*digits(1.0_wp)), least = 16.0_wp/way
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(stepper_t) :: given
+      type(response_t) :: near, far
+      real(wp), dimension(2, 6) :: u0, du, direction, expected, product
+      integer :: k
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      call add_step(scene, .false., 0.1_wp, 1)
+      call open_with(given, scene, coupled_neo_hooke(), .true., error)
+      if (allocated(error)) return
+      call shake(u0, 0.1_wp)
+      call shake(du, 0.1_wp)
+      call shake(direction, 1.0_wp)
+      u0 = least*anint(u0/least)
+      du = least*anint(du/least)
+      do k = 0, 2
+         if (k == 1) u0 = u0 + way
+         if (k == 2) du = du + way
+         call solid_answers(given, motion_of(evaluation_t(), scene%x, u0, du), far)
+         call solid_times(given, motion_of(evaluation_t(), scene%x, u0, du), direction, product)
+         if (k == 0) near = far
+         if (k == 0) expected = product
+         call check_near(error, far%part(role_internal)%force, near%part(role_internal)%force, &
+            1.0e3_wp*eps, young, "forces")
+         call check_near(error, product, expected, 1.0e3_wp*eps, 10.0_wp*young, "tangent")
+      end do
+      call stepper_close(given)
+   end subroutine test_far
 
    !> The second of two elements has the given law: its stress is as by our own law, less that across
    !> the plane. Beyond what the law answers for there is none, in the first element there is.

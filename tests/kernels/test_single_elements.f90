@@ -49,6 +49,7 @@ contains
       tests = [ &
          test_case_t("forces and energies are the sums over the elements", test_sums), &
          test_case_t("tangent: differences, and products", test_tangent), &
+         test_case_t("far from where it began", test_far), &
          test_case_t("small strains: those of KINEMATICS=LINEAR", test_linear), &
          test_case_t("stress and strain of a uniform field", test_stress), &
          test_case_t("the largest of small rotations and strains", test_widen), &
@@ -255,6 +256,45 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_tangent
+
+   !> A way that takes half of the digits of displacements, on it or done in the step: what is
+   !> between nodes keeps the other half, and forces are the same.
+   subroutine test_far(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: way = 2.0_wp**nint(0.5*digits(1.0_wp)), least = 16.0_wp/way
+      type(scheme_energy_momentum_t) :: scheme
+      type(evaluation_t) :: evaluation
+      type(scene_t) :: scene
+      type(system_t) :: system
+      real(wp), allocatable :: u0(:, :), du(:, :), force(:, :), energy(:)
+      real(dp), allocatable :: value(:)
+      integer :: k
+
+      call make_system([1, 2, 3, 4, 5], .true., scene, system, error)
+      if (allocated(error)) return
+      evaluation = scheme%evaluation(instant_t(), 0.25_wp)
+      allocate(u0, du, force, source=0.0_wp*scene%x)
+      call shake(u0, 0.05_wp)
+      call shake(du, 0.05_wp)
+      u0 = least*anint(u0/least)
+      du = least*anint(du/least)
+      do k = 0, 2
+         if (k == 1) u0 = u0 + way
+         if (k == 2) du = du + way
+         call system_respond(system, motion_of(evaluation, scene%x, u0, du), .true.)
+         associate (part => system%response%part(role_internal))
+            if (k == 0) then
+               force = part%force
+               energy = system%response%energy
+               value = system%matrix%value
+            end if
+            call check_near(error, part%force, force, tol, young, "forces")
+            call check_near(error, system%response%energy, energy, tol, young, "energies")
+         end associate
+         call check_near(error, real(system%matrix%value, wp), real(value, wp), tol, &
+            10.0_wp*maxval(real(abs(value), wp)), "tangent")
+      end do
+   end subroutine test_far
 
    !> Everywhere E of the gradient and F S F^T/J, without NLGEOM their linear parts.
    subroutine test_stress(error)
