@@ -102,20 +102,22 @@ contains
       end do
    end subroutine test_penalties
 
-   !> Step by step: the changes of both blocks' momenta, and what was summed up from the start.
+   !> Step by step: the changes of both blocks' momenta, what was summed up from the start, and the
+   !> energy that contact makes or takes.
    subroutine follow(scene, what, error)
       type(scene_t), intent(in) :: scene
       character(len=*), intent(in) :: what
       type(error_t), allocatable, intent(out) :: error
       type(march_t) :: march
       type(increment_t) :: increment
-      real(wp) :: before(3, 2), now(3, 2), first(3, 2)
+      real(wp) :: before(3, 2), now(3, 2), first(3, 2), total
       integer :: k, n_pushed
 
       call march_init(march, scene, error)
       if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
       if (allocated(error)) return
       n_pushed = 0
+      total = march%ledger%total
       first = momenta_of(march%system, scene%x + march%state%u, march%state%v)
       before = first
       do k = 1, nint(scene%step(1)%time%duration/scene%step(1)%time%h)
@@ -134,6 +136,10 @@ contains
          associate (sum => march%state%sums%sum(1))
             call check_near(error, now(:2, 2) - first(:2, 2), sum%impulse(:2), tol, 2.0_wp, &
                "impulse, " // what)
+         end associate
+         associate (ledger => march%ledger)
+            if (.not. scene%step(1)%scheme%is_explicit) call check_near(error, ledger%total &
+               - ledger%contact_work + ledger%friction, total, tol, total, "energy, " // what)
          end associate
          if (allocated(error)) return
          if (norm2(now(:2, 2) - before(:2, 2)) > 1.0e-3_wp) n_pushed = n_pushed + 1

@@ -402,6 +402,9 @@ contains
             end do
          end do
          call check_near(error, explicit%contact, force, tol, young, "forces of contact")
+         ! Gaps open upwards: multipliers are pushes.
+         call check_near(error, sum(state%contacts%lam), sum(state%contact(2, 11:)), tol, young, &
+            "multipliers that are told")
       end associate
    end subroutine check_pushes
 

@@ -72,7 +72,7 @@ contains
       at_once = .true.
    end function at_once
 
-   !> A mass point at the speed 1 in increments of 1, each of which is as long as its time.
+   !> A mass point at the speed 1/2 in increments of the size 2: each goes on by 1.
    subroutine open_flight(stepper, wall, longest, h_min, error)
       type(stepper_t), intent(inout) :: stepper
       real(wp), intent(in) :: wall, longest, h_min
@@ -81,9 +81,9 @@ contains
       type(gate_t) :: gate
       integer, allocatable :: slot(:)
 
-      call make_line(scene, 1, .false., 1.0_wp, 4)
+      call make_line(scene, 1, .false., 2.0_wp, 4)
       scene%step(1)%time%h_min = h_min
-      scene%v0(1, 1) = 1.0_wp
+      scene%v0(1, 1) = 0.5_wp
       gate%name = "GATE"
       gate%wall = wall
       gate%longest = longest
@@ -96,8 +96,8 @@ contains
    subroutine test_halves(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: n_tried(3) = [0, 5, 7], n_cut(3) = [0, 2, 3]
-      real(wp), parameter :: time(5) = [1.0_wp, 1.0_wp, 1.5_wp, 1.5_wp, 1.75_wp], &
-         least(5) = [1.0_wp, 0.5_wp, 0.5_wp, 0.25_wp, 0.25_wp]
+      real(wp), parameter :: time(5) = [2.0_wp, 2.0_wp, 3.0_wp, 3.0_wp, 3.5_wp], &
+         least(5) = [2.0_wp, 1.0_wp, 1.0_wp, 0.5_wp, 0.5_wp]
       type(stepper_t) :: stepper
       type(increment_t) :: increment
       type(writer_t), target :: writer
@@ -111,7 +111,7 @@ contains
          call stepper_advance(stepper, increment, error)
          if (allocated(error)) return
          call check_near(error, [stepper%march%state%clock%time, stepper%march%state%u(1, 1), &
-            increment%h, increment%done], [real(k, wp), real(k, wp), 1.0_wp, 1.0_wp], &
+            increment%h, increment%done], [2.0_wp*k, real(k, wp), 2.0_wp, 2.0_wp], &
             16.0_wp*epsilon(1.0_wp), 4.0_wp, "a whole one")
          call check_equal(error, [writer%n, increment%n_cut, increment%notes%n], [n_tried(k), &
             n_cut(k), n_cut(k)], "tried and cut")
@@ -120,8 +120,8 @@ contains
          if (k /= 2 .or. allocated(error)) cycle
          call check_near(error, writer%time(:5), time, 0.0_wp, 1.0_wp, "times")
          call check_near(error, writer%least(:5), least, 0.0_wp, 1.0_wp, "the smallest")
-         call check_true(error, index(increment%notes%item(2)%text, "increment cut at time 1.5, " &
-            // "h = 0.5: the given force GATE is put out of its range") == 1, &
+         call check_true(error, index(increment%notes%item(2)%text, "increment cut at time 3, " &
+            // "h = 1: the given force GATE is put out of its range") == 1, &
             increment%notes%item(2)%text)
       end do
       call stepper_close(stepper)
@@ -134,16 +134,16 @@ contains
       type(stepper_t) :: stepper
       type(increment_t) :: increment
 
-      call open_flight(stepper, 1.6_wp, 0.0_wp, 0.25_wp, error)
+      call open_flight(stepper, 1.6_wp, 0.0_wp, 0.5_wp, error)
       if (.not. allocated(error)) call stepper_advance(stepper, increment, error)
       if (allocated(error)) return
       call stepper_advance(stepper, increment, stopped)
-      call check_error(error, stopped, err_analysis, "the analysis stops at time 1.5: with h = " // &
-         "0.25, the smallest allowed, the given force GATE is put out of its range", "stopped")
+      call check_error(error, stopped, err_analysis, "the analysis stops at time 3: with h = " // &
+         "0.5, the smallest allowed, the given force GATE is put out of its range", "stopped")
       call check_equal(error, increment%n_cut, 3, "cuts")
       associate (state => stepper%march%state)
-         call check_near(error, [state%clock%time, state%u(1, 1), increment%done], [1.5_wp, &
-            1.5_wp, 0.5_wp], 16.0_wp*epsilon(1.0_wp), 1.0_wp, "as far as it came")
+         call check_near(error, [state%clock%time, state%u(1, 1), increment%done], [3.0_wp, &
+            1.5_wp, 1.0_wp], 16.0_wp*epsilon(1.0_wp), 1.0_wp, "as far as it came")
          call check_true(error, state%clock%is_off_grid .and. state%clock%n_grid == 1, "between")
       end associate
       call stepper_close(stepper)
@@ -157,12 +157,12 @@ contains
       type(stepper_t) :: stepper
       type(increment_t) :: increment
 
-      call open_flight(stepper, 0.0_wp, 1.1_wp/4096.0_wp, 1.0_wp/8192.0_wp, error)
+      call open_flight(stepper, 0.0_wp, 1.1_wp/4096.0_wp, 1.0_wp/4096.0_wp, error)
       if (allocated(error)) return
       call stepper_advance(stepper, increment, stopped)
       call check_error(error, stopped, err_analysis, "was tried in 4000 parts, the smallest of " // &
-         "h = 2.44141E-04, and 64.9 % of it are done; give smaller increments", "stopped")
-      call check_near(error, stepper%march%state%clock%time, 2659.0_wp/4096.0_wp, 0.0_wp, 1.0_wp, &
+         "h = 4.88281E-04, and 64.9 % of it are done; give smaller increments", "stopped")
+      call check_near(error, stepper%march%state%clock%time, 2659.0_wp/2048.0_wp, 0.0_wp, 1.0_wp, &
          "time")
       call stepper_close(stepper)
    end subroutine test_crawl
@@ -182,7 +182,7 @@ contains
       call stepper_advance(stepper, increment, stopped)
       call check_equal(error, stopped%code, err_interrupt, "interrupted")
       call check_near(error, [stepper%march%state%clock%time, stepper%march%state%u(1, 1), &
-         stepper%march%state%v(1, 1)], [1.0_wp, 1.0_wp, 1.0_wp], 16.0_wp*epsilon(1.0_wp), 1.0_wp, &
+         stepper%march%state%v(1, 1)], [2.0_wp, 1.0_wp, 0.5_wp], 16.0_wp*epsilon(1.0_wp), 1.0_wp, &
          "as before")
       call stepper_close(stepper)
    end subroutine test_interrupt
