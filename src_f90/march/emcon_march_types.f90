@@ -174,8 +174,6 @@ contains
       type(step_check_t), intent(inout) :: self
 
       self%ratio = -1.0_wp
-      self%changes_contact = .false.
-      self%event_at = 0.0_wp
    end subroutine step_check_begin
 
 end module emcon_march_types

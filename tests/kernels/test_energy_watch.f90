@@ -27,6 +27,7 @@ contains
          test_case_t("a state that was set from outside", test_moved), &
          test_case_t("what works are made of", test_scale), &
          test_case_t("each reason by itself, at its bar", test_reasons), &
+         test_case_t("a balance so bad that the run has failed", test_failure), &
          test_case_t("what impacts took is told, of explicit steps up to a bar", test_warnings)]
    end subroutine collect_energy_watch
 
@@ -206,9 +207,23 @@ contains
             call check_equal(error, reasons%n, 0, "round-off")
          end do
       end do
-      watch = energy_watch_t(largest=largest)
-      call check_true(error, .not. energy_is_failure(watch), "no failure")
    end subroutine test_reasons
+
+   !> A part of the largest energy, and what is round-off beyond it.
+   subroutine test_failure(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: largest = 4.0_wp, bar = merge(1.0e-6_wp, 1.0e-2_wp, &
+         precision(1.0_wp) >= 15)
+      type(energy_watch_t) :: watch
+      integer :: k
+
+      do k = 0, 16
+         watch = energy_watch_t(largest=largest, dynamic_error=0.1_wp*(k + 0.01_wp)*bar*largest)
+         call check_true(error, energy_is_failure(watch) .eqv. k >= 10, "above the bar")
+         watch%scale = 0.25_wp*bar*largest/(16.0_wp*eps)
+         call check_true(error, energy_is_failure(watch) .eqv. k >= 13, "and round-off")
+      end do
+   end subroutine test_failure
 
    !> More than a hundredth; of explicit steps not what is bad by itself.
    subroutine test_warnings(error)

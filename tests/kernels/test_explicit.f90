@@ -2,6 +2,7 @@
 !> of a block that penalties stop, whose pushes and momenta have closed forms.
 module test_explicit
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
+   use emcon_amplitudes, only : amplitude_t
    use emcon_condition_nodes, only : condition_resize
    use emcon_constraints, only : constraint_set_t, constraints_select
    use emcon_critical_step, only : critical_bound, critical_sharp
@@ -17,12 +18,13 @@ module test_explicit
    use emcon_scheme_registry, only : scheme_row
    use emcon_penalty_law, only : penalty_t
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_t
-   use emcon_steps, only : method_penalty
-   use emcon_system, only : system_t, system_tangent_times
+   use emcon_steps, only : load_point, load_t, method_penalty
+   use emcon_system, only : mass_times, system_t, system_tangent_times
    use emcon_term_registry, only : terms_mass_values
    use given_hosts, only : well_t
    use given_scenes, only : make_line, open_given
-   use small_scenes, only : add_step, block_t, clamp, make_block, make_two_blocks, shake
+   use linear_scenes, only : add_equation
+   use small_scenes, only : add_load, add_step, block_t, clamp, make_block, make_two_blocks, shake
    use sparse_samples, only : dense_of
    implicit none
    private
@@ -51,6 +53,7 @@ contains
          test_case_t("the element that ends the run is named", test_squeezed), &
          test_case_t("central differences in a well, in closed form", test_well), &
          test_case_t("round a centre: what a potential stores is no growth", test_centre), &
+         test_case_t("a force that begins at rest, on nodes that are linked", test_linked), &
          test_case_t("what has no mass is told", test_refused)]
    end subroutine collect_explicit
 
@@ -428,6 +431,50 @@ contains
       end do
       call stepper_close(stepper)
    end subroutine test_centre
+
+   !> Nothing moves in the first step, as the force is 0 at its start: at its end there is half of
+   !> the impulse of the force there, shared by two nodes that move alike; the other half is of the
+   !> next step.
+   subroutine test_linked(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: tol = 1.0e3_wp*eps, pull = 8.0_wp
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(load_t) :: load
+      real(wp) :: impulse(2, 6)
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      call add_equation(scene, [3, 6], [1, 1], [1.0_wp, -1.0_wp])
+      call add_step(scene, .false., h, 4)
+      scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+      deallocate(scene%amplitude)
+      allocate(scene%amplitude(1))
+      scene%amplitude(1) = amplitude_t(name="A", time=[0.0_wp, 1.0_wp], value=[0.0_wp, 1.0_wp])
+      load%kind = load_point
+      load%target = 3
+      load%place = 1
+      load%value = pull
+      load%amplitude = 1
+      call add_load(scene%step(1), load)
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      if (.not. allocated(error)) call march_increment(march, scene, increment, error)
+      if (allocated(error)) return
+      call check_near(error, march%state%u, 0.0_wp*scene%x, 0.0_wp, 1.0_wp, "at rest")
+      call mass_times(march%system, march%state%v, impulse)
+      impulse(1, 3) = impulse(1, 3) + impulse(1, 6) - 0.5_wp*h*(h*pull)
+      impulse(1, 6) = 0.0_wp
+      call check_near(error, impulse, 0.0_wp*impulse, tol, h*h*pull, "impulse")
+      call check_near(error, march%state%v(1, 3), march%state%v(1, 6), tol, h*h*pull, "alike")
+      call check_true(error, march%state%v(1, 3) > 0.1_wp*h*h*pull, "to the right")
+      call march_increment(march, scene, increment, error)
+      if (allocated(error)) return
+      call check_near(error, sum(march%ledger%momentum), 2.0_wp*h*(h*pull), tol, h*h*pull, &
+         "two impulses, one of the middle and half of the end")
+      call march_free(march)
+   end subroutine test_linked
 
    !> A block of which the second element has no density: the nodes that are its alone.
    subroutine test_refused(error)
