@@ -1,7 +1,7 @@
 !> The matrix of the system against differences of its forces, for sections of every kinematics,
 !> with dependent freedoms, damping, follower loads and mean dilatation.
 module test_system_kinds
-   use check, only : check_near, check_true, test_case_t
+   use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_csr, only : csr_multiply
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_at_end, evaluation_t, instant_t
@@ -34,7 +34,8 @@ contains
          test_case_t("tangents of all kinds of sections", test_kinds), &
          test_case_t("which matrices are symmetric", test_symmetric), &
          test_case_t("far from its place", test_far), &
-         test_case_t("far bodies beside others", test_beside)]
+         test_case_t("far bodies beside others", test_beside), &
+         test_case_t("what has shrunk to a point has no frame", test_point)]
    end subroutine collect_system_kinds
 
    !> Two blocks of three cells, of quadrilaterals and of triangles; with links nodes of the second
@@ -311,5 +312,37 @@ contains
          end do
       end do
    end subroutine test_beside
+
+   !> The third of three elements, of which the second and third have frames.
+   subroutine test_point(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scheme_static_t) :: static
+      type(scene_t) :: scene
+      type(system_t) :: system
+      type(block_t) :: block
+      type(evaluation_t) :: evaluation
+      real(wp) :: u(2, 8)
+      integer :: i
+
+      call make_block(scene, "CPE4", [3, 1], block)
+      scene%element%label = [5, 77, 88]
+      scene%section = [scene%section, scene%section]
+      scene%section(2)%kinematics = kinematics_corotated
+      scene%element%section = [1, 2, 2]
+      call add_step(scene, .true., 0.25_wp, 4)
+      call clamp(scene%step(1), [1])
+      call system_init(system, scene, error)
+      if (.not. allocated(error)) call system_begin_step(system, scene, 1, error)
+      if (allocated(error)) return
+      evaluation = static%evaluation(instant_t(0.5_wp, 0.5_wp), 0.25_wp)
+      u = 0.0_wp
+      do i = 1, size(u, 2)
+         if (any(i == [3, 4, 7, 8])) u(:, i) = [2.5_wp, 0.5_wp] - scene%x(:, i)
+      end do
+      call system_respond(system, motion_of(evaluation, scene%x, 0.0_wp*u, u), .false.)
+      call check_true(error, allocated(system%response%refusal), "refused")
+      if (.not. allocated(error)) call check_equal(error, system%response%refusal, &
+         "element 88 is inverted", "which")
+   end subroutine test_point
 
 end module test_system_kinds
