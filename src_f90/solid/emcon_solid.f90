@@ -148,28 +148,18 @@ contains
       call make_packs(self)
    end subroutine solid_init
 
-   !> An element that grows normal to the plane, or in space, asks for a law that is known there.
+   !> An element that grows normal to the plane asks for a law that is known there.
    subroutine check_law(self, scene, e, error)
       type(solid_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: e
       type(error_t), allocatable, intent(out) :: error
-      character(len=:), allocatable :: where_it_is
 
-      if (self%trait%is_rigid(e)) return
-      if (self%trait%is_thin(e)) then
-         if (allocated(self%law(self%law_of(e))%law)) return
-         where_it_is = "plane stress"
-      else if (self%is_single) then
-         if (allocated(self%law(self%law_of(e))%law) .or. .not. self%is_axial) return
-         where_it_is = "axisymmetric"
-      else
-         return
-      end if
+      if (self%trait%is_rigid(e) .or. .not. self%trait%is_thin(e)) return
+      if (allocated(self%law(self%law_of(e))%law)) return
       call raise(error, err_input, where_text(scene, scene%element%origin(e)) // ": error: " &
          // "element " // to_text(self%deck%label(e)) // " is of type " &
-         // trim(scene%element%kinds(self%kind(e))%name) // ", " // where_it_is &
-         // ", in which the law of " &
+         // trim(scene%element%kinds(self%kind(e))%name) // ", plane stress, in which the law of " &
          // "material " &
          // self%deck%material(scene%section(scene%element%section(e))%material)%text &
          // " is not known: it gives no stress normal to the plane; take ELASTIC, NEO HOOKE, " &

@@ -8,6 +8,7 @@ module test_host_law
    use emcon_errors, only : err_analysis, err_input, error_t
    use emcon_kinds, only : dp, wp
    use emcon_law, only : lame_constants
+   use emcon_law_linear, only : law_linear_t
    use emcon_law_registry, only : law_user, law_linear
    use emcon_march, only : increment_t
    use emcon_motion, only : motion_of, motion_t
@@ -17,7 +18,7 @@ module test_host_law
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_term, only : response_init, response_t, role_internal
-   use emcon_term_registry, only : terms_solid
+   use emcon_term_registry, only : terms_mass_rows, terms_solid
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_read_source, &
       stepper_t
    use emcon_stepper_file, only : stepper_load, stepper_save
@@ -26,6 +27,7 @@ module test_host_law
    use emcon_stress, only : element_means, nodal_stress
    use emcon_text, only : string_t, to_text
    use kind_rows, only : law_code
+   use one_element, only : law_given, read_one
    use small_scenes, only : add_block, add_step, block_t, clamp, make_block, make_two_blocks, &
       poisson, prescribe, shake, young
    implicit none
@@ -66,6 +68,8 @@ contains
          test_case_t("outside: the step is cut", test_outside), &
          test_case_t("failed: an error, the state stands", test_failed), &
          test_case_t("bad laws at rest", test_bad_rest), &
+         test_case_t("a type of law that takes the constants of the deck", test_taken), &
+         test_case_t("where the stress normal to the plane is asked for", test_normal), &
          test_case_t("wrong order of calls, wrong names", test_bad_calls), &
          test_case_t("restart file of a deck with a given law", test_restart)]
    end subroutine collect_host_law
@@ -587,6 +591,84 @@ contains
       call open_pull(failed, -1.0_wp, point_failed, refused)
       call check_error(error, refused, err_analysis, "has failed at zero strain", "failed")
    end subroutine test_bad_rest
+
+   !> Our law of St. Venant and Kirchhoff given from outside: its forces, its masses, and what it says
+   !> of constants that are wrong.
+   subroutine test_taken(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: refused
+      type(stepper_t) :: given, own, wrong
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(response_t) :: one, other
+      real(wp) :: u0(2, 6), du(2, 6)
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      scene%material(1)%density = 3.0_wp
+      call add_step(scene, .false., 0.1_wp, 1)
+      given%scene = scene
+      given%scene%material(1)%law = law_user
+      given%scene%material(1)%constant = [young, poisson]
+      wrong%scene = given%scene
+      given%is_read = .true.
+      call stepper_give_law(given, "rubber", law_linear_t(), error)
+      if (.not. allocated(error)) call stepper_build(given, error)
+      if (.not. allocated(error)) call open_with(own, scene, law_linear, .false., error)
+      if (allocated(error)) return
+      call shake(u0, 0.1_wp)
+      call shake(du, 0.1_wp)
+      call solid_answers(given, motion_of(evaluation_t(), scene%x, u0, du), one)
+      call solid_answers(own, motion_of(evaluation_t(), scene%x, u0, du), other)
+      call check_near(error, one%part(role_internal)%force, other%part(role_internal)%force, &
+         64.0_wp*eps, young, "force")
+      call check_near(error, given%march%ledger%kinetic, own%march%ledger%kinetic, 0.0_wp, 1.0_wp, &
+         "energy")
+      call check_near(error, sum(terms_mass_of(given)), 6.0_wp, 64.0_wp*eps, 6.0_wp, "mass")
+      wrong%scene%material(1)%constant = [young, 0.75_wp]
+      wrong%is_read = .true.
+      call stepper_give_law(wrong, "rubber", law_linear_t(), error)
+      if (allocated(error)) return
+      call stepper_build(wrong, refused)
+      call check_error(error, refused, err_input, ": error: material RUBBER: ", "constants")
+      call stepper_close(given)
+      call stepper_close(own)
+      call stepper_close(wrong)
+   end subroutine test_taken
+
+   !> Mass at the nodes.
+   function terms_mass_of(stepper) result(mass)
+      type(stepper_t), intent(in) :: stepper
+      real(wp) :: mass(size(stepper%scene%x, 2))
+
+      call terms_mass_rows(stepper%march%system%term, mass)
+   end function terms_mass_of
+
+   !> An energy of the strains of the plane says nothing of it: refused in plane stress.
+   subroutine test_normal(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=4), parameter :: kind(2) = ["CPE4", "CPS4"]
+      type(error_t), allocatable :: refused
+      type(elastic_t) :: law
+      integer :: k
+
+      do k = 1, 2
+         block
+            type(stepper_t) :: stepper
+
+            call read_one(kind(k), law_given, "NONLINEAR", stepper, error)
+            if (allocated(error)) return
+            law = elastic_of(law_linear)
+            call stepper_give_law(stepper, "M", law, error)
+            if (allocated(error)) return
+            if (allocated(refused)) deallocate(refused)
+            call stepper_build(stepper, refused)
+            if (k == 1) call check_true(error, .not. allocated(refused), "plane strain")
+            if (k > 1) call check_error(error, refused, err_input, "element 1 is of type " &
+               // "CPS4, plane stress, in which the law of material M is not known", kind(k))
+            call stepper_close(stepper)
+         end block
+      end do
+   end subroutine test_normal
 
    subroutine test_bad_calls(error)
       type(error_t), allocatable, intent(out) :: error
