@@ -231,15 +231,16 @@ contains
       if (n_dim == 3) r(:, :2) = matmul(r(:, :2), rotation(-0.4_wp))
    end function some_rotation
 
-   !> Two elements along x with corners in columns of `n_column`, bent about the last axis but one of
-   !> them, along the axes and in some other direction, with strains of any size. The elements have
-   !> no strain across; with the mean of the volume change they resist as if lambda were -2 mu/3.
+   !> Two elements along x that are bent in the plane of x and the last axis; then the same in some
+   !> other direction, and with large rotations. The elements have no strain across; with the mean
+   !> of the volume change they resist as if lambda were -2 mu/3.
    subroutine test_bars(error)
       type(error_t), allocatable, intent(out) :: error
-      character(len=5), parameter :: name(4) = [character(len=5) :: "CPE4", "CPE4H", "C3D8", "C3D8H"]
+      character(len=5), parameter :: name(4) = [character(len=5) :: "CPE4", "CPE4H", "C3D8", &
+         "C3D8H"]
       real(wp), parameter :: lambda = bulk - 2.0_wp*shear/3.0_wp, width = 0.75_wp
       real(wp), parameter :: plate = 4.0_wp*shear*(lambda + shear)/(lambda + 2.0_wp*shear)
-      !> Corners across a bar, and the columns of each element in the order of its nodes.
+      !> Corners across a bar.
       real(wp), parameter :: across(2, 4) = reshape(0.5_wp*[-width, -b, width, -b, width, b, &
          -width, b], [2, 4])
       type(scene_t) :: scene
@@ -314,8 +315,8 @@ contains
    end subroutine test_bars
 
    !> On either side of a face at x = 0 an element whose tip lies at x and some `tip` across; the
-   !> tip of the second is moved across. Each turns against the other, about what is across x and the
-   !> motion, and bends in the direction of the motion.
+   !> tip of the second is moved across. Each turns against the other, about what is across x and
+   !> the motion, and bends in the direction of the motion.
    subroutine test_simplices(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: lambda = bulk - 2.0_wp*shear/3.0_wp
@@ -391,7 +392,8 @@ contains
          plane = slope - spread(normal, 2, 3)*spread(matmul(normal, slope), 1, 3)
          plane = plane - spread(matmul(plane, normal), 2, 3)*spread(normal, 1, 3)
          trace = plane(1, 1) + plane(2, 2) + plane(3, 3)
-         plane = plane - lambda/(lambda + 2.0_wp*shear)*trace*spread(normal, 2, 3)*spread(normal, 1, 3)
+         plane = plane - lambda/(lambda + 2.0_wp*shear)*trace*spread(normal, 2, 3) &
+            *spread(normal, 1, 3)
          slope = slope - plane
          trace = slope(1, 1) + slope(2, 2) + slope(3, 3)
          energy = volume*(0.5_wp*lambda*trace**2 + shear*sum(slope**2))
@@ -407,12 +409,13 @@ contains
    subroutine test_uniform(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: c = 1.0e-3_wp, pi = 2.0_wp*acos(0.0_wp)
+      real(wp), parameter :: round = 0.5_wp*pi*(2.25_wp**2 - 1.0_wp)
       real(wp), parameter :: ring(2, 4) = reshape([1.0_wp, 0.0_wp, 2.25_wp, 0.0_wp, 2.25_wp, &
          0.5_wp, 1.0_wp, 0.5_wp], [2, 4])
       integer :: i
 
-      call stretch("CAX3", ring, reshape([1, 2, 3, 1, 3, 4], [3, 2]), 0.5_wp*pi*(2.25_wp**2 - 1.0_wp))
-      call stretch("CAX4", ring, reshape([1, 2, 3, 4], [4, 1]), 0.5_wp*pi*(2.25_wp**2 - 1.0_wp))
+      call stretch("CAX3", ring, reshape([1, 2, 3, 1, 3, 4], [3, 2]), round)
+      call stretch("CAX4", ring, reshape([1, 2, 3, 4], [4, 1]), round)
       call stretch("C3D8H", reshape([0.0_wp, 0.0_wp, 0.0_wp, a, 0.0_wp, 0.0_wp, a, b, 0.0_wp, &
          0.0_wp, b, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, a, 0.0_wp, 1.0_wp, a, b, 1.0_wp, 0.0_wp, b, &
          1.0_wp], [3, 8]), reshape([(i, i = 1, 8)], [8, 1]), a*b)

@@ -372,8 +372,8 @@ contains
       if (.not. allocated(error)) call open_given(stepper, scene, potential, 1.0_wp, error)
    end subroutine open_well
 
-   !> x_n+1 - 2 x_n + x_n-1 = -h^2 k x_n: an oscillation of the phase phi in each step, with 2 cos phi
-   !> = 2 - h^2 k. Velocities are differences over two steps.
+   !> x_n+1 - 2 x_n + x_n-1 = -h^2 k x_n: an oscillation of the phase phi in each step, with
+   !> 2 cos phi = 2 - h^2 k. Velocities are differences over two steps.
    subroutine test_well(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: k = 2.0_wp, v = 0.5_wp, h = 0.3_wp

@@ -1,5 +1,5 @@
-!> Solvers, schemes and conditions that a program gives: one that does what ours do leads to the same
-!> run, and one that nobody gives is told.
+!> Solvers, schemes and conditions that a program gives: one that does what ours do leads to the
+!> same run, and one that nobody gives is told.
 module test_given_kinds
    use check, only : check_error, check_near, check_true, test_case_t
    use emcon_constraint, only : condition_t, constraint_t

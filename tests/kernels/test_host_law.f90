@@ -503,7 +503,7 @@ contains
    !> A way that takes half of the digits, gone or to go: strains keep the other half.
    subroutine test_far(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: way = 2.0_wp**nint(0.5*digits(1.0_wp)), least = 16.0_wp/way
+      real(wp), parameter :: way = 2.0_wp**nint(0.5_wp*digits(1.0_wp)), least = 16.0_wp/way
       type(scene_t) :: scene
       type(block_t) :: block
       type(stepper_t) :: given
@@ -534,8 +534,8 @@ contains
       call stepper_close(given)
    end subroutine test_far
 
-   !> The second of two elements has the given law: its stress is as by our own law, less that across
-   !> the plane. Beyond what the law answers for there is none, in the first element there is.
+   !> The second of two elements has the given law: its stress is as by our own law, less that
+   !> across the plane. Beyond what the law answers for there is none, but in the first element.
    subroutine test_mixed(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -592,8 +592,8 @@ contains
       call check_error(error, refused, err_analysis, "has failed at zero strain", "failed")
    end subroutine test_bad_rest
 
-   !> Our law of St. Venant and Kirchhoff given from outside: its forces, its masses, and what it says
-   !> of constants that are wrong.
+   !> Our law of St. Venant and Kirchhoff given from outside: its forces, its masses, and what it
+   !> says of constants that are wrong.
    subroutine test_taken(error)
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: refused

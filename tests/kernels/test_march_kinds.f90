@@ -370,8 +370,8 @@ contains
       call march_free(march)
    end subroutine test_explicit_contact
 
-   !> Two pushes, by the forces at the start and at the end of a step; that at the end stops what goes
-   !> on into the other side, by contacts that do not pull.
+   !> Two pushes, by the forces at the start and at the end of a step; that at the end stops what
+   !> goes on into the other side, by contacts that do not pull.
    subroutine check_pushes(error, march, before, step)
       type(error_t), allocatable, intent(inout) :: error
       type(march_t), intent(in) :: march

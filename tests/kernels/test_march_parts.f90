@@ -149,8 +149,8 @@ contains
       call stepper_close(stepper)
    end subroutine test_none
 
-   !> Parts of 2^-12 only. After the first twelve, which are too long, of three that are tried two go
-   !> on and one is the double that comes next: 3988 lead to 2659 of 4096.
+   !> Parts of 2^-12 only. After the first twelve, which are too long, of three that are tried two
+   !> go on and one is the double that comes next: 3988 lead to 2659 of 4096.
    subroutine test_crawl(error)
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: stopped
@@ -160,8 +160,8 @@ contains
       call open_flight(stepper, 0.0_wp, 1.1_wp/4096.0_wp, 1.0_wp/4096.0_wp, error)
       if (allocated(error)) return
       call stepper_advance(stepper, increment, stopped)
-      call check_error(error, stopped, err_analysis, "was tried in 4000 parts, the smallest of " // &
-         "h = 4.88281E-04, and 64.9 % of it are done; give smaller increments", "stopped")
+      call check_error(error, stopped, err_analysis, "was tried in 4000 parts, the smallest " // &
+         "of h = 4.88281E-04, and 64.9 % of it are done; give smaller increments", "stopped")
       call check_near(error, stepper%march%state%clock%time, 2659.0_wp/2048.0_wp, 0.0_wp, 1.0_wp, &
          "time")
       call stepper_close(stepper)

@@ -1,4 +1,5 @@
-!> What a scheme looks back on: made where it is missing, handed to the next motion, kept, forgotten.
+!> What a scheme looks back on: made where it is missing, handed to the next motion, kept and
+!> forgotten.
 module test_march_past
    use check, only : check_near, check_true, test_case_t
    use emcon_amplitudes, only : amplitude_t

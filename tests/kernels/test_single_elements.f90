@@ -261,7 +261,7 @@ contains
    !> between nodes keeps the other half, and forces are the same.
    subroutine test_far(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: way = 2.0_wp**nint(0.5*digits(1.0_wp)), least = 16.0_wp/way
+      real(wp), parameter :: way = 2.0_wp**nint(0.5_wp*digits(1.0_wp)), least = 16.0_wp/way
       type(scheme_energy_momentum_t) :: scheme
       type(evaluation_t) :: evaluation
       type(scene_t) :: scene

@@ -232,7 +232,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: h(2, 2) = reshape([0.125_wp, -0.25_wp, 0.5_wp, -0.25_wp], [2, 2])
       !> Of this way half of the digits are left for what is beside it.
-      real(wp), parameter :: way = 2.0_wp**nint(0.5*digits(1.0_wp))
+      real(wp), parameter :: way = 2.0_wp**nint(0.5_wp*digits(1.0_wp))
       type(scene_t) :: scene
       type(solid_t) :: solid
       type(small_range_t) :: range

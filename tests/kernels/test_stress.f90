@@ -302,11 +302,11 @@ contains
 
    end subroutine test_small
 
-   !> Displacements of half of the digits and a way that takes the other half: elements in frames and
-   !> those of space see what is between their nodes, of which no digit is lost.
+   !> Displacements of half of the digits and a way that takes the other half: elements in frames
+   !> and those of space see what is between their nodes, of which no digit is lost.
    subroutine test_far(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: way = 2.0_wp**nint(0.5*digits(1.0_wp)), least = 16.0_wp/way
+      real(wp), parameter :: way = 2.0_wp**nint(0.5_wp*digits(1.0_wp)), least = 16.0_wp/way
       integer :: k
 
       do k = 1, size(plane)
