@@ -121,12 +121,11 @@ contains
       type(constraint_set_t), intent(in) :: set
       type(push_t), intent(in) :: push
       real(wp), intent(inout), contiguous :: v(:, :)     !! (n_dim, n_node)
-      logical, intent(out) :: has_root           !! .false.: `v` is left as it is
+      logical, intent(inout) :: has_root         !! .false.: `v` is left as it is, as by an error
       type(error_t), allocatable, intent(out) :: error
       type(gain_t) :: gain
       real(wp) :: part
 
-      has_root = .false.
       call push_along(self, system, set, push%force, v, gain, error)
       if (allocated(error)) return
       call smaller_root(gain%a, gain%b, push%gain, part, has_root)

@@ -14,7 +14,7 @@ module emcon_host_term
    use emcon_reduction, only : freedom_numbers, reduction_slot
    use emcon_scene, only : scene_t
    use emcon_space, only : lists_append, lists_t, space_t
-   use emcon_term, only : fastest_t, response_t, role_internal, term_t
+   use emcon_term, only : fastest_t, response_t, term_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -45,7 +45,6 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: i, k, n, n_dim
 
-      self%role = role_internal
       n_dim = size(scene%x, 1)
       n = size(scene%x, 2)
       call host_check_force(force, n_dim, n, error)

@@ -5,6 +5,7 @@ module test_host_law
    use emcon_deck_source, only : deck_source_t
    use emcon_dgrad_series, only : log1p_excess, log1p_of
    use emcon_diagnostics, only : diagnostics_t
+   use emcon_element_kind, only : find_element_kind
    use emcon_errors, only : err_analysis, err_input, error_t
    use emcon_kinds, only : dp, wp
    use emcon_law, only : lame_constants
@@ -70,6 +71,7 @@ contains
          test_case_t("bad laws at rest", test_bad_rest), &
          test_case_t("a type of law that takes the constants of the deck", test_taken), &
          test_case_t("where the stress normal to the plane is asked for", test_normal), &
+         test_case_t("where modes ask for moduli", test_modes), &
          test_case_t("wrong order of calls, wrong names", test_bad_calls), &
          test_case_t("restart file of a deck with a given law", test_restart)]
    end subroutine collect_host_law
@@ -642,6 +644,32 @@ contains
 
       call terms_mass_rows(stepper%march%system%term, mass)
    end function terms_mass_of
+
+   !> The given law is that of the second of three materials.
+   subroutine test_modes(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: refused
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(stepper_t) :: stepper
+
+      call make_block(scene, "CPE4", [1, 1], block)
+      scene%element%kind = find_element_kind(scene%element%kinds, "CPE4I")
+      scene%material = [scene%material, scene%material, scene%material]
+      scene%material(1)%name = "STEEL"
+      scene%material(3)%name = "WOOD"
+      scene%material(2)%law = law_user
+      scene%section(1)%material = 2
+      call add_step(scene, .false., 0.1_wp, 1)
+      stepper%scene = scene
+      stepper%is_read = .true.
+      call stepper_give_law(stepper, "Rubber", elastic_of(law_linear), error)
+      if (allocated(error)) return
+      call stepper_build(stepper, refused)
+      call check_error(error, refused, err_input, "element 1 has incompatible modes, for which " // &
+         "the law given for material RUBBER tells no moduli; take CPE4 or CPE8", "modes")
+      call stepper_close(stepper)
+   end subroutine test_modes
 
    !> An energy of the strains of the plane says nothing of it: refused in plane stress.
    subroutine test_normal(error)

@@ -1,11 +1,11 @@
 !> What the march decides of contact, on a block that is thrown on another one: friction and its
 !> limit, restitution, surfaces without mass, contact that gives way, bodies that contact holds.
 module test_march_contact
-   use check, only : check_near, check_true, test_case_t
+   use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_constraints, only : constraint_set_t, constraints_select
    use emcon_condition_nodes, only : condition_resize
    use emcon_correction, only : correction_t
-   use emcon_errors, only : error_t
+   use emcon_errors, only : err_analysis, error_t
    use emcon_flexibility, only : flexibility_free, flexibility_make, flexibility_row, flexibility_t
    use emcon_friction_limit, only : friction_limit_find
    use emcon_interactions, only : formulation_mortar, formulation_nts
@@ -45,7 +45,8 @@ contains
          test_case_t("surfaces without mass keep energy and momenta", test_massless), &
          test_case_t("penalties store what they take", test_penalty), &
          test_case_t("dashpots between surfaces take energy, not momentum", test_dashpots), &
-         test_case_t("a body that contact alone holds", test_held)]
+         test_case_t("a body that contact alone holds", test_held), &
+         test_case_t("a body that a load takes away", test_taken)]
    end subroutine collect_march_contact
 
    !> The upper block, nodes 11 to 16, falls with a velocity of 1, aslant by `slide`.
@@ -401,5 +402,37 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_held
+
+   !> Nothing holds it upwards: no smaller increment does, and none is tried.
+   subroutine test_taken(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: stopped
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(load_t) :: load
+      integer :: i
+
+      call make_two_blocks(scene, 0.05_wp, lower, upper)
+      call add_step(scene, .true., 0.25_wp, 4)
+      call clamp(scene%step(1), [(i, i = 1, 5)])
+      do i = 11, 16
+         call prescribe(scene%step(1), i, 1, 0.0_wp)
+      end do
+      load%kind = load_point
+      load%target = 15
+      load%place = 2
+      load%value = 1.0_wp
+      call add_load(scene%step(1), load)
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      if (allocated(error)) return
+      call march_increment(march, scene, increment, stopped)
+      call check_error(error, stopped, err_analysis, &
+         "the analysis stops at time 0: nothing holds what moves without resistance", "stopped")
+      call check_equal(error, increment%n_cut, 0, "cuts")
+      call march_free(march)
+   end subroutine test_taken
 
 end module test_march_contact

@@ -111,7 +111,7 @@ contains
       type(march_t) :: march
       type(increment_t) :: increment
       real(wp) :: before(3, 2), now(3, 2), first(3, 2), total
-      integer :: k, n_pushed
+      integer :: i, k, n_pushed
 
       call march_init(march, scene, error)
       if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
@@ -141,6 +141,10 @@ contains
             if (.not. scene%step(1)%scheme%is_explicit) call check_near(error, ledger%total &
                - ledger%contact_work + ledger%friction, total, tol, total, "energy, " // what)
          end associate
+         do i = 1, increment%notes%n
+            call check_true(error, index(increment%notes%item(i)%text, "saddle point") == 0, &
+               "by the null space, " // what)
+         end do
          if (allocated(error)) return
          if (norm2(now(:2, 2) - before(:2, 2)) > 1.0e-3_wp) n_pushed = n_pushed + 1
          before = now

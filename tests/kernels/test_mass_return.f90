@@ -11,6 +11,7 @@ module test_mass_return
    use emcon_scene, only : scene_t
    use emcon_steps, only : initiation_massless
    use emcon_system, only : mass_times
+   use emcon_term_registry, only : terms_massless
    use emcon_text, only : to_text
    use small_scenes, only : add_step, block_t, make_two_blocks
    implicit none
@@ -103,7 +104,7 @@ contains
       type(increment_t) :: increment
       type(ledger_t) :: start
       real(wp), dimension(2, n_node) :: field, product
-      logical :: is_back(n_node)
+      logical, dimension(n_node) :: is_back, is_massless, is_bare
       integer :: k
 
       call begin(scene, march, error)
@@ -122,6 +123,9 @@ contains
       if (allocated(error)) return
       call check_true(error, .not. any(march%layer%is_massless(11:12)) .and. &
          march%layer%is_massless(13), "two have it again")
+      call terms_massless(march%system%term, is_massless, is_bare)
+      call check_true(error, all(is_massless .eqv. march%layer%is_massless) .and. .not. &
+         any(is_bare), "the model says the same")
       call check_near(error, march%state%v(:, 11:12), reshape([0.5_wp, -1.0_wp, 0.5_wp, -1.0_wp], &
          [2, 2]), tol, 1.0_wp, "velocities")
       field(1, :) = 1.0_wp
