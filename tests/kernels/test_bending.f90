@@ -182,6 +182,13 @@ contains
       call check_equal(error, bending%element, [0, 1], "elements")
       call check_near(error, [bending%strain, bending%missed], [0.0_wp, alone%strain(1), 0.0_wp, &
          alone%missed(1)], tol, alone%strain(1), "of the second body")
+      body(:2) = 1
+      call bending_measure(bending, solid, body, scene%x, u, .false.)
+      call check_equal(error, bending%element, [1, 3], "first elements of both")
+      call check_near(error, bending%strain, [2.0_wp, 3.0_wp]/n*alone%strain(1), tol, &
+         alone%strain(1), "two elements and three")
+      call check_near(error, bending%missed, [2.0_wp, 3.0_wp]/n*alone%missed(1), tol, &
+         alone%missed(1), "and what they miss")
       body = 0
       call bending_measure(bending, solid, body, scene%x, u, .false.)
       call check_equal(error, size(bending%strain), 0, "of none")

@@ -52,6 +52,7 @@ contains
          test_case_t("closed contacts are met in a step", test_met), &
          test_case_t("the element that ends the run is named", test_squeezed), &
          test_case_t("central differences in a well, in closed form", test_well), &
+         test_case_t("nothing that vibrates", test_loose), &
          test_case_t("round a centre: what a potential stores is no growth", test_centre), &
          test_case_t("a force that begins at rest, on nodes that are linked", test_linked), &
          test_case_t("what has no mass is told", test_refused)]
@@ -406,6 +407,25 @@ contains
       end do
       call stepper_close(stepper)
    end subroutine test_well
+
+   !> Without a force there is no critical step.
+   subroutine test_loose(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(stepper_t) :: stepper
+      type(well_t) :: well
+      real(wp) :: limit
+
+      well%k = 0.0_wp
+      well%n_variable = 2
+      call open_well(stepper, well, 0.5_wp, 0.3_wp, 20, error)
+      if (allocated(error)) return
+      limit = 7.0_wp
+      call critical_sharp(stepper%march%system, stepper%march%explicit%place, [0.0_wp], limit, error)
+      if (allocated(error)) return
+      call check_near(error, [limit, stepper%march%state%explicit%critical_h]/huge(limit), [1.0_wp, &
+         1.0_wp], 0.0_wp, 1.0_wp, "as large as can be")
+      call stepper_close(stepper)
+   end subroutine test_loose
 
    !> On a circle a potential -k/r has twice the kinetic energy, below 0; the momentum about the
    !> centre stays, as all forces point there.

@@ -30,6 +30,7 @@ contains
          test_case_t("inversion is cut", test_inversion), &
          test_case_t("last increment ends at the duration", test_remainder), &
          test_case_t("automatic increments grow on the grid", test_growth), &
+         test_case_t("automatic increments shrink after a cut", test_shrink), &
          test_case_t("increments used up", test_used_up), &
          test_case_t("smallest increment fails", test_failure), &
          test_case_t("inverted at the start", test_inverted_start), &
@@ -248,6 +249,50 @@ contains
       call check_near(error, march%state%u(1, 3), 0.2_wp, 4.0_wp*eps, 1.0_wp, "driven node")
       call march_free(march)
    end subroutine test_growth
+
+   !> Few iterations are allowed: what is too long is cut. Twice as long after five that were not, half
+   !> as long after one that was.
+   subroutine test_shrink(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(march_t) :: march
+      type(increment_t) :: increment
+      integer :: stride, n_easy, n_shrunk, done
+
+      call make_block(scene, "CPE4", [1, 1], block)
+      call add_step(scene, .true., 0.01_wp, 100)
+      scene%step(1)%time%is_direct = .false.
+      scene%step(1)%solution%newton_maximum = 3
+      call clamp(scene%step(1), [1, 2])
+      call prescribe(scene%step(1), 3, 1, 3.0_wp)
+      call begin(scene, march, error)
+      if (allocated(error)) return
+      stride = 1
+      n_easy = 0
+      n_shrunk = 0
+      done = 0
+      do while (.not. march_is_done(march))
+         stride = min(stride, 100 - done)
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         call check_near(error, increment%h, 0.01_wp*stride, 64.0_wp*eps, 1.0_wp, "after " &
+            // to_text(done))
+         if (allocated(error)) return
+         done = done + stride
+         n_easy = n_easy + 1
+         if (increment%n_cut > 0) then
+            n_easy = 0
+            if (stride > 1) n_shrunk = n_shrunk + 1
+            stride = max(1, stride/2)
+         else if (n_easy == 5 .and. 2*stride <= march%grid%most_stride) then
+            stride = 2*stride
+            n_easy = 0
+         end if
+      end do
+      call check_true(error, n_shrunk > 1, "some were too long")
+      call march_free(march)
+   end subroutine test_shrink
 
    subroutine test_used_up(error)
       type(error_t), allocatable, intent(out) :: error

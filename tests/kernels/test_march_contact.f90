@@ -292,6 +292,10 @@ contains
                call march_increment(march, scene, increment, error)
                if (allocated(error)) return
                most = max(most, march%ledger%contact_energy)
+               associate (contacts => march%state%contacts)
+                  if (method == method_penalty) call check_true(error, all(contacts%is_active &
+                     .eqv. contacts%closure < 0.0_wp), "what stores acts")
+               end associate
                push = sum(march%state%contact(2, 11:))
                if (method == method_augmented_lagrange) left = left &
                   + push*scene%step(1)%contact%penalty%tolerance
