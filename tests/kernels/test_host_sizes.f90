@@ -62,6 +62,11 @@ contains
       if (allocated(error)) return
       call shake(u0, 1.0_wp)
       call shake(du, 0.5_wp)
+      ! To either side, farther than before.
+      u0(:, 1) = -0.5_wp
+      du(:, 1) = -0.25_wp
+      u0(:, 3) = 0.5_wp
+      du(:, 3) = 0.25_wp
       motion = motion_of(evaluation_t(), scene%x, u0, du)
       call response_init(response, 2, n, 0)
    end subroutine begin
