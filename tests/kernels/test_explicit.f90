@@ -420,10 +420,11 @@ contains
       call open_well(stepper, well, 0.5_wp, 0.3_wp, 20, error)
       if (allocated(error)) return
       limit = 7.0_wp
-      call critical_sharp(stepper%march%system, stepper%march%explicit%place, [0.0_wp], limit, error)
+      call critical_sharp(stepper%march%system, stepper%march%explicit%place, [0.0_wp], limit, &
+         error)
       if (allocated(error)) return
-      call check_near(error, [limit, stepper%march%state%explicit%critical_h]/huge(limit), [1.0_wp, &
-         1.0_wp], 0.0_wp, 1.0_wp, "as large as can be")
+      call check_near(error, [limit, stepper%march%state%explicit%critical_h]/huge(limit), &
+         [1.0_wp, 1.0_wp], 0.0_wp, 1.0_wp, "as large as can be")
       call stepper_close(stepper)
    end subroutine test_loose
 

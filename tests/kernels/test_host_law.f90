@@ -666,8 +666,8 @@ contains
       call stepper_give_law(stepper, "Rubber", elastic_of(law_linear), error)
       if (allocated(error)) return
       call stepper_build(stepper, refused)
-      call check_error(error, refused, err_input, "element 1 has incompatible modes, for which " // &
-         "the law given for material RUBBER tells no moduli; take CPE4 or CPE8", "modes")
+      call check_error(error, refused, err_input, "element 1 has incompatible modes, for " // &
+         "which the law given for material RUBBER tells no moduli; take CPE4 or CPE8", "modes")
       call stepper_close(stepper)
    end subroutine test_modes
 

@@ -250,8 +250,8 @@ contains
       call march_free(march)
    end subroutine test_growth
 
-   !> Few iterations are allowed: what is too long is cut. Twice as long after five that were not, half
-   !> as long after one that was.
+   !> Few iterations are allowed: what is too long is cut. Twice as long after five that were not,
+   !> half as long after one that was.
    subroutine test_shrink(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
