@@ -9,9 +9,11 @@ module emcon_contact_newton
    use emcon_condensation, only : condensation_free, condensation_make, condensation_t
    use emcon_constraint, only : condition_rate
    use emcon_constraint_rows, only : constraints_rows
-   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_take_hold
+   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_rounding, &
+      constraints_take_hold
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
-      contact_problem_force, contact_problem_solve, contact_problem_status, contact_problem_stiffness, contact_problem_t
+      contact_problem_force, contact_problem_solve, contact_problem_status, &
+      contact_problem_stiffness, contact_problem_t
    use emcon_convergence, only : convergence_begin, most_rounding, round_off
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
       contact_trial_t, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
@@ -220,7 +222,7 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! refused: there are no forces
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: defect, missed
+      real(wp) :: defect, rounded, missed
       integer :: left
 
       status = newton_refused
@@ -236,28 +238,30 @@ contains
       call constraints_rows(set, system%space%numbering)
       call phase_leave(system%phases, left)
       call newton_pick_residual(newton, system, set)
-      call newton_measure_forces(newton, system, set)
-      call find_defect(self, set, defect)
+      call newton_measure_forces(newton, system, set, motion)
+      call find_defect(self, set, motion, defect, rounded)
       call find_missed(self, system, set, missed)
       self%size = max(relative_size(newton%residual, newton%forces), defect, missed)
       self%is_rounding = relative_size(newton%residual, newton%rounding) <= round_off &
-         .and. defect <= round_off .and. missed <= newton%convergence%tolerance
+         .and. rounded <= round_off .and. missed <= newton%convergence%tolerance
       newton%is_idle = self%is_rounding .and. .not. newton_has_load(system)
       if (.not. newton%is_idle) self%is_rounding = self%is_rounding .and. &
          self%size <= most_rounding
    end subroutine measure
 
    !> What rows that are to hold are off by at worst, and by how much those are closed that are not,
-   !> over edges.
-   subroutine find_defect(self, set, defect)
+   !> over edges and over what they are computed from.
+   subroutine find_defect(self, set, motion, defect, rounded)
       type(solve_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
-      real(wp), intent(out) :: defect
+      type(motion_t), intent(in) :: motion       !! evaluated
+      real(wp), intent(out) :: defect, rounded
       type(slip_status_t) :: status
       real(wp) :: off
       integer :: k
 
       defect = 0.0_wp
+      rounded = 0.0_wp
       do k = 1, set%n_row
          off = abs(set%defect(k))
          associate (condition => set%condition(k), slip => set%slip(k))
@@ -270,6 +274,7 @@ contains
                   contact_slides])) off = 0.0_wp
             end if
             defect = max(defect, off/set%item(condition)%size)
+            rounded = max(rounded, off/constraints_rounding(set, motion, k))
          end associate
       end do
    end subroutine find_defect

@@ -335,7 +335,7 @@ contains
       if (allocated(error)) return
       call constraints_evaluate(self%set, system, motion, .true.)
       if (self%set%n_condition > 0) call constraints_rows(self%set, system%space%numbering)
-      call newton_measure_forces(newton, system, self%set)
+      call newton_measure_forces(newton, system, self%set, motion)
       newton%correction%fell_back = .false.
    end subroutine finish
 

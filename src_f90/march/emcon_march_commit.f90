@@ -323,13 +323,15 @@ contains
    end subroutine restore_energy
 
    !> Tell of what moves with nothing to hold it, and of what was brought into contact without load.
-   !> The stiffness of STABILIZE is in the tangent alone: it bears what the balance leaves over.
+   !> The stiffness of STABILIZE is in the tangent of loose bodies alone: it bears what the balance
+   !> leaves over there.
    subroutine book_stabilization(self, increment)
       type(march_t), intent(inout) :: self
       type(increment_t), intent(inout) :: increment
       integer :: i, a
 
-      associate (support => self%active%support, system => self%system)
+      associate (support => self%active%support, system => self%system, &
+            body => self%system%space%body)
          if (.not. support%is_needed) return
          if (any(support%brought > 0.0_wp .and. self%active%is_active)) call note_add( &
             increment%warnings, support%brought_text // ", on which no load does work: moved " // &
@@ -338,6 +340,8 @@ contains
          if (.not. allocated(support%text)) return
          call tell_stabilized(self%active%support, increment)
          do i = 1, size(self%motion%du, 2)
+            if (body(i) == 0) cycle
+            if (.not. support%is_loose(body(i))) cycle
             do a = 1, size(self%motion%du, 1)
                if (system%space%numbering%unknown(a, i) == 0) cycle
                self%ledger%stabilization = self%ledger%stabilization &

@@ -72,6 +72,9 @@ contains
          end if
       end if
       line = line // "all residuals are within the tolerance"
+      if (self%unconverged > 0.0_wp) line = line // ", or round-off (" &
+         // to_text(self%unconverged, 3) // " of the forces at time " &
+         // to_text(self%unconverged_time, 9) // ")"
    end subroutine good_line
 
    !> Are there bodies that no pair brings together, and that overlapped as a step began?

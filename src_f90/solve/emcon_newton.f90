@@ -7,7 +7,8 @@ module emcon_newton
    use emcon_constraint, only : condition_rate
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_set_t, constraints_add_law_forces, &
-      constraints_add_row_forces, constraints_evaluate, constraints_force, constraints_take_hold
+      constraints_add_rounding, constraints_add_row_forces, constraints_evaluate, &
+      constraints_force, constraints_rounding, constraints_take_hold
    use emcon_convergence, only : convergence_begin, convergence_init, convergence_judge, &
       convergence_nears_end, convergence_t, most_rounding, next_done, next_give_up, next_tangent, &
       round_off
@@ -161,7 +162,7 @@ contains
             if (self%n_solve == 0) return        ! Newton's method finds no forces there either
             exit
          end if
-         call measure(self, system, set, norm, defect, is_rounding)
+         call measure(self, system, set, motion, norm, defect, is_rounding)
          if (self%correction%n_redundant > 0) status = newton_redundant
          if (status /= newton_converged) return
          call make_factor(self, system, set, motion, is_fit, error)
@@ -254,7 +255,7 @@ contains
          has_tangent = is_driven .or. .not. convergence_nears_end(self%convergence)
          call evaluate_damped(self, system, set, motion, has_tangent, status, error)
          if (.not. allocated(error) .and. status == newton_converged) call measure(self, system, &
-            set, norm, defect, is_rounding)
+            set, motion, norm, defect, is_rounding)
          if (self%correction%n_redundant > 0 .and. status == newton_converged) then
             status = newton_redundant
             if (is_driven) motion%du = motion%du + self%driven
@@ -490,10 +491,11 @@ contains
 
    !> Residual with contact forces, its size relative to its contributions, and the largest gap
    !> defect relative to the edge.
-   subroutine measure(self, system, set, norm, defect, is_rounding)
+   subroutine measure(self, system, set, motion, norm, defect, is_rounding)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(inout) :: set
+      type(motion_t), intent(in) :: motion       !! they are of
       real(wp), intent(out) :: norm, defect
       logical, intent(out) :: is_rounding        !! nothing but round-off is left
       integer :: k, left
@@ -503,14 +505,15 @@ contains
       call correction_multipliers(self%correction, system, set, self%residual)
       call constraints_take_hold(set)
       call phase_leave(system%phases, left)
-      call newton_measure_forces(self, system, set)
+      call newton_measure_forces(self, system, set, motion)
       norm = relative_size(self%residual, self%forces)
+      is_rounding = relative_size(self%residual, self%rounding) <= round_off
       defect = 0.0_wp
       do k = 1, set%n_row
          defect = max(defect, abs(set%defect(k))/set%item(set%condition(k))%size)
+         if (is_rounding) is_rounding = abs(set%defect(k)) &
+            <= round_off*constraints_rounding(set, motion, k)
       end do
-      is_rounding = relative_size(self%residual, self%rounding) <= round_off &
-         .and. defect <= round_off
       if (set%penalty%is_under_way) call measure_lack(self, system, set, norm, is_rounding)
       ! A body that moves as a rigid one has no forces to compare its round-off with.
       self%is_idle = is_rounding .and. .not. newton_has_load(system)
@@ -519,13 +522,15 @@ contains
 
    !> The residual with the forces of the set as they are, and what it is to be measured by where
    !> the sizes of forces are known.
-   subroutine newton_measure_forces(self, system, set)
+   subroutine newton_measure_forces(self, system, set, motion)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(inout) :: system    !! it has responded
       type(constraint_set_t), intent(in) :: set  !! evaluated
+      type(motion_t), intent(in) :: motion       !! they are of
 
       if (system%response%with_sizes) then
          call constraints_force(set, 1, self%contact, system%response%magnitude)
+         call constraints_add_rounding(set, motion, system%response%rounding)
          call take_sizes(self, system)
       else
          call constraints_force(set, 1, self%contact)

@@ -20,7 +20,7 @@ module emcon_constraints
    public :: constraints_stick, constraints_take_hold, constraints_gives_back
    public :: constraints_add_law_forces, constraints_add_row_forces, constraints_lam, &
       constraints_dissipated
-   public :: constraint_index
+   public :: constraint_index, constraints_rounding, constraints_add_rounding
 
    !> Of the rows of gaps that do not hold: laws give their multipliers.
    type :: soft_rows_t
@@ -317,6 +317,44 @@ contains
          call add_force(self%item(k), lam(k), condition_friction(self%item(k), lam(k)), force)
       end do
    end subroutine constraints_add_row_forces
+
+   !> What row `k` is computed from, over the motion that was evaluated: epsilon times this is
+   !> round-off of what it lacks, docs/theory.md, eq. (26a).
+   pure real(wp) function constraints_rounding(self, motion, k) result(terms)
+      type(constraint_set_t), intent(in) :: self
+      type(motion_t), intent(in) :: motion
+      integer, intent(in) :: k                   !! 1..n_row
+      integer :: i
+
+      associate (item => self%item(self%condition(k)), s => self%slip(k))
+         terms = item%size
+         do i = 1, item%n_node
+            associate (moved => motion%computed(:, item%node(i)))
+               if (s == 0) terms = terms + dot_product(abs(item%c(:, i)), moved)
+               if (s > 0) terms = terms + dot_product(abs(item%t1(:, i, s)), moved)
+            end associate
+         end do
+      end associate
+   end function constraints_rounding
+
+   !> Add what the forces of laws in place of rows are rounded by.
+   pure subroutine constraints_add_rounding(self, motion, rounding)
+      type(constraint_set_t), intent(in) :: self
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(inout), contiguous :: rounding(:, :)              !! (n_dim, n_node)
+      real(wp) :: push
+      integer :: i, k
+
+      do k = 1, self%n
+         if (.not. self%penalty%slope(k) > 0.0_wp) cycle
+         push = self%penalty%slope(k)*constraints_rounding(self, motion, k)
+         associate (item => self%item(k))
+            do i = 1, item%n_node
+               rounding(:, item%node(i)) = rounding(:, item%node(i)) + push*abs(item%g(:, i))
+            end do
+         end associate
+      end do
+   end subroutine constraints_add_rounding
 
    !> The multiplier of the row that condition `k` has of its gap; 0 if there is none.
    pure real(wp) function constraints_lam(self, k) result(lam)

@@ -1,7 +1,7 @@
 !> Newton's method: order of convergence with and without contact, damping, and how it fails.
 module test_newton
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_constraints, only : constraint_set_t, constraints_select
+   use emcon_constraints, only : constraint_set_t, constraints_rounding, constraints_select
    use emcon_correction, only : correction_free, correction_reset, correction_t
    use emcon_errors, only : error_t
    use emcon_evaluation, only : instant_t
@@ -17,7 +17,7 @@ module test_newton
    use emcon_term, only : role_internal
    use emcon_text, only : to_text
    use small_scenes, only : add_load, add_step, block_t, clamp, make_block, make_two_blocks, &
-      shake, young
+      poisson, prescribe, shake, young
    implicit none
    private
    public :: collect_newton
@@ -44,6 +44,7 @@ contains
       tests = [ &
          test_case_t("quadratic convergence of a large step", test_order), &
          test_case_t("quadratic convergence in contact", test_order_in_contact), &
+         test_case_t("round-off of what is stiff and moves far", test_floor), &
          test_case_t("nothing to solve for", test_no_unknowns), &
          test_case_t("a step from rest to rest", test_rest), &
          test_case_t("too few iterations", test_diverged), &
@@ -166,6 +167,64 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_order_in_contact
+
+   !> A soft block under one that is a million times stiffer, all moved by a long way: forces of the
+   !> stiff one and gaps are rounded by it to more than Newton's tolerance, and that is the end.
+   subroutine test_floor(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: ratio = 1.0e6_wp, press = 0.01_wp
+      !> Forces of the stiff block are rounded by this part of those of the soft one.
+      real(wp), parameter :: part = 1.0e-6_wp, far = part*press/(ratio*epsilon(1.0_wp))
+      real(wp) :: lam(3), found(3)
+
+      call press_block(0.0_wp, lam, error)
+      if (.not. allocated(error)) call press_block(far, found, error)
+      if (.not. allocated(error)) call check_near(error, found, lam, 4.0_wp*part + round_off, &
+         maxval(lam), "contact forces")
+
+   contains
+
+      !> Press after a way of `way` along both axes.
+      subroutine press_block(way, lam, error)
+         real(wp), intent(in) :: way
+         real(wp), intent(out) :: lam(3)
+         type(error_t), allocatable, intent(out) :: error
+         type(scene_t) :: scene
+         type(block_t) :: lower, upper
+         type(trial_t) :: trial
+         integer :: i
+
+         call make_two_blocks(scene, 0.0_wp, lower, upper)
+         scene%material = [scene%material, scene%material]
+         scene%material(2)%constant = [ratio*young, poisson]
+         scene%section = [scene%section, scene%section]
+         scene%section(2)%material = 2
+         scene%element%section(upper%elements_before + 1:) = 2
+         call add_step(scene, .true., 1.0_wp, 1)
+         do i = 1, size(scene%x, 2)
+            if (i > 5 .and. i < 14) cycle        ! between the lowest and the topmost ones
+            call prescribe(scene%step(1), i, 1, way)
+            call prescribe(scene%step(1), i, 2, merge(way, way - press, i <= 5))
+         end do
+         call prepare(trial, scene, 0.0_wp, 20, method_null_space, error)
+         if (allocated(error)) return
+         call constraints_select(trial%set, [1, 2, 3])
+         trial%motion%du = way
+         trial%motion%du(2, 14:) = way - press
+         call trial%system%contact(1)%contact%begin_step(scene%x, trial%motion%u0, trial%motion%du)
+         call solve(trial, error)
+         if (allocated(error)) return
+         call check_equal(error, trial%status, newton_converged, "status at " // to_text(way))
+         lam = trial%set%lam
+         ! A gap is made of the edge and of the way of either side; what is pressed leans a little.
+         do i = 1, 3
+            call check_near(error, constraints_rounding(trial%set, trial%motion, i), &
+               trial%set%item(i)%size + 2.0_wp*way, 4.0_wp*press, 1.0_wp + way, "terms of a gap")
+         end do
+         call correction_free(trial%newton%correction)
+      end subroutine press_block
+
+   end subroutine test_floor
 
    subroutine test_no_unknowns(error)
       type(error_t), allocatable, intent(out) :: error

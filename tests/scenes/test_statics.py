@@ -195,6 +195,58 @@ A, GRAV, {gravity}, 0., -1.
     assert low < verdict["unconverged"] <= high
     assert "is accepted as round-off" in run.log
     assert ("BAD" in run.errors) == (word == "bad")
+    assert ("or round-off (" in run.log) == (word == "good")
+
+
+def between_plates(unit, force, kind, way):
+    """A block of rubber, E = 1, on a plate of 2e5 with another one above that comes down by `way`
+    and half of its height, in other units of length and force."""
+    lines, stress = [], force / unit**2
+    for k, (x, y, nx, ny) in enumerate(((0.0, 0.0, 4, 2), (-1.0, -0.5, 5, 1), (-1.0, 1.0 + way, 5, 1))):
+        first, width, height = 100 * k + 1, 2.0 if k == 0 else 4.0, 1.0 if k == 0 else 0.5
+        lines += ["*NODE"]
+        lines += [f"{first + j * (nx + 1) + i}, {unit * (x + width * i / nx)!r}, "
+                  f"{unit * (y + height * j / ny)!r}" for j in range(ny + 1) for i in range(nx + 1)]
+        lines += [f"*ELEMENT, TYPE=CPE4, ELSET=E{k}"]
+        for a in [first + j * (nx + 1) + i for j in range(ny) for i in range(nx)]:
+            lines += [f"{a}, {a}, {a + 1}, {a + nx + 2}, {a + nx + 1}"]
+        lines += [f"*SURFACE, NAME=LOW{k}"] + [f"{first + i}, S1" for i in range(nx)]
+        lines += [f"*SURFACE, NAME=TOP{k}"]
+        lines += [f"{first + (ny - 1) * (nx + 1) + i}, S3" for i in range(nx)]
+        lines += [f"*SOLID SECTION, ELSET=E{k}, MATERIAL=M{k}", f"{unit!r}", f"*MATERIAL, NAME=M{k}"]
+        lines += ["*ELASTIC", f"{(2e5 if k else 1.0) * stress!r}, {0.3 if k else 0.4}"]
+    held = "*NSET, NSET=FIX, GENERATE\n101, 106\n*NSET, NSET=HEAD, GENERATE\n207, 212\n"
+    return "\n".join(lines) + f"""
+{held}*SURFACE INTERACTION, NAME=I
+*FRICTION
+0.3
+*CONTACT PAIR, INTERACTION=I, TYPE={kind}
+LOW0, TOP1
+TOP0, LOW2
+*BOUNDARY
+FIX, 1, 2
+HEAD, 1, 1
+*STEP, NLGEOM
+*CONTACT CONTROLS, STABILIZE
+*STATIC
+0.1, 1., 1e-4, 0.2
+*BOUNDARY
+HEAD, 2, 2, {-unit * (way + 0.5)!r}
+*END STEP
+"""
+
+
+@pytest.mark.parametrize("kind", ["SURFACE TO SURFACE", "NODE TO SURFACE"])
+@pytest.mark.parametrize(("unit", "force"), [(1.0, 1.0), (1e-6, 1.0), (1e6, 1.0), (1.0, 1e6)])
+def test_rubber_between_plates_that_come_from_afar(tmp_path, unit, force, kind):
+    """Where they touch first the forces of the rubber are less than what the way of the plate,
+    thirty heights, rounds in its own; the force at the end is that of a plate that comes from near.
+    """
+    runs = [solve(tmp_path, between_plates(unit, force, kind, way)) for way in (1.0, 30.0)]
+    near, far = (run.history["strain"][-1] for run in runs)
+    assert far == pytest.approx(near, rel=1e-3)
+    assert runs[1].verdict["verdict"] == "good"
+    assert runs[1].verdict["cuts"] == 0
 
 
 @pytest.mark.parametrize(
