@@ -494,8 +494,8 @@ class Model(Source):
 
     def step(self, procedure: Literal["STATIC", "DYNAMIC"], h: Number = 1.0,
              duration: Number = 1.0, h_min: Number | None = None, h_max: Number | None = None, *,
-             direct: bool = False, explicit: bool = False, nlgeom: bool | None = None,
-             increments: int | str | None = None,
+             direct: bool = False, explicit: bool = False, stabilize: bool | Number = False,
+             nlgeom: bool | None = None, increments: int | str | None = None,
              amplitude: Literal["RAMP", "STEP"] | None = None, solver: str | None = None) -> Step:
         """`*STEP`: a further step, to which conditions, settings and output are added.
 
@@ -503,6 +503,8 @@ class Model(Source):
         h_min, h_max   bounds of the increment [T] where it is cut or grown
         direct         keep to h
         explicit       of dynamic steps: central differences, h below the critical step
+        stabilize      of static steps: viscous forces hold what snaps; a number: the part of the
+                       strain energy that they take from the first increment (2e-4)
         nlgeom         large displacements; stays on for later steps
         increments     most increments of the step; default no limit
         amplitude      RAMP in static steps, STEP in dynamic ones: what holds anyway
@@ -512,7 +514,7 @@ class Model(Source):
             "NLGEOM": "NO" if nlgeom is False else nlgeom, "INC": increments,
             "AMPLITUDE": amplitude}
         step = Step((self._nodes, self._elements), options, procedure,
-                    {"DIRECT": direct, "EXPLICIT": explicit, "SOLVER": solver},
+                    {"DIRECT": direct, "EXPLICIT": explicit, "STABILIZE": stabilize, "SOLVER": solver},
                     (h, duration, h_min, h_max))
         self._steps.append(step)
         return step

@@ -94,7 +94,8 @@ module emcon_deck_keywords
          // "!USER,!SUBMODEL"), &
       keyword_t("STEP", in_both, "NLGEOM?,INC=,AMPLITUDE=,~NAME,~UNSYMM:NO," &
          // "~EXTRAPOLATION,~CONVERTSDI,!PERTURBATION"), &
-      keyword_t("STATIC", in_step, "DIRECT,SOLVER=,!STABILIZE:0,!RIKS,!EXPLICIT"), &
+      keyword_t("STATIC", in_step, "DIRECT,SOLVER=,STABILIZE?,!FACTOR,!ALLSDTOL," &
+         // "!CONTINUE:NO,!RIKS,!EXPLICIT"), &
       keyword_t("DYNAMIC", in_step, "DIRECT,EXPLICIT,SOLVER=,!ALPHA:0,!APPLICATION,!INITIAL," &
          // "~NOHAF,~HAFTOL,~HALFINCSCALEFACTOR"), &
       keyword_t("CLOAD", in_step, "OP=,AMPLITUDE=,TIMEDELAY=,!LOADCASE:1,!USER,!FOLLOWER," &

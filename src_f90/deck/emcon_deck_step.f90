@@ -25,7 +25,7 @@ module emcon_deck_step
    use emcon_deck_scheme, only : check_schemes, read_scheme
    use emcon_deck_penalty, only : check_penalty, read_constraint_method
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
-      option_name, option_real, option_word, reader_t, refuse_option
+      option_name, option_number, option_real, option_word, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
@@ -43,6 +43,8 @@ module emcon_deck_step
 
    !> Increments of a step are counted in default integers, those that are cut too.
    real(wp), parameter :: most_increments = 0.5_wp*huge(1)
+   !> STABILIZE of *STATIC without a value, and at most.
+   real(wp), parameter :: default_stabilization = 2.0e-4_wp, most_stabilization = 0.1_wp
 
 contains
 
@@ -237,6 +239,7 @@ contains
       if (has_option(card, "EXPLICIT")) step%scheme = scheme_row(card%name, "CENTRALDIFFERENCE")
       step%time%is_direct = has_option(card, "DIRECT")
       call read_solver(reader, card, step)
+      call read_stabilize(reader, card, step)
       value = [1.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]
       call data_open(data, card)
       if (.not. next_line(reader, data)) return
@@ -283,6 +286,20 @@ contains
          step%solution%solver = row%code
       end if
    end subroutine read_solver
+
+   !> STABILIZE of *STATIC: viscous stress, by the part of the strain energy that it takes from the
+   !> first increment; 0: none.
+   subroutine read_stabilize(reader, card, step)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(step_t), intent(inout) :: step
+
+      if (.not. has_option(card, "STABILIZE")) return
+      step%stabilization = default_stabilization
+      if (option_name(card, "STABILIZE") == "") return
+      call option_number(reader, card, "STABILIZE", "a part of the strain energy, from 0 to 0.1", &
+         0.0_wp, most_stabilization, step%stabilization)
+   end subroutine read_stabilize
 
    subroutine check_times(reader, data, value)
       type(reader_t), intent(inout) :: reader

@@ -28,7 +28,7 @@ module emcon_march_commit
    use emcon_stand_off, only : stand_off_add
    use emcon_steps, only : initiation_velocity_update, step_initiation
    use emcon_term, only : role_external, role_inertia, role_internal
-   use emcon_term_registry, only : terms_dissipation
+   use emcon_term_registry, only : terms_dissipation, terms_stabilization
    use emcon_text, only : note_add, notes_t, to_text
    use emcon_rigid_rotation, only : rigid_rotation_measure
    use emcon_velocity_jumps, only : jumps_add, jumps_begin, jumps_join, jumps_scale
@@ -371,11 +371,12 @@ contains
    !> taken as linear over the step.
    subroutine book_work(self)
       type(march_t), intent(inout) :: self
-      real(wp) :: contact_work, decay, damped, damping, friction, energy
+      real(wp) :: contact_work, decay, damped, damping, friction, energy, viscous
       integer :: k
 
       associate (state => self%state, part => self%system%response%part, &
             set => self%active%set, motion => self%motion)
+         call terms_stabilization(self%system%term, viscous)
          contact_work = 0.0_wp
          friction = 0.0_wp
          damped = 0.0_wp
@@ -399,8 +400,8 @@ contains
                + sum(part(role_inertia)%force*motion%offset)
          else
             contact_work = 0.5_wp*sum((state%contact + self%newton%contact)*motion%du)
-            self%ledger%external_work = self%ledger%external_work - contact_work &
-               + 0.5_wp*sum((state%internal + part(role_internal)%force)*motion%du)
+            self%ledger%external_work = self%ledger%external_work - contact_work + viscous &
+               + 0.5_wp*sum((state%internal + self%end_state%force)*motion%du)
             contact_work = contact_work + friction
          end if
          self%ledger%friction = self%ledger%friction + friction
@@ -413,7 +414,7 @@ contains
          self%ledger%contact_energy = energy
          call terms_dissipation(self%system%term, decay, damping)
          self%ledger%decay = self%ledger%decay + decay
-         self%ledger%damping = self%ledger%damping + damping
+         self%ledger%damping = self%ledger%damping + damping + viscous
       end associate
    end subroutine book_work
 

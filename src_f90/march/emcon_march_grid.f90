@@ -12,6 +12,8 @@ module emcon_march_grid
 
    !> An increment is halved so often at most, unless the deck gives h_min.
    integer, parameter :: default_levels = 12, most_levels = 24
+   !> With STABILIZE down to 2/`finest` of the time of its stress.
+   real(wp), parameter :: finest = 16.0_wp
    !> So often for its error.
    integer, parameter :: error_levels = 6
    !> Increments without a cut after which an automatic increment is doubled.
@@ -43,6 +45,9 @@ contains
       if (step%time%h_min > 0.0_wp) then
          self%grid%n_level = max(0, min(most_levels, exponent(step%time%h/step%time%h_min) - 1))
       end if
+      ! What viscous stress holds on its way moves in its time, not in that of the load.
+      if (step%stabilization > 0.0_wp) self%grid%n_level = max(self%grid%n_level, &
+         min(most_levels, exponent(finest/step%stabilization)))
       call count_units(self, step)
    end subroutine march_count_grid
 

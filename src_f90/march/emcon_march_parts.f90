@@ -306,6 +306,9 @@ contains
          text = "bodies would overlap where no contact acts"
       case (step_rough)
          text = "the error is " // to_text(self%step_check%ratio, 3) // " times TOLERANCE"
+         if (.not. evaluation_has_inertia(self%motion%evaluation)) text = "it snaps: work and " // &
+            "energy of the elements differ by " // to_text(100.0_wp*self%step_check%ratio, 2) // &
+            " % of what they store"
       case (step_strikes)
          text = "contact begins or ends: the error is " // to_text(self%step_check%ratio, 3) // &
             " times TOLERANCE"
@@ -332,10 +335,16 @@ contains
          call free_motion_text(self%system, scene, &
             scene%step(self%state%clock%i_step)%prescribed, motion, with_contact=.true., &
             u=self%state%u)
-         if (len(motion) == 0) return
-         call holders_text(self%system, size(scene%x, 2), holders)
-         text = text // "; without " // holders // " " // motion
+         if (len(motion) > 0) then
+            call holders_text(self%system, size(scene%x, 2), holders)
+            text = text // "; without " // holders // " " // motion
+         end if
       end if
+      if (evaluation_has_inertia(self%motion%evaluation) &
+         .or. .not. sum(self%state%energy) > 0.0_wp) return
+      if (scene%step(self%state%clock%i_step)%stabilization > 0.0_wp) return
+      text = text // "; no state of rest was found beyond this time: if a body snaps through or " &
+         // "slips off there, none follows, and *STATIC, STABILIZE goes on to the next one"
    end subroutine failure_text
 
    !> What may hold bodies beside the conditions of the deck: "contact and given forces".

@@ -19,6 +19,7 @@ module emcon_march_step
    use emcon_march_events, only : events_judge, events_look
    use emcon_march_guess, only : march_guess
    use emcon_march_past, only : march_past_begin
+   use emcon_march_snap, only : snap_judge
    use emcon_march_types, only : step_check_begin, increment_t, march_t, part_t
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_layer, only : layer_settle
@@ -230,6 +231,7 @@ contains
          end_state%potential = system%response%potential
          if (is_elsewhere) call system_respond(system, motion, .false.)
       end associate
+      call snap_judge(self, scene, part, status)
    end subroutine find_ending
 
    !> The part of the overclosure at the start of the step that is left at `step_time`.

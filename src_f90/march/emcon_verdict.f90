@@ -16,6 +16,7 @@ module emcon_verdict
    use emcon_ledger, only : ledger_t
    use emcon_overlap_query, only : overlap_text
    use emcon_march, only : increment_t, march_is_done, march_t
+   use emcon_march_snap, only : snap_left
    use emcon_nodal_pull, only : nodal_pull_join, nodal_pull_t
    use emcon_scene, only : scene_t
    use emcon_small_range, only : small_limit, small_range_init, small_range_t, small_range_widen
@@ -32,6 +33,8 @@ module emcon_verdict
    !> Largest relative residual that is accepted where rounding ends Newton's method early: half of
    !> the digits are left.
    real(wp), parameter :: half_digits = sqrt(epsilon(1.0_wp))
+   !> Part of the forces that STABILIZE may bear at the end of a step.
+   real(wp), parameter :: most_viscous = 1.0e-3_wp
    !> So far in each other, per edge, bodies make the run a failure.
    real(wp), parameter :: far_behind = 0.1_wp
    !> What contact gives way by is told; so many times that is deeper, whichever edge counts.
@@ -199,8 +202,25 @@ contains
          increment%work_scale)
       if (.not. march_is_done(march)) return
       call follow_bending(self, scene, march)
+      call warn_of_snap(self, scene, march)
       call warn_of_distance(self, march, terms_solid(march%system%term))
    end subroutine verdict_update
+
+   !> What STABILIZE holds on its way at the end of a step is not at rest there.
+   subroutine warn_of_snap(self, scene, march)
+      type(verdict_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(in) :: march
+      real(wp) :: left
+
+      if (.not. scene%step(march%state%clock%i_step)%stabilization > 0.0_wp) return
+      left = snap_left(march)
+      if (left > most_viscous) call add_warning(self, "at the end of step " // &
+         to_text(march%state%clock%i_step) // " STABILIZE bears " // to_text(left, 2) // &
+         " of the forces: a body is on its way there; let the step last longer, or give a " // &
+         "smaller part than STABILIZE=" // &
+         to_text(scene%step(march%state%clock%i_step)%stabilization, 2))
+   end subroutine warn_of_snap
 
    !> A body that is bent at the end of a step though its elements are too stiff for it.
    subroutine follow_bending(self, scene, march)

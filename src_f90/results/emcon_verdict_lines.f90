@@ -162,7 +162,7 @@ contains
          "took " // to_text(ledger%restitution, 9) // ", part of contact work")
       if (abs(ledger%decay) > 0.0_wp) call note_add(lines, "SCHEME=ENERGY DECAYING took " // &
          to_text(ledger%decay, 9))
-      if (abs(ledger%damping) > 0.0_wp) call note_add(lines, "material damping took " // &
+      if (abs(ledger%damping) > 0.0_wp) call note_add(lines, "damping took " // &
          to_text(ledger%damping, 9))
       if (abs(ledger%friction) > 0.0_wp) call note_add(lines, "friction took " // &
          to_text(ledger%friction, 9) // "; friction law satisfied to " // &

@@ -131,6 +131,8 @@ module emcon_steps
       type(scheme_choice_t) :: choice                !! by *TIME INTEGRATION
       logical :: nlgeom = .false.
       logical :: stabilizes = .false.                !! statics: what no load works on may be free
+      !> Statics: part of its strain energy that viscous stress takes from the first increment
+      real(wp) :: stabilization = 0.0_wp
       type(step_time_t) :: time
       type(step_solution_t) :: solution
       type(step_contact_t) :: contact

@@ -27,7 +27,7 @@ module emcon_evaluation
    type :: evaluation_t
       real(wp) :: mass_scale = 0.0_wp            !! s [1/T]; 0: no inertia
       real(wp) :: rate = 0.0_wp                  !! b [1/T]
-      real(wp) :: lapse = 0.0_wp                 !! 1/b, as the scheme rounds it [T]
+      real(wp) :: lapse = 0.0_wp                 !! 1/b, as the scheme rounds it; statics: h [T]
       real(wp) :: v_weight = 0.0_wp              !! w
       real(wp) :: at = 1.0_wp                    !! part of the way from start to end: 0 < . <= 1
       logical :: is_gradient = .false.           !! at `place`, else discrete from the start to it

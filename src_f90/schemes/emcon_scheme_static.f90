@@ -23,6 +23,7 @@ contains
 
       evaluation = evaluation_at_end
       evaluation%v_weight = 1.0_wp
+      evaluation%lapse = h
       evaluation%load_instant = instant_later(start, h)
    end function static_pose
 

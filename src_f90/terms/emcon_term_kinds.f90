@@ -10,6 +10,8 @@ submodule (emcon_term_registry) emcon_term_kinds
    use emcon_materials, only : kinematics_corotated, kinematics_linear
    use emcon_massless, only : massless_bare, massless_find, massless_return, massless_shed
    use emcon_solid_term, only : solid_term_init, solid_term_t
+   use emcon_stabilization, only : stabilization_force, stabilization_term_init, &
+      stabilization_term_t
    implicit none
 
    !> Where the terms that every model has stand; what is given comes after them.
@@ -21,6 +23,7 @@ contains
       integer :: n, i, first
       logical :: has_linear, turns               ! there are linear elements, corotated ones
       logical :: decays                          ! elements take energy
+      logical :: stabilizes                      ! a static step is damped
 
       n = 0
       if (present(host)) then
@@ -30,14 +33,17 @@ contains
       turns = any(scene%section(scene%element%section)%kinematics == kinematics_corotated)
       decays = any(scene%step%scheme%dissipates) .or. any(scene%material%alpha > 0.0_wp .or. &
          scene%material%beta > 0.0_wp)
-      first = n_own + count([has_linear, turns, decays])
+      stabilizes = any(scene%step%stabilization > 0.0_wp)
+      first = n_own + count([has_linear, turns, decays, stabilizes])
       allocate(term(first + n))
       allocate(inertia_t :: term(of_inertia)%term)
       allocate(solid_term_t :: term(of_solid)%term)
       allocate(loads_t :: term(of_loads)%term)
       if (has_linear) allocate(linear_term_t :: term(n_own + 1)%term)
       if (turns) allocate(corotated_term_t :: term(n_own + count([has_linear, turns]))%term)
-      if (decays) allocate(dissipation_term_t :: term(first)%term)
+      if (decays) allocate(dissipation_term_t :: term(n_own &
+         + count([has_linear, turns, decays]))%term)
+      if (stabilizes) allocate(stabilization_term_t :: term(first)%term)
       call create_own(scene, term, error, host)
       do i = 1, n
          if (allocated(error)) return
@@ -95,6 +101,8 @@ contains
             call corotated_term_init(part, solid, size(scene%x, 1))
          type is (dissipation_term_t)
             call dissipation_term_init(part, solid, scene)
+         type is (stabilization_term_t)
+            call stabilization_term_init(part, solid)
          end select
       end do
    end subroutine create_own
@@ -191,6 +199,20 @@ contains
          end select
       end do
    end procedure terms_dissipation
+
+   module procedure terms_stabilization
+      integer :: k
+
+      work = 0.0_wp
+      if (present(force)) force = 0.0_wp
+      do k = n_own + 1, size(term)
+         select type (part => term(k)%term)
+         type is (stabilization_term_t)
+            work = part%work
+            if (present(force)) call stabilization_force(part, force)
+         end select
+      end do
+   end procedure terms_stabilization
 
    module procedure terms_mass_times
       select type (part => term(of_inertia)%term)

@@ -11,7 +11,8 @@ module emcon_term_registry
    implicit none
    private
    public :: terms_create, terms_solid, terms_mass, terms_mass_rows, terms_mass_times, &
-      terms_mass_values, terms_massless, terms_return_mass, terms_dissipation
+      terms_mass_values, terms_massless, terms_return_mass, terms_dissipation, &
+      terms_stabilization
 
    interface
       !> The terms of `scene`, and of what it is given.
@@ -76,6 +77,13 @@ module emcon_term_registry
          type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
          real(wp), intent(out) :: work, damping     !! [M L^2/T^2]
       end subroutine terms_dissipation
+
+      !> What the viscous stress of STABILIZE has taken in the last motion, and its forces.
+      pure module subroutine terms_stabilization(term, work, force)
+         type(term_box_t), intent(in) :: term(:)    !! of `terms_create`
+         real(wp), intent(out) :: work              !! [M L^2/T^2]
+         real(wp), intent(out), optional :: force(:, :)   !! (n_dim, n_node) [M L/T^2]
+      end subroutine terms_stabilization
    end interface
 
 end module emcon_term_registry

@@ -44,6 +44,7 @@ program main
    use test_dgrad_space, only : collect_dgrad_space
    use test_dgrad_wide, only : collect_dgrad_wide
    use test_dissipation, only : collect_dissipation
+   use test_stabilization, only : collect_stabilization
    use test_element, only : collect_element
    use test_element_kinds, only : collect_element_kinds
    use test_element_axial, only : collect_element_axial
@@ -236,6 +237,7 @@ program main
    call run("dgrad_space", collect_dgrad_space)
    call run("dgrad_wide", collect_dgrad_wide)
    call run("dissipation", collect_dissipation)
+   call run("stabilization", collect_stabilization)
    call run("point_function", collect_point_function)
    call run("shape", collect_shape)
    call run("judge", collect_judge)

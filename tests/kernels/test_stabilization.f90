@@ -1,0 +1,212 @@
+!> Viscous stress of *STATIC, STABILIZE: force and tangent are derivatives of its potential, it takes
+!> the part of the strain energy that is asked for, and nothing of what does not strain.
+module test_stabilization
+   use check, only : check_near, check_true, test_case_t
+   use emcon_csr, only : csr_t
+   use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_at_end
+   use emcon_kinds, only : dp, wp
+   use emcon_motion, only : motion_evaluate, motion_of, motion_t
+   use emcon_solid, only : solid_init, solid_t
+   use emcon_space, only : space_t
+   use emcon_stabilization, only : stabilization_term_init, stabilization_term_t
+   use emcon_stepper, only : stepper_t
+   use emcon_term, only : response_begin, response_init, response_t, role_internal
+   use one_element, only : read_one
+   use random_draws, only : draw_random
+   implicit none
+   private
+   public :: collect_stabilization
+
+   real(wp), parameter :: part = 0.02_wp, h = 0.1_wp
+   character(len=6), parameter :: kinds(*) = [character(len=6) :: "CPE4", "CPE4I", "CPE4H", "CPS3", &
+      "CAX4", "C3D8", "C3D8I", "C3D4"]
+
+   !> One element, and its motion.
+   type :: sample_t
+      type(stabilization_term_t) :: term
+      type(solid_t) :: solid
+      type(motion_t) :: motion
+   end type sample_t
+
+contains
+
+   subroutine collect_stabilization(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("derivatives of the potential", test_derivatives), &
+         test_case_t("the part of the strain energy that is asked for", test_part), &
+         test_case_t("drag takes as much of what has grown in time", test_drag), &
+         test_case_t("a turn takes nothing", test_turn)]
+   end subroutine collect_stabilization
+
+   subroutine begin(kind, size_of_motion, sample, error)
+      character(len=*), intent(in) :: kind
+      real(wp), intent(in) :: size_of_motion
+      type(sample_t), intent(out) :: sample
+      type(error_t), allocatable, intent(out) :: error
+      type(stepper_t) :: stepper
+      type(space_t) :: space
+      type(csr_t) :: matrix
+      real(wp), allocatable :: u0(:, :), du(:, :)
+      integer :: i
+
+      call read_one(trim(kind), 1, "NONLINEAR", stepper, error)
+      if (.not. allocated(error)) call solid_init(sample%solid, stepper%scene, error)
+      if (allocated(error)) return
+      allocate(u0, du, mold=stepper%scene%x)
+      call draw_random(u0)
+      call draw_random(du)
+      stepper%scene%step(1)%stabilization = part
+      stepper%scene%step(1)%time%h = h
+      call stabilization_term_init(sample%term, sample%solid)
+      call sample%term%begin_step(stepper%scene, 1, space, matrix, [(i, i = 1, size(du)**2)])
+      sample%motion = motion_of(evaluation_at_end, stepper%scene%x, size_of_motion*(u0 - 0.5_wp), &
+         size_of_motion*(du - 0.5_wp))
+      sample%motion%evaluation%lapse = h
+   end subroutine begin
+
+   subroutine find(sample, du, work, force, tangent)
+      type(sample_t), intent(inout) :: sample
+      real(wp), intent(in) :: du(:, :)
+      real(wp), intent(out) :: work
+      real(wp), intent(out) :: force(:)          !! (size(du))
+      real(dp), intent(out) :: tangent(:)        !! (size(du)**2) by columns
+      type(response_t) :: response
+      real(dp) :: none(1)
+
+      call response_init(response, size(du, 1), size(du, 2), 1)
+      call response_begin(response)
+      sample%motion%du = du
+      call motion_evaluate(sample%motion)
+      tangent = 0.0_dp
+      call sample%term%respond(sample%motion, response, tangent, none)
+      work = sample%term%work
+      force = reshape(response%part(role_internal)%force, [size(force)])
+   end subroutine find
+
+   !> By central differences, whose error falls as the square of their size.
+   subroutine test_derivatives(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      real(wp), parameter :: small = epsilon(1.0_wp)**0.333_wp
+      real(wp), allocatable :: du(:, :), force(:), low(:), high(:), slope(:), by(:, :)
+      real(wp) :: work, less, more
+      real(dp), allocatable :: tangent(:), other(:)
+      integer :: i, j, k
+
+      do k = 1, size(kinds)
+         call begin(kinds(k), 0.2_wp, sample, error)
+         if (allocated(error)) return
+         du = sample%motion%du
+         allocate(force(size(du)), low(size(du)), high(size(du)), slope(size(du)), &
+            by(size(du), size(du)), tangent(size(du)**2), other(size(du)**2))
+         call find(sample, du, work, force, tangent)
+         call check_true(error, work > 0.0_wp, trim(kinds(k)) // ": takes something")
+         do j = 1, size(du)
+            associate (a => 1 + mod(j - 1, size(du, 1)), node => 1 + (j - 1)/size(du, 1))
+               du(a, node) = du(a, node) + small
+               call find(sample, du, more, high, other)
+               du(a, node) = du(a, node) - 2.0_wp*small
+               call find(sample, du, less, low, other)
+               du(a, node) = du(a, node) + small
+            end associate
+            slope(j) = 0.5_wp*(more - less)/(2.0_wp*small)
+            by(:, j) = (high - low)/(2.0_wp*small)
+         end do
+         call check_near(error, slope, force, 100.0_wp*small**2, maxval(abs(force)), &
+            trim(kinds(k)) // ": force")
+         do i = 1, size(du)
+            call check_near(error, by(:, i), real(tangent(size(du)*(i - 1) + 1:size(du)*i), wp), &
+               100.0_wp*small**2, real(maxval(abs(tangent)), wp), trim(kinds(k)) // ": tangent")
+         end do
+         deallocate(force, low, high, slope, by, tangent, other)
+         if (allocated(error)) return
+      end do
+   end subroutine test_derivatives
+
+   !> Of a small uniform strain from rest, E = 100, nu = 0.3, over the first increment.
+   subroutine test_part(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      real(wp), parameter :: strain = 1.0e-3_wp, modulus = 100.0_wp*0.7_wp/(1.3_wp*0.4_wp)
+      real(wp), allocatable :: force(:), du(:, :)
+      real(dp), allocatable :: tangent(:)
+      real(wp) :: work
+      integer :: k
+
+      do k = 1, size(kinds)
+         if (any(kinds(k) == ["CAX4 ", "CPE4H", "CPS3 "])) cycle
+         call begin(kinds(k), 0.0_wp, sample, error)
+         if (allocated(error)) return
+         du = 0.0_wp*sample%motion%x
+         du(1, :) = strain*sample%motion%x(1, :)
+         allocate(force(size(du)), tangent(size(du)**2))
+         call find(sample, du, work, force, tangent)
+         call check_near(error, work, 0.5_wp*part*modulus*strain**2 &
+            *sum(sample%solid%geometry(1)%weight), 2.0_wp*strain, work, trim(kinds(k)) // ": work")
+         deallocate(force, tangent)
+         if (allocated(error)) return
+      end do
+   end subroutine test_part
+
+   !> After ten increments of a small uniform strain, over the eleventh: twice as much, of the stress
+   !> and of the drag, where nothing moves but by the strain.
+   subroutine test_drag(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      real(wp), parameter :: strain = 1.0e-4_wp
+      real(wp), allocatable :: force(:), du(:, :)
+      real(dp), allocatable :: tangent(:)
+      real(wp) :: work, alone
+      integer :: k
+
+      do k = 1, size(kinds)
+         call begin(kinds(k), 0.0_wp, sample, error)
+         if (allocated(error)) return
+         du = 0.0_wp*sample%motion%x
+         du(2, :) = strain*sample%motion%x(2, :)
+         allocate(force(size(du)), tangent(size(du)**2))
+         call find(sample, du, alone, force, tangent)
+         sample%motion%u0 = 10.0_wp*du
+         call find(sample, du, work, force, tangent)
+         call check_near(error, work, 2.0_wp*alone, 60.0_wp*strain, alone, trim(kinds(k)))
+         sample%motion%u0(1, :) = sample%motion%u0(1, :) + 1.0_wp
+         if (kinds(k) /= "CAX4") then
+            call find(sample, du, work, force, tangent)
+            call check_true(error, work < 1.01_wp*alone, trim(kinds(k)) // ": carried along")
+         end if
+         deallocate(force, tangent)
+         if (allocated(error)) return
+      end do
+   end subroutine test_drag
+
+   !> From rest by a large angle.
+   subroutine test_turn(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: c = cos(0.8_wp), s = sin(0.8_wp), tol = 256.0_wp*epsilon(1.0_wp)
+      type(sample_t) :: sample
+      real(wp), allocatable :: force(:), du(:, :), place(:, :)
+      real(dp), allocatable :: tangent(:)
+      real(wp) :: work
+      integer :: k
+
+      do k = 1, size(kinds)
+         if (kinds(k) == "CAX4") cycle
+         call begin(kinds(k), 0.0_wp, sample, error)
+         if (allocated(error)) return
+         place = sample%motion%x + sample%motion%u0
+         du = 0.0_wp*place
+         du(1, :) = (c - 1.0_wp)*place(1, :) - s*place(2, :) + 3.0_wp
+         du(2, :) = s*place(1, :) + (c - 1.0_wp)*place(2, :)
+         allocate(force(size(du)), tangent(size(du)**2))
+         call find(sample, du, work, force, tangent)
+         call check_near(error, force, 0.0_wp*force, tol, real(maxval(abs(tangent)), wp), &
+            trim(kinds(k)) // ": force")
+         deallocate(force, tangent)
+         if (allocated(error)) return
+      end do
+   end subroutine test_turn
+
+end module test_stabilization
