@@ -49,6 +49,7 @@ module emcon_active_set
    type :: active_set_t
       !> Which contacts act, stick and slide is a part of Newton's method: emcon_contact_rounds
       logical :: is_one_problem = .false.
+      logical :: falls_back = .false.            !! and where no set stands, only then
       logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start,
       logical, allocatable :: closes(:)          !! (n_constraint) but here: its node has no mass
       logical :: has_impacts = .true.            !! what closes arrives with a velocity

@@ -10,8 +10,8 @@
 !> docs/theory.md, section 6.
 module emcon_active_set_solve
    use emcon_active_set, only : active_set_drop, active_set_let_go, active_set_put_off, &
-      active_set_restart, active_set_select, active_set_t, step_cycling, step_done, step_loose, &
-      step_not_held
+      active_set_restart, active_set_select, active_set_t, step_cycling, step_diverged, step_done, &
+      step_loose, step_not_held, step_singular, step_too_far
    use emcon_active_set_update, only : active_set_advance, active_set_leave, active_set_narrow, &
       find_grips, most_early
    use emcon_contact_rounds, only : contact_rounds_solve
@@ -50,8 +50,30 @@ contains
          call solve_as_one(self, system, scene, newton, motion, status, error)
       else
          call solve_set_by_set(self, system, scene, newton, motion, status, error)
+         if (allocated(error) .or. .not. self%falls_back) return
+         if (.not. any(status == [step_diverged, step_singular, step_cycling]) .and. &
+            (self%has_impacts .or. status /= step_too_far)) return
+         call begin_again(self, system, newton, motion)
+         self%is_one_problem = .true.
+         call solve_as_one(self, system, scene, newton, motion, status, error)
+         self%is_one_problem = .false.
       end if
    end subroutine active_set_solve
+
+   !> Begin the step again.
+   subroutine begin_again(self, system, newton, motion)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      integer :: n_newton
+
+      n_newton = self%n_newton
+      motion%du = self%first
+      newton%driven = self%driven
+      call active_set_restart(self, system, motion)
+      self%n_newton = n_newton
+   end subroutine begin_again
 
    !> One set after the other, until one stands.
    subroutine solve_set_by_set(self, system, scene, newton, motion, status, error)
@@ -223,7 +245,7 @@ contains
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
       logical, intent(out) :: is_done
-      integer :: pair, n_newton
+      integer :: pair
 
       is_done = self%has_impacts
       if (is_done) return
@@ -234,14 +256,10 @@ contains
          end associate
       end do
       if (is_done) return
-      n_newton = self%n_newton
-      motion%du = self%first
-      newton%driven = self%driven
       do pair = 1, size(system%contact)
          system%contact(pair)%contact%step%is_sharp = system%contact(pair)%contact%may_sharpen
       end do
-      call active_set_restart(self, system, motion)
-      self%n_newton = n_newton
+      call begin_again(self, system, newton, motion)
    end subroutine begin_sharp
 
    !> Take in what holds the bodies that would be free with the present set. The prescribed motion

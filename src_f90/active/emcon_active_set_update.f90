@@ -16,8 +16,8 @@ module emcon_active_set_update
    implicit none
    private
    public :: active_set_advance, active_set_leave, active_set_narrow
-   public :: find_grips, look_at_active, look_at_open, begins_unseen, gap_to_hold, gap_noise, noise_at, &
-      most_stale
+   public :: find_grips, look_at_active, look_at_open, begins_unseen, gap_to_hold, gap_noise, &
+      noise_at, most_stale
 
    !> Penetration and tension below these multiples of epsilon are round-off.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)

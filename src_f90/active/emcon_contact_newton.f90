@@ -54,7 +54,6 @@ module emcon_contact_newton
       type(contact_problem_t) :: problem
       real(wp), allocatable :: mu(:)             !! (n) of the normal force
       real(wp), allocatable :: push(:, :)        !! (0:n_slip, n) of the condensed contacts
-      real(wp), allocatable :: hold(:)           !! (n_row) what rows are held by in it [M/T^2]
       type(slip_status_t), allocatable :: status(:)      !! (n) in which way the law is to hold
       real(wp), allocatable :: old(:), new(:)    !! (n_row) multipliers about a correction
       real(wp) :: size = huge(1.0_wp)            !! relative residual, and what contacts miss
@@ -109,7 +108,7 @@ contains
       self%mu = law%mu
       self%problem%mu = law%mu
       allocate(self%push(0:n_slip, size(law)), source=0.0_wp)
-      allocate(self%hold(set%n_row), source=0.0_wp)
+      allocate(self%condensation%hold(set%n_row), source=0.0_wp)
       allocate(self%status(size(law)))
       allocate(self%old(set%n_row), self%new(set%n_row))
    end subroutine begin
@@ -142,7 +141,8 @@ contains
          if (allocated(error) .or. status /= newton_converged) return
          call correct(self, newton, system, set)
          if (.not. is_driven .and. goes_far(newton)) then
-            call take(self, newton, system, set, motion, newton%largest_move/maxval(abs(newton%dq)))
+            call take(self, newton, system, set, motion, newton%line%largest_move &
+               /maxval(abs(newton%dq)))
             status = newton_early
             return
          end if
@@ -162,7 +162,7 @@ contains
       type(newton_t), intent(in) :: newton
 
       goes_far = .false.
-      if (size(newton%dq) > 0) goes_far = maxval(abs(newton%dq)) > newton%largest_move
+      if (size(newton%dq) > 0) goes_far = maxval(abs(newton%dq)) > newton%line%largest_move
    end function goes_far
 
    !> Is the step solved?
@@ -360,7 +360,7 @@ contains
       call phase_enter(system%phases, phase_factorise, left)
       call find_hold(self, system, set)
       call condensation_make(self%condensation, system, set, newton%correction, newton%residual, &
-         has_curvature, self%hold, error)
+         has_curvature, error)
       call phase_leave(system%phases, phase_eliminate)
       system%phases%n_factorisation = system%phases%n_factorisation + 1
       newton%convergence%n_iteration = newton%convergence%n_iteration + 1
@@ -394,7 +394,7 @@ contains
          end do
          if (.not. self%is_static) return
          do k = first + 1, set%n_row
-            self%hold(k) = problem%stiffness(set%condition(k) - first)
+            self%condensation%hold(k) = problem%stiffness(set%condition(k) - first)
          end do
       end associate
    end subroutine find_hold
@@ -411,7 +411,7 @@ contains
          problem%w = 0.0_wp
          problem%free = 0.0_wp
          call gather(set, set%lam, problem%base)
-         call gather(set, self%hold, problem%hold)
+         call gather(set, self%condensation%hold, problem%hold)
          call gather(set, set%defect, problem%start)
          problem%start(1:, :) = problem%start(1:, :) - problem%slip_target
          place = m*(set%condition(first + 1:) - first - 1) + 1 + set%slip(first + 1:)

@@ -109,7 +109,7 @@ contains
             return
          end if
  
-         if (largest_motion(motion%du - first) > self%largest_move .and. .not. self%has_impacts) then
+         if (.not. self%has_impacts .and. largest_motion(motion%du - first) > self%largest_move) then
             motion%du = first
             newton%driven = driven
             return
@@ -244,8 +244,8 @@ contains
       integer :: i
 
       newton%looks_early = .false.
-      newton%largest_move = huge(1.0_wp)
-      if (.not. self%has_impacts) newton%largest_move = self%largest_move
+      newton%line%largest_move = huge(1.0_wp)
+      if (.not. self%has_impacts) newton%line%largest_move = self%largest_move
       do i = 1, most_rounds
          call select_all(self, system, motion, candidates)
          associate (set => self%set)
@@ -310,8 +310,10 @@ contains
             associate (id => set%id(set%n_permanent + k))
                candidates%acts(id) = law(k)%status%kind /= contact_open
                ! What touches holds a body that nothing pushes.
-               if (self%support%is_needed) candidates%acts(id) = candidates%acts(id) .or. &
-                  abs(set%defect(set%n_permanent + k)) <= gap_noise*set%item(set%n_permanent + k)%size
+               associate (place => set%n_permanent + k)
+                  if (self%support%is_needed) candidates%acts(id) = candidates%acts(id) .or. &
+                     abs(set%defect(place)) <= gap_noise*set%item(place)%size
+               end associate
                if (friction%is_on .and. candidates%acts(id)) friction%law(id)%status = law(k)%status
             end associate
          end do

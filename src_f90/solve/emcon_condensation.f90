@@ -20,6 +20,8 @@ module emcon_condensation
    public :: condensation_t, condensation_make, condensation_free
 
    type :: condensation_t
+      !> (n_row) c, the stiffness that rows have in A; not allocated: none [M/T^2]
+      real(wp), allocatable :: hold(:)
       logical :: is_singular = .true.            !! something moves freely: nothing is known
       integer :: n_permanent = 0                 !! rows that always hold, the first ones
       !> (n_unknown, 0:rows) what moves by no other multipliers (0), and by one more of each row
@@ -35,21 +37,20 @@ module emcon_condensation
 contains
 
    !> Factorise the tangent and find out what forces of the rows of `set` move.
-   subroutine condensation_make(self, system, set, correction, residual, has_curvature, hold, error)
+   subroutine condensation_make(self, system, set, correction, residual, has_curvature, error)
       type(condensation_t), intent(inout) :: self        !! keeps its orderings
       type(system_t), intent(in) :: system               !! with the tangent of its terms
       type(constraint_set_t), intent(in) :: set          !! evaluated, with rows
       type(correction_t), intent(in) :: correction       !! by the solver of which
       real(wp), intent(in) :: residual(:)                !! (n_unknown)
       logical, intent(in) :: has_curvature               !! the tangent has that of the rows
-      real(wp), intent(in) :: hold(:)                    !! (rows) c: stiffness of each in A [M/T^2]
       type(error_t), allocatable, intent(out) :: error
       real(wp), allocatable :: held(:, :)                ! (n_unknown, n_permanent) by those rows
       real(wp) :: force(size(residual))
       integer :: k
 
       self%n_permanent = set%n_permanent
-      call assemble(self, system, set, has_curvature, hold)
+      call assemble(self, system, set, has_curvature)
       call factorise(self, correction, error)
       if (allocated(error) .or. self%is_singular) return
       if (allocated(self%motion)) deallocate(self%motion, self%free, self%w)
@@ -76,12 +77,11 @@ contains
    end subroutine condensation_make
 
    !> The tangent of the terms, of laws, and of rows as far as it is wanted.
-   subroutine assemble(self, system, set, has_curvature, hold)
+   subroutine assemble(self, system, set, has_curvature)
       type(condensation_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       logical, intent(in) :: has_curvature
-      real(wp), intent(in) :: hold(:)
       integer, allocatable :: slot(:)
       integer :: k
 
@@ -90,8 +90,9 @@ contains
          self%tangent%value(slot(k)) = system%matrix%value(k)
       end do
       if (has_curvature) call constraints_add_curvature(set, system%space%numbering, self%tangent)
+      if (.not. allocated(self%hold)) return
       do k = set%n_permanent + 1, set%n_row
-         if (hold(k) > 0.0_wp) call hold_row(set, k, hold(k), self%tangent)
+         if (self%hold(k) > 0.0_wp) call hold_row(set, k, self%hold(k), self%tangent)
       end do
    end subroutine assemble
 

@@ -53,15 +53,17 @@ contains
             set%n_permanent = m
             hold = 0.0_wp*set%defect
             if (case > 5) hold = [(real(k, wp), k = 1, size(hold))]
+            condensation%hold = hold
             call condensation_make(condensation, system, set, correction, problem%residual, &
-               mod(case, 2) == 0, hold, error)
+               mod(case, 2) == 0, error)
             if (allocated(error)) return
             lam = set%lam(m + 1:set%n)
             allocate(full(n + m, n + m), rhs(n + m, 1), x(n + m, 1), source=0.0_dp)
             full(:n, :n) = dense_of(problem%base)
             if (mod(case, 2) == 0) full(:n, :n) = dense_of(problem%matrix)
             do k = m + 1, size(hold)
-               full(:n, :n) = full(:n, :n) + hold(k)*spread(force(k, :), 2, n)*spread(gap(k, :), 1, n)
+               full(:n, :n) = full(:n, :n) + hold(k)*spread(force(k, :), 2, n) &
+                  *spread(gap(k, :), 1, n)
             end do
             full(:n, n + 1:) = -transpose(force(:m, :))
             full(n + 1:, :n) = gap(:m, :)
@@ -101,7 +103,7 @@ contains
       system%matrix%value = 0.0_dp
       call correction_reset(correction, method_null_space, solver_default)
       call condensation_make(condensation, system, problem%set, correction, problem%residual, &
-         .false., 0.0_wp*problem%set%defect, error)
+         .false., error)
       if (allocated(error)) return
       call check_true(error, condensation%is_singular, "it is singular")
       call condensation_free(condensation)
