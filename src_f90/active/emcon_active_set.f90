@@ -142,7 +142,7 @@ contains
       self%overclosure = 0.0_wp
       self%largest_move = huge(1.0_wp)
       do pair = 1, size(system%contact)
-         self%largest_move = min(self%largest_move, system%contact(pair)%contact%own_edge(x))
+         self%largest_move = min(self%largest_move, system%contact(pair)%contact%mean_size(x))
       end do
       if (.not. is_meant) return
       do pair = 1, size(system%contact)

@@ -43,6 +43,7 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
+      integer :: failed
 
       self%first = motion%du
       self%driven = newton%driven
@@ -50,13 +51,14 @@ contains
          call solve_as_one(self, system, scene, newton, motion, status, error)
       else
          call solve_set_by_set(self, system, scene, newton, motion, status, error)
-         if (allocated(error) .or. .not. self%falls_back) return
-         if (.not. any(status == [step_diverged, step_singular, step_cycling]) .and. &
-            (self%has_impacts .or. status /= step_too_far)) return
+         if (allocated(error) .or. .not. self%falls_back .or. self%has_impacts) return
+         if (.not. any(status == [step_diverged, step_singular, step_cycling, step_too_far])) return
+         failed = status
          call begin_again(self, system, newton, motion)
          self%is_one_problem = .true.
          call solve_as_one(self, system, scene, newton, motion, status, error)
          self%is_one_problem = .false.
+         if (status /= step_done) status = failed        ! which tells more of what is the matter
       end if
    end subroutine active_set_solve
 

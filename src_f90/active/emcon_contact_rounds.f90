@@ -69,7 +69,8 @@ contains
       allocate(candidates%takes_part(system%n_constraint), candidates%acts(system%n_constraint), &
          candidates%has_left(system%n_constraint), source=.false.)
       if (self%support%is_needed) then
-         candidates%takes_part = self%is_active
+         call active_set_select(self, system, motion)
+         candidates%takes_part(self%set%id(:self%set%n)) = .true.
       else
          call solve_by_sets(self, system, newton, motion, candidates, status, error)
          if (candidates%is_settled .or. allocated(error) .or. size(system%contact) == 0) return
@@ -109,7 +110,8 @@ contains
             return
          end if
  
-         if (.not. self%has_impacts .and. largest_motion(motion%du - first) > self%largest_move) then
+         if (.not. self%has_impacts .and. &
+            largest_motion(motion%du - first) > self%largest_move) then
             motion%du = first
             newton%driven = driven
             return

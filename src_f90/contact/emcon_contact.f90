@@ -86,7 +86,7 @@ module emcon_contact
       procedure :: linearise
       procedure :: has_looked
       procedure :: own_area
-      procedure :: own_edge
+      procedure :: mean_size
       procedure :: share
       procedure :: narrow
       procedure :: mean_gap
@@ -188,18 +188,18 @@ contains
       self%n_look = 1 + mod(self%n_look, huge(self%n_look) - 1)
    end subroutine has_looked
 
-   !> The mean edge of the slave side in the reference configuration; huge where it has none.
-   pure real(wp) function own_edge(self, x) result(edge)
+   !> The mean facet of the slave side in the reference configuration; huge where it has none [L].
+   pure real(wp) function mean_size(self, x) result(length)
       class(contact_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)    !! (n_dim, n_node) reference positions [L]
-      real(wp), dimension(self%n_constraint) :: area, length
+      real(wp), dimension(self%n_constraint) :: area, part
       real(wp) :: u(size(x, 1), size(x, 2))
 
       u = 0.0_wp
-      call self%area_points(x, u, area, length)
-      edge = huge(edge)
-      if (sum(length) > 0.0_wp) edge = sum(length)/self%n_constraint
-   end function own_edge
+      call self%area_points(x, u, area, part)
+      length = huge(length)
+      if (sum(part) > 0.0_wp) length = sum(part)/self%n_constraint
+   end function mean_size
 
    !> Area that belongs to each constraint in the reference configuration.
    pure subroutine own_area(self, x, area)

@@ -25,9 +25,18 @@ contains
       type(scene_t), intent(in) :: scene
       type(part_t), intent(in) :: part
       integer, intent(inout) :: status           !! one of the `step_` codes
-      real(wp) :: viscous(size(scene%x, 1), size(scene%x, 2)), work, missed, before, after
 
-      if (.not. scene%step(self%state%clock%i_step)%stabilization > 0.0_wp) return
+      if (scene%step(self%state%clock%i_step)%stabilization > 0.0_wp) call judge(self, part, status)
+   end subroutine snap_judge
+
+   !> The same in a step that has them.
+   subroutine judge(self, part, status)
+      type(march_t), intent(inout) :: self
+      type(part_t), intent(in) :: part
+      integer, intent(inout) :: status           !! one of the `step_` codes
+      real(wp) :: viscous(size(self%motion%x, 1), size(self%motion%x, 2)), work, missed, before, &
+         after
+
       call terms_stabilization(self%system%term, work, viscous)
       associate (state => self%state, ending => self%end_state)
          ending%force = ending%force - viscous
@@ -41,7 +50,7 @@ contains
          self%step_check%ratio = missed/max(before, after)
       end associate
       if (status == step_done) status = step_rough
-   end subroutine snap_judge
+   end subroutine judge
 
    !> The viscous force of STABILIZE by those of the elements, all nodes together.
    real(wp) function snap_left(self) result(left)

@@ -3,7 +3,8 @@
 !> With the tangent A, the residual r, the directions F of forces and the gradients G of the values
 !> of rows, the unknowns follow dq = A^-1 (F^T y - r), and the rows G dq + defect = free + W y. With
 !> c F^T G in A, of rows that hold what nothing else does, multipliers gain y - c G dq, else y.
-!> Rows that always hold are eliminated first: their multipliers follow. Source: docs/theory.md, eq. (14i).
+!> Rows that always hold are eliminated first: their multipliers follow. Source: docs/theory.md,
+!> eq. (14i).
 module emcon_condensation
    use emcon_constraint_rows, only : constraints_add_curvature, constraints_merge_pattern
    use emcon_constraints, only : constraint_set_t

@@ -70,7 +70,8 @@ contains
       self%n_slip = n_slip
       allocate(self%w((1 + n_slip)*n, (1 + n_slip)*n), self%free(0:n_slip, n), &
          self%base(0:n_slip, n), &
-         self%start(0:n_slip, n), self%hold(0:n_slip, n), self%slip_target(n_slip, n), self%mu(n), self%stiffness(n), source=0.0_wp)
+         self%start(0:n_slip, n), self%hold(0:n_slip, n), self%slip_target(n_slip, n), &
+         self%mu(n), self%stiffness(n), source=0.0_wp)
    end subroutine contact_problem_create
 
    !> Forces that obey the law at all contacts.

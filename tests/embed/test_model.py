@@ -279,7 +279,7 @@ def everything() -> Model:
         step.output(request, ["U", "V"], set=group, frequency=2, time_points="T1",
                     totals="YES" if "PRINT" in request and "ENERGY" not in request else None)
     step.restart(5)
-    model.step("STATIC", nlgeom=False, direct=True, solver="UMFPACK")
+    model.step("STATIC", nlgeom=False, direct=True, solver="UMFPACK", stabilize=1e-3)
     model.step("DYNAMIC", 0.001, 1.0, explicit=True)
     return model
 

@@ -26,7 +26,8 @@ contains
    end subroutine collect_condensation
 
    !> N dq = F^T lam - r with the rows that always hold at 0 after it, whose multipliers are
-   !> unknowns too: by LAPACK, for none, two and all but one of such rows, with curvature and without.
+   !> unknowns too: by LAPACK, for none, two and all but one of such rows, with curvature and
+   !> without, and with rows that are held.
    subroutine test_motion(error)
       type(error_t), allocatable, intent(out) :: error
       type(problem_t) :: problem

@@ -175,8 +175,8 @@ contains
       end do
    end subroutine test_load
 
-   !> A block that stands askew, without load: it is moved until the lowest node touches, and held by
-   !> that and by the next, over their gaps, which are told; nodes that have pulled are left out.
+   !> A block that stands askew, without load: it is moved until the lowest node touches, and held
+   !> by that and by the next, over their gaps, which are told; nodes that have pulled are left out.
    subroutine test_nearest(error)
       type(error_t), allocatable, intent(out) :: error
       type(block_t) :: lower, upper

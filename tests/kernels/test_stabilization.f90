@@ -1,4 +1,5 @@
-!> Viscous stress of *STATIC, STABILIZE: force and tangent are derivatives of its potential, it takes
+!> Viscous stress of *STATIC, STABILIZE: force and tangent are derivatives of its potential, it
+!> takes
 !> the part of the strain energy that is asked for, and nothing of what does not strain.
 module test_stabilization
    use check, only : check_near, check_true, test_case_t
@@ -19,7 +20,8 @@ module test_stabilization
    public :: collect_stabilization
 
    real(wp), parameter :: part = 0.02_wp, h = 0.1_wp
-   character(len=6), parameter :: kinds(*) = [character(len=6) :: "CPE4", "CPE4I", "CPE4H", "CPS3", &
+   character(len=6), parameter :: kinds(*) = [character(len=6) :: "CPE4", "CPE4I", "CPE4H", &
+      "CPS3", &
       "CAX4", "C3D8", "C3D8I", "C3D4"]
 
    !> One element, and its motion.
@@ -151,7 +153,8 @@ contains
       end do
    end subroutine test_part
 
-   !> After ten increments of a small uniform strain, over the eleventh: twice as much, of the stress
+   !> After ten increments of a small uniform strain, over the eleventh: twice as much, of the
+   !> stress
    !> and of the drag, where nothing moves but by the strain.
    subroutine test_drag(error)
       type(error_t), allocatable, intent(out) :: error
