@@ -92,3 +92,80 @@ def test_statics(tmp_path):
         assert run.verdict["verdict"] == "good"
         u.append(run.fields()["displacement"])
     assert np.abs(u[1] - u[0]).max() < 4*np.sqrt(np.finfo(float).eps)
+
+
+#: A block on a floor, held beside contact by a strip that is as soft as asked for alone.
+WEAKLY_HELD = """*NODE, NSET=ALL
+1, -1., -1.
+2, 2., -1.
+3, 2., 0.
+4, -1., 0.
+5, 0., 0.
+6, 1., 0.
+7, 1., 1.
+8, 0., 1.
+9, 3., .5
+10, 3., 1.
+11, 1., .5
+12, 0., .5
+*ELEMENT, TYPE=CPE4, ELSET=FLOOR
+1, 1, 2, 3, 4
+*ELEMENT, TYPE=CPE4, ELSET=BLOCK
+2, 5, 6, 11, 12
+4, 12, 11, 7, 8
+*ELEMENT, TYPE=CPE4, ELSET=STRIP
+3, 11, 9, 10, 7
+*SURFACE, NAME=TOP
+1, S3
+*SURFACE, NAME=FOOT
+2, S1
+*MATERIAL, NAME=HARD
+*ELASTIC
+1e6, 0.
+*MATERIAL, NAME=SOFT
+*ELASTIC
+<soft>, 0.
+*SOLID SECTION, ELSET=FLOOR, MATERIAL=HARD
+*SOLID SECTION, ELSET=BLOCK, MATERIAL=HARD
+*SOLID SECTION, ELSET=STRIP, MATERIAL=SOFT
+*CONTACT PAIR, INTERACTION=I, TYPE=<formulation>
+FOOT, TOP
+*SURFACE INTERACTION, NAME=I
+*BOUNDARY
+1, 1, 2
+2, 1, 2
+3, 1, 2
+4, 1, 2
+9, 1, 2
+10, 1, 2
+*STEP
+*STATIC
+*DLOAD
+4, P3, <load>
+*NODE FILE
+U
+*CONSTRAINT METHOD, TYPE=<method>
+*END STEP
+"""
+
+
+@pytest.mark.parametrize("method", ["COMPLEMENTARITY", "NULL SPACE"])
+def test_a_body_that_a_spring_holds_weakly(method, tmp_path):
+    """Neither the size of the load nor that of the spring decides whether it runs, or how soon: it
+    stands by the load over the stiffness of its own height, 1/E."""
+    newton = []
+    for load in (1e-3, 1.0, 1e3):
+        for soft in (1e-3, 1.0, 1e3):
+            text = WEAKLY_HELD
+            for name, value in (("soft", soft), ("load", load), ("formulation", NODES), ("method", method)):
+                text = text.replace(f"<{name}>", str(value))
+            folder = tmp_path / f"{load}_{soft}"
+            folder.mkdir()
+            (folder / "scene.inp").write_text(text)
+            run = run_deck(folder / "scene.inp", folder)
+            assert run.verdict["verdict"] == "good" and run.history["cuts"].sum() == 0
+            u = run.fields()["displacement"][-1]
+            np.testing.assert_allclose(u[[6, 7], 1], -load/1e6, rtol=2e-2 if soft > 1 else 1e-4)
+            newton.append(run.history["newton"].sum())
+    # Sets are tried first with the null space.
+    assert max(newton) <= (3 if method == "NULL SPACE" else 2)*min(newton)

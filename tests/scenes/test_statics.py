@@ -455,7 +455,8 @@ def test_coarse_ring_around_a_fine_one(tmp_path, formulation):
         assert ("F1 is the slave" in run.log) == (sides == "")
         moved.append(run.fields()["displacement"][-1])
     assert np.abs(moved[0]).max() > 0.02
-    assert (moved[1] == moved[0]).all() and (moved[2] == moved[0]).all()
+    assert (moved[2] == moved[1]).all()
+    assert np.abs(moved[1] - moved[0]).max() <= 64*np.finfo(float).eps*np.abs(moved[0]).max()
 
 
 @pytest.mark.parametrize("cells", [(8, 11), (11, 8)], ids=str)
