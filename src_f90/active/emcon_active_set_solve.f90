@@ -43,7 +43,7 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      integer :: failed
+      integer :: failed, pair
 
       self%first = motion%du
       self%driven = newton%driven
@@ -54,6 +54,9 @@ contains
          if (allocated(error) .or. .not. self%falls_back .or. self%has_impacts) return
          if (.not. any(status == [step_diverged, step_singular, step_cycling, step_too_far])) return
          failed = status
+         do pair = 1, size(system%contact)
+            system%contact(pair)%contact%step%is_sharp = .false.
+         end do
          call begin_again(self, system, newton, motion)
          self%is_one_problem = .true.
          call solve_as_one(self, system, scene, newton, motion, status, error)

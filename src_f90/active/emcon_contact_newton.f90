@@ -141,7 +141,7 @@ contains
          if (allocated(error) .or. status /= newton_converged) return
          call correct(self, newton, system, set)
          if (.not. is_driven .and. goes_far(newton)) then
-            call take(self, newton, system, set, motion, newton%line%largest_move &
+            call take(self, newton, system, set, motion, newton%convergence%largest_move &
                /maxval(abs(newton%dq)))
             status = newton_early
             return
@@ -162,7 +162,7 @@ contains
       type(newton_t), intent(in) :: newton
 
       goes_far = .false.
-      if (size(newton%dq) > 0) goes_far = maxval(abs(newton%dq)) > newton%line%largest_move
+      if (size(newton%dq) > 0) goes_far = maxval(abs(newton%dq)) > newton%convergence%largest_move
    end function goes_far
 
    !> Is the step solved?

@@ -109,7 +109,6 @@ contains
             candidates%is_measured = .false.
             return
          end if
- 
          if (.not. self%has_impacts .and. &
             largest_motion(motion%du - first) > self%largest_move) then
             motion%du = first
@@ -246,8 +245,8 @@ contains
       integer :: i
 
       newton%looks_early = .false.
-      newton%line%largest_move = huge(1.0_wp)
-      if (.not. self%has_impacts) newton%line%largest_move = self%largest_move
+      newton%convergence%largest_move = huge(1.0_wp)
+      if (.not. self%has_impacts) newton%convergence%largest_move = self%largest_move
       do i = 1, most_rounds
          call select_all(self, system, motion, candidates)
          associate (set => self%set)

@@ -260,7 +260,6 @@ contains
       real(wp) :: direction(size(motion%du, 1), size(motion%du, 2)), time, turn
       real(dp) :: rigid(bodies%n_motion*size(free%member)), share(size(free%along))
       logical :: is_next(size(is_active))
-      integer :: place(bodies%n_motion), i
 
       share = free%along/norm2(free%along)
       rigid = matmul(free%z, share)
@@ -275,14 +274,7 @@ contains
          if (time*maxval(abs(direction)) <= in_the_way*maxval(bodies%size(free%member))) return
       end if
       self%is_pushed = .false.
-      turn = 0.0_wp
-      do i = 1, size(free%member)
-         place = mechanism_places(bodies, i)
-         associate (size => bodies%size(free%member(i)))
-            if (size > 0.0_wp) turn = max(turn, &
-               real(maxval(abs(rigid(place(bodies%n_dim + 1:)))), wp)/size)
-         end associate
-      end do
+      turn = turn_of(bodies, free, rigid)
       if (time*turn > largest_turn) then
          time = largest_turn/turn
          is_next = .false.
@@ -323,7 +315,8 @@ contains
       type(constraint_set_t), intent(in) :: set
       logical, intent(in) :: is_next(:)          !! (n_constraint)
       real(wp), intent(inout), contiguous :: du(:, :)
-      real(wp) :: direction(size(du, 1), size(du, 2)), rate(size(free%z, 2))
+      real(wp) :: direction(size(du, 1), size(du, 2)), rate(size(free%z, 2)), time
+      real(dp) :: rigid(bodies%n_motion*size(free%member))
       integer :: j, k
 
       k = minloc(set%target(:set%n), 1, is_next(set%id(:set%n)))
@@ -332,9 +325,30 @@ contains
          call mechanism_field(bodies, free%member, free%z(:, j), direction)
          rate(j) = condition_rate(set%item(k), direction)
       end do
-      call mechanism_field(bodies, free%member, matmul(free%z, real(rate, dp)), direction)
-      call move(system, direction, -set%target(k)/sum(rate**2), du)
+      rigid = matmul(free%z, real(rate, dp))
+      time = set%target(k)/sum(rate**2)
+      ! What is near the center of a turn is for Newton's method to close.
+      if (time*turn_of(bodies, free, rigid) > largest_turn) return
+      call mechanism_field(bodies, free%member, rigid, direction)
+      call move(system, direction, -time, du)
    end subroutine bring
+
+   !> The largest angle by which bodies of an assembly turn in a motion, per unit of it.
+   pure real(wp) function turn_of(bodies, free, rigid) result(turn)
+      type(mechanisms_t), intent(in) :: bodies
+      type(free_t), intent(in) :: free
+      real(dp), intent(in) :: rigid(:)           !! (n_motion*members)
+      integer :: place(bodies%n_motion), i
+
+      turn = 0.0_wp
+      do i = 1, size(free%member)
+         place = mechanism_places(bodies, i)
+         associate (size => bodies%size(free%member(i)))
+            if (size > 0.0_wp) turn = max(turn, &
+               real(maxval(abs(rigid(place(bodies%n_dim + 1:)))), wp)/size)
+         end associate
+      end do
+   end function turn_of
 
    !> Remember contacts that are closed over a gap with no load to close it.
    subroutine note_brought(self, system, scene, bodies, free, set, is_next)

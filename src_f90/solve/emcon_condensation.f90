@@ -116,6 +116,7 @@ contains
       end associate
    end subroutine hold_row
 
+   !> By the solver of `correction`.
    subroutine factorise(self, correction, error)
       type(condensation_t), intent(inout) :: self
       type(correction_t), intent(in) :: correction

@@ -50,6 +50,7 @@ module emcon_convergence
       integer :: n_renewal = 0                   !! factors made in the solve for that they stalled
       real(wp) :: tolerance = 0.0_wp             !! of the relative residual
       integer :: maximum = 0                     !! iterations
+      real(wp) :: largest_move = huge(1.0_wp)    !! of a correction, where contacts stand beside [L]
       logical :: polishes = .true.               !! else the tolerance is the end
       !> Tangents factorised so far, or corrections by a kept factor before the tolerance was met
       integer :: n_iteration = 0

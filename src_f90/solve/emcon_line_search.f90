@@ -25,7 +25,6 @@ module emcon_line_search
       real(wp) :: at = 1.0_wp                    !! the next place: part of the correction
       real(wp) :: low = 0.0_wp, high = 1.0_wp    !! places with work below and above 0
       integer :: n_place = 0
-      real(wp) :: largest_move = huge(1.0_wp)    !! of a correction that contacts stand beside [L]
    end type line_search_t
 
 contains

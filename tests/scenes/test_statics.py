@@ -441,7 +441,8 @@ def test_overclosure_that_is_meant_is_no_penetration(tmp_path, formulation):
 @pytest.mark.parametrize("formulation", FORMULATIONS[2::2], ids=" ".join)
 def test_coarse_ring_around_a_fine_one(tmp_path, formulation):
     """The fine one's nodes begin behind chords of the coarse one, whose arcs are 0.02 off: in either
-    order of the pair the coarse one is the slave, as `SIDES=ONE` has it."""
+    order of the pair the coarse one is the slave, as `SIDES=ONE` has it: to the bit in both orders,
+    and to round-off without the guards of the other side, which say the same at two corners."""
     text = press_fit((12, 4), formulation, -0.02).replace("*CONTACT INTERFERENCE, SHRINK\n", "")
     bore = "*SURFACE, NAME=BORE\n" + "".join(f"{1 + 6*i}, S1\n" for i in range(12))
     text = text.replace("*MATERIAL", bore + "*MATERIAL", 1)
