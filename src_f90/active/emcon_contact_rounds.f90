@@ -1,11 +1,11 @@
 !> A step as one problem of its contacts: which of them take part, and how it is solved.
 !>
 !> Candidates are what acted at the start of the step and what closes in it; they only grow within a
-!> step, but for those that lose their surface, which do not come back. First sets of them are tried
-!> by the null space, beginning with what acted before: in most steps nothing else acts. What is
-!> found is checked: all that acts pushes, friction obeys its law, no candidate closes. Where that
-!> fails the contacts are condensed by the kept factor, and their problem tells the next set. Where
-!> there is no such factor, or no set stands, emcon_contact_newton solves the step with all
+!> step, but for those that lose their surface, which come back once at most. First sets of them are
+!> tried by the null space, beginning with what acted before: in most steps nothing else acts. What
+!> is found is checked: all that acts pushes, friction obeys its law, no candidate closes. Where
+!> that fails the contacts are condensed by the kept factor, and their problem tells the next set.
+!> Where there is no such factor, or no set stands, emcon_contact_newton solves the step with all
 !> candidates. Source: docs/theory.md, section 6.
 module emcon_contact_rounds
    use emcon_active_set, only : active_set_pass, active_set_select, active_set_t, &
@@ -46,7 +46,8 @@ module emcon_contact_rounds
    type :: candidates_t
       logical, allocatable :: takes_part(:)      !! (n_constraint)
       logical, allocatable :: acts(:)            !! (n_constraint) of these, in the present set
-      logical, allocatable :: has_left(:)        !! (n_constraint) it lost its surface
+      logical, allocatable :: has_left(:)        !! (n_constraint) it lost its surface,
+      logical, allocatable :: is_back(:)         !! (n_constraint) and has come back
       logical :: is_measured = .false.           !! gaps are known for the motion that there is
       logical :: have_changed = .false.          !! solve the step again
       logical :: is_settled = .false.            !! the step is solved, or cannot be
@@ -67,7 +68,8 @@ contains
       type(candidates_t) :: candidates
 
       allocate(candidates%takes_part(system%n_constraint), candidates%acts(system%n_constraint), &
-         candidates%has_left(system%n_constraint), source=.false.)
+         candidates%has_left(system%n_constraint), candidates%is_back(system%n_constraint), &
+         source=.false.)
       if (self%support%is_needed) then
          call active_set_select(self, system, motion)
          candidates%takes_part(self%set%id(:self%set%n)) = .true.
@@ -401,8 +403,7 @@ contains
          do i = 1, contact%n_constraint
             id = system%first_constraint(pair) + i
             if (.not. candidates%takes_part(id)) then
-               if (.not. candidates%has_left(id)) call join(self, system, pair, i, motion, &
-                  candidates, status)
+               call join(self, system, pair, i, motion, candidates, status)
                cycle
             end if
             acts = candidates%acts(id)
@@ -451,9 +452,12 @@ contains
       logical :: closes
 
       associate (contact => system%contact(pair)%contact, id => system%first_constraint(pair) + i)
+         if (contact%state(i)%is_leaving) return
          call look_at_open(self, contact, i, id, closes, status)
          ! What the pairs take in may hold the bodies away from their guards.
          if (.not. closes .or. (contact%slack > 0.0_wp .and. candidates%have_changed)) return
+         if (candidates%has_left(id) .and. candidates%is_back(id)) status = step_too_far
+         candidates%is_back(id) = candidates%has_left(id)
          if (self%friction%is_on) call friction_close(self%friction, system, pair, i, motion, &
             contact%state(i)%gap1 - gap_to_hold(self, contact%state(i), id), &
             .not. self%is_candidate(id))

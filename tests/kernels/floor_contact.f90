@@ -14,6 +14,7 @@ module floor_contact
       real(wp), allocatable :: height(:)             !! (n_constraint) of the floor [L]
       real(wp) :: closed = 0.0_wp                    !! the gap that acts [L]
       logical, allocatable :: leaves(:)              !! (n_constraint) it loses its surface
+      integer, allocatable :: leaves_at(:)           !! at these looks alone; not allocated: at all
       logical, allocatable :: is_seen(:)             !! (n_constraint) stencils hold
       real(wp) :: shift = 0.0_wp                     !! of slip, at each look up to number `until`
       real(wp) :: drift = 0.0_wp                     !! gaps are measured by so much too large then
@@ -77,6 +78,8 @@ contains
             state%is_near = .true.
             state%is_over = .true.
             state%is_leaving = self%leaves(i)
+            if (allocated(self%leaves_at)) state%is_leaving = state%is_leaving .and. &
+               any(self%n_look == self%leaves_at)
             state%size = 1.0_wp
             state%closed = self%closed
             state%gap0 = gap_of(self, i, x, u0)

@@ -64,6 +64,7 @@ contains
          test_case_t("as set by set", test_set_by_set), &
          test_case_t("rows that follow from others", test_redundant), &
          test_case_t("what has lost its surface does not come back", test_left), &
+         test_case_t("unless it closes again, and once alone", test_back), &
          test_case_t("friction that acts elsewhere", test_lagged), &
          test_case_t("stencils of another motion", test_stale), &
          test_case_t("what cannot begin", test_begins), &
@@ -373,6 +374,39 @@ contains
          end block
       end do
    end subroutine test_left
+
+   !> Node 2 has lost its surface where the step is first looked at, and closes all the same: it
+   !> acts in the end. Where it loses that again the step cannot be solved.
+   subroutine test_back(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      do i = 0, 3
+         block
+            type(case_t) :: self
+
+            call make_case(self, 0.5_wp)
+            if (mod(i, 2) == 1) self%mu = 0.3_wp
+            self%was_active = [.true., .true., .true.]
+            allocate(self%floor(1))
+            call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3) - 0.01_wp)
+            self%floor(1)%leaves(2) = .true.
+            self%floor(1)%leaves_at = [2]
+            if (i > 1) self%floor(1)%leaves_at = [2, 4]
+            call solve(self, error)
+            if (allocated(error)) return
+            if (i > 1) then
+               call check_equal(error, self%status, step_too_far, "a second time")
+            else
+               self%floor(1)%leaves = .false.
+               call check_laws(self, "case " // to_text(i), error)
+               if (.not. allocated(error)) call check_true(error, all(self%active%is_active), &
+                  "all act")
+            end if
+            if (allocated(error)) return
+         end block
+      end do
+   end subroutine test_back
 
    !> The step is solved again while friction acts elsewhere, so often at most.
    subroutine test_lagged(error)
