@@ -9,11 +9,12 @@
 !> candidates. Source: docs/theory.md, section 6.
 module emcon_contact_rounds
    use emcon_active_set, only : active_set_pass, active_set_select, active_set_t, &
-      active_set_update_gaps, step_cycling, step_done, step_too_far
+      active_set_update_gaps, step_cycling, step_done, &
+      step_loose, step_too_far
    use emcon_active_set_update, only : begins_unseen, gap_noise, gap_to_hold, look_at_active, &
       look_at_open, most_stale, noise_at
    use emcon_constraint_rows, only : constraints_rows
-   use emcon_constraints, only : constraint_index, constraints_evaluate
+   use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_gives_back
    use emcon_contact, only : contact_t
    use emcon_contact_newton, only : contact_newton_solve
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
@@ -29,6 +30,7 @@ module emcon_contact_rounds
    use emcon_near_laws, only : near_laws_are_none, near_laws_update
    use emcon_newton, only : newton_converged, newton_early, newton_measure_forces, &
       newton_pick_residual, newton_redundant, newton_solve, newton_t
+   use emcon_penalty, only : most_augmentations, penalty_augment
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_system, only : system_respond, system_t
    implicit none
@@ -70,7 +72,10 @@ contains
       allocate(candidates%takes_part(system%n_constraint), candidates%acts(system%n_constraint), &
          candidates%has_left(system%n_constraint), candidates%is_back(system%n_constraint), &
          source=.false.)
-      if (self%support%is_needed) then
+      if (self%penalty%is_on) then
+         call solve_by_laws(self, system, newton, motion, candidates, status, error)
+         return
+      else if (self%support%is_needed) then
          call active_set_select(self, system, motion)
          candidates%takes_part(self%set%id(:self%set%n)) = .true.
       else
@@ -133,6 +138,60 @@ contains
          if (.not. (candidates%is_new_set .or. is_early .or. self%is_stale)) return
       end do
    end subroutine solve_by_sets
+
+   !> Solve with contacts that give way: those act that push, until the step stands on them. With an
+   !> augmented Lagrangian also until nothing is left of their gaps.
+   subroutine solve_by_laws(self, system, newton, motion, candidates, status, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      type(candidates_t), intent(inout) :: candidates
+      integer, intent(out) :: status             !! one of the `step_` codes
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_left, is_done, goes_on, before(size(candidates%acts))
+      integer :: i
+
+      newton%looks_early = .false.
+      do i = 1, most_rounds
+         call solve_set(self, system, newton, motion, candidates, status, error)
+         if (allocated(error)) return
+         if (status == newton_redundant) then
+            call leave_out(self, newton%correction%redundant, candidates, goes_on)
+            if (goes_on) cycle
+         end if
+         if (status /= newton_converged .or. self%penalty%is_at_ends) return
+         newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
+         call penalty_augment(self%penalty, self%set, is_done)
+         is_left = .not. is_done
+         self%lam(self%set%id(:self%set%n)) = self%set%lam(:self%set%n)
+         before = candidates%acts
+         call look(self, system, motion, candidates, status)
+         if (status /= step_done) return
+         call let_go(self, system, candidates)
+         self%is_active = candidates%acts
+         is_left = is_left .or. any(before .neqv. candidates%acts)
+         if (.not. (is_left .or. candidates%have_changed)) return
+         if (self%penalty%n_augmentation > most_augmentations) exit
+      end do
+      status = merge(step_loose, step_cycling, self%penalty%n_augmentation > most_augmentations)
+   end subroutine solve_by_laws
+
+   !> What pulls acts no more, unless it gives back what it stores.
+   subroutine let_go(self, system, candidates)
+      type(active_set_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      type(candidates_t), intent(inout) :: candidates
+      integer :: k, pair, i
+
+      do k = self%set%n_permanent + 1, self%set%n
+         associate (id => self%set%id(k))
+            call constraint_index(system, id, pair, i)
+            candidates%acts(id) = self%set%lam(k) >= -noise_at(self, system, &
+               system%contact(pair)%contact%node(i)) .or. constraints_gives_back(self%set, k)
+         end associate
+      end do
+   end subroutine let_go
 
    !> Solve with what acts.
    subroutine solve_set(self, system, newton, motion, candidates, status, error)
@@ -422,8 +481,9 @@ contains
                if (.not. friction%is_on) cycle
                if (friction%law(id)%mu > 0.0_wp) friction%lags = friction%lags .or. &
                   contact%state(i)%slip_shift > most_shift
-            else
-               candidates%one_closes = candidates%one_closes .or. has_closed(self, contact, i, id)
+            else if (has_closed(self, contact, i, id)) then
+               candidates%one_closes = .true.
+               candidates%acts(id) = self%penalty%is_on
             end if
          end do
       end associate
@@ -462,6 +522,7 @@ contains
             contact%state(i)%gap1 - gap_to_hold(self, contact%state(i), id), &
             .not. self%is_candidate(id))
          candidates%takes_part(id) = .true.
+         candidates%acts(id) = self%penalty%is_on
          candidates%have_changed = .true.
          self%is_candidate(id) = .true.
       end associate

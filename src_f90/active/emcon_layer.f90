@@ -141,6 +141,7 @@ contains
          allocate(self%system%contact(i)%contact, source=model%contact(i)%contact)
       end do
       call layer_mark(self, self%system, self%active%closes)
+      self%active%is_one_problem = .true.
       self%active%holds_gap = .true.
       self%active%has_impacts = .false.
       self%active%may_cut = .false.

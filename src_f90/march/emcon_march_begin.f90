@@ -314,8 +314,7 @@ contains
 
       active%puts_off = .true.
       active%has_rigid = has_rigid
-      active%is_one_problem = step%contact%method == method_complementarity
-      active%falls_back = any(step%contact%method == [method_null_space, method_saddle_point])
+      active%is_one_problem = .true.
       call active_set_suit(active, step)
       active%holds_gap = any(step_initiation(step) == [initiation_persistent, &
          initiation_massless]) .and. step%contact%method /= method_penalty
