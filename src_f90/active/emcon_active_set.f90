@@ -1,8 +1,7 @@
-!> The constraints that act in a step: how the set begins, what it hands to the constraints, and
-!> what is let go, put off and dropped. How it goes on: emcon_active_set_update.
+!> The constraints that act in a step: how the set begins, and what it hands to the constraints.
+!> Which they are in the end: emcon_contact_rounds.
 module emcon_active_set
-   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_gives_back, &
-      constraints_select
+   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_select
    use emcon_contact_support, only : contact_support_forget, contact_support_t
    use emcon_near_laws, only : near_laws_are_none, near_laws_select, near_laws_t, near_laws_update
    use emcon_evaluation, only : evaluation_is_equilibrium
@@ -20,8 +19,7 @@ module emcon_active_set
    private
    public :: active_set_t, active_set_init, active_set_suit, active_set_overclosure, &
       active_set_begin, active_set_restart, active_set_select, active_set_update_gaps
-   public :: active_set_pass, active_set_let_go, active_set_put_off, active_set_drop
-   public :: touch_tol, most_sets
+   public :: active_set_pass, touch_tol
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
       step_stands_off, step_not_held, step_overlaps, step_unbalanced, step_rough, step_strikes, &
       step_passes_event, step_loose
@@ -34,8 +32,6 @@ module emcon_active_set
 
    !> A gap closed by more than this fraction of an edge is a penetration.
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
-   !> Sets tried in one step at most.
-   integer, parameter :: most_sets = 40
 
    !> Until when a contact whose surfaces are far apart need not be looked at.
    type :: skip_until_t
@@ -47,16 +43,11 @@ module emcon_active_set
    end type skip_until_t
 
    type :: active_set_t
-      !> Which contacts act, stick and slide is a part of Newton's method: emcon_contact_rounds
-      logical :: is_one_problem = .false.
-      logical :: falls_back = .false.            !! and where no set stands, only then
       logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start,
       logical, allocatable :: closes(:)          !! (n_constraint) but here: its node has no mass
       logical :: has_impacts = .true.            !! what closes arrives with a velocity
       logical :: pushes_out = .false.            !! also what is closed too far, which makes energy
       logical :: puts_off = .false.              !! what follows from others nearly waits
-      logical :: has_rigid = .false.             !! bodies that few contacts hold: what follows from
-                                                 !! others waits, then the set changes one by one
       real(wp) :: largest_move = huge(1.0_wp)    !! of a correction in statics [L]
       real(wp) :: gap_tolerance = 0.0_wp         !! largest new stand-off per edge; 0: any
       type(constraint_set_t) :: set
@@ -65,24 +56,14 @@ module emcon_active_set
       !> (n_constraint) what acted at the end of the step before, with which multipliers
       logical, allocatable :: was_active(:)
       real(wp), allocatable :: lam0(:)
-      logical, allocatable :: tried(:, :)        !! (n_constraint, most_sets)
-      integer :: n_tried = 0
-      integer :: n_newton = 0                    !! iterations over all sets of the last step
+      integer :: n_newton = 0                    !! iterations in the last step
       logical :: is_stale = .false.              !! stencils were chosen for another motion
       integer :: n_stale = 0                     !! so often in this step
-      logical :: only_adds = .false.             !! nothing is let go any more in this step
-      logical :: has_cycled = .false.            !! candidates close below their gaps of the start
-      logical :: one_by_one = .false.            !! one contact a time is taken in or let go
-      integer :: n_early = 0                     !! sets left before they were solved, in this step
       logical :: may_cut = .true.                !! the step may be tried in smaller parts
       logical, allocatable :: is_candidate(:)    !! (n_constraint) acted at the start of the step,
                                                  !! or has closed in it
-      logical, allocatable :: comes_and_goes(:)  !! (n_constraint) in the last step's cycle of sets
-      logical, allocatable :: is_dropped(:)      !! (n_constraint) they follow from others
-      logical, allocatable :: is_put_off(:)      !! (n_constraint) nearly so: they waited once
-      logical, allocatable :: is_let_go(:)       !! (n_constraint) they pulled where Newton failed
-      real(wp), allocatable :: before(:, :)      !! (n_dim, n_node) first guess of the present set
-      real(wp), allocatable :: first(:, :)       !! (n_dim, n_node) and of the step's first set,
+      logical, allocatable :: is_left_out(:)     !! (n_constraint) cannot act in this step
+      real(wp), allocatable :: first(:, :)       !! (n_dim, n_node) first guess of the step,
       real(wp), allocatable :: driven(:, :)      !! (n_dim, n_node) with the prescribed motion in it
       !> (n_constraint) gap at the start of a step that resolves overclosure where it is closed,
       !> else 0; and the parts of it that are left at the start and the end of the increment.
@@ -113,22 +94,17 @@ contains
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(in) :: system
 
-      if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%tried, &
-         self%comes_and_goes, self%is_dropped, self%is_put_off, self%is_let_go, self%overclosure, &
-         self%closes, self%skip_until, self%is_candidate)
+      if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%is_left_out, &
+         self%overclosure, self%closes, self%skip_until, self%is_candidate)
       allocate(self%closes(system%n_constraint), source=.false.)
       allocate(self%skip_until(size(system%contact)))
       allocate(self%overclosure(system%n_constraint), source=0.0_wp)
       allocate(self%is_active(system%n_constraint), source=.false.)
       allocate(self%is_candidate(system%n_constraint), source=.false.)
-      allocate(self%comes_and_goes(system%n_constraint), source=.false.)
-      allocate(self%is_dropped(system%n_constraint), source=.false.)
-      allocate(self%is_put_off(system%n_constraint), source=.false.)
-      allocate(self%is_let_go(system%n_constraint), source=.false.)
+      allocate(self%is_left_out(system%n_constraint), source=.false.)
       allocate(self%lam(system%n_constraint), source=0.0_wp)
-      allocate(self%tried(system%n_constraint, most_sets), source=.false.)
       call constraints_select(self%set, [integer ::])
-      call friction_init(self%friction, system, most_sets)
+      call friction_init(self%friction, system)
    end subroutine active_set_init
 
    !> With `is_meant` the gaps at x + u that are closed are what the step resolves, else nothing.
@@ -199,19 +175,11 @@ contains
       call contact_support_forget(self%support)
       self%lam = self%lam0
       self%n_newton = 0
-      self%n_tried = 0
       self%n_stale = 0
-      self%n_early = 0
       self%penalty%n_augmentation = 0
       if (self%near_laws%is_on) self%near_laws%is_near = .false.
-      self%only_adds = .false.
-      self%has_cycled = .false.
       self%is_candidate = self%was_active
-      self%one_by_one = .false.
-      self%comes_and_goes = .false.
-      self%is_dropped = .false.
-      self%is_put_off = .false.
-      self%is_let_go = .false.
+      self%is_left_out = .false.
    end subroutine active_set_restart
 
    !> Choose the stencils of a contact for `motion`, and measure it over `du` if that is given.
@@ -302,8 +270,6 @@ contains
       logical :: is_known
       integer :: k, pair, i
 
-      self%n_tried = self%n_tried + 1
-      self%tried(:, self%n_tried) = self%is_active
       if (self%set%n_condition == 0 .and. .not. self%near_laws%is_on) then
          if (.not. any(self%is_active)) return
       end if
@@ -313,7 +279,7 @@ contains
       if (self%near_laws%is_on) then
          call find_near(self, system)
          ! What may open in the solve itself has one law all through the step.
-         self%near_laws%is_held = merge(self%is_candidate, self%is_active, self%is_one_problem)
+         self%near_laws%is_held = self%is_candidate
          call constraints_select(self%set, places_of(self%is_active), &
             places_of(self%near_laws%is_near .and. .not. self%is_active))
          call near_laws_select(self%near_laws, system, self%set)
@@ -325,8 +291,7 @@ contains
          call constraint_index(system, self%set%id(k), pair, i)
          self%set%is_kept(k) = self%set%id(k) <= system%space%linear%n
          if (pair == 0) cycle
-         self%set%is_firm(k) = .not. self%puts_off .or. self%only_adds &
-            .or. self%is_put_off(self%set%id(k))
+         self%set%is_firm(k) = .not. self%puts_off
          associate (gap => system%contact(pair)%contact%state(i))
             self%set%target(k) = self%left(1)*self%overclosure(self%set%id(k)) + gap%closed
             ! What is closed too far is never pushed out: that would make energy.
@@ -340,7 +305,7 @@ contains
          end associate
       end do
       self%set%n_permanent = count(self%set%id(:self%set%n) <= system%first_constraint(1))
-      call friction_select(self%friction, self%set, self%n_tried)
+      call friction_select(self%friction, self%set)
       call penalty_select(self%penalty, system, self%set, self%has_impacts .and. &
          .not. motion%evaluation%pushes_at_end)
    end subroutine active_set_select
@@ -381,59 +346,5 @@ contains
          call pair_measure(system, pair, motion%x, motion%u0, motion%du)
       end do
    end subroutine measure_all
-
-   !> Newton's method has not converged: let go of the contacts that pull in its last iterate, each
-   !> once in a step, and start again with the multipliers and from where it started. `is_done` if
-   !> there are none.
-   pure subroutine active_set_let_go(self, du, is_done)
-      type(active_set_t), intent(inout) :: self
-      real(wp), intent(inout), contiguous :: du(:, :)    !! (n_dim, n_node) [L]
-      logical, intent(out) :: is_done            !! nothing pulls that was not let go before
-      integer :: k
-
-      is_done = .true.
-      if (self%only_adds) return
-      do k = self%set%n_permanent + 1, self%set%n
-         associate (id => self%set%id(k))
-            if (self%is_let_go(id) .or. .not. self%set%lam(k) < 0.0_wp) cycle
-            if (constraints_gives_back(self%set, k)) cycle
-            self%is_let_go(id) = .true.
-            self%is_active(id) = .false.
-            is_done = .false.
-         end associate
-      end do
-      if (is_done) return
-      self%lam = self%lam0
-      self%n_tried = 0
-      du = self%before
-   end subroutine active_set_let_go
-
-   !> Constraints that follow from others nearly, at the places `near` of the set, wait: each comes
-   !> back once its gap closes without it, and then goes before those others.
-   pure subroutine active_set_put_off(self, near)
-      type(active_set_t), intent(inout) :: self
-      integer, intent(in) :: near(:)             !! (any) places in the set, from 1
-
-      self%is_put_off(self%set%id(near)) = .true.
-      self%is_active(self%set%id(near)) = .false.
-      self%n_tried = 0
-   end subroutine active_set_put_off
-
-   !> Constraints that follow from earlier ones do not act in this step. They stand at the places
-   !> `redundant` of the set; of constraints that depend on each other the last ones go. Where rigid
-   !> bodies may need others of them, they come back, one by one.
-   pure subroutine active_set_drop(self, redundant)
-      type(active_set_t), intent(inout) :: self
-      integer, intent(in) :: redundant(:)        !! (any) places in the set, from 1
-
-      if (self%has_rigid .and. .not. self%one_by_one) then
-         self%one_by_one = .true.
-         self%is_active(self%set%id(redundant)) = .false.
-      else
-         self%is_dropped(self%set%id(redundant)) = .true.
-      end if
-      self%is_active = self%is_active .and. .not. self%is_dropped
-      self%n_tried = 0
-   end subroutine active_set_drop
 
 end module emcon_active_set

@@ -11,8 +11,8 @@ module emcon_contact_rounds
    use emcon_active_set, only : active_set_pass, active_set_select, active_set_t, &
       active_set_update_gaps, step_cycling, step_done, &
       step_loose, step_too_far
-   use emcon_active_set_update, only : begins_unseen, gap_noise, gap_to_hold, look_at_active, &
-      look_at_open, most_stale, noise_at
+   use emcon_contact_conditions, only : begins_unseen, gap_noise, gap_to_hold, look_at_active, &
+      look_at_open, noise_at
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_gives_back
    use emcon_contact, only : contact_t
@@ -35,12 +35,14 @@ module emcon_contact_rounds
    use emcon_system, only : system_respond, system_t
    implicit none
    private
-   public :: contact_rounds_solve
+   public :: contact_rounds_solve, contact_rounds_stand
 
    !> Sets that are tried by the null space in one step at most.
    integer, parameter :: most_tried = 6
    !> And rounds with all candidates.
    integer, parameter :: most_rounds = 100
+   !> A step is solved again so often at most because stencils were chosen for another motion.
+   integer, parameter :: most_stale = 3
    !> By so much of the largest push friction may miss its law: what a solve leaves.
    real(wp), parameter :: least_missed = 1.0e4_wp*epsilon(1.0_wp)
 
@@ -69,9 +71,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(candidates_t) :: candidates
 
-      allocate(candidates%takes_part(system%n_constraint), candidates%acts(system%n_constraint), &
-         candidates%has_left(system%n_constraint), candidates%is_back(system%n_constraint), &
-         source=.false.)
+      call make_candidates(candidates, system%n_constraint)
       if (self%penalty%is_on) then
          call solve_by_laws(self, system, newton, motion, candidates, status, error)
          return
@@ -84,6 +84,29 @@ contains
       end if
       call solve_with_all(self, system, newton, motion, candidates, status, error)
    end subroutine contact_rounds_solve
+
+   !> Is the motion that was found without contacts a solution of the step?
+   subroutine contact_rounds_stand(self, system, motion, is_solved, status)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      logical, intent(out) :: is_solved          !! also where `status` is a failure
+      integer, intent(out) :: status             !! one of the `step_` codes
+      type(candidates_t) :: candidates
+
+      call make_candidates(candidates, system%n_constraint)
+      call look(self, system, motion, candidates, status)
+      is_solved = status /= step_done .or. .not. candidates%have_changed
+   end subroutine contact_rounds_stand
+
+   !> None yet.
+   pure subroutine make_candidates(candidates, n)
+      type(candidates_t), intent(out) :: candidates
+      integer, intent(in) :: n                   !! constraints
+
+      allocate(candidates%takes_part(n), candidates%acts(n), candidates%has_left(n), &
+         candidates%is_back(n), source=.false.)
+   end subroutine make_candidates
 
    !> Try sets of candidates by the null space; that settles it unless none stands: then `motion`
    !> has come nearer, or is the first guess.
@@ -205,7 +228,6 @@ contains
       integer :: left
 
       call phase_enter(system%phases, phase_gaps, left)
-      self%n_tried = 0
       call active_set_select(self, system, motion, candidates%is_measured)
       candidates%acts = .false.
       candidates%acts(self%set%id(:self%set%n)) = .true.
@@ -352,7 +374,6 @@ contains
       call phase_enter(system%phases, phase_gaps, left)
       self%is_active = candidates%takes_part
       if (self%friction%is_on) self%friction%law%status = slip_status_t()
-      self%n_tried = 0
       call active_set_select(self, system, motion, candidates%is_measured)
       call phase_leave(system%phases, left)
    end subroutine select_all
@@ -391,7 +412,6 @@ contains
       type(motion_t), intent(inout) :: motion
       type(error_t), allocatable, intent(out) :: error
 
-      self%n_tried = 0
       call active_set_select(self, system, motion, .true.)
       call motion_evaluate(motion)
       call system_respond(system, motion, .false., .true.)
