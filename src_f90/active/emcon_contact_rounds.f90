@@ -139,12 +139,6 @@ contains
             candidates%is_measured = .false.
             return
          end if
-         if (.not. self%has_impacts .and. &
-            largest_motion(motion%du - first) > self%largest_move) then
-            motion%du = first
-            newton%driven = driven
-            return
-         end if
          is_early = status == newton_early
          newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
          self%lam(self%set%id(:self%set%n)) = self%set%lam(:self%set%n)
@@ -154,6 +148,14 @@ contains
          call look(self, system, motion, candidates, status)
          candidates%is_settled = obeys .and. (status /= step_done .or. &
             .not. (candidates%have_changed .or. candidates%one_closes))
+         if (candidates%is_settled .and. status == step_done) return
+         if (.not. self%has_impacts .and. &
+            largest_motion(motion%du - first) > self%largest_move) then
+            motion%du = first
+            newton%driven = driven
+            candidates%is_measured = .false.
+            return
+         end if
          if (candidates%is_settled .or. status /= step_done) return
          call choose(self, system, newton, motion, candidates, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
