@@ -9,15 +9,14 @@ module emcon_active_set_solve
    use emcon_constraints, only : constraint_index
    use emcon_contact_conditions, only : noise_at
    use emcon_contact_rounds, only : contact_rounds_solve
-   use emcon_contact_support, only : contact_support_complete, contact_support_find_free
+   use emcon_contact_support, only : contact_support_find_free
    use emcon_errors, only : error_t
    use emcon_friction, only : friction_holds
-   use emcon_gaps, only : pair_search
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_newton, only : newton_t
    use emcon_scene, only : scene_t
-   use emcon_system, only : system_stiffen, system_t
+   use emcon_system, only : system_t
    implicit none
    private
    public :: active_set_solve
@@ -39,14 +38,8 @@ contains
       self%driven = newton%driven
       is_done = .false.
       do while (.not. is_done)
-         if (self%support%is_needed) then
-            call hold(self, system, scene, newton%driven, motion)
-            status = step_not_held
-            if (allocated(self%support%text)) return
-            call system_stiffen(system, self%support%hangs)
-         end if
-         call contact_rounds_solve(self, system, newton, motion, status, error)
-         if (allocated(error)) return
+         call contact_rounds_solve(self, system, scene, newton, motion, status, error)
+         if (allocated(error) .or. allocated(self%support%text)) return
          if (status == step_done) then
             if (self%support%is_needed) call find_grips(self, system)
             call look_for_free(self, system, scene, motion, status)
@@ -127,24 +120,5 @@ contains
       end do
       call begin_again(self, system, newton, motion)
    end subroutine begin_sharp
-
-   !> Take in what holds the bodies that would be free with the present set. The prescribed motion
-   !> `driven`, which the first correction of Newton's method meets, is left out on the way.
-   subroutine hold(self, system, scene, driven, motion)
-      type(active_set_t), intent(inout) :: self
-      type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
-      real(wp), intent(in), contiguous :: driven(:, :)               !! (n_dim, n_node)
-      type(motion_t), intent(inout) :: motion
-      integer :: pair
-
-      motion%du = motion%du - driven
-      if (self%friction%is_on) self%support%grips = friction_holds(self%friction)
-      call contact_support_complete(self%support, system, scene, motion, self%is_active)
-      motion%du = motion%du + driven
-      do pair = 1, size(system%contact)
-         call pair_search(system, pair, motion)
-      end do
-   end subroutine hold
 
 end module emcon_active_set_solve

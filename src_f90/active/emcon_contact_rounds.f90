@@ -10,7 +10,7 @@
 module emcon_contact_rounds
    use emcon_active_set, only : active_set_pass, active_set_select, active_set_t, &
       active_set_update_gaps, step_cycling, step_done, &
-      step_loose, step_too_far
+      step_loose, step_not_held, step_too_far
    use emcon_contact_conditions, only : begins_unseen, gap_noise, gap_to_hold, look_at_active, &
       look_at_open, noise_at
    use emcon_constraint_rows, only : constraints_rows
@@ -19,10 +19,12 @@ module emcon_contact_rounds
    use emcon_contact_newton, only : contact_newton_solve
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
       contact_problem_solve, contact_problem_status, contact_problem_t
+   use emcon_contact_support, only : contact_support_complete, contact_support_forget
    use emcon_coulomb_law, only : contact_open, coulomb_t, slip_status_t
    use emcon_errors, only : error_t
-   use emcon_friction, only : friction_close, friction_keep, friction_missed, most_lagged, &
-      most_shift
+   use emcon_friction, only : friction_close, friction_holds, friction_keep, friction_missed, friction_turn, &
+      most_lagged, most_shift
+   use emcon_gaps, only : pair_search
    use emcon_kept_factor, only : kept_factor_condense, kept_factor_has_room
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_evaluate, motion_t
@@ -32,7 +34,8 @@ module emcon_contact_rounds
       newton_pick_residual, newton_redundant, newton_solve, newton_t
    use emcon_penalty, only : most_augmentations, penalty_augment
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
-   use emcon_system, only : system_respond, system_t
+   use emcon_scene, only : scene_t
+   use emcon_system, only : system_respond, system_stiffen, system_t
    implicit none
    private
    public :: contact_rounds_solve, contact_rounds_stand
@@ -49,7 +52,8 @@ module emcon_contact_rounds
    !> Who takes part.
    type :: candidates_t
       logical, allocatable :: takes_part(:)      !! (n_constraint)
-      logical, allocatable :: acts(:)            !! (n_constraint) of these, in the present set
+      logical, allocatable :: acts(:)            !! (n_constraint) of these, in the next set,
+      logical, allocatable :: acted(:)           !! (n_constraint) and in that of the last solve
       logical, allocatable :: has_left(:)        !! (n_constraint) it lost its surface,
       logical, allocatable :: is_back(:)         !! (n_constraint) and has come back
       logical :: is_measured = .false.           !! gaps are known for the motion that there is
@@ -62,28 +66,75 @@ module emcon_contact_rounds
 contains
 
    !> Solve the step that has begun; `motion%du` is the first guess and the result.
-   subroutine contact_rounds_solve(self, system, newton, motion, status, error)
+   subroutine contact_rounds_solve(self, system, scene, newton, motion, status, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       type(candidates_t) :: candidates
+      real(wp), dimension(size(motion%du, 1), size(motion%du, 2)) :: first, driven
+      logical :: acts(size(self%is_active))
 
       call make_candidates(candidates, system%n_constraint)
       if (self%penalty%is_on) then
          call solve_by_laws(self, system, newton, motion, candidates, status, error)
          return
-      else if (self%support%is_needed) then
-         call active_set_select(self, system, motion)
-         candidates%takes_part(self%set%id(:self%set%n)) = .true.
-      else
-         call solve_by_sets(self, system, newton, motion, candidates, status, error)
-         if (candidates%is_settled .or. allocated(error) .or. size(system%contact) == 0) return
+      end if
+      acts = self%is_active
+      first = motion%du
+      driven = newton%driven
+      call solve_by_sets(self, system, scene, newton, motion, candidates, status, error)
+      if (candidates%is_settled .or. allocated(error) .or. size(system%contact) == 0) return
+      if (self%support%is_needed .or. (.not. self%has_impacts .and. &
+         largest_motion(motion%du - first) > self%largest_move)) then
+         motion%du = first
+         newton%driven = driven
+         self%is_active = acts
+         if (self%support%is_needed) then
+            call contact_support_forget(self%support)
+            call hold(self, system, scene, newton%driven, motion)
+            call system_stiffen(system, self%support%hangs)
+         end if
+         call begin_again(self, system, motion, candidates)
       end if
       call solve_with_all(self, system, newton, motion, candidates, status, error)
    end subroutine contact_rounds_solve
+
+   !> From `motion`, the first guess, with what acted then.
+   subroutine begin_again(self, system, motion, candidates)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      type(candidates_t), intent(out) :: candidates
+
+      call make_candidates(candidates, system%n_constraint)
+      self%lam = self%lam0
+      if (self%friction%is_on) self%friction%tau = self%friction%tau0
+      call active_set_select(self, system, motion)
+      candidates%takes_part(self%set%id(:self%set%n)) = .true.
+   end subroutine begin_again
+
+   !> Take in what holds the bodies that would be free with the present set. The prescribed motion
+   !> `driven`, which the first correction of Newton's method meets, is left out on the way.
+   subroutine hold(self, system, scene, driven, motion)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in), contiguous :: driven(:, :)               !! (n_dim, n_node)
+      type(motion_t), intent(inout) :: motion
+      integer :: pair
+
+      motion%du = motion%du - driven
+      if (self%friction%is_on) self%support%grips = friction_holds(self%friction)
+      call contact_support_complete(self%support, system, scene, motion, self%is_active)
+      motion%du = motion%du + driven
+      do pair = 1, size(system%contact)
+         call pair_search(system, pair, motion)
+      end do
+   end subroutine hold
 
    !> Is the motion that was found without contacts a solution of the step?
    subroutine contact_rounds_stand(self, system, motion, is_solved, status)
@@ -104,15 +155,16 @@ contains
       type(candidates_t), intent(out) :: candidates
       integer, intent(in) :: n                   !! constraints
 
-      allocate(candidates%takes_part(n), candidates%acts(n), candidates%has_left(n), &
-         candidates%is_back(n), source=.false.)
+      allocate(candidates%takes_part(n), candidates%acts(n), candidates%acted(n), &
+         candidates%has_left(n), candidates%is_back(n), source=.false.)
    end subroutine make_candidates
 
    !> Try sets of candidates by the null space; that settles it unless none stands: then `motion`
    !> has come nearer, or is the first guess.
-   subroutine solve_by_sets(self, system, newton, motion, candidates, status, error)
+   subroutine solve_by_sets(self, system, scene, newton, motion, candidates, status, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
       type(candidates_t), intent(inout) :: candidates
@@ -126,7 +178,11 @@ contains
       driven = newton%driven
       candidates%is_new_set = .true.
       do i = 1, most_tried
-         newton%looks_early = candidates%is_new_set
+         if (self%support%is_needed) call hold(self, system, scene, newton%driven, motion)
+         status = step_not_held
+         candidates%is_settled = allocated(self%support%text)
+         if (candidates%is_settled) return
+         newton%looks_early = candidates%is_new_set .and. .not. self%support%is_needed
          call solve_set(self, system, newton, motion, candidates, status, error)
          if (allocated(error)) return
          if (status == newton_redundant) then
@@ -148,14 +204,6 @@ contains
          call look(self, system, motion, candidates, status)
          candidates%is_settled = obeys .and. (status /= step_done .or. &
             .not. (candidates%have_changed .or. candidates%one_closes))
-         if (candidates%is_settled .and. status == step_done) return
-         if (.not. self%has_impacts .and. &
-            largest_motion(motion%du - first) > self%largest_move) then
-            motion%du = first
-            newton%driven = driven
-            candidates%is_measured = .false.
-            return
-         end if
          if (candidates%is_settled .or. status /= step_done) return
          call choose(self, system, newton, motion, candidates, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
@@ -174,7 +222,7 @@ contains
       type(candidates_t), intent(inout) :: candidates
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      logical :: is_left, is_done, goes_on, before(size(candidates%acts))
+      logical :: is_left, is_done, goes_on
       integer :: i
 
       newton%looks_early = .false.
@@ -190,12 +238,11 @@ contains
          call penalty_augment(self%penalty, self%set, is_done)
          is_left = .not. is_done
          self%lam(self%set%id(:self%set%n)) = self%set%lam(:self%set%n)
-         before = candidates%acts
          call look(self, system, motion, candidates, status)
          if (status /= step_done) return
          call let_go(self, system, candidates)
          self%is_active = candidates%acts
-         is_left = is_left .or. any(before .neqv. candidates%acts)
+         is_left = is_left .or. any(candidates%acted .neqv. candidates%acts)
          if (.not. (is_left .or. candidates%have_changed)) return
          if (self%penalty%n_augmentation > most_augmentations) exit
       end do
@@ -233,6 +280,7 @@ contains
       call active_set_select(self, system, motion, candidates%is_measured)
       candidates%acts = .false.
       candidates%acts(self%set%id(:self%set%n)) = .true.
+      candidates%acted = candidates%acts
       candidates%takes_part = candidates%takes_part .or. candidates%acts
       call phase_leave(system%phases, left)
       call newton_solve(newton, system, self%set, motion, status, error)
@@ -257,30 +305,73 @@ contains
       end do
    end subroutine leave_out
 
-   !> The set that obeys the laws where the step is linearised by the kept factor.
+   !> The next set: that which obeys the laws where the step is linearised, if a kept factor tells it
+   !> without friction; else what pushes, in the way that its trial has, and what closes.
    subroutine choose(self, system, newton, motion, candidates, goes_on, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
       type(candidates_t), intent(inout) :: candidates
-      logical, intent(out) :: goes_on            !! there is such a factor, and such a set
+      logical, intent(out) :: goes_on            !! there is such a set
+      type(error_t), allocatable, intent(out) :: error
+      logical :: turns
+
+      turns = .false.
+      goes_on = newton%factor_policy%is_allowed .and. newton%correction%kept%is_made &
+         .and. .not. self%friction%is_on
+      if (goes_on) then
+         call choose_by_problem(self, system, newton, motion, candidates, goes_on, error)
+         if (allocated(error) .or. .not. goes_on) return
+      else
+         goes_on = .true.
+         call choose_by_trials(self, system, candidates, turns)
+      end if
+      self%is_active = candidates%acts
+      candidates%is_new_set = turns .or. any(candidates%acted .neqv. candidates%acts)
+   end subroutine choose
+
+   !> What pulls goes; what is friction turns as its trial has it.
+   subroutine choose_by_trials(self, system, candidates, turns)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(candidates_t), intent(inout) :: candidates
+      logical, intent(out) :: turns
+      integer :: k, pair, i
+
+      turns = .false.
+      do k = self%set%n_permanent + 1, self%set%n
+         associate (id => self%set%id(k))
+            call constraint_index(system, id, pair, i)
+            candidates%acts(id) = candidates%acts(id) .and. self%set%lam(k) >= &
+               -noise_at(self, system, system%contact(pair)%contact%node(i))
+            if (self%support%is_needed .and. .not. candidates%acts(id)) &
+               self%support%has_pulled(id) = .true.
+            if (candidates%acts(id) .and. self%friction%is_on) call friction_turn(self%friction, &
+               system, self%set, k, turns)
+         end associate
+      end do
+   end subroutine choose_by_trials
+
+   !> The contacts condensed by the kept factor, and the laws solved there.
+   subroutine choose_by_problem(self, system, newton, motion, candidates, is_solved, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      type(candidates_t), intent(inout) :: candidates
+      logical, intent(out) :: is_solved
       type(error_t), allocatable, intent(out) :: error
       type(contact_problem_t) :: problem
       type(contact_effort_t) :: effort
       type(slip_status_t), allocatable :: status(:)
       real(wp), allocatable :: force(:, :)
-      logical :: before(size(candidates%acts))
 
-      before = candidates%acts
-      candidates%is_new_set = .false.
-      goes_on = newton%factor_policy%is_allowed .and. newton%correction%kept%is_made
-      if (.not. goes_on) return
       call select_all(self, system, motion, candidates)
       associate (set => self%set)
-         goes_on = set%n_permanent == 0 .and. set%n > 0 .and. set%n_condition == set%n .and. &
+         is_solved = set%n_permanent == 0 .and. set%n > 0 .and. set%n_condition == set%n .and. &
             kept_factor_has_room(newton%correction%kept, set%n, size(system%matrix%column))
-         if (.not. goes_on) return
+         if (.not. is_solved) return
          call constraints_evaluate(set, system, motion, .true.)
          call constraints_rows(set, system%space%numbering)
          call newton_pick_residual(newton, system, set)
@@ -290,15 +381,13 @@ contains
             problem%free(0, :), error)
          if (allocated(error)) return
          force(0, :) = set%lam(:set%n)
-         call contact_problem_solve(problem, force, effort, goes_on)
-         if (.not. goes_on) return
+         call contact_problem_solve(problem, force, effort, is_solved)
+         if (.not. is_solved) return
          self%lam(set%id) = force(0, :)
          status = contact_problem_status(problem, force)
          candidates%acts(set%id) = status%kind /= contact_open
       end associate
-      self%is_active = candidates%acts
-      candidates%is_new_set = any(before .neqv. candidates%acts)
-   end subroutine choose
+   end subroutine choose_by_problem
 
    !> Do all contacts of the set push, and is friction as its law says?
    pure logical function obeys_laws(self, system)
@@ -505,7 +594,7 @@ contains
                   contact%state(i)%slip_shift > most_shift
             else if (has_closed(self, contact, i, id)) then
                candidates%one_closes = .true.
-               candidates%acts(id) = self%penalty%is_on
+               candidates%acts(id) = .true.
             end if
          end do
       end associate
@@ -544,7 +633,7 @@ contains
             contact%state(i)%gap1 - gap_to_hold(self, contact%state(i), id), &
             .not. self%is_candidate(id))
          candidates%takes_part(id) = .true.
-         candidates%acts(id) = self%penalty%is_on
+         candidates%acts(id) = .true.
          candidates%have_changed = .true.
          self%is_candidate(id) = .true.
       end associate

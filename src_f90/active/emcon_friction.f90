@@ -17,7 +17,7 @@ module emcon_friction
    implicit none
    private
    public :: friction_t, friction_init, friction_begin, friction_select, friction_keep, &
-      friction_close, friction_missed, friction_holds, friction_stiffness
+      friction_close, friction_turn, friction_missed, friction_holds, friction_stiffness
 
    !> So much of the friction of a contact may act on another node than its push, and a step is
    !> solved again so often at most for more.
@@ -193,6 +193,30 @@ contains
          if (law%status%kind == contact_open) law%status%kind = contact_sticks
       end associate
    end subroutine friction_close
+
+   !> The way of contact `k` of the set, which acts and goes on to do so, by the trial that what
+   !> solves the step makes.
+   pure subroutine friction_turn(self, system, set, k, turns)
+      type(friction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(in) :: k                   !! > n_permanent
+      logical, intent(inout) :: turns            !! becomes true if it is another one than before
+      type(contact_trial_t) :: at
+      type(slip_status_t) :: next
+
+      associate (item => set%item(k), law => self%law(set%id(k)))
+         if (.not. law%mu > 0.0_wp) return
+         at = contact_trial_t(item%normal*set%lam(k), 0.0_wp, condition_friction(item, &
+            set%lam(k)), item%slip, law%slip_target, slip_rounding*item%size)
+         ! Where slip is held the solution has no other, but for round-off.
+         if (law%holds_slip()) at%slip = law%slip_held()
+         next = coulomb_status(at, law%mu, friction_stiffness(system, item))
+         turns = turns .or. next%kind /= law%status%kind .or. &
+            dot_product(next%direction, law%status%direction) < 0.0_wp
+         law%status = next
+      end associate
+   end subroutine friction_turn
 
    !> How far the laws of contact and friction are missed at worst, and the largest push.
    pure subroutine friction_missed(self, system, set, missed, largest)
