@@ -306,7 +306,7 @@ contains
    end subroutine leave_out
 
    !> The next set: that which obeys the laws where the step is linearised, if a kept factor tells it
-   !> without friction; else what pushes, in the way that its trial has, and what closes.
+   !> without friction; in statics what pushes, in the way that its trial has, and what closes.
    subroutine choose(self, system, newton, motion, candidates, goes_on, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -324,7 +324,8 @@ contains
          call choose_by_problem(self, system, newton, motion, candidates, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
       else
-         goes_on = .true.
+         goes_on = .not. self%has_impacts
+         if (.not. goes_on) return
          call choose_by_trials(self, system, candidates, turns)
       end if
       self%is_active = candidates%acts
