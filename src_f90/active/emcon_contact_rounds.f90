@@ -30,7 +30,7 @@ module emcon_contact_rounds
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_motion_bound, only : largest_motion
    use emcon_near_laws, only : near_laws_are_none, near_laws_update
-   use emcon_newton, only : newton_converged, newton_early, newton_measure_forces, &
+   use emcon_newton, only : newton_converged, newton_diverged, newton_early, newton_measure_forces, &
       newton_pick_residual, newton_redundant, newton_solve, newton_t
    use emcon_penalty, only : most_augmentations, penalty_augment
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
@@ -40,8 +40,8 @@ module emcon_contact_rounds
    private
    public :: contact_rounds_solve, contact_rounds_stand
 
-   !> Sets that are tried by the null space in one step at most.
-   integer, parameter :: most_tried = 6
+   !> Sets that are tried by the null space in one step at most, and in statics.
+   integer, parameter :: most_tried = 6, most_in_statics = 20
    !> And rounds with all candidates.
    integer, parameter :: most_rounds = 100
    !> A step is solved again so often at most because stencils were chosen for another motion.
@@ -170,18 +170,18 @@ contains
       type(candidates_t), intent(inout) :: candidates
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      real(wp), dimension(size(motion%du, 1), size(motion%du, 2)) :: first, driven
+      real(wp), dimension(size(motion%du, 1), size(motion%du, 2)) :: before, driven
       logical :: goes_on, is_early, obeys
       integer :: i
 
-      first = motion%du
       driven = newton%driven
       candidates%is_new_set = .true.
-      do i = 1, most_tried
+      do i = 1, merge(most_tried, most_in_statics, self%has_impacts)
          if (self%support%is_needed) call hold(self, system, scene, newton%driven, motion)
          status = step_not_held
          candidates%is_settled = allocated(self%support%text)
          if (candidates%is_settled) return
+         before = motion%du
          newton%looks_early = candidates%is_new_set .and. .not. self%support%is_needed
          call solve_set(self, system, newton, motion, candidates, status, error)
          if (allocated(error)) return
@@ -190,13 +190,17 @@ contains
             if (goes_on) cycle
             return
          else if (.not. any(status == [newton_converged, newton_early])) then
-            motion%du = first
+            motion%du = before
             newton%driven = driven
             candidates%is_measured = .false.
+            goes_on = status == newton_diverged .and. .not. self%has_impacts
+            if (goes_on) call let_go_alone(self, goes_on)
+            if (goes_on) cycle
             return
          end if
          is_early = status == newton_early
          newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
+         driven = 0.0_wp
          self%lam(self%set%id(:self%set%n)) = self%set%lam(:self%set%n)
          call friction_keep(self%friction, self%set)
          obeys = .not. is_early
@@ -211,6 +215,20 @@ contains
          if (.not. (candidates%is_new_set .or. is_early .or. self%is_stale)) return
       end do
    end subroutine solve_by_sets
+
+   !> Newton's method has not converged: what pulls in its last iterate goes. `goes_on` if some does.
+   pure subroutine let_go_alone(self, goes_on)
+      type(active_set_t), intent(inout) :: self
+      logical, intent(out) :: goes_on
+      integer :: k
+
+      goes_on = .false.
+      do k = self%set%n_permanent + 1, self%set%n
+         if (.not. self%set%lam(k) < 0.0_wp) cycle
+         self%is_active(self%set%id(k)) = .false.
+         goes_on = .true.
+      end do
+   end subroutine let_go_alone
 
    !> Solve with contacts that give way: those act that push, until the step stands on them. With an
    !> augmented Lagrangian also until nothing is left of their gaps.

@@ -212,6 +212,8 @@ contains
          ! Where slip is held the solution has no other, but for round-off.
          if (law%holds_slip()) at%slip = law%slip_held()
          next = coulomb_status(at, law%mu, friction_stiffness(system, item))
+         ! What nothing pushes goes on as it was.
+         if (next%kind == contact_open) return
          turns = turns .or. next%kind /= law%status%kind .or. &
             dot_product(next%direction, law%status%direction) < 0.0_wp
          law%status = next
