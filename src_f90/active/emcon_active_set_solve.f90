@@ -5,7 +5,8 @@
 !> is found the step is tried with sharp convex corners before it is cut. Source: docs/theory.md,
 !> section 6.
 module emcon_active_set_solve
-   use emcon_active_set, only : active_set_restart, active_set_t, step_done, step_not_held
+   use emcon_active_set, only : active_set_restart, active_set_t, step_cycling, step_diverged, &
+      step_done, step_not_held
    use emcon_constraints, only : constraint_index
    use emcon_contact_conditions, only : noise_at
    use emcon_contact_rounds, only : contact_rounds_solve
@@ -47,7 +48,28 @@ contains
          end if
          call begin_sharp(self, system, newton, motion, is_done)
       end do
+      if (self%support%is_needed .and. any(status == [step_diverged, step_cycling])) &
+         call look_for_slide(self, system, scene, motion, status)
    end subroutine active_set_solve
+
+   !> No state of equilibrium was found: does something move along contacts that slide, under a load?
+   subroutine look_for_slide(self, system, scene, motion, status)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(motion_t), intent(in) :: motion
+      integer, intent(inout) :: status           !! becomes `step_not_held` if so
+      logical :: is_held
+
+      if (.not. self%friction%is_on) return
+      call find_grips(self, system)
+      call contact_support_find_free(self%support, system, scene, motion, self%is_active, is_held)
+      if (is_held .or. .not. self%support%is_pushed) then
+         if (allocated(self%support%text)) deallocate(self%support%text)
+      else
+         status = step_not_held
+      end if
+   end subroutine look_for_slide
 
    !> Begin the step again.
    subroutine begin_again(self, system, newton, motion)

@@ -83,7 +83,7 @@ contains
       self%is_static = evaluation_is_equilibrium(motion%evaluation)
       call iterate(self, newton, system, set, motion, status, error)
       call condensation_free(self%condensation)
-      if (allocated(error) .or. .not. any(status == [newton_converged, newton_early])) return
+      if (allocated(error)) return
       do k = 1, size(law)
          law(k)%status = self%status(k)
       end do

@@ -14,7 +14,8 @@ module emcon_contact_rounds
    use emcon_contact_conditions, only : begins_unseen, gap_noise, gap_to_hold, look_at_active, &
       look_at_open, noise_at
    use emcon_constraint_rows, only : constraints_rows
-   use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_gives_back
+   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate, &
+      constraints_gives_back
    use emcon_contact, only : contact_t
    use emcon_contact_newton, only : contact_newton_solve
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
@@ -32,6 +33,7 @@ module emcon_contact_rounds
    use emcon_near_laws, only : near_laws_are_none, near_laws_update
    use emcon_newton, only : newton_converged, newton_diverged, newton_early, newton_measure_forces, &
       newton_pick_residual, newton_redundant, newton_solve, newton_t
+   use emcon_numbering, only : numbering_holds
    use emcon_penalty, only : most_augmentations, penalty_augment
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_scene, only : scene_t
@@ -319,9 +321,30 @@ contains
          if (redundant(k) > self%set%n) cycle
          id = self%set%id(redundant(k))
          if (redundant(k) <= self%set%n_permanent) candidates%takes_part(id) = .false.
+         if (is_bound(self%set, redundant(k))) call exclude(self, candidates, id)
          self%is_active(id) = .false.
       end do
    end subroutine leave_out
+
+   !> Is nothing in row `k` of the set free to move?
+   pure logical function is_bound(set, k)
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(in) :: k
+
+      is_bound = set%force_rows%row_start(k) == set%force_rows%row_start(k + 1)
+   end function is_bound
+
+   !> Contact `id` cannot act in this step.
+   pure subroutine exclude(self, candidates, id)
+      type(active_set_t), intent(inout) :: self
+      type(candidates_t), intent(inout) :: candidates
+      integer, intent(in) :: id
+
+      self%is_left_out(id) = .true.
+      self%is_active(id) = .false.
+      candidates%takes_part(id) = .false.
+      candidates%acts(id) = .false.
+   end subroutine exclude
 
    !> The next set: that which obeys the laws where the step is linearised, if a kept factor tells it
    !> without friction; in statics what pushes, in the way that its trial has, and what closes.
@@ -461,9 +484,9 @@ contains
             if (status /= step_done) return
             cycle
          end if
+         call keep(self, law, candidates)
          if (status /= newton_converged) return
          newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
-         call keep(self, law, candidates)
          ! Before stencils are chosen anew: the step was solved with these.
          call finish(self, system, newton, motion, error)
          if (allocated(error)) return
@@ -478,15 +501,40 @@ contains
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
-      type(candidates_t), intent(in) :: candidates
+      type(candidates_t), intent(inout) :: candidates
       integer :: left
 
       call phase_enter(system%phases, phase_gaps, left)
-      self%is_active = candidates%takes_part
       if (self%friction%is_on) self%friction%law%status = slip_status_t()
+      self%is_active = candidates%takes_part
       call active_set_select(self, system, motion, candidates%is_measured)
+      call exclude_bound(self, system, motion, candidates)
       call phase_leave(system%phases, left)
    end subroutine select_all
+
+   !> Contacts in which nothing is free to move are no candidates: no force closes them.
+   subroutine exclude_bound(self, system, motion, candidates)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      type(candidates_t), intent(inout) :: candidates
+      logical :: may_be(self%set%n)
+      integer :: k, pair, i
+
+      may_be = .false.
+      do k = self%set%n_permanent + 1, self%set%n
+         call constraint_index(system, self%set%id(k), pair, i)
+         may_be(k) = numbering_holds(system%space%numbering, system%contact(pair)%contact%node(i))
+      end do
+      if (.not. any(may_be)) return
+      call constraints_evaluate(self%set, system, motion, .true.)
+      call constraints_rows(self%set, system%space%numbering)
+      do k = self%set%n_permanent + 1, self%set%n
+         may_be(k) = may_be(k) .and. is_bound(self%set, k)
+         if (may_be(k)) call exclude(self, candidates, self%set%id(k))
+      end do
+      if (any(may_be)) call active_set_select(self, system, motion, candidates%is_measured)
+   end subroutine exclude_bound
 
    !> Multipliers and ways of the candidates: what is not open acts.
    subroutine keep(self, law, candidates)

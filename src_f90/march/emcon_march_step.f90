@@ -119,7 +119,11 @@ contains
             self%motion, status, error)
          if (allocated(error)) return
          increment%n_newton = increment%n_newton + self%active%n_newton
-         if (.not. any(status == [step_refused, step_diverged, step_singular])) exit
+         ! Where contacts are at play the guess may lie on the other side of one.
+         is_done = .not. any(status == [step_refused, step_diverged, step_singular])
+         if (.not. any(self%active%is_candidate)) is_done = status /= step_refused .or. &
+            self%active%n_newton > 0
+         if (is_done) exit
       end do
    end subroutine solve
 
