@@ -2,6 +2,7 @@
 !> Which they are in the end: emcon_contact_rounds.
 module emcon_active_set
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_select
+   use emcon_contact, only : gap_state_t
    use emcon_contact_support, only : contact_support_forget, contact_support_t
    use emcon_near_laws, only : near_laws_are_none, near_laws_select, near_laws_t, near_laws_update
    use emcon_evaluation, only : evaluation_is_equilibrium
@@ -267,7 +268,7 @@ contains
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       logical, intent(in), optional :: is_measured   !! as the gaps were when last looked at
-      logical :: is_known
+      logical :: is_known, is_kept
       integer :: k, pair, i
 
       if (self%set%n_condition == 0 .and. .not. self%near_laws%is_on) then
@@ -292,23 +293,36 @@ contains
          self%set%is_kept(k) = self%set%id(k) <= system%space%linear%n
          if (pair == 0) cycle
          self%set%is_firm(k) = .not. self%puts_off
-         associate (gap => system%contact(pair)%contact%state(i))
-            self%set%target(k) = self%left(1)*self%overclosure(self%set%id(k)) + gap%closed
-            ! What is closed too far is never pushed out: that would make energy.
-            self%set%is_kept(k) = (self%holds_gap .and. .not. self%closes(self%set%id(k))) .or. &
-               (.not. self%pushes_out .and. &
-               gap%gap0 < self%set%target(k) - touch_tol*gap%size)
-            if (self%penalty%is_on .and. .not. self%penalty%augments) then
-               self%set%is_kept(k) = .false.
-            end if
-            if (self%set%is_kept(k)) self%set%target(k) = gap%gap0
-         end associate
+         call find_target(self, system%contact(pair)%contact%state(i), self%set%id(k), &
+            self%set%target(k), self%set%is_kept(k))
+      end do
+      do k = self%set%n + 1, self%set%n_condition
+         if (.not. self%is_candidate(self%set%id(k))) cycle
+         call constraint_index(system, self%set%id(k), pair, i)
+         call find_target(self, system%contact(pair)%contact%state(i), self%set%id(k), &
+            self%set%target(k), is_kept)
       end do
       self%set%n_permanent = count(self%set%id(:self%set%n) <= system%first_constraint(1))
       call friction_select(self%friction, self%set)
       call penalty_select(self%penalty, system, self%set, self%has_impacts .and. &
          .not. motion%evaluation%pushes_at_end)
    end subroutine active_set_select
+
+   !> The mean gap that contact `id` holds where it acts; `is_kept` if that is the gap of the start.
+   pure subroutine find_target(self, gap, id, target, is_kept)
+      type(active_set_t), intent(in) :: self
+      type(gap_state_t), intent(in) :: gap
+      integer, intent(in) :: id                  !! number over all pairs
+      real(wp), intent(out) :: target            !! [L]
+      logical, intent(out) :: is_kept
+
+      target = self%left(1)*self%overclosure(id) + gap%closed
+      ! What is closed too far is never pushed out: that would make energy.
+      is_kept = (self%holds_gap .and. .not. self%closes(id)) .or. &
+         (.not. self%pushes_out .and. gap%gap0 < target - touch_tol*gap%size)
+      if (self%penalty%is_on .and. .not. self%penalty%augments) is_kept = .false.
+      if (is_kept) target = gap%gap0
+   end subroutine find_target
 
    !> Where a list is true.
    pure function places_of(is_meant) result(place)
