@@ -20,7 +20,7 @@ module emcon_active_set
    private
    public :: active_set_t, active_set_init, active_set_suit, active_set_overclosure, &
       active_set_begin, active_set_restart, active_set_select, active_set_update_gaps
-   public :: active_set_pass, touch_tol
+   public :: active_set_pass, candidates_t, candidates_clear, touch_tol
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
       step_stands_off, step_not_held, step_overlaps, step_unbalanced, step_rough, step_strikes, &
       step_passes_event, step_loose
@@ -43,6 +43,21 @@ module emcon_active_set
       logical :: passes = .false.                !! nothing comes near: see `active_set_pass`
    end type skip_until_t
 
+   !> Who takes part in a step.
+   type :: candidates_t
+      logical, allocatable :: takes_part(:)      !! (n_constraint)
+      logical, allocatable :: acts(:)            !! (n_constraint) of these, in the next set,
+      logical, allocatable :: acted(:)           !! (n_constraint) in that of the last solve,
+      logical, allocatable :: began(:)           !! (n_constraint) and in the first one
+      logical, allocatable :: has_left(:)        !! (n_constraint) it lost its surface,
+      logical, allocatable :: is_back(:)         !! (n_constraint) and has come back
+      logical :: is_measured = .false.           !! gaps are known for the motion that there is
+      logical :: have_changed = .false.          !! solve the step again
+      logical :: is_settled = .false.            !! the step is solved, or cannot be
+      logical :: one_closes = .false.            !! that does not act
+      logical :: is_new_set = .false.            !! others act than in the set before
+   end type candidates_t
+
    type :: active_set_t
       logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start,
       logical, allocatable :: closes(:)          !! (n_constraint) but here: its node has no mass
@@ -63,9 +78,11 @@ module emcon_active_set
       logical :: may_cut = .true.                !! the step may be tried in smaller parts
       logical, allocatable :: is_candidate(:)    !! (n_constraint) acted at the start of the step,
                                                  !! or has closed in it
+      type(candidates_t) :: candidates           !! of emcon_contact_rounds
       logical, allocatable :: is_left_out(:)     !! (n_constraint) cannot act in this step
       real(wp), allocatable :: first(:, :)       !! (n_dim, n_node) first guess of the step,
-      real(wp), allocatable :: driven(:, :)      !! (n_dim, n_node) with the prescribed motion in it
+      real(wp), allocatable :: driven(:, :)      !! (n_dim, n_node) the prescribed motion in it,
+      real(wp), allocatable :: before(:, :)      !! (n_dim, n_node) and that of the present set
       !> (n_constraint) gap at the start of a step that resolves overclosure where it is closed,
       !> else 0; and the parts of it that are left at the start and the end of the increment.
       real(wp), allocatable :: overclosure(:)
@@ -103,10 +120,31 @@ contains
       allocate(self%is_active(system%n_constraint), source=.false.)
       allocate(self%is_candidate(system%n_constraint), source=.false.)
       allocate(self%is_left_out(system%n_constraint), source=.false.)
+      self%candidates = candidates_t()
+      associate (own => self%candidates, n => system%n_constraint)
+         allocate(own%takes_part(n), own%acts(n), own%acted(n), own%began(n), own%has_left(n), &
+            own%is_back(n), source=.false.)
+      end associate
       allocate(self%lam(system%n_constraint), source=0.0_wp)
       call constraints_select(self%set, [integer ::])
       call friction_init(self%friction, system)
    end subroutine active_set_init
+
+   !> None takes part yet.
+   pure subroutine candidates_clear(self)
+      type(candidates_t), intent(inout) :: self
+
+      self%takes_part = .false.
+      self%acts = .false.
+      self%acted = .false.
+      self%has_left = .false.
+      self%is_back = .false.
+      self%is_measured = .false.
+      self%have_changed = .false.
+      self%is_settled = .false.
+      self%one_closes = .false.
+      self%is_new_set = .false.
+   end subroutine candidates_clear
 
    !> With `is_meant` the gaps at x + u that are closed are what the step resolves, else nothing.
    subroutine active_set_overclosure(self, system, x, u, is_meant)

@@ -337,6 +337,7 @@ contains
          if (len(motion) > 0) then
             call holders_text(self%system, size(scene%x, 2), holders)
             text = text // "; without " // holders // " " // motion
+            if (slides(self)) text = text // "; friction is at its limit at contacts that slide"
          end if
       end if
       if (evaluation_has_inertia(self%motion%evaluation) &
