@@ -65,6 +65,9 @@ contains
 
       call candidates_clear(self%candidates)
       if (self%penalty%is_on) then
+         if (self%support%is_needed) call hold(self, system, scene, newton%driven, motion)
+         status = step_not_held
+         if (allocated(self%support%text)) return
          call solve_by_laws(self, system, newton, motion, status, error)
          return
       end if
