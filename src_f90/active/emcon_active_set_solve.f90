@@ -52,7 +52,7 @@ contains
          call look_for_slide(self, system, scene, motion, status)
    end subroutine active_set_solve
 
-   !> No state of equilibrium was found: does something move along contacts that slide, under a load?
+   !> No state of equilibrium was found: does a load move something along contacts that slide?
    subroutine look_for_slide(self, system, scene, motion, status)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system

@@ -1,0 +1,265 @@
+!> The candidates of a step: which contacts take part, solved with those that act, and looked at.
+!>
+!> They are what acted at the start of the step and what closes in it; they only grow within a step,
+!> but for those that lose their surface, which come back once at most. Source: docs/theory.md,
+!> section 6.
+module emcon_contact_candidates
+   use emcon_active_set, only : active_set_pass, active_set_select, active_set_t, &
+      active_set_update_gaps, step_done, step_too_far
+   use emcon_constraint_rows, only : constraints_rows
+   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate
+   use emcon_contact, only : contact_t
+   use emcon_contact_conditions, only : begins_unseen, gap_noise, gap_to_hold, look_at_active, &
+      look_at_open
+   use emcon_coulomb_law, only : slip_status_t
+   use emcon_errors, only : error_t
+   use emcon_friction, only : friction_close, friction_keep, most_lagged, most_shift
+   use emcon_kinds, only : wp
+   use emcon_motion, only : motion_t
+   use emcon_near_laws, only : near_laws_are_none, near_laws_update
+   use emcon_newton, only : newton_solve, newton_t
+   use emcon_numbering, only : numbering_holds
+   use emcon_phases, only : phase_enter, phase_gaps, phase_leave
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: candidates_select, candidates_solve, &
+      candidates_look, candidates_leave_out, candidates_keep_forces
+
+   !> A step is solved again so often at most because stencils were chosen for another motion.
+   integer, parameter :: most_stale = 3
+
+contains
+
+   !> All candidates act for now, and hold their slips.
+   subroutine candidates_select(self, system, motion)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      integer :: left
+
+      call phase_enter(system%phases, phase_gaps, left)
+      if (self%friction%is_on) self%friction%law%status = slip_status_t()
+      self%is_active = self%candidates%takes_part
+      call active_set_select(self, system, motion, self%candidates%is_measured)
+      call exclude_bound(self, system, motion)
+      call phase_leave(system%phases, left)
+   end subroutine candidates_select
+
+   !> Contacts in which nothing is free to move are no candidates: no force closes them.
+   subroutine exclude_bound(self, system, motion)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      logical :: may_be(self%set%n)
+      integer :: k, pair, i
+
+      may_be = .false.
+      do k = self%set%n_permanent + 1, self%set%n
+         call constraint_index(system, self%set%id(k), pair, i)
+         may_be(k) = numbering_holds(system%space%numbering, system%contact(pair)%contact%node(i))
+      end do
+      if (.not. any(may_be)) return
+      call constraints_evaluate(self%set, system, motion, .true.)
+      call constraints_rows(self%set, system%space%numbering)
+      do k = self%set%n_permanent + 1, self%set%n
+         may_be(k) = may_be(k) .and. is_bound(self%set, k)
+         if (may_be(k)) call exclude(self, self%set%id(k))
+      end do
+      if (any(may_be)) call active_set_select(self, system, motion, self%candidates%is_measured)
+   end subroutine exclude_bound
+
+   !> Solve with what acts.
+   subroutine candidates_solve(self, system, newton, motion, status, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status             !! one of the `newton_` codes
+      type(error_t), allocatable, intent(out) :: error
+      integer :: k, left
+
+      call phase_enter(system%phases, phase_gaps, left)
+      call active_set_select(self, system, motion, self%candidates%is_measured)
+      self%candidates%acts = .false.
+      do k = 1, self%set%n
+         self%candidates%acts(self%set%id(k)) = .true.
+         self%candidates%takes_part(self%set%id(k)) = .true.
+      end do
+      self%candidates%acted(:) = self%candidates%acts
+      call phase_leave(system%phases, left)
+      call newton_solve(newton, system, self%set, motion, status, error)
+      self%n_newton = self%n_newton + newton%convergence%n_iteration
+   end subroutine candidates_solve
+
+   !> Multipliers and friction of the set, by the numbers of its contacts.
+   pure subroutine candidates_keep_forces(self)
+      type(active_set_t), intent(inout) :: self
+      integer :: k
+
+      do k = 1, self%set%n
+         self%lam(self%set%id(k)) = self%set%lam(k)
+      end do
+      call friction_keep(self%friction, self%set)
+   end subroutine candidates_keep_forces
+
+   !> What follows from others waits: rows of gaps do, and of what always holds for the whole step.
+   !> `goes_on` if these are all.
+   pure subroutine candidates_leave_out(self, redundant, goes_on)
+      type(active_set_t), intent(inout) :: self
+      integer, intent(in) :: redundant(:)        !! (any) rows of the set, from 1
+      logical, intent(out) :: goes_on
+      integer :: k, id
+
+      goes_on = all(redundant <= self%set%n)
+      do k = 1, size(redundant)
+         if (redundant(k) > self%set%n) cycle
+         id = self%set%id(redundant(k))
+         if (redundant(k) <= self%set%n_permanent) self%candidates%takes_part(id) = .false.
+         if (is_bound(self%set, redundant(k))) call exclude(self, id)
+         self%is_active(id) = .false.
+      end do
+   end subroutine candidates_leave_out
+
+   !> Is nothing in row `k` of the set free to move?
+   pure logical function is_bound(set, k)
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(in) :: k
+
+      is_bound = set%force_rows%row_start(k) == set%force_rows%row_start(k + 1)
+   end function is_bound
+
+   !> Contact `id` cannot act in this step.
+   pure subroutine exclude(self, id)
+      type(active_set_t), intent(inout) :: self
+      integer, intent(in) :: id
+
+      self%is_left_out(id) = .true.
+      self%is_active(id) = .false.
+      self%candidates%takes_part(id) = .false.
+      self%candidates%acts(id) = .false.
+   end subroutine exclude
+
+   !> Measure all gaps for the motion. Who joins, who has lost its surface, who closes although it
+   !> does not act, which stencils were chosen for another motion?
+   subroutine candidates_look(self, system, motion, status)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      integer, intent(out) :: status             !! one of the `step_` codes
+      integer :: pair, k, left
+
+      call phase_enter(system%phases, phase_gaps, left)
+      status = step_done
+      self%candidates%have_changed = .false.
+      self%candidates%one_closes = .false.
+      self%candidates%is_measured = .true.
+      self%is_stale = .false.
+      self%friction%lags = .false.
+      k = self%set%n_permanent
+      call active_set_pass(self, system, motion)
+      do pair = 1, size(system%contact)
+         associate (first => system%first_constraint(pair) + 1, &
+               last => system%first_constraint(pair + 1))
+            if (self%skip_until(pair)%passes .and. &
+               .not. any(self%candidates%takes_part(first:last))) cycle
+            call active_set_update_gaps(self, system, pair, motion, motion%du)
+            if (.not. near_laws_are_none(self%near_laws, system%contact(pair)%contact)) &
+               call near_laws_update(self%near_laws, system, pair, self%candidates%acts, &
+               self%candidates%have_changed)
+            call look_at_pair(self, system, pair, motion, k, status)
+         end associate
+      end do
+      call phase_leave(system%phases, left)
+      if (status /= step_done) return
+      if (self%is_stale) then
+         self%n_stale = self%n_stale + 1
+         if (self%n_stale > most_stale) status = step_too_far
+         self%candidates%have_changed = .true.
+      else if (self%friction%lags .and. .not. self%candidates%have_changed) then
+         self%friction%n_lagged = self%friction%n_lagged + 1
+         self%candidates%have_changed = self%friction%n_lagged <= most_lagged
+      end if
+   end subroutine candidates_look
+
+   !> The conditions of one contact.
+   subroutine look_at_pair(self, system, pair, motion, k, status)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      integer, intent(in) :: pair
+      type(motion_t), intent(in) :: motion
+      integer, intent(inout) :: k                !! places of the set that were looked at
+      integer, intent(inout) :: status
+      logical :: acts
+      integer :: i, id
+
+      associate (contact => system%contact(pair)%contact, friction => self%friction)
+         do i = 1, contact%n_constraint
+            id = system%first_constraint(pair) + i
+            if (.not. self%candidates%takes_part(id)) then
+               call join(self, system, pair, i, motion, status)
+               cycle
+            end if
+            acts = self%candidates%acts(id)
+            if (acts) k = k + 1
+            if (contact%state(i)%is_leaving) then
+               self%candidates%takes_part(id) = .false.
+               self%candidates%has_left(id) = .true.
+               self%candidates%acts(id) = .false.
+               self%is_active(id) = .false.
+               self%candidates%have_changed = .true.
+            else if (acts) then
+               call look_at_active(self, contact, i, k, motion, status)
+               if (.not. self%was_active(id)) then
+                  if (begins_unseen(self, contact, i, motion)) status = step_too_far
+               end if
+               if (.not. friction%is_on) cycle
+               if (friction%law(id)%mu > 0.0_wp) friction%lags = friction%lags .or. &
+                  contact%state(i)%slip_shift > most_shift
+            else if (has_closed(self, contact, i, id)) then
+               self%candidates%one_closes = .true.
+               self%candidates%acts(id) = .true.
+            end if
+         end do
+      end associate
+   end subroutine look_at_pair
+
+   !> Has the `i`-th constraint of `contact`, a candidate that does not act, closed below its gap?
+   pure logical function has_closed(self, contact, i, id)
+      type(active_set_t), intent(in) :: self
+      class(contact_t), intent(in) :: contact
+      integer, intent(in) :: i, id
+
+      associate (gap => contact%state(i))
+         has_closed = gap%is_near .and. gap%is_over .and. &
+            gap%gap1 - gap_to_hold(self, gap, id) < -gap_noise*gap%size
+      end associate
+   end function has_closed
+
+   !> Does the `i`-th constraint of a pair, which is no candidate, close?
+   subroutine join(self, system, pair, i, motion, status)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      integer, intent(in) :: pair, i
+      type(motion_t), intent(in) :: motion
+      integer, intent(inout) :: status           !! a failure where it cannot
+      logical :: closes
+
+      associate (contact => system%contact(pair)%contact, id => system%first_constraint(pair) + i)
+         if (contact%state(i)%is_leaving) return
+         call look_at_open(self, contact, i, id, closes, status)
+         ! What the pairs take in may hold the bodies away from their guards.
+         if (.not. closes .or. (contact%slack > 0.0_wp .and. self%candidates%have_changed)) return
+         if (self%candidates%has_left(id) .and. self%candidates%is_back(id)) status = step_too_far
+         self%candidates%is_back(id) = self%candidates%has_left(id)
+         if (self%friction%is_on) call friction_close(self%friction, system, pair, i, motion, &
+            contact%state(i)%gap1 - gap_to_hold(self, contact%state(i), id), &
+            .not. self%is_candidate(id))
+         self%candidates%takes_part(id) = .true.
+         self%candidates%acts(id) = .true.
+         self%candidates%have_changed = .true.
+         self%is_candidate(id) = .true.
+      end associate
+   end subroutine join
+
+end module emcon_contact_candidates

@@ -1,0 +1,285 @@
+!> A step solved by sets of its candidates, one after the other, beginning with what acted before:
+!> in most steps nothing else acts.
+!>
+!> What is found is checked: all that acts pushes, friction obeys its law, no candidate closes.
+!> Where that fails the contacts are condensed by the kept factor, and their problem tells the next
+!> set; in statics trials of single contacts do. Contacts that give way are solved by sets alone.
+!> Source: docs/theory.md, section 6.
+module emcon_contact_sets
+   use emcon_active_set, only : active_set_t, step_cycling, step_done, step_loose, step_not_held
+   use emcon_constraint_rows, only : constraints_rows
+   use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_gives_back
+   use emcon_contact_candidates, only : candidates_keep_forces, candidates_leave_out, &
+      candidates_look, candidates_select, candidates_solve
+   use emcon_contact_conditions, only : noise_at
+   use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
+      contact_problem_solve, contact_problem_status, contact_problem_t
+   use emcon_contact_support, only : contact_support_complete
+   use emcon_coulomb_law, only : contact_open, slip_status_t
+   use emcon_errors, only : error_t
+   use emcon_friction, only : friction_holds, friction_missed, friction_turn
+   use emcon_gaps, only : pair_search
+   use emcon_kept_factor, only : kept_factor_condense, kept_factor_has_room
+   use emcon_kinds, only : wp
+   use emcon_motion, only : motion_t
+   use emcon_newton, only : newton_converged, newton_diverged, newton_early, &
+      newton_pick_residual, newton_redundant, newton_t
+   use emcon_penalty, only : most_augmentations, penalty_augment
+   use emcon_scene, only : scene_t
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: contact_sets_solve, contact_sets_solve_by_laws, contact_sets_hold
+
+   !> Sets that are tried by the null space in one step at most, and in statics.
+   integer, parameter :: most_tried = 6, most_in_statics = 20
+   !> By so much of the largest push friction may miss its law: what a solve leaves.
+   real(wp), parameter :: least_missed = 1.0e4_wp*epsilon(1.0_wp)
+   !> Rounds with contacts that give way at most.
+   integer, parameter :: most_rounds = 100
+
+contains
+
+   !> Try sets of candidates by the null space; that settles it unless none stands: then `motion`
+   !> has come nearer, or is the first guess.
+   subroutine contact_sets_solve(self, system, scene, newton, motion, status, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status             !! one of the `step_` codes
+      type(error_t), allocatable, intent(out) :: error
+      logical :: goes_on, is_early, is_driven, obeys
+      integer :: i
+
+      is_driven = .true.
+      self%candidates%is_new_set = .true.
+      do i = 1, merge(most_tried, most_in_statics, self%has_impacts)
+         if (self%support%is_needed) call contact_sets_hold(self, system, scene, newton%driven, &
+            motion)
+         status = step_not_held
+         self%candidates%is_settled = allocated(self%support%text)
+         if (self%candidates%is_settled) return
+         self%before = motion%du
+         newton%looks_early = self%candidates%is_new_set .and. .not. self%support%is_needed
+         call candidates_solve(self, system, newton, motion, status, error)
+         if (allocated(error)) return
+         if (status == newton_redundant) then
+            call candidates_leave_out(self, newton%correction%redundant, goes_on)
+            if (goes_on) cycle
+            return
+         else if (.not. any(status == [newton_converged, newton_early])) then
+            self%candidates%is_measured = .false.
+            goes_on = status == newton_diverged .and. .not. self%has_impacts
+            if (goes_on) call let_go_alone(self, goes_on)
+            if (goes_on) then
+               motion%du = self%before
+               if (is_driven) newton%driven = self%driven
+               cycle
+            end if
+            motion%du = self%first
+            newton%driven = self%driven
+            return
+         end if
+         is_early = status == newton_early
+         newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
+         is_driven = .false.
+         call candidates_keep_forces(self)
+         obeys = .not. is_early
+         if (obeys) obeys = obeys_laws(self, system)
+         call candidates_look(self, system, motion, status)
+         self%candidates%is_settled = obeys .and. (status /= step_done .or. &
+            .not. (self%candidates%have_changed .or. self%candidates%one_closes))
+         if (self%candidates%is_settled .or. status /= step_done) return
+         call choose(self, system, newton, motion, goes_on, error)
+         if (allocated(error) .or. .not. goes_on) return
+         ! The same set again: where it was left before its end, or has other stencils.
+         if (.not. (self%candidates%is_new_set .or. is_early .or. self%is_stale)) return
+      end do
+   end subroutine contact_sets_solve
+
+   !> Take in what holds the bodies that would be free with the present set. The prescribed motion
+   !> `driven`, which the first correction of Newton's method meets, is left out on the way.
+   subroutine contact_sets_hold(self, system, scene, driven, motion)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in), contiguous :: driven(:, :)               !! (n_dim, n_node)
+      type(motion_t), intent(inout) :: motion
+      integer :: pair
+
+      motion%du = motion%du - driven
+      if (self%friction%is_on) self%support%grips = friction_holds(self%friction)
+      call contact_support_complete(self%support, system, scene, motion, self%is_active)
+      motion%du = motion%du + driven
+      do pair = 1, size(system%contact)
+         call pair_search(system, pair, motion)
+      end do
+   end subroutine contact_sets_hold
+
+   !> Newton's method has not converged: what pulls in its last iterate goes. `goes_on`: some does.
+   pure subroutine let_go_alone(self, goes_on)
+      type(active_set_t), intent(inout) :: self
+      logical, intent(out) :: goes_on
+      integer :: k
+
+      goes_on = .false.
+      do k = self%set%n_permanent + 1, self%set%n
+         if (.not. self%set%lam(k) < 0.0_wp) cycle
+         self%is_active(self%set%id(k)) = .false.
+         goes_on = .true.
+      end do
+   end subroutine let_go_alone
+
+   !> The next set: that which obeys the laws where the step is linearised, if a kept factor tells
+   !> it without friction; in statics what pushes, in the way that its trial has, and what closes.
+   subroutine choose(self, system, newton, motion, goes_on, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      logical, intent(out) :: goes_on            !! there is such a set
+      type(error_t), allocatable, intent(out) :: error
+      logical :: turns
+
+      turns = .false.
+      goes_on = newton%factor_policy%is_allowed .and. newton%correction%kept%is_made &
+         .and. .not. self%friction%is_on
+      if (goes_on) then
+         call choose_by_problem(self, system, newton, motion, goes_on, error)
+         if (allocated(error) .or. .not. goes_on) return
+      else
+         goes_on = .not. self%has_impacts
+         if (.not. goes_on) return
+         call choose_by_trials(self, system, turns)
+      end if
+      self%is_active = self%candidates%acts
+      self%candidates%is_new_set = turns .or. any(self%candidates%acted .neqv. self%candidates%acts)
+   end subroutine choose
+
+   !> What pulls goes; what is friction turns as its trial has it.
+   subroutine choose_by_trials(self, system, turns)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      logical, intent(out) :: turns
+      integer :: k, pair, i
+
+      turns = .false.
+      do k = self%set%n_permanent + 1, self%set%n
+         associate (id => self%set%id(k))
+            call constraint_index(system, id, pair, i)
+            self%candidates%acts(id) = self%candidates%acts(id) .and. self%set%lam(k) >= &
+               -noise_at(self, system, system%contact(pair)%contact%node(i))
+            if (self%support%is_needed .and. .not. self%candidates%acts(id)) &
+               self%support%has_pulled(id) = .true.
+            if (self%candidates%acts(id) .and. self%friction%is_on) call friction_turn( &
+               self%friction, system, self%set, k, turns)
+         end associate
+      end do
+   end subroutine choose_by_trials
+
+   !> The contacts condensed by the kept factor, and the laws solved there.
+   subroutine choose_by_problem(self, system, newton, motion, is_solved, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      logical, intent(out) :: is_solved
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_problem_t) :: problem
+      type(contact_effort_t) :: effort
+      type(slip_status_t), allocatable :: status(:)
+      real(wp), allocatable :: force(:, :)
+
+      call candidates_select(self, system, motion)
+      associate (set => self%set)
+         is_solved = set%n_permanent == 0 .and. set%n > 0 .and. set%n_condition == set%n .and. &
+            kept_factor_has_room(newton%correction%kept, set%n, size(system%matrix%column))
+         if (.not. is_solved) return
+         call constraints_evaluate(set, system, motion, .true.)
+         call constraints_rows(set, system%space%numbering)
+         call newton_pick_residual(newton, system, set)
+         call contact_problem_create(problem, 0, set%n)
+         allocate(force(0:0, set%n))
+         call kept_factor_condense(newton%correction%kept, set, newton%residual, problem%w, &
+            problem%free(0, :), error)
+         if (allocated(error)) return
+         force(0, :) = set%lam(:set%n)
+         call contact_problem_solve(problem, force, effort, is_solved)
+         if (.not. is_solved) return
+         self%lam(set%id) = force(0, :)
+         status = contact_problem_status(problem, force)
+         self%candidates%acts(set%id) = status%kind /= contact_open
+      end associate
+   end subroutine choose_by_problem
+
+   !> Do all contacts of the set push, and is friction as its law says?
+   pure logical function obeys_laws(self, system)
+      type(active_set_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      real(wp) :: missed, largest
+      integer :: k, pair, i
+
+      obeys_laws = .true.
+      do k = self%set%n_permanent + 1, self%set%n
+         call constraint_index(system, self%set%id(k), pair, i)
+         obeys_laws = obeys_laws .and. self%set%lam(k) >= -noise_at(self, system, &
+            system%contact(pair)%contact%node(i))
+      end do
+      call friction_missed(self%friction, system, self%set, missed, largest)
+      obeys_laws = obeys_laws .and. missed <= least_missed*largest
+   end function obeys_laws
+
+   !> Solve with contacts that give way: those act that push, until the step stands on them. With an
+   !> augmented Lagrangian also until nothing is left of their gaps.
+   subroutine contact_sets_solve_by_laws(self, system, newton, motion, status, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status             !! one of the `step_` codes
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_left, is_done, goes_on
+      integer :: i
+
+      newton%looks_early = .false.
+      do i = 1, most_rounds
+         call candidates_solve(self, system, newton, motion, status, error)
+         if (allocated(error)) return
+         if (status == newton_redundant) then
+            call candidates_leave_out(self, newton%correction%redundant, goes_on)
+            if (goes_on) cycle
+         end if
+         if (status /= newton_converged .or. self%penalty%is_at_ends) return
+         newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
+         call penalty_augment(self%penalty, self%set, is_done)
+         is_left = .not. is_done
+         call candidates_keep_forces(self)
+         call candidates_look(self, system, motion, status)
+         if (status /= step_done) return
+         call let_go(self, system)
+         self%is_active = self%candidates%acts
+         is_left = is_left .or. any(self%candidates%acted .neqv. self%candidates%acts)
+         if (.not. (is_left .or. self%candidates%have_changed)) return
+         if (self%penalty%n_augmentation > most_augmentations) exit
+      end do
+      status = merge(step_loose, step_cycling, self%penalty%n_augmentation > most_augmentations)
+   end subroutine contact_sets_solve_by_laws
+
+   !> What pulls acts no more, unless it gives back what it stores.
+   subroutine let_go(self, system)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      integer :: k, pair, i
+
+      do k = self%set%n_permanent + 1, self%set%n
+         associate (id => self%set%id(k))
+            call constraint_index(system, id, pair, i)
+            self%candidates%acts(id) = self%set%lam(k) >= -noise_at(self, system, &
+               system%contact(pair)%contact%node(i)) .or. constraints_gives_back(self%set, k)
+         end associate
+      end do
+   end subroutine let_go
+
+end module emcon_contact_sets
