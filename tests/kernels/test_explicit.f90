@@ -18,6 +18,7 @@ module test_explicit
    use emcon_scheme_registry, only : scheme_row
    use emcon_penalty_law, only : penalty_t
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_t
+   use emcon_stepper_free, only : stepper_set_state
    use emcon_steps, only : load_point, load_t, method_penalty
    use emcon_system, only : mass_times, system_t, system_tangent_times
    use emcon_term_registry, only : terms_mass_values
@@ -51,7 +52,9 @@ contains
          test_case_t("a block that penalties stop", test_drop), &
          test_case_t("closed contacts are met in a step", test_met), &
          test_case_t("the element that ends the run is named", test_squeezed), &
+         test_case_t("the critical step is looked at now and then", test_looked_at), &
          test_case_t("central differences in a well, in closed form", test_well), &
+         test_case_t("what is put elsewhere starts from there", test_put), &
          test_case_t("nothing that vibrates", test_loose), &
          test_case_t("round a centre: what a potential stores is no growth", test_centre), &
          test_case_t("a force that begins at rest, on nodes that are linked", test_linked), &
@@ -356,6 +359,51 @@ contains
       call march_free(march)
    end subroutine test_squeezed
 
+   !> After 200 increments of the step: at rest the critical step of a free block is the one of its
+   !> start. Of a step below the bound by elements nothing is found anew.
+   subroutine test_looked_at(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: unknown = 100.0_wp
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(march_t) :: march
+      type(increment_t) :: increment
+      real(wp) :: bound, sharp
+      integer :: k, element
+      logical :: is_bounded
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      scene%x(1, [3, 6]) = scene%x(1, [3, 6]) - 0.25_wp
+      call add_step(scene, .false., h, 400)
+      scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      if (allocated(error)) return
+      call critical_bound(march%system, march%explicit%place, spread(0.0_wp, 1, 6), bound, element, &
+         is_bounded)
+      call check_near(error, march%state%explicit%critical_h, bound, 0.0_wp, 1.0_wp, "the bound")
+      call critical_sharp(march%system, march%explicit%place, spread(0.0_wp, 1, 6), sharp, error)
+      if (.not. allocated(error)) call check_true(error, sharp > 1.01_wp*bound, "a larger one")
+      do k = 1, 4
+         if (allocated(error)) return
+         scene%step(1)%time%h = merge(0.5_wp*(bound + sharp), 0.9_wp*bound, k /= 2)
+         march%state%clock%increment = 200
+         march%state%clock%n_before = 0
+         if (k == 3) march%state%clock%n_before = 200
+         if (k == 4) march%state%clock%increment = 201
+         march%state%explicit%critical_h = unknown
+         march%state%explicit%critical_element = 0
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         associate (found => march%state%explicit)
+            call check_near(error, found%critical_h, merge(sharp, unknown, k == 1), 1.0e-6_wp, &
+               sharp, "the critical step")
+            call check_equal(error, found%critical_element, merge(element, 0, k == 1), "of which")
+         end associate
+      end do
+      call march_free(march)
+   end subroutine test_looked_at
+
    !> A mass point at (1, 0) with the velocity (0, v) in a well about the origin.
    subroutine open_well(stepper, well, v, h, n, error)
       type(stepper_t), intent(inout) :: stepper
@@ -395,6 +443,7 @@ contains
          if (allocated(error)) return
          call stepper_advance(stepper, increment, error)
          if (allocated(error)) return
+         call check_equal(error, increment%n_newton, 0, "nothing is solved")
          associate (state => stepper%march%state, ledger => stepper%march%ledger, &
                x => [cos(i*phi), v*h/sin(phi)*sin(i*phi)], &
                rate => [-sin(i*phi)*sin(phi)/h, v*cos(i*phi)])
@@ -408,12 +457,37 @@ contains
       call stepper_close(stepper)
    end subroutine test_well
 
+   !> After three increments at (2, 0), at rest: x = 2 cos(phi) of each increment from there on.
+   subroutine test_put(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: k = 2.0_wp, h = 0.3_wp
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      type(well_t) :: well
+      integer :: i
+
+      well%k = k
+      well%n_variable = 2
+      call open_well(stepper, well, 0.5_wp, h, 20, error)
+      do i = -2, 5
+         if (i == 1 .and. .not. allocated(error)) call stepper_set_state(stepper, error, &
+            u=reshape([1.0_wp, 0.0_wp], [2, 1]), v=reshape([0.0_wp, 0.0_wp], [2, 1]))
+         if (.not. allocated(error)) call stepper_advance(stepper, increment, error)
+         if (allocated(error)) return
+         if (i > 0) call check_near(error, stepper%march%state%u(1, 1), 2.0_wp*cos(real(i, wp) &
+            *acos(1.0_wp - 0.5_wp*k*h**2)) - 1.0_wp, 256.0_wp*eps, 1.0_wp, "places")
+      end do
+      call stepper_close(stepper)
+   end subroutine test_put
+
    !> Without a force there is no critical step.
    subroutine test_loose(error)
       type(error_t), allocatable, intent(out) :: error
       type(stepper_t) :: stepper
       type(well_t) :: well
-      real(wp) :: limit
+      real(wp) :: limit, bound
+      integer :: element
+      logical :: is_bounded
 
       well%k = 0.0_wp
       well%n_variable = 2
@@ -423,8 +497,12 @@ contains
       call critical_sharp(stepper%march%system, stepper%march%explicit%place, [0.0_wp], limit, &
          error)
       if (allocated(error)) return
-      call check_near(error, [limit, stepper%march%state%explicit%critical_h]/huge(limit), &
-         [1.0_wp, 1.0_wp], 0.0_wp, 1.0_wp, "as large as can be")
+      bound = 7.0_wp
+      call critical_bound(stepper%march%system, stepper%march%explicit%place, [0.0_wp], bound, &
+         element, is_bounded)
+      call check_near(error, [limit, bound, stepper%march%state%explicit%critical_h]/huge(limit), &
+         spread(1.0_wp, 1, 3), 0.0_wp, 1.0_wp, "as large as can be")
+      call check_true(error, element == 0 .and. .not. is_bounded, "what is given has no element")
       call stepper_close(stepper)
    end subroutine test_loose
 
