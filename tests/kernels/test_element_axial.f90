@@ -44,6 +44,7 @@ contains
          test_case_t("tangent against differences", test_tangent), &
          test_case_t("patch: energy and work of a uniform strain", test_patch), &
          test_case_t("a motion along the axis costs nothing", test_along), &
+         test_case_t("pressed to nothing, in the plane or around the axis", test_pressed), &
          test_case_t("rank", test_rank), &
          test_case_t("mass and centre are those of the ring", test_mass), &
          test_case_t("pressure: work on a closed section", test_pressure), &
@@ -180,6 +181,52 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_step
+
+   !> A motion that leaves the part `left` of one length at the point next to the axis: along the axis,
+   !> along the radius or of the circle, and all of the others there. With a law of the volume its square has to be
+   !> more than 64 roundings; the other way round it is inverted.
+   subroutine test_pressed(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: left(4) = [4.0_wp, 16.0_wp, -4.0_wp, -16.0_wp]*sqrt(eps)
+      type(sample_t) :: sample
+      type(space_part_t) :: part
+      real(wp) :: u(2, m), zero(2, m), r
+      integer :: law, way, k
+
+      zero = 0.0_wp
+      do law = 1, 3, 2
+         call make_sample(1, law, .true., 0.0_wp, sample, error)
+         if (allocated(error)) return
+         associate (x => sample%x, n => sample%n)
+            r = 1.0_wp/maxval(sum(sample%solid%geometry(1)%circle(:n, :), 1))
+            do way = 1, 3
+               do k = 1, size(left)
+                  u = 0.0_wp
+                  select case (way)
+                  case (1)
+                     u(2, :n) = (left(k) - 1.0_wp)*x(2, :n)
+                  case (2)
+                     u(1, :n) = (left(k) - 1.0_wp)*(x(1, :n) - r)
+                  case default
+                     u(1, :n) = (left(k) - 1.0_wp)*r
+                  end select
+                  call respond(sample, 0.5_wp*u, 0.5_wp*u, .false., part)
+                  call check_true(error, part%is_inverted .eqv. (left(k) < 0.0_wp .or. k == 1 &
+                     .and. law == 3), sample%what // ", way " // to_text(way) // ", case " &
+                     // to_text(k))
+                  call respond(sample, zero, 0.5_wp*u, .false., part)
+                  call check_true(error, .not. part%is_inverted, "half of it")
+               end do
+            end do
+            do k = 1, 2
+               u = 0.0_wp
+               u(k, :n) = huge(1.0_wp)**0.11_wp*x(k, :n)
+               call respond(sample, zero, u, .false., part)
+               call check_true(error, part%is_inverted, "beyond what energies can be told of")
+            end do
+         end associate
+      end do
+   end subroutine test_pressed
 
    !> Central differences over four points, of step h = eps^(0.3)/4: an error of order h^4 =
    !> eps^(1.2)/256 and one of eps/h = 4 eps^(0.7). Yeoh's (J - 1)^6 bends over longer steps.

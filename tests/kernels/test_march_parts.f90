@@ -113,8 +113,9 @@ contains
          call check_near(error, [stepper%march%state%clock%time, stepper%march%state%u(1, 1), &
             increment%h, increment%done], [2.0_wp*k, real(k, wp), 2.0_wp, 2.0_wp], &
             16.0_wp*epsilon(1.0_wp), 4.0_wp, "a whole one")
-         call check_equal(error, [writer%n, increment%n_cut, increment%notes%n], [n_tried(k), &
-            n_cut(k), n_cut(k)], "tried and cut")
+         call check_equal(error, [writer%n, increment%n_cut, increment%notes%n, &
+            stepper%march%state%clock%n_easy], [n_tried(k), n_cut(k), n_cut(k), merge(1, 0, &
+            k == 1)], "tried, cut, and easy ones in a row")
          call check_equal(error, writer%part(:writer%n), [(i, i = 1, writer%n)], "counted")
          call check_equal(error, writer%increment(:writer%n), spread(k, 1, writer%n), "increment")
          if (k /= 2 .or. allocated(error)) cycle
