@@ -16,7 +16,9 @@ module test_march_parts
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_t
    use emcon_stepper_user, only : stepper_give_force
-   use emcon_steps, only : initiation_persistent, initiation_velocity_update, method_penalty
+   use emcon_steps, only : initiation_massless, initiation_persistent, initiation_velocity_update, &
+      method_penalty
+   use emcon_scheme_registry, only : scheme_row
    use emcon_text, only : to_text
    use given_scenes, only : given_eps, make_line, open_given
    use small_scenes, only : add_step, block_t, clamp, make_two_blocks, prescribe
@@ -27,8 +29,8 @@ module test_march_parts
    !> Energies and forces of the size 10 and 100, after two dozen steps.
    real(wp), parameter :: tol = 1.0e5_wp*given_eps
    !> How blocks touch: NTS and friction, mortar and velocity updates, impacts that keep a part,
-   !> penalties, in statics.
-   integer, parameter :: n_kind = 5
+   !> penalties, in statics, in explicit steps, without mass.
+   integer, parameter :: n_kind = 7, kind_static = 5, kind_explicit = 6
    !> The way that a node is driven over all increments.
    real(wp), parameter :: drive = 0.02_wp
 
@@ -36,7 +38,7 @@ module test_march_parts
    type, extends(host_force_t) :: gate_t
       integer :: node = 1
       real(wp) :: wall = 0.0_wp, longest = 0.0_wp
-      logical :: is_static = .false.             !! ways are from where it was asked last
+      logical :: is_at_rest = .false.            !! ways are from where it was asked last
       real(wp) :: last = 0.0_wp
    contains
       procedure :: respond => gate_respond
@@ -70,7 +72,7 @@ contains
       type(force_response_t), intent(inout) :: response
 
       associate (i => self%node, place => u0(1, self%node) + du(1, self%node))
-         if (place > self%wall .and. merge(place - self%last, du(1, i), self%is_static) &
+         if (place > self%wall .and. merge(place - self%last, du(1, i), self%is_at_rest) &
             > self%longest) then
             response%status = host_outside
          else
@@ -229,7 +231,7 @@ contains
       logical :: is_static
       integer :: i
 
-      is_static = kind == n_kind
+      is_static = kind == kind_static
       associate (scene => stepper%scene)
          call make_two_blocks(scene, merge(0.0_wp, 0.03_wp, is_static), lower, upper)
          call add_step(scene, is_static, h, n)
@@ -246,9 +248,14 @@ contains
             case (3)
                scene%pair(1)%interaction%restitution = 0.25_wp
             case (4)
-               scene%pair(1)%interaction%friction = 0.0_wp
                contact%method = method_penalty
+            case (kind_explicit)
+               contact%method = method_penalty
+               scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+            case (7)
+               contact%initiation = initiation_massless
             end select
+            if (contact%method == method_penalty) scene%pair(1)%interaction%friction = 0.0_wp
          end associate
          scene%amplitude = [amplitude_t(name="RAMP", time=[0.0_wp, n*h], value=[0.0_wp, 1.0_wp])]
          if (.not. is_static) then
@@ -266,7 +273,7 @@ contains
       gate%name = "GATE"
       gate%node = 10
       gate%longest = longest
-      gate%is_static = is_static
+      gate%is_at_rest = is_static .or. kind == kind_explicit
       call csr_from_elements(gate%pattern, 32, [1, 3], [19, 20], slot, error)
       if (.not. allocated(error)) call stepper_give_force(stepper, gate, error)
       if (.not. allocated(error)) call stepper_build(stepper, error)
@@ -276,7 +283,7 @@ contains
    subroutine test_pieces(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: n = 12
-      real(wp), parameter :: h = 0.02_wp
+      real(wp), parameter :: h = 0.015_wp
       type(stepper_t) :: whole, half
       type(increment_t) :: one, two(2)
       type(pair_sum_t) :: sum(2)
@@ -298,9 +305,9 @@ contains
             call check_equal(error, [one%n_cut, two%n_cut], [1, 0, 0], "cuts of kind " // to_text(kind) // " in " // to_text(k))
             call compare_states(error, whole%march%state, half%march%state, "kind " &
                // to_text(kind) // ", increment " // to_text(k))
-            call compare_increments(error, one, two, kind == n_kind)
+            call compare_increments(error, one, two, kind == kind_static)
             if (.not. allocated(error)) call compare_sums(error, whole%march%state%sums%sum(1), &
-               sum, kind == n_kind)
+               sum, kind == kind_static)
             if (.not. allocated(error)) call compare_ledgers(error, whole%march%ledger, &
                half%march%ledger)
             if (allocated(error)) return
