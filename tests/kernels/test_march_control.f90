@@ -2,6 +2,7 @@
 module test_march_control
    use, intrinsic :: iso_fortran_env, only : int64
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
+   use emcon_amplitudes, only : amplitude_t
    use emcon_errors, only : err_analysis, error_t
    use emcon_kinds, only : dp, wp
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
@@ -10,13 +11,13 @@ module test_march_control
    use emcon_scene, only : scene_t
    use emcon_step_control, only : why_error, why_event, why_newton
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_t
-   use emcon_steps, only : initiation_persistent
+   use emcon_steps, only : initiation_persistent, load_point, load_t
    use emcon_system, only : mass_times
    use emcon_text, only : to_text
    use given_hosts, only : chain_host_init, chain_host_t
    use given_scenes, only : make_line, open_given
-   use small_scenes, only : add_block, add_step, block_t, clamp, make_block, make_two_blocks, &
-      prescribe
+   use small_scenes, only : add_block, add_load, add_step, block_t, clamp, make_block, &
+      make_two_blocks, prescribe
    implicit none
    private
    public :: collect_march_control
@@ -67,15 +68,24 @@ contains
    end subroutine begin
 
    !> Each increment is what time goes on by, all of it done, a power of two of that of the deck,
-   !> the first one two of these; the energy stays, and each solve that was given up is counted.
+   !> the first one two of these; the energy stays, the momentum is what a force that grows with time
+   !> has given, and each solve that was given up is counted.
    subroutine test_counts(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: tolerance(2) = [1.0_wp, 1.0e-4_wp]
+      real(wp), parameter :: tolerance(2) = [1.0_wp, 1.0e-4_wp], pull = 3.0_wp
       type(scene_t) :: scene
+      type(load_t) :: load
       integer :: k
 
       do k = 1, 2
          call make_spin(scene, tolerance(k), 60)
+         scene%amplitude = [amplitude_t(name="GROWTH", time=[0.0_wp, n*h], value=[0.0_wp, n*h])]
+         load%kind = load_point
+         load%target = 3
+         load%place = 1
+         load%value = pull
+         load%amplitude = 1
+         call add_load(scene%step(1), load)
          call run()
          if (allocated(error)) return
       end do
@@ -85,12 +95,13 @@ contains
       subroutine run()
          type(march_t) :: march
          type(increment_t) :: increment
-         real(wp) :: before, total, part
+         real(wp) :: before, total, part, momentum(2)
          integer :: n_increment, n_cut
 
          call begin(scene, march, error)
          if (allocated(error)) return
          total = march%ledger%total
+         momentum = march%ledger%momentum
          n_increment = 0
          n_cut = 0
          do while (.not. march_is_done(march))
@@ -107,6 +118,8 @@ contains
             if (n_increment == 1) part = 0.5_wp*part
             call check_near(error, fraction(part), 0.5_wp, 16.0_wp*eps, 1.0_wp, "power of two")
             call check_near(error, march%ledger%total, total, 1.0e3_wp*eps, total, "energy")
+            call check_near(error, march%ledger%momentum, momentum &
+               + [0.5_wp*pull*march%state%clock%time**2, 0.0_wp], 1.0e3_wp*eps, 4.0_wp, "momentum")
          end do
          associate (control => march%state%control)
             call check_near(error, march%state%clock%time, n*h, 0.0_wp, 1.0_wp, "end")

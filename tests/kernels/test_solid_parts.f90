@@ -427,7 +427,7 @@ contains
          call draw_random(size)
          size = largest*(0.5_wp + size)
          do i = 1, 3
-            strain(i, i) = size(i)
+            strain(i, i) = merge(size(i), -size(i), mod(draw, 4) < 2)
          end do
          f(4, 1, 1) = size(4)
          f(5, 2, 1) = size(5)
