@@ -6,7 +6,7 @@ module test_march_control
    use emcon_errors, only : err_analysis, error_t
    use emcon_kinds, only : dp, wp
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
-      march_is_done, march_t
+      march_is_done, march_resume, march_t
    use emcon_rigid_bodies, only : rigid_frame_choose
    use emcon_scene, only : scene_t
    use emcon_step_control, only : why_error, why_event, why_newton
@@ -69,7 +69,8 @@ contains
 
    !> Each increment is what time goes on by, all of it done, a power of two of that of the deck,
    !> the first one two of these; the energy stays, the momentum is what a force that grows with time
-   !> has given, and each solve that was given up is counted.
+   !> has given, and each solve that was given up is counted. Nothing changes where the step is taken up
+   !> again between increments.
    subroutine test_counts(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: tolerance(2) = [1.0_wp, 1.0e-4_wp], pull = 3.0_wp
@@ -96,10 +97,11 @@ contains
          type(march_t) :: march
          type(increment_t) :: increment
          real(wp) :: before, total, part, momentum(2)
-         integer :: n_increment, n_cut
+         integer :: n_increment, n_cut, n_between
 
          call begin(scene, march, error)
          if (allocated(error)) return
+         n_between = 0
          total = march%ledger%total
          momentum = march%ledger%momentum
          n_increment = 0
@@ -118,6 +120,12 @@ contains
             if (n_increment == 1) part = 0.5_wp*part
             call check_near(error, fraction(part), 0.5_wp, 16.0_wp*eps, 1.0_wp, "power of two")
             call check_near(error, march%ledger%total, total, 1.0e3_wp*eps, total, "energy")
+            if (mod(n_increment, 2) == 1 .and. .not. allocated(error)) call march_resume(march, &
+               scene, error)
+            if (allocated(error)) return
+            call check_near(error, [march%state%clock%step_time, march%ledger%total], &
+               [march%state%clock%time, total], 1.0e3_wp*eps, total, "taken up again")
+            n_between = n_between + merge(1, 0, march%state%clock%n_part > 0)
             call check_near(error, march%ledger%momentum, momentum &
                + [0.5_wp*pull*march%state%clock%time**2, 0.0_wp], 1.0e3_wp*eps, 4.0_wp, "momentum")
          end do
@@ -129,6 +137,7 @@ contains
             call check_equal(error, control%n_over, 0, "all as asked for")
             call check_true(error, n_cut > 0 .eqv. k == 2, "cuts: " // to_text(n_cut))
             call check_true(error, (n_increment > n) .eqv. k == 2, "of " // to_text(n_increment))
+            call check_true(error, (n_between > 0) .eqv. k == 2, "between points of the grid")
          end associate
          call march_free(march)
       end subroutine run
