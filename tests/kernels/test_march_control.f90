@@ -16,6 +16,7 @@ module test_march_control
    use emcon_text, only : to_text
    use given_hosts, only : chain_host_init, chain_host_t
    use given_scenes, only : make_line, open_given
+   use linear_scenes, only : add_equation
    use small_scenes, only : add_block, add_load, add_step, block_t, clamp, make_block, &
       make_two_blocks, prescribe
    implicit none
@@ -34,6 +35,7 @@ contains
       tests = [ &
          test_case_t("sizes, times and counts of a stretched block that spins", test_counts), &
          test_case_t("the error of increments, by their forces", test_error), &
+         test_case_t("the error of what equations link", test_linked), &
          test_case_t("masses that errors are weighed by", test_masses), &
          test_case_t("an event is found by the velocities", test_event), &
          test_case_t("solves that take long", test_slow), &
@@ -225,6 +227,42 @@ contains
       end function error_of
 
    end subroutine test_error
+
+   !> Two halves of a block whose nodes move alike have the errors of the block.
+   subroutine test_linked(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: of_half(8) = [1, 2, 4, 5, 2, 3, 5, 6]
+      type(scene_t) :: scene, halves
+      type(block_t) :: block
+      type(march_t) :: march, other
+      type(increment_t) :: increment, as_well
+      integer :: i, a
+
+      call make_spin(scene, 1.0e-3_wp, 60)
+      call make_block(halves, "CPE4", [1, 1], block)
+      call add_block(halves, "CPE4", [1, 1], [1.0_wp, 0.0_wp], [1.0_wp, 1.0_wp], block)
+      do a = 1, 2
+         call add_equation(halves, [5, 2], [a, a], [1.0_wp, -1.0_wp])
+         call add_equation(halves, [7, 4], [a, a], [1.0_wp, -1.0_wp])
+      end do
+      halves%step = scene%step
+      halves%v0 = scene%v0(:, of_half)
+      call begin(scene, march, error)
+      if (.not. allocated(error)) call begin(halves, other, error)
+      do i = 1, 8
+         if (allocated(error)) return
+         call march_increment(march, scene, increment, error)
+         if (.not. allocated(error)) call march_increment(other, halves, as_well, error)
+         if (allocated(error)) return
+         call check_near(error, other%state%u, march%state%u(:, of_half), 1.0e4_wp*eps, 1.0_wp, &
+            "displacements")
+         call check_near(error, as_well%h, increment%h, 4.0_wp*eps, 1.0_wp, "sizes")
+         call check_near(error, other%step_check%ratio, march%step_check%ratio, 1.0e7_wp*eps, &
+            1.0_wp, "errors")
+      end do
+      call march_free(march)
+      call march_free(other)
+   end subroutine test_linked
 
    !> Sums of rows where nodes move freely; none of supports and of a rigid body.
    subroutine test_masses(error)
