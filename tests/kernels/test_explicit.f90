@@ -19,7 +19,7 @@ module test_explicit
    use emcon_penalty_law, only : penalty_t
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_t
    use emcon_stepper_free, only : stepper_set_state
-   use emcon_steps, only : load_point, load_t, method_penalty
+   use emcon_steps, only : load_point, load_pressure, load_t, method_penalty
    use emcon_system, only : mass_times, system_t, system_tangent_times
    use emcon_term_registry, only : terms_mass_values
    use given_hosts, only : well_t
@@ -55,6 +55,7 @@ contains
          test_case_t("the critical step is looked at now and then", test_looked_at), &
          test_case_t("central differences in a well, in closed form", test_well), &
          test_case_t("what is put elsewhere starts from there", test_put), &
+         test_case_t("a pressure that follows its edge", test_pressure), &
          test_case_t("nothing that vibrates", test_loose), &
          test_case_t("round a centre: what a potential stores is no growth", test_centre), &
          test_case_t("a force that begins at rest, on nodes that are linked", test_linked), &
@@ -479,6 +480,57 @@ contains
       end do
       call stepper_close(stepper)
    end subroutine test_put
+
+   !> A pressure that follows the right edge of a block that spins: in each step the momentum changes
+   !> by the mean of what it pushes with at the start and at the end.
+   subroutine test_pressure(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: pressure = 3.0_wp
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(load_t) :: load
+      real(wp) :: push(2, 0:1), before(2)
+      integer :: i
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      call add_step(scene, .false., h, 20)
+      scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+      load%kind = load_pressure
+      load%target = 2
+      load%place = 2
+      load%value = pressure
+      call add_load(scene%step(1), load)
+      scene%v0(1, :) = -2.0_wp*scene%x(2, :)
+      scene%v0(2, :) = 2.0_wp*scene%x(1, :)
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      if (allocated(error)) return
+      push(:, 1) = along_normal(scene%x)
+      do i = 1, 20
+         before = march%ledger%momentum
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         push(:, 0) = push(:, 1)
+         push(:, 1) = along_normal(scene%x + march%state%u)
+         call check_near(error, march%ledger%momentum - before, 0.5_wp*h*sum(push, 2), 256.0_wp*eps, &
+            2.0_wp, "momentum")
+      end do
+      call check_true(error, abs(push(2, 1)) > 0.3_wp*pressure, "the edge has turned")
+      call march_free(march)
+
+   contains
+
+      !> Into the edge from node 3 to node 6.
+      pure function along_normal(place) result(force)
+         real(wp), intent(in) :: place(2, 6)
+         real(wp) :: force(2)
+
+         force = pressure*[place(2, 3) - place(2, 6), place(1, 6) - place(1, 3)]
+      end function along_normal
+
+   end subroutine test_pressure
 
    !> Without a force there is no critical step.
    subroutine test_loose(error)
