@@ -304,7 +304,8 @@ contains
                if (.not. allocated(error)) sum(i) = half%march%state%sums%sum(1)
             end do
             if (allocated(error)) return
-            call check_equal(error, [one%n_cut, two%n_cut], [1, 0, 0], "cuts of kind " // to_text(kind) // " in " // to_text(k))
+            call check_equal(error, [one%n_cut, two%n_cut], [1, 0, 0], "cuts of kind " &
+               // to_text(kind) // " in " // to_text(k))
             call compare_states(error, whole%march%state, half%march%state, "kind " &
                // to_text(kind) // ", increment " // to_text(k))
             call compare_increments(error, one, two, kind == kind_static)
