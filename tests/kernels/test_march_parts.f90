@@ -9,7 +9,7 @@ module test_march_parts
    use emcon_interactions, only : formulation_mortar, formulation_nts
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
-   use emcon_march, only : increment_t, march_watch
+   use emcon_march, only : increment_t, march_resume, march_watch
    use emcon_march_types, only : march_t, watcher_t
    use emcon_scene, only : scene_t
    use emcon_pair_sums, only : pair_sum_t
@@ -280,14 +280,14 @@ contains
    end subroutine open_thrown
 
    !> What is refused and made in two halves comes to what two increments come to, of a march that is
-   !> spoilt before each.
+   !> spoilt before each, and taken up again.
    subroutine test_pieces(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: n = 12
       real(wp), parameter :: h = 0.015_wp
       type(stepper_t) :: whole, half
       type(increment_t) :: one, two(2)
-      type(pair_sum_t) :: sum(2)
+      type(pair_sum_t) :: pushed(2)
       real(wp) :: way
       integer :: kind, k, i, n_touch
 
@@ -298,19 +298,26 @@ contains
          n_touch = 0
          do k = 1, n
             if (.not. allocated(error)) call stepper_advance(whole, one, error)
+            if (k > n/2 .and. .not. allocated(error)) call march_resume(half%march, half%scene, &
+               error)
             do i = 1, 2
                if (.not. allocated(error)) call soil(half%march)
                if (.not. allocated(error)) call stepper_advance(half, two(i), error)
-               if (.not. allocated(error)) sum(i) = half%march%state%sums%sum(1)
+               if (.not. allocated(error)) pushed(i) = half%march%state%sums%sum(1)
             end do
             if (allocated(error)) return
             call check_equal(error, [one%n_cut, two%n_cut], [1, 0, 0], "cuts of kind " &
                // to_text(kind) // " in " // to_text(k))
             call compare_states(error, whole%march%state, half%march%state, "kind " &
                // to_text(kind) // ", increment " // to_text(k))
-            call compare_increments(error, one, two, kind == kind_static)
+            call compare_increments(error, one, two)
+            ! In statics an iteration leads to what is refused; a factor is lost as a step is resumed,
+            ! and surfaces that keep their mass are told again.
+            if (k <= n/2) call check_equal(error, [one%n_newton, one%warnings%n], &
+               [sum(two%n_newton) + merge(1, 0, kind == kind_static), sum(two%warnings%n)], &
+               "iterations and warnings")
             if (.not. allocated(error)) call compare_sums(error, whole%march%state%sums%sum(1), &
-               sum, kind == kind_static)
+               pushed, kind == kind_static)
             if (.not. allocated(error)) call compare_ledgers(error, whole%march%ledger, &
                half%march%ledger)
             if (allocated(error)) return
@@ -400,17 +407,13 @@ contains
    end subroutine compare_states
 
    !> Counts and sums are those of both, what is largest that of one of them.
-   subroutine compare_increments(error, one, two, is_static)
+   subroutine compare_increments(error, one, two)
       type(error_t), allocatable, intent(inout) :: error
       type(increment_t), intent(in) :: one, two(2)
-      logical, intent(in) :: is_static
 
-      call check_equal(error, [one%n_active, one%n_augmentation, one%n_held, one%notes%n, &
-         one%warnings%n], [two(2)%n_active, maxval(two%n_augmentation), maxval(two%n_held), &
-         sum(two%notes%n) + 1, sum(two%warnings%n)], "counts")
-      ! In statics an iteration leads to what is refused.
-      call check_equal(error, one%n_newton, sum(two%n_newton) + merge(1, 0, is_static), &
-         "iterations")
+      call check_equal(error, [one%n_active, one%n_augmentation, one%n_held, one%notes%n], &
+         [two(2)%n_active, maxval(two%n_augmentation), maxval(two%n_held), sum(two%notes%n) + 1], &
+         "counts")
       call check_near(error, [one%h, one%done], spread(sum(two%h), 1, 2), tol, 1.0_wp, "size")
       call check_near(error, [one%give, one%law_missed, one%largest_push, &
          one%stand_off%largest, one%nodal_pull%force, one%overlap%depth], [maxval(two%give), &
