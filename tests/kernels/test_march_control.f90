@@ -11,7 +11,7 @@ module test_march_control
    use emcon_scene, only : scene_t
    use emcon_step_control, only : why_error, why_event, why_newton
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_t
-   use emcon_steps, only : initiation_persistent, load_point, load_t
+   use emcon_steps, only : initiation_persistent, load_point, load_t, newton_kept
    use emcon_system, only : mass_times
    use emcon_text, only : to_text
    use given_hosts, only : chain_host_init, chain_host_t
@@ -35,6 +35,7 @@ contains
       tests = [ &
          test_case_t("sizes, times and counts of a stretched block that spins", test_counts), &
          test_case_t("the error of increments, by their forces", test_error), &
+         test_case_t("first sizes that were too large leave nothing", test_retry), &
          test_case_t("the error of what equations link", test_linked), &
          test_case_t("masses that errors are weighed by", test_masses), &
          test_case_t("an event is found by the velocities", test_event), &
@@ -227,6 +228,48 @@ contains
       end function error_of
 
    end subroutine test_error
+
+   !> An increment of a size that was found by trying is, bit by bit, the same as one that is tried at
+   !> once.
+   subroutine test_retry(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment, at_once
+      integer :: power
+
+      call make_spin(scene, 1.0e-5_wp, 60)
+      scene%step(1)%solution%newton = newton_kept
+      call begin(scene, march, error)
+      if (.not. allocated(error)) call march_increment(march, scene, increment, error)
+      if (allocated(error)) return
+      call check_true(error, increment%n_cut > 0, "tried larger ones")
+      power = nint(log(0.5_wp*increment%h/h)/log(2.0_wp)) + 1
+      block
+         type(march_t) :: other
+
+         call begin(scene, other, error)
+         if (allocated(error)) return
+         other%state%control%power = power
+         call march_increment(other, scene, at_once, error)
+         if (allocated(error)) return
+         call check_equal(error, at_once%n_cut, 0, "at once")
+         associate (now => march%state, then => other%state)
+            call check_near(error, [increment%h, increment%done, now%clock%time, now%base%h], &
+               [at_once%h, at_once%done, then%clock%time, then%base%h], 0.0_wp, 1.0_wp, "sizes")
+            call check_near(error, [now%u, now%v, now%internal], [then%u, then%v, then%internal], &
+               0.0_wp, 1.0_wp, "state")
+            call check_equal(error, [now%clock%increment, now%clock%n_grid, now%clock%n_part, &
+               now%control%n_known, now%base%increment, now%base%n_least], [then%clock%increment, &
+               then%clock%n_grid, then%clock%n_part, then%control%n_known, then%base%increment, &
+               then%base%n_least], "counts")
+         end associate
+         call check_near(error, [march%ledger%total, march%ledger%kinetic], [other%ledger%total, &
+            other%ledger%kinetic], 0.0_wp, 1.0_wp, "energies")
+         call march_free(other)
+      end block
+      call march_free(march)
+   end subroutine test_retry
 
    !> Two halves of a block whose nodes move alike have the errors of the block.
    subroutine test_linked(error)
