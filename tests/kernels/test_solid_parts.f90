@@ -45,6 +45,7 @@ contains
          test_case_t("turns and strains in space", test_space), &
          test_case_t("elements that lock", test_locking), &
          test_case_t("what to take in place of stiff elements", test_advice), &
+         test_case_t("what may lock, at small and at large strains", test_may_lock), &
          test_case_t("ends of motions that laws answer to", test_regular), &
          test_case_t("the same side by side", test_regular_lanes), &
          test_case_t("the same in space", test_regular_space)]
@@ -372,6 +373,30 @@ contains
             index(bending_advice(solid), "take " // bent(k)) == 1, kind(k))
       end do
    end subroutine test_advice
+
+   !> Elements of corners alone, with incompatible modes at large strains only.
+   subroutine test_may_lock(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=5), parameter :: kind(4) = ["CPE4 ", "CPE4H", "CPE4I", "CPE8R"]
+      logical, parameter :: expected(4, 2) = reshape([.true., .false., .true., .false., &
+         .true., .false., .false., .false.], [4, 2])
+      type(stepper_t) :: stepper
+      type(solid_t) :: solid
+      integer :: k, i
+
+      do i = 1, 2
+         do k = 1, size(kind)
+            stepper = stepper_t()
+            call read_one(trim(kind(k)), 1, "NONLINEAR", stepper, error)
+            if (allocated(error)) return
+            stepper%scene%step%nlgeom = i == 1
+            call solid_init(solid, stepper%scene, error)
+            if (allocated(error)) return
+            call check_true(error, solid%trait%may_lock(1) .eqv. expected(k, i), kind(k))
+            call check_true(error, solid%trait%has_mean(1) .eqv. k == 2, "mean of " // kind(k))
+         end do
+      end do
+   end subroutine test_may_lock
 
    !> det F > 0, and det C = (1 + 2 E11)(1 + 2 E22) - (2 E12)^2 > 0 where the law knows a volume; of
    !> both ends of the strain the second one counts. No powers that are infinite.
