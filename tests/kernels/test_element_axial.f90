@@ -183,8 +183,9 @@ contains
       end do
    end subroutine test_step
 
-   !> A motion that leaves the part `left` of one length at the point next to the axis: along the axis,
-   !> along the radius or of the circle, and all of the others there. With a law of the volume its square has to be
+   !> A motion that leaves the part `left` of one length at the point next to the axis: along the
+   !> axis, along the radius or of the circle, and all of the others there. With a law of the volume
+   !> its square has to be
    !> more than 64 roundings; the other way round it is inverted.
    subroutine test_pressed(error)
       type(error_t), allocatable, intent(out) :: error
@@ -229,14 +230,15 @@ contains
       end do
    end subroutine test_pressed
 
-   !> sigma = F S F^T/det F with F of three rows; E11, E22, 2 E12, E33 of C = F^T F. Of small strains
-   !> S by the symmetric part of the gradient.
+   !> sigma = F S F^T/det F with F of three rows; E11, E22, 2 E12, E33 of C = F^T F. Of small
+   !> strains S by the symmetric part of the gradient.
    subroutine test_stress(error)
       type(error_t), allocatable, intent(out) :: error
       type(sample_t) :: sample
       type(space_motion_t) :: motion
       type(space_response_t) :: response
-      real(wp) :: grad(2, 2), h(3, 3), e(3, 3), f(3, 3), s(3, 3), stress(6, 16), strain(6, 16), one(6)
+      real(wp), dimension(3, 3) :: h, e, f, s
+      real(wp) :: grad(2, 2), stress(6, 16), strain(6, 16), one(6)
       integer :: i, k
 
       do i = 0, 2*n_law - 1

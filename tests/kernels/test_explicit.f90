@@ -380,8 +380,8 @@ contains
       call march_init(march, scene, error)
       if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
       if (allocated(error)) return
-      call critical_bound(march%system, march%explicit%place, spread(0.0_wp, 1, 6), bound, element, &
-         is_bounded)
+      call critical_bound(march%system, march%explicit%place, spread(0.0_wp, 1, 6), bound, &
+         element, is_bounded)
       call check_near(error, march%state%explicit%critical_h, bound, 0.0_wp, 1.0_wp, "the bound")
       call critical_sharp(march%system, march%explicit%place, spread(0.0_wp, 1, 6), sharp, error)
       if (.not. allocated(error)) call check_true(error, sharp > 1.01_wp*bound, "a larger one")
@@ -481,8 +481,8 @@ contains
       call stepper_close(stepper)
    end subroutine test_put
 
-   !> A pressure that follows the right edge of a block that spins: in each step the momentum changes
-   !> by the mean of what it pushes with at the start and at the end.
+   !> A pressure that follows the right edge of a block that spins: in each step the momentum
+   !> changes by the mean of what it pushes with at the start and at the end.
    subroutine test_pressure(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: pressure = 3.0_wp
@@ -514,8 +514,8 @@ contains
          if (allocated(error)) return
          push(:, 0) = push(:, 1)
          push(:, 1) = along_normal(scene%x + march%state%u)
-         call check_near(error, march%ledger%momentum - before, 0.5_wp*h*sum(push, 2), 256.0_wp*eps, &
-            2.0_wp, "momentum")
+         call check_near(error, march%ledger%momentum - before, 0.5_wp*h*sum(push, 2), &
+            256.0_wp*eps, 2.0_wp, "momentum")
       end do
       call check_true(error, abs(push(2, 1)) > 0.3_wp*pressure, "the edge has turned")
       call march_free(march)

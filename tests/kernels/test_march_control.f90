@@ -71,9 +71,9 @@ contains
    end subroutine begin
 
    !> Each increment is what time goes on by, all of it done, a power of two of that of the deck,
-   !> the first one two of these; the energy stays, the momentum is what a force that grows with time
-   !> has given, and each solve that was given up is counted. Nothing changes where the step is taken up
-   !> again between increments.
+   !> the first one two of these; the energy stays, the momentum is what a force that grows with
+   !> time has given, and each solve that was given up is counted. Nothing changes where the step is
+   !> taken up again between increments.
    subroutine test_counts(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: tolerance(2) = [1.0_wp, 1.0e-4_wp], pull = 3.0_wp
@@ -229,8 +229,8 @@ contains
 
    end subroutine test_error
 
-   !> An increment of a size that was found by trying is, bit by bit, the same as one that is tried at
-   !> once.
+   !> An increment of a size that was found by trying is, bit by bit, the same as one that is tried
+   !> at once.
    subroutine test_retry(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene

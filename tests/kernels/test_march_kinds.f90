@@ -325,8 +325,8 @@ contains
    end subroutine test_events
 
    !> Central differences with exact contact: no node goes in, nothing pulls, the momentum changes
-   !> by the pushes, and energy falls by what contact does. With a factor that is kept over steps, and
-   !> with none.
+   !> by the pushes, and energy falls by what contact does. With a factor that is kept over steps,
+   !> and with none.
    subroutine test_explicit_contact(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: method(2) = [method_null_space, method_saddle_point]

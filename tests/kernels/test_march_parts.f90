@@ -279,8 +279,8 @@ contains
       if (.not. allocated(error)) call stepper_build(stepper, error)
    end subroutine open_thrown
 
-   !> What is refused and made in two halves comes to what two increments come to, of a march that is
-   !> spoilt before each, and taken up again.
+   !> What is refused and made in two halves comes to what two increments come to, of a march that
+   !> is spoilt before each, and taken up again.
    subroutine test_pieces(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: n = 12
@@ -311,8 +311,8 @@ contains
             call compare_states(error, whole%march%state, half%march%state, "kind " &
                // to_text(kind) // ", increment " // to_text(k))
             call compare_increments(error, one, two)
-            ! In statics an iteration leads to what is refused; a factor is lost as a step is resumed,
-            ! and surfaces that keep their mass are told again.
+            ! In statics an iteration leads to what is refused; a factor is lost as a step is
+            ! resumed, and surfaces that keep their mass are told again.
             if (k <= n/2) call check_equal(error, [one%n_newton, one%warnings%n], &
                [sum(two%n_newton) + merge(1, 0, kind == kind_static), sum(two%warnings%n)], &
                "iterations and warnings")

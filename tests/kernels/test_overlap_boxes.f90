@@ -87,7 +87,7 @@ contains
       end do
    end subroutine test_boxes
 
-   !> Contact points of straight sides go by 5/3 as far as a node, so that 3 apart is less for nodes.
+   !> Contact points of straight sides go by 5/3 as far as a node: 3 apart is less for nodes.
    subroutine test_midside(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene

@@ -176,8 +176,8 @@ contains
             side = 0.0_dp
             call sample%term%respond(sample%motion, response, value, side)
             where ([(mod(i, 3) == 0, i = 1, n**2)]) tangent = 0.0_dp
-            call check_near(error, real([value, side], wp), real([0.0_dp*value, tangent], wp), tol, &
-               real(maxval(abs(tangent)), wp), trim(kinds(k)) // ": to the side")
+            call check_near(error, real([value, side], wp), real([0.0_dp*value, tangent], wp), &
+               tol, real(maxval(abs(tangent)), wp), trim(kinds(k)) // ": to the side")
             associate (total => response%part(role_internal))
                call check_near(error, total%magnitude, abs(total%force), tol, maxval(abs(force)), &
                   trim(kinds(k)) // ": sizes")
@@ -208,8 +208,8 @@ contains
          allocate(law(1)%energy, source=well)
          call begin(trim(merge("CPE4", "C3D8", i == 1)), 0.2_wp, own, error, &
             constant=[young, 0.25_wp])
-         if (.not. allocated(error)) call begin(trim(merge("CPE4", "C3D8", i == 1)), 0.2_wp, given, &
-            error, user=law)
+         if (.not. allocated(error)) call begin(trim(merge("CPE4", "C3D8", i == 1)), 0.2_wp, &
+            given, error, user=law)
          if (allocated(error)) return
          given%motion = own%motion
          allocate(force(size(own%motion%du)), other(size(own%motion%du)), &

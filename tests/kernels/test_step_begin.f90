@@ -126,9 +126,9 @@ contains
       call march_free(new)
    end subroutine compare
 
-   !> Two more nodes are held from the second increment on: the state and the works stay as they are,
-   !> and the critical step is that of a march that starts so. At first the right element is the
-   !> narrower one, then the left one.
+   !> Two more nodes are held from the second increment on: the state and the works stay as they
+   !> are, and the critical step is that of a march that starts so. At first the right element is
+   !> the narrower one, then the left one.
    subroutine test_renumber(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene, later

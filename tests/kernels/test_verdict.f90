@@ -110,8 +110,8 @@ contains
          verdict%penalty%give = give(k)
          call verdict_end(verdict)
          call check_equal(error, verdict%reasons%n, n_reason(k), "reasons")
-         call check_true(error, verdict_is_failure(verdict, .false.) .eqv. max(give(k), deepest(k)) &
-            > 0.1_wp, "a failure")
+         call check_true(error, verdict_is_failure(verdict, .false.) .eqv. max(give(k), &
+            deepest(k)) > 0.1_wp, "a failure")
       end do
       if (allocated(error)) return
       call check_equal(error, verdict%reasons%item(1)%text, "bodies overlap by 0.231 of an edge " &
