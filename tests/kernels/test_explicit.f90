@@ -56,6 +56,7 @@ contains
          test_case_t("central differences in a well, in closed form", test_well), &
          test_case_t("what is put elsewhere starts from there", test_put), &
          test_case_t("a pressure that follows its edge", test_pressure), &
+         test_case_t("energy that grows a million times is told", test_growth), &
          test_case_t("nothing that vibrates", test_loose), &
          test_case_t("round a centre: what a potential stores is no growth", test_centre), &
          test_case_t("a force that begins at rest, on nodes that are linked", test_linked), &
@@ -531,6 +532,38 @@ contains
       end function along_normal
 
    end subroutine test_pressure
+
+   !> At first there may be what there is; more than a million times what there may be ends the run.
+   subroutine test_growth(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: growth(2) = [0.9e6_wp, 1.1e6_wp]
+      type(error_t), allocatable :: stopped
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      type(well_t) :: well
+      integer :: k
+
+      well%k = 2.0_wp
+      well%n_variable = 2
+      call open_well(stepper, well, 0.5_wp, 0.03_wp, 20, error)
+      if (.not. allocated(error)) call stepper_advance(stepper, increment, error)
+      if (allocated(error)) return
+      associate (state => stepper%march%state, ledger => stepper%march%ledger)
+         call check_near(error, state%explicit%budget, ledger%kinetic + ledger%potential, &
+            64.0_wp*eps, 1.0_wp, "as much as there is")
+         do k = 1, 2
+            state%explicit%budget = (ledger%kinetic + ledger%potential)/growth(k)
+            call stepper_advance(stepper, increment, stopped)
+            if (k == 1) call check_true(error, .not. allocated(stopped), "less than a million")
+            if (k == 2) call check_error(error, stopped, err_analysis, &
+               "grows without bound, its energy ", "more than a million")
+            if (allocated(error)) return
+         end do
+      end associate
+      call check_true(error, index(stopped%message, " is 1.10E+06 times what was put in; give a " &
+         // "smaller increment") > 0, stopped%message)
+      call stepper_close(stepper)
+   end subroutine test_growth
 
    !> Without a force there is no critical step.
    subroutine test_loose(error)
