@@ -185,14 +185,15 @@ contains
 
    !> A motion that leaves the part `left` of one length at the point next to the axis: along the
    !> axis, along the radius or of the circle, and all of the others there. With a law of the volume
-   !> its square has to be
-   !> more than 64 roundings; the other way round it is inverted.
+   !> the square has to be more than 64 roundings, twice as many of the area, whose terms come to 2;
+   !> the other way round it is inverted.
    subroutine test_pressed(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: left(4) = [4.0_wp, 16.0_wp, -4.0_wp, -16.0_wp]*sqrt(eps)
+      real(wp), parameter :: some(4) = [1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp] &
+         *sqrt(64.0_wp*[0.85_wp, 1.15_wp, 0.85_wp, 1.15_wp]*eps)
       type(sample_t) :: sample
       type(space_part_t) :: part
-      real(wp) :: u(2, m), zero(2, m), r
+      real(wp) :: u(2, m), zero(2, m), r, left(4)
       integer :: law, way, k
 
       zero = 0.0_wp
@@ -202,6 +203,7 @@ contains
          associate (x => sample%x, n => sample%n)
             r = 1.0_wp/maxval(sum(sample%solid%geometry(1)%circle(:n, :), 1))
             do way = 1, 3
+               left = merge(sqrt(2.0_wp), 1.0_wp, way < 3)*some
                do k = 1, size(left)
                   u = 0.0_wp
                   select case (way)

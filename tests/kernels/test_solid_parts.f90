@@ -346,6 +346,7 @@ contains
          solid%trait%is_rigid = .true.
          call locking_element(solid, e, ratio)
          call check_equal(error, e, 0, "rigid")
+         call check_near(error, ratio, 0.0_wp, 0.0_wp, 1.0_wp, "a ratio of none")
       end do
       solid%trait%is_rigid = .false.
       solid%geometry(2)%n_gp = 1
