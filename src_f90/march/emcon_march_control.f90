@@ -222,7 +222,7 @@ contains
       integer, intent(in) :: status              !! why it failed
       integer(int64), intent(inout) :: n         !! units that were tried; out: fewer
       integer(int64) :: before
-      real(wp) :: window, ratio
+      real(wp) :: window
       integer :: power
 
       before = n
@@ -235,12 +235,10 @@ contains
          n = min(n, max(self%grid%n_window, before - before/least_share))
          return
       end if
-      ratio = 0.0_wp
-      if (any(status == [step_rough, step_strikes])) ratio = self%step_check%ratio
       associate (control => self%state%control)
          power = control%power
-         call control_refuse(control, real(n, wp)/real(self%grid%n_unit, wp), ratio, &
-            why_of(status), self%grid%least_power)
+         call control_refuse(control, real(n, wp)/real(self%grid%n_unit, wp), &
+            self%step_check%ratio, why_of(status), self%grid%least_power)
          n = next_units(self, scene, from)
          ! Sizes that accuracy does not ask for are below the least power.
          if (n >= before) n = max(self%grid%n_least, before/2)

@@ -24,7 +24,7 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(part_t), intent(in) :: part
-      integer, intent(inout) :: status           !! one of the `step_` codes
+      integer, intent(inout) :: status           !! `step_done`, or why a smaller one may do
 
       if (scene%step(self%state%clock%i_step)%stabilization > 0.0_wp) call judge(self, part, status)
    end subroutine snap_judge
@@ -49,7 +49,7 @@ contains
             *sum(self%system%response%rounding*abs(ending%du))) return
          self%step_check%ratio = missed/max(before, after)
       end associate
-      if (status == step_done) status = step_rough
+      status = step_rough
    end subroutine judge
 
    !> The viscous force of STABILIZE by those of the elements, all nodes together.

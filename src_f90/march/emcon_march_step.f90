@@ -53,6 +53,7 @@ contains
       type(increment_t), intent(inout) :: increment
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
+      type(increment_t) :: found                 ! of the step
       character(len=:), allocatable :: text
       integer :: left
 
@@ -75,11 +76,12 @@ contains
       if (status /= step_done .or. allocated(error)) return
       self%end_state%du = self%motion%du
       if (self%layer%is_settled) self%end_state%du = self%end_state%du + self%layer%du
-      call overlap_check(self, scene, part, increment, status)
+      call overlap_check(self, scene, part, increment%h, found, status)
       if (status == step_done .and. self%grid%judges_size) call judge_size(self, scene, part, &
          status)
       if (status == step_done) call find_ending(self, scene, part, status, error)
       if (status /= step_done .or. allocated(error)) return
+      call keep_overlap(found, increment)
       if (any(self%active%is_left_out)) then
          call blocked_contact_text(self%system, scene, self%active%is_left_out, text)
          if (len(text) > 0) then
@@ -243,38 +245,47 @@ contains
       end associate
    end function overclosure_left
 
-   !> Let the judge look at the solved step: cut it, or keep what was found.
-   subroutine overlap_check(self, scene, part, increment, status)
+   !> Look at the overlap of bodies in the solved step: it may cut the step.
+   subroutine overlap_check(self, scene, part, h, found, status)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(part_t), intent(in) :: part
-      type(increment_t), intent(inout) :: increment
+      real(wp), intent(in) :: h                  !! of the increment, > 0 [T]
+      type(increment_t), intent(inout) :: found  !! `overlap` and `stray` of the step are set
       integer, intent(inout) :: status
-      type(overlap_t) :: overlap
       integer :: left
 
       if (self%overlap_check%n_piece == 0) return
       call phase_enter(self%system%phases, phase_judge, left)
-      if (self%active%motion_bound%total &
-         + largest_motion(self%end_state%du) >= self%overlap_check%clear_until) then
-         call overlap_check_step(self%overlap_check, scene%x, self%state%u, self%end_state%du, &
-            overlap)
-         self%overlap_check%clear_until = self%active%motion_bound%total &
-            + self%overlap_check%clearance
-         if (self%overlap_check%stray%depth > increment%stray%depth) increment%stray &
-            = self%overlap_check%stray
-      end if
-      overlap%depth = max(0.0_wp, overlap%depth &
-         - self%active%left(1)*self%overlap_check%meant_overlap)
-      if (part%may_cut .and. part%h > scale(increment%h, -judge_levels)) then
-         if (goes_in(self, scene, overlap)) status = step_overlaps
-      end if
+      associate (overlap => found%overlap)
+         if (self%active%motion_bound%total &
+            + largest_motion(self%end_state%du) >= self%overlap_check%clear_until) then
+            call overlap_check_step(self%overlap_check, scene%x, self%state%u, self%end_state%du, &
+               overlap)
+            self%overlap_check%clear_until = self%active%motion_bound%total &
+               + self%overlap_check%clearance
+            found%stray = self%overlap_check%stray
+         end if
+         overlap%depth = max(0.0_wp, overlap%depth &
+            - self%active%left(1)*self%overlap_check%meant_overlap)
+         if (part%may_cut .and. part%h > scale(h, -judge_levels)) then
+            if (goes_in(self, scene, overlap)) status = step_overlaps
+         end if
+      end associate
       call phase_leave(self%system%phases, left)
-      if (status /= step_done) return
-      overlap%of_facets = max(overlap%of_facets, increment%overlap%of_facets)
-      if (overlap%depth > increment%overlap%depth) increment%overlap = overlap
-      increment%overlap%of_facets = overlap%of_facets
    end subroutine overlap_check
+
+   !> Keep the deepest overlap of the steps of an increment.
+   pure subroutine keep_overlap(found, increment)
+      type(increment_t), intent(in) :: found     !! of the step that succeeded
+      type(increment_t), intent(inout) :: increment
+      real(wp) :: of_facets
+
+      of_facets = max(found%overlap%of_facets, increment%overlap%of_facets)
+      if (found%overlap%depth > increment%overlap%depth) increment%overlap = found%overlap
+      increment%overlap%of_facets = of_facets
+      if (found%stray%depth > increment%stray%depth) increment%stray = found%stray
+   end subroutine keep_overlap
 
    !> Has the step brought bodies deeper into each other than guards allow, at nodes that contact of
    !> both sides could hold and does not? In a smaller step it sees them come.

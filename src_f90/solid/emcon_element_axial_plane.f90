@@ -134,7 +134,7 @@ contains
       logical, intent(in) :: has_volume          !! as in law_t
       real(wp), parameter :: largest = huge(1.0_wp)**0.1_wp   ! its powers in energies are finite
       real(wp), parameter :: noise = 64.0_wp*epsilon(1.0_wp)
-      real(wp) :: e(n_strain), c11, c22, c33
+      real(wp) :: e(n_strain), area, terms
 
       e = point%strain + point%dstrain
       associate (f => point%f_end)
@@ -144,11 +144,10 @@ contains
          is_regular = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1) > 0.0_wp .and. point%stretch_end > 0.0_wp
       end associate
       if (.not. (is_regular .and. has_volume)) return
-      c11 = 1.0_wp + 2.0_wp*e(radial)
-      c22 = 1.0_wp + 2.0_wp*e(axial)
-      c33 = 1.0_wp + 2.0_wp*e(circle)
-      is_regular = c33 > noise .and. c11 > 0.0_wp .and. c11*c22 - e(shear)**2 > noise &
-         *(abs(c11) + abs(e(shear)))*(abs(c22) + abs(e(shear)))
+      ! det C of the plane, and the stretch of the circle, where they are more than round-off.
+      terms = (1.0_wp + 2.0_wp*abs(e(radial)))*(1.0_wp + 2.0_wp*abs(e(axial))) + e(shear)**2
+      area = (1.0_wp + 2.0_wp*e(radial))*(1.0_wp + 2.0_wp*e(axial)) - e(shear)**2
+      is_regular = 1.0_wp + 2.0_wp*e(circle) > noise .and. area > noise*terms
    end function is_regular
 
    !> Add the forces of a point, F S grad N, and those of the circle along the radius.

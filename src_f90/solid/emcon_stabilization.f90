@@ -108,7 +108,7 @@ contains
                *sum(abs(geometry%gradient(:, 1, g)))
          end do
       end associate
-      modulus = solid%stiffness(1, e)/spread
+      modulus = 2.0_wp*solid%stiffness(1, e)/spread    ! by the end of no step
    end function given_modulus
 
    !> The forces of the last motion.

@@ -175,7 +175,7 @@ contains
       integer, intent(in) :: e
       type(element_motion_t), intent(in) :: motion       !! of no size
       type(host_response_t), intent(in) :: user
-      type(law_points_t), intent(inout) :: points        !! workspace, `dstrain` is 0
+      type(law_points_t), intent(inout) :: points        !! workspace, as it was made
       real(wp), intent(inout) :: stress(:, :), strain(:, :)   !! (6 and 3, n_gp), and room
       type(point_motion_t) :: point
       real(wp) :: f(size(motion%from, 1), size(motion%from, 1), n_lane)
@@ -216,7 +216,6 @@ contains
       integer :: l
 
       points%stress = ieee_value(1.0_wp, ieee_quiet_nan)
-      points%stress_33 = 0.0_wp
       if (user%inverted_element /= 0) return
       do l = 1, n
          state = host_state(user%points(law), first - 1 + l)

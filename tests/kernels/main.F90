@@ -103,6 +103,7 @@ program main
    use test_march_grid, only : collect_march_grid
    use test_march_parts, only : collect_march_parts
    use test_march_past, only : collect_march_past
+   use test_march_snap, only : collect_march_snap
    use test_march_schemes, only : collect_march_schemes
    use test_march_size, only : collect_march_size
    use test_march_kinds, only : collect_march_kinds
@@ -352,6 +353,7 @@ program main
    call run("march_impulse", collect_march_impulse)
    call run("march_parts", collect_march_parts)
    call run("march_past", collect_march_past)
+   call run("march_snap", collect_march_snap)
    call run("march_schemes", collect_march_schemes)
    call run("march_size", collect_march_size)
    call run("march_kinds", collect_march_kinds)

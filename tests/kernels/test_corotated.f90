@@ -1,12 +1,19 @@
 !> A corotated element over one step: identity, momenta, tangent, rigid motions.
 module test_corotated
-   use check, only : check_near, test_case_t
+   use check, only : check_near, check_true, test_case_t
    use emcon_corotated_pack_plane, only : corotated_pack_fill, corotated_pack_gather, &
       corotated_pack_motion_t, corotated_pack_respond, corotated_pack_t
    use emcon_corotated_plane, only : corotated_energy, corotated_image, corotated_motion_t, &
       corotated_move, corotated_t
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_t
    use emcon_kinds, only : wp
+   use emcon_materials, only : kinematics_corotated
+   use emcon_motion, only : motion_of, motion_t
+   use emcon_scene, only : scene_t
+   use emcon_system, only : system_begin_step, system_init, system_t, system_tangent_times
+   use kind_rows, only : law_code
+   use small_scenes, only : add_step, block_t, make_block, shake
    implicit none
    private
    public :: collect_corotated
@@ -23,7 +30,8 @@ contains
       tests = [ &
          test_case_t("identity and momenta", test_identity), &
          test_case_t("tangent", test_tangent), &
-         test_case_t("rigid motions cost nothing", test_rigid)]
+         test_case_t("rigid motions cost nothing", test_rigid), &
+         test_case_t("no tangent where an element is a point", test_point)]
    end subroutine collect_corotated
 
    !> A quadrilateral with a stiffness that has no force in rigid motions of small angles: springs
@@ -167,5 +175,30 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_rigid
+
+   !> At the end of a step; half of the way there is one.
+   subroutine test_point(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(system_t) :: system
+      type(motion_t) :: motion
+      real(wp), dimension(2, 4) :: way, product
+      integer :: k
+
+      call make_block(scene, "CPE4", [1, 1], block)
+      scene%section(1)%kinematics = kinematics_corotated
+      scene%material(1)%law = law_code("linear")
+      call add_step(scene, .false., 0.1_wp, 1)
+      call system_init(system, scene, error)
+      if (.not. allocated(error)) call system_begin_step(system, scene, 1, error)
+      if (allocated(error)) return
+      call shake(way, 1.0_wp)
+      do k = 1, 2
+         motion = motion_of(evaluation_t(), scene%x, 0.0_wp*scene%x, -0.5_wp*k*scene%x)
+         call system_tangent_times(system, motion, way, product)
+         call check_true(error, any(abs(product) > 0.0_wp) .eqv. k == 1, "part of the way")
+      end do
+   end subroutine test_point
 
 end module test_corotated

@@ -1,7 +1,7 @@
 !> Elements of solids of revolution, distorted, with each law, and pressure on their edges.
 module test_element_axial
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_element_axial_plane, only : axial_element_respond
+   use emcon_element_axial_plane, only : axial_element_hold, axial_element_respond
    use emcon_element_kind, only : element_row_t
    use emcon_element_registry, only : element_row
    use emcon_element_space, only : space_motion_t, space_part_t
@@ -43,7 +43,9 @@ contains
          test_case_t("identity and force along the axis of a step", test_step), &
          test_case_t("tangent against differences", test_tangent), &
          test_case_t("patch: energy and work of a uniform strain", test_patch), &
+         test_case_t("Cauchy stress, by the whole deformation gradient", test_stress), &
          test_case_t("a motion along the axis costs nothing", test_along), &
+         test_case_t("pressed to nothing, in the plane or around the axis", test_pressed), &
          test_case_t("rank", test_rank), &
          test_case_t("mass and centre are those of the ring", test_mass), &
          test_case_t("pressure: work on a closed section", test_pressure), &
@@ -180,6 +182,111 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_step
+
+   !> A motion that leaves the part `left` of one length at the point next to the axis: along the
+   !> axis, along the radius or of the circle, and all of the others there. With a law of the volume
+   !> the square has to be more than 64 roundings, twice as many of the area, whose terms come to 2;
+   !> the other way round it is inverted.
+   subroutine test_pressed(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: some(4) = [1.0_wp, 1.0_wp, -1.0_wp, -1.0_wp] &
+         *sqrt(64.0_wp*[0.85_wp, 1.15_wp, 0.85_wp, 1.15_wp]*eps)
+      type(sample_t) :: sample
+      type(space_part_t) :: part
+      real(wp) :: u(2, m), zero(2, m), r, left(4)
+      integer :: law, way, k
+
+      zero = 0.0_wp
+      do law = 1, 3, 2
+         call make_sample(1, law, .true., 0.0_wp, sample, error)
+         if (allocated(error)) return
+         associate (x => sample%x, n => sample%n)
+            r = 1.0_wp/maxval(sum(sample%solid%geometry(1)%circle(:n, :), 1))
+            do way = 1, 3
+               left = merge(sqrt(2.0_wp), 1.0_wp, way < 3)*some
+               do k = 1, size(left)
+                  u = 0.0_wp
+                  select case (way)
+                  case (1)
+                     u(2, :n) = (left(k) - 1.0_wp)*x(2, :n)
+                  case (2)
+                     u(1, :n) = (left(k) - 1.0_wp)*(x(1, :n) - r)
+                  case default
+                     u(1, :n) = (left(k) - 1.0_wp)*r
+                  end select
+                  call respond(sample, 0.5_wp*u, 0.5_wp*u, .false., part)
+                  call check_true(error, part%is_inverted .eqv. (left(k) < 0.0_wp .or. k == 1 &
+                     .and. law == 3), sample%what // ", way " // to_text(way) // ", case " &
+                     // to_text(k))
+                  call respond(sample, zero, 0.5_wp*u, .false., part)
+                  call check_true(error, .not. part%is_inverted, "half of it")
+               end do
+            end do
+            do k = 1, 2
+               u = 0.0_wp
+               u(k, :n) = huge(1.0_wp)**0.11_wp*x(k, :n)
+               call respond(sample, zero, u, .false., part)
+               call check_true(error, part%is_inverted, "beyond what energies can be told of")
+            end do
+         end associate
+      end do
+   end subroutine test_pressed
+
+   !> sigma = F S F^T/det F with F of three rows; E11, E22, 2 E12, E33 of C = F^T F. Of small
+   !> strains S by the symmetric part of the gradient.
+   subroutine test_stress(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(space_motion_t) :: motion
+      type(space_response_t) :: response
+      real(wp), dimension(3, 3) :: h, e, f, s
+      real(wp) :: grad(2, 2), stress(6, 16), strain(6, 16), one(6)
+      integer :: i, k
+
+      do i = 0, 2*n_law - 1
+         call make_sample(n_axial_row(), 1 + mod(i, n_law), i < n_law, 0.2_wp, sample, error)
+         if (allocated(error)) return
+         call shake(grad, 0.2_wp)
+         motion%nlgeom = sample%nlgeom
+         associate (x => sample%x, n => sample%n, geometry => sample%solid%geometry(1), &
+               law => sample%solid%law(sample%solid%law_of(1))%law)
+            motion%from(:2, :n) = matmul(grad, x(:, :n))
+            call axial_element_hold(geometry, law, motion, stress, strain)
+            do k = 1, geometry%n_gp
+               h = 0.0_wp
+               h(:2, :2) = grad
+               h(3, 3) = dot_product(motion%from(1, :n), geometry%circle(:n, k))
+               f = 0.0_wp
+               if (motion%nlgeom) f = h
+               e = 0.5_wp*(h + transpose(h) + matmul(transpose(f), f))
+               f = f + reshape([1, 0, 0, 0, 1, 0, 0, 0, 1], [3, 3])
+               one = [e(1, 1), e(2, 2), e(3, 3), 2.0_wp*e(1, 2), 0.0_wp, 0.0_wp]
+               call law_response_space(law, one, 0.0_wp*one, response)
+               s = 0.0_wp
+               s(1, 1) = response%stress(1)
+               s(2, 2) = response%stress(2)
+               s(3, 3) = response%stress(3)
+               s(1, 2) = response%stress(4)
+               s(2, 1) = s(1, 2)
+               s = matmul(f, matmul(s, transpose(f)))/determinant(f)
+               call check_near(error, stress(:, k), [s(1, 1), s(2, 2), s(3, 3), s(1, 2), 0.0_wp, &
+                  0.0_wp], tol, young, sample%what // ": stress")
+               call check_near(error, strain(:, k), [one([1, 2, 4, 3]), 0.0_wp, 0.0_wp], tol, &
+                  1.0_wp, sample%what // ": strain")
+            end do
+         end associate
+         if (allocated(error)) return
+      end do
+   end subroutine test_stress
+
+   !> Of three rows.
+   pure real(wp) function determinant(a)
+      real(wp), intent(in) :: a(3, 3)
+
+      determinant = a(1, 1)*(a(2, 2)*a(3, 3) - a(2, 3)*a(3, 2)) &
+         - a(1, 2)*(a(2, 1)*a(3, 3) - a(2, 3)*a(3, 1)) &
+         + a(1, 3)*(a(2, 1)*a(3, 2) - a(2, 2)*a(3, 1))
+   end function determinant
 
    !> Central differences over four points, of step h = eps^(0.3)/4: an error of order h^4 =
    !> eps^(1.2)/256 and one of eps/h = 4 eps^(0.7). Yeoh's (J - 1)^6 bends over longer steps.

@@ -229,8 +229,10 @@ contains
    subroutine test_warnings(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: part(3) = [0.009_wp, 0.011_wp, 0.051_wp]
+      real(wp), parameter :: wide(4) = [0.025_wp, 0.035_wp, 0.065_wp, 0.075_wp]
+      integer, parameter :: told(4) = [0, 1, 1, 0], bad(4) = [0, 0, 0, 1]
       type(energy_watch_t) :: watch
-      type(notes_t) :: warnings
+      type(notes_t) :: warnings, reasons
       integer :: k, n(3, 3)
 
       do k = 1, 3
@@ -248,6 +250,15 @@ contains
          n(k, 3) = warnings%n
       end do
       call check_equal(error, reshape(n, [9]), [0, 1, 1, 0, 1, 0, 0, 0, 0], "warnings")
+      ! Round-off of 0.02 comes to both bars.
+      do k = 1, 4
+         watch = energy_watch_t(largest=2.0_wp, contact_taken=2.0_wp*wide(k), has_explicit=.true., &
+            scale=2.0_wp*0.02_wp/(16.0_wp*eps))
+         warnings = notes_t()
+         call energy_warnings(watch, warnings)
+         call energy_reasons(watch, reasons)
+         call check_equal(error, [warnings%n, reasons%n], [told(k), bad(k)], "with round-off")
+      end do
    end subroutine test_warnings
 
 end module test_energy_watch

@@ -18,7 +18,8 @@ module test_explicit
    use emcon_scheme_registry, only : scheme_row
    use emcon_penalty_law, only : penalty_t
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_t
-   use emcon_steps, only : load_point, load_t, method_penalty
+   use emcon_stepper_free, only : stepper_set_state
+   use emcon_steps, only : load_point, load_pressure, load_t, method_penalty
    use emcon_system, only : mass_times, system_t, system_tangent_times
    use emcon_term_registry, only : terms_mass_values
    use given_hosts, only : well_t
@@ -51,7 +52,11 @@ contains
          test_case_t("a block that penalties stop", test_drop), &
          test_case_t("closed contacts are met in a step", test_met), &
          test_case_t("the element that ends the run is named", test_squeezed), &
+         test_case_t("the critical step is looked at now and then", test_looked_at), &
          test_case_t("central differences in a well, in closed form", test_well), &
+         test_case_t("what is put elsewhere starts from there", test_put), &
+         test_case_t("a pressure that follows its edge", test_pressure), &
+         test_case_t("energy that grows a million times is told", test_growth), &
          test_case_t("nothing that vibrates", test_loose), &
          test_case_t("round a centre: what a potential stores is no growth", test_centre), &
          test_case_t("a force that begins at rest, on nodes that are linked", test_linked), &
@@ -356,6 +361,51 @@ contains
       call march_free(march)
    end subroutine test_squeezed
 
+   !> After 200 increments of the step: at rest the critical step of a free block is the one of its
+   !> start. Of a step below the bound by elements nothing is found anew.
+   subroutine test_looked_at(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: unknown = 100.0_wp
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(march_t) :: march
+      type(increment_t) :: increment
+      real(wp) :: bound, sharp
+      integer :: k, element
+      logical :: is_bounded
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      scene%x(1, [3, 6]) = scene%x(1, [3, 6]) - 0.25_wp
+      call add_step(scene, .false., h, 400)
+      scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      if (allocated(error)) return
+      call critical_bound(march%system, march%explicit%place, spread(0.0_wp, 1, 6), bound, &
+         element, is_bounded)
+      call check_near(error, march%state%explicit%critical_h, bound, 0.0_wp, 1.0_wp, "the bound")
+      call critical_sharp(march%system, march%explicit%place, spread(0.0_wp, 1, 6), sharp, error)
+      if (.not. allocated(error)) call check_true(error, sharp > 1.01_wp*bound, "a larger one")
+      do k = 1, 4
+         if (allocated(error)) return
+         scene%step(1)%time%h = merge(0.5_wp*(bound + sharp), 0.9_wp*bound, k /= 2)
+         march%state%clock%increment = 200
+         march%state%clock%n_before = 0
+         if (k == 3) march%state%clock%n_before = 200
+         if (k == 4) march%state%clock%increment = 201
+         march%state%explicit%critical_h = unknown
+         march%state%explicit%critical_element = 0
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         associate (found => march%state%explicit)
+            call check_near(error, found%critical_h, merge(sharp, unknown, k == 1), 1.0e-6_wp, &
+               sharp, "the critical step")
+            call check_equal(error, found%critical_element, merge(element, 0, k == 1), "of which")
+         end associate
+      end do
+      call march_free(march)
+   end subroutine test_looked_at
+
    !> A mass point at (1, 0) with the velocity (0, v) in a well about the origin.
    subroutine open_well(stepper, well, v, h, n, error)
       type(stepper_t), intent(inout) :: stepper
@@ -395,6 +445,7 @@ contains
          if (allocated(error)) return
          call stepper_advance(stepper, increment, error)
          if (allocated(error)) return
+         call check_equal(error, increment%n_newton, 0, "nothing is solved")
          associate (state => stepper%march%state, ledger => stepper%march%ledger, &
                x => [cos(i*phi), v*h/sin(phi)*sin(i*phi)], &
                rate => [-sin(i*phi)*sin(phi)/h, v*cos(i*phi)])
@@ -408,12 +459,120 @@ contains
       call stepper_close(stepper)
    end subroutine test_well
 
+   !> After three increments at (2, 0), at rest: x = 2 cos(phi) of each increment from there on.
+   subroutine test_put(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: k = 2.0_wp, h = 0.3_wp
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      type(well_t) :: well
+      integer :: i
+
+      well%k = k
+      well%n_variable = 2
+      call open_well(stepper, well, 0.5_wp, h, 20, error)
+      do i = -2, 5
+         if (i == 1 .and. .not. allocated(error)) call stepper_set_state(stepper, error, &
+            u=reshape([1.0_wp, 0.0_wp], [2, 1]), v=reshape([0.0_wp, 0.0_wp], [2, 1]))
+         if (.not. allocated(error)) call stepper_advance(stepper, increment, error)
+         if (allocated(error)) return
+         if (i > 0) call check_near(error, stepper%march%state%u(1, 1), 2.0_wp*cos(real(i, wp) &
+            *acos(1.0_wp - 0.5_wp*k*h**2)) - 1.0_wp, 256.0_wp*eps, 1.0_wp, "places")
+      end do
+      call stepper_close(stepper)
+   end subroutine test_put
+
+   !> A pressure that follows the right edge of a block that spins: in each step the momentum
+   !> changes by the mean of what it pushes with at the start and at the end.
+   subroutine test_pressure(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: pressure = 3.0_wp
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(load_t) :: load
+      real(wp) :: push(2, 0:1), before(2)
+      integer :: i
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      call add_step(scene, .false., h, 20)
+      scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+      load%kind = load_pressure
+      load%target = 2
+      load%place = 2
+      load%value = pressure
+      call add_load(scene%step(1), load)
+      scene%v0(1, :) = -2.0_wp*scene%x(2, :)
+      scene%v0(2, :) = 2.0_wp*scene%x(1, :)
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      if (allocated(error)) return
+      push(:, 1) = along_normal(scene%x)
+      do i = 1, 20
+         before = march%ledger%momentum
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         push(:, 0) = push(:, 1)
+         push(:, 1) = along_normal(scene%x + march%state%u)
+         call check_near(error, march%ledger%momentum - before, 0.5_wp*h*sum(push, 2), &
+            256.0_wp*eps, 2.0_wp, "momentum")
+      end do
+      call check_true(error, abs(push(2, 1)) > 0.3_wp*pressure, "the edge has turned")
+      call march_free(march)
+
+   contains
+
+      !> Into the edge from node 3 to node 6.
+      pure function along_normal(place) result(force)
+         real(wp), intent(in) :: place(2, 6)
+         real(wp) :: force(2)
+
+         force = pressure*[place(2, 3) - place(2, 6), place(1, 6) - place(1, 3)]
+      end function along_normal
+
+   end subroutine test_pressure
+
+   !> At first there may be what there is; more than a million times what there may be ends the run.
+   subroutine test_growth(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: growth(2) = [0.9e6_wp, 1.1e6_wp]
+      type(error_t), allocatable :: stopped
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      type(well_t) :: well
+      integer :: k
+
+      well%k = 2.0_wp
+      well%n_variable = 2
+      call open_well(stepper, well, 0.5_wp, 0.03_wp, 20, error)
+      if (.not. allocated(error)) call stepper_advance(stepper, increment, error)
+      if (allocated(error)) return
+      associate (state => stepper%march%state, ledger => stepper%march%ledger)
+         call check_near(error, state%explicit%budget, ledger%kinetic + ledger%potential, &
+            64.0_wp*eps, 1.0_wp, "as much as there is")
+         do k = 1, 2
+            state%explicit%budget = (ledger%kinetic + ledger%potential)/growth(k)
+            call stepper_advance(stepper, increment, stopped)
+            if (k == 1) call check_true(error, .not. allocated(stopped), "less than a million")
+            if (k == 2) call check_error(error, stopped, err_analysis, &
+               "grows without bound, its energy ", "more than a million")
+            if (allocated(error)) return
+         end do
+      end associate
+      call check_true(error, index(stopped%message, " is 1.10E+06 times what was put in; give a " &
+         // "smaller increment") > 0, stopped%message)
+      call stepper_close(stepper)
+   end subroutine test_growth
+
    !> Without a force there is no critical step.
    subroutine test_loose(error)
       type(error_t), allocatable, intent(out) :: error
       type(stepper_t) :: stepper
       type(well_t) :: well
-      real(wp) :: limit
+      real(wp) :: limit, bound
+      integer :: element
+      logical :: is_bounded
 
       well%k = 0.0_wp
       well%n_variable = 2
@@ -423,8 +582,12 @@ contains
       call critical_sharp(stepper%march%system, stepper%march%explicit%place, [0.0_wp], limit, &
          error)
       if (allocated(error)) return
-      call check_near(error, [limit, stepper%march%state%explicit%critical_h]/huge(limit), &
-         [1.0_wp, 1.0_wp], 0.0_wp, 1.0_wp, "as large as can be")
+      bound = 7.0_wp
+      call critical_bound(stepper%march%system, stepper%march%explicit%place, [0.0_wp], bound, &
+         element, is_bounded)
+      call check_near(error, [limit, bound, stepper%march%state%explicit%critical_h]/huge(limit), &
+         spread(1.0_wp, 1, 3), 0.0_wp, 1.0_wp, "as large as can be")
+      call check_true(error, element == 0 .and. .not. is_bounded, "what is given has no element")
       call stepper_close(stepper)
    end subroutine test_loose
 

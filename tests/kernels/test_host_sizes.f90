@@ -18,7 +18,7 @@ module test_host_sizes
    private
    public :: collect_host_sizes
 
-   !> A giver whose answers have `what` wrong.
+   !> A giver whose answers have `what` wrong; 0: nothing.
    type, extends(host_force_t) :: odd_t
       integer :: what = 0
    contains
@@ -36,6 +36,7 @@ contains
       tests = [ &
          test_case_t("tangent by finite differences", test_tangent), &
          test_case_t("sizes of forces and positions", test_sizes), &
+         test_case_t("sizes that are told too small", test_too_small), &
          test_case_t("symmetric as the giver says", test_symmetric), &
          test_case_t("answers that are none", test_answers)]
    end subroutine collect_host_sizes
@@ -155,6 +156,31 @@ contains
       end do
    end subroutine test_sizes
 
+   !> What is told counts where it is more than the force.
+   subroutine test_too_small(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(host_term_t) :: term
+      type(motion_t) :: motion
+      type(response_t) :: response
+      type(scene_t) :: scene
+      type(odd_t) :: odd
+      real(wp) :: expected(2, n)
+
+      call begin(term, motion, response, .false., error)
+      if (allocated(error)) return
+      call make_line(scene, n, .false., 0.1_wp, 1)
+      odd%name = "ODD"
+      odd%pattern = term%force%pattern
+      call host_term_init(term, odd, scene, error)
+      if (allocated(error)) return
+      call response_begin(response)
+      call term%respond(motion, response)
+      expected = 1.0_wp
+      expected(1, 1) = 3.0_wp
+      call check_near(error, response%part(role_internal)%magnitude, expected, 0.0_wp, 1.0_wp, &
+         "magnitude")
+   end subroutine test_too_small
+
    !> At the end of a motion, and of a step, each by itself.
    subroutine test_symmetric(error)
       type(error_t), allocatable, intent(out) :: error
@@ -229,6 +255,9 @@ contains
 
       response%force = 1.0_wp
       select case (self%what)
+      case (0)
+         response%magnitude(1, 1) = 3.0_wp
+         response%magnitude(2, 2) = 0.25_wp
       case (1)
          response%energy = ieee_value(1.0_wp, ieee_quiet_nan)
       case (2)

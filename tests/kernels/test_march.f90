@@ -8,7 +8,7 @@ module test_march
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_is_done, march_t
    use emcon_scene, only : scene_t
-   use emcon_steps, only : load_gravity, load_t
+   use emcon_steps, only : load_gravity, load_t, newton_kept
    use emcon_text, only : to_text
    use small_scenes, only : add_load, add_step, block_t, clamp, make_block, prescribe, shake, young
    implicit none
@@ -36,7 +36,8 @@ contains
          test_case_t("inverted at the start", test_inverted_start), &
          test_case_t("free motion in statics", test_free_motion), &
          test_case_t("driven motion in the ledger", test_driven), &
-         test_case_t("gravity in the ledger", test_gravity)]
+         test_case_t("gravity in the ledger", test_gravity), &
+         test_case_t("each factor that is kept is counted once", test_factors)]
    end subroutine collect_march
 
    subroutine begin(scene, march, error)
@@ -432,5 +433,31 @@ contains
       end do
       call march_free(march)
    end subroutine test_gravity
+
+   !> The state knows of which step the present factor is: a new one is one more factorisation.
+   subroutine test_factors(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+      integer :: i, last, n_factor
+
+      call make_spin(scene, 0.02_wp, 120, 20)
+      scene%step(1)%solution%newton = newton_kept
+      call begin(scene, march, error)
+      n_factor = 0
+      last = -1
+      do i = 1, 120
+         if (allocated(error)) return
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         if (.not. march%state%base%is_set) cycle
+         if (march%state%base%increment /= last) n_factor = n_factor + 1
+         last = march%state%base%increment
+      end do
+      call check_true(error, n_factor > 2, "some")
+      call check_equal(error, march%system%phases%n_factorisation, n_factor, "factorisations")
+      call march_free(march)
+   end subroutine test_factors
 
 end module test_march

@@ -26,6 +26,8 @@ module test_march_commit
    !> Forces of the size 100 that balance, summed over nodes.
    real(wp), parameter :: tol = 1.0e5_wp*eps
    real(wp), parameter :: h = 0.02_wp
+   !> So far to the left the blocks reach.
+   real(wp), parameter :: farthest = 5.0_wp
 
 contains
 
@@ -50,6 +52,7 @@ contains
       integer :: i
 
       call make_two_blocks(scene, merge(0.0_wp, 0.03_wp, is_static), lower, upper)
+      scene%x(1, :) = scene%x(1, :) - (farthest - 2.0_wp)
       scene%pair(1)%interaction%friction = merge(0.05_wp, 0.3_wp, is_static)
       call add_step(scene, is_static, merge(0.25_wp, h, is_static), merge(4, 40, is_static))
       scene%step(1)%contact%initiation = initiation_persistent
@@ -95,6 +98,12 @@ contains
          if (allocated(error)) return
          if (increment%n_cut > 0) cycle
          call check_motion(error, march, before, books)
+         associate (response => march%system%response, state => march%state)
+            call check_near(error, increment%work_scale, (norm2(state%contact) &
+               + norm2(state%reaction) + norm2(response%part(role_external)%force)) &
+               *(farthest + maxval(abs(state%u)) + maxval(abs(march%motion%du))), tol, 100.0_wp, &
+               "what works are made of")
+         end associate
          if (.not. allocated(error)) call check_contacts(error, march, before, increment)
          if (.not. allocated(error)) call check_pairs(error, march)
          if (allocated(error)) return

@@ -2,21 +2,23 @@
 module test_march_control
    use, intrinsic :: iso_fortran_env, only : int64
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
+   use emcon_amplitudes, only : amplitude_t
    use emcon_errors, only : err_analysis, error_t
    use emcon_kinds, only : dp, wp
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
-      march_is_done, march_t
+      march_is_done, march_resume, march_t
    use emcon_rigid_bodies, only : rigid_frame_choose
    use emcon_scene, only : scene_t
    use emcon_step_control, only : why_error, why_event, why_newton
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_t
-   use emcon_steps, only : initiation_persistent
+   use emcon_steps, only : initiation_persistent, load_point, load_t, newton_kept
    use emcon_system, only : mass_times
    use emcon_text, only : to_text
    use given_hosts, only : chain_host_init, chain_host_t
    use given_scenes, only : make_line, open_given
-   use small_scenes, only : add_block, add_step, block_t, clamp, make_block, make_two_blocks, &
-      prescribe
+   use linear_scenes, only : add_equation
+   use small_scenes, only : add_block, add_load, add_step, block_t, clamp, make_block, &
+      make_two_blocks, prescribe
    implicit none
    private
    public :: collect_march_control
@@ -33,6 +35,8 @@ contains
       tests = [ &
          test_case_t("sizes, times and counts of a stretched block that spins", test_counts), &
          test_case_t("the error of increments, by their forces", test_error), &
+         test_case_t("first sizes that were too large leave nothing", test_retry), &
+         test_case_t("the error of what equations link", test_linked), &
          test_case_t("masses that errors are weighed by", test_masses), &
          test_case_t("an event is found by the velocities", test_event), &
          test_case_t("solves that take long", test_slow), &
@@ -67,15 +71,25 @@ contains
    end subroutine begin
 
    !> Each increment is what time goes on by, all of it done, a power of two of that of the deck,
-   !> the first one two of these; the energy stays, and each solve that was given up is counted.
+   !> the first one two of these; the energy stays, the momentum is what a force that grows with
+   !> time has given, and each solve that was given up is counted. Nothing changes where the step is
+   !> taken up again between increments.
    subroutine test_counts(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: tolerance(2) = [1.0_wp, 1.0e-4_wp]
+      real(wp), parameter :: tolerance(2) = [1.0_wp, 1.0e-4_wp], pull = 3.0_wp
       type(scene_t) :: scene
+      type(load_t) :: load
       integer :: k
 
       do k = 1, 2
          call make_spin(scene, tolerance(k), 60)
+         scene%amplitude = [amplitude_t(name="GROWTH", time=[0.0_wp, n*h], value=[0.0_wp, n*h])]
+         load%kind = load_point
+         load%target = 3
+         load%place = 1
+         load%value = pull
+         load%amplitude = 1
+         call add_load(scene%step(1), load)
          call run()
          if (allocated(error)) return
       end do
@@ -85,12 +99,14 @@ contains
       subroutine run()
          type(march_t) :: march
          type(increment_t) :: increment
-         real(wp) :: before, total, part
-         integer :: n_increment, n_cut
+         real(wp) :: before, total, part, momentum(2)
+         integer :: n_increment, n_cut, n_between
 
          call begin(scene, march, error)
          if (allocated(error)) return
+         n_between = 0
          total = march%ledger%total
+         momentum = march%ledger%momentum
          n_increment = 0
          n_cut = 0
          do while (.not. march_is_done(march))
@@ -107,6 +123,14 @@ contains
             if (n_increment == 1) part = 0.5_wp*part
             call check_near(error, fraction(part), 0.5_wp, 16.0_wp*eps, 1.0_wp, "power of two")
             call check_near(error, march%ledger%total, total, 1.0e3_wp*eps, total, "energy")
+            if (mod(n_increment, 2) == 1 .and. .not. allocated(error)) call march_resume(march, &
+               scene, error)
+            if (allocated(error)) return
+            call check_near(error, [march%state%clock%step_time, march%ledger%total], &
+               [march%state%clock%time, total], 1.0e3_wp*eps, total, "taken up again")
+            n_between = n_between + merge(1, 0, march%state%clock%n_part > 0)
+            call check_near(error, march%ledger%momentum, momentum &
+               + [0.5_wp*pull*march%state%clock%time**2, 0.0_wp], 1.0e3_wp*eps, 4.0_wp, "momentum")
          end do
          associate (control => march%state%control)
             call check_near(error, march%state%clock%time, n*h, 0.0_wp, 1.0_wp, "end")
@@ -116,6 +140,7 @@ contains
             call check_equal(error, control%n_over, 0, "all as asked for")
             call check_true(error, n_cut > 0 .eqv. k == 2, "cuts: " // to_text(n_cut))
             call check_true(error, (n_increment > n) .eqv. k == 2, "of " // to_text(n_increment))
+            call check_true(error, (n_between > 0) .eqv. k == 2, "between points of the grid")
          end associate
          call march_free(march)
       end subroutine run
@@ -203,6 +228,84 @@ contains
       end function error_of
 
    end subroutine test_error
+
+   !> An increment of a size that was found by trying is, bit by bit, the same as one that is tried
+   !> at once.
+   subroutine test_retry(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment, at_once
+      integer :: power
+
+      call make_spin(scene, 1.0e-5_wp, 60)
+      scene%step(1)%solution%newton = newton_kept
+      call begin(scene, march, error)
+      if (.not. allocated(error)) call march_increment(march, scene, increment, error)
+      if (allocated(error)) return
+      call check_true(error, increment%n_cut > 0, "tried larger ones")
+      power = nint(log(0.5_wp*increment%h/h)/log(2.0_wp)) + 1
+      block
+         type(march_t) :: other
+
+         call begin(scene, other, error)
+         if (allocated(error)) return
+         other%state%control%power = power
+         call march_increment(other, scene, at_once, error)
+         if (allocated(error)) return
+         call check_equal(error, at_once%n_cut, 0, "at once")
+         associate (now => march%state, then => other%state)
+            call check_near(error, [increment%h, increment%done, now%clock%time, now%base%h], &
+               [at_once%h, at_once%done, then%clock%time, then%base%h], 0.0_wp, 1.0_wp, "sizes")
+            call check_near(error, [now%u, now%v, now%internal], [then%u, then%v, then%internal], &
+               0.0_wp, 1.0_wp, "state")
+            call check_equal(error, [now%clock%increment, now%clock%n_grid, now%clock%n_part, &
+               now%control%n_known, now%base%increment, now%base%n_least], [then%clock%increment, &
+               then%clock%n_grid, then%clock%n_part, then%control%n_known, then%base%increment, &
+               then%base%n_least], "counts")
+         end associate
+         call check_near(error, [march%ledger%total, march%ledger%kinetic], [other%ledger%total, &
+            other%ledger%kinetic], 0.0_wp, 1.0_wp, "energies")
+         call march_free(other)
+      end block
+      call march_free(march)
+   end subroutine test_retry
+
+   !> Two halves of a block whose nodes move alike have the errors of the block.
+   subroutine test_linked(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: of_half(8) = [1, 2, 4, 5, 2, 3, 5, 6]
+      type(scene_t) :: scene, halves
+      type(block_t) :: block
+      type(march_t) :: march, other
+      type(increment_t) :: increment, as_well
+      integer :: i, a
+
+      call make_spin(scene, 1.0e-3_wp, 60)
+      call make_block(halves, "CPE4", [1, 1], block)
+      call add_block(halves, "CPE4", [1, 1], [1.0_wp, 0.0_wp], [1.0_wp, 1.0_wp], block)
+      do a = 1, 2
+         call add_equation(halves, [5, 2], [a, a], [1.0_wp, -1.0_wp])
+         call add_equation(halves, [7, 4], [a, a], [1.0_wp, -1.0_wp])
+      end do
+      halves%step = scene%step
+      halves%v0 = scene%v0(:, of_half)
+      call begin(scene, march, error)
+      if (.not. allocated(error)) call begin(halves, other, error)
+      do i = 1, 8
+         if (allocated(error)) return
+         call march_increment(march, scene, increment, error)
+         if (.not. allocated(error)) call march_increment(other, halves, as_well, error)
+         if (allocated(error)) return
+         call check_near(error, other%state%u, march%state%u(:, of_half), 1.0e4_wp*eps, 1.0_wp, &
+            "displacements")
+         call check_near(error, as_well%h, increment%h, 4.0_wp*eps, 1.0_wp, "sizes")
+         call check_near(error, other%step_check%ratio, march%step_check%ratio, 1.0e7_wp*eps, &
+            1.0_wp, "errors")
+      end do
+      call march_free(march)
+      call march_free(other)
+   end subroutine test_linked
 
    !> Sums of rows where nodes move freely; none of supports and of a rigid body.
    subroutine test_masses(error)

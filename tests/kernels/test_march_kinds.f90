@@ -11,7 +11,7 @@ module test_march_kinds
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_row
    use emcon_state, only : state_t
-   use emcon_steps, only : events_nodes, events_pairs
+   use emcon_steps, only : events_nodes, events_pairs, method_null_space, method_saddle_point
    use emcon_system, only : mass_times
    use emcon_text, only : to_text
    use small_scenes, only : add_step, block_t, clamp, make_block, make_two_blocks, prescribe, &
@@ -325,8 +325,20 @@ contains
    end subroutine test_events
 
    !> Central differences with exact contact: no node goes in, nothing pulls, the momentum changes
-   !> by the pushes, and energy falls by what contact does.
+   !> by the pushes, and energy falls by what contact does. With a factor that is kept over steps,
+   !> and with none.
    subroutine test_explicit_contact(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: method(2) = [method_null_space, method_saddle_point]
+      integer :: i
+
+      do i = 1, size(method)
+         if (.not. allocated(error)) call run_explicit(method(i), error)
+      end do
+   end subroutine test_explicit_contact
+
+   subroutine run_explicit(method, error)
+      integer, intent(in) :: method
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: step = 0.25_wp*h
       type(scene_t) :: scene
@@ -341,6 +353,7 @@ contains
       scene%step(1)%time%h = step
       scene%step(1)%time%duration = 80.0_wp*step
       scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+      scene%step(1)%contact%method = method
       call begin(scene, march, error)
       if (allocated(error)) return
       start = march%ledger
@@ -365,10 +378,12 @@ contains
          if (push > 0.0_wp) n_contact = n_contact + 1
          if (allocated(error)) return
       end do
+      call check_true(error, march%newton%correction%kept%is_made .eqv. method &
+         == method_null_space, "a factor")
       call check_true(error, n_contact > 10, "contact")
       call check_true(error, march%ledger%momentum(2) > 0.5_wp, "it bounces")
       call march_free(march)
-   end subroutine test_explicit_contact
+   end subroutine run_explicit
 
    !> Two pushes, by the forces at the start and at the end of a step; that at the end stops what
    !> goes on into the other side, by contacts that do not pull.

@@ -2,22 +2,44 @@
 !> interrupt leaves.
 module test_march_parts
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
+   use emcon_amplitudes, only : amplitude_t
    use emcon_csr, only : csr_from_elements
    use emcon_errors, only : err_analysis, err_interrupt, error_t
    use emcon_host_force, only : force_response_t, host_force_t, host_outside
+   use emcon_interactions, only : formulation_mortar, formulation_nts
    use emcon_kinds, only : wp
-   use emcon_march, only : increment_t, march_watch
-   use emcon_march_types, only : watcher_t
+   use emcon_ledger, only : ledger_t
+   use emcon_march, only : increment_t, march_resume, march_watch
+   use emcon_march_types, only : march_t, watcher_t
    use emcon_scene, only : scene_t
-   use emcon_stepper, only : stepper_advance, stepper_close, stepper_t
-   use given_scenes, only : make_line, open_given
+   use emcon_pair_sums, only : pair_sum_t
+   use emcon_state, only : state_t
+   use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_t
+   use emcon_stepper_user, only : stepper_give_force
+   use emcon_steps, only : initiation_massless, initiation_persistent, initiation_velocity_update, &
+      method_penalty
+   use emcon_scheme_registry, only : scheme_row
+   use emcon_text, only : to_text
+   use given_scenes, only : given_eps, make_line, open_given
+   use small_scenes, only : add_step, block_t, clamp, make_two_blocks, prescribe
    implicit none
    private
    public :: collect_march_parts
 
-   !> No force, but node 1 may go past the place `wall` in ways of no more than `longest` only.
+   !> Energies and forces of the size 10 and 100, after two dozen steps.
+   real(wp), parameter :: tol = 1.0e5_wp*given_eps
+   !> How blocks touch: NTS and friction, mortar and velocity updates, impacts that keep a part,
+   !> penalties, in statics, in explicit steps, without mass.
+   integer, parameter :: n_kind = 7, kind_static = 5, kind_explicit = 6
+   !> The way that a node is driven over all increments.
+   real(wp), parameter :: drive = 0.02_wp
+
+   !> No force, but a node may go past the place `wall` in ways of no more than `longest` only.
    type, extends(host_force_t) :: gate_t
+      integer :: node = 1
       real(wp) :: wall = 0.0_wp, longest = 0.0_wp
+      logical :: is_at_rest = .false.            !! ways are from where it was asked last
+      real(wp) :: last = 0.0_wp
    contains
       procedure :: respond => gate_respond
    end type gate_t
@@ -39,7 +61,8 @@ contains
          test_case_t("halves, and back on the grid", test_halves), &
          test_case_t("no part is small enough", test_none), &
          test_case_t("too many parts", test_crawl), &
-         test_case_t("an interrupt leaves the increment before", test_interrupt)]
+         test_case_t("an interrupt leaves the increment before", test_interrupt), &
+         test_case_t("two halves are two increments", test_pieces)]
    end subroutine collect_march_parts
 
    subroutine gate_respond(self, u0, du, wants_tangent, response)
@@ -48,8 +71,14 @@ contains
       logical, intent(in) :: wants_tangent
       type(force_response_t), intent(inout) :: response
 
-      if (u0(1, 1) + du(1, 1) > self%wall .and. du(1, 1) > self%longest) response%status &
-         = host_outside
+      associate (i => self%node, place => u0(1, self%node) + du(1, self%node))
+         if (place > self%wall .and. merge(place - self%last, du(1, i), self%is_at_rest) &
+            > self%longest) then
+            response%status = host_outside
+         else
+            self%last = place
+         end if
+      end associate
    end subroutine gate_respond
 
    subroutine writer_tell(self, increment, time, n_part, h_least)
@@ -113,8 +142,9 @@ contains
          call check_near(error, [stepper%march%state%clock%time, stepper%march%state%u(1, 1), &
             increment%h, increment%done], [2.0_wp*k, real(k, wp), 2.0_wp, 2.0_wp], &
             16.0_wp*epsilon(1.0_wp), 4.0_wp, "a whole one")
-         call check_equal(error, [writer%n, increment%n_cut, increment%notes%n], [n_tried(k), &
-            n_cut(k), n_cut(k)], "tried and cut")
+         call check_equal(error, [writer%n, increment%n_cut, increment%notes%n, &
+            stepper%march%state%clock%n_easy], [n_tried(k), n_cut(k), n_cut(k), merge(1, 0, &
+            k == 1)], "tried, cut, and easy ones in a row")
          call check_equal(error, writer%part(:writer%n), [(i, i = 1, writer%n)], "counted")
          call check_equal(error, writer%increment(:writer%n), spread(k, 1, writer%n), "increment")
          if (k /= 2 .or. allocated(error)) cycle
@@ -186,5 +216,241 @@ contains
          "as before")
       call stepper_close(stepper)
    end subroutine test_interrupt
+
+   !> A block that is thrown on a clamped one, or pressed on it, in `n` increments of `h`; steps in
+   !> which node 10 is driven farther than `longest` are refused. `kind`: how they touch.
+   subroutine open_thrown(stepper, kind, h, n, longest, error)
+      type(stepper_t), intent(inout) :: stepper
+      integer, intent(in) :: kind
+      real(wp), intent(in) :: h, longest
+      integer, intent(in) :: n
+      type(error_t), allocatable, intent(out) :: error
+      type(block_t) :: lower, upper
+      type(gate_t) :: gate
+      integer, allocatable :: slot(:)
+      logical :: is_static
+      integer :: i
+
+      is_static = kind == kind_static
+      associate (scene => stepper%scene)
+         call make_two_blocks(scene, merge(0.0_wp, 0.03_wp, is_static), lower, upper)
+         call add_step(scene, is_static, h, n)
+         call clamp(scene%step(1), [(i, i = 1, 5)])
+         call prescribe(scene%step(1), 10, 1, drive)
+         scene%pair(1)%formulation = formulation_nts
+         scene%pair(1)%interaction%friction = 0.3_wp
+         associate (contact => scene%step(1)%contact)
+            contact%initiation = initiation_persistent
+            select case (kind)
+            case (2)
+               scene%pair(1)%formulation = formulation_mortar
+               contact%initiation = initiation_velocity_update
+            case (3)
+               scene%pair(1)%interaction%restitution = 0.25_wp
+            case (4)
+               contact%method = method_penalty
+            case (kind_explicit)
+               contact%method = method_penalty
+               scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+            case (7)
+               contact%initiation = initiation_massless
+            end select
+            if (contact%method == method_penalty) scene%pair(1)%interaction%friction = 0.0_wp
+         end associate
+         scene%amplitude = [amplitude_t(name="RAMP", time=[0.0_wp, n*h], value=[0.0_wp, 1.0_wp])]
+         if (.not. is_static) then
+            scene%v0(1, 11:) = 0.3_wp
+            scene%v0(2, 11:) = -1.0_wp
+         else
+            do i = 14, 16
+               call prescribe(scene%step(1), i, 1, 0.06_wp)
+               call prescribe(scene%step(1), i, 2, -0.05_wp)
+            end do
+         end if
+         scene%step(1)%prescribed%amplitude = 1
+      end associate
+      stepper%is_read = .true.
+      gate%name = "GATE"
+      gate%node = 10
+      gate%longest = longest
+      gate%is_at_rest = is_static .or. kind == kind_explicit
+      call csr_from_elements(gate%pattern, 32, [1, 3], [19, 20], slot, error)
+      if (.not. allocated(error)) call stepper_give_force(stepper, gate, error)
+      if (.not. allocated(error)) call stepper_build(stepper, error)
+   end subroutine open_thrown
+
+   !> What is refused and made in two halves comes to what two increments come to, of a march that
+   !> is spoilt before each, and taken up again.
+   subroutine test_pieces(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n = 12
+      real(wp), parameter :: h = 0.015_wp
+      type(stepper_t) :: whole, half
+      type(increment_t) :: one, two(2)
+      type(pair_sum_t) :: pushed(2)
+      real(wp) :: way
+      integer :: kind, k, i, n_touch
+
+      way = drive/real(2*n, wp)
+      do kind = 1, n_kind
+         call open_thrown(whole, kind, 2.0_wp*h, n, 1.5_wp*way, error)
+         if (.not. allocated(error)) call open_thrown(half, kind, h, 2*n, 1.5_wp*way, error)
+         n_touch = 0
+         do k = 1, n
+            if (.not. allocated(error)) call stepper_advance(whole, one, error)
+            if (k > n/2 .and. .not. allocated(error)) call march_resume(half%march, half%scene, &
+               error)
+            do i = 1, 2
+               if (.not. allocated(error)) call soil(half%march)
+               if (.not. allocated(error)) call stepper_advance(half, two(i), error)
+               if (.not. allocated(error)) pushed(i) = half%march%state%sums%sum(1)
+            end do
+            if (allocated(error)) return
+            call check_equal(error, [one%n_cut, two%n_cut], [1, 0, 0], "cuts of kind " &
+               // to_text(kind) // " in " // to_text(k))
+            call compare_states(error, whole%march%state, half%march%state, "kind " &
+               // to_text(kind) // ", increment " // to_text(k))
+            call compare_increments(error, one, two)
+            ! In statics an iteration leads to what is refused; a factor is lost as a step is
+            ! resumed, and surfaces that keep their mass are told again.
+            if (k <= n/2) call check_equal(error, [one%n_newton, one%warnings%n], &
+               [sum(two%n_newton) + merge(1, 0, kind == kind_static), sum(two%warnings%n)], &
+               "iterations and warnings")
+            if (.not. allocated(error)) call compare_sums(error, whole%march%state%sums%sum(1), &
+               pushed, kind == kind_static)
+            if (.not. allocated(error)) call compare_ledgers(error, whole%march%ledger, &
+               half%march%ledger)
+            if (allocated(error)) return
+            if (one%n_active > 0) n_touch = n_touch + 1
+         end do
+         call check_true(error, n_touch > 2, "contact")
+         call stepper_close(whole)
+         call stepper_close(half)
+         whole = stepper_t()
+         half = stepper_t()
+      end do
+   end subroutine test_pieces
+
+   !> Spoil what a march holds beside its state: no increment looks at what the last one left there.
+   subroutine soil(march)
+      type(march_t), intent(inout) :: march
+      real(wp), parameter :: dirt = 1.0e3_wp
+
+      associate (motion => march%motion, ending => march%end_state, newton => march%newton, &
+            active => march%active, layer => march%layer, explicit => march%explicit)
+         motion%u0 = dirt
+         motion%du = dirt
+         motion%v0 = dirt
+         motion%offset = dirt
+         motion%from = dirt
+         motion%by = dirt
+         motion%at = dirt
+         motion%computed = dirt
+         if (allocated(ending%du)) ending%du = dirt
+         ending%v = dirt
+         if (allocated(ending%force)) ending%force = dirt
+         if (allocated(ending%energy)) ending%energy = dirt
+         ending%potential = dirt
+         if (allocated(newton%contact)) newton%contact = dirt
+         if (allocated(newton%driven)) newton%driven = dirt
+         if (allocated(newton%left)) newton%left = dirt
+         newton%convergence%last = dirt
+         newton%convergence%n_history = 3
+         newton%convergence%history = dirt
+         layer%needs_mass = .true.
+         layer%is_settled = .true.
+         march%step_check%ratio = dirt
+         active%may_cut = .not. active%may_cut
+         active%gap_tolerance = dirt
+         active%left = dirt
+         active%is_active = .not. active%is_active
+         active%is_dropped = .true.
+         active%comes_and_goes = .true.
+         active%n_newton = 77
+         explicit%is_free = .not. explicit%is_free
+         if (allocated(explicit%v1)) explicit%v1 = dirt
+         if (allocated(explicit%mu)) explicit%mu = dirt
+         if (allocated(explicit%residual)) explicit%residual = dirt
+         if (allocated(explicit%load0)) explicit%load0 = dirt
+         if (allocated(explicit%start)) explicit%start = dirt
+         if (allocated(explicit%load)) explicit%load = dirt
+         if (allocated(explicit%contact)) explicit%contact = dirt
+         march%system%response%residual = dirt
+         march%system%response%energy = dirt
+         march%system%response%potential = dirt
+      end associate
+   end subroutine soil
+
+   subroutine compare_states(error, a, b, what)
+      type(error_t), allocatable, intent(inout) :: error
+      type(state_t), intent(in) :: a, b
+      character(len=*), intent(in) :: what
+
+      call check_near(error, [a%clock%time, a%clock%step_time], [b%clock%time, b%clock%step_time], &
+         tol, 1.0_wp, "time, " // what)
+      call check_near(error, a%u, b%u, tol, 1.0_wp, "u, " // what)
+      call check_near(error, a%v, b%v, tol, 10.0_wp, "v, " // what)
+      call check_near(error, a%contact, b%contact, tol, 100.0_wp, "contact, " // what)
+      call check_near(error, a%reaction, b%reaction, tol, 100.0_wp, "reactions, " // what)
+      call check_near(error, a%internal, b%internal, tol, 100.0_wp, "internal forces, " // what)
+      call check_near(error, [a%energy, a%potential], [b%energy, b%potential], tol, 10.0_wp, &
+         "energies, " // what)
+      associate (now => a%contacts, then => b%contacts)
+         call check_true(error, all(now%is_active .eqv. then%is_active), "what acts, " // what)
+         call check_near(error, [now%lam, now%closure, now%slip_path], [then%lam, then%closure, &
+            then%slip_path], tol, 100.0_wp, "contacts, " // what)
+         if (size(now%drag) > 0) call check_near(error, [now%drag, now%slip, now%slides_along], &
+            [then%drag, then%slip, then%slides_along], tol, 100.0_wp, "friction, " // what)
+      end associate
+      call check_near(error, a%pairs%total(1)%slave, b%pairs%total(1)%slave, tol, 100.0_wp, &
+         "pairs, " // what)
+   end subroutine compare_states
+
+   !> Counts and sums are those of both, what is largest that of one of them.
+   subroutine compare_increments(error, one, two)
+      type(error_t), allocatable, intent(inout) :: error
+      type(increment_t), intent(in) :: one, two(2)
+
+      call check_equal(error, [one%n_active, one%n_augmentation, one%n_held, one%notes%n], &
+         [two(2)%n_active, maxval(two%n_augmentation), maxval(two%n_held), sum(two%notes%n) + 1], &
+         "counts")
+      call check_near(error, [one%h, one%done], spread(sum(two%h), 1, 2), tol, 1.0_wp, "size")
+      call check_near(error, [one%give, one%law_missed, one%largest_push, &
+         one%stand_off%largest, one%nodal_pull%force, one%overlap%depth], [maxval(two%give), &
+         maxval(two%law_missed), maxval(two%largest_push), maxval(two%stand_off%largest), &
+         maxval(two%nodal_pull%force), maxval(two%overlap%depth)], tol, 100.0_wp, "the most")
+      call check_near(error, [one%stand_off%impulse, one%stand_off%impulse_gap], &
+         [sum(two%stand_off%impulse), sum(two%stand_off%impulse_gap)], tol, 10.0_wp, "impulses")
+      call check_near(error, one%work_scale, hypot(two(1)%work_scale, two(2)%work_scale), tol, &
+         100.0_wp, "what works are made of")
+   end subroutine compare_increments
+
+   !> Of the pair; in statics of the second half.
+   subroutine compare_sums(error, one, two, is_static)
+      type(error_t), allocatable, intent(inout) :: error
+      type(pair_sum_t), intent(in) :: one, two(2)
+      logical, intent(in) :: is_static
+      integer :: first
+
+      first = merge(2, 1, is_static)
+      call check_near(error, [one%span, one%weight], [sum(two(first:)%span), &
+         sum(two(first:)%weight)], tol, 10.0_wp, "time and force by it")
+      call check_near(error, one%push + one%moment, merge(0.0_wp, two(1)%push + two(1)%moment, &
+         is_static) + two(2)%push + two(2)%moment, tol, 10.0_wp, "pushes and moments")
+      call check_near(error, [one%impulse, one%friction, one%damping, one%duration], &
+         [two(2)%impulse, two(2)%friction, two(2)%damping, two(2)%duration], tol, 10.0_wp, "so far")
+      call check_true(error, one%is_pressed .eqv. two(2)%is_pressed, "is pressed at last")
+   end subroutine compare_sums
+
+   subroutine compare_ledgers(error, a, b)
+      type(error_t), allocatable, intent(inout) :: error
+      type(ledger_t), intent(in) :: a, b
+
+      call check_near(error, [a%kinetic, a%strain, a%potential, a%external_work, a%contact_work, &
+         a%restitution, a%decay, a%damping, a%friction, a%contact_energy, a%total, a%momentum, &
+         a%angular], [b%kinetic, b%strain, b%potential, b%external_work, b%contact_work, &
+         b%restitution, b%decay, b%damping, b%friction, b%contact_energy, b%total, b%momentum, &
+         b%angular], tol, 10.0_wp, "works")
+   end subroutine compare_ledgers
 
 end module test_march_parts

@@ -9,6 +9,7 @@ module test_march_past
    use emcon_march, only : march_begin_step, march_free, march_init, march_t
    use emcon_march_past, only : march_past_begin, march_past_forget, march_past_keep, &
       march_past_take
+   use emcon_rigid_bodies, only : rigid_frame_choose
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_row
    use emcon_steps, only : load_point, load_t
@@ -30,6 +31,7 @@ contains
 
       tests = [ &
          test_case_t("loads and accelerations at the start", test_begin), &
+         test_case_t("accelerations of a rigid body that spins", test_spin), &
          test_case_t("what the next motion gets", test_take), &
          test_case_t("kept and forgotten", test_keep)]
    end subroutine collect_march_past
@@ -95,6 +97,40 @@ contains
       if (.not. allocated(error)) call check_true(error, .not. other%state%history%has_past, "none")
       call march_free(other)
    end subroutine test_begin
+
+   !> Towards its centre, by the square of its spin.
+   subroutine test_spin(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: spin = 3.0_wp
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(march_t) :: march
+      real(wp) :: arm(2, n_node)
+      integer :: i
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      arm = scene%x - spread([1.0_wp, 0.5_wp], 2, n_node)
+      scene%v0(1, :) = -spin*arm(2, :)
+      scene%v0(2, :) = spin*arm(1, :)
+      deallocate(scene%rigid)
+      allocate(scene%rigid(1))
+      associate (body => scene%rigid(1))
+         body%name = "ALL"
+         body%reference = 1
+         body%element = [1, 2]
+         body%node = [(i, i = 1, n_node)]
+         call rigid_frame_choose(scene%x, body%node, body%reference, body%frame)
+      end associate
+      call add_step(scene, .false., h, 4)
+      scene%step(1)%scheme = scheme_row("DYNAMIC", "GENERALIZEDALPHA")
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      if (.not. allocated(error)) call march_past_begin(march, scene, instant_t(), error)
+      if (allocated(error)) return
+      call check_near(error, march%state%history%past(:, :, 1), -spin**2*arm, tol, 10.0_wp, &
+         "accelerations")
+      call march_free(march)
+   end subroutine test_spin
 
    !> Weights times what there is, and nothing that was there for a step before.
    subroutine test_take(error)

@@ -9,6 +9,7 @@ module test_overlap_boxes
       overlap_check_t, overlap_t
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
+   use midside_scenes, only : make_rows
    use small_scenes, only : add_block, add_surface, block_t, scene_begin, shake, top
    implicit none
    private
@@ -23,6 +24,7 @@ contains
 
       tests = [ &
          test_case_t("boxes, motions and distances", test_boxes), &
+         test_case_t("distances of sides with nodes between", test_midside), &
          test_case_t("what overlaps at the start is excused", test_excused), &
          test_case_t("looks on the way", test_looks)]
    end subroutine collect_overlap_boxes
@@ -84,6 +86,24 @@ contains
          call check_near(error, overlap%depth, 0.0_wp, 0.0_wp, 1.0_wp, "nothing overlaps")
       end do
    end subroutine test_boxes
+
+   !> Contact points of straight sides go by 5/3 as far as a node: 3 apart is less for nodes.
+   subroutine test_midside(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(overlap_check_t) :: judge
+      type(overlap_t) :: overlap
+      real(wp), allocatable :: rest(:, :)
+
+      call make_rows(scene)
+      scene%pair = [contact_pair_t(slave=2, master=1)]
+      scene%x(2, 16:) = scene%x(2, 16:) + 3.0_wp
+      rest = 0.0_wp*scene%x
+      call overlap_check_init(judge, scene)
+      call overlap_check_step(judge, scene%x, rest, rest, overlap)
+      call check_near(error, judge%clearance, 0.495_wp*3.0_wp*3.0_wp/5.0_wp, tol, 1.0_wp, &
+         "clearance")
+   end subroutine test_midside
 
    !> The third block is in the second one by a quarter as all begins, later in the first one.
    subroutine test_excused(error)

@@ -1,18 +1,23 @@
 !> All elements together: masses in closed form, assembly, bad geometry.
 module test_solid
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
+   use emcon_csr, only : csr_t
    use emcon_element_plane, only : element_motion_t, element_response_t
    use emcon_host_law, only : host_response_t
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
-   use emcon_motion, only : motion_of
+   use emcon_materials, only : kinematics_linear
+   use emcon_motion, only : motion_of, motion_t
    use emcon_evaluation, only : evaluation_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_t
    use emcon_solid_respond, only : solid_element_respond
    use emcon_solid_term, only : solid_term_init, solid_term_t
+   use emcon_space, only : space_t
    use emcon_term, only : response_begin, response_init, response_t, role_internal
-   use small_scenes, only : add_block, block_t, make_block, shake, young
+   use emcon_text, only : to_text
+   use kind_rows, only : law_code
+   use small_scenes, only : add_block, add_step, block_t, make_block, shake, young
    implicit none
    private
    public :: collect_solid
@@ -31,6 +36,7 @@ contains
          test_case_t("forces and energies are the sums over the elements", test_sums), &
          test_case_t("translation by 1e8 costs nothing", test_translation), &
          test_case_t("first inverted element is named", test_inverted), &
+         test_case_t("tangents that are symmetric", test_symmetric), &
          test_case_t("clockwise element", test_clockwise), &
          test_case_t("element without area", test_no_area)]
    end subroutine collect_solid
@@ -224,5 +230,48 @@ contains
       call solid_init(solid, scene, raised)
       call check_error(error, raised, err_input, "element 2", "element without area")
    end subroutine test_no_area
+
+   !> At the end of a motion all are; in steps those of linear laws at small strains, and what has
+   !> no elements but those of small kinematics.
+   subroutine test_symmetric(error)
+      type(error_t), allocatable, intent(out) :: error
+      !> Of the two elements: is the law linear, is the section; symmetric with and without nlgeom
+      logical, parameter :: has_linear_law(2, 4) = reshape([.true., .true., .true., .false., &
+         .false., .true., .false., .false.], [2, 4]), is_small(2, 4) = reshape([.false., .false., &
+         .false., .true., .false., .true., .true., .true.], [2, 4]), expected(2, 4) = reshape([ &
+         .false., .true., .false., .true., .false., .false., .true., .true.], [2, 4])
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(solid_term_t) :: term
+      type(space_t) :: space
+      type(csr_t) :: matrix
+      type(motion_t) :: motion
+      integer :: slot(0), i, k
+
+      do k = 1, size(expected, 2)
+         call make_block(scene, "CPE4", [2, 1], block)
+         scene%material = [scene%material, scene%material]
+         scene%section = [scene%section, scene%section]
+         scene%section%material = [1, 2]
+         scene%element%section = [1, 2]
+         do i = 1, 2
+            if (has_linear_law(i, k)) scene%material(i)%law = law_code("linear")
+            if (is_small(i, k)) scene%section(i)%kinematics = kinematics_linear
+         end do
+         call solid_term_init(term, scene, error)
+         if (allocated(error)) return
+         call add_step(scene, .true., 0.1_wp, 1)
+         motion%x = scene%x
+         do i = 1, 2
+            scene%step(1)%nlgeom = i == 1
+            call term%begin_step(scene, 1, space, matrix, slot)
+            motion%evaluation = evaluation_t(is_gradient=.true.)
+            call check_true(error, term%is_symmetric(motion), "at the end")
+            motion%evaluation%is_gradient = .false.
+            call check_true(error, term%is_symmetric(motion) .eqv. expected(i, k), "case " &
+               // to_text(k) // ", nlgeom " // to_text(2 - i))
+         end do
+      end do
+   end subroutine test_symmetric
 
 end module test_solid

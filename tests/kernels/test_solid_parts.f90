@@ -13,14 +13,16 @@ module test_solid_parts
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_law, only : n_lane
-   use emcon_locking, only : locking_element, strainless_element
+   use emcon_locking, only : bending_advice, locking_advice, locking_element, strainless_element
    use emcon_materials, only : kinematics_corotated, kinematics_linear
    use emcon_pack_shares, only : border_keep, pack_shares_t, shares_has, shares_lay_out
    use emcon_scene, only : scene_t
    use emcon_small_range, only : small_range_init, small_range_t, small_range_widen
    use emcon_small_widen_space, only : small_widen
    use emcon_solid, only : solid_init, solid_t
+   use emcon_stepper, only : stepper_t
    use emcon_text, only : to_text
+   use one_element, only : read_one
    use random_draws, only : draw_random
    use small_scenes, only : add_block, block_t, make_block, poisson, scene_begin, shake
    implicit none
@@ -42,6 +44,8 @@ contains
          test_case_t("corotated sections do not turn", test_corotated), &
          test_case_t("turns and strains in space", test_space), &
          test_case_t("elements that lock", test_locking), &
+         test_case_t("what to take in place of stiff elements", test_advice), &
+         test_case_t("what may lock, at small and at large strains", test_may_lock), &
          test_case_t("ends of motions that laws answer to", test_regular), &
          test_case_t("the same side by side", test_regular_lanes), &
          test_case_t("the same in space", test_regular_space)]
@@ -342,6 +346,7 @@ contains
          solid%trait%is_rigid = .true.
          call locking_element(solid, e, ratio)
          call check_equal(error, e, 0, "rigid")
+         call check_near(error, ratio, 0.0_wp, 0.0_wp, 1.0_wp, "a ratio of none")
       end do
       solid%trait%is_rigid = .false.
       solid%geometry(2)%n_gp = 1
@@ -349,6 +354,50 @@ contains
       solid%geometry%n_node = 3
       call check_equal(error, strainless_element(solid), 0, "of a triangle")
    end subroutine test_locking
+
+   !> Of the family that the elements are of.
+   subroutine test_advice(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=4), parameter :: kind(4) = ["CPE4", "CPS4", "C3D8", "CAX4"]
+      character(len=5), parameter :: locked(4) = ["CPE4H", "CPE4H", "C3D8H", "CAX6 "], &
+         bent(4) = ["CPE4I", "CPS4I", "C3D8I", "CAX6 "]
+      type(stepper_t) :: stepper
+      type(solid_t) :: solid
+      integer :: k
+
+      do k = 1, size(kind)
+         stepper = stepper_t()
+         call read_one(kind(k), 1, "NONLINEAR", stepper, error)
+         if (.not. allocated(error)) call solid_init(solid, stepper%scene, error)
+         if (allocated(error)) return
+         call check_true(error, index(locking_advice(solid), "; take " // locked(k)) > 0 .and. &
+            index(bending_advice(solid), "take " // bent(k)) == 1, kind(k))
+      end do
+   end subroutine test_advice
+
+   !> Elements of corners alone, with incompatible modes at large strains only.
+   subroutine test_may_lock(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=5), parameter :: kind(4) = ["CPE4 ", "CPE4H", "CPE4I", "CPE8R"]
+      logical, parameter :: expected(4, 2) = reshape([.true., .false., .true., .false., &
+         .true., .false., .false., .false.], [4, 2])
+      type(stepper_t) :: stepper
+      type(solid_t) :: solid
+      integer :: k, i
+
+      do i = 1, 2
+         do k = 1, size(kind)
+            stepper = stepper_t()
+            call read_one(trim(kind(k)), 1, "NONLINEAR", stepper, error)
+            if (allocated(error)) return
+            stepper%scene%step%nlgeom = i == 1
+            call solid_init(solid, stepper%scene, error)
+            if (allocated(error)) return
+            call check_true(error, solid%trait%may_lock(1) .eqv. expected(k, i), kind(k))
+            call check_true(error, solid%trait%has_mean(1) .eqv. k == 2, "mean of " // kind(k))
+         end do
+      end do
+   end subroutine test_may_lock
 
    !> det F > 0, and det C = (1 + 2 E11)(1 + 2 E22) - (2 E12)^2 > 0 where the law knows a volume; of
    !> both ends of the strain the second one counts. No powers that are infinite.
@@ -427,7 +476,7 @@ contains
          call draw_random(size)
          size = largest*(0.5_wp + size)
          do i = 1, 3
-            strain(i, i) = size(i)
+            strain(i, i) = merge(size(i), -size(i), mod(draw, 4) < 2)
          end do
          f(4, 1, 1) = size(4)
          f(5, 2, 1) = size(5)

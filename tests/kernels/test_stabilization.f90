@@ -6,26 +6,32 @@ module test_stabilization
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_at_end
+   use emcon_host_law, only : host_law_t
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_evaluate, motion_of, motion_t
+   use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_t
    use emcon_space, only : space_t
    use emcon_stabilization, only : stabilization_term_init, stabilization_term_t
    use emcon_stepper, only : stepper_t
    use emcon_term, only : response_begin, response_init, response_t, role_internal
-   use one_element, only : read_one
+   use given_hosts, only : well_t
+   use one_element, only : law_given, read_one
    use random_draws, only : draw_random
    implicit none
    private
    public :: collect_stabilization
 
-   real(wp), parameter :: part = 0.02_wp, h = 0.1_wp
+   real(wp), parameter :: part = 0.02_wp, h = 0.1_wp, tol = 256.0_wp*epsilon(1.0_wp)
    character(len=6), parameter :: kinds(*) = [character(len=6) :: "CPE4", "CPE4I", "CPE4H", &
       "CPS3", &
       "CAX4", "C3D8", "C3D8I", "C3D4"]
 
    !> One element, and its motion.
    type :: sample_t
+      type(scene_t) :: scene
+      type(space_t) :: space
+      type(csr_t) :: matrix
       type(stabilization_term_t) :: term
       type(solid_t) :: solid
       type(motion_t) :: motion
@@ -38,24 +44,28 @@ contains
 
       tests = [ &
          test_case_t("derivatives of the potential", test_derivatives), &
+         test_case_t("tangent times a field; entries of a condensed one", test_times), &
+         test_case_t("laws that are given, as elastic ones of their modulus", test_given), &
          test_case_t("the part of the strain energy that is asked for", test_part), &
          test_case_t("drag takes as much of what has grown in time", test_drag), &
          test_case_t("a turn takes nothing", test_turn)]
    end subroutine collect_stabilization
 
-   subroutine begin(kind, size_of_motion, sample, error)
+   subroutine begin(kind, size_of_motion, sample, error, constant, user)
       character(len=*), intent(in) :: kind
       real(wp), intent(in) :: size_of_motion
       type(sample_t), intent(out) :: sample
       type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(in), optional :: constant(:)    !! of an elastic law
+      type(host_law_t), intent(in), optional :: user(:)
       type(stepper_t) :: stepper
-      type(space_t) :: space
-      type(csr_t) :: matrix
       real(wp), allocatable :: u0(:, :), du(:, :)
       integer :: i
 
-      call read_one(trim(kind), 1, "NONLINEAR", stepper, error)
-      if (.not. allocated(error)) call solid_init(sample%solid, stepper%scene, error)
+      call read_one(trim(kind), merge(law_given, 1, present(user)), "NONLINEAR", stepper, error)
+      if (allocated(error)) return
+      if (present(constant)) stepper%scene%material(1)%constant = constant
+      call solid_init(sample%solid, stepper%scene, error, user)
       if (allocated(error)) return
       allocate(u0, du, mold=stepper%scene%x)
       call draw_random(u0)
@@ -63,7 +73,9 @@ contains
       stepper%scene%step(1)%stabilization = part
       stepper%scene%step(1)%time%h = h
       call stabilization_term_init(sample%term, sample%solid)
-      call sample%term%begin_step(stepper%scene, 1, space, matrix, [(i, i = 1, size(du)**2)])
+      sample%scene = stepper%scene
+      call sample%term%begin_step(sample%scene, 1, sample%space, sample%matrix, [(i, i = 1, &
+         size(du)**2)])
       sample%motion = motion_of(evaluation_at_end, stepper%scene%x, size_of_motion*(u0 - 0.5_wp), &
          size_of_motion*(du - 0.5_wp))
       sample%motion%evaluation%lapse = h
@@ -128,6 +140,89 @@ contains
       end do
    end subroutine test_derivatives
 
+   !> The tangent that the matrix is given, and nothing where there is no time; entries of the slots
+   !> below 0 go to the side.
+   subroutine test_times(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(response_t) :: response
+      real(wp), allocatable :: force(:), way(:, :), product(:, :), by_matrix(:)
+      real(dp), allocatable :: tangent(:), value(:), side(:)
+      real(wp) :: work
+      integer :: k, i
+
+      do k = 1, size(kinds)
+         call begin(kinds(k), 0.2_wp, sample, error)
+         if (allocated(error)) return
+         allocate(way, product, mold=sample%motion%x)
+         associate (n => size(way))
+            allocate(force(n), tangent(n**2), value(n**2), side(n**2))
+            call find(sample, sample%motion%du, work, force, tangent)
+            call draw_random(way)
+            by_matrix = matmul(reshape(real(tangent, wp), [n, n]), reshape(way, [n]))
+            product = 1.0_wp
+            call sample%term%tangent_times(sample%motion, way, product)
+            call check_near(error, reshape(product, [n]), 1.0_wp + by_matrix, tol, &
+               real(maxval(abs(tangent)), wp), trim(kinds(k)) // ": times")
+            sample%motion%evaluation%lapse = 0.0_wp
+            call sample%term%tangent_times(sample%motion, way, product)
+            call check_near(error, reshape(product, [n]), 1.0_wp + by_matrix, tol, &
+               real(maxval(abs(tangent)), wp), trim(kinds(k)) // ": no time")
+            sample%motion%evaluation%lapse = h
+            call sample%term%begin_step(sample%scene, 1, sample%space, sample%matrix, &
+               [(merge(-i, 0, mod(i, 3) > 0), i = 1, n**2)])
+            call response_init(response, size(way, 1), size(way, 2), 1)
+            value = 0.0_dp
+            side = 0.0_dp
+            call sample%term%respond(sample%motion, response, value, side)
+            where ([(mod(i, 3) == 0, i = 1, n**2)]) tangent = 0.0_dp
+            call check_near(error, real([value, side], wp), real([0.0_dp*value, tangent], wp), &
+               tol, real(maxval(abs(tangent)), wp), trim(kinds(k)) // ": to the side")
+            associate (total => response%part(role_internal))
+               call check_near(error, total%magnitude, abs(total%force), tol, maxval(abs(force)), &
+                  trim(kinds(k)) // ": sizes")
+            end associate
+         end associate
+         deallocate(force, way, product, tangent, value, side)
+         if (allocated(error)) return
+      end do
+   end subroutine test_times
+
+   !> W = k |E|^2/2 resists as an elastic law of lambda + 2 mu = k, lambda = mu.
+   subroutine test_given(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: k = 30.0_wp, young = 2.5_wp*k/3.0_wp
+      type(sample_t) :: own, given
+      real(wp), allocatable :: force(:), other(:)
+      real(dp), allocatable :: tangent(:)
+      type(host_law_t) :: law(1)
+      type(well_t) :: well
+      real(wp) :: work(2)
+      integer :: i
+
+      do i = 1, 2
+         well%k = k
+         well%n_variable = merge(3, 6, i == 1)
+         law(1)%material = "M"
+         if (allocated(law(1)%energy)) deallocate(law(1)%energy)
+         allocate(law(1)%energy, source=well)
+         call begin(trim(merge("CPE4", "C3D8", i == 1)), 0.2_wp, own, error, &
+            constant=[young, 0.25_wp])
+         if (.not. allocated(error)) call begin(trim(merge("CPE4", "C3D8", i == 1)), 0.2_wp, &
+            given, error, user=law)
+         if (allocated(error)) return
+         given%motion = own%motion
+         allocate(force(size(own%motion%du)), other(size(own%motion%du)), &
+            tangent(size(own%motion%du)**2))
+         call find(own, own%motion%du, work(1), force, tangent)
+         call find(given, own%motion%du, work(2), other, tangent)
+         call check_near(error, work(2), work(1), tol, work(1), "work")
+         call check_near(error, other, force, tol, maxval(abs(force)), "forces")
+         deallocate(force, other, tangent)
+         if (allocated(error)) return
+      end do
+   end subroutine test_given
+
    !> Of a small uniform strain from rest, E = 100, nu = 0.3, over the first increment.
    subroutine test_part(error)
       type(error_t), allocatable, intent(out) :: error
@@ -188,7 +283,7 @@ contains
    !> From rest by a large angle.
    subroutine test_turn(error)
       type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: c = cos(0.8_wp), s = sin(0.8_wp), tol = 256.0_wp*epsilon(1.0_wp)
+      real(wp), parameter :: c = cos(0.8_wp), s = sin(0.8_wp)
       type(sample_t) :: sample
       real(wp), allocatable :: force(:), du(:, :), place(:, :)
       real(dp), allocatable :: tangent(:)

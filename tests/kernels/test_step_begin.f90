@@ -5,11 +5,14 @@ module test_step_begin
    use emcon_amplitudes, only : amplitude_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
+   use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
+   use emcon_march_begin, only : march_renumber
    use emcon_scene, only : scene_t
    use emcon_scheme, only : scheme_row_t
    use emcon_scheme_registry, only : n_scheme_row, scheme_row
+   use emcon_state, only : state_t
    use small_scenes, only : add_step, block_t, clamp, make_block, make_two_blocks, prescribe, &
       shake
    implicit none
@@ -26,6 +29,7 @@ contains
 
       tests = [ &
          test_case_t("as a march that starts there, by all schemes", test_schemes), &
+         test_case_t("other conditions within a step", test_renumber), &
          test_case_t("what overlaps as it begins goes over the step", test_overclosure)]
    end subroutine collect_step_begin
 
@@ -80,6 +84,7 @@ contains
       later = scene
       later%u0 = march%state%u
       later%v0 = march%state%v
+      if (.not. row%has_inertia) later%v0 = 1.0_wp
       later%step = scene%step(2:)
       call march_init(new, later, error)
       ! As if increments were of other sizes, and time between two of them.
@@ -93,6 +98,8 @@ contains
       if (.not. allocated(error)) call march_begin_step(march, scene, 2, error)
       if (.not. allocated(error)) call march_begin_step(new, later, 1, error)
       if (allocated(error)) return
+      if (.not. row%has_inertia) call check_near(error, new%state%v, 0.0_wp*scene%x, 0.0_wp, &
+         1.0_wp, "no velocities in statics")
       associate (now => march%state%clock, first => new%state%clock)
          call check_equal(error, [now%i_step, now%n_grid, now%n_part, now%grid_stride, now%n_easy, &
             now%n_before, march%state%control%power], [2, first%n_grid, first%n_part, &
@@ -118,6 +125,62 @@ contains
       call march_free(march)
       call march_free(new)
    end subroutine compare
+
+   !> Two more nodes are held from the second increment on: the state and the works stay as they
+   !> are, and the critical step is that of a march that starts so. At first the right element is
+   !> the narrower one, then the left one.
+   subroutine test_renumber(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene, later
+      type(march_t) :: march, new
+      type(increment_t) :: increment
+      type(state_t) :: before
+      type(ledger_t) :: works
+      integer :: revision
+
+      call make_pulled(scene, scheme_row("DYNAMIC", "CENTRALDIFFERENCE"), 3)
+      scene%x(1, [3, 6]) = scene%x(1, [3, 6]) - 0.25_wp
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      if (.not. allocated(error)) call march_increment(march, scene, increment, error)
+      if (allocated(error)) return
+      call check_equal(error, march%state%explicit%critical_element, 2, "the right one")
+      march%state%u(1, [2, 5]) = -0.5_wp
+      march%state%u(1, [3, 6]) = 0.0_wp
+      march%state%base%is_set = .true.
+      before = march%state
+      works = march%ledger
+      revision = march%revision
+      call clamp(scene%step(1), [3, 6])
+      call march_renumber(march, scene, error)
+      if (allocated(error)) return
+      later = scene
+      later%u0 = march%state%u
+      later%v0 = march%state%v
+      call march_init(new, later, error)
+      if (.not. allocated(error)) call march_begin_step(new, later, 1, error)
+      if (allocated(error)) return
+      call check_equal(error, [march%system%space%numbering%n_unknown, &
+         march%state%explicit%critical_element, march%revision - revision], [4, 1, 1], &
+         "unknowns, fastest element, revision")
+      associate (now => march%state)
+         call check_near(error, now%explicit%critical_h, new%state%explicit%critical_h, tol, &
+            1.0_wp, "critical step")
+         call check_true(error, now%explicit%critical_h < 0.9_wp*before%explicit%critical_h, &
+            "another one")
+         call check_true(error, .not. now%base%is_set, "no factor")
+         call check_equal(error, [now%clock%n_grid, now%clock%increment, now%clock%i_step], &
+            [1, 1, 1], "counts")
+         call check_near(error, now%internal, before%internal, 0.0_wp, 1.0_wp, "forces")
+         call check_near(error, [now%clock%time, now%clock%step_time, now%potential, now%energy], &
+            [before%clock%time, before%clock%step_time, before%potential, before%energy], 0.0_wp, &
+            1.0_wp, "times and energies")
+      end associate
+      call check_near(error, [march%ledger%total, march%ledger%external_work], [works%total, &
+         works%external_work], 0.0_wp, 1.0_wp, "works")
+      call march_free(march)
+      call march_free(new)
+   end subroutine test_renumber
 
    !> Held blocks that overlap by 1/20: gaps rise to 0 over the step, or by an amplitude.
    subroutine test_overclosure(error)

@@ -27,6 +27,7 @@ contains
          test_case_t("a clean run is good", test_good), &
          test_case_t("what is bad is named", test_bad), &
          test_case_t("a tenth of an edge is a failure", test_deep), &
+         test_case_t("what contact gives way by bodies may overlap by", test_give), &
          test_case_t("a balance that is wrong in six digits is a failure", test_balance), &
          test_case_t("round-off of works is no error of the balance", test_rounding), &
          test_case_t("air across which forces act is told, or bad", test_air), &
@@ -89,6 +90,35 @@ contains
       call verdict_end(verdict)
       call check_true(error, verdict_is_failure(verdict, .false.), "a failure")
    end subroutine test_deep
+
+   !> Bodies may be in each other by what contact gives way by, twice and 0.01 more, and by a tenth
+   !> of an edge unless contact itself gives way by more: then that is told, and a failure.
+   subroutine test_give(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: give(6) = [0.01_wp, 0.01_wp, 0.09_wp, 0.09_wp, 0.11_wp, 0.11_wp], &
+         deepest(6) = [0.029_wp, 0.031_wp, 0.099_wp, 0.101_wp, 0.229_wp, 0.231_wp]
+      integer, parameter :: n_reason(6) = [0, 1, 0, 1, 1, 2]
+      type(verdict_t) :: verdict
+      integer :: k
+
+      do k = 1, size(give)
+         verdict = verdict_t()
+         verdict%overlap%bar = 0.01_wp
+         verdict%overlap%place = "between bodies"
+         verdict%overlap%time = 2.5_wp
+         verdict%overlap%deepest = deepest(k)
+         verdict%penalty%give = give(k)
+         call verdict_end(verdict)
+         call check_equal(error, verdict%reasons%n, n_reason(k), "reasons")
+         call check_true(error, verdict_is_failure(verdict, .false.) .eqv. max(give(k), &
+            deepest(k)) > 0.1_wp, "a failure")
+      end do
+      if (allocated(error)) return
+      call check_equal(error, verdict%reasons%item(1)%text, "bodies overlap by 0.231 of an edge " &
+         // "at time 2.5, between bodies", "how deep, when and where")
+      call check_equal(error, verdict%reasons%item(2)%text, "contact penetrates by up to 0.11 of " &
+         // "an edge: STIFFNESS or FACTOR of *CONSTRAINT METHOD is too small", "what gave way")
+   end subroutine test_give
 
    !> One part in a million: nothing to do with round-off in double and more.
    subroutine test_balance(error)

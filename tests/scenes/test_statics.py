@@ -529,3 +529,15 @@ def test_amplitude_of_the_overclosure(tmp_path):
     table = "*AMPLITUDE, NAME=LEFT\n0., 1., 0.5, 0.1, 1., 0.\n*STEP\n"
     done = bore(solve(tmp_path, text.replace("*STEP\n", table)))
     assert done[1] / done[2] == pytest.approx(0.9, rel=1e-3)
+
+
+def test_one_element_of_few_points(tmp_path):
+    """CPE8R has a motion without strain, held as it is: what to take is told."""
+    x = [(0, 0), (1, 0), (1, 1), (0, 1), (0.5, 0), (1, 0.5), (0.5, 1), (0, 0.5)]
+    lines = ["*NODE", *(f"{k}, {a}, {b}" for k, (a, b) in enumerate(x, 1))]
+    lines += ["*ELEMENT, TYPE=CPE8R, ELSET=B", "7, 1, 2, 3, 4, 5, 6, 7, 8"]
+    lines += ["*MATERIAL, NAME=M", "*ELASTIC", f"{E}, {NU}", "*SOLID SECTION, ELSET=B, MATERIAL=M"]
+    lines += ["*STEP", "*STATIC, DIRECT", "1., 1.", "*BOUNDARY", "1, 1, 2", "2, 2"]
+    run = solve(tmp_path, "\n".join([*lines, "*CLOAD", "3, 1, 0.01", "*END STEP", ""]), code=3)
+    assert "; elements of type CPE8R, as 7, have motions without strain" in run.errors
+    assert run.errors.rstrip().endswith("take two across, or CPE8")
