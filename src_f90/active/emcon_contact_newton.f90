@@ -6,7 +6,8 @@
 !> the method converges as Newton's does. The end is told by the laws, not by the set: where rows
 !> follow from others motions stand while forces still trade. Source: docs/theory.md, eq. (14i).
 module emcon_contact_newton
-   use emcon_condensation, only : condensation_free, condensation_make, condensation_t
+   use emcon_condensation, only : condensation_free, condensation_make, condensation_renew, condensation_free, condensation_make, &
+      condensation_t
    use emcon_constraint, only : condition_rate
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_rounding, &
@@ -17,6 +18,7 @@ module emcon_contact_newton
    use emcon_convergence, only : convergence_begin, most_rounding, round_off
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
       contact_trial_t, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
+   use emcon_early_set, only : one_closes_clearly
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_friction, only : friction_stiffness
@@ -133,6 +135,8 @@ contains
          call measure_damped(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          if (i > 0 .and. is_done(self, newton)) return
+         if (i == 1) call look(self, newton, system, set, motion, status)
+         if (status == newton_early) return
          status = newton_diverged
          if (i == most_iterates .or. .not. self%size < huge(self%size)) return
          call count_stall(self)
@@ -156,6 +160,23 @@ contains
          is_driven = .false.
       end do
    end subroutine iterate
+
+   !> Has something closed by the first correction that is no candidate? In statics it may join at
+   !> once: one that does not close in the end costs a row.
+   subroutine look(self, newton, system, set, motion, status)
+      type(solve_t), intent(in) :: self
+      type(newton_t), intent(inout) :: newton
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(in) :: set
+      type(motion_t), intent(in) :: motion
+      integer, intent(inout) :: status           !! `newton_early` if so
+      logical :: closes
+
+      if (.not. newton%looks_early) return
+      if (.not. self%is_static) return
+      call one_closes_clearly(system, set, motion, closes)
+      if (closes) status = newton_early
+   end subroutine look
 
    !> Does the correction move something farther than contacts that are no candidates allow?
    pure logical function goes_far(newton)
@@ -358,12 +379,17 @@ contains
 
       has_curvature = .not. btest(self%n_stall/stall_turn, 0)
       call phase_enter(system%phases, phase_factorise, left)
-      call find_hold(self, system, set)
-      call condensation_make(self%condensation, system, set, newton%correction, newton%residual, &
-         has_curvature, error)
-      call phase_leave(system%phases, phase_eliminate)
-      system%phases%n_factorisation = system%phases%n_factorisation + 1
-      newton%convergence%n_iteration = newton%convergence%n_iteration + 1
+      if (nears_end(self, newton)) then
+         call condensation_renew(self%condensation, set, newton%residual, error)
+         call phase_leave(system%phases, phase_eliminate)
+      else
+         call find_hold(self, system, set)
+         call condensation_make(self%condensation, system, set, newton%correction, &
+            newton%residual, has_curvature, error)
+         call phase_leave(system%phases, phase_eliminate)
+         system%phases%n_factorisation = system%phases%n_factorisation + 1
+         newton%convergence%n_iteration = newton%convergence%n_iteration + 1
+      end if
       status = newton_singular
       if (allocated(error) .or. self%condensation%is_singular) return
       call lay_out(self, set)
@@ -380,6 +406,15 @@ contains
       if (is_solved) self%status = contact_problem_status(self%problem, self%push)
       call phase_leave(system%phases, left)
    end subroutine condense
+
+   !> Is the step within its tolerance? The last tangent does for what is left.
+   pure logical function nears_end(self, newton)
+      type(solve_t), intent(in) :: self
+      type(newton_t), intent(in) :: newton
+
+      nears_end = newton%convergence%n_iteration > 0 .and. .not. self%condensation%is_singular &
+         .and. self%size <= newton%convergence%tolerance
+   end function nears_end
 
    !> In statics contacts may be all that holds a body: they are held as the tangent is factorised.
    pure subroutine find_hold(self, system, set)
