@@ -41,6 +41,8 @@ module emcon_contact_rounds
    integer, parameter :: most_tried = 6
    !> And rounds with all candidates.
    integer, parameter :: most_rounds = 100
+   !> Of these, so many are left before their end at most, as something closes on the way.
+   integer, parameter :: most_early = 8
    !> By so much of the largest push friction may miss its law: what a solve leaves.
    real(wp), parameter :: least_missed = 1.0e4_wp*epsilon(1.0_wp)
 
@@ -96,7 +98,7 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       real(wp), dimension(size(motion%du, 1), size(motion%du, 2)) :: first, driven
-      logical :: goes_on, is_early, obeys
+      logical :: goes_on, is_early, obeys, goes_far
       integer :: i
 
       first = motion%du
@@ -116,12 +118,8 @@ contains
             candidates%is_measured = .false.
             return
          end if
-         if (.not. self%has_impacts .and. &
-            largest_motion(motion%du - first) > self%largest_move) then
-            motion%du = first
-            newton%driven = driven
-            return
-         end if
+         goes_far = .not. self%has_impacts
+         if (goes_far) goes_far = largest_motion(motion%du - first) > self%largest_move
          is_early = status == newton_early
          newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
          self%lam(self%set%id(:self%set%n)) = self%set%lam(:self%set%n)
@@ -129,8 +127,19 @@ contains
          obeys = .not. is_early
          if (obeys) obeys = obeys_laws(self, system)
          call look(self, system, motion, candidates, status)
-         candidates%is_settled = obeys .and. (status /= step_done .or. &
-            .not. (candidates%have_changed .or. candidates%one_closes))
+         if (status == step_done) then
+            candidates%is_settled = obeys .and. &
+               .not. (candidates%have_changed .or. candidates%one_closes)
+         else
+            candidates%is_settled = obeys .and. .not. goes_far
+         end if
+         if (goes_far .and. .not. candidates%is_settled) then
+            ! Who is near there, where contacts were passed, tells nothing.
+            motion%du = first
+            newton%driven = driven
+            candidates%is_measured = .false.
+            return
+         end if
          if (candidates%is_settled .or. status /= step_done) return
          call choose(self, system, newton, motion, candidates, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
@@ -303,13 +312,14 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       type(coulomb_t), allocatable :: law(:)     ! (contacts of the set)
-      integer :: i
+      integer :: i, n_early, n_stale
 
-      newton%looks_early = .false.
+      n_early = 0
       newton%convergence%largest_move = huge(1.0_wp)
       if (.not. self%has_impacts) newton%convergence%largest_move = self%largest_move
       do i = 1, most_rounds
          call select_all(self, system, motion, candidates)
+         newton%looks_early = n_early < most_early
          associate (set => self%set)
             if (allocated(law)) deallocate(law)
             allocate(law(set%n - set%n_permanent))
@@ -325,7 +335,11 @@ contains
          if (status == newton_early) then
             newton%driven = 0.0_wp
             call keep(self, law, candidates)
+            n_early = n_early + 1
+            n_stale = self%n_stale
             call look(self, system, motion, candidates, status)
+            ! On the way stencils are chosen as often as it takes.
+            self%n_stale = n_stale
             if (status /= step_done) return
             cycle
          end if
