@@ -26,8 +26,8 @@ module emcon_contact_newton
    use emcon_lane_sums, only : relative_size
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_newton, only : newton_check_interrupt, newton_converged, newton_diverged, &
-      newton_early, newton_has_load, newton_measure_forces, newton_pick_residual, newton_refused, &
-      newton_singular, newton_t
+      newton_early, newton_has_load, newton_measure_forces, newton_pick_residual, newton_redundant, &
+      newton_refused, newton_singular, newton_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_phases, only : phase_eliminate, phase_enter, phase_factorise, phase_gaps, phase_leave
    use emcon_system, only : system_respond, system_tangent_times, system_t
@@ -134,6 +134,8 @@ contains
          if (allocated(error)) return
          call measure_damped(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
+         if (i == 0) call find_blocked(newton, set, status)
+         if (status == newton_redundant) return
          if (i > 0 .and. is_done(self, newton)) return
          if (i == 1) call look(self, newton, system, set, motion, status)
          if (status == newton_early) return
@@ -160,6 +162,20 @@ contains
          is_driven = .false.
       end do
    end subroutine iterate
+
+   !> Gaps and slips of which all nodes move as they are prescribed: no contact changes them.
+   subroutine find_blocked(newton, set, status)
+      type(newton_t), intent(inout) :: newton
+      type(constraint_set_t), intent(in) :: set  !! evaluated, with rows
+      integer, intent(inout) :: status           !! redundant if there are some
+      integer :: k
+
+      associate (start => set%gap_rows%row_start)
+         newton%correction%redundant = pack([(k, k = 1, set%n)], [(k > set%n_permanent .and. &
+            start(k + 1) == start(k), k = 1, set%n)])
+      end associate
+      if (size(newton%correction%redundant) > 0) status = newton_redundant
+   end subroutine find_blocked
 
    !> Has something closed by the first correction that is no candidate? In statics it may join at
    !> once: one that does not close in the end costs a row.

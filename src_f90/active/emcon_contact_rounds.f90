@@ -332,6 +332,17 @@ contains
          end associate
          self%n_newton = self%n_newton + newton%convergence%n_iteration
          if (allocated(error)) return
+         if (status == newton_redundant) then
+            ! They go for the step, and the user is told where that lets bodies into each other.
+            associate (blocked => self%set%id(newton%correction%redundant))
+               self%is_dropped(blocked) = .true.
+               candidates%takes_part(blocked) = .false.
+            end associate
+            motion%du = self%first
+            newton%driven = self%driven
+            candidates%is_measured = .false.
+            cycle
+         end if
          if (status == newton_early) then
             newton%driven = 0.0_wp
             call keep(self, law, candidates)
