@@ -1,8 +1,8 @@
-!> The constraints that act in a step: how the set begins, what it hands to the constraints, and
-!> what is let go, put off and dropped. How it goes on: emcon_active_set_update.
+!> The constraints that act in a step: how the set begins, and what it hands to the constraints.
+!> Which they are in the end: emcon_contact_rounds.
 module emcon_active_set
-   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_gives_back, &
-      constraints_select
+   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_select
+   use emcon_contact, only : gap_state_t
    use emcon_contact_support, only : contact_support_forget, contact_support_t
    use emcon_near_laws, only : near_laws_are_none, near_laws_select, near_laws_t, near_laws_update
    use emcon_evaluation, only : evaluation_is_equilibrium
@@ -20,8 +20,7 @@ module emcon_active_set
    private
    public :: active_set_t, active_set_init, active_set_suit, active_set_overclosure, &
       active_set_begin, active_set_restart, active_set_select, active_set_update_gaps
-   public :: active_set_pass, active_set_let_go, active_set_put_off, active_set_drop
-   public :: touch_tol, most_sets
+   public :: active_set_pass, candidates_t, candidates_clear, touch_tol
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
       step_stands_off, step_not_held, step_overlaps, step_unbalanced, step_rough, step_strikes, &
       step_passes_event, step_loose
@@ -34,8 +33,6 @@ module emcon_active_set
 
    !> A gap closed by more than this fraction of an edge is a penetration.
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
-   !> Sets tried in one step at most.
-   integer, parameter :: most_sets = 40
 
    !> Until when a contact whose surfaces are far apart need not be looked at.
    type :: skip_until_t
@@ -46,17 +43,27 @@ module emcon_active_set
       logical :: passes = .false.                !! nothing comes near: see `active_set_pass`
    end type skip_until_t
 
+   !> Who takes part in a step.
+   type :: candidates_t
+      logical, allocatable :: takes_part(:)      !! (n_constraint)
+      logical, allocatable :: acts(:)            !! (n_constraint) of these, in the next set,
+      logical, allocatable :: acted(:)           !! (n_constraint) in that of the last solve,
+      logical, allocatable :: began(:)           !! (n_constraint) and in the first one
+      logical, allocatable :: has_left(:)        !! (n_constraint) it lost its surface,
+      logical, allocatable :: is_back(:)         !! (n_constraint) and has come back
+      logical :: is_measured = .false.           !! gaps are known for the motion that there is
+      logical :: have_changed = .false.          !! solve the step again
+      logical :: is_settled = .false.            !! the step is solved, or cannot be
+      logical :: one_closes = .false.            !! that does not act
+      logical :: is_new_set = .false.            !! others act than in the set before
+   end type candidates_t
+
    type :: active_set_t
-      !> Which contacts act, stick and slide is a part of Newton's method: emcon_contact_rounds
-      logical :: is_one_problem = .false.
-      logical :: falls_back = .false.            !! and where no set stands, only then
       logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start,
       logical, allocatable :: closes(:)          !! (n_constraint) but here: its node has no mass
       logical :: has_impacts = .true.            !! what closes arrives with a velocity
       logical :: pushes_out = .false.            !! also what is closed too far, which makes energy
       logical :: puts_off = .false.              !! what follows from others nearly waits
-      logical :: has_rigid = .false.             !! bodies that few contacts hold: what follows from
-                                                 !! others waits, then the set changes one by one
       real(wp) :: largest_move = huge(1.0_wp)    !! of a correction in statics [L]
       real(wp) :: gap_tolerance = 0.0_wp         !! largest new stand-off per edge; 0: any
       type(constraint_set_t) :: set
@@ -65,25 +72,17 @@ module emcon_active_set
       !> (n_constraint) what acted at the end of the step before, with which multipliers
       logical, allocatable :: was_active(:)
       real(wp), allocatable :: lam0(:)
-      logical, allocatable :: tried(:, :)        !! (n_constraint, most_sets)
-      integer :: n_tried = 0
-      integer :: n_newton = 0                    !! iterations over all sets of the last step
+      integer :: n_newton = 0                    !! iterations in the last step
       logical :: is_stale = .false.              !! stencils were chosen for another motion
       integer :: n_stale = 0                     !! so often in this step
-      logical :: only_adds = .false.             !! nothing is let go any more in this step
-      logical :: has_cycled = .false.            !! candidates close below their gaps of the start
-      logical :: one_by_one = .false.            !! one contact a time is taken in or let go
-      integer :: n_early = 0                     !! sets left before they were solved, in this step
       logical :: may_cut = .true.                !! the step may be tried in smaller parts
       logical, allocatable :: is_candidate(:)    !! (n_constraint) acted at the start of the step,
                                                  !! or has closed in it
-      logical, allocatable :: comes_and_goes(:)  !! (n_constraint) in the last step's cycle of sets
-      logical, allocatable :: is_dropped(:)      !! (n_constraint) they follow from others
-      logical, allocatable :: is_put_off(:)      !! (n_constraint) nearly so: they waited once
-      logical, allocatable :: is_let_go(:)       !! (n_constraint) they pulled where Newton failed
-      real(wp), allocatable :: before(:, :)      !! (n_dim, n_node) first guess of the present set
-      real(wp), allocatable :: first(:, :)       !! (n_dim, n_node) and of the step's first set,
-      real(wp), allocatable :: driven(:, :)      !! (n_dim, n_node) with the prescribed motion in it
+      type(candidates_t) :: candidates           !! of emcon_contact_rounds
+      logical, allocatable :: is_left_out(:)     !! (n_constraint) cannot act in this step
+      real(wp), allocatable :: first(:, :)       !! (n_dim, n_node) first guess of the step,
+      real(wp), allocatable :: driven(:, :)      !! (n_dim, n_node) the prescribed motion in it,
+      real(wp), allocatable :: before(:, :)      !! (n_dim, n_node) and that of the present set
       !> (n_constraint) gap at the start of a step that resolves overclosure where it is closed,
       !> else 0; and the parts of it that are left at the start and the end of the increment.
       real(wp), allocatable :: overclosure(:)
@@ -113,23 +112,39 @@ contains
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(in) :: system
 
-      if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%tried, &
-         self%comes_and_goes, self%is_dropped, self%is_put_off, self%is_let_go, self%overclosure, &
-         self%closes, self%skip_until, self%is_candidate)
+      if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%is_left_out, &
+         self%overclosure, self%closes, self%skip_until, self%is_candidate)
       allocate(self%closes(system%n_constraint), source=.false.)
       allocate(self%skip_until(size(system%contact)))
       allocate(self%overclosure(system%n_constraint), source=0.0_wp)
       allocate(self%is_active(system%n_constraint), source=.false.)
       allocate(self%is_candidate(system%n_constraint), source=.false.)
-      allocate(self%comes_and_goes(system%n_constraint), source=.false.)
-      allocate(self%is_dropped(system%n_constraint), source=.false.)
-      allocate(self%is_put_off(system%n_constraint), source=.false.)
-      allocate(self%is_let_go(system%n_constraint), source=.false.)
+      allocate(self%is_left_out(system%n_constraint), source=.false.)
+      self%candidates = candidates_t()
+      associate (own => self%candidates, n => system%n_constraint)
+         allocate(own%takes_part(n), own%acts(n), own%acted(n), own%began(n), own%has_left(n), &
+            own%is_back(n), source=.false.)
+      end associate
       allocate(self%lam(system%n_constraint), source=0.0_wp)
-      allocate(self%tried(system%n_constraint, most_sets), source=.false.)
       call constraints_select(self%set, [integer ::])
-      call friction_init(self%friction, system, most_sets)
+      call friction_init(self%friction, system)
    end subroutine active_set_init
+
+   !> None takes part yet.
+   pure subroutine candidates_clear(self)
+      type(candidates_t), intent(inout) :: self
+
+      self%takes_part = .false.
+      self%acts = .false.
+      self%acted = .false.
+      self%has_left = .false.
+      self%is_back = .false.
+      self%is_measured = .false.
+      self%have_changed = .false.
+      self%is_settled = .false.
+      self%one_closes = .false.
+      self%is_new_set = .false.
+   end subroutine candidates_clear
 
    !> With `is_meant` the gaps at x + u that are closed are what the step resolves, else nothing.
    subroutine active_set_overclosure(self, system, x, u, is_meant)
@@ -199,19 +214,11 @@ contains
       call contact_support_forget(self%support)
       self%lam = self%lam0
       self%n_newton = 0
-      self%n_tried = 0
       self%n_stale = 0
-      self%n_early = 0
       self%penalty%n_augmentation = 0
       if (self%near_laws%is_on) self%near_laws%is_near = .false.
-      self%only_adds = .false.
-      self%has_cycled = .false.
       self%is_candidate = self%was_active
-      self%one_by_one = .false.
-      self%comes_and_goes = .false.
-      self%is_dropped = .false.
-      self%is_put_off = .false.
-      self%is_let_go = .false.
+      self%is_left_out = .false.
    end subroutine active_set_restart
 
    !> Choose the stencils of a contact for `motion`, and measure it over `du` if that is given.
@@ -299,11 +306,9 @@ contains
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       logical, intent(in), optional :: is_measured   !! as the gaps were when last looked at
-      logical :: is_known
+      logical :: is_known, is_kept
       integer :: k, pair, i
 
-      self%n_tried = self%n_tried + 1
-      self%tried(:, self%n_tried) = self%is_active
       if (self%set%n_condition == 0 .and. .not. self%near_laws%is_on) then
          if (.not. any(self%is_active)) return
       end if
@@ -313,7 +318,7 @@ contains
       if (self%near_laws%is_on) then
          call find_near(self, system)
          ! What may open in the solve itself has one law all through the step.
-         self%near_laws%is_held = merge(self%is_candidate, self%is_active, self%is_one_problem)
+         self%near_laws%is_held = self%is_candidate
          call constraints_select(self%set, places_of(self%is_active), &
             places_of(self%near_laws%is_near .and. .not. self%is_active))
          call near_laws_select(self%near_laws, system, self%set)
@@ -325,25 +330,37 @@ contains
          call constraint_index(system, self%set%id(k), pair, i)
          self%set%is_kept(k) = self%set%id(k) <= system%space%linear%n
          if (pair == 0) cycle
-         self%set%is_firm(k) = .not. self%puts_off .or. self%only_adds &
-            .or. self%is_put_off(self%set%id(k))
-         associate (gap => system%contact(pair)%contact%state(i))
-            self%set%target(k) = self%left(1)*self%overclosure(self%set%id(k)) + gap%closed
-            ! What is closed too far is never pushed out: that would make energy.
-            self%set%is_kept(k) = (self%holds_gap .and. .not. self%closes(self%set%id(k))) .or. &
-               (.not. self%pushes_out .and. &
-               gap%gap0 < self%set%target(k) - touch_tol*gap%size)
-            if (self%penalty%is_on .and. .not. self%penalty%augments) then
-               self%set%is_kept(k) = .false.
-            end if
-            if (self%set%is_kept(k)) self%set%target(k) = gap%gap0
-         end associate
+         self%set%is_firm(k) = .not. self%puts_off
+         call find_target(self, system%contact(pair)%contact%state(i), self%set%id(k), &
+            self%set%target(k), self%set%is_kept(k))
+      end do
+      do k = self%set%n + 1, self%set%n_condition
+         if (.not. self%is_candidate(self%set%id(k))) cycle
+         call constraint_index(system, self%set%id(k), pair, i)
+         call find_target(self, system%contact(pair)%contact%state(i), self%set%id(k), &
+            self%set%target(k), is_kept)
       end do
       self%set%n_permanent = count(self%set%id(:self%set%n) <= system%first_constraint(1))
-      call friction_select(self%friction, self%set, self%n_tried)
+      call friction_select(self%friction, self%set)
       call penalty_select(self%penalty, system, self%set, self%has_impacts .and. &
          .not. motion%evaluation%pushes_at_end)
    end subroutine active_set_select
+
+   !> The mean gap that contact `id` holds where it acts; `is_kept` if that is the gap of the start.
+   pure subroutine find_target(self, gap, id, target, is_kept)
+      type(active_set_t), intent(in) :: self
+      type(gap_state_t), intent(in) :: gap
+      integer, intent(in) :: id                  !! number over all pairs
+      real(wp), intent(out) :: target            !! [L]
+      logical, intent(out) :: is_kept
+
+      target = self%left(1)*self%overclosure(id) + gap%closed
+      ! What is closed too far is never pushed out: that would make energy.
+      is_kept = (self%holds_gap .and. .not. self%closes(id)) .or. &
+         (.not. self%pushes_out .and. gap%gap0 < target - touch_tol*gap%size)
+      if (self%penalty%is_on .and. .not. self%penalty%augments) is_kept = .false.
+      if (is_kept) target = gap%gap0
+   end subroutine find_target
 
    !> Where a list is true.
    pure function places_of(is_meant) result(place)
@@ -381,59 +398,5 @@ contains
          call pair_measure(system, pair, motion%x, motion%u0, motion%du)
       end do
    end subroutine measure_all
-
-   !> Newton's method has not converged: let go of the contacts that pull in its last iterate, each
-   !> once in a step, and start again with the multipliers and from where it started. `is_done` if
-   !> there are none.
-   pure subroutine active_set_let_go(self, du, is_done)
-      type(active_set_t), intent(inout) :: self
-      real(wp), intent(inout), contiguous :: du(:, :)    !! (n_dim, n_node) [L]
-      logical, intent(out) :: is_done            !! nothing pulls that was not let go before
-      integer :: k
-
-      is_done = .true.
-      if (self%only_adds) return
-      do k = self%set%n_permanent + 1, self%set%n
-         associate (id => self%set%id(k))
-            if (self%is_let_go(id) .or. .not. self%set%lam(k) < 0.0_wp) cycle
-            if (constraints_gives_back(self%set, k)) cycle
-            self%is_let_go(id) = .true.
-            self%is_active(id) = .false.
-            is_done = .false.
-         end associate
-      end do
-      if (is_done) return
-      self%lam = self%lam0
-      self%n_tried = 0
-      du = self%before
-   end subroutine active_set_let_go
-
-   !> Constraints that follow from others nearly, at the places `near` of the set, wait: each comes
-   !> back once its gap closes without it, and then goes before those others.
-   pure subroutine active_set_put_off(self, near)
-      type(active_set_t), intent(inout) :: self
-      integer, intent(in) :: near(:)             !! (any) places in the set, from 1
-
-      self%is_put_off(self%set%id(near)) = .true.
-      self%is_active(self%set%id(near)) = .false.
-      self%n_tried = 0
-   end subroutine active_set_put_off
-
-   !> Constraints that follow from earlier ones do not act in this step. They stand at the places
-   !> `redundant` of the set; of constraints that depend on each other the last ones go. Where rigid
-   !> bodies may need others of them, they come back, one by one.
-   pure subroutine active_set_drop(self, redundant)
-      type(active_set_t), intent(inout) :: self
-      integer, intent(in) :: redundant(:)        !! (any) places in the set, from 1
-
-      if (self%has_rigid .and. .not. self%one_by_one) then
-         self%one_by_one = .true.
-         self%is_active(self%set%id(redundant)) = .false.
-      else
-         self%is_dropped(self%set%id(redundant)) = .true.
-      end if
-      self%is_active = self%is_active .and. .not. self%is_dropped
-      self%n_tried = 0
-   end subroutine active_set_drop
 
 end module emcon_active_set

@@ -16,10 +16,10 @@ contains
 
    !> What to say of the first contact that closes at the end of the motion that was last measured,
    !> but was left out since nothing in it is free.
-   subroutine blocked_contact_text(system, scene, is_dropped, text)
+   subroutine blocked_contact_text(system, scene, is_left_out, text)
       type(system_t), intent(in) :: system       !! numbered for the step
       type(scene_t), intent(in) :: scene
-      logical, intent(in) :: is_dropped(:)       !! (n_constraint)
+      logical, intent(in) :: is_left_out(:)       !! (n_constraint)
       character(len=:), allocatable, intent(out) :: text   !! empty: there is none
       integer :: k, i
 
@@ -28,7 +28,7 @@ contains
          associate (contact => system%contact(k)%contact, pair => scene%pair(k), &
                first => system%first_constraint(k))
             do i = 1, contact%n_constraint
-               if (.not. is_dropped(first + i)) cycle
+               if (.not. is_left_out(first + i)) cycle
                if (.not. contact%state(i)%gap1 < -touch_tol*contact%state(i)%size) cycle
                if (.not. numbering_holds(system%space%numbering, contact%node(i))) cycle
                if (.not. surface_is_bound(system, scene, pair%master)) cycle

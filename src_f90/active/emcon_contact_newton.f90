@@ -6,7 +6,7 @@
 !> the method converges as Newton's does. The end is told by the laws, not by the set: where rows
 !> follow from others motions stand while forces still trade. Source: docs/theory.md, eq. (14i).
 module emcon_contact_newton
-   use emcon_condensation, only : condensation_free, condensation_make, condensation_renew, condensation_free, condensation_make, &
+   use emcon_condensation, only : condensation_free, condensation_make, condensation_renew, &
       condensation_t
    use emcon_constraint, only : condition_rate
    use emcon_constraint_rows, only : constraints_rows
@@ -18,7 +18,6 @@ module emcon_contact_newton
    use emcon_convergence, only : convergence_begin, most_rounding, round_off
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
       contact_trial_t, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
-   use emcon_early_set, only : one_closes_clearly
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_friction, only : friction_stiffness
@@ -26,8 +25,8 @@ module emcon_contact_newton
    use emcon_lane_sums, only : relative_size
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_newton, only : newton_check_interrupt, newton_converged, newton_diverged, &
-      newton_early, newton_has_load, newton_measure_forces, newton_pick_residual, newton_redundant, &
-      newton_refused, newton_singular, newton_t
+      newton_early, newton_has_load, newton_measure_forces, newton_pick_residual, newton_refused, &
+      newton_singular, newton_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_phases, only : phase_eliminate, phase_enter, phase_factorise, phase_gaps, phase_leave
    use emcon_system, only : system_respond, system_tangent_times, system_t
@@ -85,7 +84,7 @@ contains
       self%is_static = evaluation_is_equilibrium(motion%evaluation)
       call iterate(self, newton, system, set, motion, status, error)
       call condensation_free(self%condensation)
-      if (allocated(error) .or. .not. any(status == [newton_converged, newton_early])) return
+      if (allocated(error)) return
       do k = 1, size(law)
          law(k)%status = self%status(k)
       end do
@@ -134,11 +133,7 @@ contains
          if (allocated(error)) return
          call measure_damped(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
-         if (i == 0) call find_blocked(newton, set, status)
-         if (status == newton_redundant) return
          if (i > 0 .and. is_done(self, newton)) return
-         if (i == 1) call look(self, newton, system, set, motion, status)
-         if (status == newton_early) return
          status = newton_diverged
          if (i == most_iterates .or. .not. self%size < huge(self%size)) return
          call count_stall(self)
@@ -162,37 +157,6 @@ contains
          is_driven = .false.
       end do
    end subroutine iterate
-
-   !> Gaps and slips of which all nodes move as they are prescribed: no contact changes them.
-   subroutine find_blocked(newton, set, status)
-      type(newton_t), intent(inout) :: newton
-      type(constraint_set_t), intent(in) :: set  !! evaluated, with rows
-      integer, intent(inout) :: status           !! redundant if there are some
-      integer :: k
-
-      associate (start => set%gap_rows%row_start)
-         newton%correction%redundant = pack([(k, k = 1, set%n)], [(k > set%n_permanent .and. &
-            start(k + 1) == start(k), k = 1, set%n)])
-      end associate
-      if (size(newton%correction%redundant) > 0) status = newton_redundant
-   end subroutine find_blocked
-
-   !> Has something closed by the first correction that is no candidate? In statics it may join at
-   !> once: one that does not close in the end costs a row.
-   subroutine look(self, newton, system, set, motion, status)
-      type(solve_t), intent(in) :: self
-      type(newton_t), intent(inout) :: newton
-      type(system_t), intent(inout) :: system
-      type(constraint_set_t), intent(in) :: set
-      type(motion_t), intent(in) :: motion
-      integer, intent(inout) :: status           !! `newton_early` if so
-      logical :: closes
-
-      if (.not. newton%looks_early) return
-      if (.not. self%is_static) return
-      call one_closes_clearly(system, set, motion, closes)
-      if (closes) status = newton_early
-   end subroutine look
 
    !> Does the correction move something farther than contacts that are no candidates allow?
    pure logical function goes_far(newton)

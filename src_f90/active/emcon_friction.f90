@@ -1,17 +1,14 @@
 !> Which contacts with friction stick in a step and which slide where to.
 !>
-!> All of them change at once, by the trial of emcon_coulomb_law: what closes begins in the way
-!> that its slip tells, and what slides may turn at once. Contacts that acted at the start or close
-!> within the step are its candidates: they hold their gaps as one complementarity, and never cease
-!> to be candidates within the step. Source: docs/theory.md, section 4.13.
+!> What closes begins in the way that its slip tells, by the trial of emcon_coulomb_law; how it goes
+!> on is found in emcon_contact_newton. Source: docs/theory.md, section 4.13.
 module emcon_friction
    use emcon_constraint, only : condition_friction, condition_normal, condition_t
    use emcon_constraints, only : constraint_set_t, constraints_stick
    use emcon_contact, only : contact_t
    use emcon_contact_law, only : contact_laws_add
-   use emcon_coulomb_law, only : contact_free, contact_open, contact_slides, contact_sticks, &
-      contact_trial_t, coulomb_t, coulomb_trial, coulomb_violation, is_same_status, slip_rounding, &
-      slip_status_t
+   use emcon_coulomb_law, only : contact_open, contact_slides, contact_sticks, contact_trial_t, &
+      coulomb_status, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
    use emcon_csr, only : csr_find
    use emcon_evaluation, only : evaluation_is_equilibrium, evaluation_displacement
    use emcon_kinds, only : wp
@@ -19,16 +16,13 @@ module emcon_friction
    use emcon_system, only : system_t
    implicit none
    private
-   public :: friction_t, friction_init, friction_begin, friction_select, friction_idle, &
-      friction_keep, friction_turn, friction_close, friction_missed, friction_holds, &
-      friction_is_same, friction_stiffness
+   public :: friction_t, friction_init, friction_begin, friction_select, friction_keep, &
+      friction_close, friction_turn, friction_missed, friction_holds, friction_stiffness
 
    !> So much of the friction of a contact may act on another node than its push, and a step is
    !> solved again so often at most for more.
    real(wp), parameter, public :: most_shift = 5.0e-3_wp
    integer, parameter, public :: most_lagged = 2
-   !> Forces that differ by less than this part of the largest push are one.
-   real(wp), parameter :: tied = 5.0e4_wp*epsilon(1.0_wp)
 
    type :: friction_t
       logical :: is_on = .false. !! some contact has friction; else nothing is allocated
@@ -39,24 +33,18 @@ module emcon_friction
       real(wp), allocatable :: tau(:, :), tau0(:, :)
       !> (n_slip, n_constraint) of slip, where it slid then, of length 1; else 0
       real(wp), allocatable :: direction0(:, :)
-      logical, allocatable :: is_idle(:)         !! (n_constraint) others hold its slip
-      logical, allocatable :: is_needed(:)       !! (n_constraint) others hold its slip but nearly
-      logical, allocatable :: has_turned(:)      !! (n_constraint) from one slide to the other
       logical, allocatable :: knows_limit(:)     !! (n_constraint) of mu: see emcon_friction_limit
       logical, allocatable :: knows_corners(:)   !! (n_contact) as emcon_interlock_plane tells
-      type(slip_status_t), allocatable :: tried(:, :)   !! (n_constraint, sets) of the sets tried
-      integer :: n_asked = 0                     !! times that the referee has set all of it
       logical :: lags = .false.                  !! it acts where slip was expected, not where it is
       integer :: n_lagged = 0                    !! so often the step was solved again for that
    end type friction_t
 
 contains
 
-   !> Set up for the contacts of `system`; `n_set` sets at most are tried in a step.
-   subroutine friction_init(self, system, n_set)
+   !> Set up for the contacts of `system`.
+   subroutine friction_init(self, system)
       type(friction_t), intent(out) :: self
       type(system_t), intent(in) :: system
-      integer, intent(in) :: n_set               !! > 0
       type(coulomb_t) :: law(size(system%contact))
       integer :: i, n
 
@@ -70,10 +58,8 @@ contains
       allocate(self%law(n))
       allocate(self%tau(self%n_slip, n), self%tau0(self%n_slip, n), &
          self%direction0(self%n_slip, n), source=0.0_wp)
-      allocate(self%is_idle(n), self%is_needed(n), self%has_turned(n), self%knows_limit(n), &
-         source=.false.)
+      allocate(self%knows_limit(n), source=.false.)
       allocate(self%knows_corners(size(system%contact)), source=.false.)
-      allocate(self%tried(n, merge(n_set, 0, self%is_on)))
       if (.not. self%is_on) return
       do i = 1, size(system%contact)
          self%law(system%first_constraint(i) + 1:system%first_constraint(i + 1)) = law(i)
@@ -113,10 +99,6 @@ contains
          self%law(i)%status%direction(:self%n_slip) = self%direction0(:, i)
       end do
       self%tau = self%tau0
-      self%is_idle = .false.
-      self%is_needed = .false.
-      self%has_turned = .false.
-      self%n_asked = 0
       self%n_lagged = 0
       if (.not. evaluation_is_equilibrium(motion%evaluation)) call find_targets(self, system, &
          motion, was_active)
@@ -145,15 +127,13 @@ contains
    end subroutine find_targets
 
    !> Give the conditions of `set`, just selected, their laws, and what sticks rows of its slips.
-   pure subroutine friction_select(self, set, n_tried)
+   pure subroutine friction_select(self, set)
       type(friction_t), intent(inout) :: self
       type(constraint_set_t), intent(inout) :: set
-      integer, intent(in) :: n_tried             !! number of the set among those tried
       logical :: sticks(set%n)
       integer :: k
 
       if (.not. self%is_on) return
-      self%tried(:, n_tried) = self%law%status
       sticks = .false.
       do k = set%n_permanent + 1, set%n
          associate (item => set%item(k), law => self%law(set%id(k)))
@@ -161,12 +141,11 @@ contains
             item%has_friction = .true.
             item%slip_target = law%slip_held()
             call contact_laws_add(set%law(k), law)
-            sticks(k) = holds(self, set%id(k))
+            sticks(k) = law%holds_slip()
          end associate
       end do
       associate (stuck => pack([(k, k = 1, set%n)], sticks))
-         call constraints_stick(set, stuck, self%tau(:, set%id(stuck)), &
-            self%is_needed(set%id(stuck)))
+         call constraints_stick(set, stuck, self%tau(:, set%id(stuck)))
       end associate
    end subroutine friction_select
 
@@ -178,34 +157,6 @@ contains
       grips = self%law%mu > 0.0_wp .and. self%law%status%kind /= contact_slides
    end function friction_holds
 
-   !> Are the ways of what acts those of set number `n_tried`?
-   pure logical function friction_is_same(self, n_tried, is_active) result(is_same)
-      type(friction_t), intent(in) :: self
-      integer, intent(in) :: n_tried             !! number of the set among those tried
-      logical, intent(in) :: is_active(:)        !! (n_constraint)
-
-      is_same = .true.
-      if (self%is_on) is_same = all(is_same_status(self%tried(:, n_tried), self%law%status) .or. &
-         .not. is_active)
-   end function friction_is_same
-
-   !> Does contact `id` hold its slip by itself?
-   pure logical function holds(self, id)
-      type(friction_t), intent(in) :: self
-      integer, intent(in) :: id                  !! from 1
-
-      holds = self%law(id)%holds_slip() .and. .not. self%is_idle(id)
-   end function holds
-
-   !> What sticks by the rows `row` of slips does so by what holds others.
-   pure subroutine friction_idle(self, set, row)
-      type(friction_t), intent(inout) :: self
-      type(constraint_set_t), intent(in) :: set
-      integer, intent(in) :: row(:)              !! (any) of the set
-
-      if (size(row) > 0) self%is_idle(set%id(set%condition(row))) = .true.
-   end subroutine friction_idle
-
    !> Friction of what sticks, to start from with the next set.
    pure subroutine friction_keep(self, set)
       type(friction_t), intent(inout) :: self
@@ -216,46 +167,6 @@ contains
          self%tau(set%slip(k), set%id(set%condition(k))) = set%lam(k)
       end do
    end subroutine friction_keep
-
-   !> The way of contact `k` of the set, which acts and goes on to do so, from what solves the step.
-   pure subroutine friction_turn(self, system, set, k, turns)
-      type(friction_t), intent(inout) :: self
-      type(system_t), intent(in) :: system
-      type(constraint_set_t), intent(in) :: set
-      integer, intent(in) :: k                   !! > set%n_held
-      logical, intent(out) :: turns              !! it is another one than before
-      type(contact_trial_t) :: at
-      type(slip_status_t) :: next
-      real(wp) :: stiffness, tie
-
-      turns = .false.
-      associate (id => set%id(k), item => set%item(k), lam => set%lam(k), &
-            law => self%law(set%id(k)))
-         if (.not. law%mu > 0.0_wp) return
-         stiffness = friction_stiffness(system, item)
-         tie = tied*largest_push(set)
-         at = contact_trial_t(item%normal*lam, 0.0_wp, condition_friction(item, lam), item%slip, &
-            law%slip_target, slip_rounding*item%size)
-         ! Where slip is held the solution has no other, but for round-off.
-         if (holds(self, id)) at%slip = law%slip_held()
-         if (self%is_idle(id) .and. .not. self%is_needed(id)) then
-            ! Others do not hold it: it does so itself before it may slide.
-            turns = stiffness*(norm2(at%slip - law%slip_held()) - at%rounding) > tie
-            self%is_needed(id) = turns
-            return
-         end if
-         next = coulomb_trial(law%status, at, law%mu, stiffness, tie)
-         ! What pulls and is held closed all the same has no friction: it would make energy.
-         if (next%kind == contact_open) next = slip_status_t(contact_free)
-         ! What turns twice would turn again and again: it sticks in between.
-         if (dot_product(next%direction, law%status%direction) < 0.0_wp) then
-            if (self%has_turned(id)) next = slip_status_t(contact_sticks)
-            self%has_turned(id) = .true.
-         end if
-         turns = .not. is_same_status(next, law%status)
-         law%status = next
-      end associate
-   end subroutine friction_turn
 
    !> Contact `i` of a pair closes from the motion, by `gap` below the one that it will hold, and
    !> begins in the way that its slip tells.
@@ -278,10 +189,36 @@ contains
          at%gap = min(gap, -tiny(gap))
          at%slip(:self%n_slip) = contact%slip(i, motion%x, motion%u0, motion%du)
          at%slip_target = law%slip_target
-         law%status = coulomb_trial(slip_status_t(contact_open), at, law%mu, 1.0_wp, 0.0_wp)
+         law%status = coulomb_status(at, law%mu, 1.0_wp)
          if (law%status%kind == contact_open) law%status%kind = contact_sticks
       end associate
    end subroutine friction_close
+
+   !> The way of contact `k` of the set, which acts and goes on to do so, by the trial that what
+   !> solves the step makes.
+   pure subroutine friction_turn(self, system, set, k, turns)
+      type(friction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(in) :: k                   !! > n_permanent
+      logical, intent(inout) :: turns            !! becomes true if it is another one than before
+      type(contact_trial_t) :: at
+      type(slip_status_t) :: next
+
+      associate (item => set%item(k), law => self%law(set%id(k)))
+         if (.not. law%mu > 0.0_wp) return
+         at = contact_trial_t(item%normal*set%lam(k), 0.0_wp, condition_friction(item, &
+            set%lam(k)), item%slip, law%slip_target, slip_rounding*item%size)
+         ! Where slip is held the solution has no other, but for round-off.
+         if (law%holds_slip()) at%slip = law%slip_held()
+         next = coulomb_status(at, law%mu, friction_stiffness(system, item))
+         ! What nothing pushes goes on as it was.
+         if (next%kind == contact_open) return
+         turns = turns .or. next%kind /= law%status%kind .or. &
+            dot_product(next%direction, law%status%direction) < 0.0_wp
+         law%status = next
+      end associate
+   end subroutine friction_turn
 
    !> How far the laws of contact and friction are missed at worst, and the largest push.
    pure subroutine friction_missed(self, system, set, missed, largest)

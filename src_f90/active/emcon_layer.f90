@@ -141,7 +141,6 @@ contains
          allocate(self%system%contact(i)%contact, source=model%contact(i)%contact)
       end do
       call layer_mark(self, self%system, self%active%closes)
-      self%active%is_one_problem = .true.
       self%active%holds_gap = .true.
       self%active%has_impacts = .false.
       self%active%may_cut = .false.
@@ -283,7 +282,7 @@ contains
       self%state%contacts%is_active = self%acts .and. .not. stays
       self%state%contacts%lam = self%lam
       call active_set_begin(self%active, self%system, self%motion, self%state)
-      self%active%is_dropped = stays
+      self%active%is_left_out = stays
       self%newton%driven = 0.0_wp
       call active_set_solve(self%active, self%system, self%scene, self%newton, self%motion, &
          status, error)
@@ -298,7 +297,7 @@ contains
       logical :: have_closed(size(self%acts))    !! (contacts)
       integer :: i
 
-      have_closed = self%active%is_dropped
+      have_closed = self%active%is_left_out
       do i = 1, size(self%system%contact)
          associate (contact => self%system%contact(i)%contact, &
                first => self%system%first_constraint(i))

@@ -14,14 +14,12 @@ module emcon_penalty
    implicit none
    private
    public :: penalty_state_t, penalty_begin_step, penalty_select, penalty_augment, &
-      penalty_stored, penalty_depth, penalty_pulls, penalty_keep, penalty_owes
+      penalty_stored, penalty_depth, penalty_keep, penalty_owes
 
    !> Solves with multipliers that are given, at most.
    integer, parameter, public :: most_augmentations = 50
    !> By default an augmented Lagrangian is so much stiffer than what it pushes at.
    real(wp), parameter :: augmented_factor = 3.0_wp
-   !> A pull of this part of the largest multiplier tells that the set will change.
-   real(wp), parameter :: pull = 1.0e-2_wp
 
    type :: penalty_state_t
       logical :: is_on = .false.                 !! contact gives way in this step
@@ -181,18 +179,6 @@ contains
          call set%law(k)%row%push_on(set%lam(k))
       end do
    end subroutine penalty_augment
-
-   !> Does a contact of `set` that is pushed back pull by more than may turn while gaps still close?
-   !> Rows that say nearly the same never close all of their gaps: the multiplier of one falls on.
-   pure logical function penalty_pulls(self, set) result(pulls)
-      type(penalty_state_t), intent(in) :: self
-      type(constraint_set_t), intent(in) :: set
-      integer :: first
-
-      first = set%n_permanent + 1
-      pulls = self%augments .and. set%n >= first
-      if (pulls) pulls = minval(set%lam(first:set%n)) < -pull*maxval(set%lam(first:set%n))
-   end function penalty_pulls
 
    !> What the contacts of `set` store at the end of the step [M L^2/T^2].
    pure real(wp) function penalty_stored(self, set) result(energy)

@@ -5,7 +5,7 @@
 !> by multipliers that hold velocities there. Source: docs/theory.md, section 14.
 module emcon_explicit
    use emcon_active_set, only : active_set_select, step_done
-   use emcon_active_set_update, only : active_set_advance
+   use emcon_contact_rounds, only : contact_rounds_stand
    use emcon_constraint, only : condition_rate
    use emcon_constraints, only : constraint_set_t, constraints_force
    use emcon_critical_step, only : critical_bound, critical_sharp
@@ -224,7 +224,7 @@ contains
          call active_set_select(active, system, motion)
          is_done = size(system%contact) == 0 .or. active%penalty%is_at_ends
          status = step_done
-         if (.not. is_done) call active_set_advance(active, system, motion, is_done, status)
+         if (.not. is_done) call contact_rounds_stand(active, system, motion, is_done, status)
          call phase_leave(system%phases, left)
          if (.not. is_done) return
          self%explicit%is_free = .true.

@@ -189,7 +189,7 @@ contains
          state%base = factor_base_t()
          self%newton%factor_policy%is_wanted = step%solution%newton == newton_kept .and. &
             step_is_dynamic(step)
-         call begin_active(self%active, step, size(scene%rigid) > 0)
+         call begin_active(self%active, step)
          if (.not. step_is_dynamic(step)) call contact_support_begin(self%active%support, &
             self%system, scene, state%u)
          call configure_contact(self, scene)
@@ -307,14 +307,11 @@ contains
    end subroutine measure_start
 
    !> How contact begins and ends in a step.
-   subroutine begin_active(active, step, has_rigid)
+   subroutine begin_active(active, step)
       type(active_set_t), intent(inout) :: active
       type(step_t), intent(in) :: step
-      logical, intent(in) :: has_rigid           !! some bodies are rigid
 
       active%puts_off = .true.
-      active%has_rigid = has_rigid
-      active%is_one_problem = .true.
       call active_set_suit(active, step)
       active%holds_gap = any(step_initiation(step) == [initiation_persistent, &
          initiation_massless]) .and. step%contact%method /= method_penalty

@@ -9,7 +9,7 @@ module emcon_march_parts
    use emcon_kinds, only : wp
    use emcon_locking, only : strainless_element
    use emcon_march_begin, only : march_renumber
-   use emcon_march_step, only : cycling_text, march_step, nodes_text
+   use emcon_march_step, only : march_step, nodes_text
    use emcon_march_types, only : increment_t, march_t, part_t, rollback_t
    use emcon_mass_return, only : mass_find_troubled, mass_match, mass_return
    use emcon_mechanism_text, only : free_motion_text
@@ -103,8 +103,7 @@ contains
             parts%was_active = is_active
             allocate(parts%changes(size(is_active)), source=.false.)
          end if
-         parts%changes = parts%changes .or. (parts%was_active .neqv. is_active) .or. &
-            self%active%comes_and_goes
+         parts%changes = parts%changes .or. (parts%was_active .neqv. is_active)
          parts%was_active = is_active
       end associate
       if (associated(self%watcher)) call self%watcher%tell(self%state%clock%increment + 1, &
@@ -288,7 +287,7 @@ contains
       case (step_singular)
          call singular_text(terms_solid(self%system%term), scene, text)
       case (step_cycling)
-         call cycling_text(self, scene, text)
+         text = "which contacts act, stick and slide does not settle"
       case (step_too_far)
          text = "a contact slides farther than its stencil was chosen for"
       case (step_stands_off)
@@ -338,6 +337,7 @@ contains
          if (len(motion) > 0) then
             call holders_text(self%system, size(scene%x, 2), holders)
             text = text // "; without " // holders // " " // motion
+            if (slides(self)) text = text // "; friction is at its limit at contacts that slide"
          end if
       end if
       if (evaluation_has_inertia(self%motion%evaluation) &

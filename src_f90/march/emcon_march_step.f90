@@ -35,7 +35,7 @@ module emcon_march_step
    use emcon_motion_bound, only : largest_motion
    implicit none
    private
-   public :: march_step, cycling_text, nodes_text
+   public :: march_step, nodes_text
 
    !> New overlap beyond this, by the edge, cuts an increment, down to this level of its halvings.
    real(wp), parameter :: deepest_new = 1.2_wp*guard_slack
@@ -80,20 +80,13 @@ contains
          status)
       if (status == step_done) call find_ending(self, scene, part, status, error)
       if (status /= step_done .or. allocated(error)) return
-      if (any(self%active%comes_and_goes)) call tell_held(self, scene, increment)
-      if (self%active%friction%n_asked > 0) call note_add(increment%notes, "contacts keep " // &
-         "changing between stick, slip and open: their laws were solved for the step " // &
-         "linearised, " // to_text(self%active%friction%n_asked) // " times")
-      if (any(self%active%is_dropped)) then
-         call blocked_contact_text(self%system, scene, self%active%is_dropped, text)
+      if (any(self%active%is_left_out)) then
+         call blocked_contact_text(self%system, scene, self%active%is_left_out, text)
          if (len(text) > 0) then
             call raise(error, err_analysis, "at time " // to_text(part%start%total_time &
                + part%h, 9) // " " // text)
             return
          end if
-         call nodes_text(self, scene, self%active%is_dropped, text)
-         call note_add(increment%notes, "contacts that are redundant or have lost their " // &
-            "surface are left out, at slave nodes " // text)
       end if
       call march_commit(self, scene, part%h, increment, error)
    end subroutine march_step
@@ -126,11 +119,11 @@ contains
             self%motion, status, error)
          if (allocated(error)) return
          increment%n_newton = increment%n_newton + self%active%n_newton
-         if (self%active%is_one_problem) then
-            if (.not. any(status == [step_refused, step_diverged, step_singular])) exit
-         else
-            if (status /= step_refused .or. self%active%n_newton > 0) exit
-         end if
+         ! Where contacts are at play the guess may lie on the other side of one.
+         is_done = .not. any(status == [step_refused, step_diverged, step_singular])
+         if (.not. any(self%active%is_candidate)) is_done = status /= step_refused .or. &
+            self%active%n_newton > 0
+         if (is_done) exit
       end do
    end subroutine solve
 
@@ -307,39 +300,6 @@ contains
          before)
       goes_in = overlap%depth > before%depth + 0.1_wp*deepest_new
    end function goes_in
-
-   !> Tell of contacts that are held closed because they open and close in turn. Where the gap of
-   !> the start is held that makes no energy; else what pulls there is an error of the forces.
-   subroutine tell_held(self, scene, increment)
-      type(march_t), intent(in) :: self
-      type(scene_t), intent(in) :: scene
-      type(increment_t), intent(inout) :: increment
-      character(len=:), allocatable :: text
-
-      increment%n_held = max(increment%n_held, count(self%active%comes_and_goes))
-      call cycling_text(self, scene, text)
-      if (self%active%holds_gap) then
-         call note_add(increment%notes, text // ": held closed in this step")
-      else
-         call note_add(increment%warnings, text // ": held closed in this step, the smallest " // &
-            "allowed, where they may pull")
-      end if
-   end subroutine tell_held
-
-   !> The contacts of the last step that opened and closed in turn, by their slave nodes; none: they
-   !> are the same, and friction comes back.
-   subroutine cycling_text(self, scene, text)
-      type(march_t), intent(in) :: self
-      type(scene_t), intent(in) :: scene
-      character(len=:), allocatable, intent(out) :: text   !! names nodes by their labels
-
-      call nodes_text(self, scene, self%active%comes_and_goes, text)
-      if (text == "") then
-         text = "contacts stick and slide in turn"
-      else
-         text = "contact opens and closes in turn at slave nodes " // text
-      end if
-   end subroutine cycling_text
 
    !> The slave nodes of the constraints that `is_meant` marks.
    subroutine nodes_text(self, scene, is_meant, text)

@@ -61,7 +61,6 @@ module emcon_march_types
       integer :: n_augmentation = 0              !! of contact, the most of its steps
       real(wp) :: give = 0.0_wp                  !! how deep contact has given way, by the edge
       logical :: is_guarded = .false.            !! guards act in it
-      integer :: n_held = 0                      !! contacts held closed that come and go
       type(overlap_t) :: overlap                 !! the deepest of bodies, by the judge
       type(overlap_t) :: stray                   !! of bodies that no pair brings together
       type(stand_off_t) :: stand_off             !! air across which contact forces act

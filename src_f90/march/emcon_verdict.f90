@@ -73,8 +73,6 @@ module emcon_verdict
       integer :: newton = 0
       integer :: cut = 0
       integer :: guarded = 0                     !! increments in which guards act
-      integer :: held = 0                        !! increments in which contacts that come and go
-      integer :: most_held = 0                   !! are held closed, and the most of these in one
    end type verdict_counts_t
 
    !> Running figures, and how the run ended.
@@ -164,8 +162,6 @@ contains
       self%count%newton = self%count%newton + increment%n_newton
       self%count%cut = self%count%cut + increment%n_cut
       if (increment%is_guarded) self%count%guarded = self%count%guarded + 1
-      if (increment%n_held > 0) self%count%held = self%count%held + 1
-      self%count%most_held = max(self%count%most_held, increment%n_held)
       associate (state => march%state)
          self%has_massless = self%has_massless .or. &
             step_initiation(scene%step(state%clock%i_step)) == initiation_massless

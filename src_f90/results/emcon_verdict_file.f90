@@ -77,8 +77,6 @@ contains
          call json_number(line, "newton", real(self%count%newton, wp))
          call json_number(line, "cuts", real(self%count%cut, wp))
          call json_number(line, "guarded_increments", real(self%count%guarded, wp))
-         call json_number(line, "held_increments", real(self%count%held, wp))
-         call json_number(line, "held_contacts", real(self%count%most_held, wp))
          call json_number(line, "kinetic", ledger%kinetic)
          call json_number(line, "strain", ledger%strain)
          call json_number(line, "external_work", ledger%external_work)
@@ -163,8 +161,6 @@ contains
       call restart_exchange(restart, "effort", self%count%cut)
       call restart_exchange(restart, "effort", self%n_warning)
       call restart_exchange(restart, "effort", self%count%guarded)
-      call restart_exchange(restart, "effort", self%count%held)
-      call restart_exchange(restart, "effort", self%count%most_held)
       call restart_exchange(restart, "pair_largest", self%largest_force)
       if (restart_offers(restart, "linear_range", size(self%small%section) > 0)) then
          call restart_exchange(restart, "linear_range", self%small%rotation)

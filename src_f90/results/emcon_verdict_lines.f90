@@ -107,10 +107,6 @@ contains
             call note_add(lines, "guards hold nodes in " // to_text(self%count%guarded) // &
                " increments; to need none: " // text)
          end if
-         if (self%count%held > 0) call note_add(lines, &
-            "contacts that kept opening and closing " // &
-            "were held closed in " // to_text(self%count%held) // " increments, at most " // &
-            to_text(self%count%most_held) // " of them in one")
          if (self%stand_off%largest > rounding) call note_add(lines, &
             "largest stand-off (gap across which contact forces act) " // &
             to_text(self%stand_off%largest, 3) // " of an element, mean over the impulse " // &

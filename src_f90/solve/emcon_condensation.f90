@@ -58,7 +58,8 @@ contains
       if (allocated(error) .or. self%is_singular) return
       if (allocated(self%motion)) deallocate(self%motion, self%held, self%permanent, self%w)
       associate (n => size(residual), first => set%n_permanent, last => set%n_row - set%n_permanent)
-         allocate(self%held(n, first), self%motion(n, 0:last), self%permanent(first, 0:last))
+         allocate(self%held(n, first), self%motion(n, 0:last), self%permanent(first, 0:last), &
+            self%w(last, last))
          force = -residual
          call self%solver%solve(force, self%motion(:, 0), error)
          do k = 1, set%n_row
@@ -71,7 +72,6 @@ contains
          call find_held_rate(self, set)
          call eliminate(self, set, 0, last)
          if (self%is_singular) return
-         allocate(self%w(last, last))
          do k = 1, last
             self%w(:, k) = rates(set, first + 1, set%n_row, self%motion(:, k))
          end do

@@ -12,7 +12,7 @@ module emcon_early_set
    use emcon_system, only : system_t
    implicit none
    private
-   public :: predicts_new_set, one_closes_clearly, early_enough
+   public :: predicts_new_set, early_enough
 
    !> Relative residual from which on a look is worth while.
    real(wp), parameter :: early_enough = 1.0e-4_wp
@@ -28,22 +28,12 @@ contains
       type(constraint_set_t), intent(in) :: set
       type(motion_t), intent(in) :: motion
       logical, intent(out) :: changes            !! clearly so
+      integer :: pair, i, id, k
 
       changes = .false.
       if (set%n > set%n_permanent) changes = minval(set%lam(set%n_permanent + 1:set%n)) &
          < -clearly*maxval(abs(set%lam(set%n_permanent + 1:set%n)))
-      if (.not. changes) call one_closes_clearly(system, set, motion, changes)
-   end subroutine predicts_new_set
-
-   !> Has a contact that is not in the set gone in deep?
-   subroutine one_closes_clearly(system, set, motion, closes)
-      type(system_t), intent(inout) :: system
-      type(constraint_set_t), intent(in) :: set
-      type(motion_t), intent(in) :: motion
-      logical, intent(out) :: closes
-      integer :: pair, i, id, k
-
-      closes = .false.
+      if (changes) return
       k = set%n_permanent                        ! active ones so far; they ascend
       do pair = 1, size(system%contact)
          associate (contact => system%contact(pair)%contact, &
@@ -61,12 +51,12 @@ contains
                end if
                associate (gap => contact%state(i))
                   if (.not. (gap%is_near .and. gap%is_over) .or. gap%is_arriving) cycle
-                  closes = closes .or. (gap%gap1 < min(gap%gap0, gap%closed) - clearly*gap%size)
+                  changes = changes .or. (gap%gap1 < min(gap%gap0, gap%closed) - clearly*gap%size)
                end associate
             end do
          end associate
-         if (closes) return
+         if (changes) return
       end do
-   end subroutine one_closes_clearly
+   end subroutine predicts_new_set
 
 end module emcon_early_set

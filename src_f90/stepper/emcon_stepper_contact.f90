@@ -11,13 +11,13 @@
 !> displacements are the host's: it may repeat a step with another size. Source: docs/theory.md,
 !> sections 4 and 5.
 module emcon_stepper_contact
-   use emcon_active_set, only : active_set_begin, active_set_drop, active_set_select, &
-      active_set_suit, step_cycling, step_done, step_stands_off, step_too_far
-   use emcon_active_set_update, only : active_set_advance
+   use emcon_active_set, only : active_set_begin, active_set_select, active_set_suit, &
+      step_cycling, step_done, step_stands_off, step_too_far
    use emcon_constraints, only : constraint_index, constraints_force, constraints_select
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
    use emcon_contact_support, only : contact_support_t
+   use emcon_host_set, only : host_set_advance, host_set_begin, host_set_drop, host_set_try
    use emcon_overlap_check, only : overlap_check_step, overlap_t
    use emcon_kinds, only : wp
    use emcon_evaluation, only : evaluation_at_end, evaluation_t
@@ -65,6 +65,7 @@ contains
          march%active%support = contact_support_t()
          call constraints_select(march%active%set, [integer ::])
          call active_set_begin(march%active, march%system, march%motion, march%state)
+         call host_set_begin(self%host_set, march%system%n_constraint)
          active = march%active%is_active
       end associate
    end subroutine query_begin_contact
@@ -124,6 +125,7 @@ contains
       call check_near(self, stepper, pack([(i, i = 1, size(active))], active), error)
       if (allocated(error)) return
       self%march%active%is_active = active
+      call host_set_try(self%host_set, self%march%active)
       call active_set_select(self%march%active, self%march%system, self%march%motion)
       self%has_set = self%march%active%set%n == 0
       self%has_null_space = .false.
@@ -229,7 +231,7 @@ contains
             call constraints_force(own%set, 1, force, march%system%response%magnitude)
          end if
          march%state%u = march%motion%u0
-         call active_set_advance(own, march%system, march%motion, is_done, outcome)
+         call host_set_advance(self%host_set, own, march%system, march%motion, is_done, outcome)
          active = own%is_active
       end associate
    end subroutine query_update_active
@@ -247,7 +249,7 @@ contains
          call check_choice("redundant", redundant(k), 1, self%march%active%set%n, error)
       end do
       if (allocated(error)) return
-      call active_set_drop(self%march%active, redundant)
+      call host_set_drop(self%host_set, self%march%active, redundant)
       active = self%march%active%is_active
    end subroutine query_drop
 

@@ -13,6 +13,7 @@ module emcon_stepper_query
    use emcon_contact, only : gap_state_t
    use emcon_csr, only : csr_t
    use emcon_errors, only : err_analysis, error_t, raise
+   use emcon_host_set, only : host_set_t
    use emcon_kinds, only : wp
    use emcon_ledger, only : body_momenta
    use emcon_motion, only : at_rest, motion_evaluate
@@ -42,6 +43,7 @@ module emcon_stepper_query
       real(wp), allocatable :: contact(:, :)     !! (2, n_node) sum of lam_k g_k
       logical :: has_set = .false.               !! the constraints selected last are evaluated
       logical :: has_begun = .false.             !! a step of contact, by `query_begin_contact`
+      type(host_set_t) :: host_set               !! of that step
       type(null_space_t) :: null_space           !! of the last `query_null_space`
       logical :: has_tangent = .false.           !! of the last evaluation
       logical :: has_null_space = .false.
@@ -242,7 +244,7 @@ contains
          active%is_active(:system%first_constraint(1)) = system%acts
          active%lam = state%contacts%lam
          active%penalty%closure = state%contacts%closure
-         active%n_tried = 0
+         active%is_candidate = active%is_active
       end associate
    end subroutine begin_contact
 

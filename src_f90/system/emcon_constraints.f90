@@ -96,11 +96,10 @@ contains
    end subroutine constraints_select
 
    !> Let the conditions `stuck` stick, with the friction `tau` to start from: rows of their slips.
-   pure subroutine constraints_stick(self, stuck, tau, is_firm)
+   pure subroutine constraints_stick(self, stuck, tau)
       type(constraint_set_t), intent(inout) :: self      !! of `constraints_select`
       integer, intent(in) :: stuck(:)            !! (any) ascending, up to n; these rub
       real(wp), intent(in) :: tau(:, :)          !! (slips, as many) [M L/T^2]
-      logical, intent(in) :: is_firm(:)          !! (as many) also where others nearly do
       integer :: k, s
 
       associate (n => self%n, n_slip => size(tau, 1))
@@ -109,7 +108,7 @@ contains
          self%slip = [self%slip(:n), [((s, s = 1, n_slip), k = 1, size(stuck))]]
          self%lam = [self%lam(:n), tau]
          self%defect = [self%defect(:n), 0.0_wp*tau]
-         self%is_firm = [self%is_firm(:n), [((is_firm(k), s = 1, n_slip), k = 1, size(stuck))]]
+         self%is_firm = [self%is_firm(:n), spread(.false., 1, size(tau))]
       end associate
       call constraints_take_hold(self)
    end subroutine constraints_stick

@@ -13,8 +13,8 @@ module emcon_coulomb_law
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: coulomb_t, contact_trial_t, slip_status_t, coulomb_trial, coulomb_map, &
-      coulomb_status, coulomb_violation, is_same_status
+   public :: coulomb_t, contact_trial_t, slip_status_t, coulomb_map, &
+      coulomb_status, coulomb_violation
    public :: contact_open, contact_sticks, contact_slides, contact_free, contact_rests, &
       slip_rounding
 
@@ -132,45 +132,11 @@ contains
       if (norm2(self%slip_target) <= rounding) self%slip_target = 0.0_wp
    end subroutine leads_to
 
-   !> Do two statuses say the same, but for what forces of one size are rounded to?
-   elemental logical function is_same_status(one, other) result(is_same)
-      type(slip_status_t), intent(in) :: one, other
-
-      is_same = one%kind == other%kind .and. &
-         norm2(one%direction - other%direction) <= sqrt(epsilon(1.0_wp))
-   end function is_same_status
-
-   !> The way in which the law is to hold next. What is undecided by less than `tie`, or than slip
-   !> is rounded to, stays as it is: in short steps c makes much of that.
-   pure type(slip_status_t) function coulomb_trial(was, at, mu, stiffness, tie) result(next)
-      type(slip_status_t), intent(in) :: was         !! so far
-      type(contact_trial_t), intent(in) :: at
-      real(wp), intent(in) :: mu                     !! >= 0
-      real(wp), intent(in) :: stiffness              !! c > 0 [M/T^2]
-      real(wp), intent(in) :: tie                    !! >= 0 [M L/T^2]
-      type(remainder_t) :: rest
-      real(wp) :: push, drag(most_slips), most, unsure
-
-      next = slip_status_t(contact_open)
-      push = at%lam - stiffness*at%gap
-      if (abs(push) <= tie) then
-         if (was%kind == contact_open) return
-      else if (push <= 0.0_wp) then
-         return
-      end if
-      drag = at%tau + stiffness*at%slip
-      most = mu*max(0.0_wp, push)
-      unsure = tie + stiffness*at%rounding
-      rest = remainder_of(drag, stiffness*at%slip_target)
-      next = status_of(rest, most)
-      if (rest%length > 0.0_wp) next = held_first(was, next, rest)
-      if (is_undecided(was, rest, drag, most, unsure)) next = was
-   end function coulomb_trial
-
    !> How the law holds where it does.
    pure type(slip_status_t) function coulomb_status(at, mu, stiffness) result(status)
       type(contact_trial_t), intent(in) :: at
-      real(wp), intent(in) :: mu, stiffness          !! as in `coulomb_trial`
+      real(wp), intent(in) :: mu                     !! >= 0
+      real(wp), intent(in) :: stiffness              !! c > 0 [M/T^2]
 
       status = slip_status_t(contact_open)
       if (.not. at%lam - stiffness*at%gap > 0.0_wp) return
@@ -189,70 +155,6 @@ contains
       if (norm2(rest%over) > most) status = slip_status_t(contact_slides, &
          rest%over/norm2(rest%over))
    end function status_of
-
-   !> What slides or is free holds its slip first, at the end of the segment that it comes to:
-   !> bodies that stop as a whole are softer than c.
-   pure type(slip_status_t) function held_first(was, meant, rest) result(next)
-      type(slip_status_t), intent(in) :: was, meant
-      type(remainder_t), intent(in) :: rest          !! of a segment
-      real(wp) :: end
-
-      next = meant
-      end = rest%part
-      select case (was%kind)
-      case (contact_slides)
-         if (is_across(was, rest)) return
-         end = merge(1.0_wp, 0.0_wp, dot_product(was%direction, rest%along) > 0.0_wp)
-         if (abs(end - rest%part) <= 0.0_wp) return
-      case (contact_free)
-         if (end > 0.0_wp .and. end < 1.0_wp) return
-      case default
-         return
-      end select
-      next = slip_status_t(merge(contact_sticks, contact_rests, end > 0.0_wp))
-   end function held_first
-
-   !> Did it slide across the segment, free along it?
-   pure logical function is_across(was, rest)
-      type(slip_status_t), intent(in) :: was
-      type(remainder_t), intent(in) :: rest
-
-      is_across = rest%length > 0.0_wp .and. &
-         abs(dot_product(was%direction, rest%along)) <= sqrt(epsilon(1.0_wp))
-   end function is_across
-
-   !> Is the trial within `unsure` of where the status so far would end?
-   pure logical function is_undecided(was, rest, drag, most, unsure)
-      type(slip_status_t), intent(in) :: was
-      type(remainder_t), intent(in) :: rest
-      real(wp), intent(in) :: drag(most_slips)       !! the trial [M L/T^2]
-      real(wp), intent(in) :: most, unsure           !! [M L/T^2]
-      real(wp) :: along, beyond, tip(most_slips)
-      logical :: at_start, at_tip
-
-      along = dot_product(drag, rest%along)
-      beyond = along - rest%length
-      tip = drag - rest%length*rest%along
-      at_start = rest%length > 0.0_wp .and. abs(along) <= unsure
-      at_tip = rest%length > 0.0_wp .and. abs(beyond) <= unsure
-      select case (was%kind)
-      case (contact_sticks)
-         is_undecided = at_tip .or. (.not. beyond < 0.0_wp .and. norm2(tip) - most <= unsure)
-      case (contact_rests)
-         is_undecided = at_start .or. (.not. along > 0.0_wp .and. rest%length > 0.0_wp .and. &
-            norm2(drag) - most <= unsure)
-      case (contact_free)
-         is_undecided = at_start .or. at_tip
-      case (contact_slides)
-         if (rest%length > 0.0_wp .and. .not. dot_product(was%direction, rest%along) > 0.0_wp) then
-            tip = drag
-         end if
-         if (is_across(was, rest)) tip = rest%over
-         is_undecided = norm2(tip - most*was%direction) <= unsure
-      case default
-         is_undecided = .false.
-      end select
-   end function is_undecided
 
    !> What a trial leaves over a segment from 0.
    pure type(remainder_t) function remainder_of(drag, tip) result(rest)
@@ -278,7 +180,7 @@ contains
    !> those, with slips they grow. At kinks the derivative is that of one side.
    pure subroutine coulomb_map(at, mu, stiffness, force, slope)
       type(contact_trial_t), intent(in) :: at
-      real(wp), intent(in) :: mu, stiffness          !! as in `coulomb_trial`
+      real(wp), intent(in) :: mu, stiffness          !! as in `coulomb_status`
       real(wp), intent(out) :: force(0:most_slips)   !! [M L/T^2]
       real(wp), intent(out) :: slope(0:most_slips, 0:most_slips)   !! (row, by)
       type(remainder_t) :: rest
@@ -312,7 +214,7 @@ contains
    !> How far the law is missed, as a force, by more than slip is rounded to.
    pure real(wp) function coulomb_violation(at, mu, stiffness) result(missed)
       type(contact_trial_t), intent(in) :: at
-      real(wp), intent(in) :: mu, stiffness          !! as in `coulomb_trial`
+      real(wp), intent(in) :: mu, stiffness          !! as in `coulomb_status`
       type(contact_trial_t) :: pushed
       real(wp) :: force(0:most_slips), slope(0:most_slips, 0:most_slips)
 

@@ -61,7 +61,6 @@ program main
    use test_facets, only : collect_facets
    use test_first_touch, only : collect_first_touch
    use test_friction, only : collect_friction
-   use test_friction_referee, only : collect_friction_referee
    use test_friction_ways, only : collect_friction_ways
    use test_gauss, only : collect_gauss
    use test_holding, only : collect_holding
@@ -226,7 +225,6 @@ program main
    call run("lapack", collect_lapack)
    call run("first_touch", collect_first_touch)
    call run("friction", collect_friction)
-   call run("friction_referee", collect_friction_referee)
    call run("friction_ways", collect_friction_ways)
    call run("dashpot_law", collect_dashpot_law)
    call run("gauss", collect_gauss)

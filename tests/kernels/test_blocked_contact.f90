@@ -36,9 +36,9 @@ contains
 
    !> The upper block comes down by `way` from 0.1 above the lower one, of which nodes up to
    !> `last_bound` are prescribed.
-   subroutine expect(way, is_dropped, last_bound, start, error)
+   subroutine expect(way, is_left_out, last_bound, start, error)
       real(wp), intent(in) :: way
-      logical, intent(in) :: is_dropped(3)
+      logical, intent(in) :: is_left_out(3)
       integer, intent(in) :: last_bound
       character(len=*), intent(in) :: start      !! of the text; "": there is none
       type(error_t), allocatable, intent(out) :: error
@@ -61,7 +61,7 @@ contains
       motion%du(2, 11:) = way
       call motion_evaluate(motion)
       call gaps_measure(march%system, motion)
-      call blocked_contact_text(march%system, scene, is_dropped, text)
+      call blocked_contact_text(march%system, scene, is_left_out, text)
       if (start == "") then
          call check_equal(error, text, "", "nothing")
       else

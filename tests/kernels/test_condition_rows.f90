@@ -173,7 +173,7 @@ contains
             call contact_laws_add(set%law(k), quartic_t())
          end do
          set%target(3) = 8.0_wp                  ! it is closed
-         call constraints_stick(set, [1], reshape([-0.4_wp, 0.9_wp], [2, 1]), [.true.])
+         call constraints_stick(set, [1], reshape([-0.4_wp, 0.9_wp], [2, 1]))
          set%lam(:2) = [1.3_wp, 0.8_wp]
       end associate
       call shake(x, 1.0_wp)

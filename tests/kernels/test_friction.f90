@@ -7,8 +7,8 @@ module test_friction
    use emcon_errors, only : error_t
    use emcon_contact_law, only : contact_values_t, loss_friction
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
-      contact_sticks, contact_trial_t, coulomb_map, coulomb_status, coulomb_t, coulomb_trial, &
-      coulomb_violation, is_same_status, slip_status_t
+      contact_sticks, contact_trial_t, coulomb_map, coulomb_status, coulomb_t, coulomb_violation, &
+      slip_status_t
    use emcon_interactions, only : interaction_t
    use emcon_kinds, only : wp
    use emcon_lemke, only : lemke_solve
@@ -32,9 +32,7 @@ contains
       tests = [ &
          test_case_t("trials: where the law holds next", test_trial), &
          test_case_t("violation of the law", test_violation), &
-         test_case_t("trials of what is led to a slip", test_led_trial), &
          test_case_t("trials of one slip, all over the line", test_line), &
-         test_case_t("trials across what is led to a slip", test_across), &
          test_case_t("the law of what is led to a slip", test_led), &
          test_case_t("vectors of slips: the cone, work, and trials that stand", test_vectors), &
          test_case_t("vectors of slips turn with the surface", test_turned), &
@@ -49,33 +47,17 @@ contains
    subroutine test_trial(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: mu = 0.5_wp, c = 4.0_wp
-      integer :: next(9)
+      integer :: next(7)
 
-      next = [trial(contact_open, contact_trial_t(gap=1.0_wp)), &
-         trial(contact_open, place(0.0_wp, 0.0_wp, 0.4_wp, gap=-1.0_wp)), &
-         trial(contact_open, place(0.0_wp, 0.0_wp, -0.6_wp, gap=-1.0_wp)), &
-         trial(contact_sticks, place(2.0_wp, 1.1_wp, 0.0_wp)), &
-         trial(contact_sticks, place(2.0_wp, 1.1_wp, 0.0_wp), 0.2_wp), &
-         trial(1, place(2.0_wp, 1.0_wp, -0.4_wp)), &
-         trial(1, place(2.0_wp, 1.0_wp, -0.6_wp)), &
-         trial(-1, place(-0.1_wp, -0.05_wp, -0.6_wp)), &
-         trial(1, place(2.0_wp, 1.0_wp, -0.4_wp, rounding=0.5_wp))]
-      call check_equal(error, next, [contact_open, contact_sticks, -1, 1, contact_sticks, &
-         contact_sticks, -1, contact_open, 1], "ways")
-
-   contains
-
-      pure integer function trial(was, at, tie)
-         integer, intent(in) :: was
-         type(contact_trial_t), intent(in) :: at
-         real(wp), intent(in), optional :: tie
-         real(wp) :: unsure
-
-         unsure = 0.0_wp
-         if (present(tie)) unsure = tie
-         trial = code_of(coulomb_trial(status_of(was), at, mu, c, unsure))
-      end function trial
-
+      next = code_of([coulomb_status(contact_trial_t(gap=1.0_wp), mu, c), &
+         coulomb_status(place(0.0_wp, 0.0_wp, 0.4_wp, gap=-1.0_wp), mu, c), &
+         coulomb_status(place(0.0_wp, 0.0_wp, -0.6_wp, gap=-1.0_wp), mu, c), &
+         coulomb_status(place(2.0_wp, 1.1_wp, 0.0_wp), mu, c), &
+         coulomb_status(place(2.0_wp, 1.0_wp, -0.4_wp), mu, c), &
+         coulomb_status(place(2.0_wp, 1.0_wp, -0.6_wp), mu, c), &
+         coulomb_status(place(-0.1_wp, -0.05_wp, -0.6_wp), mu, c)])
+      call check_equal(error, next, [contact_open, contact_sticks, -1, 1, contact_sticks, -1, &
+         contact_open], "ways")
    end subroutine test_trial
 
    !> A place with one slip.
@@ -99,15 +81,6 @@ contains
       if (code == contact_slides) code = nint(status%direction(1))
    end function code_of
 
-   elemental type(slip_status_t) function status_of(code) result(status)
-      integer, intent(in) :: code
-
-      status%kind = code
-      if (abs(code) /= 1) return
-      status%kind = contact_slides
-      status%direction(1) = real(code, wp)
-   end function status_of
-
    subroutine test_violation(error)
       type(error_t), allocatable, intent(out) :: error
 
@@ -120,77 +93,26 @@ contains
          [0.0_wp, 2.0_wp, 0.5_wp, 0.5_wp, 1.5_wp, 0.25_wp], tol, 1.0_wp, "missed")
    end subroutine test_violation
 
-   !> Each way, and where it leads to next; what slides or is free holds its slip on the way. The
-   !> same the other way round.
-   subroutine test_led_trial(error)
-      type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: mu = 0.5_wp, c = 4.0_wp, lam = 2.0_wp, a = 0.5_wp
-      integer, parameter :: n = 12
-      integer, parameter :: was(n) = [contact_open, contact_open, contact_open, &
-         contact_open, contact_open, &
-         contact_sticks, contact_sticks, contact_rests, contact_free, contact_free, 1, -1]
-      real(wp), parameter :: tau(n) = [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, -0.2_wp, 1.1_wp, &
-         0.2_wp, 0.0_wp, 0.0_wp, 1.0_wp, -1.0_wp]
-      real(wp), parameter :: slip(n) = [-0.6_wp, -0.1_wp, 0.3_wp, 0.6_wp, 0.8_wp, a, a, 0.0_wp, &
-         1.5_wp, -1.5_wp, -2.0_wp, 2.0_wp]
-      integer, parameter :: expected(n) = [-1, contact_rests, contact_free, contact_sticks, 1, &
-         contact_free, 1, contact_free, contact_sticks, contact_rests, contact_sticks, &
-         contact_rests]
-      integer :: next(n), side, k
-
-      do side = -1, 1, 2
-         do k = 1, n
-            next(k) = code_of(coulomb_trial(status_of(turned(was(k))), place(lam, side*tau(k), &
-               side*slip(k), side*a), mu, c, 0.0_wp))
-         end do
-         call check_equal(error, next, [(turned(expected(k)), k = 1, n)], "ways")
-      end do
-      call check_equal(error, code_of(coulomb_trial(status_of(contact_free), place(lam, 0.0_wp, &
-         a + 0.01_wp, a), mu, c, 0.05_wp)), contact_free, "undecided")
-
-   contains
-
-      pure integer function turned(status)
-         integer, intent(in) :: status
-
-         turned = status
-         if (abs(status) == 1) turned = side*status
-      end function turned
-
-   end subroutine test_led_trial
-
    !> One slip with mu lam = 1 and c = 4, led to c a = 2 or nowhere: wherever the trial lies the
-   !> status is read off the number line, also next to its ends, by exactly as much as is undecided.
+   !> status is read off the number line. What is pushed by nothing is open.
    subroutine test_line(error)
       type(error_t), allocatable, intent(out) :: error
-      integer, parameter :: ways(6) = [contact_open, contact_sticks, contact_free, contact_rests, &
-         1, -1]
       real(wp), parameter :: c = 4.0_wp
-      type(contact_trial_t) :: at
-      real(wp) :: p, length, unsure
-      integer :: i, k, side, led, doubt
+      real(wp) :: p, length
+      integer :: i, side, led
 
       do led = 0, 1
          length = 2.0_wp*led
-         do doubt = 0, 2
-            unsure = 0.125_wp*doubt
-            do side = -1, 1, 2
-               do i = -16, 32
-                  p = 0.125_wp*i
-                  do k = 1, size(ways)
-                     ! Half by forces, half by slip; all of the doubt by slip, or by forces.
-                     at = place(2.5_wp, 0.5_wp*side*p, 0.5_wp*side*p/c, side*length/c, 0.5_wp/c, &
-                        merge(unsure/c, 0.0_wp, doubt == 1))
-                     associate (next => coulomb_trial(status_of(turned(ways(k))), at, 0.5_wp, c, &
-                           merge(unsure, 0.0_wp, doubt == 2)))
-                        call check_equal(error, turned(code_of(next)), expected(ways(k)), &
-                           "from " // to_text(ways(k)) // " at " // to_text(p))
-                     end associate
-                     if (allocated(error)) return
-                  end do
-                  call check_equal(error, turned(code_of(coulomb_status(at, 0.5_wp, c))), &
-                     on_graph(), "status")
-               end do
+         do side = -1, 1, 2
+            do i = -16, 32
+               p = 0.125_wp*i
+               ! Half by forces, half by slip; the push half by a gap.
+               call check_equal(error, code_of(coulomb_status(place(1.0_wp, 0.5_wp*side*p, &
+                  0.5_wp*side*p/c, side*length/c, -1.0_wp/c), 0.5_wp, c)), turned(on_graph()), &
+                  "at " // to_text(p))
+               call check_equal(error, code_of(coulomb_status(place(1.0_wp, 0.5_wp*side*p, &
+                  0.5_wp*side*p/c, side*length/c, 1.0_wp/c), 0.5_wp, c)), contact_open, "no push")
+               if (allocated(error)) return
             end do
          end do
       end do
@@ -214,74 +136,7 @@ contains
          if (led == 0 .and. abs(p) <= 1.0_wp) way = contact_sticks
       end function on_graph
 
-      !> What slides comes to an end first, what is free too; what is in doubt stays.
-      pure integer function expected(was) result(way)
-         integer, intent(in) :: was
-         logical :: stays
-
-         way = on_graph()
-         if (led == 1) then
-            if (was == 1 .and. p < length) way = contact_sticks
-            if (was == -1 .and. p > 0.0_wp) way = contact_rests
-            if (was == contact_free .and. way == 1) way = contact_sticks
-            if (was == contact_free .and. way == -1) way = contact_rests
-         end if
-         stays = .false.
-         select case (was)
-         case (contact_sticks)
-            stays = is_at(length + 1.0_wp) .or. (led == 1 .and. is_at(length)) &
-               .or. (led == 0 .and. is_at(-1.0_wp))
-         case (contact_rests)
-            stays = led == 1 .and. (is_at(0.0_wp) .or. is_at(-1.0_wp))
-         case (contact_free)
-            stays = led == 1 .and. (is_at(0.0_wp) .or. is_at(length))
-         case (1)
-            stays = is_at(length + 1.0_wp)
-         case (-1)
-            stays = is_at(-1.0_wp)
-         end select
-         if (stays) way = was
-      end function expected
-
-      pure logical function is_at(end)
-         real(wp), intent(in) :: end
-
-         is_at = abs(p - end) <= unsure
-      end function is_at
-
    end subroutine test_line
-
-   !> What slides across the segment, free along it, goes on like that, and stays where it is in
-   !> doubt; a push in doubt keeps what is open open, and what is closed closed.
-   subroutine test_across(error)
-      type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: c = 4.0_wp, up(2) = [0.0_wp, 1.0_wp]
-      real(wp), parameter :: trial(2, 5) = reshape([1.0_wp, 3.0_wp, 1.0_wp, -3.0_wp, 1.0_wp, &
-         0.5_wp, 1.0_wp, 1.25_wp, 1.0_wp, 0.75_wp], [2, 5])
-      type(contact_trial_t) :: at
-      type(slip_status_t) :: was, next, seen(3)
-      integer :: k
-
-      was = slip_status_t(contact_slides, up)
-      do k = 1, size(trial, 2)
-         at = contact_trial_t(lam=2.0_wp, slip=trial(:, k)/c, slip_target=[2.0_wp, 0.0_wp]/c)
-         next = coulomb_trial(slip_status_t(contact_free), at, 0.5_wp, c, 0.25_wp)
-         call check_equal(error, next%kind, merge(contact_slides, contact_free, &
-            k < 3 .or. k == 4), "from where it is free")
-         next = coulomb_trial(was, at, 0.5_wp, c, 0.25_wp)
-         call check_equal(error, next%kind, merge(contact_free, contact_slides, k == 3), "status")
-         call check_near(error, next%direction, merge(-1.0_wp, 1.0_wp, k == 2)*merge(0.0_wp, &
-            1.0_wp, k == 3)*up, tol, 1.0_wp, "direction")
-      end do
-      do k = -1, 1, 2
-         at = contact_trial_t(lam=0.125_wp*k)
-         seen = [coulomb_trial(slip_status_t(contact_open), at, 0.5_wp, c, 0.25_wp), &
-            coulomb_trial(slip_status_t(contact_sticks), at, 0.5_wp, c, 0.25_wp), &
-            coulomb_trial(slip_status_t(contact_sticks), at, 0.5_wp, c, 0.0_wp)]
-         call check_equal(error, seen%kind, [contact_open, contact_sticks, merge(contact_open, &
-            contact_sticks, k < 0)], "a push in doubt")
-      end do
-   end subroutine test_across
 
    !> Friction on the graph misses nothing and takes work; off it, it is missed by the distance.
    subroutine test_led(error)
@@ -337,7 +192,7 @@ contains
       type(contact_trial_t) :: at
       type(slip_status_t) :: status
       real(wp) :: force(0:most_slips), slope(0:most_slips, 0:most_slips)
-      integer :: case, i, n, seen(0:4)
+      integer :: case, n, seen(0:4)
 
       seen = 0
       do case = 1, 4000
@@ -354,12 +209,7 @@ contains
          call check_true(error, norm2(at%tau) <= mu*at%lam + tol, "cone")
          call check_true(error, dot_product(at%tau, at%slip) >= -tol, "work")
          call check_true(error, coulomb_violation(at, mu, c) <= tol, "fixed point")
-         status = slip_status_t(contact_open)
-         do i = 1, 2
-            status = coulomb_trial(status, at, mu, c, 0.0_wp)
-         end do
-         call check_true(error, is_same_status(coulomb_trial(status, at, mu, c, tol), status), &
-            "it stands")
+         status = coulomb_status(at, mu, c)
          if (status%kind == contact_slides) call check_near(error, at%tau, &
             mu*at%lam*status%direction, tol, 1.0_wp, "along slip")
          seen(status%kind) = seen(status%kind) + 1
@@ -389,8 +239,8 @@ contains
          call check_near(error, again, [force(0), matmul(turn, force(1:))], tol, 1.0_wp, "forces")
          call check_near(error, [slope_again(1:, 1:)], [matmul(matmul(turn, slope(1:, 1:)), &
             transpose(turn))], tol, 1.0_wp, "slopes")
-         status = coulomb_trial(slip_status_t(contact_open), at, mu, c, 0.0_wp)
-         other = coulomb_trial(slip_status_t(contact_open), turned, mu, c, 0.0_wp)
+         status = coulomb_status(at, mu, c)
+         other = coulomb_status(turned, mu, c)
          call check_equal(error, other%kind, status%kind, "status")
          call check_near(error, other%direction, matmul(turn, status%direction), tol, 1.0_wp, &
             "direction")
@@ -416,7 +266,7 @@ contains
          call draw_place(n, case, at)
          do i = 0, n
             do k = -1, 1
-               status(k) = coulomb_trial(slip_status_t(contact_open), moved(k*small), mu, c, 0.0_wp)
+               status(k) = coulomb_status(moved(k*small), mu, c)
                call coulomb_map(moved(k*small), mu, c, force(:, k), slope(:, :, k))
             end do
             if (any(status%kind /= status(0)%kind)) cycle

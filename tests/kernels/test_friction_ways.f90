@@ -1,4 +1,4 @@
-!> In which way each contact of a set rubs: how a step begins, what closes, turns, idles, is missed.
+!> In which way each contact of a set rubs: how a step begins, what closes, what is missed.
 module test_friction_ways
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_active_set, only : active_set_select, active_set_t
@@ -7,8 +7,8 @@ module test_friction_ways
       slip_rounding, slip_status_t
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_at_end, evaluation_moving
-   use emcon_friction, only : friction_begin, friction_close, friction_holds, friction_idle, &
-      friction_is_same, friction_keep, friction_missed, friction_turn
+   use emcon_friction, only : friction_begin, friction_close, friction_holds, friction_keep, &
+      friction_missed
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_system, only : system_t
@@ -31,10 +31,8 @@ contains
          test_case_t("a step begins", test_begin), &
          test_case_t("rows of what sticks", test_select), &
          test_case_t("what closes", test_close), &
-         test_case_t("what turns", test_turn), &
-         test_case_t("what others hold", test_idle), &
-         test_case_t("what is missed", test_missed), &
-         test_case_t("sets that are the same", test_same)]
+         test_case_t("what a held node is missed by", test_held), &
+         test_case_t("what is missed", test_missed)]
    end subroutine collect_friction_ways
 
    !> Four contacts that rub, the fourth without; the matrix has 3 and 5 at each node, and the
@@ -70,7 +68,6 @@ contains
       logical, intent(in) :: is_active(n)
       integer :: k
 
-      active%n_tried = 0
       active%is_active = is_active
       call active_set_select(active, system, motion)
       do k = 1, active%set%n
@@ -101,10 +98,6 @@ contains
          associate (friction => active%friction)
             friction%direction0(1, :) = [1.0_wp, -1.0_wp, 0.0_wp, 0.0_wp]
             friction%tau0(1, :) = [1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp]
-            friction%is_idle = .true.
-            friction%is_needed = .true.
-            friction%has_turned = .true.
-            friction%n_asked = 3
             friction%n_lagged = 3
             friction%law(3)%slip_target = 7.0_wp
             friction%law(3)%status%kind = contact_free
@@ -117,9 +110,7 @@ contains
                merge(0.0_wp, 1.0_wp, k == 2)*[0.1_wp, -0.2_wp, 0.0_wp, 0.0_wp], tol, 1.0_wp, &
                "led to")
             call check_near(error, friction%tau, friction%tau0, 0.0_wp, 1.0_wp, "friction")
-            call check_true(error, .not. any([friction%is_idle, friction%is_needed, &
-               friction%has_turned]), "nothing is left")
-            call check_equal(error, [friction%n_asked, friction%n_lagged], [0, 0], "counts")
+            call check_equal(error, friction%n_lagged, 0, "count")
             contact%slid(1) = 1.9_wp*slip_rounding
             call friction_begin(friction, system, motion, [.true., .false., .false., .false.])
             call check_near(error, friction%law(1)%slip_target(1), 0.0_wp, 0.0_wp, 1.0_wp, &
@@ -128,7 +119,7 @@ contains
       end do
    end subroutine test_begin
 
-   !> Of contacts 1, 2, 3 and 4 the first slides, the third is held by others.
+   !> Of contacts 1, 2, 3 and 4 the first slides, the fourth has no friction.
    subroutine test_select(error)
       type(error_t), allocatable, intent(out) :: error
       type(system_t) :: system
@@ -139,17 +130,16 @@ contains
       associate (friction => active%friction, set => active%set)
          friction%law(1)%status = slip_status_t(contact_slides, [1.0_wp, 0.0_wp])
          friction%law(2)%slip_target(1) = 0.3_wp
-         friction%is_idle(3) = .true.
-         friction%is_needed(2) = .true.
          friction%tau(1, :) = [1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp]
          call select(system, active, motion, spread(.true., 1, n))
          call check_true(error, all(set%item%has_friction .eqv. [.true., .true., .true., &
             .false.]), "what rubs")
-         call check_equal(error, [set%n_row, set%condition(5), set%slip(5)], [5, 2, 1], "one row")
+         call check_equal(error, [set%n_row, set%condition(5:6), set%slip(5:6)], &
+            [6, 2, 3, 1, 1], "rows of slips")
          call check_near(error, [set%lam(5), set%item(2)%response%stick(1)], [2.0_wp, 2.0_wp], &
             0.0_wp, 1.0_wp, "begins with")
          call check_near(error, set%item(2)%slip_target(1), 0.3_wp, 0.0_wp, 1.0_wp, "and holds")
-         call check_true(error, set%is_firm(5), "whatever others say")
+         call check_true(error, .not. any(set%is_firm(5:6)), "unless others do")
          call check_true(error, all([allocated(set%law(1)%beside), allocated(set%law(3)%beside)]) &
             .and. .not. allocated(set%law(4)%beside), "laws")
          call check_true(error, all(friction_holds(friction) .eqv. [.false., .true., .true., &
@@ -158,14 +148,6 @@ contains
          call friction_keep(friction, set)
          call check_near(error, friction%tau(1, :), [1.0_wp, -7.0_wp, 3.0_wp, 4.0_wp], 0.0_wp, &
             1.0_wp, "kept")
-         call friction_idle(friction, set, [5])
-         call check_true(error, all(friction%is_idle .eqv. [.false., .true., .true., .false.]), &
-            "idle")
-         friction%is_needed = .false.
-         friction%is_idle = .false.
-         call select(system, active, motion, [.false., .true., .true., .true.])
-         call check_equal(error, [set%n_row, set%condition(4:5)], [5, 1, 2], "two rows")
-         call check_true(error, .not. any(set%is_firm(4:5)), "unless others do")
       end associate
    end subroutine test_select
 
@@ -207,83 +189,23 @@ contains
       end do
    end subroutine test_close
 
-   !> A push of 4 bears friction of 1 at a stiffness of 4. What slides back twice is held between.
-   subroutine test_turn(error)
-      type(error_t), allocatable, intent(out) :: error
-      !> What it sticks or slides with, slips, and where that leads to.
-      real(wp), parameter :: stick(9) = [0.9_wp, 1.1_wp, -1.1_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
-         0.0_wp, 0.5_wp]
-      real(wp), parameter :: along(9) = [0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 1.0_wp, 1.0_wp, 1.0_wp, &
-         -1.0_wp, 0.0_wp]
-      real(wp), parameter :: slip(9) = [3.0_wp, 3.0_wp, 3.0_wp, 0.1_wp, -0.1_wp, -0.6_wp, -0.6_wp, &
-         0.1_wp, 0.0_wp]
-      real(wp), parameter :: next(9) = [0.0_wp, 1.0_wp, -1.0_wp, 1.0_wp, 0.0_wp, -1.0_wp, 0.0_wp, &
-         0.0_wp, 0.0_wp]
-      type(system_t) :: system
-      type(active_set_t) :: active
-      type(motion_t) :: motion
-      integer :: k
-      logical :: turns
-
-      do k = 1, size(slip)
-         call open(system, active, motion)
-         associate (friction => active%friction, set => active%set)
-            if (abs(along(k)) > 0.0_wp) friction%law(3)%status = slip_status_t(contact_slides, &
-               [along(k), 0.0_wp])
-            call select(system, active, motion, [.false., .false., .true., .false.])
-            set%lam(1) = merge(-4.0_wp, 4.0_wp, k == 9)
-            set%item(1)%response%stick(1) = stick(k)
-            set%item(1)%response%mu_sigma(1) = mu*along(k)
-            set%item(1)%slip(1) = slip(k)
-            friction%has_turned(3) = k == 7
-            call friction_turn(friction, system, set, 1, turns)
-            call check_near(error, friction%law(3)%status%direction(1), next(k), tol, 1.0_wp, &
-               "direction " // to_text(k))
-            call check_equal(error, friction%law(3)%status%kind, merge(merge(contact_free, &
-               contact_sticks, k == 9), contact_slides, abs(next(k)) <= 0.0_wp), &
-               "way " // to_text(k))
-            call check_true(error, turns .eqv. (abs(next(k) - along(k)) > 0.0_wp .or. k == 9), &
-               "turns " // to_text(k))
-            call check_true(error, friction%has_turned(3) .eqv. (k == 6 .or. k == 7), &
-               "has turned " // to_text(k))
-         end associate
-      end do
-      call select(system, active, motion, [.false., .false., .false., .true.])
-      call friction_turn(active%friction, system, active%set, 1, turns)
-      call check_true(error, .not. turns, "without friction")
-   end subroutine test_turn
-
-   !> What others hold holds itself once it slips by more than is rounded, at its own stiffness or,
-   !> where it is held, at that of the next node: (2 + 4)/2, without what follows by a half.
-   subroutine test_idle(error)
+   !> At a node that is held by the stiffness of the next one: (2 + 4)/2, without what follows by a
+   !> half.
+   subroutine test_held(error)
       type(error_t), allocatable, intent(out) :: error
       type(system_t) :: system
       type(active_set_t) :: active
       type(motion_t) :: motion
       real(wp) :: missed, largest
-      integer :: k
-      logical :: turns
 
-      do k = 1, 4
-         call open(system, active, motion)
-         associate (friction => active%friction, set => active%set)
-            friction%is_idle(2) = .true.
-            friction%is_needed(2) = k == 4
-            friction%law(2)%slip_target(1) = merge(0.5_wp, 0.0_wp, k == 3)
-            call select(system, active, motion, [.false., .true., .false., .false.])
-            set%lam(1) = 1.0_wp
-            ! 3 times the slip against what is tied, 5e4 epsilon of the push.
-            set%item(1)%slip(1) = merge(0.5_wp, 0.0_wp, k == 3) &
-               + (5.0e4_wp/3.0_wp*merge(0.9_wp, 1.1_wp, k == 1) + 16.0_wp)*epsilon(1.0_wp)
-            call friction_turn(friction, system, set, 1, turns)
-            call check_true(error, turns .eqv. (k == 2 .or. k == 3), "turns " // to_text(k))
-            call check_true(error, friction%is_needed(2) .eqv. k > 1, "needed " // to_text(k))
-         end associate
-      end do
+      call open(system, active, motion)
+      call select(system, active, motion, [.false., .true., .false., .false.])
+      active%set%lam(1) = 1.0_wp
+      active%set%item(1)%slip = 0.0_wp
       active%set%defect(1) = 0.25_wp
       call friction_missed(active%friction, system, active%set, missed, largest)
       call check_near(error, missed, 0.75_wp, tol, 1.0_wp, "by the stiffness of the next node")
-   end subroutine test_idle
+   end subroutine test_held
 
    !> The gap by the stiffness, or friction by what it is off; the largest of all.
    subroutine test_missed(error)
@@ -326,31 +248,5 @@ contains
          call check_near(error, [missed, largest], [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "no push")
       end associate
    end subroutine test_missed
-
-   !> By what acts alone.
-   subroutine test_same(error)
-      type(error_t), allocatable, intent(out) :: error
-      type(system_t) :: system
-      type(active_set_t) :: active
-      type(motion_t) :: motion
-      logical, parameter :: acts(n) = [.true., .true., .false., .false.]
-
-      call open(system, active, motion)
-      associate (friction => active%friction)
-         call select(system, active, motion, acts)
-         call check_true(error, friction_is_same(friction, 1, acts), "the same")
-         friction%law(3)%status%kind = contact_free
-         call check_true(error, friction_is_same(friction, 1, acts), "but for what is open")
-         friction%law(2)%status = slip_status_t(contact_slides, [1.0_wp, 0.0_wp])
-         call check_true(error, .not. friction_is_same(friction, 1, acts), "another way")
-         friction%tried(2, 2)%kind = contact_slides
-         friction%tried(2, 2)%direction = [-1.0_wp, 0.0_wp]
-         call check_true(error, .not. friction_is_same(friction, 2, acts), "the other direction")
-         friction%tried(2, 2)%direction = [1.0_wp, 0.0_wp]
-         call check_true(error, friction_is_same(friction, 2, acts), "the same direction")
-         friction%is_on = .false.
-         call check_true(error, friction_is_same(friction, 1, acts), "no friction")
-      end associate
-   end subroutine test_same
 
 end module test_friction_ways

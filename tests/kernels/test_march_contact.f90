@@ -14,7 +14,6 @@ module test_march_contact
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
-   use emcon_march_step, only : cycling_text
    use emcon_scene, only : scene_t
    use emcon_solver_registry, only : solver_default
    use emcon_steps, only : initiation_massless, initiation_persistent, load_point, load_t, &
@@ -40,7 +39,6 @@ contains
       tests = [ &
          test_case_t("friction is at most mu times the push, and takes", test_friction), &
          test_case_t("limit of friction of a contact by itself", test_limit), &
-         test_case_t("what comes back in turn is told", test_cycling), &
          test_case_t("restitution takes what the ledger says", test_restitution), &
          test_case_t("surfaces without mass keep energy and momenta", test_massless), &
          test_case_t("penalties store what they take", test_penalty), &
@@ -65,26 +63,6 @@ contains
       scene%v0(1, 11:) = slide
       scene%v0(2, 11:) = -1.0_wp
    end subroutine make_drop
-
-   !> Contacts are named by their nodes; where none changes it is friction that comes back.
-   subroutine test_cycling(error)
-      type(error_t), allocatable, intent(out) :: error
-      type(scene_t) :: scene
-      type(march_t) :: march
-      character(len=:), allocatable :: text
-
-      call make_drop(scene, formulation_nts, 0.0_wp)
-      call begin(scene, march, error)
-      if (allocated(error)) return
-      march%active%comes_and_goes = .false.
-      call cycling_text(march, scene, text)
-      call check_true(error, text == "contacts stick and slide in turn", text)
-      march%active%comes_and_goes(1) = .true.
-      call cycling_text(march, scene, text)
-      call check_true(error, text == "contact opens and closes in turn at slave nodes " &
-         // to_text(scene%node%label(march%system%contact(1)%contact%node(1))), text)
-      call march_free(march)
-   end subroutine test_cycling
 
    subroutine begin(scene, march, error)
       type(scene_t), intent(in) :: scene

@@ -9,7 +9,7 @@ module test_penalty_state
    use emcon_march, only : march_begin_step, march_free, march_init, march_t
    use emcon_motion, only : motion_t
    use emcon_penalty, only : penalty_augment, penalty_begin_step, penalty_depth, penalty_keep, &
-      penalty_owes, penalty_pulls, penalty_select, penalty_state_t, penalty_stored
+      penalty_owes, penalty_select, penalty_state_t, penalty_stored
    use emcon_penalty_law, only : augmented_t, penalty_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : method_augmented_lagrange, method_penalty
@@ -278,17 +278,7 @@ contains
             call check_near(error, law%base, real(k, wp), 0.0_wp, 1.0_wp, "goes on from that")
          end select
       end do
-      active%set%lam = [5.0_wp, -0.04_wp]
-      call check_true(error, .not. penalty_pulls(state, active%set), "hardly")
-      active%set%lam = [5.0_wp, -0.06_wp]
-      call check_true(error, penalty_pulls(state, active%set), "pulls")
-      active%set%n_permanent = 1
-      call check_true(error, penalty_pulls(state, active%set), "alone")
-      active%set%n_permanent = 2
-      call check_true(error, .not. penalty_pulls(state, active%set), "no contact acts")
-      active%set%n_permanent = 0
       state%augments = .false.
-      call check_true(error, .not. penalty_pulls(state, active%set), "of a penalty")
       call penalty_augment(state, active%set, is_done)
       call check_true(error, is_done .and. state%n_augmentation == 4, "which is not pushed back")
    end subroutine test_augment

@@ -58,17 +58,16 @@ def test_an_arch(part, tmp_path):
     assert run.history["cuts"].sum() == 0
 
 
-@pytest.mark.parametrize(("scene", "sides", "formulation"), [
-    ("comb", BOTH, NODES), ("tower", BOTH, NODES), ("pile", BOTH, NODES), ("bowl", ONE, "MORTAR")])
-def test_fewer_cuts(scene, sides, formulation, tmp_path):
-    """No more increments are cut than by sets that are tried one after the other."""
+@pytest.mark.parametrize(("scene", "sides", "formulation", "most"), [
+    ("comb", BOTH, NODES, 2), ("tower", BOTH, NODES, 0), ("pile", BOTH, NODES, 1),
+    ("bowl", ONE, "MORTAR", 1)])
+def test_few_cuts(scene, sides, formulation, most, tmp_path):
+    """Many bodies meet at once, by each method that holds contact exactly."""
     deck = (plain_scenes.SCENES.get(scene) or getattr(plain_scenes, scene))().deck(sides)
-    cuts = []
-    for method in ("NULL SPACE", "COMPLEMENTARITY"):
+    for method in ("NULL SPACE", "SADDLE POINT", "COMPLEMENTARITY"):
         run = run_deck(deck, tmp_path / method.replace(" ", "_"), formulation=formulation, method=method)
         obeys(run)
-        cuts.append(run.history["cuts"].sum())
-    assert cuts[1] <= cuts[0]/3
+        assert run.history["cuts"].sum() <= most, method
 
 
 @pytest.mark.parametrize("scene", ["pile", "comb"])

@@ -212,15 +212,14 @@ FINER = {"corners": lambda: corners(cells=(3, 3)), "crossing": lambda: crossing(
 
 
 @pytest.mark.parametrize(("name", "choice"), [
-    ("tower", {"formulation": "NODE TO SURFACE"}), ("crossing", {"formulation": "MORTAR"}),
+    ("crossing", {"formulation": "MORTAR"}),
     ("slide off", {"formulation": "MORTAR"}), ("slide off", {"formulation": "MORTAR", "h": 0.01}),
     ("slide off", {"formulation": "MORTAR", "h": 0.006})], ids=lambda x: x if isinstance(x, str) else "")
 def test_soft_bodies_on_corners(name, choice, tmp_path):
     """A massless node slips off a corner at once; with its mass back it takes its time."""
     scene = (SCENES | FINER)[name]()
-    sides = "BOTH" if choice["formulation"].startswith("NODE") else "ONE"
     # Where corners cross a guard would hold them.
-    run = run_deck(scene.deck("UNGUARDED" if name == "crossing" else sides), tmp_path, **MASSLESS,
+    run = run_deck(scene.deck("UNGUARDED" if name == "crossing" else "ONE"), tmp_path, **MASSLESS,
                    **choice)
     assert BACK in run.log
     assert run.history["time"][-1] == pytest.approx(scene.t_end)
@@ -228,11 +227,11 @@ def test_soft_bodies_on_corners(name, choice, tmp_path):
 
 
 @pytest.mark.parametrize(("name", "formulation", "sides"), [
-    ("corners", "NODE TO SURFACE", "BOTH"),
+    ("tower", "NODE TO SURFACE", "BOTH"), ("corners", "NODE TO SURFACE", "BOTH"),
     ("crossing late", "NODE TO SURFACE", "BOTH")])
 def test_bodies_that_meet_by_corners_need_no_mass_there(name, formulation, sides, tmp_path):
     """Not where they meet corner on corner at 45 degrees, which rounding decides."""
-    scene = FINER[name]()
+    scene = (SCENES | FINER)[name]()
     run = run_deck(scene.deck(sides), tmp_path, **MASSLESS, formulation=formulation)
     assert run.history["active"].max() >= 1
     assert BACK not in run.log

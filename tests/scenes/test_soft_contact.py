@@ -133,25 +133,18 @@ def test_a_penalty_goes_on_where_mortar_meets_other_edges(normal, smoothing, cel
     assert run.verdict["verdict"] == "good"
 
 
-#: Edges of these scenes lose their surface while they are in it: what they stored is lost.
-LOSE = {("crossing", "MORTAR")}
-
-
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
 @pytest.mark.parametrize("name", ["pile", "wedge", "ledge", "coil", "tower", "crossing", "slide off",
                                   "slave floor", "twin"])
-def test_what_a_penalty_loses_is_told(name, formulation, tmp_path):
-    """Corners, ends of surfaces, thin bodies: to round-off, or the verdict says how much."""
+def test_a_penalty_loses_nothing(name, formulation, tmp_path):
+    """Corners, ends of surfaces, thin bodies: nothing, to round-off."""
     scene = SCENES[name]()
     if name == "pile":
         scene.t_end = 0.34               # by when thirty nodes are in contact
     done, run = attempt(scene.deck(ONE), tmp_path, (), {"method": PENALTY, "formulation": formulation})
     assert run.history["contact_energy"].max() > 0
     error, made = balance(run.history)
-    told = [text for text in run.verdict["reasons"] if "has made or taken an energy" in text]
-    assert error < 1e-12
-    assert bool(told) == ((name, formulation) in LOSE) == (made > 1e-12)
-    assert all("TYPE=NODE TO SURFACE of *CONTACT PAIR follows them" in text for text in told)
+    assert error < 1e-12 and made < 1e-12
     assert run.verdict["verdict"] == "bad" or done.returncode == 0
 
 
@@ -162,15 +155,15 @@ def factorisations(run):
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
 def test_a_stiff_penalty_costs_what_exact_contact_does(formulation, tmp_path):
     """Its multipliers are unknowns on their way, so that no iterate is pushed by what its gaps
-    happen to be. The step to exact contact is as large as that to a softer one: some two times (119
-    and 120 for 57, as BLAS rounds), and a half of one more."""
+    happen to be. The step to exact contact is as large as that to a softer one: some three times (76
+    for 25), and a half of one more."""
     flight = {"formulation": formulation, "t_end": 1.0}          # of which half is free
     exact = run_deck(discs(ONE), tmp_path/"exact", **flight)
     for factor in (1, 10, 100):
         _, run = attempt(soft(discs(ONE), f"FACTOR={factor}"), tmp_path/str(factor), (),
                          {"method": PENALTY, **flight})
         assert run.history["active"].max() > 1
-        assert factorisations(run) < 2.5*factorisations(exact), factor
+        assert factorisations(run) < 3.5*factorisations(exact), factor
 
 
 @pytest.mark.parametrize("smoothing", ["NONE", "HERMITE"])

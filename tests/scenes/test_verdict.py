@@ -40,9 +40,9 @@ def test_statics_have_a_verdict(tmp_path):
 
 
 def ring_that_stops(folder):
-    """The ring with two corrections an increment at most, which cannot be cut."""
+    """The ring with one correction an increment at most, which cannot be cut."""
     deck = Deck.read(DECKS / "ring.inp")
-    deck.replace("TOLERANCE=<tolerance>", "TOLERANCE=<tolerance>, MAXIMUM=2")
+    deck.replace("TOLERANCE=<tolerance>", "TOLERANCE=<tolerance>, MAXIMUM=1")
     deck.replace("<h>, <t_end>", "<h>, <t_end>, <h>")
     return deck.write(folder / "ring.inp")
 

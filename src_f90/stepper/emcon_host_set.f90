@@ -1,0 +1,180 @@
+!> The active set of a host that solves the steps of its solids itself: one set after the other.
+!>
+!> What would penetrate is taken in, what pulls or has lost its surface is let go. If a set comes
+!> back, the union of those since then is taken and nothing is let go any more: where gaps of the
+!> start are held, which makes no energy, or where the host cannot cut the step; else it is to be
+!> tried with another size. Source: docs/theory.md, section 6.
+module emcon_host_set
+   use emcon_active_set, only : active_set_pass, active_set_t, active_set_update_gaps, &
+      step_cycling, step_done, step_too_far, touch_tol
+   use emcon_contact_conditions, only : begins_unseen, look_at_active, look_at_open, noise_at
+   use emcon_kinds, only : wp
+   use emcon_motion, only : motion_t
+   use emcon_system, only : system_t
+   implicit none
+   private
+   public :: host_set_t, host_set_begin, host_set_try, host_set_advance, host_set_drop
+
+   !> Sets of one step at most; a step is solved again so often at most because stencils were chosen
+   !> for another motion.
+   integer, parameter :: most_sets = 40, most_stale = 3
+
+   type :: host_set_t
+      logical, allocatable :: tried(:, :)        !! (n_constraint, most_sets)
+      integer :: n_tried = 0
+      logical :: only_adds = .false.             !! nothing is let go any more
+   end type host_set_t
+
+contains
+
+   !> A step begins.
+   pure subroutine host_set_begin(self, n)
+      type(host_set_t), intent(out) :: self
+      integer, intent(in) :: n                   !! constraints
+
+      allocate(self%tried(n, most_sets), source=.false.)
+   end subroutine host_set_begin
+
+   !> The host solves with what acts.
+   pure subroutine host_set_try(self, active)
+      type(host_set_t), intent(inout) :: self
+      type(active_set_t), intent(in) :: active
+
+      self%n_tried = min(self%n_tried + 1, most_sets)
+      self%tried(:, self%n_tried) = active%is_active
+   end subroutine host_set_try
+
+   !> The next set from the motion and the multipliers that solve the step with the present one;
+   !> `is_done` if that one stands, or if `status` tells of a failure.
+   subroutine host_set_advance(self, active, system, motion, is_done, status)
+      type(host_set_t), intent(inout) :: self
+      type(active_set_t), intent(inout) :: active
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      logical, intent(out) :: is_done            !! else solve the step again with the next set
+      integer, intent(out) :: status             !! one of the `step_` codes
+      logical :: before(size(active%is_active))
+
+      before = active%is_active
+      call update(self, active, system, motion, status)
+      is_done = status /= step_done
+      if (active%is_stale) then
+         active%n_stale = active%n_stale + 1
+         is_done = active%n_stale > most_stale
+         status = merge(step_too_far, step_done, is_done)
+         self%n_tried = 0
+         return
+      end if
+      is_done = is_done .or. all(before .eqv. active%is_active)
+      if (is_done) return
+      if (comes_again(self, active) .or. self%n_tried == most_sets) call end_cycle(self, active, &
+         status)
+      is_done = status /= step_done
+   end subroutine host_set_advance
+
+   !> Of the conditions gap >= 0, lam >= 0, lam gap = 0 the set fulfils the last: what acts is let
+   !> go where lam < 0, what does not is taken in where gap < 0.
+   subroutine update(self, active, system, motion, status)
+      type(host_set_t), intent(in) :: self
+      type(active_set_t), intent(inout) :: active
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion
+      integer, intent(out) :: status             !! one of the `step_` codes
+      logical :: has_changed, changes
+      integer :: pair, i, id, k
+
+      status = step_done
+      active%is_stale = .false.
+      has_changed = .false.
+      k = count(active%is_active(:system%first_constraint(1)))
+      call active_set_pass(active, system, motion)
+      do pair = 1, size(system%contact)
+         associate (contact => system%contact(pair)%contact, &
+               first => system%first_constraint(pair))
+            if (active%skip_until(pair)%passes .and. &
+               .not. any(active%is_active(first + 1:system%first_constraint(pair + 1)))) cycle
+            call active_set_update_gaps(active, system, pair, motion, motion%du)
+            do i = 1, contact%n_constraint
+               id = first + i
+               if (active%is_active(id)) then
+                  k = k + 1
+                  call look_at_active(active, contact, i, k, motion, status)
+                  changes = contact%state(i)%is_leaving .or. .not. (self%only_adds .or. &
+                     active%set%lam(k) >= -noise_at(active, system, contact%node(i)))
+               else
+                  call look_at_left_out(active, system, pair, i, status)
+                  call look_at_open(active, contact, i, id, changes, status)
+                  ! What the pairs take in may hold the bodies away from their guards.
+                  changes = changes .and. .not. (contact%slack > 0.0_wp .and. has_changed)
+                  if (changes .and. begins_unseen(active, contact, i, motion)) status = step_too_far
+                  active%is_candidate(id) = active%is_candidate(id) .or. changes
+               end if
+               has_changed = has_changed .or. changes
+               active%is_active(id) = active%is_active(id) .neqv. changes
+            end do
+         end associate
+      end do
+   end subroutine update
+
+   !> A contact that was dropped and closes all the same does not follow from others: it had lost
+   !> its surface.
+   pure subroutine look_at_left_out(active, system, pair, i, status)
+      type(active_set_t), intent(in) :: active
+      type(system_t), intent(in) :: system
+      integer, intent(in) :: pair, i
+      integer, intent(inout) :: status           !! becomes `step_too_far` if so
+
+      associate (gap => system%contact(pair)%contact%state(i), &
+            id => system%first_constraint(pair) + i)
+         if (.not. (active%is_left_out(id) .and. active%may_cut)) return
+         if (.not. (gap%is_near .and. gap%is_over)) return
+         if (gap%gap1 < min(gap%gap0, active%left(1)*active%overclosure(id) + gap%closed) &
+            - touch_tol*gap%size) status = step_too_far
+      end associate
+   end subroutine look_at_left_out
+
+   !> Was the next set tried before?
+   pure logical function comes_again(self, active)
+      type(host_set_t), intent(in) :: self
+      type(active_set_t), intent(in) :: active
+      integer :: k
+
+      comes_again = .false.
+      do k = 1, self%n_tried
+         comes_again = comes_again .or. all(self%tried(:, k) .eqv. active%is_active)
+      end do
+   end function comes_again
+
+   !> Go on with the union of the sets since the first coming of the present one, if that may be.
+   pure subroutine end_cycle(self, active, status)
+      type(host_set_t), intent(inout) :: self
+      type(active_set_t), intent(inout) :: active
+      integer, intent(inout) :: status           !! `step_cycling` if not
+      integer :: k, first
+
+      if (self%only_adds .or. (active%may_cut .and. .not. active%holds_gap)) then
+         status = step_cycling
+         return
+      end if
+      first = 1
+      do k = self%n_tried, 1, -1
+         if (all(self%tried(:, k) .eqv. active%is_active)) first = k
+      end do
+      active%is_active = any(self%tried(:, first:self%n_tried), dim=2)
+      self%only_adds = .true.
+      self%n_tried = 0
+   end subroutine end_cycle
+
+   !> Constraints at the places `redundant` of the set follow from others, and do not act in this
+   !> step.
+   pure subroutine host_set_drop(self, active, redundant)
+      type(host_set_t), intent(inout) :: self
+      type(active_set_t), intent(inout) :: active
+      integer, intent(in) :: redundant(:)        !! (any) from 1
+
+      active%is_left_out(active%set%id(redundant)) = .true.
+      active%is_active = active%is_active .and. .not. active%is_left_out
+      self%n_tried = 0
+   end subroutine host_set_drop
+
+end module emcon_host_set
