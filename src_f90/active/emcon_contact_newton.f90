@@ -6,7 +6,8 @@
 !> the method converges as Newton's does. The end is told by the laws, not by the set: where rows
 !> follow from others motions stand while forces still trade. Source: docs/theory.md, eq. (14i).
 module emcon_contact_newton
-   use emcon_condensation, only : condensation_free, condensation_make, condensation_t
+   use emcon_condensation, only : condensation_free, condensation_make, condensation_renew, &
+      condensation_t
    use emcon_constraint, only : condition_rate
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_rounding, &
@@ -358,12 +359,17 @@ contains
 
       has_curvature = .not. btest(self%n_stall/stall_turn, 0)
       call phase_enter(system%phases, phase_factorise, left)
-      call find_hold(self, system, set)
-      call condensation_make(self%condensation, system, set, newton%correction, newton%residual, &
-         has_curvature, error)
-      call phase_leave(system%phases, phase_eliminate)
-      system%phases%n_factorisation = system%phases%n_factorisation + 1
-      newton%convergence%n_iteration = newton%convergence%n_iteration + 1
+      if (nears_end(self, newton)) then
+         call condensation_renew(self%condensation, set, newton%residual, error)
+         call phase_leave(system%phases, phase_eliminate)
+      else
+         call find_hold(self, system, set)
+         call condensation_make(self%condensation, system, set, newton%correction, &
+            newton%residual, has_curvature, error)
+         call phase_leave(system%phases, phase_eliminate)
+         system%phases%n_factorisation = system%phases%n_factorisation + 1
+         newton%convergence%n_iteration = newton%convergence%n_iteration + 1
+      end if
       status = newton_singular
       if (allocated(error) .or. self%condensation%is_singular) return
       call lay_out(self, set)
@@ -380,6 +386,15 @@ contains
       if (is_solved) self%status = contact_problem_status(self%problem, self%push)
       call phase_leave(system%phases, left)
    end subroutine condense
+
+   !> Is the step within its tolerance? The last tangent does for what is left.
+   pure logical function nears_end(self, newton)
+      type(solve_t), intent(in) :: self
+      type(newton_t), intent(in) :: newton
+
+      nears_end = newton%convergence%n_iteration > 0 .and. .not. self%condensation%is_singular &
+         .and. self%size <= newton%convergence%tolerance
+   end function nears_end
 
    !> In statics contacts may be all that holds a body: they are held as the tangent is factorised.
    pure subroutine find_hold(self, system, set)

@@ -18,7 +18,7 @@ module emcon_condensation
    use emcon_system, only : system_t
    implicit none
    private
-   public :: condensation_t, condensation_make, condensation_free
+   public :: condensation_t, condensation_make, condensation_renew, condensation_free
 
    type :: condensation_t
       !> (n_row) c, the stiffness that rows have in A; not allocated: none [M/T^2]
@@ -31,6 +31,9 @@ module emcon_condensation
       real(wp), allocatable :: w(:, :)           !! (rows, rows) and what they gain by them [T^2/M]
       !> (n_permanent, 0:rows) multipliers of what always holds, as `motion`
       real(wp), allocatable :: permanent(:, :)
+      !> (n_unknown, n_permanent) what moves by those rows alone, and their rates by it
+      real(wp), allocatable, private :: held(:, :)
+      real(dp), allocatable, private :: held_rate(:, :)
       class(sparse_solver_t), allocatable, private :: solver
       type(csr_t), private :: tangent
    end type condensation_t
@@ -46,7 +49,6 @@ contains
       real(wp), intent(in) :: residual(:)                !! (n_unknown)
       logical, intent(in) :: has_curvature               !! the tangent has that of the rows
       type(error_t), allocatable, intent(out) :: error
-      real(wp), allocatable :: held(:, :)                ! (n_unknown, n_permanent) by those rows
       real(wp) :: force(size(residual))
       integer :: k
 
@@ -54,28 +56,54 @@ contains
       call assemble(self, system, set, has_curvature)
       call factorise(self, correction, error)
       if (allocated(error) .or. self%is_singular) return
-      if (allocated(self%motion)) deallocate(self%motion, self%free, self%w)
-      associate (n => size(residual), first => set%n_permanent)
-         allocate(held(n, first), self%motion(n, 0:set%n_row - first))
+      if (allocated(self%motion)) deallocate(self%motion, self%held, self%permanent, self%w)
+      associate (n => size(residual), first => set%n_permanent, last => set%n_row - set%n_permanent)
+         allocate(self%held(n, first), self%motion(n, 0:last), self%permanent(first, 0:last), &
+            self%w(last, last))
          force = -residual
          call self%solver%solve(force, self%motion(:, 0), error)
          do k = 1, set%n_row
             if (allocated(error)) return
             call spread_row(set%force_rows, k, force)
-            if (k <= first) call self%solver%solve(force, held(:, k), error)
+            if (k <= first) call self%solver%solve(force, self%held(:, k), error)
             if (k > first) call self%solver%solve(force, self%motion(:, k - first), error)
          end do
          if (allocated(error)) return
-         call eliminate(self, set, held)
+         call find_held_rate(self, set)
+         call eliminate(self, set, 0, last)
          if (self%is_singular) return
-         self%free = set%defect(first + 1:set%n_row) + rates(set, first + 1, set%n_row, &
-            self%motion(:, 0))
-         allocate(self%w(set%n_row - first, set%n_row - first))
-         do k = 1, size(self%free)
+         do k = 1, last
             self%w(:, k) = rates(set, first + 1, set%n_row, self%motion(:, k))
          end do
       end associate
    end subroutine condensation_make
+
+   !> The same tangent where another residual and other defects are left: as the motion nears its
+   !> end this is as good as a new one.
+   subroutine condensation_renew(self, set, residual, error)
+      type(condensation_t), intent(inout) :: self        !! made for these rows
+      type(constraint_set_t), intent(in) :: set          !! evaluated, with rows
+      real(wp), intent(in) :: residual(:)                !! (n_unknown)
+      type(error_t), allocatable, intent(out) :: error
+
+      call self%solver%solve(-residual, self%motion(:, 0), error)
+      if (.not. allocated(error)) call eliminate(self, set, 0, 0)
+   end subroutine condensation_renew
+
+   !> What the rows that always hold gain by their own multipliers.
+   subroutine find_held_rate(self, set)
+      type(condensation_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+      integer :: k
+
+      associate (n => set%n_permanent)
+         if (allocated(self%held_rate)) deallocate(self%held_rate)
+         allocate(self%held_rate(n, n))
+         do k = 1, n
+            self%held_rate(:, k) = real(rates(set, 1, n, self%held(:, k)), dp)
+         end do
+      end associate
+   end subroutine find_held_rate
 
    !> The tangent of the terms, of laws, and of rows as far as it is wanted.
    subroutine assemble(self, system, set, has_curvature)
@@ -129,31 +157,28 @@ contains
       if (.not. allocated(error)) self%is_singular = self%solver%is_singular
    end subroutine factorise
 
-   !> Let the rows that always hold do so.
-   subroutine eliminate(self, set, held)
+   !> Let the rows that always hold do so in the motions `first` to `last`, and find what is free.
+   subroutine eliminate(self, set, first, last)
       type(condensation_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
-      real(wp), intent(in) :: held(:, :)                 !! (n_unknown, n_permanent)
-      real(dp), allocatable :: matrix(:, :), rate(:, :), lam(:, :)
+      integer, intent(in) :: first, last                 !! 0: by no other multipliers
+      real(dp), dimension(set%n_permanent, first:last) :: rate, lam
       integer :: k
 
-      associate (n => self%n_permanent, last => ubound(self%motion, 2))
-         allocate(matrix(n, n), rate(n, last + 1), lam(n, last + 1))
+      associate (n => self%n_permanent)
          if (n > 0) then
-            do k = 1, n
-               matrix(:, k) = real(rates(set, 1, n, held(:, k)), dp)
+            do k = first, last
+               rate(:, k) = real(rates(set, 1, n, self%motion(:, k)), dp)
             end do
-            do k = 0, last
-               rate(:, k + 1) = real(rates(set, 1, n, self%motion(:, k)), dp)
-            end do
-            rate(:, 1) = rate(:, 1) + real(set%defect(:n), dp)
-            call dense_solve(matrix, rate, lam, self%is_singular)
+            if (first == 0) rate(:, 0) = rate(:, 0) + real(set%defect(:n), dp)
+            call dense_solve(self%held_rate, rate, lam, self%is_singular)
             if (self%is_singular) return
-            self%motion = self%motion - matmul(held, real(lam, wp))
+            self%motion(:, first:last) = self%motion(:, first:last) - matmul(self%held, &
+               real(lam, wp))
+            self%permanent(:, first:last) = -real(lam, wp)
          end if
-         if (allocated(self%permanent)) deallocate(self%permanent)
-         allocate(self%permanent(n, 0:last))
-         self%permanent = -real(lam, wp)
+         if (first == 0) self%free = set%defect(n + 1:set%n_row) + rates(set, n + 1, set%n_row, &
+            self%motion(:, 0))
       end associate
    end subroutine eliminate
 

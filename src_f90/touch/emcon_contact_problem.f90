@@ -316,16 +316,18 @@ contains
       real(dp) :: slope(size(push), size(push)), x(size(push), 1)
       real(wp) :: part, before
       integer :: i, halving
-      logical :: is_singular
+      logical :: is_singular, was_solved
 
       trial = push
       is_solved = .false.
       do i = 0, most
+         was_solved = is_solved
          call natural_map(self, trial, defect, slope)
          is_solved = missed_by(self, trial, defect) <= met*maxval(abs(contact_problem_force(self, &
             trial)))
-         ! A start that is near is made exact.
-         if ((is_solved .and. (i > 0 .or. .not. maxval(abs(defect)) > 0.0_wp)) .or. i == most) exit
+         ! What is near is made exact: the first step to it leaves what W is stiffer by.
+         if ((is_solved .and. (was_solved .or. .not. maxval(abs(defect)) > 0.0_wp)) &
+            .or. i == most) exit
          n_trial = n_trial + 1
          call dense_solve(slope, reshape(real(-defect, dp), [size(push), 1]), x, is_singular)
          if (is_singular) exit
