@@ -364,8 +364,7 @@ contains
          active%gap_tolerance = dirt
          active%left = dirt
          active%is_active = .not. active%is_active
-         active%is_dropped = .true.
-         active%comes_and_goes = .true.
+         active%is_left_out = .true.
          active%n_newton = 77
          explicit%is_free = .not. explicit%is_free
          if (allocated(explicit%v1)) explicit%v1 = dirt
