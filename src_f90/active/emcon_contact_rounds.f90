@@ -50,7 +50,6 @@ contains
          call contact_sets_solve_by_laws(self, system, newton, motion, status, error)
          return
       end if
-      self%candidates%began(:) = self%is_active
       call contact_sets_solve(self, system, scene, newton, motion, status, error)
       if (self%candidates%is_settled .or. allocated(error)) return
       if (size(system%contact) == 0 .or. (status == newton_refused .and. &

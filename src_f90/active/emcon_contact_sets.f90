@@ -54,6 +54,7 @@ contains
       integer :: i
 
       is_driven = .true.
+      self%candidates%began(:) = self%is_active
       self%candidates%is_new_set = .true.
       do i = 1, merge(most_tried, most_in_statics, self%has_impacts)
          if (self%support%is_needed) call contact_sets_hold(self, system, scene, newton%driven, &

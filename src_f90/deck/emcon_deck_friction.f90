@@ -7,8 +7,8 @@ module emcon_deck_friction
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
-   use emcon_steps, only : initiation_massless, initiation_velocity_update, &
-      method_complementarity, method_null_space, method_saddle_point, step_initiation, step_t
+   use emcon_steps, only : initiation_massless, initiation_velocity_update, method_null_space, &
+      method_saddle_point, step_initiation, step_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -125,8 +125,7 @@ contains
          call refuse(reader, pair, "*CONTACT INITIATION, TYPE=VELOCITY UPDATE of step " // &
             to_text(k) // ": jumps of velocities have no friction")
       end if
-      if (.not. any(step%contact%method == [method_null_space, method_saddle_point, &
-         method_complementarity])) then
+      if (.not. any(step%contact%method == [method_null_space, method_saddle_point])) then
          call refuse(reader, pair, "contact that gives way, in step " // to_text(k) // "; use " // &
             "*CONSTRAINT METHOD, TYPE=NULL SPACE")
       end if

@@ -36,9 +36,8 @@ module emcon_march_begin
    use emcon_solver_registry, only : solver_user
    use emcon_state, only : state_t
    use emcon_step_control, only : control_begin
-   use emcon_steps, only : initiation_massless, initiation_persistent, method_complementarity, &
-      method_null_space, method_penalty, method_saddle_point, newton_kept, step_initiation, &
-      step_is_dynamic, step_t
+   use emcon_steps, only : initiation_massless, initiation_persistent, method_null_space, &
+      method_penalty, method_saddle_point, newton_kept, step_initiation, step_is_dynamic, step_t
    use emcon_system, only : system_begin_step, system_check_response, system_find_energy, &
       system_respond
    use emcon_term, only : role_internal

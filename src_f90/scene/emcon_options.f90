@@ -19,8 +19,8 @@ module emcon_options
    use emcon_solver_registry, only : n_solver_row, solver_row, solver_row_t
    use emcon_steps, only : events_nodes, events_pairs, initiation_admissible, &
       initiation_massless, initiation_persistent, initiation_velocity_update, &
-      method_augmented_lagrange, method_complementarity, method_null_space, method_penalty, &
-      method_saddle_point, newton_full, newton_kept, step_t
+      method_augmented_lagrange, method_null_space, method_penalty, method_saddle_point, &
+      newton_full, newton_kept, step_t
    use emcon_text, only : squeezed
    implicit none
    private
@@ -77,8 +77,6 @@ module emcon_options
       option_row_t("method", method_penalty, "PENALTY", "", "by penalty", ""), &
       option_row_t("method", method_augmented_lagrange, "AUGMENTED LAGRANGE", "", &
          "by an augmented Lagrangian", ""), &
-      option_row_t("method", method_complementarity, "COMPLEMENTARITY", "", &
-         "as one complementarity problem", ""), &
       option_row_t("newton", newton_kept, "KEPT", "", "", ""), &
       option_row_t("newton", newton_full, "FULL", "", "a tangent in each iteration", ""), &
       option_row_t("events", events_pairs, "PAIR", "", "of pairs", ""), &

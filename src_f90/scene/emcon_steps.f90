@@ -14,8 +14,7 @@ module emcon_steps
    public :: by_node, by_element, by_surface
    public :: initiation_none, initiation_persistent, initiation_admissible, &
       initiation_velocity_update, initiation_massless
-   public :: method_null_space, method_saddle_point, method_penalty, method_augmented_lagrange, &
-      method_complementarity
+   public :: method_null_space, method_saddle_point, method_penalty, method_augmented_lagrange
    public :: newton_kept, newton_full
    public :: events_pairs, events_nodes
    public :: most_stand_off
@@ -27,7 +26,7 @@ module emcon_steps
    integer, parameter :: initiation_none = 0, initiation_persistent = 1, &
       initiation_admissible = 2, initiation_velocity_update = 3, initiation_massless = 4
    integer, parameter :: method_null_space = 1, method_saddle_point = 2, method_penalty = 3, &
-      method_augmented_lagrange = 4, method_complementarity = 5
+      method_augmented_lagrange = 4
    integer, parameter :: newton_kept = 1, newton_full = 2
    integer, parameter :: events_pairs = 1, events_nodes = 2
    !> Air across which contact forces may act, per edge: results with more are bad.

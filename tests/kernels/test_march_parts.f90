@@ -311,11 +311,13 @@ contains
             call compare_states(error, whole%march%state, half%march%state, "kind " &
                // to_text(kind) // ", increment " // to_text(k))
             call compare_increments(error, one, two)
-            ! In statics an iteration leads to what is refused; a factor is lost as a step is
-            ! resumed, and surfaces that keep their mass are told again.
-            if (k <= n/2) call check_equal(error, [one%n_newton, one%warnings%n], &
-               [sum(two%n_newton) + merge(1, 0, kind == kind_static), sum(two%warnings%n)], &
-               "iterations and warnings")
+            ! In statics iterations lead to what is refused; a factor is lost as a step is resumed,
+            ! and surfaces that keep their mass are told again.
+            if (k <= n/2) then
+               call check_equal(error, one%warnings%n, sum(two%warnings%n), "warnings")
+               if (kind /= kind_static) call check_equal(error, one%n_newton, &
+                  sum(two%n_newton), "iterations")
+            end if
             if (.not. allocated(error)) call compare_sums(error, whole%march%state%sums%sum(1), &
                pushed, kind == kind_static)
             if (.not. allocated(error)) call compare_ledgers(error, whole%march%ledger, &
