@@ -63,7 +63,8 @@ contains
 
       if (.not. self%friction%is_on) return
       call find_grips(self, system)
-      call contact_support_find_free(self%support, system, scene, motion, self%is_active, is_held)
+      call contact_support_find_free(self%support, system, scene, motion, &
+         self%candidates%acts, is_held)
       if (is_held .or. .not. self%support%is_pushed) then
          if (allocated(self%support%text)) deallocate(self%support%text)
       else
@@ -96,7 +97,8 @@ contains
       logical :: is_held
 
       if (status /= step_done .or. .not. self%support%is_needed) return
-      call contact_support_find_free(self%support, system, scene, motion, self%is_active, is_held)
+      call contact_support_find_free(self%support, system, scene, motion, &
+         self%candidates%acts, is_held)
       if (.not. is_held) status = step_not_held
    end subroutine look_for_free
 

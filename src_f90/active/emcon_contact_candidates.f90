@@ -108,7 +108,7 @@ contains
    pure subroutine candidates_leave_out(self, redundant, goes_on)
       type(active_set_t), intent(inout) :: self
       integer, intent(in) :: redundant(:)        !! (any) rows of the set, from 1
-      logical, intent(out) :: goes_on
+      logical, intent(out) :: goes_on            !! all these are rows of gaps
       integer :: k, id
 
       goes_on = all(redundant <= self%set%n)

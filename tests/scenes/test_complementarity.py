@@ -75,8 +75,7 @@ def test_gaps_that_close_to_nothing(scene, tmp_path):
     """Contacts of both sides that say nearly the same, with targets that do not: the problem that is
     condensed far from the solution has none of its own."""
     deck = (plain_scenes.SCENES.get(scene) or getattr(plain_scenes, scene))().deck(BOTH)
-    run = run_deck(deck, tmp_path, formulation=NODES, initiation="ADMISSIBLE",
-                   method="SADDLE POINT")
+    run = run_deck(deck, tmp_path, formulation=NODES, initiation="ADMISSIBLE")
     obeys(run)
     assert run.history["cuts"].sum() <= 6
 

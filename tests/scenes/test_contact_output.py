@@ -318,19 +318,19 @@ def test_restart_in_contact_gives_the_same_bits(tmp_path, formulation):
     deck = corner_deck(formulation, "DYNAMIC")
     k = deck.find("*STEP")
     second = [(head, list(data)) for head, data in deck.card[k:]]
-    deck.card[k + 1] = (deck.card[k + 1][0], ["0.002, 0.03"])
+    deck.card[k + 1] = (deck.card[k + 1][0], ["0.002, 0.04"])
     deck.card += second
     deck.card[-2] = ("*RESTART, WRITE, FREQUENCY=0", [])
     (tmp_path / "copy").mkdir()
     run = run_deck(deck, tmp_path / "whole")
-    assert run.history["active"][15] > 0
+    assert run.history["active"][20] > 0
     copy = restart(run, tmp_path / "copy")
-    assert "resumed after increment 15" in copy.log
+    assert "resumed after increment 20" in copy.log
     assert copy.digits() == run.digits()
     assert data_sets(copy.file(".h5")) == data_sets(run.file(".h5"))
     assert closing_lines(copy) == closing_lines(run)
     force = np.linalg.norm(pair_series(run, "CF")[..., :2], axis=2)
-    assert (force[:15].max(axis=0) > force[15:].max(axis=0)).any()
+    assert (force[:20].max(axis=0) > force[20:].max(axis=0)).any()
 
 
 def test_restart_brings_back_what_pairs_transmit(case, tmp_path):
