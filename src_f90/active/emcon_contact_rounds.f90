@@ -11,7 +11,7 @@ module emcon_contact_rounds
    use emcon_contact_conditions, only : gap_noise
    use emcon_contact_newton, only : contact_newton_solve
    use emcon_contact_sets, only : contact_sets_hold, contact_sets_solve, &
-      contact_sets_solve_by_laws
+      contact_sets_solve_by_laws, most_condensed
    use emcon_contact_support, only : contact_support_forget
    use emcon_coulomb_law, only : contact_open, coulomb_t
    use emcon_errors, only : error_t
@@ -66,6 +66,8 @@ contains
          end if
          call begin_again(self, system, motion)
       end if
+      status = step_cycling
+      if (self%has_impacts .and. count(self%candidates%takes_part) > most_condensed) return
       call solve_with_all(self, system, newton, motion, status, error)
    end subroutine contact_rounds_solve
 

@@ -31,8 +31,10 @@ module emcon_contact_sets
    private
    public :: contact_sets_solve, contact_sets_solve_by_laws, contact_sets_hold
 
-   !> Sets that are tried by the null space in one step at most, and in statics.
-   integer, parameter :: most_tried = 6, most_in_statics = 20
+   !> Sets that are tried by the null space in one step at most, and where trials tell them.
+   integer, parameter :: most_tried = 6, most_by_trials = 20
+   !> Of more contacts than these trials tell the next set in dynamics too: their problem is dense.
+   integer, parameter, public :: most_condensed = 200
    !> By so much of the largest push friction may miss its law: what a solve leaves.
    real(wp), parameter :: least_missed = 1.0e4_wp*epsilon(1.0_wp)
    !> Rounds with contacts that give way at most.
@@ -56,7 +58,9 @@ contains
       is_driven = .true.
       self%candidates%began(:) = self%is_active
       self%candidates%is_new_set = .true.
-      do i = 1, merge(most_tried, most_in_statics, self%has_impacts)
+      do i = 1, most_by_trials
+         if (i > most_tried .and. self%has_impacts .and. &
+            count(self%candidates%takes_part) <= most_condensed) return
          if (self%support%is_needed) call contact_sets_hold(self, system, scene, newton%driven, &
             motion)
          status = step_not_held
@@ -134,7 +138,8 @@ contains
    end subroutine let_go_alone
 
    !> The next set: that which obeys the laws where the step is linearised, if a kept factor tells
-   !> it without friction; in statics what pushes, in the way that its trial has, and what closes.
+   !> it without friction; in statics, and of many, what pushes, in the way that its trial has, and
+   !> what closes.
    subroutine choose(self, system, newton, motion, goes_on, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -143,15 +148,19 @@ contains
       logical, intent(out) :: goes_on            !! there is such a set
       type(error_t), allocatable, intent(out) :: error
       logical :: turns
+      integer :: n
 
       turns = .false.
+      n = count(self%candidates%takes_part)
       goes_on = newton%factor_policy%is_allowed .and. newton%correction%kept%is_made &
-         .and. .not. self%friction%is_on
+         .and. .not. self%friction%is_on .and. n <= most_condensed
+      if (goes_on) goes_on = kept_factor_has_room(newton%correction%kept, n, &
+         size(system%matrix%column))
       if (goes_on) then
          call choose_by_problem(self, system, newton, motion, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
       else
-         goes_on = .not. self%has_impacts
+         goes_on = .not. self%has_impacts .or. n > most_condensed
          if (.not. goes_on) return
          call choose_by_trials(self, system, turns)
       end if
@@ -195,8 +204,7 @@ contains
 
       call candidates_select(self, system, motion)
       associate (set => self%set)
-         is_solved = set%n_permanent == 0 .and. set%n > 0 .and. set%n_condition == set%n .and. &
-            kept_factor_has_room(newton%correction%kept, set%n, size(system%matrix%column))
+         is_solved = set%n_permanent == 0 .and. set%n > 0 .and. set%n_condition == set%n
          if (.not. is_solved) return
          call constraints_evaluate(set, system, motion, .true.)
          call constraints_rows(set, system%space%numbering)

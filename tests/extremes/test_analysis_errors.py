@@ -191,14 +191,15 @@ def test_last_increment_meets_the_end(tmp_path):
 
 
 def test_failed_analysis_keeps_its_results(tmp_path):
-    """In flight two iterations do; in contact they do not, and no cut is allowed."""
+    """In flight, where contacts are at play too, two iterations do; in the end they do not, and no
+    cut is allowed."""
     deck = ring_moved_down(-1.0)
     deck.replace("TOLERANCE=<tolerance>", "TOLERANCE=<tolerance>, MAXIMUM=2")
     deck.replace("<h>, <t_end>", "<h>, <t_end>, <h>")
     done, result = run(deck, tmp_path, h=0.05, frame=0.1)
     assert_told(done, 3, "the analysis stops at time", "smallest allowed", "Newton")
     history = result.history
-    assert len(history) > 5 and not history["active"].any()
+    assert len(history) > 5 and history["time"][-1] < 8
     assert result.fields().time[-1] == pytest.approx(history["time"][-1], abs=0.1)
     assert "the analysis stops" in result.log and "verdict" in result.log
     assert f"time {history['time'][-1]:.3g}" in done.stderr

@@ -1,7 +1,8 @@
 !> A step in the multipliers of its contacts alone, beside the whole linear system.
 module test_condensation
    use check, only : check_near, check_true, test_case_t
-   use emcon_condensation, only : condensation_free, condensation_make, condensation_t
+   use emcon_condensation, only : condensation_free, condensation_make, condensation_renew, &
+      condensation_t
    use emcon_correction, only : correction_free, correction_reset, correction_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
@@ -22,6 +23,7 @@ contains
 
       tests = [ &
          test_case_t("motion and values by any multipliers", test_motion), &
+         test_case_t("another residual by the same tangent", test_renew), &
          test_case_t("what moves freely is told", test_free)]
    end subroutine collect_condensation
 
@@ -89,6 +91,44 @@ contains
       call condensation_free(condensation)
       call correction_free(correction)
    end subroutine test_motion
+
+   !> What is left later, by the tangent of before, is what a new one with that tangent leaves.
+   subroutine test_renew(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(system_t) :: system
+      type(correction_t) :: correction
+      type(condensation_t) :: later, anew
+      integer :: m
+
+      call make_problem(problem)
+      call make_rows(problem)
+      system%space%numbering = problem%numbering
+      system%matrix = problem%base
+      call correction_reset(correction, method_null_space, solver_default)
+      associate (set => problem%set)
+         do m = 0, set%n - 1, 2
+            set%n_permanent = m
+            set%defect = -3.0_wp*set%defect
+            call condensation_make(later, system, set, correction, 0.5_wp*problem%residual, .true., &
+               error)
+            set%defect = set%defect/(-3.0_wp)
+            if (.not. allocated(error)) call condensation_renew(later, set, problem%residual, error)
+            if (.not. allocated(error)) call condensation_make(anew, system, set, correction, &
+               problem%residual, .true., error)
+            if (allocated(error)) return
+            call check_near(error, [later%motion(:, 0), later%permanent(:, 0), later%free], &
+               [anew%motion(:, 0), anew%permanent(:, 0), anew%free], tol_dp, &
+               maxval(abs(anew%motion(:, 0))), "what is left")
+            if (.not. allocated(error)) call check_near(error, [later%w], [anew%w], 0.0_wp, &
+               1.0_wp, "and its flexibility")
+            if (allocated(error)) return
+         end do
+      end associate
+      call condensation_free(later)
+      call condensation_free(anew)
+      call correction_free(correction)
+   end subroutine test_renew
 
    subroutine test_free(error)
       type(error_t), allocatable, intent(out) :: error
