@@ -313,7 +313,7 @@ contains
       integer, intent(inout) :: n_trial              !! counted on
       logical, intent(out) :: is_solved
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: trial, defect, new, step
-      real(dp) :: slope(size(push), size(push)), x(size(push), 1)
+      real(dp) :: slope(size(push), size(push)), x(size(push))
       real(wp) :: part, before
       integer :: i, halving
       logical :: is_singular, was_solved
@@ -329,9 +329,9 @@ contains
          if ((is_solved .and. (was_solved .or. .not. maxval(abs(defect)) > 0.0_wp)) &
             .or. i == most) exit
          n_trial = n_trial + 1
-         call dense_solve(slope, reshape(real(-defect, dp), [size(push), 1]), x, is_singular)
+         call find_step(slope, reshape(real(-defect, dp), [size(push)]), x, is_singular)
          if (is_singular) exit
-         step = reshape(real(x(:, 1), wp), shape(step))
+         step = reshape(real(x, wp), shape(step))
          before = norm2(defect)
          part = 1.0_wp
          do halving = 0, most_halvings
@@ -345,6 +345,38 @@ contains
       end do
       if (is_solved) push = trial
    end subroutine solve_by_trials
+
+   !> x of slope x = b. Rows of what neither pushes nor holds are those of the unit matrix: they are
+   !> left out of the elimination.
+   subroutine find_step(slope, b, x, is_singular)
+      real(dp), intent(in) :: slope(:, :)            !! (n, n)
+      real(dp), intent(in) :: b(:)                   !! (n)
+      real(dp), intent(out) :: x(:)                  !! (n)
+      logical, intent(out) :: is_singular            !! then x is nothing
+      logical :: pushes(size(b))
+      integer, allocatable :: row(:), other(:)
+      real(dp), allocatable :: rest(:, :), step(:, :)
+      integer :: j
+
+      pushes = .false.
+      do j = 1, size(b)
+         pushes(:j - 1) = pushes(:j - 1) .or. abs(slope(:j - 1, j)) > 0.0_dp
+         pushes(j + 1:) = pushes(j + 1:) .or. abs(slope(j + 1:, j)) > 0.0_dp
+         pushes(j) = pushes(j) .or. abs(slope(j, j) - 1.0_dp) > 0.0_dp
+      end do
+      row = pack([(j, j = 1, size(b))], pushes)
+      other = pack([(j, j = 1, size(b))], .not. pushes)
+      x = b
+      is_singular = .false.
+      if (size(row) == 0) return
+      rest = reshape(b(row), [size(row), 1])
+      do j = 1, size(other)
+         rest(:, 1) = rest(:, 1) - slope(row, other(j))*b(other(j))
+      end do
+      allocate(step(size(row), 1))
+      call dense_solve(slope(row, row), rest, step, is_singular)
+      x(row) = step(:, 1)
+   end subroutine find_step
 
    !> Contact by contact, each exactly with the pushes of the others, over and over.
    subroutine solve_by_sweeps(self, push, most, n_sweep, is_solved)
