@@ -37,8 +37,10 @@ module emcon_contact_problem
    !> What a sum of W and forces rounds, per sum of their sizes.
    real(wp), parameter :: rounded = 16.0_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
    !> W of Newton's method is stiffer by this part of its diagonal: its solutions are the same, and
-   !> where W is singular it has steps.
-   real(wp), parameter :: proximal = 1.0e3_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
+   !> where W is singular it has steps; where c is not 0 by this: a body of which all contacts slide
+   !> is nowhere in particular, and round-off over that part is how far it is moved.
+   real(wp), parameter :: proximal = 1.0e3_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp)), &
+      loosely = sqrt(max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp)))
 
    type :: contact_problem_t
       integer :: n_slip = 0                          !! of each contact, n_dim - 1
@@ -298,7 +300,8 @@ contains
             slope(row:m*i, :) = real(matmul(gain, self%w(row:m*i, :)), dp)
             do k = 0, self%n_slip
                slope(row:m*i, row + k) = slope(row:m*i, row + k) + real(by(:self%n_slip, k) &
-                  *(stiffness*proximal*self%w(row + k, row + k) - 1.0_wp), dp)
+                  *(stiffness*merge(loosely, proximal, self%hold(k, i) > 0.0_wp) &
+                  *self%w(row + k, row + k) - 1.0_wp), dp)
                slope(row + k, row + k) = slope(row + k, row + k) + 1.0_dp
             end do
          end associate
