@@ -6,12 +6,12 @@ module emcon_contact_rounds
       step_done, step_not_held
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraints_evaluate
-   use emcon_contact_candidates, only : candidates_keep_forces, candidates_look, &
-      candidates_select
+   use emcon_contact_candidates, only : candidates_are_many, candidates_keep_forces, &
+      candidates_look, candidates_select
    use emcon_contact_conditions, only : gap_noise
    use emcon_contact_newton, only : contact_newton_solve
    use emcon_contact_sets, only : contact_sets_hold, contact_sets_solve, &
-      contact_sets_solve_by_laws, most_condensed
+      contact_sets_solve_by_laws
    use emcon_contact_support, only : contact_support_forget
    use emcon_coulomb_law, only : contact_open, coulomb_t
    use emcon_errors, only : error_t
@@ -67,7 +67,7 @@ contains
          call begin_again(self, system, motion)
       end if
       status = step_cycling
-      if (self%has_impacts .and. count(self%candidates%takes_part) > most_condensed) return
+      if (candidates_are_many(self)) return
       call solve_with_all(self, system, newton, motion, status, error)
    end subroutine contact_rounds_solve
 

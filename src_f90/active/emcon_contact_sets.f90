@@ -9,8 +9,8 @@ module emcon_contact_sets
    use emcon_active_set, only : active_set_t, step_cycling, step_done, step_loose, step_not_held
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_gives_back
-   use emcon_contact_candidates, only : candidates_keep_forces, candidates_leave_out, &
-      candidates_look, candidates_select, candidates_solve
+   use emcon_contact_candidates, only : candidates_are_many, candidates_keep_forces, &
+      candidates_leave_out, candidates_look, candidates_select, candidates_solve
    use emcon_contact_conditions, only : noise_at
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
       contact_problem_solve, contact_problem_status, contact_problem_t
@@ -33,8 +33,6 @@ module emcon_contact_sets
 
    !> Sets that are tried by the null space in one step at most, and where trials tell them.
    integer, parameter :: most_tried = 6, most_by_trials = 20
-   !> Of more contacts than these trials tell the next set in dynamics too: their problem is dense.
-   integer, parameter, public :: most_condensed = 200
    !> By so much of the largest push friction may miss its law: what a solve leaves.
    real(wp), parameter :: least_missed = 1.0e4_wp*epsilon(1.0_wp)
    !> Rounds with contacts that give way at most.
@@ -59,8 +57,7 @@ contains
       self%candidates%began(:) = self%is_active
       self%candidates%is_new_set = .true.
       do i = 1, most_by_trials
-         if (i > most_tried .and. self%has_impacts .and. &
-            count(self%candidates%takes_part) <= most_condensed) return
+         if (i > most_tried .and. self%has_impacts .and. .not. candidates_are_many(self)) return
          if (self%support%is_needed) call contact_sets_hold(self, system, scene, newton%driven, &
             motion)
          status = step_not_held
@@ -148,19 +145,17 @@ contains
       logical, intent(out) :: goes_on            !! there is such a set
       type(error_t), allocatable, intent(out) :: error
       logical :: turns
-      integer :: n
 
       turns = .false.
-      n = count(self%candidates%takes_part)
       goes_on = newton%factor_policy%is_allowed .and. newton%correction%kept%is_made &
-         .and. .not. self%friction%is_on .and. n <= most_condensed
-      if (goes_on) goes_on = kept_factor_has_room(newton%correction%kept, n, &
-         size(system%matrix%column))
+         .and. .not. (self%friction%is_on .or. candidates_are_many(self))
+      if (goes_on) goes_on = kept_factor_has_room(newton%correction%kept, &
+         count(self%candidates%takes_part), size(system%matrix%column))
       if (goes_on) then
          call choose_by_problem(self, system, newton, motion, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
       else
-         goes_on = .not. self%has_impacts .or. n > most_condensed
+         goes_on = .not. self%has_impacts .or. candidates_are_many(self)
          if (.not. goes_on) return
          call choose_by_trials(self, system, turns)
       end if
