@@ -237,9 +237,9 @@ contains
       end associate
    end subroutine look_at_pair
 
-   !> Has the `i`-th constraint of `contact`, a candidate that does not act, closed below its gap? Of
-   !> many, below that at which it would be taken in: those of one side hold the others nearly where
-   !> they began, and sets of both do not settle.
+   !> Has the `i`-th constraint of `contact`, a candidate that does not act, closed below its gap?
+   !> Of many, below that at which it would be taken in: those of one side hold the others nearly
+   !> where they began, and sets of both do not settle.
    pure logical function has_closed(self, contact, i, id, are_many)
       type(active_set_t), intent(in) :: self
       class(contact_t), intent(in) :: contact
