@@ -157,12 +157,10 @@ contains
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
-      logical :: are_many
       integer :: pair, k, left
 
       call phase_enter(system%phases, phase_gaps, left)
       status = step_done
-      are_many = candidates_are_many(self)
       self%candidates%have_changed = .false.
       self%candidates%one_closes = .false.
       self%candidates%is_measured = .true.
@@ -179,7 +177,7 @@ contains
             if (.not. near_laws_are_none(self%near_laws, system%contact(pair)%contact)) &
                call near_laws_update(self%near_laws, system, pair, self%candidates%acts, &
                self%candidates%have_changed)
-            call look_at_pair(self, system, pair, motion, are_many, k, status)
+            call look_at_pair(self, system, pair, motion, k, status)
          end associate
       end do
       call phase_leave(system%phases, left)
@@ -195,12 +193,11 @@ contains
    end subroutine candidates_look
 
    !> The conditions of one contact.
-   subroutine look_at_pair(self, system, pair, motion, are_many, k, status)
+   subroutine look_at_pair(self, system, pair, motion, k, status)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       integer, intent(in) :: pair
       type(motion_t), intent(in) :: motion
-      logical, intent(in) :: are_many            !! candidates
       integer, intent(inout) :: k                !! places of the set that were looked at
       integer, intent(inout) :: status
       logical :: acts
@@ -229,7 +226,7 @@ contains
                if (.not. friction%is_on) cycle
                if (friction%law(id)%mu > 0.0_wp) friction%lags = friction%lags .or. &
                   contact%state(i)%slip_shift > most_shift
-            else if (has_closed(self, contact, i, id, are_many)) then
+            else if (has_closed(self, contact, i, id)) then
                self%candidates%one_closes = .true.
                self%candidates%acts(id) = .true.
             end if
@@ -237,19 +234,15 @@ contains
       end associate
    end subroutine look_at_pair
 
-   !> Has the `i`-th constraint of `contact`, a candidate that does not act, closed below its gap?
-   !> Of many, below that at which it would be taken in: those of one side hold the others nearly
-   !> where they began, and sets of both do not settle.
-   pure logical function has_closed(self, contact, i, id, are_many)
+   !> Has the `i`-th constraint of `contact`, a candidate that does not act, closed?
+   pure logical function has_closed(self, contact, i, id)
       type(active_set_t), intent(in) :: self
       class(contact_t), intent(in) :: contact
       integer, intent(in) :: i, id
-      logical, intent(in) :: are_many            !! candidates
       real(wp) :: held
 
       associate (gap => contact%state(i))
-         held = gap_to_hold(self, gap, id)
-         if (are_many) held = min(held, self%left(1)*self%overclosure(id) + gap%closed)
+         held = min(gap_to_hold(self, gap, id), self%left(1)*self%overclosure(id) + gap%closed)
          has_closed = gap%is_near .and. gap%is_over .and. gap%gap1 - held < -gap_noise*gap%size
       end associate
    end function has_closed

@@ -61,6 +61,7 @@ module emcon_contact_newton
       real(wp) :: best = huge(1.0_wp), last = huge(1.0_wp)
       logical :: is_rounding = .false.           !! nothing but round-off is left
       integer :: n_stall = 0
+      integer :: least_soft = 0                  !! first of `softer` that is tried, 0: none
       logical :: is_static = .false.             !! nothing has inertia
       logical :: is_searching = .false.          !! no tangent is wanted
    end type solve_t
@@ -355,7 +356,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(contact_effort_t) :: effort
       logical :: is_solved, has_curvature
-      integer :: left, k
+      integer :: left, level
 
       has_curvature = .not. btest(self%n_stall/stall_turn, 0)
       call phase_enter(system%phases, phase_factorise, left)
@@ -372,16 +373,14 @@ contains
       end if
       status = newton_singular
       if (allocated(error) .or. self%condensation%is_singular) return
-      call lay_out(self, set)
-      self%push = 0.0_wp
-      call contact_problem_solve(self%problem, self%push, effort, is_solved)
-      do k = 1, size(softer)
-         if (is_solved) exit
+      do level = self%least_soft, size(softer)
          call lay_out(self, set)
          self%push = 0.0_wp
-         call soften(self, softer(k))
+         if (level > 0) call soften(self, softer(level))
          call contact_problem_solve(self%problem, self%push, effort, is_solved)
+         if (is_solved) exit
       end do
+      self%least_soft = min(level, 1)
       status = merge(newton_converged, newton_diverged, is_solved)
       if (is_solved) self%status = contact_problem_status(self%problem, self%push)
       call phase_leave(system%phases, left)

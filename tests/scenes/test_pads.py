@@ -33,7 +33,7 @@ def falling(lift):
 
 
 @pytest.mark.parametrize(("formulation", "sides", "initiation"), [
-    ("NODE TO SURFACE", BOTH, "ADMISSIBLE"), ("NODE TO SURFACE", ONE, "MASSLESS"),
+    ("NODE TO SURFACE", BOTH, "PERSISTENT"), ("NODE TO SURFACE", ONE, "MASSLESS"),
     ("SEGMENT", ONE, "PERSISTENT"), ("MORTAR", ONE, "PERSISTENT"), ("MORTAR", ONE, "MASSLESS")])
 def test_over_a_plane_a_pad_is_a_lift(formulation, sides, initiation, tmp_path):
     """The same history as without it and nearer by as much."""
