@@ -234,7 +234,8 @@ contains
       end associate
    end subroutine look_at_pair
 
-   !> Has the `i`-th constraint of `contact`, a candidate that does not act, closed?
+   !> Has the `i`-th constraint of `contact`, a candidate that does not act, closed? One that would
+   !> hold the gap of its start may end below that, without a force, as long as it is not in.
    pure logical function has_closed(self, contact, i, id)
       type(active_set_t), intent(in) :: self
       class(contact_t), intent(in) :: contact

@@ -62,9 +62,8 @@ contains
          *sum(system%response%rounding(:, node))
    end function noise_at
 
-   !> Does the `i`-th constraint of `contact`, number `id`, which does not act, close? A contact
-   !> that was left out and closes all the same does not follow from others: it had lost its
-   !> surface.
+   !> Does the `i`-th constraint of `contact`, number `id`, which does not act, close? What was left
+   !> out as nothing in it is free to move does not.
    pure subroutine look_at_open(self, contact, i, id, closes, status)
       type(active_set_t), intent(in) :: self
       class(contact_t), intent(in) :: contact
@@ -75,9 +74,8 @@ contains
 
       closes = .false.
       associate (gap => contact%state(i))
-         if (.not. (gap%is_near .and. gap%is_over)) return
+         if (self%is_left_out(id) .or. .not. (gap%is_near .and. gap%is_over)) return
          allowed = self%left*self%overclosure(id) + gap%closed
-         if (self%is_left_out(id)) return
          if (gap%is_arriving .and. contact%step%is_penalty) then
             closes = gap%gap1 < allowed(1) &
                .and. gap%gap1 > -contact%max_penetration_at_start*gap%size

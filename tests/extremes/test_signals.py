@@ -76,7 +76,8 @@ def test_a_signal_leaves_a_restart_file(flight, tmp_path, number):
 def test_standard_output_that_nobody_reads_any_more(flight, tmp_path):
     """As under `emcon deck | head -1`: the first line that is not taken stops the run."""
     read_end, write_end = os.pipe()
-    process, run = begun(tmp_path, flight, *LONG, stdout=write_end)
+    # The first line comes after five seconds.
+    process, run = begun(tmp_path, flight, "--set=h=0.0001", stdout=write_end)
     os.close(write_end)
     os.close(read_end)
     err = end(process)
