@@ -87,20 +87,9 @@ contains
             < -contact%max_penetration_at_start*gap%size) then
             closes = .not. gap%gap1 - allowed(1) >= -merge(0.0_wp, gap_noise, &
                contact%step%is_penalty)*gap%size
-            if (self%holds_gap .and. self%is_candidate(id) .and. has_friction(self, id)) &
-               closes = gap%gap1 - gap%gap0 < -gap_noise*gap%size
          end if
       end associate
    end subroutine look_at_open
-
-   !> Does friction act on contact `id`?
-   pure logical function has_friction(self, id)
-      type(active_set_t), intent(in) :: self
-      integer, intent(in) :: id
-
-      has_friction = self%friction%is_on
-      if (has_friction) has_friction = self%friction%law(id)%mu > 0.0_wp
-   end function has_friction
 
    !> With nothing to hold at its start, a contact begins with the next step, or in a smaller one;
    !> in the smallest it begins at once, if it is deep.
