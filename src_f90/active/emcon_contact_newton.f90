@@ -135,6 +135,7 @@ contains
          call measure_damped(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          if (i > 0 .and. is_done(self, newton)) return
+         if (i == most_iterates .and. self%size <= newton%convergence%tolerance) return
          status = newton_diverged
          if (i == most_iterates .or. .not. self%size < huge(self%size)) return
          call count_stall(self)
@@ -346,7 +347,8 @@ contains
       end do
    end subroutine add_driven
 
-   !> The contacts in their multipliers alone, and those that obey the laws there.
+   !> The contacts in their multipliers alone, and those that obey the laws there. Where none do the
+   !> curvature of the rows is left out: without it W is that of a body which is pushed.
    subroutine condense(self, newton, system, set, status, error)
       type(solve_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
@@ -354,25 +356,42 @@ contains
       type(constraint_set_t), intent(inout) :: set
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
-      type(contact_effort_t) :: effort
       logical :: is_solved, has_curvature
-      integer :: left, level
+      integer :: left, turn
 
-      has_curvature = .not. btest(self%n_stall/stall_turn, 0)
-      call phase_enter(system%phases, phase_factorise, left)
-      if (nears_end(self, newton)) then
-         call condensation_renew(self%condensation, set, newton%residual, error)
-         call phase_leave(system%phases, phase_eliminate)
-      else
-         call find_hold(self, system, set)
-         call condensation_make(self%condensation, system, set, newton%correction, &
-            newton%residual, has_curvature, error)
-         call phase_leave(system%phases, phase_eliminate)
-         system%phases%n_factorisation = system%phases%n_factorisation + 1
-         newton%convergence%n_iteration = newton%convergence%n_iteration + 1
-      end if
-      status = newton_singular
-      if (allocated(error) .or. self%condensation%is_singular) return
+      do turn = 1, 2
+         has_curvature = .not. btest(self%n_stall/stall_turn, 0)
+         call phase_enter(system%phases, phase_factorise, left)
+         if (turn == 1 .and. nears_end(self, newton)) then
+            call condensation_renew(self%condensation, set, newton%residual, error)
+            call phase_leave(system%phases, phase_eliminate)
+         else
+            call find_hold(self, system, set)
+            call condensation_make(self%condensation, system, set, newton%correction, &
+               newton%residual, has_curvature, error)
+            call phase_leave(system%phases, phase_eliminate)
+            system%phases%n_factorisation = system%phases%n_factorisation + 1
+            newton%convergence%n_iteration = newton%convergence%n_iteration + 1
+         end if
+         status = newton_singular
+         if (allocated(error) .or. self%condensation%is_singular) return
+         call solve_condensed(self, set, is_solved)
+         call phase_leave(system%phases, left)
+         if (is_solved .or. .not. has_curvature) exit
+         self%n_stall = stall_turn
+      end do
+      status = merge(newton_converged, newton_diverged, is_solved)
+      if (is_solved) self%status = contact_problem_status(self%problem, self%push)
+   end subroutine condense
+
+   !> Forces that obey the laws as the step is condensed; softer where there are none.
+   subroutine solve_condensed(self, set, is_solved)
+      type(solve_t), intent(inout) :: self
+      type(constraint_set_t), intent(in) :: set
+      logical, intent(out) :: is_solved
+      type(contact_effort_t) :: effort
+      integer :: level
+
       do level = self%least_soft, size(softer)
          call lay_out(self, set)
          self%push = 0.0_wp
@@ -381,10 +400,7 @@ contains
          if (is_solved) exit
       end do
       self%least_soft = min(level, 1)
-      status = merge(newton_converged, newton_diverged, is_solved)
-      if (is_solved) self%status = contact_problem_status(self%problem, self%push)
-      call phase_leave(system%phases, left)
-   end subroutine condense
+   end subroutine solve_condensed
 
    !> Is the step within its tolerance? The last tangent does for what is left.
    pure logical function nears_end(self, newton)
