@@ -132,12 +132,19 @@ contains
       do i = 0, most_iterates
          call newton_check_interrupt(newton, status, error)
          if (allocated(error)) return
+         ! The correction to come from here may be the last one, or by the tangent that there is.
+         self%is_searching = i > 0 .and. self%size <= no_search
          call measure_damped(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          if (i > 0 .and. is_done(self, newton)) return
          if (i == most_iterates .and. self%size <= newton%convergence%tolerance) return
          status = newton_diverged
          if (i == most_iterates .or. .not. self%size < huge(self%size)) return
+         if (self%is_searching .and. .not. nears_end(self, newton)) then
+            self%is_searching = .false.
+            call measure(self, newton, system, set, motion, status, error)
+            if (allocated(error) .or. status /= newton_converged) return
+         end if
          call count_stall(self)
          if (is_driven) call add_driven(newton, system, set, motion)
          call condense(self, newton, system, set, status, error)
@@ -538,7 +545,6 @@ contains
          call take(self, newton, system, set, motion, best_part)
       end if
       newton%dq = best_part*newton%dq
-      self%is_searching = .false.
    end subroutine search
 
    !> Go a part of the way to what the condensed step has as its solution.
