@@ -52,8 +52,8 @@ contains
       end if
       call contact_sets_solve(self, system, scene, newton, motion, status, error)
       if (self%candidates%is_settled .or. allocated(error)) return
-      if (size(system%contact) == 0 .or. (status == newton_refused .and. &
-         .not. any(self%candidates%takes_part))) return
+      if (size(system%contact) == 0) return
+      if (status == newton_refused .and. newton%n_solve == 0) return    ! nor are there forces below
       if (self%support%is_needed .or. (.not. self%has_impacts .and. &
          largest_motion(motion%du - self%first) > self%largest_move)) then
          motion%du = self%first
