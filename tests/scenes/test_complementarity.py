@@ -59,7 +59,7 @@ def test_an_arch(part, tmp_path):
 
 
 @pytest.mark.parametrize(("scene", "sides", "formulation", "most"), [
-    ("comb", BOTH, NODES, 2), ("tower", BOTH, NODES, 0), ("pile", BOTH, NODES, 1),
+    ("comb", BOTH, NODES, 2), ("tower", BOTH, NODES, 1), ("pile", BOTH, NODES, 1),
     ("bowl", ONE, "MORTAR", 1)])
 def test_few_cuts(scene, sides, formulation, most, tmp_path):
     """Many bodies meet at once, by each method that holds contact exactly."""

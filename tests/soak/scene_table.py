@@ -4,7 +4,8 @@
 
 Each seed is a scene of `drawn_scenes.py`, judged by `field_check.py`. What is done is kept in
 FOLDER/results.jsonl, so that a table that was interrupted goes on; `--again` begins anew. The exit
-code is 1 where a run is wrong and called good.
+code is 1 where a run is wrong and called good, unless a warning tells of it: directions of forces are
+off in steps in which bodies pass each other's corners while contact holds them far apart.
 """
 
 import argparse
@@ -66,6 +67,12 @@ def reason_of(text):
     return text[:110]
 
 
+def is_told(result):
+    """Is directions of forces all that is wrong, and does a warning say that they act across gaps?"""
+    return set(result["faults"]) == {"push"} and any(
+        text.startswith("contact forces act across gaps") for text in result["warnings"])
+
+
 def table(results):
     """Lines that sum up `results`, and the seeds that are to be looked at."""
     lines, count = [], collections.Counter()
@@ -83,8 +90,11 @@ def table(results):
     right = [r for r in results if r["verdict"] == "bad" and not r["faults"]]
     bad = [r for r in results if r["verdict"] == "bad"]
     lines.append(f"increments cut: {sum(r.get('cuts', 0) for r in results)}")
-    lines.append(f"wrong and called good: {len(wrong)}")
-    lines += [f"  seed {r['seed']}: {'; '.join(r['faults'].values())}" for r in wrong]
+    told = [r for r in wrong if is_told(r)]
+    wrong = [r for r in wrong if not is_told(r)]
+    for which, found in [("called good", wrong), ("warned of", told)]:
+        lines.append(f"wrong and {which}: {len(found)}")
+        lines += [f"  seed {r['seed']}: {'; '.join(r['faults'].values())}" for r in found]
     lines.append(f"called bad: {len(bad)}, {100*len(bad)/max(1, len(results)):.1f} %; "
                  f"right and called bad: {len(right)}")
     lines += [f"  seed {r['seed']}: {'RIGHT ' if not r['faults'] else ''}{'; '.join(r['reasons'])}"

@@ -57,6 +57,16 @@ def test_drawn_scenes_are_right_and_called_right(tmp_path):
     assert not wrong and [r["verdict"] for r in results] == ["good"]*7, lines
 
 
+def test_what_a_warning_tells_is_not_called_good(tmp_path):
+    """Directions of forces, of contact across gaps; nothing else, and no other warning."""
+    result = judge_seed(1, tmp_path)
+    gaps = ["contact forces act across gaps, 0.3 of an edge in the mean over the impulse: ..."]
+    for faults, warnings, is_wrong in [({"push": "x"}, gaps, False), ({"push": "x"}, [], True),
+                                       ({"push": "x", "energy": "y"}, gaps, True)]:
+        lines, wrong = table([result | {"faults": faults, "warnings": warnings}])
+        assert bool(wrong) == is_wrong and (f"wrong and warned of: {1 - is_wrong}" in lines)
+
+
 def test_the_judge_of_fields_sees_what_is_wrong(tmp_path):
     """Each field changed in one frame breaks what it stands in."""
     case = draw_case(1)
