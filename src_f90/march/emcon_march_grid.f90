@@ -132,7 +132,6 @@ contains
       type(step_t), intent(in) :: step
       integer :: n, power
 
-      self%grid%judges_size = .false.
       self%grid%is_controlled = step_is_dynamic(step) &
          .and. .not. self%explicit%is_on .and. (step%time%tolerance > 0.0_wp &
          .or. step%time%event_fraction > 0.0_wp)

@@ -61,6 +61,7 @@ contains
          test_case_t("halves, and back on the grid", test_halves), &
          test_case_t("no part is small enough", test_none), &
          test_case_t("too many parts", test_crawl), &
+         test_case_t("what is told where statics end", test_end), &
          test_case_t("an interrupt leaves the increment before", test_interrupt), &
          test_case_t("two halves are two increments", test_pieces)]
    end subroutine collect_march_parts
@@ -196,6 +197,40 @@ contains
          "time")
       call stepper_close(stepper)
    end subroutine test_crawl
+
+   !> What holds the upper block beside its conditions is named, and, once there is strain, what
+   !> may come next, unless the step goes on to it anyway.
+   subroutine test_end(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=*), parameter :: held = "is put out of its range; without contact and given " &
+         // "forces the body ", beyond = "; no state of rest was found beyond this time"
+      type(error_t), allocatable :: stopped
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      integer :: k, last
+
+      do k = 1, 4
+         call open_thrown(stepper, kind_static, 0.1_wp, 10, 0.003_wp, error)
+         if (.not. allocated(error) .and. k > 1) call stepper_advance(stepper, increment, error)
+         if (allocated(error)) return
+         associate (scene => stepper%scene)
+            scene%amplitude(1)%value(2) = 8.0_wp
+            stepper%march%grid%n_level = 0
+            if (k == 3) scene%step(1)%stabilization = 1.0e-3_wp
+            last = size(scene%step(1)%prescribed)
+            if (k == 4) scene%step(1)%prescribed = scene%step(1)%prescribed(:last - 6)
+         end associate
+         call stepper_advance(stepper, increment, stopped)
+         call check_error(error, stopped, err_analysis, "is put out of its range", "stopped")
+         if (allocated(error)) return
+         call check_true(error, (index(stopped%message, beyond) > 0) .eqv. (k == 2 .or. k == 4), &
+            "what may come " // to_text(k) // ": " // stopped%message)
+         call check_true(error, (index(stopped%message, held) > 0) .eqv. k == 4, &
+            "what holds " // to_text(k) // ": " // stopped%message)
+         call stepper_close(stepper)
+         stepper = stepper_t()
+      end do
+   end subroutine test_end
 
    !> After a part that was given up, and before anything else, the state is as it was.
    subroutine test_interrupt(error)
