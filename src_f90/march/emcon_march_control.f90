@@ -232,7 +232,6 @@ contains
          n = int(min(real(n, wp), max(0.0_wp, self%step_check%event_at*real(n, wp) &
             - margin*window)), int64)
          n = max(n, before/least_share, self%grid%n_window)
-         n = min(n, max(self%grid%n_window, before - before/least_share))
          return
       end if
       associate (control => self%state%control)

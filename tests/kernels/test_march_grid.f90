@@ -159,6 +159,12 @@ contains
       march%explicit%is_on = .false.
       call march_count_grid(march, scene%step(1))
       call check_true(error, .not. march%grid%is_controlled, "statics")
+      ! Of viscous forces halves go down to an eighth of their time, but no farther than 2**-24.
+      do k = 1, 3
+         scene%step(1)%stabilization = 10.0_wp**(2 - 3*k)
+         call march_count_grid(march, scene%step(1))
+         call check_equal(error, march%grid%n_level, min(24, 12 + 6*(k - 1)), "viscous")
+      end do
    end subroutine test_sizes
 
    !> At each point, up to the rounding of a sum, and in the middle of each interval. The last one

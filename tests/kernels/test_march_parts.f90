@@ -13,6 +13,7 @@ module test_march_parts
    use emcon_march_types, only : march_t, watcher_t
    use emcon_scene, only : scene_t
    use emcon_pair_sums, only : pair_sum_t
+   use emcon_phases, only : phase_enter, phase_vectors
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_t
    use emcon_stepper_user, only : stepper_give_force
@@ -341,6 +342,8 @@ contains
                if (.not. allocated(error)) pushed(i) = half%march%state%sums%sum(1)
             end do
             if (allocated(error)) return
+            call check_phase(error, whole%march)
+            call check_phase(error, half%march)
             call check_equal(error, [one%n_cut, two%n_cut], [1, 0, 0], "cuts of kind " &
                // to_text(kind) // " in " // to_text(k))
             call compare_states(error, whole%march%state, half%march%state, "kind " &
@@ -367,6 +370,16 @@ contains
          half = stepper_t()
       end do
    end subroutine test_pieces
+
+   !> Time is counted for the rest again: each phase was left.
+   subroutine check_phase(error, march)
+      type(error_t), allocatable, intent(inout) :: error
+      type(march_t), intent(inout) :: march
+      integer :: left
+
+      call phase_enter(march%system%phases, phase_vectors, left)
+      call check_equal(error, left, phase_vectors, "phase")
+   end subroutine check_phase
 
    !> Spoil what a march holds beside its state: no increment looks at what the last one left there.
    subroutine soil(march)
