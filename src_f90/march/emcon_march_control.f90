@@ -176,7 +176,6 @@ contains
       size = self%grid%n_unit
       if (power >= 0) size = size*2_int64**power
       if (power < 0) size = size/2_int64**(-power)
-      size = max(self%grid%n_least, size)
       n = size - mod(from, size)
       n = min(n, march_next_corner(self, int(from/self%grid%n_unit))*self%grid%n_unit - from)
    end function next_units

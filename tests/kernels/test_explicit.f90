@@ -206,6 +206,8 @@ contains
             if (allocated(error)) return
             call check_near(error, march%explicit%stiffness, expected, 16.0_wp*eps, stiffness, &
                "at nodes")
+            call check_near(error, march%explicit%met, expected, 16.0_wp*eps, stiffness, &
+               "the most so far")
             ! What slave nodes have is shared out by parts of the master surface.
             scene%x = 4.0_wp*scene%x
             call explicit_penalty_limit(march, scene)

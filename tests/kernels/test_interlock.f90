@@ -98,14 +98,14 @@ contains
    end subroutine look_at
 
    !> Contacts 2 to 4, of which the first ones slide; 5 is a long way round, but sticks. 1 and 6, which
-   !> are too, are of other pairs.
+   !> are too, are of other pairs. All of it is turned.
    subroutine let_slide(march, row)
       type(march_t), intent(inout) :: march
       type(case_t), intent(in) :: row
       real(wp) :: angle(6)
       integer :: k
 
-      angle = [80.0_wp, 0.0_wp, -5.0_wp, row%angle, 80.0_wp, 80.0_wp]*degree
+      angle = [80.0_wp, 0.0_wp, -5.0_wp, row%angle, 80.0_wp, 80.0_wp]*degree + 0.5_wp
       march%system%first_constraint(:2) = [1, 5]
       call constraints_select(march%active%set, [1, 2, 3, 4, 5, 6])
       associate (set => march%active%set, contacts => march%state%contacts)
