@@ -70,7 +70,6 @@ contains
       end if
       next = point_at(self, step, step%time%duration)
       self%grid%n_grid = max(1, next%n)
-      self%grid%corner = pack(self%grid%corner, self%grid%corner%n < self%grid%n_grid)
    end subroutine count_points
 
    !> The point of the grid at `time`, after all corners so far.

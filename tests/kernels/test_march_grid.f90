@@ -15,7 +15,8 @@ module test_march_grid
 
    real(wp), parameter :: h = 0.25_wp
    integer, parameter :: n = 8
-   !> Corners at points 1 and 5, and between two at point 3; the last interval is shorter.
+   !> Corners at points 1 and 5 and at the end, and between two at point 3; the last interval is
+   !> shorter.
    real(wp), parameter :: time(0:n) = [0.0_wp, 0.25_wp, 0.5_wp, 0.625_wp, 0.875_wp, 1.125_wp, &
       1.375_wp, 1.625_wp, 1.8125_wp]
 
@@ -43,7 +44,7 @@ contains
       associate (step => scene%step(1))
          step%time%is_direct = is_direct
          step%time%duration = time(n)
-         step%time%corner = time([1, 3, 5])
+         step%time%corner = time([1, 3, 5, n])
          step%time%tolerance = 1.0e-3_wp
          call march_count_grid(march, step)
       end associate
