@@ -21,6 +21,8 @@ import numpy as np
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 DECKS = ROOT / "input_decks"
 PROGRAM = pathlib.Path(os.environ.get("EMCON", ROOT / "build" / "release" / "emcon"))
+#: What a program allocates holds rubbish until it is set (glibc).
+RUBBISH = {"GLIBC_TUNABLES": "glibc.malloc.tcache_count=0:glibc.malloc.perturb=128"}
 EPSILON = np.finfo(float).eps
 #: A program that checks every access takes longer: how many times what is allowed to others.
 PATIENCE = float(os.environ.get("EMCON_PATIENCE", "1"))

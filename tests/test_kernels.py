@@ -1,10 +1,12 @@
 """The kernel tests, one suite at a time, as built for use and with all run-time checks."""
 
+import os
 import pathlib
 import re
 import subprocess
 
 import pytest
+from scene_tools import RUBBISH
 
 ROOT = pathlib.Path(__file__).resolve().parents[1]
 SUITES = re.findall(r'^ *call run\("(\w+)"', (ROOT / "tests/kernels/main.F90").read_text(), re.M)
@@ -15,7 +17,8 @@ SUITES = re.findall(r'^ *call run\("(\w+)"', (ROOT / "tests/kernels/main.F90").r
 def test_suite(suite, mode):
     program = ROOT / "build" / mode / "kernels"
     done = subprocess.run(
-        [program, suite], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=120
+        [program, suite], stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, timeout=120,
+        env=os.environ | RUBBISH
     )
     assert done.returncode == 0, done.stdout
 

@@ -251,7 +251,6 @@ contains
       before = self%state
       ledger_before = self%ledger
       increment%h = h
-      self%grid%judges_size = .false.
       call control_forget(self%state%control)
       call march_in_parts(self, scene, self%state%clock%step_time, increment, error)
       if (allocated(error)) then

@@ -176,7 +176,6 @@ contains
       size = self%grid%n_unit
       if (power >= 0) size = size*2_int64**power
       if (power < 0) size = size/2_int64**(-power)
-      size = max(self%grid%n_least, size)
       n = size - mod(from, size)
       n = min(n, march_next_corner(self, int(from/self%grid%n_unit))*self%grid%n_unit - from)
    end function next_units
@@ -232,7 +231,6 @@ contains
          n = int(min(real(n, wp), max(0.0_wp, self%step_check%event_at*real(n, wp) &
             - margin*window)), int64)
          n = max(n, before/least_share, self%grid%n_window)
-         n = min(n, max(self%grid%n_window, before - before/least_share))
          return
       end if
       associate (control => self%state%control)

@@ -70,7 +70,6 @@ contains
       end if
       next = point_at(self, step, step%time%duration)
       self%grid%n_grid = max(1, next%n)
-      self%grid%corner = pack(self%grid%corner, self%grid%corner%n < self%grid%n_grid)
    end subroutine count_points
 
    !> The point of the grid at `time`, after all corners so far.
@@ -132,7 +131,6 @@ contains
       type(step_t), intent(in) :: step
       integer :: n, power
 
-      self%grid%judges_size = .false.
       self%grid%is_controlled = step_is_dynamic(step) &
          .and. .not. self%explicit%is_on .and. (step%time%tolerance > 0.0_wp &
          .or. step%time%event_fraction > 0.0_wp)

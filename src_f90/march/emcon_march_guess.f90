@@ -24,15 +24,13 @@ contains
       type(instant_t), intent(in) :: start
       real(wp), intent(in) :: h                  !! > 0 [T]
       logical, intent(in) :: is_at_rest          !! free nodes do not move in the guess
-      type(instant_t) :: begin, finish
+      type(instant_t) :: finish
       real(wp) :: u, v
       logical :: has_inertia
       integer :: k
 
       finish = instant_later(start, h)
-      begin = start
-      begin%h_before = self%state%history%h_before
-      self%motion%evaluation = self%scheme%evaluation(begin, h)
+      self%motion%evaluation = self%scheme%evaluation(start, h)
       has_inertia = evaluation_has_inertia(self%motion%evaluation)
       call march_past_take(self)
       self%motion%u0 = self%state%u

@@ -54,6 +54,7 @@ contains
       character(len=:), allocatable :: reason
       integer :: level, place, status
 
+      self%grid%judges_size = .false.
       call march_match(self, scene, increment, error)
       if (allocated(error)) return
       level = 0

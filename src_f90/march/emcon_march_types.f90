@@ -119,7 +119,7 @@ module emcon_march_types
    !> The increments of a step of the deck: its grid of time, and the sizes that there may be.
    type :: time_grid_t
       integer :: n_grid = 0                      !! grid increments in the step
-      type(grid_corner_t), allocatable :: corner(:)   !! ascending, before its end
+      type(grid_corner_t), allocatable :: corner(:)   !! ascending, up to its end
       integer :: most_stride = 1                 !! largest increment, in grid increments
       integer :: n_level = 0                     !! halvings allowed
       logical :: is_controlled = .false.

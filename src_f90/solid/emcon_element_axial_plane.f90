@@ -138,8 +138,7 @@ contains
 
       e = point%strain + point%dstrain
       associate (f => point%f_end)
-         is_regular = maxval(abs(f)) < largest .and. maxval(abs(e)) < largest &
-            .and. abs(point%stretch_end) < largest
+         is_regular = maxval(abs(e)) < largest
          if (.not. is_regular) return
          is_regular = f(1, 1)*f(2, 2) - f(1, 2)*f(2, 1) > 0.0_wp .and. point%stretch_end > 0.0_wp
       end associate

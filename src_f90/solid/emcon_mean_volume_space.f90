@@ -65,7 +65,7 @@ contains
       type(space_element_t), intent(in) :: self
       class(law_t), intent(in) :: law
       type(space_motion_t), intent(in) :: motion
-      type(dg_t), intent(out) :: u               !! undefined if `is_inverted`
+      type(dg_t), intent(out) :: u               !! 0 if `is_inverted`
       logical, intent(out) :: is_inverted        !! at some point at the end
       type(space_point_t) :: point
       type(space_change_t) :: change
@@ -137,7 +137,6 @@ contains
       integer :: k
 
       call find_pressure(self, law, motion, u, is_inverted)
-      if (is_inverted) u = dg_t()
       do k = 1, self%n_gp
          call space_point(self, k, motion, point)
          call law_change_space(law, point%strain, point%dstrain, change)

@@ -113,7 +113,7 @@ contains
       integer, intent(in) :: least, largest      !! power
 
       if (self%asked < too_small*scale(1.0_wp, self%power) .and. self%power > least) then
-         self%power = max(least, min(self%power - 1, exponent(self%asked) - 1))
+         self%power = max(least, exponent(self%asked) - 1)
          self%n_same = 0
       else if (self%asked >= scale(1.0_wp, self%power + 1) .and. self%n_same >= easy_increments &
             .and. self%power < largest) then

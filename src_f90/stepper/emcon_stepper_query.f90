@@ -141,6 +141,7 @@ contains
 
       now%step_time = self%march%state%clock%step_time
       now%total_time = self%march%state%clock%start_time + self%march%state%clock%step_time
+      now%h_before = self%march%state%history%h_before
    end function now
 
    !> Evaluate the step of size `h` from the present state to `u1`: what the functions below give

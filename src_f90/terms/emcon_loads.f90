@@ -95,8 +95,6 @@ contains
 
       allocate(self%own_mass, mold=solid%mass%of_volume)
       allocate(self%first_moment(size(x, 1), size(solid%node, 1), solid%n_element))
-      self%own_mass = 0.0_wp
-      self%first_moment = 0.0_wp
       do e = 1, solid%n_element
          associate (n => solid%geometry(e)%n_node)
             associate (mass => solid%mass%consistent(:n, :n, e), node => solid%node(:n, e))

@@ -90,6 +90,7 @@ contains
       type(scene_t) :: scene
       type(bending_t) :: bending
       real(wp), allocatable :: u(:, :)
+      real(wp) :: missed
 
       call make_beam(scene, "CPE4", 1, 0.0_wp, 0.0_wp, u)
       call measure(scene, u, .false., bending, error)
@@ -99,6 +100,10 @@ contains
          bending%strain(1), "strain energy")
       call check_near(error, bending%missed, [lessened**2*part*(lambda**2/(lambda + 2.0_wp*mu) &
          *b**2 + mu*a**2)], tol, bending%missed(1), "missed")
+      missed = bending%missed(1)
+      call measure(scene, u + 0.25_wp*scene%x, .false., bending, error)
+      if (allocated(error)) return
+      call check_near(error, bending%missed, [missed], tol, missed, "whatever it is stretched by")
       call measure(scene, 0.0_wp*u, .false., bending, error)
       if (allocated(error)) return
       call check_near(error, [bending%strain, bending%missed], [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, &

@@ -80,7 +80,7 @@ contains
       type(dissipation_term_t) :: term
       type(solid_t) :: solid
       type(motion_t) :: motion
-      real(wp) :: force(2, n), middle(2, n)
+      real(wp), dimension(2, n) :: force, moved, middle
       integer :: k
 
       do k = 1, 3
@@ -100,6 +100,11 @@ contains
          middle = motion%x + motion%u0 + 0.5_wp*motion%du
          call check_near(error, [sum(force, 2), sum(middle(1, :)*force(2, :) - middle(2, :) &
             *force(1, :))], [0.0_wp, 0.0_wp, 0.0_wp], tol, 100.0_wp, "resultants")
+         motion%u0 = motion%u0 + 0.5_wp
+         motion%du = motion%du - 0.25_wp
+         if (k == 3) motion%du_before = motion%du_before + 0.125_wp
+         call find(term, motion, moved)
+         call check_near(error, moved, force, tol, 100.0_wp, "carried along")
       end do
       motion%evaluation%mass_scale = 0.0_wp
       call find(term, motion, force)

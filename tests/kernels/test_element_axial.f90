@@ -227,6 +227,11 @@ contains
                u(k, :n) = huge(1.0_wp)**0.11_wp*x(k, :n)
                call respond(sample, zero, u, .false., part)
                call check_true(error, part%is_inverted, "beyond what energies can be told of")
+               ! Each line turned towards the other: det F is 1/5, and -1/5.
+               u(1, :n) = 2.0_wp*(x(2, :n) - minval(x(2, :n)))
+               u(2, :n) = merge(0.4_wp, 0.6_wp, k == 1)*x(1, :n)
+               call respond(sample, zero, u, .false., part)
+               call check_true(error, part%is_inverted .eqv. k == 2, sample%what // ", turned")
             end do
          end associate
       end do

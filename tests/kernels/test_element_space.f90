@@ -291,6 +291,10 @@ contains
          call make_sample(1 + mod(i/n_law, n_kind), 1 + mod(i, n_law), i >= n_law*n_kind, 0.03_wp, &
             sample, error)
          if (allocated(error)) return
+         call respond(sample, zero, zero, .false., start)
+         call check_near(error, [start%energy, reshape(start%force, [3*m]), &
+            reshape(start%magnitude, [3*m])], spread(0.0_wp, 1, 6*m + 1), tol, young, &
+            sample%what // ": at rest")
          do k = 1, 2
             call draw(sample, u0, du)
             if (k == 2) du = scale(du, -20)

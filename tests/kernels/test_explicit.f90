@@ -7,7 +7,7 @@ module test_explicit
    use emcon_constraints, only : constraint_set_t, constraints_select
    use emcon_critical_step, only : critical_bound, critical_sharp
    use emcon_errors, only : err_analysis, err_input, error_t
-   use emcon_explicit_penalty, only : explicit_penalty_widen
+   use emcon_explicit_penalty, only : explicit_penalty_limit, explicit_penalty_widen
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_eigen
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
@@ -206,6 +206,13 @@ contains
             if (allocated(error)) return
             call check_near(error, march%explicit%stiffness, expected, 16.0_wp*eps, stiffness, &
                "at nodes")
+            call check_near(error, march%explicit%met, expected, 16.0_wp*eps, stiffness, &
+               "the most so far")
+            ! What slave nodes have is shared out by parts of the master surface.
+            scene%x = 4.0_wp*scene%x
+            call explicit_penalty_limit(march, scene)
+            call check_near(error, march%explicit%stiffness, expected, 16.0_wp*eps, stiffness, &
+               "of any size")
             call march_free(march)
          end block
          if (allocated(error)) return

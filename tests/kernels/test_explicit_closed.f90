@@ -18,7 +18,7 @@ module test_explicit_closed
    integer, parameter :: n = 8
    !> Guards that are closed below -0.02 are the last two; edges are 1/2, so that what begins closed
    !> by more than 0.05 is on the other side.
-   real(wp), parameter :: gap(n) = [0.01_wp, -0.01_wp, -0.04_wp, -0.06_wp, -0.06_wp, -0.01_wp, &
+   real(wp), parameter :: gap(n) = [0.01_wp, -0.01_wp, -0.04_wp, -0.065_wp, -0.06_wp, -0.01_wp, &
       -0.01_wp, -0.03_wp]
    real(wp), parameter :: closed(n) = [0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, -0.02_wp, &
       -0.02_wp]

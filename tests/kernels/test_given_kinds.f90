@@ -4,7 +4,7 @@ module test_given_kinds
    use check, only : check_error, check_near, check_true, test_case_t
    use emcon_constraint, only : condition_t, constraint_t
    use emcon_csr, only : csr_t
-   use emcon_errors, only : err_input, error_t
+   use emcon_errors, only : err_input, err_internal, error_t, raise
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t
@@ -14,6 +14,7 @@ module test_given_kinds
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_t
    use emcon_stepper_user, only : stepper_give_constraint, stepper_give_mass, &
       stepper_give_scheme, stepper_give_solver
+   use emcon_text, only : to_text
    use emcon_umfpack, only : umfpack_t
    use given_scenes, only : lump, make_line
    use one_element, only : read_one
@@ -32,6 +33,12 @@ module test_given_kinds
       procedure :: take_positions
       procedure :: linearise
    end type rod_t
+
+   !> One that solves nothing.
+   type, extends(umfpack_t) :: idle_solver_t
+   contains
+      procedure :: solve => idle_solve
+   end type idle_solver_t
 
 contains
 
@@ -79,18 +86,31 @@ contains
       call check_true(error, norm2(own%march%state%u) > 0.1_wp, "it moves")
    end subroutine compare
 
+   subroutine idle_solve(self, rhs, x, error)
+      class(idle_solver_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: rhs(:)
+      real(wp), intent(out), contiguous :: x(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      x = 0.0_wp*rhs
+      call raise(error, err_internal, "not the solver that was asked for, of " // to_text( &
+         self%choice))
+   end subroutine idle_solve
+
    subroutine test_solver(error)
       type(error_t), allocatable, intent(out) :: error
       type(stepper_t) :: own, other
       type(umfpack_t) :: solver
+      type(idle_solver_t) :: idle
 
       call read_flight(own, "ENERGY MOMENTUM", error)
       if (.not. allocated(error)) call read_flight(other, "ENERGY MOMENTUM", error)
       if (allocated(error)) return
       other%scene%step(1)%solution%solver = solver_user
       other%scene%step(1)%solution%solver_name = "MINE"
-      call stepper_give_solver(other, "other", solver, error)
+      call stepper_give_solver(other, "other", idle, error)
       if (.not. allocated(error)) call stepper_give_solver(other, "mine", solver, error)
+      if (.not. allocated(error)) call stepper_give_solver(other, "last", idle, error)
       call compare(own, other, error)
       call stepper_close(own)
       call stepper_close(other)

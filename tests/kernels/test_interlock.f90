@@ -97,25 +97,27 @@ contains
       call march_free(march)
    end subroutine look_at
 
-   !> Contacts 2 to 4, of which the first ones slide; the last one is a long way round, but sticks.
+   !> Contacts 2 to 4, of which the first ones slide; 5 is a long way round, but sticks. 1 and 6, which
+   !> are too, are of other pairs. All of it is turned.
    subroutine let_slide(march, row)
       type(march_t), intent(inout) :: march
       type(case_t), intent(in) :: row
-      real(wp) :: angle(4)
+      real(wp) :: angle(6)
       integer :: k
 
-      angle = [0.0_wp, -5.0_wp, row%angle, 80.0_wp]*degree
-      call constraints_select(march%active%set, [2, 3, 4, 5])
+      angle = [80.0_wp, 0.0_wp, -5.0_wp, row%angle, 80.0_wp, 80.0_wp]*degree + 0.5_wp
+      march%system%first_constraint(:2) = [1, 5]
+      call constraints_select(march%active%set, [1, 2, 3, 4, 5, 6])
       associate (set => march%active%set, contacts => march%state%contacts)
          set%lam = 2.0_wp
          contacts%slip_path = 1.0_wp
-         do k = 1, 4
+         do k = 1, 6
             call condition_resize(set%item(k), 2)
             set%item(k)%n_slave = 1
             set%item(k)%c(:, 1) = [cos(angle(k)), sin(angle(k))]
             set%item(k)%c(:, 2) = -set%item(k)%c(:, 1)
             set%item(k)%size = 0.25_wp
-            if (k <= row%n_slide) march%active%friction%law(k + 1)%status &
+            if (k <= row%n_slide + 1 .or. k == 6) march%active%friction%law(k)%status &
                = slip_status_t(contact_slides, [1.0_wp, 0.0_wp])
          end do
          contacts%slip_path(4) = 0.25_wp*row%path

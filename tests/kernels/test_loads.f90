@@ -1,6 +1,6 @@
 !> Loads and prescribed motion over time and configuration.
 module test_loads
-   use check, only : check_near, test_case_t
+   use check, only : check_near, check_true, test_case_t
    use emcon_amplitudes, only : amplitude_t
    use emcon_csr, only : csr_find
    use emcon_errors, only : error_t
@@ -11,10 +11,13 @@ module test_loads
    use emcon_evaluation, only : instant_t, evaluation_t
    use emcon_pressure_plane, only : add_pressure
    use emcon_scene, only : scene_t
+   use emcon_stepper, only : stepper_build, stepper_close, stepper_t
    use emcon_steps, only : load_centrifugal, load_gravity, load_point, load_pressure, load_t, &
       prescribed_t
    use emcon_system, only : system_begin_step, system_init, system_loads, system_t
    use emcon_term, only : response_begin, role_external
+   use emcon_text, only : to_text
+   use one_element, only : read_one
    use small_scenes, only : add_load, add_step, add_surface, block_t, bottom, clamp, left, &
       make_block, right, shake, top
    implicit none
@@ -34,6 +37,7 @@ contains
          test_case_t("pressure without nlgeom stays", test_dead_pressure), &
          test_case_t("pressure all around: no force, no moment", test_closed), &
          test_case_t("pressure on an edge of any form", test_edge), &
+         test_case_t("pressure on faces, near the origin and far from it", test_far), &
          test_case_t("pressure stiffness", test_stiffness), &
          test_case_t("gravity sums to the weight", test_gravity), &
          test_case_t("bodies that turn about an axis", test_centrifugal), &
@@ -84,6 +88,38 @@ contains
       call system_loads(system, motion_of(evaluation_t(is_gradient=.true., load_place=1.0_wp, &
          load_instant=instant), scene%x, u, 0.0_wp*u), force)
    end subroutine forces
+
+   !> Places and ways of a few digits: far from the origin forces are the same to the last bit, whose
+   !> sum around a body is 0.
+   subroutine test_far(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=*), parameter :: load(7) = [character(len=8) :: "*DLOAD", "1, P1, 3", &
+         "1, P2, 3", "1, P3, 3", "1, P4, 3", "1, P5, 3", "1, P6, 3"]
+      type(stepper_t) :: stepper
+      real(wp) :: force(3, 8, 2), u(3, 8)
+      integer :: k, n
+
+      call shake(u, 0.2_wp)
+      u = scale(real(nint(scale(u, 8)), wp), -8)
+      do n = 1, 6
+         do k = 1, 2
+            call read_one("C3D8", 2, "NONLINEAR", stepper, error, of_step=[load(1), load(n + 1:)])
+            if (allocated(error)) return
+            associate (x => stepper%scene%x)
+               x = scale(real(nint(scale(x, 8)), wp), -8)
+               if (k == 2) x = x + scale(1.0_wp, digits(1.0_wp) - 9)
+            end associate
+            call stepper_build(stepper, error)
+            if (allocated(error)) return
+            call forces(stepper%march%system, stepper%scene, instant_t(), u, force(:, :, k))
+            call stepper_close(stepper)
+            stepper = stepper_t()
+         end do
+         call check_near(error, reshape(force(:, :, 2), [24]), reshape(force(:, :, 1), [24]), &
+            0.0_wp, 1.0_wp, "far, without " // to_text(n - 1) // " faces")
+         call check_true(error, all(abs(sum(force(:, :, 1), 2)) < tol) .eqv. n == 1, "closed")
+      end do
+   end subroutine test_far
 
    !> -p n L t, half on either node, on the deformed edge.
    subroutine test_pressure(error)

@@ -375,8 +375,10 @@ contains
             call check_near(error, control%largest_kinetic, march%ledger%kinetic, tol, 1.0_wp, &
                "kinetic energy")
          end do
+         ! What the motion is off by for inertia counts.
          march%motion%v0 = -1.0_wp
-         march%motion%du = 0.0_wp
+         march%motion%du = 0.5_wp*h
+         march%motion%offset = -0.5_wp*h
          call accuracy_keep(march, h)
          call check_near(error, control%largest_kinetic, 6.0_wp, tol, 6.0_wp, "at the end")
       end associate

@@ -11,13 +11,16 @@ module test_march_commit
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
+   use emcon_march_commit, only : march_commit
    use emcon_scene, only : scene_t
    use emcon_stand_off, only : stand_off_add, stand_off_t
    use emcon_state, only : state_t
    use emcon_steps, only : initiation_persistent, load_gravity, load_t
    use emcon_system, only : mass_times
    use emcon_term, only : role_external, role_internal
-   use small_scenes, only : add_load, add_step, block_t, clamp, make_two_blocks, prescribe
+   use emcon_term_registry, only : terms_stabilization
+   use emcon_text, only : to_text
+   use small_scenes, only : add_load, add_step, block_t, clamp, make_two_blocks, prescribe, shake
    implicit none
    private
    public :: collect_march_commit
@@ -37,16 +40,19 @@ contains
       tests = [ &
          test_case_t("a step with friction", test_step), &
          test_case_t("works in statics", test_statics), &
+         test_case_t("what is told of a step", test_told), &
+         test_case_t("what is told of bodies that nothing holds", test_stabilized), &
          test_case_t("friction above what one contact bears", test_limit), &
          test_case_t("impacts that keep a part", test_restitution)]
    end subroutine collect_march_commit
 
    !> The lower block is clamped at its bottom and driven on its right; both have weight.
-   subroutine begin(scene, is_static, march, error)
+   subroutine begin(scene, is_static, march, error, stabilization)
       type(scene_t), intent(out) :: scene
       logical, intent(in) :: is_static
       type(march_t), intent(inout) :: march
       type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(in), optional :: stabilization
       type(block_t) :: lower, upper
       type(load_t) :: weight
       integer :: i
@@ -56,6 +62,7 @@ contains
       scene%pair(1)%interaction%friction = merge(0.05_wp, 0.3_wp, is_static)
       call add_step(scene, is_static, merge(0.25_wp, h, is_static), merge(4, 40, is_static))
       scene%step(1)%contact%initiation = initiation_persistent
+      if (present(stabilization)) scene%step(1)%stabilization = stabilization
       call clamp(scene%step(1), [(i, i = 1, 5)])
       call prescribe(scene%step(1), 10, 1, 0.02_wp)
       if (is_static) then
@@ -219,18 +226,26 @@ contains
    end subroutine check_pairs
 
    !> Forces are linear over a step: what the supports do beside contact and weight is half of both
-   !> ends; friction takes what it dissipates.
+   !> ends, and what viscous forces of STABILIZE take; friction takes what it dissipates.
    subroutine test_statics(error)
       type(error_t), allocatable, intent(out) :: error
+
+      call look_at_statics(error, 0.0_wp)
+      if (.not. allocated(error)) call look_at_statics(error, 0.01_wp)
+   end subroutine test_statics
+
+   subroutine look_at_statics(error, part)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(in) :: part               !! of the energy that viscous forces take
       type(scene_t) :: scene
       type(march_t) :: march
       type(increment_t) :: increment
       type(state_t) :: before
       type(ledger_t) :: books
-      real(wp) :: contact, friction, internal
+      real(wp) :: contact, friction, internal, viscous, held(2, 16)
       integer :: k, i
 
-      call begin(scene, .true., march, error)
+      call begin(scene, .true., march, error, part)
       if (allocated(error)) return
       do k = 1, 4
          before = march%state
@@ -244,20 +259,108 @@ contains
                friction = friction + constraints_dissipated(set, i, loss_friction)
             end do
             contact = 0.5_wp*sum((before%contact + state%contact)*du)
-            internal = 0.5_wp*sum((before%internal + internal_of(march))*du)
+            internal = 0.5_wp*sum((before%internal + state%internal)*du)
+            call terms_stabilization(march%system%term, viscous, held)
+            call check_true(error, (viscous > 0.0_wp) .eqv. part > 0.0_wp, "viscous forces")
             call check_near(error, march%ledger%friction - books%friction, friction, tol, 1.0_wp, &
                "friction")
             call check_near(error, march%ledger%contact_work - books%contact_work, contact &
                + friction, tol, 1.0_wp, "work of contact")
             call check_near(error, march%ledger%external_work - books%external_work, internal &
-               - contact, tol, 10.0_wp, "work")
+               - contact + viscous, tol, 10.0_wp, "work")
+            call check_near(error, march%ledger%damping - books%damping, viscous, tol, 1.0_wp, &
+               "damping")
+            call check_near(error, state%internal, internal_of(march) - held, tol, 100.0_wp, &
+               "forces of elements")
             call check_near(error, state%v, 0.0_wp*state%v, 0.0_wp, 1.0_wp, "no velocities")
          end associate
          if (allocated(error)) return
       end do
       call check_true(error, march%ledger%friction > 0.0_wp, "it slides")
       call march_free(march)
-   end subroutine test_statics
+   end subroutine look_at_statics
+
+   !> A residual above the tolerance, unless nothing was solved; the way that it was solved; guards.
+   subroutine test_told(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: before(4) = [0.0_wp, 0.5_wp, 0.0_wp, 0.0_wp]
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+      integer :: k, n_pair
+      logical :: is_told
+
+      call begin(scene, .false., march, error)
+      do while (increment%n_active == 0)
+         if (allocated(error)) return
+         call march_increment(march, scene, increment, error)
+      end do
+      n_pair = march%system%n_pair
+      do k = 1, 4
+         increment = increment_t(unconverged=before(k))
+         march%newton%convergence%last = merge(1.0e-12_wp, 0.25_wp, k == 3)
+         march%newton%is_idle = k == 4
+         march%newton%correction%fell_back = k == 1
+         march%system%n_pair = merge(0, n_pair, k == 2)
+         call march_commit(march, scene, h, increment, error)
+         if (allocated(error)) return
+         is_told = .false.
+         if (increment%notes%n > 0) is_told = index(increment%notes%item(increment%notes%n)%text, &
+            "a relative residual of 0.25 is accepted") == 1
+         call check_true(error, is_told .eqv. k < 3, "told " // to_text(k))
+         call check_near(error, increment%unconverged, max(before(k), merge(0.25_wp, 0.0_wp, &
+            k < 3)), 0.0_wp, 1.0_wp, "accepted")
+         associate (reached => march%newton%convergence)
+            call check_near(error, increment%residual, reached%history(:reached%n_history), &
+               0.0_wp, 1.0_wp, "all residuals")
+         end associate
+         call check_true(error, increment%is_guarded .eqv. k == 2, "guards")
+         call check_equal(error, increment%notes%n, merge(2, merge(1, 0, k == 2), k == 1), "notes")
+      end do
+      call march_free(march)
+   end subroutine test_told
+
+   !> The lower block moves as nothing holds it: what the balance leaves over does work; told once of
+   !> each body, and of gaps that were closed where contact acts.
+   subroutine test_stabilized(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=*), parameter :: who(4) = ["A", "A", "B", "B"], way(4) = ["x", "y", "y", "x"]
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+      character(len=:), allocatable :: told
+      real(wp) :: force(2, 16), work
+      integer :: k
+
+      call begin(scene, .false., march, error)
+      if (.not. allocated(error)) call march_increment(march, scene, increment, error)
+      if (allocated(error)) return
+      call shake(force, 1.0_wp)
+      associate (support => march%active%support, system => march%system, du => march%motion%du)
+         support%is_needed = .true.
+         support%is_loose = [.true., .false.]
+         support%brought = [0.5_wp, 0.25_wp, 0.0_wp]
+         support%brought_text = "body of C"
+         work = sum(force(:, :10)*du(:, :10), mask=system%space%numbering%unknown(:, :10) > 0)
+         do k = 1, 4
+            support%text = "body of " // who(k) // " free to move in " // way(k)
+            march%active%is_active = [.false., k == 4, .true.]
+            system%response%residual = force + march%newton%contact
+            increment = increment_t()
+            call march_commit(march, scene, h, increment, error)
+            if (allocated(error)) return
+            call check_near(error, march%ledger%stabilization, -k*work, tol, 1.0_wp, "work")
+            call check_equal(error, increment%warnings%n, merge(1, 0, k /= 2), "told " // to_text(k))
+            if (allocated(error)) return
+            if (k == 2) cycle
+            told = "body of C, on which no load does work: moved over a gap of 0.25 onto"
+            if (k < 4) told = support%text // ", on which no load does work: the smallest motion"
+            call check_true(error, index(increment%warnings%item(1)%text, told) == 1, told)
+         end do
+      end associate
+      call check_true(error, abs(work) > 1.0e3_wp*tol, "it moves")
+      call march_free(march)
+   end subroutine test_stabilized
 
    !> Told once, of pairs whose coefficient is above their limit: far above it, or below.
    subroutine test_limit(error)
@@ -337,6 +440,8 @@ contains
             call check_near(error, [ledger%momentum, ledger%angular], [start%momentum, &
                start%angular], tol, abs(start%momentum(2)), "momenta")
             call check_true(error, ledger%restitution >= before, "never given back")
+            call check_true(error, allocated(march%state%pairs%jump) .eqv. &
+               ledger%restitution > before, "a jump where it is taken, and no longer")
             if (increment%n_cut > 0) cycle
             do i = 1, set%n
                rate = rate_of(set%item(i), march%state%v)

@@ -11,7 +11,7 @@ module test_march_control
    use emcon_scene, only : scene_t
    use emcon_step_control, only : why_error, why_event, why_newton
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_t
-   use emcon_steps, only : initiation_persistent, load_point, load_t, newton_kept
+   use emcon_steps, only : initiation_persistent, load_gravity, load_point, load_t, newton_kept
    use emcon_system, only : mass_times
    use emcon_text, only : to_text
    use given_hosts, only : chain_host_init, chain_host_t
@@ -39,6 +39,7 @@ contains
          test_case_t("the error of what equations link", test_linked), &
          test_case_t("masses that errors are weighed by", test_masses), &
          test_case_t("an event is found by the velocities", test_event), &
+         test_case_t("an event that comes before they say", test_early), &
          test_case_t("solves that take long", test_slow), &
          test_case_t("long increments while bodies are apart", test_apart), &
          test_case_t("no smaller increment is allowed", test_least), &
@@ -381,6 +382,43 @@ contains
          "tries that passed it")
       call march_free(march)
    end subroutine test_event
+
+   !> A block that falls ever faster: what velocities at the start say is too late, and halves of
+   !> that are tried, however narrow the window.
+   subroutine test_early(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: longest = 0.06_wp, at = 0.05_wp, window = 1.0e-3_wp, gravity = 100.0_wp
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(load_t) :: load
+      integer :: i
+
+      call make_two_blocks(scene, at, lower, upper)
+      call add_step(scene, .false., longest, 10)
+      call clamp(scene%step(1), [(i, i = 1, 10)])
+      scene%step(1)%time%is_direct = .false.
+      scene%step(1)%time%event_fraction = window
+      scene%v0(2, 11:) = -1.0_wp
+      load%kind = load_gravity
+      load%value = gravity
+      load%direction(:2) = [0.0_wp, -1.0_wp]
+      do i = upper%elements_before + 1, size(scene%element%kind)
+         load%target = i
+         call add_load(scene%step(1), load)
+      end do
+      call begin(scene, march, error)
+      if (.not. allocated(error)) call march_increment(march, scene, increment, error)
+      if (allocated(error)) return
+      ! After t + g t**2/2 = at they meet.
+      associate (t => (sqrt(1.0_wp + 2.0_wp*gravity*at) - 1.0_wp)/gravity)
+         call check_equal(error, increment%n_cut, 1 + ceiling(log(at/t)/log(2.0_wp)), "tries")
+      end associate
+      call check_near(error, march%state%clock%time, at*0.5_wp**(increment%n_cut - 1), &
+         increment%n_cut*window*longest, 1.0_wp, "as far as nothing meets")
+      call march_free(march)
+   end subroutine test_early
 
    !> More than half of the iterations allowed: the next increments are shorter if the error counts.
    subroutine test_slow(error)

@@ -15,7 +15,8 @@ module test_march_grid
 
    real(wp), parameter :: h = 0.25_wp
    integer, parameter :: n = 8
-   !> Corners at points 1 and 5, and between two at point 3; the last interval is shorter.
+   !> Corners at points 1 and 5 and at the end, and between two at point 3; the last interval is
+   !> shorter.
    real(wp), parameter :: time(0:n) = [0.0_wp, 0.25_wp, 0.5_wp, 0.625_wp, 0.875_wp, 1.125_wp, &
       1.375_wp, 1.625_wp, 1.8125_wp]
 
@@ -28,6 +29,7 @@ contains
          test_case_t("points and corners", test_points), &
          test_case_t("units between the points", test_units), &
          test_case_t("a time that is set", test_set), &
+         test_case_t("sizes that the error asks for", test_sizes), &
          test_case_t("increments of a step", test_count)]
    end subroutine collect_march_grid
 
@@ -42,7 +44,7 @@ contains
       associate (step => scene%step(1))
          step%time%is_direct = is_direct
          step%time%duration = time(n)
-         step%time%corner = time([1, 3, 5])
+         step%time%corner = time([1, 3, 5, n])
          step%time%tolerance = 1.0e-3_wp
          call march_count_grid(march, step)
       end associate
@@ -106,6 +108,66 @@ contains
 
    end subroutine test_units
 
+   !> Of twenty increments: halved down to h_min, else six times for the error and twelve in all;
+   !> doubled up to h_max, else to the whole step. Events lie in a part of the increment, which has
+   !> as many units as that takes.
+   subroutine test_sizes(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: h_min(6) = [0.0_wp, 0.25_wp, 0.01_wp, 0.0_wp, 0.25_wp, 2.0_wp]
+      real(wp), parameter :: h_max(6) = [0.0_wp, 5.0_wp, 0.0_wp, 0.0_wp, 2.0_wp, 1.0_wp]
+      real(wp), parameter :: tolerance(6) = [1.0e-3_wp, 1.0e-3_wp, 1.0e-3_wp, 0.0_wp, 0.0_wp, &
+         1.0e-3_wp]
+      real(wp), parameter :: window(6) = [0.0_wp, 0.0_wp, 0.0_wp, 1.5e-4_wp, 0.125_wp, 0.01_wp]
+      integer, parameter :: n_level(6) = [12, 2, 6, 12, 2, 0]
+      integer, parameter :: n_unit(6) = [4096, 4, 64, 8192, 8, 128]
+      integer, parameter :: n_least(6) = [1, 1, 1, 2, 2, 128]
+      integer, parameter :: n_window(6) = [0, 0, 0, 1, 1, 1]
+      integer, parameter :: least(6) = [-6, -2, -6, -6, -2, 0]
+      integer, parameter :: largest(6) = [4, 2, 4, 0, 1, 0]
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(block_t) :: block
+      integer :: k
+
+      call make_block(scene, "CPE4", [1, 1], block)
+      call add_step(scene, .false., 1.0_wp, 20)
+      associate (step => scene%step(1), grid => march%grid)
+         do k = 1, size(h_min)
+            step%time%is_direct = .false.
+            step%time%h_min = h_min(k)
+            step%time%h_max = h_max(k)
+            step%time%tolerance = tolerance(k)
+            step%time%event_fraction = window(k)
+            call march_count_grid(march, step)
+            call check_true(error, grid%is_controlled, "controlled")
+            call check_near(error, grid%h_deck, 1.0_wp, 0.0_wp, 1.0_wp, "increment")
+            call check_equal(error, [grid%n_level, int([grid%n_unit, grid%n_least, &
+               grid%n_window]), grid%least_power, grid%largest_power], [n_level(k), n_unit(k), &
+               n_least(k), n_window(k), least(k), largest(k)], "sizes " // to_text(k))
+         end do
+         step%time%tolerance = 0.0_wp
+         step%time%event_fraction = 0.0_wp
+         call march_count_grid(march, step)
+         call check_true(error, .not. grid%is_controlled, "neither errors nor events")
+         step%time%tolerance = 1.0e-3_wp
+         march%explicit%is_on = .true.
+         call march_count_grid(march, step)
+         call check_true(error, .not. grid%is_controlled, "explicit steps")
+      end associate
+      call make_block(scene, "CPE4", [1, 1], block)
+      call add_step(scene, .true., 1.0_wp, 20)
+      scene%step(1)%time%tolerance = 1.0e-3_wp
+      march%explicit%is_on = .false.
+      call march_count_grid(march, scene%step(1))
+      call check_true(error, .not. march%grid%is_controlled, "statics")
+      ! Of viscous forces halves go down to an eighth of their time, but no farther than 2**-24.
+      do k = 1, 3
+         scene%step(1)%stabilization = 10.0_wp**(2 - 3*k)
+         call march_count_grid(march, scene%step(1))
+         call check_equal(error, march%grid%n_level, min(24, 12 + 6*(k - 1)), "viscous")
+      end do
+   end subroutine test_sizes
+
    !> At each point, up to the rounding of a sum, and in the middle of each interval. The last one
    !> may be so short that its end is nearer to the point before by whole increments.
    subroutine test_set(error)
@@ -143,6 +205,11 @@ contains
             call check_near(error, clock%step_time, 0.5_wp*(time(i) + time(i + 1)), 0.0_wp, &
                1.0_wp, "as it is")
          end do
+         scene%step(1)%time%corner = [0.55_wp]
+         call march_count_grid(march, scene%step(1))
+         call march_set_time(march, scene, 0.25_wp)
+         call check_equal(error, clock%n_grid, 1, "before the first corner, which is between")
+         call check_true(error, .not. clock%is_off_grid, "on the grid")
       end associate
    end subroutine test_set
 

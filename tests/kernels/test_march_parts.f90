@@ -13,6 +13,7 @@ module test_march_parts
    use emcon_march_types, only : march_t, watcher_t
    use emcon_scene, only : scene_t
    use emcon_pair_sums, only : pair_sum_t
+   use emcon_phases, only : phase_enter, phase_vectors
    use emcon_state, only : state_t
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_t
    use emcon_stepper_user, only : stepper_give_force
@@ -61,6 +62,7 @@ contains
          test_case_t("halves, and back on the grid", test_halves), &
          test_case_t("no part is small enough", test_none), &
          test_case_t("too many parts", test_crawl), &
+         test_case_t("what is told where statics end", test_end), &
          test_case_t("an interrupt leaves the increment before", test_interrupt), &
          test_case_t("two halves are two increments", test_pieces)]
    end subroutine collect_march_parts
@@ -197,6 +199,40 @@ contains
       call stepper_close(stepper)
    end subroutine test_crawl
 
+   !> What holds the upper block beside its conditions is named, and, once there is strain, what
+   !> may come next, unless the step goes on to it anyway.
+   subroutine test_end(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=*), parameter :: held = "is put out of its range; without contact and given " &
+         // "forces the body ", beyond = "; no state of rest was found beyond this time"
+      type(error_t), allocatable :: stopped
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      integer :: k, last
+
+      do k = 1, 4
+         call open_thrown(stepper, kind_static, 0.1_wp, 10, 0.003_wp, error)
+         if (.not. allocated(error) .and. k > 1) call stepper_advance(stepper, increment, error)
+         if (allocated(error)) return
+         associate (scene => stepper%scene)
+            scene%amplitude(1)%value(2) = 8.0_wp
+            stepper%march%grid%n_level = 0
+            if (k == 3) scene%step(1)%stabilization = 1.0e-3_wp
+            last = size(scene%step(1)%prescribed)
+            if (k == 4) scene%step(1)%prescribed = scene%step(1)%prescribed(:last - 6)
+         end associate
+         call stepper_advance(stepper, increment, stopped)
+         call check_error(error, stopped, err_analysis, "is put out of its range", "stopped")
+         if (allocated(error)) return
+         call check_true(error, (index(stopped%message, beyond) > 0) .eqv. (k == 2 .or. k == 4), &
+            "what may come " // to_text(k) // ": " // stopped%message)
+         call check_true(error, (index(stopped%message, held) > 0) .eqv. k == 4, &
+            "what holds " // to_text(k) // ": " // stopped%message)
+         call stepper_close(stepper)
+         stepper = stepper_t()
+      end do
+   end subroutine test_end
+
    !> After a part that was given up, and before anything else, the state is as it was.
    subroutine test_interrupt(error)
       type(error_t), allocatable, intent(out) :: error
@@ -306,6 +342,8 @@ contains
                if (.not. allocated(error)) pushed(i) = half%march%state%sums%sum(1)
             end do
             if (allocated(error)) return
+            call check_phase(error, whole%march)
+            call check_phase(error, half%march)
             call check_equal(error, [one%n_cut, two%n_cut], [1, 0, 0], "cuts of kind " &
                // to_text(kind) // " in " // to_text(k))
             call compare_states(error, whole%march%state, half%march%state, "kind " &
@@ -332,6 +370,16 @@ contains
          half = stepper_t()
       end do
    end subroutine test_pieces
+
+   !> Time is counted for the rest again: each phase was left.
+   subroutine check_phase(error, march)
+      type(error_t), allocatable, intent(inout) :: error
+      type(march_t), intent(inout) :: march
+      integer :: left
+
+      call phase_enter(march%system%phases, phase_vectors, left)
+      call check_equal(error, left, phase_vectors, "phase")
+   end subroutine check_phase
 
    !> Spoil what a march holds beside its state: no increment looks at what the last one left there.
    subroutine soil(march)

@@ -1,16 +1,17 @@
 !> Whole runs of all schemes: a block that is stretched, spins, is driven at a node and pulled at
 !> another, by the order of its motion and of its works.
 module test_march_schemes
-   use check, only : check_true, test_case_t
+   use check, only : check_near, check_true, test_case_t
    use emcon_amplitudes, only : amplitude_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_is_done, march_t
+   use emcon_materials, only : kinematics_linear
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_row
    use emcon_steps, only : load_point, load_t
-   use small_scenes, only : add_load, add_step, block_t, make_block, prescribe
+   use small_scenes, only : add_load, add_step, block_t, make_block, make_two_blocks, prescribe
    implicit none
    private
    public :: collect_march_schemes
@@ -32,7 +33,9 @@ contains
    subroutine collect_march_schemes(tests)
       type(test_case_t), allocatable, intent(out) :: tests(:)
 
-      tests = [test_case_t("motion and works are of second order", test_order)]
+      tests = [ &
+         test_case_t("motion and works are of second order", test_order), &
+         test_case_t("works of linear bodies that touch are exact", test_linear)]
    end subroutine collect_march_schemes
 
    subroutine run(scheme, n, outcome, error)
@@ -123,5 +126,50 @@ contains
       end function distance
 
    end subroutine test_order
+
+   !> Of forces that are linear in the displacement the mean over a step does the work: by the
+   !> trapezoidal rule the energy changes by what loads, supports and contact have done.
+   subroutine test_linear(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: h = 0.0125_wp
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(load_t) :: load
+      real(wp) :: start, done
+      integer :: k
+
+      call make_two_blocks(scene, 0.03_wp, lower, upper)
+      scene%section(1)%kinematics = kinematics_linear
+      scene%v0(1, 11:) = 0.3_wp
+      scene%v0(2, 11:) = -1.0_wp
+      call add_step(scene, .false., h, 24)
+      scene%step(1)%scheme = scheme_row("DYNAMIC", "TRAPEZOIDAL")
+      scene%amplitude = [amplitude_t(name="A", time=[0.0_wp, 1.0_wp], value=[0.0_wp, 1.0_wp])]
+      call prescribe(scene%step(1), 1, 1, 0.5_wp)
+      call prescribe(scene%step(1), 1, 2, -0.25_wp)
+      scene%step(1)%prescribed%amplitude = 1
+      load%kind = load_point
+      load%target = 15
+      load%place = 2
+      load%value = -10.0_wp
+      load%amplitude = 1
+      call add_load(scene%step(1), load)
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      if (allocated(error)) return
+      start = march%ledger%total
+      done = 0.0_wp
+      do k = 1, 24
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         call check_near(error, march%ledger%total - march%ledger%contact_work, start, &
+            1.0e5_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp)), 10.0_wp, "energy")
+         done = max(done, abs(march%ledger%contact_work))
+      end do
+      call check_true(error, done > 1.0e-3_wp*start, "contact has done work")
+      call march_free(march)
+   end subroutine test_linear
 
 end module test_march_schemes

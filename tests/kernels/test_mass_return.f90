@@ -179,6 +179,8 @@ contains
             call check_true(error, n_told == 1, "masses come back, kind " // to_text(k) // ": " &
                // to_text(n_told))
             call check_true(error, .not. any(march%layer%is_massless), "all of them")
+            call check_true(error, march%step_check%ratio >= 0.0_wp .eqv. k == 2, &
+               "what follows is judged by its error, if that counts")
             call march_free(march)
          end block
          if (allocated(error)) return

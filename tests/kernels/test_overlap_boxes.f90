@@ -44,6 +44,7 @@ contains
       scene%pair = [contact_pair_t(slave=2, master=1)]
    end subroutine make_scene
 
+   !> In one step after the other.
    subroutine test_boxes(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: first(4) = [1, 7, 11, 17]
@@ -54,10 +55,10 @@ contains
       real(wp) :: apart
       integer :: k, p, q
 
+      call make_scene(scene, [0.5_wp, 3.0_wp], [4.0_wp, 1.0_wp])
+      call overlap_check_init(judge, scene)
+      call check_equal(error, judge%n_piece, 3, "pieces")
       do k = 1, 4
-         call make_scene(scene, [0.5_wp, 3.0_wp], [4.0_wp, 1.0_wp])
-         call overlap_check_init(judge, scene)
-         call check_equal(error, judge%n_piece, 3, "pieces")
          call shake(u0, 0.1_wp)
          call shake(du, 0.1_wp)
          du(:, 11:) = du(:, 11:) + 0.1_wp*k
@@ -143,7 +144,8 @@ contains
       call check_equal(error, [judge%excused%first, judge%excused%second], [1, 3], "that alone")
    end subroutine test_excused
 
-   !> The second block falls through the first one and ends behind it, or beside it.
+   !> The second block falls through the first one or rises through it, and ends behind it or beside
+   !> it. So it does where the first one moves, or both of them, the other way round.
    subroutine test_looks(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: way(5) = [2.75_wp, 2.9_wp, 4.5_wp, 8.0_wp, 60.0_wp]
@@ -151,21 +153,28 @@ contains
       type(overlap_check_t) :: judge
       type(overlap_t) :: overlap
       real(wp), dimension(2, 16) :: rest, du
-      integer :: k
+      integer :: k, side, frame
 
-      call make_scene(scene, [0.5_wp, 3.0_wp], [90.0_wp, 90.0_wp])
-      call overlap_check_init(judge, scene)
       rest = 0.0_wp
-      do k = 1, size(way)
-         du = 0.0_wp
-         du(2, 7:10) = -way(k)
-         overlap = overlap_t()
-         call overlap_check_step(judge, scene%x, rest, du, overlap)
-         call check_true(error, overlap%depth > 0.2_wp, "seen on the way " // to_text(way(k)))
-         du(1, 7:10) = 3.0_wp*way(k)
-         overlap = overlap_t()
-         call overlap_check_step(judge, scene%x, rest, du, overlap)
-         call check_true(error, overlap%depth <= 0.0_wp, "past it " // to_text(way(k)))
+      do side = 1, -1, -2
+         call make_scene(scene, merge([0.5_wp, 3.0_wp], [0.5_wp, -3.5_wp], side > 0), &
+            [90.0_wp, 90.0_wp])
+         call overlap_check_init(judge, scene)
+         do k = 1, size(way)
+            do frame = 0, 2
+               du = 0.0_wp
+               du(2, 7:10) = -side*way(k)
+               du(2, :10) = du(2, :10) + 0.5_wp*frame*side*way(k)
+               overlap = overlap_t()
+               call overlap_check_step(judge, scene%x, rest, du, overlap)
+               call check_true(error, overlap%depth > 0.2_wp, "seen on the way " &
+                  // to_text(side*way(k)) // " in frame " // to_text(frame))
+               du(1, 7:10) = 3.0_wp*way(k)
+               overlap = overlap_t()
+               call overlap_check_step(judge, scene%x, rest, du, overlap)
+               call check_true(error, overlap%depth <= 0.0_wp, "past it " // to_text(way(k)))
+            end do
+         end do
       end do
    end subroutine test_looks
 

@@ -4,6 +4,7 @@ module test_pair_forces
    use emcon_constraint, only : condition_force
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_lam, &
       constraints_select
+   use emcon_contact, only : contact_t
    use emcon_contact_law, only : contact_laws_add, loss_friction
    use emcon_coulomb_law, only : coulomb_t
    use emcon_dashpot_law, only : dashpot_t
@@ -13,8 +14,8 @@ module test_pair_forces
    use emcon_kinds, only : wp
    use emcon_march, only : march_begin_step, march_free, march_init, march_t
    use emcon_motion, only : motion_init, motion_evaluate, motion_t
-   use emcon_pair_record, only : pair_record_init, pair_record_jump, pair_record_measure, &
-      pair_record_t
+   use emcon_pair_record, only : pair_components, pair_record_init, pair_record_jump, &
+      pair_record_measure, pair_record_t
    use emcon_pair_sums, only : pair_center, pair_force, pair_sum_t, pair_sums_add, &
       pair_sums_begin, pair_sums_init, pair_sums_jump, pair_sums_t
    use emcon_scene, only : scene_t
@@ -158,7 +159,7 @@ contains
       weight = 0.0_wp
       moment = 0.0_wp
       loss = 0.0_wp
-      do k = 1, set%n_condition
+      do k = set%n_permanent + 1, set%n_condition
          lam = constraints_lam(set, k)
          associate (item => set%item(k), own => set%law(k)%beside(2)%response)
             tau = item%response%mu_sigma*item%normal*lam + item%response%stick
@@ -226,7 +227,8 @@ contains
       call march_free(march)
    end subroutine test_sums
 
-   !> The last part alone, at the end of the motion; no impulse, no time.
+   !> The last part alone, at the end of the motion; no impulse, no time. The first condition counts
+   !> as one that always holds.
    subroutine test_static_sums(error)
       type(error_t), allocatable, intent(out) :: error
       type(march_t) :: march
@@ -239,6 +241,7 @@ contains
       if (allocated(error)) return
       allocate(sums%sum(2), source=sums_of_nothing())
       sums%of_pair = [1, -1]
+      set%n_permanent = 1
       call sum_up(march%system, set, motion, 1.0_wp, force, weight, moment, loss)
       call pair_sums_add(sums, march%system, set, motion, h)
       call pair_sums_add(sums, march%system, set, motion, 2.0_wp*h)
@@ -263,7 +266,8 @@ contains
    end subroutine test_static_sums
 
    !> Forces and moments on both sides, the sides of the second pair exchanged where it is a guard
-   !> of the first; forces at slave nodes; areas of what acts by rows.
+   !> of the first, the first condition one that always holds, and two nodes one place; forces at
+   !> slave nodes; areas of what acts by rows.
    subroutine test_record(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: lag = 0.5_wp
@@ -282,7 +286,10 @@ contains
             call begin(fresh, set, motion, .false., error)
             if (allocated(error)) return
             fresh%system%contact(2)%of_pair = of_second
+            set%n_permanent = k - 1
+            if (k == 2) call share_places(fresh%system%contact(1)%contact)
             call pair_record_init(record, fresh%system)
+            call check_equal(error, pair_components(record), 3, "force and moment in the plane")
             record%force = 7.0_wp
             u = motion%u0 + motion%du
             call pair_record_measure(record, fresh%system, set, motion%x, u, motion%du, lag)
@@ -309,6 +316,15 @@ contains
       call march_free(march)
    end subroutine test_record
 
+   !> The third node is at the place of the first, of which there are two contacts.
+   subroutine share_places(contact)
+      class(contact_t), intent(inout) :: contact
+
+      contact%duplicate(1) = contact%node(3)
+      contact%node(3) = contact%node(1)
+      contact%duplicate(3) = contact%duplicate(1)
+   end subroutine share_places
+
    subroutine check_totals(error, system, set, motion, record)
       type(error_t), allocatable, intent(inout) :: error
       type(system_t), intent(in) :: system
@@ -320,7 +336,7 @@ contains
 
       total = 0.0_wp
       n_active = 0
-      do k = 1, set%n_condition
+      do k = set%n_permanent + 1, set%n_condition
          associate (item => set%item(k), &
                of_pair => system%contact(contact_of(system, set%id(k)))%of_pair)
             pair = abs(of_pair)
@@ -352,11 +368,12 @@ contains
       integer :: k, i, own
 
       force = 0.0_wp
-      do k = 1, set%n_condition
+      do k = set%n_permanent + 1, set%n_condition
          associate (item => set%item(k), first => system%first_constraint(contact_of(system, &
                set%id(k))), contact => system%contact(contact_of(system, set%id(k)))%contact)
             do i = 1, item%n_slave
-               own = first + findloc(contact%node, item%node(i), 1)
+               own = first + findloc(contact%node == item%node(i) &
+                  .or. contact%duplicate == item%node(i), .true., 1)
                force(:, own) = force(:, own) + condition_force(item, constraints_lam(set, k), i)
             end do
          end associate
@@ -380,7 +397,7 @@ contains
             call system%contact(k)%contact%area(motion%x, motion%u0 + motion%du, area(first:last), &
                length(first:last))
             by_total(first:last) = 0.0_wp
-            do i = 1, set%n
+            do i = set%n_permanent + 1, set%n
                if (set%id(i) >= first .and. set%id(i) <= last) by_total(set%id(i)) &
                   = length(set%id(i))
             end do
@@ -389,13 +406,16 @@ contains
          end associate
       end do
       shear = area
-      shear(set%id(:set%n)) = area(set%id(:set%n))*set%item(:set%n)%normal
+      associate (id => set%id(set%n_permanent + 1:set%n))
+         shear(id) = area(id)*set%item(set%n_permanent + 1:set%n)%normal
+      end associate
       call check_near(error, record%area, area, tol, 1.0_wp, "areas")
       call check_near(error, record%shear_area, shear, tol, 1.0_wp, "areas of friction")
       call check_near(error, record%total%length, total, tol, 1.0_wp, "lengths")
    end subroutine check_areas
 
-   !> A jump of each pair, of a slave node and two master nodes.
+   !> A jump of each pair, of a slave node, the first one at the place of another, and two master
+   !> nodes.
    subroutine test_jumps(error)
       type(error_t), allocatable, intent(out) :: error
       type(march_t) :: march
@@ -405,12 +425,17 @@ contains
       type(pair_sums_t) :: sums
       type(velocity_jump_t) :: jump(2)
       real(wp) :: total(3, 2), nodal(2, 16), push(2)
-      integer :: k, i
+      integer :: k, i, own
 
       call begin(march, set, motion, .false., error)
       if (allocated(error)) return
       associate (system => march%system)
          system%contact(2)%of_pair = -1
+         associate (contact => system%contact(1)%contact)
+            own = findloc(contact%node, 12, 1)
+            contact%duplicate(own) = 12
+            contact%node(own) = 16
+         end associate
          jump(1) = velocity_jump_t(2, 1, [12, 7, 8], reshape([1.0_wp, 4.0_wp, -0.25_wp, -2.5_wp, &
             -0.75_wp, -1.5_wp], [2, 3]), 4.0_wp, [0.5_wp], [0.125_wp])
          jump(2) = velocity_jump_t(system%first_constraint(2) + 1, 1, [ &
@@ -439,8 +464,8 @@ contains
          call check_near(error, record%jump_lam([2, jump(2)%id]), [4.0_wp, 3.0_wp]/h, tol, &
             100.0_wp, "multipliers")
          call check_near(error, sum(abs(record%jump_lam)), 7.0_wp/h, tol, 100.0_wp, "and no others")
-         call check_near(error, record%force(:, findloc(system%contact(1)%contact%node, 12, 1)), &
-            jump(1)%impulse(:, 1)/h, tol, 100.0_wp, "on a slave node")
+         call check_near(error, record%force(:, own), jump(1)%impulse(:, 1)/h, tol, &
+            100.0_wp, "on a slave node")
          call check_near(error, sum(abs(record%force)), 7.5_wp/h, tol, 100.0_wp, "and no others")
          allocate(sums%sum(1))
          sums%of_pair = [1, -1]
@@ -473,7 +498,7 @@ contains
          k = contact_of(march%system, set%id(i))
          associate (state => march%system%contact(k)%contact%state(set%id(i) &
                - march%system%first_constraint(k)), item => set%item(i))
-            state%gap1 = 0.1_wp*real(i - 2, wp)
+            state%gap1 = 0.1_wp*real(mod(i, 3), wp) - 0.05_wp
             if (mod(i, 2) == 0) state%other_size = 0.25_wp*state%size
             gap(i) = max(0.0_wp, state%gap1)/min(state%size, state%other_size)
             force(i) = abs(set%lam(i))*norm2(sum(item%g(:, :item%n_slave), 2))
@@ -484,6 +509,7 @@ contains
       do step = 1, 2
          call stand_off_add(stand_off, march%system, set, real(step, wp)*h)
       end do
+      call check_true(error, sum(force*gap) > 0.0_wp, "air")
       call check_near(error, stand_off%largest, maxval(gap, mask=force > 0.0_wp), tol, 1.0_wp, &
          "largest")
       call check_near(error, stand_off%impulse, 3.0_wp*h*sum(force), tol, 10.0_wp, "impulse")

@@ -430,6 +430,34 @@ contains
       associate (which => [2, 4, 1, 3])
          call check_equal(error, which(element(0)), minloc(h(1:4), 1), "the fastest")
       end associate
+      call check_turned(error)
    end subroutine test_fastest
+
+   !> A cube that is turned about z is as fast as at rest, but not where small strains take the turn
+   !> for a strain.
+   subroutine check_turned(error)
+      type(error_t), allocatable, intent(inout) :: error
+      type(scene_t) :: scene
+      type(system_t) :: system
+      real(wp), allocatable :: none(:), u(:, :)
+      real(wp) :: h(2, 2)
+      integer :: i, k, e
+      logical :: is_bounded
+
+      do i = 1, 2
+         call make_system([1], i == 1, scene, system, error)
+         if (allocated(error)) return
+         none = 0.0_wp*scene%x(1, :)
+         do k = 1, 2
+            u = 0.0_wp*scene%x
+            if (k == 2) u(1, :) = -0.2_wp*scene%x(1, :) - 0.6_wp*scene%x(2, :)
+            if (k == 2) u(2, :) = 0.6_wp*scene%x(1, :) - 0.2_wp*scene%x(2, :)
+            call critical_bound(system, motion_of(evaluation_at_end, scene%x, u, 0.0_wp*u), none, &
+               h(k, i), e, is_bounded)
+         end do
+      end do
+      call check_near(error, h(:, 1), spread(h(1, 2), 1, 2), tol, h(1, 2), "turned as at rest")
+      call check_true(error, abs(h(2, 2) - h(1, 2)) > 0.01_wp*h(1, 2), "a strain")
+   end subroutine check_turned
 
 end module test_single_elements

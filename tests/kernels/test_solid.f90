@@ -3,21 +3,23 @@ module test_solid
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_csr, only : csr_t
    use emcon_element_plane, only : element_motion_t, element_response_t
+   use emcon_element_registry, only : find_element_row
    use emcon_host_law, only : host_response_t
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
    use emcon_materials, only : kinematics_linear
    use emcon_motion, only : motion_of, motion_t
-   use emcon_evaluation, only : evaluation_t
+   use emcon_evaluation, only : evaluation_at_end, evaluation_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_t
    use emcon_solid_respond, only : solid_element_respond
    use emcon_solid_term, only : solid_term_init, solid_term_t
    use emcon_space, only : space_t
+   use emcon_system, only : system_begin_step, system_init, system_respond, system_t
    use emcon_term, only : response_begin, response_init, response_t, role_internal
    use emcon_text, only : to_text
    use kind_rows, only : law_code
-   use small_scenes, only : add_block, add_step, block_t, make_block, shake, young
+   use small_scenes, only : add_block, add_step, block_t, make_block, poisson, shake, young
    implicit none
    private
    public :: collect_solid
@@ -35,6 +37,7 @@ contains
          test_case_t("total mass and row sums of a distorted mesh", test_total), &
          test_case_t("forces and energies are the sums over the elements", test_sums), &
          test_case_t("translation by 1e8 costs nothing", test_translation), &
+         test_case_t("modes inside let rectangles bend", test_bent), &
          test_case_t("first inverted element is named", test_inverted), &
          test_case_t("tangents that are symmetric", test_symmetric), &
          test_case_t("clockwise element", test_clockwise), &
@@ -273,5 +276,38 @@ contains
          end do
       end do
    end subroutine test_symmetric
+
+   !> Of a small curvature k, -k x y and k x**2/2 at nodes, a beam of CPE4I stores what one in plane
+   !> strain does, E/(1 - nu**2) k**2/24 of its moment of inertia and length, side by side or alone.
+   subroutine test_bent(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: curvature = 1.0e-5_wp, high = 0.75_wp
+      type(scene_t) :: scene
+      type(system_t) :: system
+      type(block_t) :: block
+      type(motion_t) :: motion
+      real(wp), allocatable :: u(:, :)
+      real(wp) :: stored
+      integer :: n
+
+      do n = 1, 9, 4
+         call make_block(scene, "CPE4", [n, 1], block)
+         scene%element%kind = find_element_row("CPE4I")
+         scene%x(2, :) = high*(scene%x(2, :) - 0.5_wp)
+         call add_step(scene, .true., 1.0_wp, 1)
+         call system_init(system, scene, error)
+         if (.not. allocated(error)) call system_begin_step(system, scene, 1, error)
+         if (allocated(error)) return
+         u = scene%x
+         u(1, :) = -curvature*scene%x(1, :)*scene%x(2, :)
+         u(2, :) = 0.5_wp*curvature*scene%x(1, :)**2
+         motion = motion_of(evaluation_at_end, scene%x, 0.0_wp*u, u)
+         call system_respond(system, motion, .false.)
+         stored = young/(1.0_wp - poisson**2)*curvature**2/24.0_wp*high**3*n
+         ! Turns of k n add strains of the size of their squares to those of k.
+         call check_near(error, sum(system%response%energy), stored, 10.0_wp*n**2*curvature, stored, &
+            to_text(n) // " elements")
+      end do
+   end subroutine test_bent
 
 end module test_solid

@@ -482,6 +482,8 @@ contains
          f(5, 2, 1) = size(5)
          f(6, 1, 2) = size(6)
          f(7, 2, 2) = size(7)
+         ! Turned by half a turn det F is the same.
+         if (mod(draw, 4) < 2) f(4:7, :, :) = -f(4:7, :, :)
          return
       end if
       strain(:6, :) = 0.0_wp

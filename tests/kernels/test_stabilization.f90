@@ -223,7 +223,8 @@ contains
       end do
    end subroutine test_given
 
-   !> Of a small uniform strain from rest, E = 100, nu = 0.3, over the first increment.
+   !> Of a small uniform strain from rest, E = 100, nu = 0.3, over the first increment: along x alone,
+   !> of a ring along its circles as well.
    subroutine test_part(error)
       type(error_t), allocatable, intent(out) :: error
       type(sample_t) :: sample
@@ -234,15 +235,16 @@ contains
       integer :: k
 
       do k = 1, size(kinds)
-         if (any(kinds(k) == ["CAX4 ", "CPE4H", "CPS3 "])) cycle
+         if (any(kinds(k) == ["CPE4H", "CPS3 "])) cycle
          call begin(kinds(k), 0.0_wp, sample, error)
          if (allocated(error)) return
          du = 0.0_wp*sample%motion%x
          du(1, :) = strain*sample%motion%x(1, :)
          allocate(force(size(du)), tangent(size(du)**2))
          call find(sample, du, work, force, tangent)
-         call check_near(error, work, 0.5_wp*part*modulus*strain**2 &
-            *sum(sample%solid%geometry(1)%weight), 2.0_wp*strain, work, trim(kinds(k)) // ": work")
+         call check_near(error, work, 0.5_wp*part*modulus*strain**2*merge(2.0_wp/0.7_wp, 1.0_wp, &
+            kinds(k) == "CAX4")*sum(sample%solid%geometry(1)%weight), 2.0_wp*strain, work, &
+            trim(kinds(k)) // ": work")
          deallocate(force, tangent)
          if (allocated(error)) return
       end do

@@ -206,6 +206,7 @@ contains
 
             call march_init(march, scene, error)
             if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+            call check_near(error, march%overlap_check%meant_overlap, depth, tol, 1.0_wp, "meant")
             do i = 1, 4
                if (allocated(error)) return
                call march_increment(march, scene, increment, error)
@@ -214,6 +215,11 @@ contains
                call check_near(error, march%system%contact(1)%contact%state%gap1, &
                   spread(-depth*left(i + 1, k), 1, 3), 1.0e-6_wp, 1.0_wp, "gaps")
             end do
+            scene%step(1)%contact%resolves_overclosure = .false.
+            call march_renumber(march, scene, error)
+            if (allocated(error)) return
+            call check_near(error, march%overlap_check%meant_overlap, 0.0_wp, 0.0_wp, 1.0_wp, &
+               "none is meant")
             call march_free(march)
          end block
       end do

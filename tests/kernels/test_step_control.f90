@@ -45,6 +45,9 @@ contains
          3, 3], "powers")
       call check_equal(error, control%n_same, 7, "of the largest size")
       call check_equal(error, [control%n_over, sum(control%n_less)], [0, 0], "nothing else")
+      control = step_control_t(asked=0.8_wp)
+      call control_accept(control, 1.0_wp, -1.0_wp, .false., least, largest)
+      call check_near(error, control%asked, 1.0_wp, 0.0_wp, 1.0_wp, "no less than what succeeded")
    end subroutine test_doubling
 
    !> A controller with integral and proportional part; an error goes with the square of the size,

@@ -111,9 +111,27 @@ contains
       end do
       call element_means(solid, u, .true., mean, strain, volume)
       call check_near(error, mean(:, 1), in_list(expected), tol, stress_size, what // ", mean")
+      if (what(:3) /= "CAX" .and. index(what, "COROTATED") == 0) call check_strain(error, grad, &
+         index(what, "LINEAR") == 0, strain(:, 1), what)
       call check_sizes(error, stepper, u, what)
       call check_derivatives(error, stepper, u, what)
    end subroutine check_stress
+
+   !> E11, E22 and 2 E12, in space E11 to E33 and twice the shears; of large strains Green's.
+   subroutine check_strain(error, grad, is_large, strain, what)
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp), intent(in) :: grad(3, 3), strain(:)
+      logical, intent(in) :: is_large
+      character(len=*), intent(in) :: what
+      real(wp) :: green(3, 3), expected(6)
+
+      green = grad + transpose(grad)
+      if (is_large) green = green + matmul(transpose(grad), grad)
+      expected = in_list(green)
+      expected(:3) = 0.5_wp*expected(:3)
+      if (size(strain) == 3) expected(3) = green(1, 2)
+      call check_near(error, strain, expected(:size(strain)), tol, 1.0_wp, what // ", strain")
+   end subroutine check_strain
 
    !> The energy changes by the forces and these by the tangent, along a random way: differences of
    !> second order in a step of eps^(1/3).

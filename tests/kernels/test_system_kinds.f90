@@ -138,6 +138,11 @@ contains
          call check_true(error, norm2(product) > 0.1_wp*young, "a stiffness")
       end do
       call check_sizes(error, system, what)
+      ! What inertia is off by of the motion counts.
+      motion = motion_of(evaluation, scene%x, u0, du)
+      motion%offset = 0.5_wp*du
+      call system_respond(system, motion, .true.)
+      call check_sizes(error, system, what // ", offset")
       ! Products leave out what loads and damped materials have of the matrix.
       if (scene%material(1)%alpha > 0.0_wp) return
       bare = scene

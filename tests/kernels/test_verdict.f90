@@ -264,6 +264,14 @@ contains
       call check_true(error, .not. scatter_is_comb(push), "impacts")
       call scatter_follow(push, pair_sum_t(weight=1.0_wp, span=1.0_wp), .false.)
       call check_equal(error, push%n_force, n/20, "statics")
+      ! What falls before statics makes no tooth behind them.
+      comb = force_scatter_t()
+      do k = 1, 4
+         call scatter_follow(comb, pair_sum_t(weight=merge(0.0_wp, 1.0_wp, k == 2), span=1.0_wp), &
+            k /= 3)
+      end do
+      call scatter_follow(comb, pair_sum_t(weight=1.0_wp, span=1.0_wp), .true.)
+      call check_equal(error, comb%n_dip, 0, "teeth")
    end subroutine test_scatter
 
    subroutine test_failed(error)
@@ -332,7 +340,14 @@ contains
       call check_near(error, found%pull, 0.3_wp, 8.0_wp*epsilon(1.0_wp), 1.0_wp, "two")
       call check_near(error, nodal_pull_share(found), 0.3_wp/4.1_wp, 8.0_wp*epsilon(1.0_wp), &
          1.0_wp, "share")
+      ! What pulls pulls at the slave node by all of it.
+      set%lam(1) = -3.0_wp
+      set%item(2)%is_mean = .false.
+      found = nodal_pull_t()
+      call nodal_pull_add(found, set, 5)
+      call check_near(error, found%pull, 3.0_wp, 8.0_wp*epsilon(1.0_wp), 1.0_wp, "a pull")
       set%n_permanent = 1
+      set%item(2)%is_mean = .true.
       found = nodal_pull_t()
       call nodal_pull_add(found, set, 5)
       call nodal_pull_text(found, text)

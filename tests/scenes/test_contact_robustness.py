@@ -5,8 +5,9 @@ import dataclasses
 import math
 
 import numpy as np
+import plain_scenes
 import pytest
-from plain_scenes import AUTO, BOTH, SCENES, Outcome
+from plain_scenes import AUTO, BOTH, SCENES, Outcome, below
 from scene_tools import EPSILON, Deck, number, run_one_sided
 
 MORTAR = {"formulation": "MORTAR"}
@@ -410,6 +411,23 @@ def test_nearly_coincident_nodes_and_ends(tmp_path, shift, choice):
     assert 1 < np.abs(force).max() <= 1346*0.2/0.8
     pressure = fields["contact_pressure"][-1]
     assert pressure.min() >= -1e-9*pressure.max()
+
+
+def test_what_goes_in_where_no_contact_acts_is_seen_in_a_smaller_increment(tmp_path):
+    """A block falls on a column that is softer and lighter than it, and on a plank below: what is
+    squeezed out between them goes by several edges in an increment."""
+    scene = plain_scenes.Scene(0.02, 0.6, gravity=10.0)
+    scene.block("BLOCK", (-0.4, 1.6), (1.0, 0.5), (5, 5), stiffness=300.0, velocity=(0.0, -0.3))
+    scene.block("PLANK", (-0.3, 0.1), (0.5, 0.2), (2, 1), density=0.1, velocity=(-0.3, 0.0))
+    scene.block("COLUMN", (-0.5, 0.3), (0.5, 1.0), (5, 5), stiffness=30.0, density=0.1,
+                velocity=(0.3, 0.0))
+    scene.block("FLOOR", (-2.0, -0.5), (4.0, 0.5), (13, 1))
+    scene.hold("FLOOR", below(-0.5))
+    done = Outcome(scene, tmp_path, AUTO, formulation="NODE TO SURFACE")
+    assert "bodies would overlap where no contact acts" in done.run.log
+    assert done.run.verdict["verdict"] == "good"
+    # A few roundings of the largest coordinate, by the shortest edge.
+    assert done.overlap.by_edge <= 64*EPSILON*2.0/0.05
 
 
 @every_choice

@@ -29,7 +29,9 @@ import shutil
 import subprocess
 import sys
 
-from traced_lines import KEPT, RELEASE, ROOT, Code, lines_of_runs, lines_of_suites
+sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
+from scene_tools import RUBBISH  # noqa: E402
+from traced_lines import KEPT, RELEASE, ROOT, Code, lines_of_runs, lines_of_suites  # noqa: E402
 
 FOLDERS = ["surfaces", "touch", "contact", "terms", "solid", "state", "active", "march"]
 GOAL = 0.95
@@ -228,7 +230,7 @@ class Trial:
         program = self.build.link("kernels", made, self.folder) if chosen else None
         for suite in chosen:
             limit = GRACE + SLOWER*suite.seconds
-            if call([program, suite.name], self.folder, limit).returncode != 0:
+            if call([program, suite.name], self.folder, limit, RUBBISH).returncode != 0:
                 return suite.name
         return ""
 
