@@ -71,9 +71,6 @@ contains
          if (pair(i)%slave == 0 .or. pair(i)%master == 0) cycle   ! its surface is unknown, and told
          call check_other_way(reader, pair(:i), given)
          if (.not. pair(i)%interaction%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
-         if (pair(i)%interaction%restitution < 1.0_wp) call refuse(reader, pair(i), &
-            "RESTITUTION below 1: velocities would " &
-            // "jump along the surface too; use RESTITUTION=1")
          do k = 1, size(step)
             call check_step(reader, pair(i), step(k), k)
          end do

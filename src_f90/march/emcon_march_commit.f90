@@ -208,7 +208,8 @@ contains
       if (step_initiation(scene%step(self%state%clock%i_step)) == initiation_velocity_update) then
          call restore_energy(self, notes, error)
       end if
-      if (has_inertia .and. .not. allocated(error)) call restitution_take(self, notes, error)
+      if (has_inertia .and. .not. allocated(error)) call restitution_take(self, h, &
+         notes, error)
       if (has_inertia) call quasi_static_move(self, h)
       if (has_inertia .and. self%layer%is_on .and. .not. allocated(error)) call end_massless(self, &
          h, notes, error)

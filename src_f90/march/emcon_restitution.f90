@@ -1,52 +1,101 @@
 !> Impacts that keep a part of their velocity: RESTITUTION below 1.
 !>
-!> A step that holds a gap reverses its rate. The part of that which is not kept is taken out by
-!> impulses along the normals: momenta stay, and the energy that goes is known.
-!> Source: docs/theory.md, eq. (22e).
+!> A step that holds a gap reverses its rate. What of that is not kept is taken out by impulses
+!> along normals, and along surfaces those by which friction is as the laws say for the impulses of
+!> step and jump together; so are rates at which the shape of rigid bodies would change: momenta
+!> stay, and the energy that goes is known.
+!> Source: docs/theory.md, eqs. (22e) and (22f).
 module emcon_restitution
-   use emcon_constraint, only : condition_rate
+   use emcon_constraint, only : condition_friction, condition_rate, most_slips
    use emcon_constraints, only : constraint_index
    use emcon_contact_law, only : contact_laws_rate_change
+   use emcon_contact_problem, only : contact_problem_create
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t
    use emcon_text, only : note_add, notes_t
-   use emcon_velocity_jumps, only : jumps_add
-   use emcon_velocity_update, only : rate_jump_t, velocity_update_change
+   use emcon_velocity_jumps, only : jumps_add, jumps_rub
+   use emcon_velocity_update, only : rate_jump_t, velocity_update_change, velocity_update_hold
    implicit none
    private
    public :: restitution_take
 
+   !> What is common to the impacts at the end of a step.
+   type :: impacts_t
+      real(wp) :: h                              !! of the step, > 0 [T]
+      integer :: n_slip                          !! of each; 0: friction stays as it is
+      real(wp), allocatable :: moved(:, :)       !! (n_dim, n_node) of velocities so far [L/T]
+   end type impacts_t
+
 contains
 
    !> Take out of the velocities at the end of the step what its impacts do not keep.
-   subroutine restitution_take(self, notes, error)
+   subroutine restitution_take(self, h, notes, error)
       type(march_t), intent(inout) :: self
+      real(wp), intent(in) :: h                  !! > 0 [T]
       type(notes_t), intent(inout) :: notes      !! for the log
       type(error_t), allocatable, intent(out) :: error
+      real(wp) :: v(size(self%end_state%v, 1), size(self%end_state%v, 2)), lost, gained
+      type(impacts_t) :: impacts
       type(rate_jump_t) :: jump
-      real(wp), allocatable :: lam(:)
 
       if (self%active%set%n == self%active%set%n_permanent .or. .not. is_asked(self)) return
-      call find_impacts(self, jump)
-      if (.not. any(jump%change < 0.0_wp)) return
-      associate (set => self%active%set, ledger => self%ledger)
-         call velocity_update_change(self%velocity_update, self%system, set, jump, &
+      v = self%end_state%v
+      call velocity_update_hold(self%velocity_update, self%system, self%active%set, &
+         self%end_state%v, lost, gained, error)
+      if (allocated(error)) return
+      call book(self, lost, gained)
+      impacts = impacts_t(h, self%active%friction%n_slip*merge(1, 0, self%active%friction%is_on), &
+         self%end_state%v - v)
+      call find_impacts(self, impacts, jump)
+      if (.not. any(abs(jump%problem%free(0, :)) > 0.0_wp)) return
+      call velocity_update_change(self%velocity_update, self%system, self%active%set, jump, &
+         self%end_state%v, error)
+      if (allocated(error)) return
+      if (.not. (jump%is_done .or. jump%is_idle) .and. impacts%n_slip > 0) then
+         ! Along normals alone it makes no energy where all keep the same part.
+         impacts%n_slip = 0
+         call find_impacts(self, impacts, jump)
+         call velocity_update_change(self%velocity_update, self%system, self%active%set, jump, &
             self%end_state%v, error)
          if (allocated(error)) return
-         if (.not. jump%is_done) then
-            call note_add(notes, "contacts that close in this step rebound fully, whatever their " &
-               // "RESTITUTION says: they depend on each other")
-            return
-         end if
-         ledger%external_work = ledger%external_work + (jump%gained + jump%lost)
-         ledger%contact_work = ledger%contact_work - jump%lost
-         ledger%restitution = ledger%restitution + jump%lost
-         allocate(lam(set%n), source=0.0_wp)
-         lam(jump%row) = jump%impulse
-         call jumps_add(self%end_state%jump, set, lam)
-      end associate
+      end if
+      if (jump%is_done) then
+         call book(self, jump%lost, jump%gained + sum(jump%rubbed))
+         call book_impulses(self, jump)
+      else if (.not. jump%is_idle) then
+         call note_add(notes, "contacts that close in this step rebound fully, whatever their " &
+            // "RESTITUTION says: with it they would gain energy")
+      end if
    end subroutine restitution_take
+
+   !> Energies of a jump that was taken, beside that of friction.
+   pure subroutine book(self, lost, gained)
+      type(march_t), intent(inout) :: self
+      real(wp), intent(in) :: lost               !! >= 0 up to round-off [M L^2/T^2]
+      real(wp), intent(in) :: gained             !! of kinetic energy [M L^2/T^2]
+
+      associate (ledger => self%ledger)
+         ledger%external_work = ledger%external_work + (gained + lost)
+         ledger%contact_work = ledger%contact_work - lost
+         ledger%restitution = ledger%restitution + max(0.0_wp, lost)
+      end associate
+   end subroutine book
+
+   !> The impulses of a jump that was taken, and what friction takes by them.
+   pure subroutine book_impulses(self, jump)
+      type(march_t), intent(inout) :: self
+      type(rate_jump_t), intent(in) :: jump
+      real(wp) :: impulse(0:jump%problem%n_slip, self%active%set%n), rubbed(self%active%set%n)
+
+      self%ledger%friction = self%ledger%friction + sum(jump%rubbed)
+      impulse = 0.0_wp
+      rubbed = 0.0_wp
+      impulse(:, jump%row) = jump%impulse
+      rubbed(jump%row) = jump%rubbed
+      call jumps_add(self%end_state%jump, self%active%set, impulse(0, :))
+      call jumps_rub(self%end_state%jump, self%active%set, impulse(1:, :), rubbed)
+   end subroutine book_impulses
 
    !> Has some pair a law that changes rates?
    pure logical function is_asked(self)
@@ -61,36 +110,74 @@ contains
       end do
    end function is_asked
 
-   !> The conditions that an impact has to do with, their rates at the end of the step and by how
-   !> much these are to change: a gap that was held and opens keeps a part of its rate. What acts on
-   !> nodes without mass is left out: no impulse acts there.
-   subroutine find_impacts(self, jump)
+   !> The contacts that an impact has to do with, what they have done in the step, and what laws
+   !> make of them: a gap keeps a part of its rate, or opens faster where nothing is left to push.
+   pure subroutine find_impacts(self, impacts, jump)
       type(march_t), intent(in) :: self
+      type(impacts_t), intent(in) :: impacts
       type(rate_jump_t), intent(out) :: jump
-      real(wp) :: rate(self%active%set%n), change(size(rate))
-      logical :: is_row(size(rate))
-      integer :: k, i, pair
+      integer :: k, id, i, pair
 
-      change = 0.0_wp
       associate (set => self%active%set)
-         is_row = [(k > set%n_linear, k = 1, set%n)]
-         do k = set%n_linear + 1, set%n
-            rate(k) = condition_rate(set%item(k), self%end_state%v)
-            call constraint_index(self%system, set%id(k), pair, i)
-            if (pair == 0) cycle
-            associate (contact => self%system%contact(pair)%contact, &
-                  node => set%item(k)%node(:set%item(k)%n_node))
-               is_row(k) = .not. any(self%massless%without_density(node))
-               if (self%layer%is_on) then
-                  is_row(k) = is_row(k) .and. .not. any(self%layer%is_massless(node))
-               end if
-               if (is_row(k)) change(k) = contact_laws_rate_change(contact%laws, rate(k))
-            end associate
+         jump%row = pack([(k, k = 1, set%n)], has_impact(self))
+         call contact_problem_create(jump%problem, impacts%n_slip, size(jump%row))
+         allocate(jump%rate(0:impacts%n_slip, size(jump%row)), jump%taken(size(jump%row)), &
+            source=0.0_wp)
+         do k = 1, size(jump%row)
+            id = set%id(jump%row(k))
+            call constraint_index(self%system, id, pair, i)
+            jump%rate(0, k) = condition_rate(set%item(jump%row(k)), self%end_state%v)
+            jump%problem%free(0, k) = -contact_laws_rate_change( &
+               self%system%contact(pair)%contact%laws, jump%rate(0, k))
+            jump%problem%base(0, k) = impacts%h*set%lam(jump%row(k)) &
+               + sum(pack(self%end_state%jump%lam, self%end_state%jump%id == id))
+            if (impacts%n_slip > 0 .and. set%item(jump%row(k))%has_friction) call find_rubbing( &
+               self, impacts, jump, k)
          end do
-         jump%row = pack([(k, k = 1, set%n)], is_row)
-         jump%rate = rate(jump%row)
-         jump%change = change(jump%row)
       end associate
    end subroutine find_impacts
+
+   !> The same along the surface, for place `k` of the jump. Slips are by half of the size of the
+   !> step: twice their mean rates, so that what changes a rate at the end changes them by as much.
+   pure subroutine find_rubbing(self, impacts, jump, k)
+      type(march_t), intent(in) :: self
+      type(impacts_t), intent(in) :: impacts
+      type(rate_jump_t), intent(inout) :: jump
+      integer, intent(in) :: k
+      real(wp) :: tau(most_slips)
+      integer :: s
+
+      associate (item => self%active%set%item(jump%row(k)), problem => jump%problem, &
+            law => self%active%friction%law(self%active%set%id(jump%row(k))))
+         tau = condition_friction(item, self%active%set%lam(jump%row(k)))
+         jump%taken(k) = dot_product(tau, item%slip)
+         problem%mu(k) = law%mu*item%normal
+         do s = 1, problem%n_slip
+            jump%rate(s, k) = condition_rate(item, self%end_state%v, s)
+            problem%base(s, k) = impacts%h*tau(s)
+            problem%free(s, k) = condition_rate(item, impacts%moved, s) &
+               - 2.0_wp/impacts%h*item%slip(s)
+            problem%slip_target(s, k) = 2.0_wp/impacts%h*law%slip_target(s)
+         end do
+      end associate
+   end subroutine find_rubbing
+
+   !> Which conditions of the set are contacts of what has mass?
+   pure function has_impact(self)
+      type(march_t), intent(in) :: self
+      logical :: has_impact(self%active%set%n)
+      integer :: k
+
+      has_impact = .false.
+      associate (set => self%active%set)
+         do k = set%n_permanent + 1, set%n
+            associate (node => set%item(k)%node(:set%item(k)%n_node))
+               has_impact(k) = .not. any(self%massless%without_density(node))
+               if (self%layer%is_on) has_impact(k) = has_impact(k) &
+                  .and. .not. any(self%layer%is_massless(node))
+            end associate
+         end do
+      end associate
+   end function has_impact
 
 end module emcon_restitution

@@ -5,8 +5,11 @@
 !> bodies apart and keeps the momenta. Source: Laursen & Love (2002); docs/theory.md,
 !> eqs. (21) and (22).
 module emcon_velocity_update
-   use emcon_constraint, only : condition_add_field, condition_t
+   use emcon_constraint, only : condition_add_field, condition_rate, condition_row_gradient, &
+      condition_t
    use emcon_constraints, only : constraint_set_t
+   use emcon_contact_problem, only : contact_effort_t, contact_problem_missed, &
+      contact_problem_solve, contact_problem_t, met, nearly_met
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
@@ -22,10 +25,12 @@ module emcon_velocity_update
    private
    public :: push_t, velocity_update_t, velocity_update_reset, velocity_update_apply, &
       velocity_update_push, velocity_update_free, push_weights, rate_jump_t, &
-      velocity_update_change, velocity_update_accelerate
+      velocity_update_change, velocity_update_hold, velocity_update_accelerate
 
    !> Contacts that stay closed keep gaps of this size relative to an edge: round-off, no loss.
    real(wp), parameter :: gap_noise = 64.0_wp*epsilon(1.0_wp)
+   !> Jumps make no energy that is less than this part of what they move: a sum of some products.
+   real(wp), parameter :: rounded = 64.0_wp*epsilon(1.0_wp)
 
    !> A push that is to give energy.
    type :: push_t
@@ -33,18 +38,31 @@ module emcon_velocity_update
       real(wp) :: gain = 0.0_wp                  !! [M L^2/T^2]
    end type push_t
 
-   !> A jump that changes the rates C v of conditions by impulses along their gradients C.
+   !> A jump that changes the rates of contacts by impulses along the gradients C of their gaps and
+   !> slips, as laws say that take impulses and rates for forces and motions.
    type :: rate_jump_t
       integer, allocatable :: row(:)             !! (n) which conditions of the set
-      real(wp), allocatable :: rate(:)           !! (n) before [L/T]
-      real(wp), allocatable :: change(:)         !! (n) [L/T]
-      logical :: is_done = .false.               !! .false.: they depend on each other, or it would
-                                                 !! make energy
-      real(wp), allocatable :: impulse(:)        !! (n) [M L/T]
-      real(wp) :: lost = 0.0_wp                  !! in the conditions, >= 0 [M L^2/T^2]
-      real(wp) :: gained = 0.0_wp                !! of kinetic energy; more than -lost: by what is
-                                                 !! driven [M L^2/T^2]
+      !> Laws and what the step has done; W [1/M] is found
+      type(contact_problem_t) :: problem
+      !> (0:n_slip, n) of gaps, and of slips the other way round, before [L/T]
+      real(wp), allocatable :: rate(:, :)
+      logical :: is_done = .false.               !! .false.: there is none to take, or it would make
+                                                 !! energy
+      logical :: is_idle = .false.               !! laws are met without it, to round-off
+      real(wp), allocatable :: taken(:)          !! (n) by friction in the step [M L^2/T^2]
+      real(wp), allocatable :: impulse(:, :)     !! (0:n_slip, n) added [M L/T]
+      real(wp), allocatable :: rubbed(:)         !! (n) what friction takes more by them, or less
+                                                 !! [M L^2/T^2]
+      real(wp) :: lost = 0.0_wp                  !! beside that, >= 0 up to round-off [M L^2/T^2]
+      real(wp) :: gained = 0.0_wp                !! of kinetic energy; more than -lost - sum(rubbed)
+                                                 !! by what is driven [M L^2/T^2]
    end type rate_jump_t
+
+   !> What an impulse acts along.
+   type :: row_t
+      integer :: condition                       !! of the set
+      integer :: slip = 0                        !! of it; 0: the gap
+   end type row_t
 
    !> The kinetic energy that s times a jump gives: s b + s^2 a/2.
    type :: gain_t
@@ -132,7 +150,8 @@ contains
       if (has_root) call add_jump(self, system, part, v)
    end subroutine velocity_update_push
 
-   !> Add to `v` the jump M^-1 C^T mu with C M^-1 C^T mu = `change`: docs/theory.md, eq. (22e).
+   !> Add to `v` the jump M^-1 C^T y of impulses that obey the laws of `jump`, if it makes no
+   !> energy: docs/theory.md, eqs. (22e) and (22f).
    subroutine velocity_update_change(self, system, set, jump, v, error)
       type(velocity_update_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -140,31 +159,121 @@ contains
       type(rate_jump_t), intent(inout) :: jump
       real(wp), intent(inout), contiguous :: v(:, :)     !! (n_dim, n_node)
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: momentum(size(v, 1), size(v, 2))
-      real(wp), allocatable :: row(:, :), response(:, :)
-      real(dp) :: product(size(jump%row), size(jump%row)), mu(size(jump%row), 1)
+      real(wp) :: momentum(size(v, 1), size(v, 2)), after(size(jump%rate, 1), size(jump%rate, 2))
+      real(wp), allocatable :: response(:, :)
+      type(contact_effort_t) :: effort
       logical :: is_singular
 
       jump%is_done = .false.
+      jump%is_idle = .true.
       if (.not. self%is_ready) call factorise_mass(self, system, error)
       if (allocated(error)) return
       if (self%mass%is_singular) return
-      call find_responses(self, system, set, jump%row, row, response, error)
-      if (allocated(error)) return
-      product = real(matmul(transpose(row), response), dp)
-      call dense_solve(product, reshape(real(jump%change, dp), shape(mu)), mu, is_singular)
-      if (is_singular) return
-      jump%impulse = real(mu(:, 1), wp)
-      jump%lost = -dot_product(jump%impulse, jump%rate + 0.5_wp*jump%change)
-      jump%is_done = jump%lost >= 0.0_wp
+      call find_compliance(self, system, set, jump, response, is_singular, error)
+      if (allocated(error) .or. is_singular) return
+      if (allocated(jump%impulse)) deallocate(jump%impulse)
+      allocate(jump%impulse(0:jump%problem%n_slip, size(jump%row)), source=0.0_wp)
+      jump%is_idle = contact_problem_missed(jump%problem, jump%impulse) <= met
+      if (jump%is_idle) return
+      call contact_problem_solve(jump%problem, jump%impulse, effort, jump%is_done)
+      if (jump%is_done) jump%is_done = contact_problem_missed(jump%problem, jump%impulse) &
+         <= nearly_met
       if (.not. jump%is_done) return
-      self%jump = matmul(response, jump%impulse)
+      after = reshape(matmul(jump%problem%w, reshape(jump%impulse, [size(after)])), shape(after))
+      call measure_losses(jump, after)
+      if (.not. jump%is_done) return
+      self%jump = matmul(response, reshape(jump%impulse, [size(jump%impulse)]))
       call mass_times(system, v, momentum)
       call pick(system, momentum, self%push)
-      jump%gained = dot_product(self%push, self%jump) &
-         + 0.5_wp*dot_product(jump%impulse, jump%change)
+      jump%gained = dot_product(self%push, self%jump) + 0.5_wp*sum(jump%impulse*after)
       call add_jump(self, system, 1.0_wp, v)
    end subroutine velocity_update_change
+
+   !> What friction and the rest take by the impulses of a jump; it is none if the rest would give.
+   pure subroutine measure_losses(jump, change)
+      type(rate_jump_t), intent(inout) :: jump
+      real(wp), intent(in) :: change(0:, :)      !! (0:n_slip, n) of rates by it [L/T]
+      real(wp), dimension(size(jump%row)) :: taken, uncertain
+
+      ! Slips are by half of the size of the step, so that they are twice their mean rates.
+      associate (problem => jump%problem, more => jump%impulse, s => jump%problem%n_slip)
+         taken = -0.5_wp*sum((problem%base(1:s, :) + more(1:s, :)) &
+            *(problem%free(1:s, :) + change(1:s, :)), 1)
+         uncertain = sum((abs(problem%base(1:s, :)) + abs(more(1:s, :))) &
+            *(abs(problem%free(1:s, :)) + abs(change(1:s, :))), 1) &
+            + sum(abs(more)*(abs(jump%rate) + abs(change)), 1)
+         jump%rubbed = taken - jump%taken
+         jump%lost = -sum(more*(jump%rate + 0.5_wp*change)) - sum(jump%rubbed)
+         jump%is_done = jump%lost >= -rounded*sum(uncertain)
+      end associate
+   end subroutine measure_losses
+
+   !> Take out of `v` the rates of conditions that always hold and are not linear, as rigid bodies
+   !> have none. `lost` is the energy that goes, `gained` that which comes into all that moves.
+   subroutine velocity_update_hold(self, system, set, v, lost, gained, error)
+      type(velocity_update_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(inout), contiguous :: v(:, :)     !! (n_dim, n_node)
+      real(wp), intent(out) :: lost              !! >= 0 [M L^2/T^2]
+      real(wp), intent(out) :: gained            !! -lost but for work of what is driven [M L^2/T^2]
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), allocatable :: jump(:, :)
+      real(wp) :: moved(size(v, 1), size(v, 2)), momentum(size(v, 1), size(v, 2))
+      logical :: is_singular
+      integer :: k
+
+      lost = 0.0_wp
+      gained = 0.0_wp
+      if (set%n_permanent == set%n_linear) return
+      if (.not. self%is_ready) call factorise_mass(self, system, error)
+      if (allocated(error)) return
+      if (self%mass%is_singular) return
+      jump = reshape(0.0_wp*self%jump, [size(self%jump), 1])
+      call keep_held(self, system, set, error, jump, is_singular, &
+         [(-condition_rate(set%item(k), v), k = set%n_linear + 1, set%n_permanent)])
+      if (allocated(error) .or. is_singular) return
+      self%jump = jump(:, 1)
+      call mass_times(system, v, momentum)
+      call pick(system, momentum, self%push)
+      gained = dot_product(self%push, self%jump)
+      moved = 0.0_wp
+      call add_jump(self, system, 1.0_wp, moved)
+      call mass_times(system, moved, momentum)
+      call pick(system, momentum, self%push)
+      lost = 0.5_wp*dot_product(self%push, self%jump)
+      gained = gained + lost
+      v = v + moved
+   end subroutine velocity_update_hold
+
+   !> What impulses of 1 in gaps and slips move, such that conditions that always hold go on to
+   !> hold, and W of the problem. A contact without friction has no slips to solve for.
+   subroutine find_compliance(self, system, set, jump, response, is_singular, error)
+      type(velocity_update_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      type(rate_jump_t), intent(inout) :: jump
+      real(wp), allocatable, intent(out) :: response(:, :)   !! (n_unknown, (1 + n_slip) n)
+      logical, intent(out) :: is_singular                    !! conditions that always hold depend
+      type(error_t), allocatable, intent(out) :: error       !! on each other
+      real(wp), allocatable :: row(:, :)
+      integer :: i, k, s
+
+      associate (n => size(jump%row), m => 1 + jump%problem%n_slip, w => jump%problem%w)
+         call find_responses(self, system, set, [((row_t(jump%row(k), s), s = 0, m - 1), &
+            k = 1, n)], row, response, error)
+         if (allocated(error)) return
+         call keep_held(self, system, set, error, response, is_singular)
+         if (allocated(error)) return
+         w = matmul(transpose(row), response)
+         do k = 1, n
+            if (set%item(jump%row(k))%has_friction) cycle
+            do i = m*(k - 1) + 2, m*k
+               w(i, i) = w(m*(k - 1) + 1, m*(k - 1) + 1)
+            end do
+         end do
+      end associate
+   end subroutine find_compliance
 
    !> The acceleration M^-1 `force` of what moves with `v`, such that conditions that always hold go
    !> on to hold.
@@ -176,6 +285,8 @@ contains
       real(wp), intent(in), contiguous :: v(:, :)        !! (n_dim, n_node) [L/T]
       real(wp), intent(out), contiguous :: acceleration(:, :)   !! (n_dim, n_node) [L/T^2]
       type(error_t), allocatable, intent(out) :: error
+      real(wp), allocatable :: jump(:, :)
+      logical :: is_singular
       integer :: k
 
       acceleration = 0.0_wp
@@ -184,9 +295,13 @@ contains
       if (self%mass%is_singular) return
       call pick(system, force, self%push)
       call self%mass%solve(self%push, self%jump, error)
-      if (.not. allocated(error)) call keep_held(self, system, held, error, &
+      if (allocated(error)) return
+      jump = reshape(self%jump, [size(self%jump), 1])
+      call keep_held(self, system, held, error, jump, is_singular, &
          [(-bend(held%item(k), v), k = held%n_linear + 1, held%n_permanent)])
-      if (.not. allocated(error)) call add_jump(self, system, 1.0_wp, acceleration)
+      if (allocated(error)) return
+      self%jump = jump(:, 1)
+      call add_jump(self, system, 1.0_wp, acceleration)
    end subroutine velocity_update_accelerate
 
    !> The second derivative of a condition along `v`.
@@ -209,6 +324,8 @@ contains
       type(gain_t), intent(out) :: gain
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: momentum(size(v, 1), size(v, 2))
+      real(wp), allocatable :: jump(:, :)
+      logical :: is_singular
 
       self%part = 0.0_wp
       if (.not. self%is_ready) call factorise_mass(self, system, error)
@@ -216,8 +333,11 @@ contains
       if (self%mass%is_singular) return
       call pick(system, force, self%push)
       call self%mass%solve(self%push, self%jump, error)
-      if (.not. allocated(error)) call keep_held(self, system, set, error)
       if (allocated(error)) return
+      jump = reshape(self%jump, [size(self%jump), 1])
+      call keep_held(self, system, set, error, jump, is_singular)
+      if (allocated(error)) return
+      self%jump = jump(:, 1)
       gain%a = dot_product(self%push, self%jump)
       call mass_times(system, v, momentum)
       call pick(system, momentum, self%push)
@@ -237,52 +357,54 @@ contains
       end if
    end subroutine pick
 
-   !> Take out of the jump what conditions that always hold, and are not linear, forbid: add
-   !> M^-1 C^T mu such that C times the jump is 0, or `wanted`, with their gradients C at the end of
+   !> Take out of jumps what conditions that always hold, and are not linear, forbid: add
+   !> M^-1 C^T mu such that C times a jump is 0, or `wanted`, with their gradients C at the end of
    !> the step.
-   subroutine keep_held(self, system, set, error, wanted)
+   subroutine keep_held(self, system, set, error, jump, is_singular, wanted)
       type(velocity_update_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(inout) :: jump(:, :)          !! (n_unknown, any)
+      logical, intent(out) :: is_singular            !! the jumps are as they were
       real(wp), intent(in), optional :: wanted(:)    !! (conditions that are not linear)
       real(wp), allocatable :: row(:, :), response(:, :)
-      real(dp), dimension(set%n_permanent - set%n_linear, 1) :: rate, mu
-      real(dp) :: product(size(rate), size(rate))
-      integer :: k, l
-      logical :: is_singular
+      real(dp), dimension(set%n_permanent - set%n_linear, size(jump, 2)) :: rate, mu
+      real(dp) :: product(size(rate, 1), size(rate, 1))
+      integer :: k
 
+      is_singular = .false.
       if (size(rate) == 0) return
-      call find_responses(self, system, set, [(k, k = set%n_linear + 1, set%n_permanent)], row, &
-         response, error)
+      call find_responses(self, system, set, [(row_t(k), k = set%n_linear + 1, &
+         set%n_permanent)], row, response, error)
       if (allocated(error)) return
-      do k = 1, size(rate)
-         rate(k, 1) = -real(dot_product(row(:, k), self%jump), dp)
-         if (present(wanted)) rate(k, 1) = rate(k, 1) + real(wanted(k), dp)
-         do l = 1, k
-            product(l, k) = real(dot_product(row(:, l), response(:, k)), dp)
-            product(k, l) = product(l, k)
-         end do
-      end do
+      rate = -real(matmul(transpose(row), jump), dp)
+      if (present(wanted)) rate = rate + spread(real(wanted, dp), 2, size(jump, 2))
+      product = real(matmul(transpose(row), response), dp)
       call dense_solve(product, rate, mu, is_singular)
-      if (.not. is_singular) self%jump = self%jump + matmul(response, real(mu(:, 1), wp))
+      if (.not. is_singular) jump = jump + matmul(response, real(mu, wp))
    end subroutine keep_held
 
-   !> Gradients of conditions at the end of the step, and what impulses of 1 along them move.
+   !> Gradients of gaps and slips of conditions at the end of the step, and what impulses of 1 along
+   !> them move. Without friction those of slips are 0.
    subroutine find_responses(self, system, set, which, row, response, error)
       type(velocity_update_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
-      integer, intent(in) :: which(:)            !! (n) of the conditions of the set
+      type(row_t), intent(in) :: which(:)        !! (n)
       real(wp), allocatable, intent(out) :: row(:, :), response(:, :) !! (n_unknown, n) C, M^-1 C^T
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: field(size(system%space%is_alive, 1), size(system%space%is_alive, 2))
       integer :: k
 
-      allocate(row(size(self%jump), size(which)), response(size(self%jump), size(which)))
+      allocate(row(size(self%jump), size(which)), response(size(self%jump), size(which)), &
+         source=0.0_wp)
       do k = 1, size(which)
-         field = 0.0_wp
-         call condition_add_field(set%item(which(k)), 1.0_wp, set%item(which(k))%c, field)
+         associate (item => set%item(which(k)%condition), slip => which(k)%slip)
+            if (slip > 0 .and. .not. item%has_friction) cycle
+            field = 0.0_wp
+            call condition_add_field(item, 1.0_wp, condition_row_gradient(item, slip), field)
+         end associate
          call pick(system, field, row(:, k))
          call self%mass%solve(row(:, k), response(:, k), error)
          if (allocated(error)) return

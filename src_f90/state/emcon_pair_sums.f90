@@ -171,6 +171,7 @@ contains
             if (self%of_pair(contact) < 0) signed = -signed
             sum_of%push(:n) = sum_of%push(:n) + signed
             sum_of%impulse(:n) = sum_of%impulse(:n) + signed
+            sum_of%friction = sum_of%friction + jump(k)%rubbed
          end associate
       end do
    end subroutine pair_sums_jump

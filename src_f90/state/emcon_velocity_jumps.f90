@@ -2,13 +2,13 @@
 !>
 !> They act in no time: what tells contact forces has them as means over the step.
 module emcon_velocity_jumps
-   use emcon_constraint, only : condition_t
+   use emcon_constraint, only : condition_row_gradient, condition_t
    use emcon_constraints, only : constraint_set_t
    use emcon_kinds, only : wp
    use emcon_rotation, only : add_moments, n_turn
    implicit none
    private
-   public :: velocity_jump_t, jumps_begin, jumps_add, jumps_join, jumps_scale
+   public :: velocity_jump_t, jumps_begin, jumps_add, jumps_rub, jumps_join, jumps_scale
 
    !> The impulse of one contact constraint.
    type :: velocity_jump_t
@@ -20,6 +20,7 @@ module emcon_velocity_jumps
       !> Moments on either side beside those of the impulses where the nodes end up, as forces that
       !> stay go with nodes that move [M L^2/T]
       real(wp), allocatable :: slave_moment(:), master_moment(:)   !! (1 or 3)
+      real(wp) :: rubbed = 0.0_wp                !! what friction takes more by it [M L^2/T^2]
    end type velocity_jump_t
 
 contains
@@ -54,6 +55,26 @@ contains
       end do
       call jumps_join(jump, more)
    end subroutine jumps_add
+
+   !> Add to the impulses that were appended last for `set` those of friction, against slips at the
+   !> end of the step.
+   pure subroutine jumps_rub(jump, set, drag, rubbed)
+      type(velocity_jump_t), intent(inout) :: jump(:)    !! of `jumps_add`
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in) :: drag(:, :)         !! (slips, n of the set) [M L/T]
+      real(wp), intent(in) :: rubbed(:)          !! (n of the set) what that takes [M L^2/T^2]
+      integer :: k, s
+
+      do k = set%n_permanent + 1, set%n
+         if (.not. set%item(k)%has_friction) cycle
+         associate (own => jump(size(jump) + k - set%n))
+            own%rubbed = rubbed(k)
+            do s = 1, size(drag, 1)
+               own%impulse = own%impulse + drag(s, k)*condition_row_gradient(set%item(k), s)
+            end do
+         end associate
+      end do
+   end subroutine jumps_rub
 
    !> Append others.
    pure subroutine jumps_join(jump, more)

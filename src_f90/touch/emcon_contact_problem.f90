@@ -5,9 +5,10 @@
 !> as W was found where nothing else holds bodies. By Newton's method for the natural map of all of
 !> them at once, which is a trial of the law at every place; where that does not come to an end
 !> place by place, each exactly, until nothing changes (Gauss and Seidel), which needs no inverse,
-!> so that contacts that follow from others do no harm; the two take turns. Last, in the plane, by
-!> the method of Lemke for (lam, tau+, tau-, rest of the cone), whose matrix is copositive. Where W
-!> is positive definite there is a solution for any coefficient. Source: docs/theory.md, eq. (14i).
+!> so that contacts that follow from others do no harm; the two take turns. After two of them, in
+!> the plane, by the method of Lemke for forces that push at a and at 0, whose matrix is copositive.
+!> Where W is positive definite there is a solution for any coefficient.
+!> Source: docs/theory.md, eq. (14i).
 module emcon_contact_problem
    use emcon_constraint, only : most_slips
    use emcon_coulomb_law, only : contact_trial_t, coulomb_map, coulomb_status, slip_status_t
@@ -22,15 +23,16 @@ module emcon_contact_problem
       contact_problem_stiffness, contact_problem_pivot
 
    !> Trials of all places at once at first, and when their turn comes again; sweeps in the first
-   !> turn, twice as many in each that follows; turns.
-   integer, parameter :: first_trials = 60, more_trials = 20, first_sweeps = 20, most_turns = 8
+   !> turn, twice as many in each that follows; turns; after this one comes the method of Lemke.
+   integer, parameter :: first_trials = 60, more_trials = 20, first_sweeps = 20, most_turns = 8, &
+      pivot_turn = 2
    !> Halvings of a step of Newton's method, and the part of what is foreseen that it is to gain.
    integer, parameter :: most_halvings = 12
    real(wp), parameter :: least_gain = 1.0e-4_wp
    !> The law is met where it is missed by less than this part of the largest force: by what a solve
    !> in double precision leaves of some hundred forces. Where no turn comes to that W is nearly
    !> singular, and what moves nothing may be missed by more.
-   real(wp), parameter :: met = 1.0e4_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp)), &
+   real(wp), parameter, public :: met = 1.0e4_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp)), &
       nearly_met = 50.0_wp*met
    !> What gives way with nothing but contact to hold it does so by this part of c.
    real(dp), parameter :: freely = sqrt(epsilon(1.0_dp))
@@ -94,13 +96,12 @@ contains
          if (is_solved) return
          call solve_by_trials(self, push, more_trials, effort%n_trial, is_solved)
          if (is_solved) return
+         if (turn /= pivot_turn .or. self%n_slip /= 1 .or. any(self%hold > 0.0_wp)) cycle
+         call contact_problem_pivot(self, push, effort%n_pivot, is_solved)
+         if (is_solved) return
       end do
       is_solved = contact_problem_missed(self, push) <= nearly_met
-      if (is_solved .or. self%n_slip /= 1) return
-      if (.not. any(self%hold > 0.0_wp)) then
-         call contact_problem_pivot(self, push, effort%n_pivot, is_solved)
-         return
-      end if
+      if (is_solved .or. self%n_slip /= 1 .or. .not. any(self%hold > 0.0_wp)) return
       call let_go(self, apart)
       call contact_problem_pivot(apart, push, effort%n_pivot, is_solved)
       if (.not. is_solved) return
@@ -462,16 +463,18 @@ contains
       end do
    end subroutine add_motion
 
-   !> In the plane, by complementary pivoting over (lam, tau+, tau-, mu lam - |tau|), with slips
-   !> from a: what is free before that, or rests, is for others to find.
+   !> In the plane, by complementary pivoting over (lam, tau+, tau-, gamma+, gamma-): with slip
+   !> counted towards a, 0 <= tau+ <= mu lam pushes back what is at a or past it, and
+   !> 0 <= tau- <= mu lam what is at 0 or before it; tau = tau+ - tau-, gamma is how far past.
    subroutine contact_problem_pivot(self, push, n_pivot, is_solved)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:1, n) y [M L/T^2]
       integer, intent(out) :: n_pivot                !! pivots that were taken
       logical, intent(out) :: is_solved              !! else `push` is as it was
-      real(wp), dimension(4*size(self%mu), 4*size(self%mu)) :: m
-      real(wp), dimension(4*size(self%mu)) :: q, z
-      real(wp) :: unit, length, free(0:1, size(self%mu))
+      real(wp), dimension(5*size(self%mu), 5*size(self%mu)) :: m
+      real(wp), dimension(5*size(self%mu)) :: q, z
+      real(wp), dimension(size(self%mu), size(self%mu)) :: w_nt, w_tn, w_tt
+      real(wp) :: unit, length, free(0:1, size(self%mu)), sense(size(self%mu))
       integer :: i, n
 
       n = size(self%mu)
@@ -479,24 +482,28 @@ contains
       length = maxval(abs(self%w))
       free = motion_of(self, -self%base)
       unit = max(maxval(abs(free)), maxval(abs(self%slip_target)), tiny(unit))
+      sense = sign(1.0_wp, self%slip_target(1, :))
+      w_nt = self%w(1::2, 2::2)/length*spread(sense, 1, n)
+      w_tn = self%w(2::2, 1::2)/length*spread(sense, 2, n)
+      w_tt = self%w(2::2, 2::2)/length*spread(sense, 1, n)*spread(sense, 2, n)
       m = 0.0_wp
-      q = 0.0_wp
-      associate (w => self%w/length, slips => free(1, :) + self%slip_target(1, :))
-         m(:n, :3*n) = reshape([w(1::2, 1::2), w(1::2, 2::2), -w(1::2, 2::2)], [n, 3*n])
-         m(n + 1:2*n, :3*n) = reshape([w(2::2, 1::2), w(2::2, 2::2), -w(2::2, 2::2)], [n, 3*n])
-         m(2*n + 1:3*n, :3*n) = -m(n + 1:2*n, :3*n)
-         q(:3*n) = [free(0, :), slips, -slips]/unit
-      end associate
+      m(:n, :3*n) = reshape([self%w(1::2, 1::2)/length, w_nt, -w_nt], [n, 3*n])
+      m(n + 1:2*n, :3*n) = reshape([w_tn, w_tt, -w_tt], [n, 3*n])
+      m(2*n + 1:3*n, :3*n) = -m(n + 1:2*n, :3*n)
       do i = 1, n
-         m([n + i, 2*n + i], 3*n + i) = 1.0_wp
-         m(3*n + i, i) = self%mu(i)
-         m(3*n + i, [n + i, 2*n + i]) = -1.0_wp
+         m(n + i, 3*n + i) = 1.0_wp
+         m(2*n + i, 4*n + i) = 1.0_wp
+         m([3*n + i, 4*n + i], i) = self%mu(i)
+         m(3*n + i, n + i) = -1.0_wp
+         m(4*n + i, 2*n + i) = -1.0_wp
       end do
+      q = 0.0_wp
+      q(:3*n) = [free(0, :), abs(self%slip_target(1, :)) + sense*free(1, :), -sense*free(1, :)]/unit
       call lemke_solve(m, q, z, is_solved, n_pivot)
       if (.not. is_solved) return
       z = (unit/length)*z
       push(0, :) = z(:n) - self%base(0, :)
-      push(1, :) = z(n + 1:2*n) - z(2*n + 1:3*n) - self%base(1, :)
+      push(1, :) = sense*(z(n + 1:2*n) - z(2*n + 1:3*n)) - self%base(1, :)
    end subroutine contact_problem_pivot
 
 end module emcon_contact_problem

@@ -1,4 +1,5 @@
-!> Restitution below 1: of the rate with which a gap opens after an impact a part is kept.
+!> Restitution below 1: of the rate of a gap that an impact has reversed a part is kept, whether it
+!> opens or closes.
 !> Source: docs/theory.md, eq. (22e).
 module emcon_restitution_law
    use emcon_constraint, only : contact_response_t
@@ -48,7 +49,7 @@ contains
       class(restitution_t), intent(in) :: self
       real(wp), intent(in) :: rate               !! [L/T]
 
-      rate_change = (self%part - 1.0_wp)*max(0.0_wp, rate)
+      rate_change = (self%part - 1.0_wp)*rate
    end function rate_change
 
 end module emcon_restitution_law

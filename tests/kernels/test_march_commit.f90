@@ -446,8 +446,7 @@ contains
             do i = 1, set%n
                rate = rate_of(set%item(i), march%state%v)
                rebound = rate_of(set%item(i), 2.0_wp*motion%du/h - motion%v0)
-               call check_near(error, rate, merge(kept, 1.0_wp, rebound > 0.0_wp)*rebound, tol, &
-                  1.0_wp, "rate")
+               call check_near(error, rate, kept*rebound, tol, 1.0_wp, "rate")
                if (rebound > 0.01_wp) n_impact = n_impact + 1
             end do
          end associate

@@ -1,0 +1,176 @@
+"""Rigid bodies with friction and restitution: they rebound, roll, slide and come to rest."""
+
+import math
+
+import numpy as np
+import pytest
+from scene_tools import Deck, run_deck
+
+#: Sums of some hundred products in double precision.
+ROUND = 1e-13
+
+
+def balance(history):
+    total = history["total"] - history["contact_work"] + history["friction_loss"]
+    return np.abs(total - total[0]).max()/(history["kinetic"].max() + 1e-300)
+
+
+def holds_laws(history):
+    """Energies close, and neither impacts nor friction give any."""
+    scale = history["kinetic"].max()
+    assert balance(history) < 1e-11
+    for name in ("restitution_loss", "friction_loss", "pair1_friction_loss"):
+        assert np.diff(history[name]).min() > -ROUND*scale, name
+
+
+PLANE = """*SURFACE, NAME=GROUND, TYPE=SEGMENTS
+START, -100., 0.
+LINE, 100., 0.
+*RIGID BODY, ANALYTICAL SURFACE=GROUND, REF NODE=10
+"""
+
+
+def scene(points, elements, *, e, mu, h, t_end, centre, velocity=(0.0, 0.0, 0.0), weight=8.0,
+          slope=0.0, rebound=0.0):
+    """A rigid body of density 1 on a plane; `velocity`: along, up, spin."""
+    nodes = "\n".join(f"{k}, {x!r}, {y!r}" for k, (x, y) in points.items())
+    faces = "\n".join(", ".join(map(str, (k + 1, *nodes))) for k, nodes in enumerate(elements))
+    load = f"*DLOAD\nBODY, GRAV, {weight!r}, {math.sin(slope)!r}, {-math.cos(slope)!r}\n"
+    x, y = centre
+    return Deck(f"""*HEADING
+A rigid body on a plane
+*NODE, NSET=BODY
+{nodes}
+*NODE
+9, {x!r}, {y!r}
+10, 0., -5.
+*ELEMENT, TYPE=CPE{len(elements[0])}, ELSET=BODY
+{faces}
+*MATERIAL, NAME=M
+*DENSITY
+1.
+*SOLID SECTION, ELSET=BODY, MATERIAL=M
+1.
+*RIGID BODY, ELSET=BODY, REF NODE=9
+*SURFACE, NAME=BODY
+BODY,
+{PLANE}*SURFACE INTERACTION, NAME=ROUGH, RESTITUTION={e!r}
+*FRICTION, RESTITUTION={rebound!r}
+{mu!r}
+*CONTACT PAIR, INTERACTION=ROUGH, SIDES=ONE
+BODY, GROUND
+*BOUNDARY
+10, 1
+10, 2
+10, 6
+*INITIAL CONDITIONS, TYPE=ROTATING VELOCITY
+9, {velocity[2]!r}, {velocity[0]!r}, {velocity[1]!r}
+{x!r}, {y!r}
+*STEP, NLGEOM, INC=1000000
+*DYNAMIC, DIRECT
+{h!r}, {t_end!r}
+{load if weight else ""}*NEWTON, TOLERANCE=1e-12
+*NODE FILE, FREQUENCY=100000
+U
+*END STEP
+""")
+
+
+def block(n, tilt=0.0, lift=0.0, **more):
+    """A square of side 1 with n + 1 nodes below, its lowest one `lift` above the plane."""
+    c, s = math.cos(tilt), math.sin(tilt)
+    label = {(i, j): 100 + (n + 1)*j + i for j in (0, 1) for i in range(n + 1)}
+    y0 = lift + 0.5*(c + abs(s))
+    points = {label[i, j]: (c*(i/n - .5) - s*(j - .5), y0 + s*(i/n - .5) + c*(j - .5))
+              for i, j in label}
+    elements = [(label[i, 0], label[i + 1, 0], label[i + 1, 1], label[i, 1]) for i in range(n)]
+    return scene(points, elements, centre=(0.0, y0), **more)
+
+
+def disc(n, turn=0.0, lift=0.0, **more):
+    """A polygon of n corners of radius 1/2, one of which comes first at turn = 0."""
+    y0 = 0.5 + lift
+    points = {100: (0.0, y0)} | {101 + k: (
+        0.5*math.sin(turn + 2*math.pi*k/n), y0 - 0.5*math.cos(turn + 2*math.pi*k/n))
+        for k in range(n)}
+    elements = [(100, 101 + k, 101 + (k + 1) % n) for k in range(n)]
+    return scene(points, elements, centre=(0.0, y0), **more)
+
+
+# ---- closed forms -------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 0.8, 1.0])
+@pytest.mark.parametrize(("mu", "slide"), [(0.1, 1.0), (0.4, 3.0), (0.4, 0.5), (0.4, 0.7), (1.0, 0.3)])
+def test_flat_and_oblique(e, mu, slide, tmp_path):
+    """It leaves with e of its normal velocity, and friction takes mu (1 + e) of it along, or all.
+    At a slide of 0.5 and 0.7 it sticks for e = 1 and slides for less than 1/4 and 3/4."""
+    deck = block(1, lift=0.255, e=e, mu=mu, h=0.01, t_end=0.5, velocity=(slide, -1.0, 0.0), weight=0)
+    history = run_deck(deck, tmp_path).history
+    along = max(0.0, slide - mu*(1 + e))
+    assert history["py"][-1] == pytest.approx(e, abs=ROUND)
+    assert history["px"][-1] == pytest.approx(along, abs=ROUND)
+    assert history["restitution_loss"][-1] == pytest.approx(0.5*(1 - e*e), abs=ROUND)
+    assert history["friction_loss"][-1] == pytest.approx(0.5*(slide**2 - along**2), abs=ROUND)
+    assert history["pair1_impulse_x"][-1] == pytest.approx(along - slide, abs=ROUND)
+    holds_laws(history)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 0.8])
+@pytest.mark.parametrize(("mu", "slide", "spin"), [(0.05, 1.0, 0.0), (0.3, 2.0, 3.0), (1.0, 0.4, 1.0)])
+def test_disc_on_a_corner(e, mu, slide, spin, tmp_path):
+    """One contact below the centre: the impulse along is mu times that of the normal, or what
+    stops the corner, slip/(1/m + r^2/I). The step turns the disc by spin h on the way."""
+    h = 0.001
+    turn = -0.05*spin                                 # so that the corner is below as it lands
+    deck = disc(8, turn=turn, lift=0.0505, e=e, mu=mu, h=h, t_end=0.06, velocity=(slide, -1.0, spin),
+                weight=0)
+    history = run_deck(deck, tmp_path).history
+    mass = -history["py"][0]
+    area = 8*0.5*0.25*math.sin(math.pi/4)
+    inertia = area*0.25/6*(2 + math.cos(math.pi/4))    # of a regular polygon about its centre
+    assert mass == pytest.approx(area, rel=ROUND)
+    slip = slide + 0.5*spin
+    push = mass*(1 + e)
+    drag = min(mu*push, slip/(1/mass + 0.25/inertia))
+    loss = history["friction_loss"][-1]
+    near = 8*(abs(spin) + abs(slip))*h                 # of the direction of the corner
+    assert history["py"][-1] - history["py"][0] == pytest.approx(push, abs=mass*near)
+    assert history["px"][0] - history["px"][-1] == pytest.approx(drag, abs=mass*near)
+    assert loss == pytest.approx(drag*(slip - 0.5*drag*(1/mass + 0.25/inertia)), abs=mass*near)
+    holds_laws(history)
+
+
+# ---- to rest ------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5])
+@pytest.mark.parametrize(("n", "tilt", "spin", "mu"), [
+    (1, 0.0, 0.0, 0.1), (3, 0.0, 0.0, 1.0), (8, 0.0, 0.0, 0.4), (1, 0.05, 0.0, 1.0),
+    (3, 0.3, 1.0, 0.4), (8, 0.05, 0.0, 0.4), (2, 0.7, 3.0, 1.0), (8, 0.7, 3.0, 0.1)])
+def test_block_comes_to_rest(n, tilt, spin, mu, e, tmp_path):
+    deck = block(n, tilt=tilt, lift=0.6, e=e, mu=mu, h=0.005, t_end=5.0, velocity=(1.0, -1.0, spin))
+    run = run_deck(deck, tmp_path)
+    history = run.history
+    holds_laws(history)
+    assert run.verdict["verdict"] == "good"
+    assert run.verdict["cuts"] == 0
+    assert run.verdict["law_violation"] < 1e-10
+    assert history["kinetic"][-1] < 1e-16*history["kinetic"].max()
+
+
+@pytest.mark.parametrize(("n", "slope", "mu", "tilt"), [(1, 0.4, 0.5, 0.0), (8, 0.0, 0.3, 0.0),
+                                                        (8, 0.25, 0.3, 0.0)])
+def test_at_rest_on_a_slope_it_stays(n, slope, mu, tilt, tmp_path):
+    deck = block(n, tilt=tilt, lift=0.1, e=0.5, mu=mu, h=0.01, t_end=110.0, slope=slope,
+                 velocity=(0.3, -0.5, 0.0))
+    deck.replace("FREQUENCY=100000", "FREQUENCY=1000")
+    run = run_deck(deck, tmp_path)
+    holds_laws(run.history)
+    assert run.verdict["verdict"] == "good"
+    assert run.history["restitution_loss"][-1] > 0
+    assert (run.history["kinetic"][1000:] < 1e-18).all()
+    fields = run.fields()
+    place = fields["displacement"][fields.time >= 9.99]
+    assert len(place) == 11                           # after 1000 increments, and 10000 more
+    assert np.abs(place - place[0]).max() < 1e-12
