@@ -306,9 +306,7 @@ contains
          text = "bodies would overlap where no contact acts"
       case (step_rough)
          text = "the error is " // to_text(self%step_check%ratio, 3) // " times TOLERANCE"
-         if (.not. evaluation_has_inertia(self%motion%evaluation)) text = "it snaps: work and " // &
-            "energy of the elements differ by " // to_text(100.0_wp*self%step_check%ratio, 2) // &
-            " % of what they store"
+         if (.not. evaluation_has_inertia(self%motion%evaluation)) call snap_text(self, text)
       case (step_strikes)
          text = "contact begins or ends: the error is " // to_text(self%step_check%ratio, 3) // &
             " times TOLERANCE"
@@ -321,6 +319,16 @@ contains
          text = "reason " // to_text(status)
       end select
    end subroutine reason_text
+
+   !> Why an increment with STABILIZE is to be smaller.
+   pure subroutine snap_text(self, text)
+      type(march_t), intent(in) :: self
+      character(len=:), allocatable, intent(out) :: text
+
+      text = "it snaps: the balance that was found is not stable"
+      if (self%step_check%ratio >= 0.0_wp) text = "it snaps: the works of the increment miss " &
+         // to_text(100.0_wp*self%step_check%ratio, 2) // " % of what the elements store"
+   end subroutine snap_text
 
    !> Add to the reason why the last step failed, which ends a static analysis, what contact and
    !> what the model is given would have to hold.
@@ -345,7 +353,8 @@ contains
          .or. .not. sum(self%state%energy) > 0.0_wp) return
       if (scene%step(self%state%clock%i_step)%stabilization > 0.0_wp) return
       text = text // "; no state of rest was found beyond this time: if a body snaps through or " &
-         // "slips off there, none follows, and *STATIC, STABILIZE goes on to the next one"
+         // "slips off there, none follows nearby; *STATIC, STABILIZE goes on to the next one, a " &
+         // "*DYNAMIC step follows the motion"
    end subroutine failure_text
 
    !> What may hold bodies beside the conditions of the deck: "contact and given forces".

@@ -1,12 +1,17 @@
 !> Static increments with STABILIZE: are they short enough for what snaps on its way?
 !>
 !> Works are taken with forces that change linearly over an increment. One that passes over a
-!> state in between misses the energy that is set free there, and the way that it takes.
+!> state in between misses the energy that is set free there, and the way that it takes. One that
+!> ends where the energy is no minimum has not gone on to where viscous motion leads: that leaves
+!> such a place. Source: docs/theory.md, section 3.
 module emcon_march_snap
    use emcon_active_set, only : step_done, step_rough
+   use emcon_correction, only : correction_try_minimum
+   use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t, part_t
    use emcon_scene, only : scene_t
+   use emcon_system, only : system_respond
    use emcon_term, only : role_internal
    use emcon_term_registry, only : terms_stabilization
    implicit none
@@ -19,17 +24,39 @@ module emcon_march_snap
 contains
 
    !> Take the viscous forces from those of the elements at the end, and cut the increment where
-   !> work and energy of these do not agree.
-   subroutine snap_judge(self, scene, part, status)
+   !> work and energy of these do not agree, or where it ends in no minimum: with viscous forces, as
+   !> they are, there is one near the start of an increment that is short enough.
+   subroutine snap_judge(self, scene, part, status, error)
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(part_t), intent(in) :: part
       integer, intent(inout) :: status           !! `step_done`, or why a smaller one may do
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_minimum
 
-      if (scene%step(self%state%clock%i_step)%stabilization > 0.0_wp) call judge(self, part, status)
+      if (.not. scene%step(self%state%clock%i_step)%stabilization > 0.0_wp) return
+      call judge(self, part, status)
+      if (status /= step_done .or. .not. part%may_cut) return
+      call find_minimum(self, is_minimum, error)
+      if (.not. is_minimum) status = step_rough
    end subroutine snap_judge
 
-   !> The same in a step that has them.
+   !> Is the end of the increment a minimum, as far as that is asked: where no contact acts and
+   !> forces have an energy?
+   subroutine find_minimum(self, is_minimum, error)
+      type(march_t), intent(inout) :: self
+      logical, intent(out) :: is_minimum
+      type(error_t), allocatable, intent(out) :: error
+
+      is_minimum = .true.
+      if (self%active%set%n_condition > 0) return
+      call system_respond(self%system, self%motion, .true.)
+      if (self%system%is_symmetric) call correction_try_minimum(self%newton%correction, &
+         self%system%matrix, is_minimum, error)
+   end subroutine find_minimum
+
+   !> Works and energies of a step that has them. Contact without friction takes none: where what
+   !> acted at the start lets go, or others take over, it does as far as the increment is too long.
    subroutine judge(self, part, status)
       type(march_t), intent(inout) :: self
       type(part_t), intent(in) :: part
@@ -45,6 +72,8 @@ contains
          after = sum(ending%energy)
          missed = abs(0.5_wp*sum((state%internal + ending%force)*ending%du) &
             - (after - before))
+         if (any(abs(state%contact) > 0.0_wp) .and. .not. self%active%friction%is_on) missed &
+            = max(missed, -0.5_wp*sum((state%contact + self%newton%contact)*ending%du))
          if (.not. missed > most_missed*max(before, after) + epsilon(missed) &
             *sum(self%system%response%rounding*abs(ending%du))) return
          self%step_check%ratio = missed/max(before, after)

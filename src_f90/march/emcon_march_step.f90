@@ -226,7 +226,7 @@ contains
          end_state%potential = system%response%potential
          if (is_elsewhere) call system_respond(system, motion, .false.)
       end associate
-      call snap_judge(self, scene, part, status)
+      call snap_judge(self, scene, part, status, error)
    end subroutine find_ending
 
    !> The part of the overclosure at the start of the step that is left at `step_time`.

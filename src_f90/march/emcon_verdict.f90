@@ -202,19 +202,22 @@ contains
       call warn_of_distance(self, march, terms_solid(march%system%term))
    end subroutine verdict_update
 
-   !> What STABILIZE holds on its way at the end of a step is not at rest there.
+   !> What STABILIZE holds on its way at the end of a step is not at rest there. What springs back
+   !> is, once its forces, as the root of what it stores, are small by what they were.
    subroutine warn_of_snap(self, scene, march)
       type(verdict_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(march_t), intent(in) :: march
-      real(wp) :: left
+      real(wp) :: left, largest
 
       if (.not. scene%step(march%state%clock%i_step)%stabilization > 0.0_wp) return
+      largest = max(self%energy%largest, sum(march%state%energy))
       left = snap_left(march)
+      if (largest > 0.0_wp) left = left*sqrt(sum(march%state%energy)/largest)
       if (left > most_viscous) call add_warning(self, "at the end of step " // &
          to_text(march%state%clock%i_step) // " STABILIZE bears " // to_text(left, 2) // &
-         " of the forces: a body is on its way there; let the step last longer, or give a " // &
-         "smaller part than STABILIZE=" // &
+         " of the largest forces: a body is on its way there; let the step last longer, or " // &
+         "give a smaller part than STABILIZE=" // &
          to_text(scene%step(march%state%clock%i_step)%stabilization, 2))
    end subroutine warn_of_snap
 

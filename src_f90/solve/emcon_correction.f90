@@ -22,6 +22,7 @@ module emcon_correction
    implicit none
    private
    public :: correction_t, correction_lay_out, correction_factorise, correction_solve, &
+      correction_try_minimum, &
       correction_multipliers, correction_reset, correction_free, correction_reason, &
       correction_ticks, correction_work
 
@@ -305,6 +306,20 @@ contains
       if (.not. allocated(error)) call solver_renew(self%solver, matrix%value, error)
       is_singular = self%solver%is_singular
    end subroutine factorise_free
+
+   !> Is the symmetric matrix of a system without contact positive definite?
+   subroutine correction_try_minimum(self, matrix, is_minimum, error)
+      type(correction_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix          !! of the system
+      logical, intent(out) :: is_minimum         !! also where there is an error
+      type(error_t), allocatable, intent(out) :: error
+
+      is_minimum = .true.
+      self%n_factorisation = self%n_factorisation + 1
+      call self%definite_solver%analyse(matrix, error)
+      if (.not. allocated(error)) call solver_renew(self%definite_solver, matrix%value, error)
+      if (.not. allocated(error)) is_minimum = .not. self%definite_solver%is_singular
+   end subroutine correction_try_minimum
 
    !> The multipliers that belong to `residual` (without contact forces), by null space only: the
    !> saddle point has them as unknowns.

@@ -373,8 +373,8 @@ contains
 
    !> Keep what is behind the edge `nearest` if it is the deepest so far. At the end of an outline
    !> that is open there is no behind. What edges overlap by because they stand for curves is taken
-   !> off. An edge of a profile is a small part of a line or an arc: it counts as no shorter than
-   !> the edge that is in it.
+   !> off. An edge of a profile is a small part of a line or an arc, without an element behind it:
+   !> it counts as no shorter and no thinner than the edge that is in it is long.
    pure subroutine take_deeper(self, x, nearest, e, share, overlap)
       class(overlap_query_plane_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
@@ -382,7 +382,7 @@ contains
       integer, intent(in) :: e                   !! the edge that is judged
       real(wp), intent(in) :: share              !! place along it, 0 to 1
       type(overlap_t), intent(inout) :: overlap
-      real(wp) :: depth, length, taken_off, next_along(2)
+      real(wp) :: depth, length, thickness, taken_off, next_along(2)
       integer :: next
 
       if (nearest%edge == 0) return
@@ -395,16 +395,18 @@ contains
          end if
          depth = nearest_depth(nearest, next_along)
          length = length_of(nearest%along)
-         if (self%links%is_profile(nearest%edge)) length = max(length, &
-            length_of(between(x, self%u, edge(1, e), edge(2, e))))
+         thickness = self%outline%thickness(nearest%edge)
+         if (self%links%is_profile(nearest%edge)) then
+            length = max(length, length_of(between(x, self%u, edge(1, e), edge(2, e))))
+            thickness = length
+         end if
          if (.not. depth > overlap%depth*length) return
          taken_off = outline_curves_overlap(self%curves, e, nearest%edge, &
             [share, nearest%share], x, self%u)
          if (taken_off > 0.0_wp) overlap%of_facets = max(overlap%of_facets, depth/length)
          depth = depth - taken_off
          if (.not. depth > overlap%depth*length) return
-         if (self%is_passing .and. depth < min(passing*length, &
-            passing_thin*self%outline%thickness(nearest%edge))) return
+         if (self%is_passing .and. depth < min(passing*length, passing_thin*thickness)) return
          overlap%depth = depth/length
          overlap%node = edge(merge(1, 2, share < 0.5_wp), e)
          overlap%length = length

@@ -371,12 +371,28 @@ contains
       call check_near(error, overlap%depth, depth/(1.0_wp + bend**2), 16.0_wp*eps, 1.0_wp, "depth")
    end subroutine test_dent
 
-   !> A corner 1/8 deep in a line of edges 1/16 long, by its own edges of 1/2.
+   !> A corner 1/8 deep in a line of edges 1/16 long, by its own edges of 1/2; on its way past the
+   !> end of the line it grazes by less than a tenth of these, or goes through it.
    subroutine test_profile(error)
       type(error_t), allocatable, intent(out) :: error
-      integer, parameter :: n = 64
       type(scene_t) :: scene
       type(overlap_t) :: overlap
+
+      call make_profile(scene, 0.875_wp)
+      call judged(scene, overlap)
+      call check_near(error, overlap%depth, 0.25_wp, 8.0_wp*eps, 1.0_wp, "depth")
+      call make_profile(scene, 1.0_wp)
+      call judged(scene, overlap, first=size(scene%x, 2) - 3, motion=[6.0_wp, -0.0625_wp])
+      call check_equal(error, overlap%node, 0, "past it")
+      call judged(scene, overlap, first=size(scene%x, 2) - 3, motion=[6.0_wp, -0.625_wp])
+      call check_true(error, overlap%depth > 0.25_wp, "seen on the way")
+   end subroutine test_profile
+
+   !> A line from x = 4 to 0 at the height 1, and a square of 1/2 that stands at `height`.
+   subroutine make_profile(scene, height)
+      type(scene_t), intent(out) :: scene
+      real(wp), intent(in) :: height
+      integer, parameter :: n = 64
       type(surface_t) :: line
       type(block_t) :: slider
       integer :: i
@@ -389,7 +405,7 @@ contains
          scene%element%label, scene%element%origin)
       allocate(scene%element%node(4, 0), scene%element%kind(0), scene%element%section(0), &
          scene%element%label(0), scene%element%origin(0))
-      call add_block(scene, "CPE4", [1, 1], [1.3_wp, 0.875_wp], [0.5_wp, 0.5_wp], slider)
+      call add_block(scene, "CPE4", [1, 1], [1.3_wp, height], [0.5_wp, 0.5_wp], slider)
       line%name = "LINE"
       line%is_profile = .true.
       line%edge = reshape([(i, i + 1, i = 1, n)], [2, n])
@@ -397,9 +413,7 @@ contains
       scene%surface = [line]
       call add_surface(scene, "SLIDER", slider, [bottom])
       scene%pair = [contact_pair_t(slave=2, master=1)]
-      call judged(scene, overlap)
-      call check_near(error, overlap%depth, 0.25_wp, 8.0_wp*eps, 1.0_wp, "depth")
-   end subroutine test_profile
+   end subroutine make_profile
 
    !> The base bent, and in it a corner of the slider.
    subroutine make_hollow(scene, bend, depth, is_reversed)

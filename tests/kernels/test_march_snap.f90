@@ -1,6 +1,6 @@
 !> What STABILIZE bears at the end of a step, and steps over which work and energy do not agree.
 module test_march_snap
-   use check, only : check_equal, check_near, test_case_t
+   use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_active_set, only : step_done, step_rough
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
@@ -8,6 +8,7 @@ module test_march_snap
       march_t
    use emcon_march_snap, only : snap_judge, snap_left
    use emcon_march_types, only : part_t
+   use emcon_motion, only : motion_evaluate
    use emcon_scene, only : scene_t
    use emcon_term, only : role_internal
    use emcon_term_registry, only : terms_stabilization
@@ -29,22 +30,25 @@ contains
       tests = [ &
          test_case_t("work and energy that do not agree", test_judge), &
          test_case_t("where there is hardly energy, but round-off", test_rounding), &
+         test_case_t("a balance that is no minimum", test_minimum), &
+         test_case_t("contact that takes works", test_taken), &
          test_case_t("what viscous forces are of all", test_left)]
    end subroutine collect_march_snap
 
-   !> A block that is pulled, after its first increment.
-   subroutine begin(scene, march, error)
+   !> A strip of `n` squares that is pulled, after its first increment.
+   subroutine begin(scene, march, n, error)
       type(scene_t), intent(out) :: scene
       type(march_t), intent(inout) :: march
+      integer, intent(in) :: n
       type(error_t), allocatable, intent(out) :: error
       type(block_t) :: block
       type(increment_t) :: increment
       integer :: i
 
-      call make_block(scene, "CPE4", [2, 1], block)
+      call make_block(scene, "CPE4", [n, 1], block)
       call add_step(scene, .true., 0.25_wp, 4)
-      call clamp(scene%step(1), [1, 4])
-      do i = 3, 6, 3
+      call clamp(scene%step(1), [1, n + 2])
+      do i = n + 1, 2*n + 2, n + 1
          call prescribe(scene%step(1), i, 1, 0.2_wp)
       end do
       scene%step(1)%stabilization = 0.05_wp
@@ -65,7 +69,7 @@ contains
       real(wp) :: work, none, stored, missed
       integer :: i, k, status
 
-      call begin(scene, march, error)
+      call begin(scene, march, 2, error)
       if (allocated(error)) return
       call terms_stabilization(march%system%term, none, viscous)
       call shake(march%state%internal, 1.0_wp)
@@ -85,7 +89,7 @@ contains
          part%may_cut = i <= 12
          scene%step(1)%stabilization = merge(0.05_wp, 0.0_wp, i <= 16)
          status = step_done
-         call snap_judge(march, scene, part, status)
+         call snap_judge(march, scene, part, status, error)
          call check_equal(error, status, merge(step_rough, step_done, k > 2 .and. i <= 12), &
             "case " // to_text(i))
          call check_near(error, march%step_check%ratio, merge(abs(part_missed(k)), -1.0_wp, k > 2 &
@@ -105,7 +109,7 @@ contains
       real(wp) :: none
       integer :: k, status
 
-      call begin(scene, march, error)
+      call begin(scene, march, 2, error)
       if (allocated(error)) return
       call terms_stabilization(march%system%term, none, viscous)
       call shake(march%end_state%du, 1.0_wp)
@@ -113,19 +117,83 @@ contains
       march%end_state%energy = march%state%energy
       march%state%internal = 0.0_wp
       associate (rounding => march%system%response%rounding, du => march%end_state%du)
-         rounding = 1.0e6_wp/eps
          do k = 1, 2
+            rounding = 1.0e6_wp/eps
             ! Works of half of what is round-off, and of twice that.
             march%end_state%force = sign(merge(1.0_wp, 4.0_wp, k == 1)*epsilon(1.0_wp)*rounding, du)
             march%end_state%force = march%end_state%force + viscous
             status = step_done
-            call snap_judge(march, scene, part_t(may_cut=.true.), status)
+            call snap_judge(march, scene, part_t(may_cut=.true.), status, error)
             call check_equal(error, status, merge(step_done, step_rough, k == 1), "work " &
                // to_text(k))
          end do
       end associate
       call march_free(march)
    end subroutine test_rounding
+
+   !> Contact that acted takes a little less, or more, than the part of what is stored that may be
+   !> missed; or it gives.
+   subroutine test_taken(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: part_taken(3) = bar*[0.9_wp, 1.1_wp, -1.1_wp]
+      type(scene_t) :: scene
+      type(march_t) :: march
+      real(wp) :: work, viscous(2, 6)
+      integer :: k, status
+
+      call begin(scene, march, 2, error)
+      if (allocated(error)) return
+      call terms_stabilization(march%system%term, work, viscous)
+      do k = 1, 3
+         march%state%internal = 0.0_wp
+         march%end_state%force = viscous
+         march%end_state%energy = march%state%energy
+         call shake(march%end_state%du, 1.0_wp)
+         associate (du => march%end_state%du)
+            march%state%contact = -part_taken(k)*sum(march%state%energy) &
+               /sum(du**2)*du
+            march%newton%contact = march%state%contact
+         end associate
+         status = step_done
+         call snap_judge(march, scene, part_t(may_cut=.true.), status, error)
+         if (allocated(error)) return
+         call check_equal(error, status, merge(step_rough, step_done, k == 2), "case " &
+            // to_text(k))
+      end do
+      call march_free(march)
+   end subroutine test_taken
+
+   !> A strip twelve times as long as it is wide that was shortened by a third, far above the load
+   !> under which it buckles, and is straight: no work is missed, but it is no minimum.
+   subroutine test_minimum(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n = 12
+      type(scene_t) :: scene
+      type(march_t) :: march
+      real(wp) :: work, viscous(2, 2*n + 2)
+      integer :: k, status
+
+      call begin(scene, march, n, error)
+      if (allocated(error)) return
+      do k = 1, 3
+         march%motion%du = 0.0_wp
+         if (k > 1) march%motion%du(1, :) = -scene%x(1, :)/3.0_wp
+         call motion_evaluate(march%motion)
+         call terms_stabilization(march%system%term, work, viscous)
+         march%state%internal = 0.0_wp
+         march%end_state%du = 0.0_wp
+         march%end_state%force = viscous
+         march%end_state%energy = march%state%energy
+         march%step_check%ratio = -1.0_wp
+         status = step_done
+         call snap_judge(march, scene, part_t(may_cut=k < 3), status, error)
+         if (allocated(error)) return
+         call check_equal(error, status, merge(step_rough, step_done, k == 2), "case " &
+            // to_text(k))
+         call check_true(error, march%step_check%ratio < 0.0_wp, "no work is missed")
+      end do
+      call march_free(march)
+   end subroutine test_minimum
 
    !> Of sizes of forces of 3 in each of 12 freedoms.
    subroutine test_left(error)
@@ -135,7 +203,7 @@ contains
       real(wp), dimension(2, 6) :: viscous
       real(wp) :: none
 
-      call begin(scene, march, error)
+      call begin(scene, march, 2, error)
       if (allocated(error)) return
       call terms_stabilization(march%system%term, none, viscous)
       associate (response => march%system%response)
