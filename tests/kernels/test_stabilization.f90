@@ -1,5 +1,5 @@
-!> Viscous stress of *STATIC, STABILIZE: force and tangent are derivatives of its potential, it takes
-!> the part of the strain energy that is asked for, and nothing of what does not strain.
+!> Viscous stress of *STATIC, STABILIZE: force and tangent are derivatives of its potential, it
+!> takes the part of the strain energy that is asked for, and nothing of what does not strain.
 module test_stabilization
    use check, only : check_near, check_true, test_case_t
    use emcon_csr, only : csr_t
@@ -226,8 +226,8 @@ contains
       end do
    end subroutine test_given
 
-   !> Of a small uniform strain from rest, E = 100, nu = 0.3, over the first increment: along x alone,
-   !> of a ring along its circles as well.
+   !> Of a small uniform strain from rest, E = 100, nu = 0.3, over the first increment: along x
+   !> alone, of a ring along its circles as well.
    subroutine test_part(error)
       type(error_t), allocatable, intent(out) :: error
       type(sample_t) :: sample
