@@ -97,8 +97,8 @@ contains
       call march_free(march)
    end subroutine look_at
 
-   !> Contacts 2 to 4, of which the first ones slide; 5 is a long way round, but sticks. 1 and 6, which
-   !> are too, are of other pairs. All of it is turned.
+   !> Contacts 2 to 4, of which the first ones slide; 5 is a long way round, but sticks. 1 and 6,
+   !> which are too, are of other pairs. All of it is turned.
    subroutine let_slide(march, row)
       type(march_t), intent(inout) :: march
       type(case_t), intent(in) :: row

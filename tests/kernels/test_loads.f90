@@ -89,8 +89,8 @@ contains
          load_instant=instant), scene%x, u, 0.0_wp*u), force)
    end subroutine forces
 
-   !> Places and ways of a few digits: far from the origin forces are the same to the last bit, whose
-   !> sum around a body is 0.
+   !> Places and ways of a few digits: far from the origin forces are the same to the last bit,
+   !> whose sum around a body is 0.
    subroutine test_far(error)
       type(error_t), allocatable, intent(out) :: error
       character(len=*), parameter :: load(7) = [character(len=8) :: "*DLOAD", "1, P1, 3", &

@@ -320,8 +320,8 @@ contains
       call march_free(march)
    end subroutine test_told
 
-   !> The lower block moves as nothing holds it: what the balance leaves over does work; told once of
-   !> each body, and of gaps that were closed where contact acts.
+   !> The lower block moves as nothing holds it: what the balance leaves over does work; told once
+   !> of each body, and of gaps that were closed where contact acts.
    subroutine test_stabilized(error)
       type(error_t), allocatable, intent(out) :: error
       character(len=*), parameter :: who(4) = ["A", "A", "B", "B"], way(4) = ["x", "y", "y", "x"]
@@ -350,7 +350,8 @@ contains
             call march_commit(march, scene, h, increment, error)
             if (allocated(error)) return
             call check_near(error, march%ledger%stabilization, -k*work, tol, 1.0_wp, "work")
-            call check_equal(error, increment%warnings%n, merge(1, 0, k /= 2), "told " // to_text(k))
+            call check_equal(error, increment%warnings%n, merge(1, 0, k /= 2), "told " &
+               // to_text(k))
             if (allocated(error)) return
             if (k == 2) cycle
             told = "body of C, on which no load does work: moved over a gap of 0.25 onto"

@@ -48,6 +48,7 @@ contains
 
       tests = [ &
          test_case_t("forces and energies are the sums over the elements", test_sums), &
+         test_case_t("blocks that threads share", test_threads), &
          test_case_t("tangent: differences, and products", test_tangent), &
          test_case_t("far from where it began", test_far), &
          test_case_t("small strains: those of KINEMATICS=LINEAR", test_linear), &
@@ -432,6 +433,38 @@ contains
       end associate
       call check_turned(error)
    end subroutine test_fastest
+
+   !> More elements than a block of threads has: the same bits.
+   subroutine test_threads(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: many = 1100
+      type(scene_t) :: scene
+      type(system_t) :: system
+      type(motion_t) :: motion
+      real(wp), allocatable :: u(:, :), force(:, :), energy(:)
+      integer :: i, k
+
+      call make_system([(1 + mod(i, n_element), i = 1, many)], .true., scene, system, error)
+      if (allocated(error)) return
+      u = scene%x
+      call shake(u, 0.05_wp)
+      motion = motion_of(evaluation_at_end, scene%x, 0.0_wp*u, u)
+      do k = 1, 3
+         system%response%n_thread = k
+         call system_respond(system, motion, .false.)
+         associate (response => system%response)
+            call check_true(error, .not. allocated(response%refusal), "there are forces")
+            if (k == 1) then
+               force = response%part(role_internal)%force
+               energy = response%energy
+            end if
+            call check_near(error, response%part(role_internal)%force, force, 0.0_wp, 1.0_wp, &
+               to_text(k) // " threads")
+            call check_near(error, response%energy, energy, 0.0_wp, 1.0_wp, "energies")
+         end associate
+      end do
+      call check_true(error, all(energy > 0.0_wp), "of all elements")
+   end subroutine test_threads
 
    !> A cube that is turned about z is as fast as at rest, but not where small strains take the turn
    !> for a strain.

@@ -305,8 +305,8 @@ contains
          call system_respond(system, motion, .false.)
          stored = young/(1.0_wp - poisson**2)*curvature**2/24.0_wp*high**3*n
          ! Turns of k n add strains of the size of their squares to those of k.
-         call check_near(error, sum(system%response%energy), stored, 10.0_wp*n**2*curvature, stored, &
-            to_text(n) // " elements")
+         call check_near(error, sum(system%response%energy), stored, 10.0_wp*n**2*curvature, &
+            stored, to_text(n) // " elements")
       end do
    end subroutine test_bent
 

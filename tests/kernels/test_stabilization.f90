@@ -1,9 +1,9 @@
 !> Viscous stress of *STATIC, STABILIZE: force and tangent are derivatives of its potential, it
-!> takes
-!> the part of the strain energy that is asked for, and nothing of what does not strain.
+!> takes the part of the strain energy that is asked for, and nothing of what does not strain.
 module test_stabilization
    use check, only : check_near, check_true, test_case_t
    use emcon_csr, only : csr_t
+   use emcon_element_registry, only : find_element_row
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_at_end
    use emcon_host_law, only : host_law_t
@@ -16,8 +16,10 @@ module test_stabilization
    use emcon_stepper, only : stepper_t
    use emcon_term, only : response_begin, response_init, response_t, role_internal
    use given_hosts, only : well_t
+   use kind_rows, only : law_code
    use one_element, only : law_given, read_one
    use random_draws, only : draw_random
+   use small_scenes, only : add_step, block_t, make_block
    implicit none
    private
    public :: collect_stabilization
@@ -47,6 +49,7 @@ contains
          test_case_t("tangent times a field; entries of a condensed one", test_times), &
          test_case_t("laws that are given, as elastic ones of their modulus", test_given), &
          test_case_t("the part of the strain energy that is asked for", test_part), &
+         test_case_t("two kinds of elements of one law", test_mixed), &
          test_case_t("drag takes as much of what has grown in time", test_drag), &
          test_case_t("a turn takes nothing", test_turn)]
    end subroutine collect_stabilization
@@ -223,8 +226,8 @@ contains
       end do
    end subroutine test_given
 
-   !> Of a small uniform strain from rest, E = 100, nu = 0.3, over the first increment: along x alone,
-   !> of a ring along its circles as well.
+   !> Of a small uniform strain from rest, E = 100, nu = 0.3, over the first increment: along x
+   !> alone, of a ring along its circles as well.
    subroutine test_part(error)
       type(error_t), allocatable, intent(out) :: error
       type(sample_t) :: sample
@@ -249,6 +252,42 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_part
+
+   !> Two elements of one law, of which one has its pressure in the mean: each by its own moduli.
+   subroutine test_mixed(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=5), parameter :: left(3) = ["CPE4 ", "CPE4H", "CPE4 "], &
+         right(3) = ["CPE4 ", "CPE4H", "CPE4H"]
+      type(sample_t) :: sample
+      type(block_t) :: block
+      type(response_t) :: response
+      real(wp) :: work(3)
+      integer :: i, k
+
+      do k = 1, 3
+         associate (scene => sample%scene)
+            call make_block(scene, "CPE4", [2, 1], block)
+            scene%material(1)%law = law_code("neo hooke")
+            scene%material(1)%constant = [20.0_wp, 0.05_wp]
+            scene%element%kind = [find_element_row(trim(left(k))), find_element_row(trim(right(k)))]
+            call add_step(scene, .true., h, 1)
+            scene%step(1)%stabilization = part
+            call solid_init(sample%solid, scene, error)
+            if (allocated(error)) return
+            call stabilization_term_init(sample%term, sample%solid)
+            call sample%term%begin_step(scene, 1, sample%space, sample%matrix, [(i, i = 1, 128)])
+            sample%motion = motion_of(evaluation_at_end, scene%x, 0.0_wp*scene%x, &
+               1.0e-3_wp*scene%x)
+         end associate
+         sample%motion%evaluation%lapse = h
+         call response_init(response, 2, 6, 1)
+         call response_begin(response)
+         call sample%term%respond(sample%motion, response)
+         work(k) = sample%term%work
+      end do
+      call check_near(error, work(3), 0.5_wp*(work(1) + work(2)), 0.01_wp, work(3), "half of each")
+      call check_true(error, abs(work(2) - work(1)) > 0.1_wp*work(1), "of which one takes more")
+   end subroutine test_mixed
 
    !> After ten increments of a small uniform strain, over the eleventh: twice as much, of the
    !> stress
