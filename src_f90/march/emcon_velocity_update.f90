@@ -229,7 +229,7 @@ contains
       if (.not. self%is_ready) call factorise_mass(self, system, error)
       if (allocated(error)) return
       if (self%mass%is_singular) return
-      jump = reshape(0.0_wp*self%jump, [size(self%jump), 1])
+      allocate(jump(size(self%jump), 1), source=0.0_wp)
       call keep_held(self, system, set, error, jump, is_singular, &
          [(-condition_rate(set%item(k), v), k = set%n_linear + 1, set%n_permanent)])
       if (allocated(error) .or. is_singular) return

@@ -159,7 +159,7 @@ def test_block_comes_to_rest(n, tilt, spin, mu, e, tmp_path):
     assert history["kinetic"][-1] < 1e-16*history["kinetic"].max()
 
 
-@pytest.mark.parametrize(("n", "slope", "mu", "tilt"), [(1, 0.4, 0.5, 0.0), (8, 0.0, 0.3, 0.0),
+@pytest.mark.parametrize(("n", "slope", "mu", "tilt"), [(1, 0.4, 0.5, 0.0), (2, 0.6, 0.7, 0.0), (3, 0.4, 0.5, 0.05),
                                                         (8, 0.25, 0.3, 0.0)])
 def test_at_rest_on_a_slope_it_stays(n, slope, mu, tilt, tmp_path):
     deck = block(n, tilt=tilt, lift=0.1, e=0.5, mu=mu, h=0.01, t_end=110.0, slope=slope,
