@@ -94,6 +94,7 @@ contains
       do i = 1, size(self%law)
          self%law(i)%status = slip_status_t()
          self%law(i)%slip_target = 0.0_wp
+         self%law(i)%slip_to_stop = 0.0_wp
          if (.not. any(abs(self%direction0(:, i)) > 0.0_wp)) cycle
          self%law(i)%status%kind = contact_slides
          self%law(i)%status%direction(:self%n_slip) = self%direction0(:, i)

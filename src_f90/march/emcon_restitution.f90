@@ -157,7 +157,7 @@ contains
             problem%base(s, k) = impacts%h*tau(s)
             problem%free(s, k) = condition_rate(item, impacts%moved, s) &
                - 2.0_wp/impacts%h*item%slip(s)
-            problem%slip_target(s, k) = 2.0_wp/impacts%h*law%slip_target(s)
+            problem%slip_target(s, k) = 2.0_wp/impacts%h*law%slip_to_stop(s)
          end do
       end associate
    end subroutine find_rubbing

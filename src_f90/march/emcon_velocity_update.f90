@@ -173,7 +173,7 @@ contains
       if (allocated(error) .or. is_singular) return
       if (allocated(jump%impulse)) deallocate(jump%impulse)
       allocate(jump%impulse(0:jump%problem%n_slip, size(jump%row)), source=0.0_wp)
-      jump%is_idle = contact_problem_missed(jump%problem, jump%impulse) <= met
+      jump%is_idle = contact_problem_missed(jump%problem, jump%impulse) <= rounded
       if (jump%is_idle) return
       call contact_problem_solve(jump%problem, jump%impulse, effort, jump%is_done)
       if (jump%is_done) jump%is_done = contact_problem_missed(jump%problem, jump%impulse) &
@@ -204,7 +204,9 @@ contains
             + sum(abs(more)*(abs(jump%rate) + abs(change)), 1)
          jump%rubbed = taken - jump%taken
          jump%lost = -sum(more*(jump%rate + 0.5_wp*change)) - sum(jump%rubbed)
-         jump%is_done = jump%lost >= -rounded*sum(uncertain)
+         ! Impulses are as exact as their problem is solved.
+         jump%is_done = jump%lost >= -rounded*sum(uncertain) &
+            - met*maxval(abs(problem%base))*sum(abs(jump%rate) + abs(change))
       end associate
    end subroutine measure_losses
 
@@ -229,7 +231,7 @@ contains
       if (.not. self%is_ready) call factorise_mass(self, system, error)
       if (allocated(error)) return
       if (self%mass%is_singular) return
-      jump = reshape(0.0_wp*self%jump, [size(self%jump), 1])
+      allocate(jump(size(self%jump), 1), source=0.0_wp)
       call keep_held(self, system, set, error, jump, is_singular, &
          [(-condition_rate(set%item(k), v), k = set%n_linear + 1, set%n_permanent)])
       if (allocated(error) .or. is_singular) return

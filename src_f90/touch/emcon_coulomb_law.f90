@@ -47,6 +47,7 @@ module emcon_coulomb_law
       real(wp) :: restitution = 0.0_wp               !! along the surface, of what sticks, 0 to 1
       type(slip_status_t) :: status
       real(wp) :: slip_target(most_slips) = 0.0_wp   !! a [L]
+      real(wp) :: slip_to_stop(most_slips) = 0.0_wp  !! the same, also below what slip is rounded to
    contains
       procedure :: take => coulomb_take
       procedure :: respond => coulomb_respond
@@ -129,6 +130,7 @@ contains
 
       self%slip_target = 0.0_wp
       self%slip_target(:size(slip)) = (1.0_wp - self%restitution)*slip
+      self%slip_to_stop = self%slip_target
       if (norm2(self%slip_target) <= rounding) self%slip_target = 0.0_wp
    end subroutine leads_to
 

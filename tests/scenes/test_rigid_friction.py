@@ -159,7 +159,7 @@ def test_block_comes_to_rest(n, tilt, spin, mu, e, tmp_path):
     assert history["kinetic"][-1] < 1e-16*history["kinetic"].max()
 
 
-@pytest.mark.parametrize(("n", "slope", "mu", "tilt"), [(1, 0.4, 0.5, 0.0), (8, 0.0, 0.3, 0.0),
+@pytest.mark.parametrize(("n", "slope", "mu", "tilt"), [(1, 0.4, 0.5, 0.0), (2, 0.6, 0.7, 0.0), (3, 0.4, 0.5, 0.05),
                                                         (8, 0.25, 0.3, 0.0)])
 def test_at_rest_on_a_slope_it_stays(n, slope, mu, tilt, tmp_path):
     deck = block(n, tilt=tilt, lift=0.1, e=0.5, mu=mu, h=0.01, t_end=110.0, slope=slope,
@@ -174,3 +174,98 @@ def test_at_rest_on_a_slope_it_stays(n, slope, mu, tilt, tmp_path):
     place = fields["displacement"][fields.time >= 9.99]
     assert len(place) == 11                           # after 1000 increments, and 10000 more
     assert np.abs(place - place[0]).max() < 1e-12
+
+
+# ---- many bodies --------------------------------------------------------------------------------
+
+
+def crowd(bodies, pairs, *, e, mu, h, t_end, velocity=None, box=(-100.0, 100.0)):
+    """Rigid polygons, name: (centre, corners), all on a floor between walls, which fall."""
+    cards, rigid, label, element = [], [], 0, 0
+    for k, (name, (centre, corners)) in enumerate(bodies.items()):
+        first = label + 1
+        cards += [f"*NODE, NSET={name}", *(f"{first + i}, {x!r}, {y!r}" for i, (x, y) in
+                                           enumerate([centre, *corners])),
+                  "*NODE", f"{9000 + k}, {centre[0]!r}, {centre[1]!r}",
+                  f"*ELEMENT, TYPE=CPE3, ELSET={name}"]
+        n = len(corners)
+        cards += [f"{element + i + 1}, {first}, {first + 1 + i}, {first + 1 + (i + 1) % n}"
+                  for i in range(n)]
+        label, element = label + n + 1, element + n
+        cards += [f"*SOLID SECTION, ELSET={name}, MATERIAL=M", "1.", f"*SURFACE, NAME={name}",
+                  f"{name},", f"*RIGID BODY, ELSET={name}, REF NODE={9000 + k}"]
+        if velocity and name in velocity:
+            spin, (x, y) = velocity[name]
+            rigid += ["*INITIAL CONDITIONS, TYPE=ROTATING VELOCITY", f"{9000 + k}, {spin!r}, 0., 0.",
+                      f"{x!r}, {y!r}"]
+    low, high = box
+    lines = "\n".join(f"{a}, {b}" for a, b in pairs)
+    ground = "\n".join(f"{name}, GROUND" for name in bodies)
+    load = "\n".join(f"*DLOAD\n{name}, GRAV, 10., 0., -1." for name in bodies)
+    cards = "\n".join(["*HEADING", "Rigid bodies fall on each other", "*MATERIAL, NAME=M", "*DENSITY",
+                       "1.", *cards, "*NODE", "8999, 0., -5.", *rigid])
+    return Deck(f"""{cards}
+*SURFACE, NAME=GROUND, TYPE=SEGMENTS
+START, {low!r}, 20.
+LINE, {low!r}, 0.
+LINE, {high!r}, 0.
+LINE, {high!r}, 20.
+*RIGID BODY, ANALYTICAL SURFACE=GROUND, REF NODE=8999
+*SURFACE INTERACTION, NAME=ROUGH, RESTITUTION={e!r}
+*FRICTION
+{mu!r}
+*CONTACT PAIR, INTERACTION=ROUGH, SIDES=ONE
+{ground}
+*CONTACT PAIR, INTERACTION=ROUGH
+{lines}
+*BOUNDARY
+8999, 1
+8999, 2
+8999, 6
+*STEP, NLGEOM, INC=1000000
+*DYNAMIC, DIRECT
+{h!r}, {t_end!r}
+{load}
+*NODE FILE, FREQUENCY=50
+U
+*END STEP
+""")
+
+
+def comes_to_rest(deck, folder):
+    run = run_deck(deck, folder)
+    history = run.history
+    assert run.verdict["verdict"] == "good"
+    assert run.verdict["law_violation"] < 1e-10
+    assert balance(history) < 1e-9                    # of Newton's default tolerance
+    assert np.diff(history["restitution_loss"]).min() >= 0
+    assert history["restitution_loss"][-1] > 0.1*history["kinetic"].max()
+    assert history["kinetic"][-1] < 1e-12*history["kinetic"].max()
+    return run
+
+
+def test_fifteen_discs(tmp_path):
+    corners = 12
+    bodies = {}
+    for k in range(15):
+        x, y = 0.62*(k % 5) - 1.24 + 0.05*(k//5), 0.4 + 0.66*(k//5)
+        bodies[f"D{k}"] = ((x, y), [(x + 0.3*math.cos(2*math.pi*(i + 0.3*k)/corners),
+                                     y + 0.3*math.sin(2*math.pi*(i + 0.3*k)/corners))
+                                    for i in range(corners)])
+    pairs = [(a, b) for a in bodies for b in bodies if a < b]
+    deck = crowd(bodies, pairs, e=0.5, mu=0.3, h=0.01, t_end=4.0, box=(-1.7, 1.7))
+    comes_to_rest(deck, tmp_path)
+
+
+def test_ten_dominoes(tmp_path):
+    """The first one is pushed over; they fall one after the other and lie on each other."""
+    bodies = {}
+    for k in range(10):
+        x = 0.5*k
+        bodies[f"D{k}"] = ((x, 0.5), [(x - 0.1, 0.0), (x + 0.1, 0.0), (x + 0.1, 1.0), (x - 0.1, 1.0)])
+    pairs = [(f"D{k}", f"D{k + 1}") for k in range(9)]
+    deck = crowd(bodies, pairs, e=0.5, mu=0.3, h=0.01, t_end=4.0, velocity={"D0": (-2.0, (0.1, 0.0))})
+    run = comes_to_rest(deck, tmp_path)
+    fields = run.fields()
+    top = fields["displacement"][-1][[6*k + 4 for k in range(10)]]     # with reference nodes
+    assert (top[:, 1] < -0.1).all()                   # of the upper left corners: all have fallen
