@@ -160,14 +160,24 @@ contains
          call choose_by_trials(self, system, turns)
       end if
       self%is_active = self%candidates%acts
+      call count_changes(self)
       self%candidates%is_new_set = turns .or. any(self%candidates%acted .neqv. self%candidates%acts)
    end subroutine choose
+
+   !> One more try in which these contacts act again, or no more.
+   pure subroutine count_changes(self)
+      type(active_set_t), intent(inout) :: self
+
+      where (self%candidates%acted .neqv. self%candidates%acts) &
+         self%candidates%n_change = self%candidates%n_change + 1
+   end subroutine count_changes
 
    !> What pulls goes; what is friction turns as its trial has it.
    subroutine choose_by_trials(self, system, turns)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       logical, intent(out) :: turns
+      logical :: this_turns
       integer :: k, pair, i
 
       turns = .false.
@@ -178,8 +188,11 @@ contains
                -noise_at(self, system, system%contact(pair)%contact%node(i))
             if (self%support%is_needed .and. .not. self%candidates%acts(id)) &
                self%support%has_pulled(id) = .true.
-            if (self%candidates%acts(id) .and. self%friction%is_on) call friction_turn( &
-               self%friction, system, self%set, k, turns)
+            if (.not. (self%candidates%acts(id) .and. self%friction%is_on)) cycle
+            this_turns = .false.
+            call friction_turn(self%friction, system, self%set, k, this_turns)
+            if (this_turns) self%candidates%n_change(id) = self%candidates%n_change(id) + 1
+            turns = turns .or. this_turns
          end associate
       end do
    end subroutine choose_by_trials
@@ -264,6 +277,7 @@ contains
          if (status /= step_done) return
          call let_go(self, system)
          self%is_active = self%candidates%acts
+         call count_changes(self)
          is_left = is_left .or. any(self%candidates%acted .neqv. self%candidates%acts)
          if (.not. (is_left .or. self%candidates%have_changed)) return
          if (self%penalty%n_augmentation > most_augmentations) exit
