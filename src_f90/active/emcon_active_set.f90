@@ -51,6 +51,9 @@ module emcon_active_set
       logical, allocatable :: began(:)           !! (n_constraint) and in the first one
       logical, allocatable :: has_left(:)        !! (n_constraint) it lost its surface,
       logical, allocatable :: is_back(:)         !! (n_constraint) and has come back
+      integer, allocatable :: n_change(:)        !! (n_constraint) tries in which it begins to
+                                                 !! act, no longer acts or slides another way
+      logical, allocatable :: is_blamed(:)       !! (n_constraint) the step cannot stand on it
       logical :: is_measured = .false.           !! gaps are known for the motion that there is
       logical :: have_changed = .false.          !! solve the step again
       logical :: is_settled = .false.            !! the step is solved, or cannot be
@@ -123,7 +126,8 @@ contains
       self%candidates = candidates_t()
       associate (own => self%candidates, n => system%n_constraint)
          allocate(own%takes_part(n), own%acts(n), own%acted(n), own%began(n), own%has_left(n), &
-            own%is_back(n), source=.false.)
+            own%is_back(n), own%is_blamed(n), source=.false.)
+         allocate(own%n_change(n), source=0)
       end associate
       allocate(self%lam(system%n_constraint), source=0.0_wp)
       call constraints_select(self%set, [integer ::])
@@ -139,6 +143,8 @@ contains
       self%acted = .false.
       self%has_left = .false.
       self%is_back = .false.
+      self%is_blamed = .false.
+      self%n_change = 0
       self%is_measured = .false.
       self%have_changed = .false.
       self%is_settled = .false.

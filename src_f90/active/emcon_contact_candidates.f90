@@ -164,6 +164,7 @@ contains
       self%candidates%have_changed = .false.
       self%candidates%one_closes = .false.
       self%candidates%is_measured = .true.
+      self%candidates%is_blamed = .false.
       self%is_stale = .false.
       self%friction%lags = .false.
       k = self%set%n_permanent
@@ -192,7 +193,7 @@ contains
       end if
    end subroutine candidates_look
 
-   !> The conditions of one contact.
+   !> The conditions of the contacts of one pair, and those on which the step cannot stand.
    subroutine look_at_pair(self, system, pair, motion, k, status)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -200,39 +201,58 @@ contains
       type(motion_t), intent(in) :: motion
       integer, intent(inout) :: k                !! places of the set that were looked at
       integer, intent(inout) :: status
-      logical :: acts
-      integer :: i, id
+      logical :: was_stale
+      integer :: i, id, own
 
-      associate (contact => system%contact(pair)%contact, friction => self%friction)
+      was_stale = self%is_stale
+      associate (contact => system%contact(pair)%contact)
          do i = 1, contact%n_constraint
             id = system%first_constraint(pair) + i
+            own = step_done
+            self%is_stale = .false.
             if (.not. self%candidates%takes_part(id)) then
-               call join(self, system, pair, i, motion, status)
-               cycle
-            end if
-            acts = self%candidates%acts(id)
-            if (acts) k = k + 1
-            if (contact%state(i)%is_leaving) then
-               self%candidates%takes_part(id) = .false.
-               self%candidates%has_left(id) = .true.
-               self%candidates%acts(id) = .false.
-               self%is_active(id) = .false.
-               self%candidates%have_changed = .true.
-            else if (acts) then
-               call look_at_active(self, contact, i, k, motion, status)
-               if (.not. self%was_active(id)) then
-                  if (begins_unseen(self, contact, i, motion)) status = step_too_far
-               end if
-               if (.not. friction%is_on) cycle
-               if (friction%law(id)%mu > 0.0_wp) friction%lags = friction%lags .or. &
-                  contact%state(i)%slip_shift > most_shift
+               call join(self, system, pair, i, motion, own)
+            else if (self%candidates%acts(id) .or. contact%state(i)%is_leaving) then
+               if (self%candidates%acts(id)) k = k + 1
+               call look_at_acting(self, contact, i, id, k, motion, own)
             else if (has_closed(self, contact, i, id)) then
                self%candidates%one_closes = .true.
                self%candidates%acts(id) = .true.
             end if
+            self%candidates%is_blamed(id) = own /= step_done .or. self%is_stale
+            was_stale = was_stale .or. self%is_stale
+            if (own /= step_done) status = own
          end do
       end associate
+      self%is_stale = was_stale
    end subroutine look_at_pair
+
+   !> The conditions of a contact that takes part, and acts or has lost its surface.
+   subroutine look_at_acting(self, contact, i, id, k, motion, status)
+      type(active_set_t), intent(inout) :: self
+      class(contact_t), intent(in) :: contact
+      integer, intent(in) :: i, id, k            !! in `contact`, over all pairs, in the set
+      type(motion_t), intent(in) :: motion
+      integer, intent(inout) :: status           !! a failure where the step cannot stand on it
+
+      if (contact%state(i)%is_leaving) then
+         self%candidates%takes_part(id) = .false.
+         self%candidates%has_left(id) = .true.
+         self%candidates%acts(id) = .false.
+         self%is_active(id) = .false.
+         self%candidates%have_changed = .true.
+         return
+      end if
+      call look_at_active(self, contact, i, k, motion, status)
+      if (.not. self%was_active(id)) then
+         if (begins_unseen(self, contact, i, motion)) status = step_too_far
+      end if
+      associate (friction => self%friction)
+         if (.not. friction%is_on) return
+         if (friction%law(id)%mu > 0.0_wp) friction%lags = friction%lags .or. &
+            contact%state(i)%slip_shift > most_shift
+      end associate
+   end subroutine look_at_acting
 
    !> Has the `i`-th constraint of `contact`, a candidate that does not act, closed? One that would
    !> hold the gap of its start may end below that, without a force, as long as it is not in.

@@ -153,6 +153,7 @@ contains
 
       associate (set => self%set, friction => self%friction)
          call candidates_keep_forces(self)
+         self%candidates%acted(:) = self%candidates%acts
          self%candidates%acts = self%candidates%takes_part
          do k = 1, size(law)
             associate (id => set%id(set%n_permanent + k))
@@ -167,6 +168,8 @@ contains
             end associate
          end do
       end associate
+      where (self%candidates%acted .neqv. self%candidates%acts) &
+         self%candidates%n_change = self%candidates%n_change + 1
       self%is_active = self%candidates%acts
    end subroutine keep
 

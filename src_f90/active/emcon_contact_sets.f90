@@ -33,6 +33,8 @@ module emcon_contact_sets
 
    !> Sets that are tried by the null space in one step at most, and where trials tell them.
    integer, parameter :: most_tried = 6, most_by_trials = 20
+   !> Tries of a step in which one contact may change, if not too many take part.
+   integer, parameter :: most_changes = 2
    !> By so much of the largest push friction may miss its law: what a solve leaves.
    real(wp), parameter :: least_missed = 1.0e4_wp*epsilon(1.0_wp)
    !> Rounds with contacts that give way at most.
@@ -50,10 +52,11 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      logical :: goes_on, is_early, is_driven, obeys
+      logical :: goes_on, has_failed, is_early, is_driven, obeys
       integer :: i
 
       is_driven = .true.
+      has_failed = .false.
       self%candidates%began(:) = self%is_active
       self%candidates%is_new_set = .true.
       do i = 1, most_by_trials
@@ -63,27 +66,27 @@ contains
          status = step_not_held
          self%candidates%is_settled = allocated(self%support%text)
          if (self%candidates%is_settled) return
+         if (has_failed .and. all(self%is_active .eqv. self%candidates%acted)) then
+            call begin_anew(self, newton, motion)
+            return
+         end if
          self%before = motion%du
          newton%looks_early = self%candidates%is_new_set .and. .not. self%support%is_needed
          call candidates_solve(self, system, newton, motion, status, error)
          if (allocated(error)) return
-         if (status == newton_redundant) then
+         ! Rows that lose their rank on the way are those of a motion that goes astray.
+         if (status == newton_redundant .and. (newton%convergence%n_iteration == 0 &
+            .or. candidates_are_many(self))) then
             call candidates_leave_out(self, newton%correction%redundant, goes_on)
             if (goes_on) cycle
             return
          else if (.not. any(status == [newton_converged, newton_early])) then
-            self%candidates%is_measured = .false.
-            goes_on = status == newton_diverged .and. .not. self%has_impacts
-            if (goes_on) call let_go_alone(self, goes_on)
-            if (goes_on) then
-               motion%du = self%before
-               if (is_driven) newton%driven = self%driven
-               cycle
-            end if
-            motion%du = self%first
-            newton%driven = self%driven
+            has_failed = status == newton_diverged .and. .not. self%has_impacts
+            call take_back(self, newton, motion, is_driven, has_failed)
+            if (has_failed) cycle
             return
          end if
+         has_failed = .false.
          is_early = status == newton_early
          newton%driven = 0.0_wp                  ! the prescribed motion is in `motion` now
          is_driven = .false.
@@ -100,6 +103,35 @@ contains
          if (.not. (self%candidates%is_new_set .or. is_early .or. self%is_stale)) return
       end do
    end subroutine contact_sets_solve
+
+   !> Newton's method has failed for a set: with `goes_on` what pulls in its last iterate goes, if
+   !> some does, and the motion is that before; else no set stands.
+   pure subroutine take_back(self, newton, motion, is_driven, goes_on)
+      type(active_set_t), intent(inout) :: self
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      logical, intent(in) :: is_driven           !! the prescribed motion was not in it yet
+      logical, intent(inout) :: goes_on          !! out: another set is to be tried
+
+      self%candidates%is_measured = .false.
+      if (goes_on) call let_go_alone(self, goes_on)
+      if (goes_on) then
+         motion%du = self%before
+         if (is_driven) newton%driven = self%driven
+      else
+         call begin_anew(self, newton, motion)
+      end if
+   end subroutine take_back
+
+   !> No set stands: from the first guess on.
+   pure subroutine begin_anew(self, newton, motion)
+      type(active_set_t), intent(in) :: self
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+
+      motion%du = self%first
+      newton%driven = self%driven
+   end subroutine begin_anew
 
    !> Take in what holds the bodies that would be free with the present set. The prescribed motion
    !> `driven`, which the first correction of Newton's method meets, is left out on the way.
@@ -160,14 +192,26 @@ contains
          call choose_by_trials(self, system, turns)
       end if
       self%is_active = self%candidates%acts
+      call count_changes(self)
+      ! Sets that come back go on to do so: all candidates together tell.
+      goes_on = candidates_are_many(self) .or. maxval(self%candidates%n_change) <= most_changes
       self%candidates%is_new_set = turns .or. any(self%candidates%acted .neqv. self%candidates%acts)
    end subroutine choose
+
+   !> One more try in which these contacts act again, or no more.
+   pure subroutine count_changes(self)
+      type(active_set_t), intent(inout) :: self
+
+      where (self%candidates%acted .neqv. self%candidates%acts) &
+         self%candidates%n_change = self%candidates%n_change + 1
+   end subroutine count_changes
 
    !> What pulls goes; what is friction turns as its trial has it.
    subroutine choose_by_trials(self, system, turns)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       logical, intent(out) :: turns
+      logical :: this_turns
       integer :: k, pair, i
 
       turns = .false.
@@ -178,8 +222,11 @@ contains
                -noise_at(self, system, system%contact(pair)%contact%node(i))
             if (self%support%is_needed .and. .not. self%candidates%acts(id)) &
                self%support%has_pulled(id) = .true.
-            if (self%candidates%acts(id) .and. self%friction%is_on) call friction_turn( &
-               self%friction, system, self%set, k, turns)
+            if (.not. (self%candidates%acts(id) .and. self%friction%is_on)) cycle
+            this_turns = .false.
+            call friction_turn(self%friction, system, self%set, k, this_turns)
+            if (this_turns) self%candidates%n_change(id) = self%candidates%n_change(id) + 1
+            turns = turns .or. this_turns
          end associate
       end do
    end subroutine choose_by_trials
@@ -264,6 +311,7 @@ contains
          if (status /= step_done) return
          call let_go(self, system)
          self%is_active = self%candidates%acts
+         call count_changes(self)
          is_left = is_left .or. any(self%candidates%acted .neqv. self%candidates%acts)
          if (.not. (is_left .or. self%candidates%have_changed)) return
          if (self%penalty%n_augmentation > most_augmentations) exit

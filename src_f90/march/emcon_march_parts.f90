@@ -21,7 +21,7 @@ module emcon_march_parts
    use emcon_text, only : joined, note_add, notes_append, notes_t, string_t, to_text
    implicit none
    private
-   public :: march_in_parts, march_attempt, march_match, march_stop
+   public :: march_in_parts, march_attempt, march_match, march_stop, march_reason
 
    !> Halvings of an increment after which nodes without mass take it back.
    integer, parameter :: return_level = 3
@@ -148,7 +148,7 @@ contains
          call march_step(self, scene, part, increment, status, error)
          if (allocated(error) .or. status == step_done) return
          if (.not. allocated(self%before)) self%before = rollback_t(self%state, self%ledger)
-         call reason_text(self, scene, status, reason)
+         call march_reason(self, scene, status, reason)
          if (.not. may_return(self, status, part%level)) exit
          call return_mass(self, scene, status, reason, increment, error)
          if (allocated(error)) return
@@ -270,11 +270,11 @@ contains
    end subroutine singular_text
 
    !> Why a step failed.
-   subroutine reason_text(self, scene, status, text)
+   subroutine march_reason(self, scene, status, text)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
-      integer, intent(in) :: status
-      character(len=:), allocatable, intent(out) :: text
+      integer, intent(in) :: status              !! one of the `step_` codes
+      character(len=:), allocatable, intent(out) :: text       !! for the message
 
       select case (status)
       case (step_refused)
@@ -288,9 +288,9 @@ contains
       case (step_singular)
          call singular_text(terms_solid(self%system%term), scene, text)
       case (step_cycling)
-         text = "which contacts act, stick and slide does not settle"
+         call cycling_text(self, scene, text)
       case (step_too_far)
-         text = "a contact slides farther than its stencil was chosen for"
+         call too_far_text(self, scene, text)
       case (step_stands_off)
          text = "a contact would close over more than the gap tolerance"
       case (step_not_held)
@@ -318,7 +318,42 @@ contains
       case default
          text = "reason " // to_text(status)
       end select
-   end subroutine reason_text
+   end subroutine march_reason
+
+   !> Which contacts act, stick and slide is another one from try to try: at which nodes?
+   subroutine cycling_text(self, scene, text)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable :: nodes
+      integer :: least
+
+      text = "which contacts act, stick and slide does not settle"
+      associate (n_change => self%active%candidates%n_change)
+         least = min(2, maxval(n_change))
+         if (least > 0) then
+            call nodes_text(self, scene, n_change >= least, nodes)
+            text = text // ": it is another one in each try at slave nodes " // nodes
+         end if
+      end associate
+      if (.not. self%active%may_cut) text = text // "; allow for smaller increments, or let " // &
+         "contact give way by *CONSTRAINT METHOD, TYPE=PENALTY"
+   end subroutine cycling_text
+
+   !> A contact goes past the edges that it was to act on: at which nodes?
+   subroutine too_far_text(self, scene, text)
+      type(march_t), intent(in) :: self
+      type(scene_t), intent(in) :: scene
+      character(len=:), allocatable, intent(out) :: text
+      character(len=:), allocatable :: nodes
+
+      text = "a contact slides farther than its stencil was chosen for"
+      if (.not. any(self%active%candidates%is_blamed)) return
+      call nodes_text(self, scene, self%active%candidates%is_blamed, nodes)
+      text = text // ", past the edge next to the one where it began: slave nodes " // nodes
+      if (.not. self%active%may_cut) text = text // "; allow for smaller increments, or give the " &
+         // "other surface longer edges there"
+   end subroutine too_far_text
 
    !> Why an increment with STABILIZE is to be smaller.
    pure subroutine snap_text(self, text)

@@ -390,6 +390,8 @@ contains
             if (allocated(error)) return
             if (i > 1) then
                call check_equal(error, self%status, step_too_far, "a second time")
+               call check_true(error, all(self%active%candidates%is_blamed .eqv. [.false., &
+                  .true., .false.]), "who is blamed")
             else
                self%floor(1)%leaves = .false.
                call check_laws(self, "case " // to_text(i), error)
@@ -459,6 +461,7 @@ contains
             if (k < 4 .or. k == 5) call check_laws(self, "stale " // to_text(k), error)
             call check_equal(error, self%status, merge(step_too_far, step_done, k == 4), "status")
             call check_equal(error, self%active%n_stale, merge(0, k, k == 5), "solved again")
+            call check_true(error, all(self%active%candidates%is_blamed .eqv. k == 4), "blamed")
             if (allocated(error)) return
          end block
       end do
@@ -488,6 +491,8 @@ contains
             call solve(self, error)
             if (allocated(error)) return
             call check_equal(error, self%status, expected(k), "status of case " // to_text(k))
+            if (k < 3) call check_true(error, all(self%active%candidates%is_blamed .eqv. [.false., &
+               k > 0, .false.]), "blamed in case " // to_text(k))
             if (expected(k) == step_done) call check_laws(self, "case " // to_text(k), error)
             if (allocated(error)) return
          end block

@@ -2,6 +2,7 @@
 !> interrupt leaves.
 module test_march_parts
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
+   use emcon_active_set, only : step_cycling, step_too_far
    use emcon_amplitudes, only : amplitude_t
    use emcon_csr, only : csr_from_elements
    use emcon_errors, only : err_analysis, err_interrupt, error_t
@@ -10,6 +11,7 @@ module test_march_parts
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t, march_resume, march_watch
+   use emcon_march_parts, only : march_reason
    use emcon_march_types, only : march_t, watcher_t
    use emcon_scene, only : scene_t
    use emcon_pair_sums, only : pair_sum_t
@@ -64,8 +66,45 @@ contains
          test_case_t("too many parts", test_crawl), &
          test_case_t("what is told where statics end", test_end), &
          test_case_t("an interrupt leaves the increment before", test_interrupt), &
-         test_case_t("two halves are two increments", test_pieces)]
+         test_case_t("two halves are two increments", test_pieces), &
+         test_case_t("what fails at which nodes", test_reasons)]
    end subroutine collect_march_parts
+
+   !> Nodes whose contacts change more than once, and those that go too far, are named; where no
+   !> smaller increment is left the user is told what to do.
+   subroutine test_reasons(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: status(2) = [step_cycling, step_too_far]
+      character(len=*), parameter :: told(2) = [character(len=50) :: &
+         "does not settle: it is another one in each try", "where it began"]
+      type(stepper_t) :: stepper
+      character(len=:), allocatable :: text
+      integer :: i, k
+
+      call open_thrown(stepper, 1, 0.25_wp, 4, 1.0_wp, error)
+      if (allocated(error)) return
+      associate (march => stepper%march, scene => stepper%scene)
+         do k = 1, 3
+            march%active%may_cut = k == 1
+            do i = 1, size(status)
+               march%active%candidates%n_change = 0
+               march%active%candidates%n_change(2) = merge(0, merge(3, 1, k == 1), k == 3)
+               march%active%candidates%n_change(1) = merge(1, 0, k == 1)
+               march%active%candidates%is_blamed = .false.
+               march%active%candidates%is_blamed(2) = k < 3
+               call march_reason(march, scene, status(i), text)
+               call check_true(error, (index(text, trim(told(i))) > 0 .and. index(text, &
+                  "slave nodes " // to_text(scene%node%label(march%system%contact(1)%contact &
+                  %node(2)))) > 0) .eqv. k < 3, text)
+               call check_true(error, index(text, to_text(scene%node%label(march%system &
+                  %contact(1)%contact%node(1)))) == 0, "one node: " // text)
+               call check_true(error, (index(text, "; allow for smaller") > 0) .eqv. &
+                  (k == 2 .or. (k == 3 .and. i == 1)), "what to do: " // text)
+            end do
+         end do
+      end associate
+      call stepper_close(stepper)
+   end subroutine test_reasons
 
    subroutine gate_respond(self, u0, du, wants_tangent, response)
       class(gate_t), intent(inout) :: self
