@@ -61,35 +61,49 @@ module emcon_active_set
       logical :: is_new_set = .false.            !! others act than in the set before
    end type candidates_t
 
-   type :: active_set_t
+   !> What the step of the deck asks of contact.
+   type :: contact_rules_t
       logical :: holds_gap = .true.              !! persistent: hold the gap of the step's start,
       logical, allocatable :: closes(:)          !! (n_constraint) but here: its node has no mass
       logical :: has_impacts = .true.            !! what closes arrives with a velocity
       logical :: pushes_out = .false.            !! also what is closed too far, which makes energy
       logical :: puts_off = .false.              !! what follows from others nearly waits
+      logical :: may_cut = .true.                !! the step may be tried in smaller parts
       real(wp) :: largest_move = huge(1.0_wp)    !! of a correction in statics [L]
       real(wp) :: gap_tolerance = 0.0_wp         !! largest new stand-off per edge; 0: any
-      type(constraint_set_t) :: set
-      logical, allocatable :: is_active(:)       !! (n_constraint)
-      real(wp), allocatable :: lam(:)            !! (n_constraint) multipliers to start from
-      !> (n_constraint) what acted at the end of the step before, with which multipliers
-      logical, allocatable :: was_active(:)
-      real(wp), allocatable :: lam0(:)
-      integer :: n_newton = 0                    !! iterations in the last step
-      logical :: is_stale = .false.              !! stencils were chosen for another motion
-      integer :: n_stale = 0                     !! so often in this step
-      logical :: may_cut = .true.                !! the step may be tried in smaller parts
-      logical, allocatable :: is_candidate(:)    !! (n_constraint) acted at the start of the step,
-                                                 !! or has closed in it
-      type(candidates_t) :: candidates           !! of emcon_contact_rounds
-      logical, allocatable :: is_left_out(:)     !! (n_constraint) cannot act in this step
-      real(wp), allocatable :: first(:, :)       !! (n_dim, n_node) first guess of the step,
-      real(wp), allocatable :: driven(:, :)      !! (n_dim, n_node) the prescribed motion in it,
-      real(wp), allocatable :: before(:, :)      !! (n_dim, n_node) and that of the present set
+   end type contact_rules_t
+
+   !> How contact was at the end of the step before.
+   type :: contact_start_t
+      logical, allocatable :: was_active(:)      !! (n_constraint) what acted
+      real(wp), allocatable :: lam0(:)           !! (n_constraint) with which multipliers
       !> (n_constraint) gap at the start of a step that resolves overclosure where it is closed,
       !> else 0; and the parts of it that are left at the start and the end of the increment.
       real(wp), allocatable :: overclosure(:)
       real(wp) :: left(0:1) = 0.0_wp
+   end type contact_start_t
+
+   !> Motions that sets of a step begin with.
+   type :: contact_guess_t
+      real(wp), allocatable :: first(:, :)       !! (n_dim, n_node) first guess of the step,
+      real(wp), allocatable :: driven(:, :)      !! (n_dim, n_node) the prescribed motion in it,
+      real(wp), allocatable :: before(:, :)      !! (n_dim, n_node) and that of the present set
+   end type contact_guess_t
+
+   type :: active_set_t
+      type(contact_rules_t) :: rules
+      type(contact_start_t) :: start
+      type(contact_guess_t) :: guess
+      type(constraint_set_t) :: set
+      logical, allocatable :: is_active(:)       !! (n_constraint)
+      real(wp), allocatable :: lam(:)            !! (n_constraint) multipliers to start from
+      integer :: n_newton = 0                    !! iterations in the last step
+      logical :: is_stale = .false.              !! stencils were chosen for another motion
+      integer :: n_stale = 0                     !! so often in this step
+      logical, allocatable :: is_candidate(:)    !! (n_constraint) acted at the start of the step,
+                                                 !! or has closed in it
+      type(candidates_t) :: candidates           !! of emcon_contact_rounds
+      logical, allocatable :: is_left_out(:)     !! (n_constraint) cannot act in this step
       type(friction_t) :: friction               !! what sticks, what slides
       type(penalty_state_t) :: penalty           !! how stiff contacts are that give way
       type(near_laws_t) :: near_laws             !! what laws act on that is near
@@ -105,9 +119,9 @@ contains
       type(active_set_t), intent(inout) :: self
       type(step_t), intent(in) :: step
 
-      self%has_impacts = step_is_dynamic(step)
-      self%pushes_out = .not. self%has_impacts
-      self%gap_tolerance = step%contact%gap_tolerance
+      self%rules%has_impacts = step_is_dynamic(step)
+      self%rules%pushes_out = .not. self%rules%has_impacts
+      self%rules%gap_tolerance = step%contact%gap_tolerance
    end subroutine active_set_suit
 
    !> Set up for the constraints of `system`.
@@ -116,10 +130,10 @@ contains
       type(system_t), intent(in) :: system
 
       if (allocated(self%is_active)) deallocate(self%is_active, self%lam, self%is_left_out, &
-         self%overclosure, self%closes, self%skip_until, self%is_candidate)
-      allocate(self%closes(system%n_constraint), source=.false.)
+         self%start%overclosure, self%rules%closes, self%skip_until, self%is_candidate)
+      allocate(self%rules%closes(system%n_constraint), source=.false.)
       allocate(self%skip_until(size(system%contact)))
-      allocate(self%overclosure(system%n_constraint), source=0.0_wp)
+      allocate(self%start%overclosure(system%n_constraint), source=0.0_wp)
       allocate(self%is_active(system%n_constraint), source=.false.)
       allocate(self%is_candidate(system%n_constraint), source=.false.)
       allocate(self%is_left_out(system%n_constraint), source=.false.)
@@ -160,10 +174,11 @@ contains
       logical, intent(in) :: is_meant            !! the step resolves what is closed
       integer :: pair
 
-      self%overclosure = 0.0_wp
-      self%largest_move = huge(1.0_wp)
+      self%start%overclosure = 0.0_wp
+      self%rules%largest_move = huge(1.0_wp)
       do pair = 1, size(system%contact)
-         self%largest_move = min(self%largest_move, system%contact(pair)%contact%mean_size(x))
+         self%rules%largest_move = min(self%rules%largest_move, &
+            system%contact(pair)%contact%mean_size(x))
       end do
       if (.not. is_meant) return
       do pair = 1, size(system%contact)
@@ -174,7 +189,7 @@ contains
             call contact%begin_step(x, u, at_rest(u))
             call contact%measure(x, u, at_rest(u))
             where (contact%state%is_near .and. contact%state%is_over)
-               self%overclosure(first:last) = min(0.0_wp, contact%state%gap0)
+               self%start%overclosure(first:last) = min(0.0_wp, contact%state%gap0)
             end where
          end associate
       end do
@@ -190,8 +205,8 @@ contains
 
       call phase_enter(system%phases, phase_gaps, left)
       if (size(system%contact) > 0) call motion_bound_add(self%motion_bound, motion%u0)
-      self%was_active = state%contacts%is_active
-      self%lam0 = state%contacts%lam
+      self%start%was_active = state%contacts%is_active
+      self%start%lam0 = state%contacts%lam
       self%penalty%closure = state%contacts%closure
       if (self%friction%is_on) then
          self%friction%direction0 = state%contacts%slides_along
@@ -216,14 +231,14 @@ contains
 
       if (size(system%contact) > 0) call gaps_forget(system)
       call begin_contact(self, system, motion)
-      call friction_begin(self%friction, system, motion, self%was_active)
+      call friction_begin(self%friction, system, motion, self%start%was_active)
       call contact_support_forget(self%support)
-      self%lam = self%lam0
+      self%lam = self%start%lam0
       self%n_newton = 0
       self%n_stale = 0
       self%penalty%n_augmentation = 0
       if (self%near_laws%is_on) self%near_laws%is_near = .false.
-      self%is_candidate = self%was_active
+      self%is_candidate = self%start%was_active
       self%is_left_out = .false.
    end subroutine active_set_restart
 
@@ -290,12 +305,12 @@ contains
                last => system%first_constraint(pair + 1))
             self%is_active(first:last) = .false.
             if (self%skip_until(pair)%passes .or. self%penalty%is_at_ends) cycle
-            if (.not. any(self%was_active(first:last))) then
+            if (.not. any(self%start%was_active(first:last))) then
                call active_set_update_gaps(self, system, pair, motion)
                cycle
             end if
             call active_set_update_gaps(self, system, pair, motion, at_rest(motion%u0))
-            self%is_active(first:last) = self%was_active(first:last) &
+            self%is_active(first:last) = self%start%was_active(first:last) &
                .and. contact%state%is_near .and. (contact%state%is_over &
                .or. penalty_owes(self%penalty, first, last))
             if (.not. (contact%may_leave .and. any(self%is_active(first:last)))) cycle
@@ -336,7 +351,7 @@ contains
          call constraint_index(system, self%set%id(k), pair, i)
          self%set%is_kept(k) = self%set%id(k) <= system%space%linear%n
          if (pair == 0) cycle
-         self%set%is_firm(k) = .not. self%puts_off
+         self%set%is_firm(k) = .not. self%rules%puts_off
          call find_target(self, system%contact(pair)%contact%state(i), self%set%id(k), &
             self%set%target(k), self%set%is_kept(k))
       end do
@@ -348,7 +363,7 @@ contains
       end do
       self%set%n_permanent = count(self%set%id(:self%set%n) <= system%first_constraint(1))
       call friction_select(self%friction, self%set)
-      call penalty_select(self%penalty, system, self%set, self%has_impacts .and. &
+      call penalty_select(self%penalty, system, self%set, self%rules%has_impacts .and. &
          .not. motion%evaluation%pushes_at_end)
    end subroutine active_set_select
 
@@ -360,10 +375,10 @@ contains
       real(wp), intent(out) :: target            !! [L]
       logical, intent(out) :: is_kept
 
-      target = self%left(1)*self%overclosure(id) + gap%closed
+      target = self%start%left(1)*self%start%overclosure(id) + gap%closed
       ! What is closed too far is never pushed out: that would make energy.
-      is_kept = (self%holds_gap .and. .not. self%closes(id)) .or. &
-         (.not. self%pushes_out .and. gap%gap0 < target - touch_tol*gap%size)
+      is_kept = (self%rules%holds_gap .and. .not. self%rules%closes(id)) .or. &
+         (.not. self%rules%pushes_out .and. gap%gap0 < target - touch_tol*gap%size)
       if (self%penalty%is_on .and. .not. self%penalty%augments) is_kept = .false.
       if (is_kept) target = gap%gap0
    end subroutine find_target

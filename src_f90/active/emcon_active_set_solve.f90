@@ -35,8 +35,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       logical :: is_done
 
-      self%first = motion%du
-      self%driven = newton%driven
+      self%guess%first = motion%du
+      self%guess%driven = newton%driven
       is_done = .false.
       do while (.not. is_done)
          call contact_rounds_solve(self, system, scene, newton, motion, status, error)
@@ -81,8 +81,8 @@ contains
       integer :: n_newton
 
       n_newton = self%n_newton
-      motion%du = self%first
-      newton%driven = self%driven
+      motion%du = self%guess%first
+      newton%driven = self%guess%driven
       call active_set_restart(self, system, motion)
       self%n_newton = n_newton
    end subroutine begin_again
@@ -130,7 +130,7 @@ contains
       logical, intent(out) :: is_done
       integer :: pair
 
-      is_done = self%has_impacts
+      is_done = self%rules%has_impacts
       if (is_done) return
       is_done = .true.
       do pair = 1, size(system%contact)

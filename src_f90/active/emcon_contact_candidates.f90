@@ -37,7 +37,7 @@ contains
    pure logical function candidates_are_many(self)
       type(active_set_t), intent(in) :: self
 
-      candidates_are_many = self%has_impacts .and. &
+      candidates_are_many = self%rules%has_impacts .and. &
          count(self%candidates%takes_part) > most_condensed
    end function candidates_are_many
 
@@ -244,7 +244,7 @@ contains
          return
       end if
       call look_at_active(self, contact, i, k, motion, status)
-      if (.not. self%was_active(id)) then
+      if (.not. self%start%was_active(id)) then
          if (begins_unseen(self, contact, i, motion)) status = step_too_far
       end if
       associate (friction => self%friction)
@@ -263,7 +263,8 @@ contains
       real(wp) :: held
 
       associate (gap => contact%state(i))
-         held = min(gap_to_hold(self, gap, id), self%left(1)*self%overclosure(id) + gap%closed)
+         held = min(gap_to_hold(self, gap, id), self%start%left(1)*self%start%overclosure(id) &
+            + gap%closed)
          has_closed = gap%is_near .and. gap%is_over .and. gap%gap1 - held < -gap_noise*gap%size
       end associate
    end function has_closed

@@ -22,8 +22,8 @@ contains
       type(gap_state_t), intent(in) :: gap
       integer, intent(in) :: id                  !! number over all pairs
 
-      gap_to_hold = self%left(1)*self%overclosure(id) + gap%closed
-      if (self%holds_gap .and. .not. self%closes(id)) gap_to_hold = gap%gap0
+      gap_to_hold = self%start%left(1)*self%start%overclosure(id) + gap%closed
+      if (self%rules%holds_gap .and. .not. self%rules%closes(id)) gap_to_hold = gap%gap0
    end function gap_to_hold
 
    !> Can the step stand on constraint `k` of the set, the `i`-th of `contact`, which acts? If its
@@ -41,9 +41,9 @@ contains
       associate (gap => contact%state(i))
          if (.not. contact%covers(i, motion%x, motion%u0, motion%du)) status = step_too_far
          ! A new contact may not be held at a larger distance than the deck allows.
-         is_new = self%set%is_kept(k) .and. .not. self%was_active(self%set%id(k))
-         if (is_new .and. self%gap_tolerance > 0.0_wp &
-            .and. gap_ratio(gap, gap%gap0) > self%gap_tolerance) status = step_stands_off
+         is_new = self%set%is_kept(k) .and. .not. self%start%was_active(self%set%id(k))
+         if (is_new .and. self%rules%gap_tolerance > 0.0_wp &
+            .and. gap_ratio(gap, gap%gap0) > self%rules%gap_tolerance) status = step_stands_off
          held = merge(gap%gap0, self%set%target(k), self%set%is_kept(k))
          if (self%set%penalty%is_on) held = held + contact%mean_gap(i, self%set%penalty%left(k))
          self%is_stale = self%is_stale .or. &
@@ -58,7 +58,7 @@ contains
       integer, intent(in) :: node                !! of the scene
 
       noise = force_noise*sum(system%response%magnitude(:, node))
-      if (.not. self%has_impacts) noise = noise + force_noise &
+      if (.not. self%rules%has_impacts) noise = noise + force_noise &
          *sum(system%response%rounding(:, node))
    end function noise_at
 
@@ -75,15 +75,15 @@ contains
       closes = .false.
       associate (gap => contact%state(i))
          if (self%is_left_out(id) .or. .not. (gap%is_near .and. gap%is_over)) return
-         allowed = self%left*self%overclosure(id) + gap%closed
+         allowed = self%start%left*self%start%overclosure(id) + gap%closed
          if (gap%is_arriving .and. contact%step%is_penalty) then
             closes = gap%gap1 < allowed(1) &
                .and. gap%gap1 > -contact%max_penetration_at_start*gap%size
-         else if (gap%is_arriving .and. self%has_impacts .and. .not. may_arrive(gap)) then
+         else if (gap%is_arriving .and. self%rules%has_impacts .and. .not. may_arrive(gap)) then
             return
-         else if (gap%is_arriving .and. self%has_impacts .and. self%may_cut) then
+         else if (gap%is_arriving .and. self%rules%has_impacts .and. self%rules%may_cut) then
             status = step_too_far
-         else if (self%was_active(id) .or. .not. gap%gap0 - allowed(0) &
+         else if (self%start%was_active(id) .or. .not. gap%gap0 - allowed(0) &
             < -contact%max_penetration_at_start*gap%size) then
             closes = .not. gap%gap1 - allowed(1) >= -merge(0.0_wp, gap_noise, &
                contact%step%is_penalty)*gap%size
@@ -109,7 +109,7 @@ contains
 
       associate (gap => contact%state(i))
          begins_unseen = .not. contact%covers(i, motion%x, motion%u0, motion%du) .or. &
-            (self%has_impacts .and. gap%gap0 > contact%max_gap_on_entry)
+            (self%rules%has_impacts .and. gap%gap0 > contact%max_gap_on_entry)
       end associate
    end function begins_unseen
 

@@ -54,10 +54,10 @@ contains
       if (self%candidates%is_settled .or. allocated(error)) return
       if (size(system%contact) == 0) return
       if (status == newton_refused .and. newton%n_solve == 0) return    ! nor are there forces below
-      if (self%support%is_needed .or. (.not. self%has_impacts .and. &
-         largest_motion(motion%du - self%first) > self%largest_move)) then
-         motion%du = self%first
-         newton%driven = self%driven
+      if (self%support%is_needed .or. (.not. self%rules%has_impacts .and. &
+         largest_motion(motion%du - self%guess%first) > self%rules%largest_move)) then
+         motion%du = self%guess%first
+         newton%driven = self%guess%driven
          self%is_active = self%candidates%began
          if (self%support%is_needed) then
             call contact_support_forget(self%support)
@@ -78,7 +78,7 @@ contains
       type(motion_t), intent(in) :: motion
 
       call candidates_clear(self%candidates)
-      self%lam = self%lam0
+      self%lam = self%start%lam0
       if (self%friction%is_on) self%friction%tau = self%friction%tau0
       call active_set_select(self, system, motion)
       self%candidates%takes_part(self%set%id(:self%set%n)) = .true.
@@ -110,14 +110,14 @@ contains
 
       newton%looks_early = .false.
       newton%convergence%largest_move = huge(1.0_wp)
-      if (.not. self%has_impacts) newton%convergence%largest_move = self%largest_move
+      if (.not. self%rules%has_impacts) newton%convergence%largest_move = self%rules%largest_move
       do i = 1, most_rounds
          call candidates_select(self, system, motion)
          associate (set => self%set)
             if (allocated(law)) deallocate(law)
             allocate(law(set%n - set%n_permanent))
             if (self%friction%is_on) law = self%friction%law(set%id(set%n_permanent + 1:set%n))
-            if (size(law) == 0 .and. self%has_impacts) then
+            if (size(law) == 0 .and. self%rules%has_impacts) then
                call newton_solve(newton, system, set, motion, status, error)
             else
                call contact_newton_solve(newton, system, set, law, motion, status, error)

@@ -60,7 +60,8 @@ contains
       self%candidates%began(:) = self%is_active
       self%candidates%is_new_set = .true.
       do i = 1, most_by_trials
-         if (i > most_tried .and. self%has_impacts .and. .not. candidates_are_many(self)) return
+         if (i > most_tried .and. self%rules%has_impacts &
+            .and. .not. candidates_are_many(self)) return
          if (self%support%is_needed) call contact_sets_hold(self, system, scene, newton%driven, &
             motion)
          status = step_not_held
@@ -70,7 +71,7 @@ contains
             call begin_anew(self, newton, motion)
             return
          end if
-         self%before = motion%du
+         self%guess%before = motion%du
          newton%looks_early = self%candidates%is_new_set .and. .not. self%support%is_needed
          call candidates_solve(self, system, newton, motion, status, error)
          if (allocated(error)) return
@@ -81,7 +82,7 @@ contains
             if (goes_on) cycle
             return
          else if (.not. any(status == [newton_converged, newton_early])) then
-            has_failed = status == newton_diverged .and. .not. self%has_impacts
+            has_failed = status == newton_diverged .and. .not. self%rules%has_impacts
             call take_back(self, newton, motion, is_driven, has_failed)
             if (has_failed) cycle
             return
@@ -116,8 +117,8 @@ contains
       self%candidates%is_measured = .false.
       if (goes_on) call let_go_alone(self, goes_on)
       if (goes_on) then
-         motion%du = self%before
-         if (is_driven) newton%driven = self%driven
+         motion%du = self%guess%before
+         if (is_driven) newton%driven = self%guess%driven
       else
          call begin_anew(self, newton, motion)
       end if
@@ -129,8 +130,8 @@ contains
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
 
-      motion%du = self%first
-      newton%driven = self%driven
+      motion%du = self%guess%first
+      newton%driven = self%guess%driven
    end subroutine begin_anew
 
    !> Take in what holds the bodies that would be free with the present set. The prescribed motion
@@ -187,7 +188,7 @@ contains
          call choose_by_problem(self, system, newton, motion, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
       else
-         goes_on = .not. self%has_impacts .or. candidates_are_many(self)
+         goes_on = .not. self%rules%has_impacts .or. candidates_are_many(self)
          if (.not. goes_on) return
          call choose_by_trials(self, system, turns)
       end if

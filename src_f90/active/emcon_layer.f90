@@ -140,10 +140,10 @@ contains
          if (allocated(self%system%contact(i)%contact)) deallocate(self%system%contact(i)%contact)
          allocate(self%system%contact(i)%contact, source=model%contact(i)%contact)
       end do
-      call layer_mark(self, self%system, self%active%closes)
-      self%active%holds_gap = .true.
-      self%active%has_impacts = .false.
-      self%active%may_cut = .false.
+      call layer_mark(self, self%system, self%active%rules%closes)
+      self%active%rules%holds_gap = .true.
+      self%active%rules%has_impacts = .false.
+      self%active%rules%may_cut = .false.
    end subroutine layer_begin_step
 
    !> The contacts of `system` whose slave nodes have no mass.
@@ -229,7 +229,7 @@ contains
       self%is_settled = .false.
       self%needs_mass = .false.
       self%acts = active%is_active(self%n_before + 1:)
-      has_changed = self%acts .neqv. active%was_active(self%n_before + 1:)
+      has_changed = self%acts .neqv. active%start%was_active(self%n_before + 1:)
       if (.not. any(has_changed)) return
       call take_multipliers(self, active)
       call begin(self, motion, load)
@@ -250,7 +250,7 @@ contains
       self%work = sum(load*self%du)
       call system_find_energy(self%system, self%motion)
       self%released = before - sum(self%system%response%energy) + self%work
-      weight = active%lam0(self%n_before + 1:) + self%lam
+      weight = active%start%lam0(self%n_before + 1:) + self%lam
       where (.not. stays)
          has_changed = has_changed .or. (self%acts .neqv. self%active%is_active)
          self%acts = self%active%is_active
@@ -334,7 +334,7 @@ contains
       logical :: is_near(size(stays))
       integer :: k, pair
 
-      stays = .not. self%active%closes
+      stays = .not. self%active%rules%closes
       do pair = 1, size(self%system%contact)
          associate (contact => self%system%contact(pair)%contact, motion => self%motion, &
                first => self%system%first_constraint(pair))

@@ -310,11 +310,11 @@ contains
       type(active_set_t), intent(inout) :: active
       type(step_t), intent(in) :: step
 
-      active%puts_off = .true.
+      active%rules%puts_off = .true.
       call active_set_suit(active, step)
-      active%holds_gap = any(step_initiation(step) == [initiation_persistent, &
+      active%rules%holds_gap = any(step_initiation(step) == [initiation_persistent, &
          initiation_massless]) .and. step%contact%method /= method_penalty
-      active%closes = .false.
+      active%rules%closes = .false.
       active%support = contact_support_t()
    end subroutine begin_active
 
@@ -330,7 +330,7 @@ contains
       if (step_initiation(step) /= initiation_massless) return
       call warn_of_mass(self, scene)
       if (self%layer%is_on) then
-         call layer_mark(self%layer, self%system, self%active%closes)
+         call layer_mark(self%layer, self%system, self%active%rules%closes)
          call layer_begin_step(self%layer, step, self%system, error)
       end if
       if (allocated(error)) return

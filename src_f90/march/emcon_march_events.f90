@@ -17,12 +17,12 @@ contains
    !> Does contact begin or end in the solved step?
    pure subroutine events_look(self)
       type(march_t), intent(inout) :: self       !! solved, not committed
-      logical :: acts(size(self%active%was_active))
+      logical :: acts(size(self%active%start%was_active))
 
       call find_acting(self, acts)
       associate (first => self%system%first_constraint)
          self%step_check%changes_contact = any(acts(first(1) + 1:first(self%system%n_pair + 1)) &
-            .neqv. self%active%was_active(first(1) + 1:first(self%system%n_pair + 1)))
+            .neqv. self%active%start%was_active(first(1) + 1:first(self%system%n_pair + 1)))
       end associate
    end subroutine events_look
 
@@ -42,11 +42,11 @@ contains
       type(part_t), intent(in) :: part
       real(wp), intent(in) :: window             !! > 0 [T]
       integer, intent(inout) :: status           !! one of the `step_` codes
-      logical :: acts(size(self%active%was_active)), is_event(size(self%active%was_active))
+      logical, dimension(size(self%active%start%was_active)) :: acts, is_event
 
       if (.not. self%step_check%changes_contact .or. part%h <= window) return
       call find_acting(self, acts)
-      call find_events(self, step, self%active%was_active, acts, is_event)
+      call find_events(self, step, self%active%start%was_active, acts, is_event)
       if (.not. any(is_event)) return
       status = step_passes_event
       call find_first(self, part%h, is_event, self%step_check%event_at)
@@ -82,7 +82,7 @@ contains
       integer :: k, i, pair
 
       part = 1.0_wp
-      if (any(is_event .and. self%active%was_active)) part = 0.5_wp
+      if (any(is_event .and. self%active%start%was_active)) part = 0.5_wp
       associate (set => self%active%set)
          do k = set%n_permanent + 1, set%n
             if (.not. is_event(set%id(k))) cycle
@@ -108,11 +108,12 @@ contains
       type(step_t), intent(in) :: step
       type(part_t), intent(in) :: part
       type(increment_t), intent(inout) :: increment
-      logical :: is_event(size(self%active%was_active))
+      logical :: is_event(size(self%active%start%was_active))
       character(len=:), allocatable :: what
       integer :: pair, i, id
 
-      call find_events(self, step, self%active%was_active, self%state%contacts%is_active, is_event)
+      call find_events(self, step, self%active%start%was_active, self%state%contacts%is_active, &
+         is_event)
       do pair = 1, self%system%n_pair
          do i = 1, self%system%contact(pair)%contact%n_constraint
             id = self%system%first_constraint(pair) + i

@@ -336,8 +336,8 @@ contains
             text = text // ": it is another one in each try at slave nodes " // nodes
          end if
       end associate
-      if (.not. self%active%may_cut) text = text // "; allow for smaller increments, or let " // &
-         "contact give way by *CONSTRAINT METHOD, TYPE=PENALTY"
+      if (.not. self%active%rules%may_cut) text = text // "; allow for smaller increments, or " // &
+         "let contact give way by *CONSTRAINT METHOD, TYPE=PENALTY"
    end subroutine cycling_text
 
    !> A contact goes past the edges that it was to act on: at which nodes?
@@ -351,8 +351,8 @@ contains
       if (.not. any(self%active%candidates%is_blamed)) return
       call nodes_text(self, scene, self%active%candidates%is_blamed, nodes)
       text = text // ", past the edge next to the one where it began: slave nodes " // nodes
-      if (.not. self%active%may_cut) text = text // "; allow for smaller increments, or give the " &
-         // "other surface longer edges there"
+      if (.not. self%active%rules%may_cut) text = text // "; allow for smaller increments, or " // &
+         "give the other surface longer edges there"
    end subroutine too_far_text
 
    !> Why an increment with STABILIZE is to be smaller.

@@ -59,11 +59,11 @@ contains
 
       self%layer%needs_mass = .false.
       call step_check_begin(self%step_check)
-      self%active%may_cut = part%may_cut
-      self%active%gap_tolerance = 0.0_wp
-      if (part%may_cut) self%active%gap_tolerance &
+      self%active%rules%may_cut = part%may_cut
+      self%active%rules%gap_tolerance = 0.0_wp
+      if (part%may_cut) self%active%rules%gap_tolerance &
          = scene%step(self%state%clock%i_step)%contact%gap_tolerance
-      self%active%left = [overclosure_left(scene, self%state, part%start%step_time), &
+      self%active%start%left = [overclosure_left(scene, self%state, part%start%step_time), &
          overclosure_left(scene, self%state, part%start%step_time + part%h)]
       call solve(self, scene, part, increment, status, error)
       if (status /= step_done .or. allocated(error)) return
@@ -267,7 +267,7 @@ contains
             found%stray = self%overlap_check%stray
          end if
          overlap%depth = max(0.0_wp, overlap%depth &
-            - self%active%left(1)*self%overlap_check%meant_overlap)
+            - self%active%start%left(1)*self%overlap_check%meant_overlap)
          if (part%may_cut .and. part%h > scale(h, -judge_levels)) then
             if (goes_in(self, scene, overlap)) status = step_overlaps
          end if

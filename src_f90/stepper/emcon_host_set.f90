@@ -126,10 +126,10 @@ contains
 
       associate (gap => system%contact(pair)%contact%state(i), &
             id => system%first_constraint(pair) + i)
-         if (.not. (active%is_left_out(id) .and. active%may_cut)) return
+         if (.not. (active%is_left_out(id) .and. active%rules%may_cut)) return
          if (.not. (gap%is_near .and. gap%is_over)) return
-         if (gap%gap1 < min(gap%gap0, active%left(1)*active%overclosure(id) + gap%closed) &
-            - touch_tol*gap%size) status = step_too_far
+         if (gap%gap1 < min(gap%gap0, active%start%left(1)*active%start%overclosure(id) &
+            + gap%closed) - touch_tol*gap%size) status = step_too_far
       end associate
    end subroutine look_at_left_out
 
@@ -152,7 +152,7 @@ contains
       integer, intent(inout) :: status           !! `step_cycling` if not
       integer :: k, first
 
-      if (self%only_adds .or. (active%may_cut .and. .not. active%holds_gap)) then
+      if (self%only_adds .or. (active%rules%may_cut .and. .not. active%rules%holds_gap)) then
          status = step_cycling
          return
       end if

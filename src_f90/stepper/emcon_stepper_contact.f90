@@ -61,7 +61,7 @@ contains
          march%state%u = u0
          march%state%contacts%is_active = was_active
          march%state%contacts%lam = 0.0_wp
-         march%active%puts_off = .false.
+         march%active%rules%puts_off = .false.
          march%active%support = contact_support_t()
          call constraints_select(march%active%set, [integer ::])
          call active_set_begin(march%active, march%system, march%motion, march%state)
@@ -78,8 +78,8 @@ contains
       associate (active => self%march%active, &
          step => stepper%scene%step(self%march%state%clock%i_step))
          call active_set_suit(active, step)
-         active%holds_gap = step_initiation(step) == initiation_persistent
-         active%may_cut = stepper%may_cut
+         active%rules%holds_gap = step_initiation(step) == initiation_persistent
+         active%rules%may_cut = stepper%may_cut
          self%march%motion%evaluation = merge(evaluation_t(), evaluation_at_end, &
             step_is_dynamic(step))
       end associate

@@ -142,14 +142,14 @@ contains
       contact%max_gap_on_entry = row%most_open
       contact%step%is_penalty = row%is_penalty
       contact%is_seen = .not. has(row%was, "U")
-      active%left = [0.75_wp, 0.5_wp]
-      active%overclosure = row%overclosure
-      active%was_active = [has(row%was, "W")]
+      active%start%left = [0.75_wp, 0.5_wp]
+      active%start%overclosure = row%overclosure
+      active%start%was_active = [has(row%was, "W")]
       active%is_candidate = has(row%was, "C")
       active%is_left_out = has(row%was, "D")
-      active%has_impacts = has(row%step, "I")
-      active%may_cut = has(row%step, "M")
-      active%holds_gap = has(row%step, "H")
+      active%rules%has_impacts = has(row%step, "I")
+      active%rules%may_cut = has(row%step, "M")
+      active%rules%holds_gap = has(row%step, "H")
       call host_set_advance(sets, active, system, motion, is_done, status)
       call check_true(error, active%is_active(1) .eqv. row%closes, what // " closes")
       call check_equal(error, status, row%status, what // ", status")
@@ -211,11 +211,11 @@ contains
       contact%is_seen = .not. has(row%is, "U")
       system%response%magnitude(:, 1) = [1.0_wp, 2.0_wp]
       system%response%rounding(:, 1) = [0.5_wp, 1.5_wp]
-      active%was_active = [has(row%is, "W")]
+      active%start%was_active = [has(row%is, "W")]
       active%is_active = .true.
-      active%has_impacts = has(row%step, "I")
+      active%rules%has_impacts = has(row%step, "I")
       sets%only_adds = has(row%step, "A")
-      active%gap_tolerance = row%tolerance
+      active%rules%gap_tolerance = row%tolerance
       call active_set_select(active, system, motion)
       active%set%lam = row%lam
       active%set%is_kept = has(row%is, "K")
@@ -241,7 +241,7 @@ contains
       call open_given_contact(system, active, motion, reshape([gap_state_t(is_near=.true., &
          is_over=.true., gap0=0.1_wp, gap1=0.2_wp, size=edge)], [1, 1]), 0)
       call host_set_begin(sets, 1)
-      active%was_active = [.true.]
+      active%start%was_active = [.true.]
       active%is_active = .true.
       do k = 1, 4
          call host_set_try(sets, active)
@@ -274,7 +274,7 @@ contains
       given(:, 1)%gap1 = gap1
       given(:, 1)%size = size
       call open_given_contact(system, active, motion, given, 0)
-      active%was_active = spread(.false., 1, 4)
+      active%start%was_active = spread(.false., 1, 4)
    end subroutine open_four
 
    !> Sets {1, 4}, {2, 4} and {1, 4} again, before them {3, 4} too, by the step that they are in.
@@ -291,8 +291,8 @@ contains
       do k = 1, size(step)
          call open_four(system, active, motion, [-0.1_wp, 0.3_wp, 0.3_wp, 0.3_wp], &
             spread(edge, 1, 4))
-         active%holds_gap = has(step(k), "H")
-         active%may_cut = has(step(k), "M")
+         active%rules%holds_gap = has(step(k), "H")
+         active%rules%may_cut = has(step(k), "M")
          call host_set_begin(sets, 4)
          active%is_active = [.false., .false., .true., .true.]
          call host_set_try(sets, active)
@@ -370,7 +370,7 @@ contains
          given(1, 1)%is_near = k == 1
          call open_given_contact(system, active, motion, given, 1)
          call host_set_begin(sets, 2)
-         active%was_active = [.false., .false.]
+         active%start%was_active = [.false., .false.]
          call host_set_advance(sets, active, system, motion, is_done, status)
          call check_true(error, all(active%is_active .eqv. [k == 1, k == 2]), "one of both")
       end do
@@ -408,7 +408,8 @@ contains
          call check_true(error, all(active%is_active .eqv. [k < 4, k == 2, .false., k < 3]), &
             "acts " // to_text(k))
          call check_near(error, active%lam, state%contacts%lam, 0.0_wp, 1.0_wp, "multipliers")
-         call check_true(error, all(active%was_active .eqv. state%contacts%is_active), "acted")
+         call check_true(error, all(active%start%was_active .eqv. &
+            state%contacts%is_active), "acted")
          call check_true(error, all(active%is_candidate .eqv. state%contacts%is_active), &
             "candidates")
          call check_true(error, .not. (contact%step%is_sharp .or. contact%reach > 0.0_wp), &
@@ -507,13 +508,13 @@ contains
          contact%given%closed = [0.0_wp, 0.0_wp, 0.0_wp, -0.02_wp]
          active%is_active = [.true., .true., .true., .true.]
          active%lam = [1.0_wp, 2.0_wp, 3.0_wp, 4.0_wp]
-         active%left(1) = 0.5_wp
-         active%overclosure(3) = -0.2_wp
-         active%holds_gap = k == 1
-         active%closes = .true.
-         active%closes(2) = .false.
-         active%pushes_out = k == 3
-         active%puts_off = k > 3
+         active%start%left(1) = 0.5_wp
+         active%start%overclosure(3) = -0.2_wp
+         active%rules%holds_gap = k == 1
+         active%rules%closes = .true.
+         active%rules%closes(2) = .false.
+         active%rules%pushes_out = k == 3
+         active%rules%puts_off = k > 3
          call active_set_select(active, system, motion)
          associate (set => active%set)
             call check_near(error, set%lam, active%lam, 0.0_wp, 1.0_wp, "multipliers")
@@ -541,11 +542,11 @@ contains
       contact%given(4)%is_over = .false.
       contact%reach = 1.0_wp
       call active_set_overclosure(active, system, motion%x, motion%u0, .true.)
-      call check_near(error, active%overclosure, [-0.1_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, &
+      call check_near(error, active%start%overclosure, [-0.1_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, &
          1.0_wp, "what is closed")
       call check_near(error, contact%reach, 0.0_wp, 0.0_wp, 1.0_wp, "a step begins")
       call active_set_overclosure(active, system, motion%x, motion%u0, .false.)
-      call check_near(error, active%overclosure, spread(0.0_wp, 1, 4), 0.0_wp, 1.0_wp, "none")
+      call check_near(error, active%start%overclosure, spread(0.0_wp, 1, 4), 0.0_wp, 1.0_wp, "none")
    end subroutine test_overclosure
 
 end module test_active_choice

@@ -110,8 +110,8 @@ contains
          do m = 0, set%n - 1, 2
             set%n_permanent = m
             set%defect = -3.0_wp*set%defect
-            call condensation_make(later, system, set, correction, 0.5_wp*problem%residual, .true., &
-               error)
+            call condensation_make(later, system, set, correction, 0.5_wp*problem%residual, &
+               .true., error)
             set%defect = set%defect/(-3.0_wp)
             if (.not. allocated(error)) call condensation_renew(later, set, problem%residual, error)
             if (.not. allocated(error)) call condensation_make(anew, system, set, correction, &

@@ -100,8 +100,8 @@ contains
       call put_floor(self)
       n = self%system%n_constraint
       call active_set_init(self%active, self%system)
-      self%active%holds_gap = self%holds_gap
-      self%active%puts_off = .true.
+      self%active%rules%holds_gap = self%holds_gap
+      self%active%rules%puts_off = .true.
       call newton_init(self%newton, self%system%space%numbering%n_unknown, self%scene%x, &
          1.0e3_wp*epsilon(1.0_wp), 30)
       call correction_reset(self%newton%correction, method_null_space, solver_default)
@@ -486,7 +486,7 @@ contains
             if (k == 2) self%was_active = [.true., .true., .true.]
             if (k == 2) self%floor(1)%is_seen(2) = .false.
             if (k == 3) self%floor(1)%max_gap_on_entry = 0.005_wp
-            if (k > 3) self%active%gap_tolerance = merge(0.005_wp, 0.02_wp, k == 4)
+            if (k > 3) self%active%rules%gap_tolerance = merge(0.005_wp, 0.02_wp, k == 4)
             self%holds_gap = k > 3
             call solve(self, error)
             if (allocated(error)) return

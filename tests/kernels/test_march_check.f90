@@ -47,7 +47,7 @@ contains
 
       call open_given_contact(march%system, march%active, march%motion, reshape(spread( &
          gap_state_t(is_near=.true., is_over=.true., size=1.0_wp), 1, 6), [2, 3]), 1)
-      march%active%was_active = was
+      march%active%start%was_active = was
       march%active%is_active = is
       call active_set_select(march%active, march%system, march%motion)
    end subroutine open

@@ -85,7 +85,7 @@ contains
       if (allocated(error)) return
       associate (march => stepper%march, scene => stepper%scene)
          do k = 1, 3
-            march%active%may_cut = k == 1
+            march%active%rules%may_cut = k == 1
             do i = 1, size(status)
                march%active%candidates%n_change = 0
                march%active%candidates%n_change(2) = merge(0, merge(3, 1, k == 1), k == 3)
@@ -449,9 +449,9 @@ contains
          layer%needs_mass = .true.
          layer%is_settled = .true.
          march%step_check%ratio = dirt
-         active%may_cut = .not. active%may_cut
-         active%gap_tolerance = dirt
-         active%left = dirt
+         active%rules%may_cut = .not. active%rules%may_cut
+         active%rules%gap_tolerance = dirt
+         active%start%left = dirt
          active%is_active = .not. active%is_active
          active%is_left_out = .true.
          active%n_newton = 77

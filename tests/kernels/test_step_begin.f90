@@ -211,7 +211,8 @@ contains
                if (allocated(error)) return
                call march_increment(march, scene, increment, error)
                if (allocated(error)) return
-               call check_near(error, march%active%left, left(i:i + 1, k), tol, 1.0_wp, "left")
+               call check_near(error, march%active%start%left, left(i:i + 1, k), tol, 1.0_wp, &
+                  "left")
                call check_near(error, march%system%contact(1)%contact%state%gap1, &
                   spread(-depth*left(i + 1, k), 1, 3), 1.0e-6_wp, 1.0_wp, "gaps")
             end do
