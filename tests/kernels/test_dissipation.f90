@@ -106,7 +106,9 @@ contains
          call find(term, motion, moved)
          call check_near(error, moved, force, tol, 100.0_wp, "carried along")
       end do
+      call check_true(error, .not. term%is_symmetric(motion), "forces in the middle of the step")
       motion%evaluation%mass_scale = 0.0_wp
+      call check_true(error, term%is_symmetric(motion), "no forces")
       call find(term, motion, force)
       call check_near(error, force, 0.0_wp*force, 0.0_wp, 1.0_wp, "nothing without inertia")
    end subroutine test_work
