@@ -40,6 +40,7 @@ contains
          test_case_t("frames that are turned", test_turned), &
          test_case_t("the only one of all sets that obeys the law", test_all_sets), &
          test_case_t("by pivots as by trials", test_pivots), &
+         test_case_t("one body led to slips that differ", test_led_apart), &
          test_case_t("what has no solution is told", test_no_solution), &
          test_case_t("held as W is found: the same forces", test_held), &
          test_case_t("a body that its contacts alone hold", test_alone), &
@@ -226,6 +227,34 @@ contains
          end do
       end do
    end subroutine test_no_solution
+
+   !> A rigid square on two corners one of which stops a little earlier: it takes all of the
+   !> friction, the other one is free on its way, and none pushes against where it slides to.
+   subroutine test_led_apart(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: turn = 6.0_wp, pushes(4) = [4.0_wp, -0.25_wp, 4.0_wp, 0.0_wp], &
+         rows(4, 3) = reshape([0.0_wp, -1.0_wp, 0.0_wp, -1.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
+         -0.5_wp, -0.5_wp, 0.5_wp, -0.5_wp], [4, 3])
+      real(wp), parameter :: apart(3) = [1.0e-3_wp, 1.0e-6_wp, 1.0e-9_wp]
+      type(contact_problem_t) :: problem
+      type(contact_effort_t) :: effort
+      real(wp) :: force(0:1, 2)
+      integer :: k
+      logical :: is_solved
+
+      do k = 1, size(apart)
+         call contact_problem_create(problem, 1, 2)
+         problem%w = matmul(rows(:, :2), transpose(rows(:, :2))) &
+            + turn*spread(rows(:, 3), 2, 4)*spread(rows(:, 3), 1, 4)
+         problem%mu = [0.4_wp, 1.0_wp]
+         problem%slip_target(1, :) = -[1.0_wp, 1.0_wp + apart(k)]
+         problem%free = reshape([0.0_wp, 1.0_wp, 0.0_wp, 1.0_wp] - matmul(problem%w, pushes), [2, 2])
+         force = 0.0_wp
+         call contact_problem_solve(problem, force, effort, is_solved)
+         call check_true(error, is_solved, "solved")
+         call check_near(error, force, reshape(pushes, [2, 2]), 1.0e6_wp*eps, 4.0_wp, "forces")
+      end do
+   end subroutine test_led_apart
 
    !> Small coefficients: there is one solution. Pivots take slips from what they lead to.
    subroutine test_pivots(error)
