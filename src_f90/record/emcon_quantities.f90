@@ -291,6 +291,7 @@ contains
       type(stepper_t), intent(in) :: stepper
       character(len=*), intent(in) :: variable
       real(dp), allocatable :: values(:, :)
+      real(wp) :: drag(stepper%scene%n_dim - 1)
       integer :: n, i
 
       n = quantity_components(variable, at_contacts, stepper%scene%n_dim)
@@ -303,8 +304,10 @@ contains
             return
          end if
          do i = 1, size(values, 2)
+            drag = state%contacts%drag(:, i)
+            if (allocated(state%pairs%jump_drag)) drag = drag + state%pairs%jump_drag(:, i)
             if (state%pairs%shear_area(i) > 0.0_wp) values(:n - 1, i) &
-               = real(state%contacts%drag(:, i)/state%pairs%shear_area(i), dp)
+               = real(drag/state%pairs%shear_area(i), dp)
             if (state%contacts%is_active(i) .and. law(i)%mu > 0.0_wp) values(n, i) = merge(2.0_dp, &
                1.0_dp, any(abs(state%contacts%slides_along(:, i)) > 0.0_wp))
          end do

@@ -37,6 +37,7 @@ module emcon_pair_record
       ! Of jumps of the velocities, not allocated where there were none: their impulses by the step,
       real(wp), allocatable :: jump(:, :)        !! (n_dim, n_node) on all nodes [M L/T^2]
       real(wp), allocatable :: jump_lam(:)       !! (n_constraint) as multipliers [M L/T^2]
+      real(wp), allocatable :: jump_drag(:, :)   !! (n_dim - 1, n_constraint) the same of friction
    end type pair_record_t
 
    !> Places in a list; none if the last is before the first.
@@ -115,13 +116,16 @@ contains
       real(wp), intent(in) :: h                  !! > 0 [T]
       integer :: k, i, contact, own
 
-      if (allocated(self%jump)) deallocate(self%jump, self%jump_lam)
+      if (allocated(self%jump)) deallocate(self%jump, self%jump_lam, &
+         self%jump_drag)
       if (size(jump) == 0) return
       allocate(self%jump, source=0.0_wp*place)
-      allocate(self%jump_lam, source=0.0_wp*self%area)
+      allocate(self%jump_lam(size(self%area)), self%jump_drag(size(place, 1) - 1, &
+         size(self%area)), source=0.0_wp)
       do k = 1, size(jump)
          associate (node => jump(k)%node, id => jump(k)%id)
             self%jump_lam(id) = self%jump_lam(id) + jump(k)%lam/h
+            self%jump_drag(:, id) = self%jump_drag(:, id) + jump(k)%drag(:size(place, 1) - 1)/h
             contact = count(system%first_constraint < id)
             call add_total(self%total(abs(system%contact(contact)%of_pair)), jump(k), place, h, &
                system%contact(contact)%of_pair < 0)

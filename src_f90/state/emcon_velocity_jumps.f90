@@ -2,7 +2,7 @@
 !>
 !> They act in no time: what tells contact forces has them as means over the step.
 module emcon_velocity_jumps
-   use emcon_constraint, only : condition_row_gradient, condition_t
+   use emcon_constraint, only : condition_row_gradient, condition_t, most_slips
    use emcon_constraints, only : constraint_set_t
    use emcon_kinds, only : wp
    use emcon_rotation, only : add_moments, n_turn
@@ -20,6 +20,7 @@ module emcon_velocity_jumps
       !> Moments on either side beside those of the impulses where the nodes end up, as forces that
       !> stay go with nodes that move [M L^2/T]
       real(wp), allocatable :: slave_moment(:), master_moment(:)   !! (1 or 3)
+      real(wp) :: drag(most_slips) = 0.0_wp      !! of friction, against slips [M L/T]
       real(wp) :: rubbed = 0.0_wp                !! what friction takes more by it [M L^2/T^2]
    end type velocity_jump_t
 
@@ -69,6 +70,7 @@ contains
          if (.not. set%item(k)%has_friction) cycle
          associate (own => jump(size(jump) + k - set%n))
             own%rubbed = rubbed(k)
+            own%drag(:size(drag, 1)) = drag(:, k)
             do s = 1, size(drag, 1)
                own%impulse = own%impulse + drag(s, k)*condition_row_gradient(set%item(k), s)
             end do

@@ -413,12 +413,15 @@ contains
          call restart_exchange(restart, "pair_total", pairs%total(k)%length)
       end do
       call restart_exchange(restart, "pair_active", pairs%total%n_active)
-      if (restart%is_reading .and. allocated(pairs%jump)) deallocate(pairs%jump, pairs%jump_lam)
+      if (restart%is_reading .and. allocated(pairs%jump)) deallocate(pairs%jump, pairs%jump_lam, &
+         pairs%jump_drag)
       if (.not. restart_offers(restart, "pair_jump", allocated(pairs%jump))) return
       if (restart%is_reading) allocate(pairs%jump_lam(size(pairs%area)), &
+         pairs%jump_drag(size(pairs%force, 1) - 1, size(pairs%area)), &
          pairs%jump(size(pairs%force, 1), restart_size(restart, "pair_jump")/size(pairs%force, 1)))
       call restart_exchange(restart, "pair_jump", pairs%jump)
       call restart_exchange(restart, "pair_jump_lam", pairs%jump_lam)
+      call restart_exchange(restart, "pair_jump_drag", pairs%jump_drag)
    end subroutine exchange_pairs
 
    !> Where the file has none they begin at 0.

@@ -176,6 +176,17 @@ def test_at_rest_on_a_slope_it_stays(n, slope, mu, tilt, tmp_path):
     assert np.abs(place - place[0]).max() < 1e-12
 
 
+def test_traction_is_the_coefficient_times_the_pressure(tmp_path):
+    """Where it slides, in the increment of the impact too: both are of step and jump together."""
+    deck = block(1, lift=0.255, e=0.5, mu=0.1, h=0.01, t_end=0.3, velocity=(1.0, -1.0, 0.0), weight=0)
+    deck.replace("*NODE FILE, FREQUENCY=100000", "*CONTACT FILE\nCSTR, CSHEAR\n*NODE FILE")
+    fields = run_deck(deck, tmp_path).fields()
+    pressure = np.nan_to_num(fields["contact_pressure"].reshape(len(fields.time), -1))
+    shear = np.nan_to_num(fields["contact_shear"].reshape(len(fields.time), -1))
+    assert pressure.max() > 1.0
+    assert np.abs(np.abs(shear) - 0.1*pressure).max() < ROUND*pressure.max()
+
+
 # ---- many bodies --------------------------------------------------------------------------------
 
 
