@@ -33,8 +33,6 @@ module emcon_contact_sets
 
    !> Sets that are tried by the null space in one step at most, and where trials tell them.
    integer, parameter :: most_tried = 6, most_by_trials = 20
-   !> Tries of a step in which one contact may change, if not too many take part.
-   integer, parameter :: most_changes = 2
    !> By so much of the largest push friction may miss its law: what a solve leaves.
    real(wp), parameter :: least_missed = 1.0e4_wp*epsilon(1.0_wp)
    !> Rounds with contacts that give way at most.
@@ -194,8 +192,6 @@ contains
       end if
       self%is_active = self%candidates%acts
       call count_changes(self)
-      ! Sets that come back go on to do so: all candidates together tell.
-      goes_on = candidates_are_many(self) .or. maxval(self%candidates%n_change) <= most_changes
       self%candidates%is_new_set = turns .or. any(self%candidates%acted .neqv. self%candidates%acts)
    end subroutine choose
 
