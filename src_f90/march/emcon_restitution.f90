@@ -35,11 +35,21 @@ contains
       real(wp), intent(in) :: h                  !! > 0 [T]
       type(notes_t), intent(inout) :: notes      !! for the log
       type(error_t), allocatable, intent(out) :: error
+
+      if (self%active%set%n == self%active%set%n_permanent .or. .not. is_asked(self)) return
+      call take(self, h, notes, error)
+   end subroutine restitution_take
+
+   !> The same where contacts act and some law asks.
+   subroutine take(self, h, notes, error)
+      type(march_t), intent(inout) :: self
+      real(wp), intent(in) :: h
+      type(notes_t), intent(inout) :: notes
+      type(error_t), allocatable, intent(out) :: error
       real(wp) :: v(size(self%end_state%v, 1), size(self%end_state%v, 2)), lost, gained
       type(impacts_t) :: impacts
       type(rate_jump_t) :: jump
 
-      if (self%active%set%n == self%active%set%n_permanent .or. .not. is_asked(self)) return
       v = self%end_state%v
       call velocity_update_hold(self%velocity_update, self%system, self%active%set, &
          self%end_state%v, lost, gained, error)
@@ -67,7 +77,7 @@ contains
          call note_add(notes, "contacts that close in this step rebound fully, whatever their " &
             // "RESTITUTION says: with it they would gain energy")
       end if
-   end subroutine restitution_take
+   end subroutine take
 
    !> Energies of a jump that was taken, beside that of friction.
    pure subroutine book(self, lost, gained)

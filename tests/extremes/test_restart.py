@@ -206,12 +206,12 @@ def test_interrupt_keeps_all_whole_increments(deck, whole, tmp_path, number):
 
 
 def test_interrupt_before_the_first_increment(deck, whole, tmp_path):
-    """At any moment in the first second: 130 with files that can be gone on with, or not begun."""
+    """At any moment of the first half: 130 with files that can be gone on with, or not begun."""
     for k in range(4):
         folder = tmp_path / str(k)
         run = Run(folder / "ring")
         process = start(deck, "--quiet", "--output", folder)
-        time.sleep(0.03*k)
+        time.sleep(whole[1]*k/8)
         process.send_signal(signal.SIGINT)
         out, err = process.communicate(timeout=60)
         if process.returncode == -signal.SIGINT:
