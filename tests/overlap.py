@@ -111,10 +111,11 @@ class Outline:
 
 
 class Bodies:
-    """The bodies of a mesh: cells (0-based nodes, counter-clockwise) and outlines of each."""
+    """The bodies of a mesh: cells (0-based nodes, counter-clockwise) and outlines of each. Lines, as
+    of trusses and springs, have none."""
 
     def __init__(self, cells):
-        self.cells = [np.asarray(cell) for cell in cells]
+        self.cells = [np.asarray(cell) for cell in cells if len(cell) > 2]
         faces = [(int(i), int(j)) for cell in self.cells
                  for i, j in zip(cell, np.roll(cell, -1), strict=True)]
         twice = {(j, i) for i, j in faces} & set(faces)

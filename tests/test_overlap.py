@@ -150,3 +150,10 @@ def test_bodies_that_fly_together_meet_nothing():
     x, bodies = together(square(), square((0.0, 1.001)))
     found = bodies.worst(np.array([x, x + [3.0, 40.0]]), [0.0, 1.0])
     assert not found.bodies
+
+
+def test_lines_and_points_have_no_outline():
+    """A square, a spring at its corner and a mass in it: the square alone is a body."""
+    x = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [-1.0, 0.0], [0.5, 0.5]])
+    bodies = Bodies([[0, 1, 2, 3], [0, 4], [5]])
+    assert bodies.n == 1 and not bodies.overlap(x).depth > 0

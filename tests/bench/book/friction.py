@@ -189,7 +189,8 @@ def report_curves(started, _):
         runs = [started["hub", *hub, one].result() for one in cells]
         rows.append((f"hub of {', '.join(str(n) for _, n in cells)} edges in a sleeve: torque",
                      f"`{hub[0]}`", f"`{hub[1]}`",
-                     ", ".join(size(np.abs(bush_torques(run) - 1).max()) for run in runs),
+                     ", ".join(size(np.abs(bush_torques(run, edges)[0] - 1).max())
+                               for run, (_, edges) in zip(runs, cells, strict=True)),
                      max(int(run.history["newton"].max()) for run in runs), law(runs[-1])))
     return table(["scene", "smoothing", "type", "largest error", "Newton, at most", "law"], rows)
 
