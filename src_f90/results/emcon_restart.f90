@@ -20,7 +20,7 @@ module emcon_restart
    !> Groups by kind: integers, reals, texts. Their names are listed in `<group>_names`.
    character(len=*), parameter :: group(3) = [character(len=9) :: "/integers", "/reals", "/texts"]
    !> Version of the layout.
-   character(len=*), parameter :: layout = "emcon restart 6"
+   character(len=*), parameter :: layout = "emcon restart 7"
 
 contains
 
