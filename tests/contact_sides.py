@@ -72,6 +72,11 @@ class FileScene:
         return has(self.given, "*CONTACT PAIR")
 
     @property
+    def is_plane(self):
+        return not any(keyword(head) == "*ELEMENT" and "TYPE=C3D" in head.replace(" ", "").upper()
+                       for head, _ in self.given.card)
+
+    @property
     def is_free(self):
         """Does nothing act from outside?"""
         return not any(has(self.given, name) for name in ("*BOUNDARY", "*CLOAD", "*DLOAD"))

@@ -52,7 +52,7 @@ def figures(runs, scene, sides, **parameters):
         return Figures(done.run.verdict, done.energy_error if done.is_dynamic else None,
                        done.momentum_error if done.is_dynamic and scene.is_free else None,
                        done.overlap.by_edge, done.way.by_edge, int(history["active"].max()),
-                       history["cpu"][-1] - history["cpu"][0], done.run.digits())
+                       history["cpu"][-1] - history["cpu"][0], done.run.digits(pairs=False))
 
     return runs.pool.submit(work)
 
@@ -120,7 +120,7 @@ def report(started, _):
 
 def start_without(runs):
     return {name: [figures(runs, scene, sides) for sides in (ONE, ALL)]
-            for name, scene in scenes(runs).items() if not scene.has_contact}
+            for name, scene in scenes(runs).items() if scene.is_plane and not scene.has_contact}
 
 
 def report_without(started, _):

@@ -192,6 +192,10 @@ def report_curves(started, _):
                      ", ".join(size(np.abs(bush_torques(run, edges)[0] - 1).max())
                                for run, (_, edges) in zip(runs, cells, strict=True)),
                      max(int(run.history["newton"].max()) for run in runs), law(runs[-1])))
+    runs = [(started["hub", *HUBS[1], one].result(), one[1]) for one in BUSHES[1:]]
+    both = [bush_torques(run, edges) for run, edges in runs]
+    rows.append(("the same, from the moments of its nodes", f"`{HUBS[1][0]}`", f"`{HUBS[1][1]}`",
+                 ", ".join(size(np.abs(torque - moments).max()) for torque, moments in both), "", ""))
     return table(["scene", "smoothing", "type", "largest error", "Newton, at most", "law"], rows)
 
 

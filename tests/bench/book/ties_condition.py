@@ -21,7 +21,7 @@ LAST_STEP = """*STEP, NLGEOM
 <last>, <last>
 *CONSTRAINT METHOD, TYPE=<method>
 *CONTACT INITIATION, TYPE=<initiation>
-*NEWTON, TOLERANCE=<tolerance>
+*NEWTON, TYPE=FULL, TOLERANCE=<tolerance>
 *END STEP
 """
 BEFORE_LAST = {"h": 0.02, "t_end": 1.7}
@@ -60,7 +60,7 @@ def condition(deck, parameters):
     done = subprocess.run(list(map(str, command)), env=environment, capture_output=True,
                           text=True, check=True)  # fmt: skip
     form, *words = done.stdout.split(",")
-    assert form == parameters["method"].lower(), done.stdout
+    assert form == parameters["method"].lower() and int(words[0]) > 0, done.stdout
     return int(words[0]), *map(float, words[1:6]), int(words[6])
 
 
