@@ -1,8 +1,9 @@
 !> *CONTACT, *CONTACT INCLUSIONS and *CONTACT PROPERTY ASSIGNMENT: all with all.
 !>
 !> What is included becomes pairs with both sides held: a surface with itself, on one body or on
-!> many, or with another one. All exterior is one surface, of every free face; those that ties cover
-!> go out of it when the ties are known (`emcon_ties`).
+!> many, or with another one. All exterior is one surface, of every free face, in contact with every
+!> analytical surface, too; faces that ties cover go out of it when the ties are known
+!> (`emcon_ties`).
 module emcon_deck_general_contact
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t, n_neighbours
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, is_blank, &
@@ -130,10 +131,19 @@ contains
             return
          end associate
       end do
-      call append_pair(scene, data%card, surface(1), surface(2), is_reverse=.false.)
-      if (surface(1) /= surface(2)) call append_pair(scene, data%card, surface(2), surface(1), &
-         is_reverse=.true.)
+      call append_pairs(scene, data%card, surface)
    end subroutine include_pair
+
+   !> Two surfaces, the nodes of both of them held, or one with itself.
+   subroutine append_pairs(scene, card, surface)
+      type(scene_t), intent(inout) :: scene
+      type(card_t), intent(in) :: card
+      integer, intent(in) :: surface(2)
+
+      call append_pair(scene, card, surface(1), surface(2), is_reverse=.false.)
+      if (surface(1) /= surface(2)) call append_pair(scene, card, surface(2), surface(1), &
+         is_reverse=.true.)
+   end subroutine append_pairs
 
    subroutine append_pair(scene, card, slave, master, is_reverse)
       type(scene_t), intent(inout) :: scene
@@ -151,12 +161,13 @@ contains
       scene%pair = [scene%pair, pair]
    end subroutine append_pair
 
-   !> Every free face, in contact with every other.
+   !> Every free face, in contact with every other and with the analytical surfaces.
    subroutine include_exterior(reader, card, scene)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(scene_t), intent(inout) :: scene
       type(surface_t) :: surface
+      integer :: all, i
 
       if (reader%doubt%elements .or. reader%doubt%names) return
       if (size(scene%pair) > 0) then
@@ -177,17 +188,22 @@ contains
          return
       end if
       scene%surface = [scene%surface, surface]
-      call name_index_put(reader%names%surfaces, exterior_name, size(scene%surface))
-      call append_pair(scene, card, size(scene%surface), size(scene%surface), is_reverse=.false.)
+      all = size(scene%surface)
+      call name_index_put(reader%names%surfaces, exterior_name, all)
+      call append_pairs(scene, card, [all, all])
+      do i = 1, all
+         if (scene%surface(i)%is_profile) call append_pairs(scene, card, [all, i])
+      end do
    end subroutine include_exterior
 
-   !> The free faces of all elements.
+   !> The free faces of all elements but those of rigid bodies with an analytical surface: that is
+   !> what others meet.
    subroutine find_exterior(scene, surface)
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(out) :: surface
       type(adjacency_t) :: adjacency
       logical, allocatable :: is_in(:, :)        ! (face, element)
-      integer :: e, f, i
+      integer :: body, e, f, i
 
       call adjacency_init(adjacency, scene)
       allocate(is_in(maxval(scene%element%kinds%n_face), size(scene%element%label)), source=.false.)
@@ -195,6 +211,13 @@ contains
          if (scene%element%node(1, e) == 0) cycle
          do f = 1, scene%element%kinds(scene%element%kind(e))%n_face
             is_in(f, e) = n_neighbours(scene, adjacency, e, f) == 0
+         end do
+      end do
+      do i = 1, size(scene%surface)
+         if (.not. scene%surface(i)%is_profile) cycle
+         do body = 1, size(scene%rigid)
+            if (any(scene%rigid(body)%node == scene%surface(i)%edge(1, 1))) &
+               is_in(:, scene%rigid(body)%element) = .false.
          end do
       end do
       associate (all => [(i, i = 0, size(is_in) - 1)], n => size(is_in, 1))

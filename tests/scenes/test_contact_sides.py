@@ -138,3 +138,70 @@ def test_what_meets_nothing_has_no_contact(tmp_path, name, parameters):
                          for sides in (ONE, ALL))
     assert with_all.history["active"].max() == 0
     assert with_all.digits(pairs=False) == without.digits(pairs=False)
+
+
+@pytest.mark.parametrize(("name", "parameters"), [
+    ("bar_on_wall", {"initiation": "PERSISTENT"}),
+    ("rigid_bar", {}),
+])
+def test_all_with_all_meets_analytical_surfaces(tmp_path, name, parameters):
+    """As the pair of the deck with the nodes of both sides held: the same motion."""
+    scene = FileScene(DECKS / f"{name}.inp")
+    both, everything = (run_deck(scene.deck(sides), tmp_path / sides, **parameters)
+                        for sides in (BOTH, ALL))
+    assert everything.history["active"].max() > 0
+    assert everything.verdict["verdict"] == both.verdict["verdict"] == "good"
+    moved = [run.fields()["displacement"] for run in (both, everything)]
+    assert np.abs(moved[1] - moved[0]).max() <= 1e4*EPSILON*np.abs(moved[0]).max()
+
+
+OWN_WALL = """*NODE
+1, 0., -1.
+2, 4., -1.
+3, 4., 0.
+4, 0., 0.
+11, 1., 0.1
+12, 2., 0.1
+13, 2., 1.1
+14, 1., 1.1
+99, 0., 0.
+*ELEMENT, TYPE=CPE4, ELSET=FLOOR
+1, 1, 2, 3, 4
+*ELEMENT, TYPE=CPE4, ELSET=BLOCK
+2, 11, 12, 13, 14
+*SURFACE, TYPE=SEGMENTS, NAME=WALL
+START, 0., 0.
+LINE, 4., 0.
+*RIGID BODY, ELSET=FLOOR, ANALYTICAL SURFACE=WALL, REF NODE=99
+*MATERIAL, NAME=M
+*ELASTIC
+1e4, 0.3
+*DENSITY
+1.
+*SOLID SECTION, ELSET=BLOCK, MATERIAL=M
+*SOLID SECTION, ELSET=FLOOR, MATERIAL=M
+*BOUNDARY
+99, 1, 2
+99, 6
+*CONTACT
+*CONTACT INCLUSIONS, ALL EXTERIOR
+*STEP, NLGEOM
+*DYNAMIC, DIRECT
+0.01, 0.4
+*DLOAD
+BLOCK, GRAV, 10., 0., -1.
+*NODE FILE
+U
+*END STEP
+"""
+
+
+def test_a_rigid_body_is_met_at_its_analytical_surface(tmp_path):
+    """A block falls on a rigid one whose upper side is a surface of its own, too: it arrives after
+    the time of a fall through 0.1, and never goes in."""
+    run = run_deck(Deck(OWN_WALL), tmp_path)
+    assert run.verdict["verdict"] == "good"
+    foot = run.fields()["displacement"][:, 4:6, 1].min(axis=1)
+    assert foot.min() >= -0.1 - 1e4*EPSILON and run.history["active"].max() > 0
+    first = run.history["time"][np.argmax(run.history["active"] > 0)]
+    assert first == pytest.approx(math.sqrt(0.02), abs=0.01)
