@@ -17,6 +17,7 @@ module emcon_deck_general_contact
    use emcon_mesh, only : surface_t
    use emcon_name_index, only : name_index_find, name_index_put
    use emcon_scene, only : scene_t, where_text
+   use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
    public :: read_general_contact
@@ -134,15 +135,16 @@ contains
       call append_pairs(scene, data%card, surface)
    end subroutine include_pair
 
-   !> Two surfaces, the nodes of both of them held, or one with itself.
+   !> Two surfaces, the nodes of both of them held, or one, with itself.
    subroutine append_pairs(scene, card, surface)
       type(scene_t), intent(inout) :: scene
       type(card_t), intent(in) :: card
-      integer, intent(in) :: surface(2)
+      integer, intent(in) :: surface(:)
 
-      call append_pair(scene, card, surface(1), surface(2), is_reverse=.false.)
-      if (surface(1) /= surface(2)) call append_pair(scene, card, surface(2), surface(1), &
-         is_reverse=.true.)
+      associate (slave => surface(1), master => surface(size(surface)))
+         call append_pair(scene, card, slave, master, is_reverse=.false.)
+         if (slave /= master) call append_pair(scene, card, master, slave, is_reverse=.true.)
+      end associate
    end subroutine append_pairs
 
    subroutine append_pair(scene, card, slave, master, is_reverse)
@@ -190,9 +192,9 @@ contains
       scene%surface = [scene%surface, surface]
       all = size(scene%surface)
       call name_index_put(reader%names%surfaces, exterior_name, all)
-      call append_pairs(scene, card, [all, all])
+      call append_pairs(scene, card, [all])
       do i = 1, all
-         if (scene%surface(i)%is_profile) call append_pairs(scene, card, [all, i])
+         if (is_analytical(scene%surface(i))) call append_pairs(scene, card, [all, i])
       end do
    end subroutine include_exterior
 
@@ -203,6 +205,7 @@ contains
       type(surface_t), intent(out) :: surface
       type(adjacency_t) :: adjacency
       logical, allocatable :: is_in(:, :)        ! (face, element)
+      integer, allocatable :: node(:)
       integer :: body, e, f, i
 
       call adjacency_init(adjacency, scene)
@@ -214,9 +217,11 @@ contains
          end do
       end do
       do i = 1, size(scene%surface)
-         if (.not. scene%surface(i)%is_profile) cycle
+         if (.not. is_analytical(scene%surface(i))) cycle
+         call surface_nodes(scene, scene%surface(i), node)
+         if (size(node) == 0) cycle
          do body = 1, size(scene%rigid)
-            if (any(scene%rigid(body)%node == scene%surface(i)%edge(1, 1))) &
+            if (any(scene%rigid(body)%node == node(1))) &
                is_in(:, scene%rigid(body)%element) = .false.
          end do
       end do
@@ -227,6 +232,13 @@ contains
       allocate(surface%node(0))
       surface%is_exterior = .true.
    end subroutine find_exterior
+
+   !> Is a surface made neither of faces nor of nodes?
+   pure logical function is_analytical(surface)
+      type(surface_t), intent(in) :: surface
+
+      is_analytical = .not. surface%is_nodal .and. size(surface%element) == 0
+   end function is_analytical
 
    !> The names in *CONTACT PROPERTY ASSIGNMENT: surface, surface, interaction. All interactions
    !> mean the same, hard contact; pads, restitution, friction and damping are of pairs only.
