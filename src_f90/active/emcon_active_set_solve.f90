@@ -3,7 +3,7 @@
 !>
 !> Bodies that contact alone holds are brought to it before, and looked at after. Where no solution
 !> is found the step is tried with sharp convex corners before it is cut. Source: docs/theory.md,
-!> section 6.
+!> section 6.2.
 module emcon_active_set_solve
    use emcon_active_set, only : active_set_restart, active_set_t, step_cycling, step_diverged, &
       step_done, step_not_held

@@ -2,7 +2,7 @@
 !>
 !> They are what acted at the start of the step and what closes in it; they only grow within a step,
 !> but for those that lose their surface, which come back once at most. Source: docs/theory.md,
-!> section 6.
+!> section 6.1.
 module emcon_contact_candidates
    use emcon_active_set, only : active_set_pass, active_set_select, active_set_t, &
       active_set_update_gaps, step_done, step_too_far

@@ -1,5 +1,5 @@
 !> The conditions of single contacts, looked at for a motion: what acts can go on to act, what does
-!> not act closes or does not. Source: docs/theory.md, section 6.
+!> not act closes or does not. Source: docs/theory.md, section 6.1.
 module emcon_contact_conditions
    use emcon_active_set, only : active_set_t, step_stands_off, step_too_far, touch_tol
    use emcon_contact, only : contact_t, gap_ratio, gap_state_t, max_penetration_on_entry

@@ -1,6 +1,6 @@
 !> A step as one problem of its contacts: first sets of them are tried (emcon_contact_sets); where
 !> none stands emcon_contact_newton solves the step with all candidates. Source: docs/theory.md,
-!> section 6.
+!> section 6.1.
 module emcon_contact_rounds
    use emcon_active_set, only : active_set_select, active_set_t, candidates_clear, step_cycling, &
       step_done, step_not_held

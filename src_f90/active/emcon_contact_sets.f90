@@ -4,7 +4,7 @@
 !> What is found is checked: all that acts pushes, friction obeys its law, no candidate closes.
 !> Where that fails the contacts are condensed by the kept factor, and their problem tells the next
 !> set; in statics trials of single contacts do. Contacts that give way are solved by sets alone.
-!> Source: docs/theory.md, section 6.
+!> Source: docs/theory.md, section 6.1.
 module emcon_contact_sets
    use emcon_active_set, only : active_set_t, step_cycling, step_done, step_loose, step_not_held
    use emcon_constraint_rows, only : constraints_rows

@@ -4,7 +4,7 @@
 !> active contacts leave one, the bodies follow their loads along it until the next contact
 !> touches, which is taken in; along a motion that no load works on the nearest contact is, unless
 !> it has pulled. The active set lets go of what turns out to pull. What is left at the end is
-!> told; with STABILIZE a motion that no load works on may be. Source: docs/theory.md, section 6.
+!> told; with STABILIZE a motion that no load works on may be. Source: docs/theory.md, section 6.2.
 module emcon_contact_support
    use emcon_constraint, only : condition_rate
    use emcon_constraints, only : constraint_set_t

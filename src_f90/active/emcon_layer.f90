@@ -4,7 +4,7 @@
 !> problem of contact in z alone, on a scene of these elements with the contact of the whole. Its
 !> energy, and what closing contacts have taken, goes back into the velocities along the forces that
 !> the contacts which open or close exert on the massive freedoms through z. Source: docs/theory.md,
-!> section 6.
+!> section 6.4.
 module emcon_layer
    use emcon_active_set, only : active_set_begin, active_set_init, active_set_t, step_done, &
       step_singular, step_too_far, touch_tol

@@ -4,7 +4,7 @@
 !> motion and no step is short enough. Such a node takes its mass back, with all massless nodes of
 !> its elements, before the step is tried again; its contact is persistent from then on. What comes
 !> back is inertia relative to what has mass around the node, so that momenta and kinetic energy
-!> stay where it moves with that. Source: docs/theory.md, section 6.
+!> stay where it moves with that. Source: docs/theory.md, section 6.4.
 module emcon_mass_return
    use emcon_constraints, only : constraint_index
    use emcon_errors, only : error_t

@@ -2,7 +2,7 @@
 !>
 !> Where edges of two meshes do not match, gaps between chords differ from those between the curves
 !> by up to the sagitta of an edge, often more than an interference. Source: docs/theory.md,
-!> section 6.
+!> section 6.6.
 module emcon_overclosure
    use emcon_contact, only : contact_t
    use emcon_interactions, only : contact_options_t

@@ -3,7 +3,7 @@
 !> Once forces are met to a few digits, what pulls hard or has gone in deep tells that the set will
 !> change: what is left of the way with this one leads nowhere. Only that it changes is told here;
 !> which set follows is judged by emcon_contact_sets, and a set that stands has always been
-!> solved to the end. Source: docs/theory.md, section 6.
+!> solved to the end. Source: docs/theory.md, section 6.1.
 module emcon_early_set
    use emcon_constraints, only : constraint_set_t
    use emcon_gaps, only : pair_measure

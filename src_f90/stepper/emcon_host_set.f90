@@ -3,7 +3,7 @@
 !> What would penetrate is taken in, what pulls or has lost its surface is let go. If a set comes
 !> back, the union of those since then is taken and nothing is let go any more: where gaps of the
 !> start are held, which makes no energy, or where the host cannot cut the step; else it is to be
-!> tried with another size. Source: docs/theory.md, section 6.
+!> tried with another size. Source: docs/theory.md, section 6.1.
 module emcon_host_set
    use emcon_active_set, only : active_set_pass, active_set_t, active_set_update_gaps, &
       step_cycling, step_done, step_too_far, touch_tol

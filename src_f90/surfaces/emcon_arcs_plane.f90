@@ -2,7 +2,7 @@
 !>
 !> At each node the circle through it and its two neighbours has the curvature there. An edge has
 !> the harmonic mean of those at its ends, none where one of them is straight or they bend to
-!> different sides. Source: docs/theory.md, section 6.
+!> different sides. Source: docs/theory.md, section 6.6.
 module emcon_arcs_plane
    use emcon_chain_plane, only : chain_corners, chain_t, next, previous
    use emcon_kinds, only : wp

@@ -1,7 +1,7 @@
 !> A small stiffness of nodes that nothing holds, in the matrix alone: it changes no solution.
 !>
 !> Newton's method then moves no body farther than the residual calls for.
-!> Source: docs/theory.md, section 6.
+!> Source: docs/theory.md, section 6.2.
 module emcon_stiffening
    use emcon_csr, only : csr_find, csr_t
    use emcon_kinds, only : dp, wp

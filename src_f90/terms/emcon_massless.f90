@@ -4,7 +4,7 @@
 !> a potential, whose force is continuous in time. An element that stands on massless nodes puts its
 !> mass on its other nodes: the consistent mass between these, scaled to the mass of the element, so
 !> that the total is exact, and frequencies change by the square of the element size. Source:
-!> docs/theory.md, section 6.
+!> docs/theory.md, section 6.4.
 module emcon_massless
    use emcon_bodies, only : bodies_find
    use emcon_csr, only : csr_from_elements, csr_t
