@@ -9,6 +9,7 @@ module emcon_deck_check_contact
    use emcon_interactions, only : contact_pair_t, formulation_user, formulation_mortar, &
       formulation_segment, multiplier_standard
    use emcon_kinds, only : wp
+   use emcon_massless_surfaces, only : pair_sheds_mass, surface_keeps_mass
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : step_t
@@ -20,7 +21,8 @@ module emcon_deck_check_contact
 contains
 
    !> Exchange slave and master where the program may choose and the slave would push its master
-   !> sideways, unless more slave nodes than before could not follow. It is told if not asked for.
+   !> sideways, or could not lose the mass that it is to lose, unless more slave nodes than before
+   !> could not follow. It is told if not asked for.
    subroutine choose_slaves(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(inout) :: scene
@@ -37,6 +39,7 @@ contains
             if (pair%both_sides .or. pair%adjust%distance >= 0.0_wp .or. pair%adjust%set > 0) cycle
             if (pair%slave == pair%master .or. has_reverse(i)) cycle
             call find_advice(scene, pair, advice, is_bent)
+            if (pair_sheds_mass(scene, pair)) call look_for_mass(scene, pair, advice, is_bent)
             if (.not. is_bent) cycle
             other = exchanged(pair)
             if (n_stuck(scene, other) > n_stuck(scene, pair)) cycle
@@ -47,6 +50,22 @@ contains
          end associate
       end do
    end subroutine choose_slaves
+
+   !> The slave is that surface which can lose its mass, if only one of them can.
+   subroutine look_for_mass(scene, pair, advice, is_better)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      character(len=:), allocatable, intent(inout) :: advice     !! to follow on the slave's name
+      logical, intent(inout) :: is_better        !! the master should be the slave
+      logical :: keeps_mass(2)
+
+      keeps_mass = [surface_keeps_mass(scene, pair%slave), &
+         surface_keeps_mass(scene, pair%master)]
+      if (all(keeps_mass) .or. .not. any(keeps_mass)) return
+      is_better = keeps_mass(1)
+      advice = " is rigid or prescribed and keeps its mass; master surface " &
+         // scene%surface(pair%master)%name // " should be the slave"
+   end subroutine look_for_mass
 
    !> `pair` with its master as the slave.
    pure type(contact_pair_t) function exchanged(pair)

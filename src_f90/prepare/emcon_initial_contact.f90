@@ -11,6 +11,7 @@ module emcon_initial_contact
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_user, &
       formulation_nts
    use emcon_kinds, only : wp
+   use emcon_massless_surfaces, only : pair_sheds_mass, surface_keeps_mass
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted
    use emcon_start_gaps, only : is_master, is_slave, start_gaps_t
@@ -66,17 +67,13 @@ contains
                if (allocated(error)) return
                cycle
             end if
+            if (waits_for_mass(scene, pair)) call become_guard(scene, pair, notes, "keeps its " &
+               // "mass, which " // scene%surface(pair%master)%name // " does not")
             call new_start_gaps(scene, pair, contact, error, options)
             if (allocated(error)) return
-            if (.not. contact%is_self) then
-               call check_crossing(scene, pair%slave, contact, is_slave, is_checked, error)
-               if (.not. allocated(error)) call check_crossing(scene, pair%master, contact, &
-                  is_master, is_checked, error)
-               if (.not. allocated(error)) call check_sides(scene, pair, contact, noise, &
-                  "master", error)
-               if (.not. allocated(error)) call check_slave_sides(scene, pair, noise, error)
-               if (allocated(error)) return
-            end if
+            if (.not. contact%is_self) call check_two(scene, pair, contact, noise, is_checked, &
+               error)
+            if (allocated(error)) return
             if (pair%adjust%distance >= 0.0_wp .or. pair%adjust%set > 0) then
                call adjust_pair(scene, pair, contact, notes)
                noise = coordinate_noise(scene)
@@ -92,7 +89,8 @@ contains
                options, noise, notes, error)
             if (allocated(error) .and. pair%is_reverse .and. pair%may_choose) then
                deallocate(error)                     ! `check_corners` has let the nodes pass
-               call become_guard(scene, pair, notes)
+               call become_guard(scene, pair, notes, "dips into edges of " // &
+                  scene%surface(pair%master)%name // " at the start")
                cycle
             end if
             if (.not. allocated(error)) call check_corners(scene, pair, options, noise, error)
@@ -101,17 +99,46 @@ contains
       end do
    end subroutine initial_contact_prepare
 
-   !> Nodes that begin behind an edge of the slave, as polygons of one curve dip into each other,
-   !> cannot be held at it: they are kept from going in farther than guards allow.
-   subroutine become_guard(scene, pair, notes)
+   !> Neither of two surfaces crosses itself, and both face each other.
+   subroutine check_two(scene, pair, contact, noise, is_checked, error)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      class(start_gaps_t), intent(inout) :: contact
+      real(wp), intent(in) :: noise              !! of coordinates [L]
+      logical, intent(inout) :: is_checked(:)    !! (n_surface) for crossings
+      type(error_t), allocatable, intent(out) :: error
+
+      call check_crossing(scene, pair%slave, contact, is_slave, is_checked, error)
+      if (.not. allocated(error)) call check_crossing(scene, pair%master, contact, is_master, &
+         is_checked, error)
+      if (.not. allocated(error)) call check_sides(scene, pair, contact, noise, "master", error)
+      if (.not. allocated(error)) call check_slave_sides(scene, pair, noise, error)
+   end subroutine check_two
+
+   !> Do the nodes of a half of a pair keep their mass where those of the other half do not? As rows
+   !> beside those of the massless nodes they would be a second one on the same nodes, which cannot
+   !> follow both.
+   pure logical function waits_for_mass(scene, pair)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+
+      waits_for_mass = pair%both_sides .and. (pair%may_choose .or. .not. pair%is_asked) &
+         .and. pair%slave /= pair%master .and. pair_sheds_mass(scene, pair)
+      if (waits_for_mass) waits_for_mass = surface_keeps_mass(scene, pair%slave) .and. .not. &
+         surface_keeps_mass(scene, pair%master)
+   end function waits_for_mass
+
+   !> Nodes that cannot be held at their master, as where polygons of one curve dip into each other,
+   !> are kept from going in farther than guards allow.
+   subroutine become_guard(scene, pair, notes, why)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(inout) :: pair
       type(notes_t), intent(inout) :: notes
+      character(len=*), intent(in) :: why        !! to follow on the name of its slave
 
       pair%slack = guard_slack
       call note_add(notes, where_text(scene, pair%origin) // ": surface " // &
-         scene%surface(pair%slave)%name // " dips into edges of " // &
-         scene%surface(pair%master)%name // " at the start: its nodes are guarded, not held")
+         scene%surface(pair%slave)%name // " " // why // ": its nodes are guarded, not held")
    end subroutine become_guard
 
    !> Does the deck leave it open which side of a pair is the slave?

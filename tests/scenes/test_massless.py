@@ -16,6 +16,7 @@ sys.path.insert(0, str(ROOT / "tests" / "bench"))
 from book import forces  # noqa: E402
 
 MASSLESS = {"initiation": "MASSLESS"}
+BACK = "contact nodes take their mass back"
 NTS = {"formulation": "NODE TO SURFACE", "sides": "AUTO"}
 MORTAR = {"formulation": "MORTAR", "sides": "ONE"}
 EPS = np.finfo(float).eps
@@ -60,6 +61,59 @@ def test_force_of_a_bar_is_that_of_the_wave(choice, tmp_path):
     assert history["penetration"].max() < 1e-12
     _, _, force = bar(tmp_path/"massive", "PERSISTENT", choice, 0.0025)
     assert (force[rests] - expected).std() > 20*scatter
+
+
+# ---- discs on a rigid floor ---------------------------------------------------------------------
+
+
+def disc_on_floor(angle, shift, h, edges=24):
+    """A disc is thrown at `angle` [degrees] on a rigid floor, whose mesh is shifted by that part of
+    an edge: wherever its nodes are beside those of the disc."""
+    scene = Scene(h, 0.9)
+    way = math.radians(angle)
+    scene.disc("DISC", (0.0, 0.51), 0.5, (edges//4, edges//8),
+               velocity=(1.5*math.cos(way), -1.5*math.sin(way)))
+    width = 4.0/(edges//2)
+    scene.block("FLOOR", (-1.0 + shift*width, -0.3), (4.0, 0.3), (edges//2, 1))
+    return scene.hold("FLOOR", lambda x, y: True)
+
+
+def roughness(run):
+    """Rms of the second differences of the force over its mean, while it acts."""
+    force = np.diff(run.history["py"])/np.diff(run.history["time"])
+    acts = np.flatnonzero(force > 1e-9*force.max())
+    force = force[acts[0]:acts[-1] + 1]
+    return np.sqrt(np.mean(np.diff(force, 2)**2))/force.mean()
+
+
+@pytest.mark.parametrize("order", ["DISC", "FLOOR"])
+@pytest.mark.parametrize("shift", [0.0, 0.02, 0.08, 0.16, 0.24])
+@pytest.mark.parametrize("angle", [30, 60, 90])
+def test_a_disc_on_a_shifted_floor(angle, shift, order, tmp_path):
+    """The floor, which keeps its mass, does not hold: no node takes mass back, nothing goes in, and
+    halving h more than halves what the force jumps by from increment to increment."""
+    rough = []
+    for h in (0.01, 0.005):
+        scene = disc_on_floor(angle, shift, h)
+        scene.pairs = [(order, "FLOOR" if order == "DISC" else "DISC")]
+        run = run_deck(scene.deck(AUTO), tmp_path/str(h), **MASSLESS, formulation="NODE TO SURFACE")
+        history = run.history
+        assert run.verdict["verdict"] == "good" and BACK not in run.log
+        assert "FLOOR keeps its mass, which DISC does not: its nodes are guarded" in run.log
+        assert history["cuts"].sum() == 0 and balances(history) < 1e-12
+        assert history["penetration"].max() == 0.0 and history["stand_off"].max() < ROUNDING
+        rough.append(roughness(run))
+    assert rough[1] < 0.5*rough[0]
+
+
+@pytest.mark.parametrize("formulation", ["SEGMENT", "MORTAR"])
+def test_the_side_that_can_lose_its_mass_is_the_slave(formulation, tmp_path):
+    """Of means of gaps one side is the slave: that of them, however the deck names the two."""
+    scene = disc_on_floor(60, 0.1, 0.01)
+    scene.pairs = [("FLOOR", "DISC")]
+    run = run_deck(scene.deck(AUTO), tmp_path, **MASSLESS, formulation=formulation)
+    assert "contact DISC on FLOOR" in run.log and run.verdict["verdict"] == "good"
+    assert BACK not in run.log and roughness(run) < 0.5
 
 
 # ---- free bodies, and bodies that lie on others -------------------------------------------------
@@ -204,7 +258,6 @@ def test_nodes_around_one_other_keep_their_mass(tmp_path):
 
 # ---- nodes that find no balance without their mass ----------------------------------------------
 
-BACK = "contact nodes take their mass back"
 
 #: Squares of nine elements: of four the nodes around the middle one keep their mass.
 FINER = {"corners": lambda: corners(cells=(3, 3)), "crossing": lambda: crossing(n=3),
