@@ -267,7 +267,7 @@ contains
             return
          end do
       end if
-      if (data%ok .and. new%is_frozen) then
+      if (data%ok .and. has_option(data%card, "FIXED")) then
          call data_warning(reader, data, "FIXED holds nodes where the step finds them: the value " &
             // to_text(new%value) // " has no effect")
       end if

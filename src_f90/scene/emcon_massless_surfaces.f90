@@ -5,12 +5,12 @@ module emcon_massless_surfaces
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
-   use emcon_steps, only : initiation_massless, initiation_persistent, step_initiation, &
-      step_is_dynamic
+   use emcon_steps, only : initiation_massless, initiation_persistent, prescribed_rests, &
+      step_initiation, step_is_dynamic
    use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
-   public :: pair_sheds_mass, surface_keeps_mass
+   public :: pair_sheds_mass, surface_keeps_mass, nodes_that_keep_mass
 
 contains
 
@@ -25,23 +25,41 @@ contains
          pair%interaction%damping%coefficient > 0.0_wp)
    end function pair_sheds_mass
 
-   !> Is each node of a surface of a rigid body, or prescribed in a dynamic step?
+   !> Do all nodes of a surface keep their mass?
    pure logical function surface_keeps_mass(scene, surface)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: surface               !! its number
       integer, allocatable :: node(:)
       logical :: keeps(size(scene%node%label))
-      integer :: i
+
+      call surface_nodes(scene, scene%surface(surface), node)
+      keeps = nodes_that_keep_mass(scene)
+      surface_keeps_mass = all(keeps(node))
+   end function surface_keeps_mass
+
+   !> Nodes of rigid bodies, those that are driven in some direction in a dynamic step, and those
+   !> that rest there in all. What rests in some direction, as on a line of symmetry, moves in the
+   !> others as free nodes do.
+   pure function nodes_that_keep_mass(scene) result(keeps)
+      type(scene_t), intent(in) :: scene
+      logical :: keeps(size(scene%node%label))   !! (n_node)
+      integer :: n_rest(size(scene%node%label)), i, k
 
       keeps = .false.
       do i = 1, size(scene%rigid)
          keeps(scene%rigid(i)%node) = .true.
       end do
       do i = 1, size(scene%step)
-         if (step_is_dynamic(scene%step(i))) keeps(scene%step(i)%prescribed%node) = .true.
+         if (.not. step_is_dynamic(scene%step(i))) cycle
+         n_rest = 0
+         do k = 1, size(scene%step(i)%prescribed)
+            associate (prescribed => scene%step(i)%prescribed(k))
+               n_rest(prescribed%node) = n_rest(prescribed%node) + 1
+               if (.not. prescribed_rests(prescribed)) keeps(prescribed%node) = .true.
+            end associate
+         end do
+         keeps = keeps .or. n_rest == scene%n_dim
       end do
-      call surface_nodes(scene, scene%surface(surface), node)
-      surface_keeps_mass = all(keeps(node))
-   end function surface_keeps_mass
+   end function nodes_that_keep_mass
 
 end module emcon_massless_surfaces

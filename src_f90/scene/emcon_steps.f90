@@ -18,7 +18,7 @@ module emcon_steps
    public :: newton_kept, newton_full
    public :: events_pairs, events_nodes
    public :: most_stand_off
-   public :: prescribed_find, step_is_dynamic, step_initiation
+   public :: prescribed_find, prescribed_rests, step_is_dynamic, step_initiation
 
    integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3, load_moment = 4, &
       load_centrifugal = 5
@@ -156,6 +156,15 @@ contains
 
       step_initiation = merge(step%contact%initiation, initiation_none, step_is_dynamic(step))
    end function step_initiation
+
+   !> Does a prescribed degree of freedom stay where the step finds it, if that is dynamic?
+   elemental logical function prescribed_rests(prescribed)
+      type(prescribed_t), intent(in) :: prescribed
+
+      prescribed_rests = prescribed%is_frozen .or. (prescribed%amplitude == 0 .and. &
+         .not. abs(prescribed%value - prescribed%before) > 0.0_wp)
+      prescribed_rests = prescribed_rests .and. prescribed%turn == 0
+   end function prescribed_rests
 
    !> Where a degree of freedom stands in the list; 0: it is not prescribed.
    pure integer function prescribed_find(list, node, dof) result(k)

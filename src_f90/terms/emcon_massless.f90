@@ -10,10 +10,10 @@ module emcon_massless
    use emcon_csr, only : csr_from_elements, csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
+   use emcon_massless_surfaces, only : nodes_that_keep_mass
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
-   use emcon_steps, only : initiation_massless, initiation_persistent, step_initiation, &
-      step_is_dynamic
+   use emcon_steps, only : initiation_massless, initiation_persistent, step_initiation
    use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
@@ -71,7 +71,7 @@ contains
    end subroutine leave_joined
 
    !> The slave nodes of all pairs but persistent ones, if dynamic steps ask; less those of surfaces
-   !> that rub, those that are prescribed in such a step, of rigid bodies, in ties and equations, or
+   !> that rub, those that are driven in such a step, of rigid bodies, in ties and equations, or
    !> given mass or forces, and those of elements that would keep none, and those that others would
    !> not hold. And all nodes that have none anyway.
    pure subroutine massless_find(scene, solid, is_given, without_density, is_massless)
@@ -96,10 +96,7 @@ contains
          call mark_surface(scene, scene%pair(i)%slave, .false., is_massless)
          call mark_surface(scene, scene%pair(i)%master, .false., is_massless)
       end do
-      do i = 1, size(scene%step)
-         if (.not. step_is_dynamic(scene%step(i))) cycle
-         is_massless(scene%step(i)%prescribed%node) = .false.
-      end do
+      is_massless = is_massless .and. .not. nodes_that_keep_mass(scene)
       call leave_joined(scene, is_given, is_massless)
       call keep_one(solid, is_massless)
       call keep_swinging(solid, size(scene%x, 1), is_massless)
