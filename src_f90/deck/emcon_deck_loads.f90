@@ -85,6 +85,7 @@ contains
       new%origin = card%origin
       new%amplitude = card_amplitude(reader, card, scene)
       new%is_frozen = has_option(card, "FIXED")
+      if (new%is_frozen) new%amplitude = 0
       call data_open(data, card)
       do while (next_line(reader, data))
          call read_boundary_line(reader, data, scene%n_dim, is_held, new%value)

@@ -21,6 +21,7 @@ module emcon_march_commit
    use emcon_pair_sums, only : pair_sums_add, pair_sums_begin, pair_sums_jump
    use emcon_phases, only : phase_enter, phase_leave, phase_restitution
    use emcon_evaluation, only : evaluation_contact_place, evaluation_has_inertia
+   use emcon_layer, only : layer_take_velocities
    use emcon_quasi_static, only : quasi_static_move
    use emcon_restitution, only : restitution_take
    use emcon_scene, only : scene_t
@@ -276,12 +277,10 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: lost
       logical :: has_root
-      integer :: i, k
+      integer :: k
 
       associate (layer => self%layer, set => self%active%set)
-         do i = 1, size(self%end_state%v, 2)
-            if (layer%is_massless(i)) self%end_state%v(:, i) = self%end_state%du(:, i)/h
-         end do
+         call layer_take_velocities(layer, h, self%end_state%du, self%end_state%v)
          if (.not. layer%is_settled) return
          lost = 0.0_wp
          do k = set%n_permanent + 1, set%n
