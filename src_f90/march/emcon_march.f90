@@ -31,7 +31,7 @@ module emcon_march
    use emcon_system, only : system_init
    use emcon_term_registry, only : terms_massless
    use emcon_text, only : to_text
-   use emcon_velocity_update, only : velocity_update_free
+   use emcon_velocity_mass, only : velocity_update_free
    implicit none
    private
    public :: march_t, increment_t, march_init, march_begin_step, march_increment, march_is_done, &

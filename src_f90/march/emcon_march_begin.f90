@@ -43,7 +43,7 @@ module emcon_march_begin
    use emcon_term, only : role_internal
    use emcon_text, only : note_add, to_text
    use emcon_unresolved_rows, only : report_unresolved
-   use emcon_velocity_update, only : velocity_update_reset
+   use emcon_velocity_mass, only : velocity_update_reset
    implicit none
    private
    public :: march_begin_step, march_resume, march_renumber

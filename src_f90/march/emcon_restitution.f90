@@ -14,9 +14,10 @@ module emcon_restitution
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t
    use emcon_mass_return, only : mass_is_at
+   use emcon_rate_jump, only : rate_jump_t, velocity_update_change
    use emcon_text, only : note_add, notes_t
    use emcon_velocity_jumps, only : jumps_add, jumps_rub
-   use emcon_velocity_update, only : rate_jump_t, velocity_update_change, velocity_update_hold
+   use emcon_velocity_update, only : velocity_update_hold
    implicit none
    private
    public :: restitution_take
