@@ -64,8 +64,7 @@ contains
       self%system%contact%of_pair = model%contact%of_pair
       allocate(self%acts(n), source=.false.)
       allocate(self%lam(n), source=0.0_wp)
-      allocate(self%state%contacts%is_active, source=self%acts)
-      allocate(self%state%contacts%lam, self%state%contacts%closure, source=self%lam)
+      call self%state%contacts%begin(n)
       call motion_init(self%motion, scene%x)
       allocate(self%du, self%push, source=at_rest(scene%x))
       call active_set_init(self%active, self%system)
