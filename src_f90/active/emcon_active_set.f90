@@ -20,7 +20,8 @@ module emcon_active_set
    private
    public :: active_set_t, active_set_init, active_set_suit, active_set_overclosure, &
       active_set_begin, active_set_restart, active_set_select, active_set_update_gaps
-   public :: active_set_pass, candidates_t, candidates_clear, touch_tol
+   public :: active_set_pass, active_set_note_stale, active_set_brought
+   public :: candidates_t, candidates_clear, touch_tol
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
       step_stands_off, step_not_held, step_overlaps, step_unbalanced, step_rough, step_strikes, &
       step_passes_event, step_loose
@@ -33,6 +34,9 @@ module emcon_active_set
 
    !> A gap closed by more than this fraction of an edge is a penetration.
    real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
+
+   !> A step is solved again so often at most because stencils were chosen for another motion.
+   integer, parameter :: most_stale = 3
 
    !> Until when a contact whose surfaces are far apart need not be looked at.
    type :: skip_until_t
@@ -382,6 +386,23 @@ contains
       if (self%penalty%is_on .and. .not. self%penalty%augments) is_kept = .false.
       if (is_kept) target = gap%gap0
    end subroutine find_target
+
+   !> The largest gap over which contact that acts was brought to hold a body; 0: none.
+   pure real(wp) function active_set_brought(self) result(brought)
+      type(active_set_t), intent(in) :: self     !! of statics that contact is to hold
+
+      brought = max(0.0_wp, maxval(self%support%brought, mask=self%is_active))
+   end function active_set_brought
+
+   !> Stencils were chosen for another motion, and the step is solved again: `status` is
+   !> `step_too_far` where that was so too often.
+   pure subroutine active_set_note_stale(self, status)
+      type(active_set_t), intent(inout) :: self
+      integer, intent(out) :: status             !! one of the `step_` codes
+
+      self%n_stale = self%n_stale + 1
+      status = merge(step_too_far, step_done, self%n_stale > most_stale)
+   end subroutine active_set_note_stale
 
    !> Where a list is true.
    pure function places_of(is_meant) result(place)

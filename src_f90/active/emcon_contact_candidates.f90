@@ -4,8 +4,8 @@
 !> but for those that lose their surface, which come back once at most. Source: docs/theory.md,
 !> section 6.1.
 module emcon_contact_candidates
-   use emcon_active_set, only : active_set_pass, active_set_select, active_set_t, &
-      active_set_update_gaps, step_done, step_too_far
+   use emcon_active_set, only : active_set_note_stale, active_set_pass, active_set_select, &
+      active_set_t, active_set_update_gaps, step_done, step_too_far
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate
    use emcon_contact, only : contact_t
@@ -26,8 +26,6 @@ module emcon_contact_candidates
    public :: candidates_select, candidates_solve, &
       candidates_look, candidates_leave_out, candidates_keep_forces, candidates_are_many
 
-   !> A step is solved again so often at most because stencils were chosen for another motion.
-   integer, parameter :: most_stale = 3
    !> Of more contacts than these trials tell the next set in dynamics too: their problem is dense.
    integer, parameter :: most_condensed = 200
 
@@ -184,8 +182,7 @@ contains
       call phase_leave(system%phases, left)
       if (status /= step_done) return
       if (self%is_stale) then
-         self%n_stale = self%n_stale + 1
-         if (self%n_stale > most_stale) status = step_too_far
+         call active_set_note_stale(self, status)
          self%candidates%have_changed = .true.
       else if (self%friction%lags .and. .not. self%candidates%have_changed) then
          self%friction%n_lagged = self%friction%n_lagged + 1

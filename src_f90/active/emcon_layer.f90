@@ -27,7 +27,7 @@ module emcon_layer
    implicit none
    private
    public :: layer_t, layer_init, layer_renew, layer_begin_step, layer_mark, layer_settle, &
-      layer_free
+      layer_count, layer_take_velocities, layer_free
 
    !> Work below this part of what it is held against is round-off.
    real(wp), parameter :: rounding = 1.0e3_wp*epsilon(1.0_wp)
@@ -64,12 +64,32 @@ contains
       self%system%contact%of_pair = model%contact%of_pair
       allocate(self%acts(n), source=.false.)
       allocate(self%lam(n), source=0.0_wp)
-      allocate(self%state%contacts%is_active, source=self%acts)
-      allocate(self%state%contacts%lam, self%state%contacts%closure, source=self%lam)
+      call self%state%contacts%begin(n)
       call motion_init(self%motion, scene%x)
       allocate(self%du, self%push, source=at_rest(scene%x))
       call active_set_init(self%active, self%system)
    end subroutine layer_init
+
+   !> How many of the marked nodes have no mass.
+   pure integer function layer_count(self, is_meant)
+      type(layer_t), intent(in) :: self
+      logical, intent(in) :: is_meant(:)         !! (n_node)
+
+      layer_count = count(self%is_massless .and. is_meant)
+   end function layer_count
+
+   !> What has no mass moves as its displacement says.
+   pure subroutine layer_take_velocities(self, h, du, v)
+      type(layer_t), intent(in) :: self
+      real(wp), intent(in) :: h                  !! > 0 [T]
+      real(wp), intent(in) :: du(:, :)           !! (n_dim, n_node) over the step [L]
+      real(wp), intent(inout) :: v(:, :)         !! (n_dim, n_node) at its end [L/T]
+      integer :: i
+
+      do i = 1, size(self%is_massless)
+         if (self%is_massless(i)) v(:, i) = du(:, i)/h
+      end do
+   end subroutine layer_take_velocities
 
    !> The layer of `scene` on other massless nodes, with the same laws. The step of the deck has to
    !> begin anew.

@@ -52,7 +52,7 @@ contains
             associate (area => self%area(before + 1:before + contact%n_constraint))
                call contact%own_area(scene%x, area)
                if (.not. sum(area) > 0.0_wp) area = 1.0_wp
-               if (contact%both_sides) area = 0.5_wp*area
+               area = contact%area_factor*area
             end associate
          end associate
       end do

@@ -113,10 +113,8 @@ contains
             return
          end if
          contact%step%is_penalty = .not. self%augments .and. step_is_dynamic(step)
-         self%area(before + 1:before + size(area)) = area*merge(0.5_wp, 1.0_wp, &
-            contact%both_sides)
-         self%stiffness(before + 1:before + size(area)) = area*merge(0.5_wp, 1.0_wp, &
-            contact%both_sides)*by_area
+         self%area(before + 1:before + size(area)) = area*contact%area_factor
+         self%stiffness(before + 1:before + size(area)) = area*contact%area_factor*by_area
          ! Nodes at the ends of a surface have half of an edge.
          self%edge(before + 1:before + size(area)) = maxval(area/contact%thickness)
          if (k <= system%n_pair) call note_add(system%notes, "contact of pair " // to_text(k) // &

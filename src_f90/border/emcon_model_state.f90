@@ -147,8 +147,7 @@ contains
       real(wp), allocatable, intent(out) :: lam(:)           !! (n_constraint)
       logical, allocatable, intent(out) :: is_active(:)      !! (n_constraint)
 
-      allocate(lam, source=model%stepper%march%state%contacts%lam)
-      allocate(is_active, source=model%stepper%march%state%contacts%is_active)
+      call model%stepper%march%state%contacts%get(1, lam, is_active)
    end subroutine model_get_multipliers
 
    pure subroutine model_contact(model, lam, is_active, label, pair)
@@ -159,8 +158,7 @@ contains
       integer :: i
 
       associate (system => model%stepper%march%system, state => model%stepper%march%state)
-         lam = state%contacts%lam(system%first_constraint(1) + 1:)
-         is_active = state%contacts%is_active(system%first_constraint(1) + 1:)
+         call state%contacts%get(system%first_constraint(1) + 1, lam, is_active)
          allocate(label(0), pair(0))
          do i = 1, size(system%contact)
             associate (node => system%contact(i)%contact%node)

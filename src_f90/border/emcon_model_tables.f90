@@ -8,7 +8,7 @@ module emcon_model_tables
    use emcon_law, only : law_response_plane, law_response_t, law_t
    use emcon_law_registry, only : law_create, law_row, law_row_t, n_constant, n_law_row
    use emcon_nts_gap, only : nts_gap
-   use emcon_options, only : n_option_row, option_default, option_row, option_row_t
+   use emcon_options, only : n_option_row, option_default, option_models, option_row, option_row_t
    implicit none
    private
    public :: model_option, model_law, model_law_response, model_node_gap
@@ -33,9 +33,7 @@ contains
       row = option_row(i)
       code = row%code
       is_default = row%code == option_default(trim(row%kind))
-      models = "plane"
-      if (row%is_axial) models = models // " axial"
-      if (row%n_dim == 0) models = models // " space"
+      call option_models(row, models)
       text = trim(row%kind) // line_end // trim(row%word) // line_end // trim(row%c_name) // &
          line_end // trim(row%text) // line_end // models // line_end // trim(row%instead)
    end subroutine model_option

@@ -5,7 +5,7 @@
 module emcon_contact
    use emcon_constraint, only : condition_normal, condition_t, constraint_t
    use emcon_contact_law, only : contact_laws_t
-   use emcon_evaluation, only : evaluation_is_equilibrium
+   use emcon_evaluation, only : evaluation_is_at_start, evaluation_is_equilibrium
    use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
    use emcon_midside_plane, only : midside_distribute, midside_points, midside_stretch, midside_t
@@ -56,7 +56,7 @@ module emcon_contact
       logical :: meets_statics = .false.              !! a step of the deck is static
       logical :: may_leave = .false.                  !! constraints lose their surface, in a step
       type(contact_step_t) :: step
-      logical :: both_sides = .false.                 !! this and others hold nodes of both surfaces
+      real(wp) :: area_factor = 1.0_wp                !! of its areas that are its own: 1/2 or 1
       real(wp) :: slack = 0.0_wp                      !! > 0: a guard, closed at -slack by the edge
       real(wp) :: offset = 0.0_wp                     !! gaps are counted from it on, >= 0 [L]
       type(contact_laws_t) :: laws                    !! that conditions get copies of
@@ -90,6 +90,7 @@ module emcon_contact
       procedure :: share
       procedure :: narrow
       procedure :: mean_gap
+      procedure :: could_hold
       ! To be called, with the displacements of nodes:
       procedure, non_overridable :: begin_step
       procedure, non_overridable :: measure
@@ -352,6 +353,14 @@ contains
       end if
    end subroutine area
 
+   !> Could it hold what is marked, by another choice of those that act?
+   pure logical function could_hold(self, is_loose)
+      class(contact_t), intent(in) :: self
+      logical, intent(in) :: is_loose(:)              !! (n_constraint) it is not held, and goes in
+
+      could_hold = .false.
+   end function could_hold
+
    !> As `constraint_t` has it: second derivatives are by the end of the step. Conditions hold at
    !> that end, and work over the whole step, wherever in it a scheme evaluates forces, or push
    !> along gradients at the start or the end, where a scheme says so.
@@ -365,7 +374,7 @@ contains
       type(condition_t), allocatable :: over(:)
       integer :: k
 
-      if (motion%evaluation%is_gradient .and. .not. motion%evaluation%at > 0.0_wp) then
+      if (evaluation_is_at_start(motion%evaluation)) then
          call from_start(self, wanted, motion, target, item)
          call find_normals(item)
          return

@@ -13,7 +13,7 @@ module emcon_midside_plane
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
    use emcon_sort, only : find_sorted, unique_sorted
-   use emcon_surface_facets, only : surface_facets
+   use emcon_surface_facets, only : facet_nodes, surface_facets
    implicit none
    private
    public :: midside_t, midside_init, midside_points, midside_distribute, midside_stretch
@@ -67,11 +67,11 @@ contains
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
       integer, allocatable, intent(inout) :: node(:)
-      integer, allocatable :: edge(:, :)
+      integer, allocatable :: edge(:, :), more(:)
 
       call surface_facets(scene, surface, edge)
-      node = [node, reshape(edge, [size(edge)])]
-      if (surface%is_nodal) node = [node, surface%node]
+      call facet_nodes(surface, edge, more)
+      node = [node, more]
    end subroutine take_nodes
 
    !> Take over the sides of `surface`, if it is none of faces those of all elements, whose midside
@@ -82,9 +82,12 @@ contains
       integer, intent(in) :: node(:)             !! ascending
       type(side_t), intent(inout) :: list(:)     !! (size of `node`)
       integer :: e, f
+      logical :: has_faces
 
       if (size(node) == 0) return
-      if (surface%is_nodal .or. allocated(surface%edge)) then
+      has_faces = allocated(surface%element)
+      if (has_faces) has_faces = size(surface%element) > 0
+      if (.not. has_faces) then
          do e = 1, size(scene%element%kind)
             do f = 1, scene%element%kinds(scene%element%kind(e))%n_face
                call take_side(scene, e, f, node, list)

@@ -35,6 +35,7 @@ module emcon_nts_choice
       type(chain_t) :: slave
       type(chain_t), allocatable :: master            !! gfortran 12 loses a second one of its kind
       logical :: is_self = .false.                    !! a surface in contact with itself
+      logical :: both_sides = .false.                 !! this and another hold all nodes
       integer :: smoothing = smoothing_none
       logical :: every_face = .false.                 !! also one that does not bear on the node
       type(touch_rule_t) :: rule                      !! only of such a surface
@@ -53,6 +54,7 @@ module emcon_nts_choice
       type(smooth_stencil_t), allocatable :: smooth(:)   !! (n_constraint) only if smoothed
    contains
       procedure :: narrow => choice_narrow
+      procedure :: could_hold => choice_could_hold
    end type nts_choice_t
 
 contains
@@ -90,6 +92,7 @@ contains
       allocate(self%polygon(2, self%n_constraint))
       self%offset = pair%interaction%offset
       self%both_sides = pair%both_sides
+      if (self%both_sides) self%area_factor = 0.5_wp
       self%own_size = [(chain_shortest(self%slave, self%chain_node(i)), i = 1, self%n_constraint)]
       call chain_thickness(self%slave, scene, self%thickness)
       self%thickness = self%thickness(self%chain_node)
@@ -314,6 +317,14 @@ contains
          end do
       end do
    end subroutine choice_narrow
+
+   !> Each node of both surfaces may be held.
+   pure logical function choice_could_hold(self, is_loose) result(could_hold)
+      class(nts_choice_t), intent(in) :: self
+      logical, intent(in) :: is_loose(:)         !! (n_constraint) it is not held, and goes in
+
+      could_hold = self%both_sides .and. any(is_loose)
+   end function choice_could_hold
 
    !> Is edge `middle` or one of its neighbours the nearest after the motion `du`, rather than the
    !> edges after next?

@@ -39,6 +39,7 @@ module emcon_deck
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_guards, only : guards_find
    use emcon_scene, only : scene_t
+   use emcon_scene_motions, only : scene_is_flat
    use emcon_text, only : string_t
    implicit none
    private
@@ -73,7 +74,7 @@ contains
       scene%n_dim = find_dimension(reader)
       scene%is_axial = scene%n_dim == n_plane .and. is_axial_deck(reader)
       reader%n_dim = scene%n_dim
-      reader%is_axial = scene%is_axial
+      reader%is_flat = scene_is_flat(scene)
       if (size(reader%card) > 0) call read_scene(reader, scene)
       diagnostics = reader%log
    end subroutine deck_read
@@ -83,7 +84,7 @@ contains
       type(scene_t), intent(inout) :: scene
 
       call check_data(reader)
-      if (scene%n_dim /= n_plane .or. scene%is_axial) call refuse_plane_cards(reader, scene%n_dim)
+      if (.not. scene_is_flat(scene)) call refuse_plane_cards(reader, scene%n_dim)
       call read_heading(reader, scene)
       call read_nodes(reader, scene)
       call read_element_kinds(reader, scene)
@@ -125,7 +126,7 @@ contains
       if (scene%n_dim == n_plane) then
          call check_shapes(reader, scene)
          call check_sides(reader, scene)
-         if (.not. scene%is_axial) return
+         if (scene_is_flat(scene)) return
          call check_axial(reader, scene)
          call check_dimension(reader, scene)
       else

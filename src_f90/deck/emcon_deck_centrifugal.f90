@@ -5,6 +5,7 @@ module emcon_deck_centrifugal
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
+   use emcon_scene_motions, only : scene_is_flat
    use emcon_steps, only : load_centrifugal, load_t
    implicit none
    private
@@ -27,12 +28,12 @@ contains
                call add_error(reader%log, load%origin, card // "is known but not supported with " &
                   // "NLGEOM: it acts on the places at rest; leave NLGEOM out")
             else if (.not. is_own_axis(scene, load)) then
-               if (scene%is_axial) then
-                  call add_error(reader%log, load%origin, card // "turns solids of revolution " &
-                     // "about their axis: 0, 0, 0, 0, 1, 0")
-               else
+               if (scene_is_flat(scene)) then
                   call add_error(reader%log, load%origin, card // "turns a plane model about an " &
                      // "axis normal to it: px, py, 0, 0, 0, 1")
+               else
+                  call add_error(reader%log, load%origin, card // "turns solids of revolution " &
+                     // "about their axis: 0, 0, 0, 0, 1, 0")
                end if
             end if
          end associate
@@ -46,11 +47,11 @@ contains
 
       is_own_axis = scene%n_dim == n_space
       if (is_own_axis) return
-      if (scene%is_axial) then
+      if (scene_is_flat(scene)) then
+         is_own_axis = all(abs(load%direction(:scene%n_dim)) <= 0.0_wp)
+      else
          is_own_axis = all(abs([load%direction(1), load%direction(n_space), load%point(1), &
             load%point(n_space)]) <= 0.0_wp)
-      else
-         is_own_axis = all(abs(load%direction(:scene%n_dim)) <= 0.0_wp)
       end if
    end function is_own_axis
 

@@ -1,11 +1,13 @@
 !> What the scene must fulfil as a whole, and can be seen without mechanics.
 module emcon_deck_check
+   use emcon_deck_check_massless, only : mark_inertia
    use emcon_deck_check_surfaces, only : mark_nodes
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_steps, only : load_centrifugal, load_gravity, load_point, step_is_dynamic
+   use emcon_surface_facets, only : profile_facets
    implicit none
    private
    public :: check_materials, check_nodes
@@ -29,15 +31,14 @@ contains
             // label_list(pack(scene%element%label, is_bare)) &
             // " has no section; give one by *SOLID SECTION")
       end if
-      allocate(is_used(size(scene%material)), has_weight(size(scene%material)), &
-         has_inertia(size(scene%material)), source=.false.)
+      allocate(is_used(size(scene%material)), has_weight(size(scene%material)), source=.false.)
       do i = 1, size(scene%section)
          associate (section => scene%section(i))
             if (section%material == 0) cycle
             is_used(section%material) = .true.
-            if (.not. section%is_massless) has_inertia(section%material) = .true.
          end associate
       end do
+      call mark_inertia(scene, has_inertia)
       call mark_rigid_materials(scene, resists, moves)
       needs_mass = .false.
       do i = 1, size(scene%step)
@@ -106,6 +107,7 @@ contains
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
       logical, allocatable :: is_bare(:), is_idle(:), is_loaded(:), is_coupled(:, :)
+      integer, allocatable :: profile(:, :)
       integer :: i, k
 
       if (reader%doubt%nodes .or. reader%doubt%elements .or. reader%doubt%positions &
@@ -122,12 +124,9 @@ contains
          is_bare(scene%rigid(i)%node) = .false.
          if (allocated(scene%rigid(i)%arm)) is_bare(scene%rigid(i)%arm) = .false.
       end do
-      do i = 1, size(scene%surface)
-         associate (surface => scene%surface(i))
-            if (surface%is_profile) is_bare([surface%edge]) = .false.
-            if (surface%inner_node > 0) is_bare(surface%inner_node) = .false.
-         end associate
-      end do
+      call profile_facets(scene, profile)
+      is_bare([profile]) = .false.
+      is_bare(pack(scene%surface%inner_node, scene%surface%inner_node > 0)) = .false.
       if (.not. any(is_bare) .or. all(is_bare)) return
       call mark_coupled(scene, is_coupled)
       is_idle = is_bare .and. .not. any(is_coupled, 1)

@@ -7,7 +7,7 @@ module emcon_deck_check_contact
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_interactions, only : contact_pair_t, formulation_user, formulation_mortar, &
-      formulation_segment, multiplier_standard
+      formulation_segment, multiplier_standard, pair_has_order, pair_may_exchange
    use emcon_kinds, only : wp
    use emcon_massless_surfaces, only : pair_sheds_mass, surface_keeps_mass
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
@@ -35,9 +35,8 @@ contains
       call find_reverses(scene%pair, has_reverse)
       do i = 1, size(scene%pair)
          associate (pair => scene%pair(i))
-            if (.not. pair%may_choose .or. pair%slave == 0 .or. pair%master == 0) cycle
-            if (pair%both_sides .or. pair%adjust%distance >= 0.0_wp .or. pair%adjust%set > 0) cycle
-            if (pair%slave == pair%master .or. has_reverse(i)) cycle
+            if (pair%slave == 0 .or. pair%master == 0 .or. has_reverse(i)) cycle
+            if (.not. pair_may_exchange(pair)) cycle
             call find_advice(scene, pair, advice, is_bent)
             if (pair_sheds_mass(scene, pair)) call look_for_mass(scene, pair, advice, is_bent)
             if (.not. is_bent) cycle
@@ -120,7 +119,7 @@ contains
       character(len=:), allocatable :: advice
       logical :: is_bent
 
-      if (pair%both_sides .or. pair%is_exchanged .or. pair%slave == pair%master) return
+      if (pair%is_exchanged .or. .not. pair_has_order(pair)) return
       if (pair%formulation == formulation_user) return
       call find_advice(scene, pair, advice, is_bent)
       if (advice == "") return

@@ -9,9 +9,21 @@ module emcon_deck_check_massless
       step_is_dynamic
    implicit none
    private
-   public :: check_massless_sections
+   public :: check_massless_sections, mark_inertia
 
 contains
+
+   !> Materials whose density makes inertia: that of a section which is not MASSLESS.
+   pure subroutine mark_inertia(scene, has_inertia)
+      type(scene_t), intent(in) :: scene
+      logical, allocatable, intent(out) :: has_inertia(:)    !! (materials)
+
+      allocate(has_inertia(size(scene%material)), source=.false.)
+      associate (section => scene%section)
+         has_inertia(pack(section%material, section%material > 0 .and. .not. section%is_massless)) &
+            = .true.
+      end associate
+   end subroutine mark_inertia
 
    !> Something has inertia, and contact on what has none begins in a way that needs none.
    subroutine check_massless_sections(reader, scene)

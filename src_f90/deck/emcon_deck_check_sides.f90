@@ -33,7 +33,6 @@ contains
 
       advice = ""
       is_bent = .false.
-      if (scene%surface(pair%slave)%is_nodal .or. scene%surface(pair%master)%is_nodal) return
       slave = surface_shape(scene, scene%surface(pair%slave))
       master = surface_shape(scene, scene%surface(pair%master))
       if (master%length <= 0.0_wp .or. slave%length <= 0.0_wp) return

@@ -115,8 +115,7 @@ contains
       call surface_facets(scene, other, list)
       list = list(:, sort_order(list(1, :)))
       first = list(1, :)
-      allocate(node(0))
-      if (other%is_nodal) node = unique_sorted(other%node)
+      node = unique_sorted(other%node)
       allocate(is_common(size(edge, 2)), source=.false.)
       do i = 1, size(is_common)
          if (any(edge(:, i) == 0)) cycle

@@ -8,7 +8,7 @@ module emcon_deck_contact
    use emcon_deck_options, only : check_option
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, n_lines, need_name, &
       option_name, option_number, option_word, reader_t, refuse_option
-   use emcon_deck_surfaces, only : get_surfaces
+   use emcon_deck_surfaces, only : get_surfaces, need_facets
    use emcon_diagnostics, only : add_error, quoted, suggestion
    use emcon_interactions, only : adjustment_t, contact_damping_t, contact_pair_t, &
       formulation_user, formulation_mortar, formulation_nts, formulation_segment
@@ -213,6 +213,7 @@ contains
          end if
       end do
       scene%pair = all(:n)
+      scene%pair%is_guarded = scene%pair%is_guarded .and. .not. scene%pair%both_sides
    end subroutine add_reverses
 
    !> The other half of a pair with both sides.
@@ -235,32 +236,23 @@ contains
       type(data_t), intent(inout) :: data
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(inout) :: pair
-      logical :: is_integrated
-      character(len=*), parameter :: advice = "define it by element faces (*SURFACE, TYPE=ELEMENT)"
 
       if (pair%slave == 0 .or. pair%master == 0) return
-      is_integrated = any(pair%formulation == [formulation_segment, formulation_mortar])
       associate (slave => scene%surface(pair%slave), master => scene%surface(pair%master))
-         if (pair%slave == pair%master .and. slave%is_nodal) then
-            call data_error(reader, data, "the surface " // quoted(slave%name) // " has TYPE=NODE" &
-               // " and cannot be in contact with itself; " // advice)
-            pair%master = 0
-            return
-         end if
-         if (is_integrated .and. slave%is_nodal) call data_error(reader, data, &
-            "the slave surface " // quoted(slave%name) // " has TYPE=NODE, but SEGMENT and MORTAR" &
-            // " integrate over edges; " // advice // ", or use TYPE=NODE TO SURFACE")
-         if (pair%both_sides .and. slave%is_nodal) call data_error(reader, data, "the slave " &
-            // "surface " // quoted(slave%name) // " has TYPE=NODE, but under SIDES=BOTH its " &
-            // "edges are needed too; " // advice)
-         if (master%is_nodal) call data_error(reader, data, "the master surface " &
-            // quoted(master%name) // " has TYPE=NODE; only the slave surface may, and " &
-            // "only under NODE TO SURFACE; " // advice)
-         if (master%is_nodal .or. ((is_integrated .or. pair%both_sides) &
-            .and. slave%is_nodal)) then
-            pair%master = 0
+         if (pair%slave == pair%master) then
+            call need_facets(reader, data, slave, "surface", &
+               " and cannot be in contact with itself; ")
+         else
+            if (any(pair%formulation == [formulation_segment, formulation_mortar])) call &
+               need_facets(reader, data, slave, "slave surface", ", but SEGMENT and MORTAR " // &
+               "integrate over edges; use TYPE=NODE TO SURFACE, or ")
+            if (pair%both_sides) call need_facets(reader, data, slave, "slave surface", &
+               ", but under SIDES=BOTH its edges are needed too; ")
+            call need_facets(reader, data, master, "master surface", &
+               "; only the slave surface may, and only under NODE TO SURFACE; ")
          end if
       end associate
+      if (.not. data%ok) pair%master = 0
    end subroutine check_nodal
 
    !> The last of `pair` must not be there already. Slave and master in turn is another pair.

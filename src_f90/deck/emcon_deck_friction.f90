@@ -6,6 +6,7 @@ module emcon_deck_friction
    use emcon_diagnostics, only : add_error, add_warning
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
+   use emcon_mesh, only : surface_t
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_steps, only : initiation_massless, initiation_velocity_update, method_null_space, &
       method_saddle_point, step_initiation, step_t
@@ -59,11 +60,11 @@ contains
 
    !> Friction is in steps whose scheme has its forces along discrete gradients or which are static,
    !> and which hold contact exactly.
-   subroutine check_friction(reader, pair, step, on_nodes)
+   subroutine check_friction(reader, pair, step, surface)
       type(reader_t), intent(inout) :: reader
       type(contact_pair_t), intent(in) :: pair(:)
       type(step_t), intent(in) :: step(:)
-      logical, intent(in) :: on_nodes(:)         !! (surfaces) it is made of nodes
+      type(surface_t), intent(in) :: surface(:)  !! those that pairs name
       type(name_index_t) :: given                !! pairs so far, by slave and master
       integer :: i, k
 
@@ -75,7 +76,7 @@ contains
             call check_step(reader, pair(i), step(k), k)
          end do
          if (pair(i)%interaction%offset > 0.0_wp &
-            .and. on_nodes(pair(i)%slave)) call add_warning(reader%log, &
+            .and. surface(pair(i)%slave)%is_nodal) call add_warning(reader%log, &
             pair(i)%origin, "*CONTACT PAIR: its surface interaction has *FRICTION and a PAD " &
             // "THICKNESS: friction acts at the nodes, so that discs slide, but do not roll")
          if (any(step_initiation(step) == initiation_massless)) then

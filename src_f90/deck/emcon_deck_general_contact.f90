@@ -10,7 +10,7 @@ module emcon_deck_general_contact
       next_line
    use emcon_deck_named, only : refuse_name
    use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
-   use emcon_deck_surfaces, only : surface_names
+   use emcon_deck_surfaces, only : need_facets, surface_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_interactions, only : contact_pair_t, formulation_nts
    use emcon_kinds, only : wp
@@ -107,10 +107,10 @@ contains
       surface = name_index_find(reader%names%surfaces, name)
       if (surface == 0) then
          call refuse_name(reader, data, "surface", name, surface_names(scene%surface))
-      else if (scene%surface(surface)%is_nodal) then
-         call data_error(reader, data, "the surface " // quoted(name) // " has TYPE=NODE, but " &
-            // "its edges are needed too; define it by element faces (*SURFACE, TYPE=ELEMENT)")
-         surface = 0
+      else
+         call need_facets(reader, data, scene%surface(surface), "surface", &
+            ", but its edges are needed too; ")
+         if (.not. data%ok) surface = 0
       end if
    end subroutine get_surface
 
@@ -159,6 +159,7 @@ contains
       pair%master = master
       pair%formulation = formulation_nts
       pair%both_sides = .true.
+      pair%is_guarded = .false.
       pair%is_reverse = is_reverse
       scene%pair = [scene%pair, pair]
    end subroutine append_pair
@@ -237,7 +238,7 @@ contains
    pure logical function is_analytical(surface)
       type(surface_t), intent(in) :: surface
 
-      is_analytical = .not. surface%is_nodal .and. size(surface%element) == 0
+      is_analytical = size(surface%element) + size(surface%node) == 0
    end function is_analytical
 
    !> The names in *CONTACT PROPERTY ASSIGNMENT: surface, surface, interaction. All interactions

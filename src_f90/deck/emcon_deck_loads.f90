@@ -84,7 +84,10 @@ contains
       call check_boundary_options(reader, card)
       new%origin = card%origin
       new%amplitude = card_amplitude(reader, card, scene)
-      new%is_frozen = has_option(card, "FIXED")
+      if (has_option(card, "FIXED")) then
+         new%is_frozen = .true.
+         new%amplitude = 0
+      end if
       call data_open(data, card)
       do while (next_line(reader, data))
          call read_boundary_line(reader, data, scene%n_dim, is_held, new%value)

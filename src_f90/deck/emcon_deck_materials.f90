@@ -17,6 +17,7 @@ module emcon_deck_materials
    use emcon_materials, only : kinematics_nonlinear, material_t, section_t
    use emcon_name_index, only : name_index_find, name_index_put
    use emcon_scene, only : scene_t, where_text
+   use emcon_scene_motions, only : scene_is_flat
    use emcon_text, only : string_t, to_text
    implicit none
    private
@@ -324,10 +325,9 @@ contains
             if (data%ok .and. section%thickness <= 0.0_wp) call data_error(reader, data, &
                "the thickness " // to_text(section%thickness) // " is not positive")
             call check_count(reader, data, 0, 1, "thickness")
-            if ((scene%n_dim /= n_plane .or. scene%is_axial) &
-               .and. abs(section%thickness - 1.0_wp) > 0.0_wp) then
+            if (abs(section%thickness - 1.0_wp) > 0.0_wp .and. .not. scene_is_flat(scene)) then
                call data_warning(reader, data, "solids of " // trim(merge("revolution      ", &
-                  "three dimensions", scene%is_axial)) // " have no thickness: " &
+                  "three dimensions", scene%n_dim == n_plane)) // " have no thickness: " &
                   // to_text(section%thickness) // " has no effect")
                section%thickness = 1.0_wp
             end if

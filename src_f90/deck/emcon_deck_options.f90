@@ -41,7 +41,7 @@ contains
       integer, intent(inout) :: code               !! one of that kind
       character(len=:), allocatable :: why
 
-      call option_refusal(kind, code, reader%n_dim, reader%is_axial, why)
+      call option_refusal(kind, code, reader%n_dim, reader%is_flat, why)
       if (why == "") return
       call card_error(reader, card, parameter // "=" // why)
       code = 0

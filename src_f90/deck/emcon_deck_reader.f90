@@ -69,7 +69,7 @@ module emcon_deck_reader
       type(diagnostics_t) :: log
       logical :: is_lenient = .false.
       integer :: n_dim = 0                               !! of the model
-      logical :: is_axial = .false.                      !! it is one of solids of revolution
+      logical :: is_flat = .true.                        !! and not one of solids of revolution
       type(doubts_t) :: doubt
       type(label_map_t) :: node_map
       type(label_map_t) :: element_map                   !! also of lines, these below 0

@@ -20,7 +20,7 @@ module emcon_deck_surfaces
    use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: read_surfaces, get_surfaces, surface_names
+   public :: read_surfaces, get_surfaces, need_facets, surface_names
 
    !> Faces of a surface while it grows.
    type :: faces_t
@@ -100,13 +100,14 @@ contains
       if (allocated(surface%edge)) n_item = size(surface%edge, 2)
       if (n_item == 0 .and. reader%log%n_errors == n_before .and. .not. reader%doubt%names &
          .and. .not. reader%doubt%elements) then
-         if (surface%is_nodal) then
-            call card_error(reader, card, "the surface has no node")
-         else if (allocated(surface%edge)) then
-            call card_error(reader, card, "the surface has no edge")
-         else
+         select case (kind)
+         case (surface_of_faces)
             call card_error(reader, card, "the surface has no face")
-         end if
+         case (surface_of_nodes)
+            call card_error(reader, card, "the surface has no node")
+         case default
+            call card_error(reader, card, "the surface has no edge")
+         end select
       end if
    end subroutine read_surface
 
@@ -381,6 +382,19 @@ contains
       master = i_surface(2)
       data%ok = slave > 0 .and. master > 0
    end subroutine get_surfaces
+
+   !> Refuse a surface of nodes where edges are needed: `data%ok` is then false.
+   subroutine need_facets(reader, data, surface, title, why)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(surface_t), intent(in) :: surface
+      character(len=*), intent(in) :: title        !! of the surface, in the message
+      character(len=*), intent(in) :: why          !! follows on "has TYPE=NODE"
+
+      if (surface%is_nodal) call data_error(reader, data, "the " // title // " " // &
+         quoted(surface%name) // " has TYPE=NODE" // why // "define it by element faces " // &
+         "(*SURFACE, TYPE=ELEMENT)")
+   end subroutine need_facets
 
    pure function surface_names(surface) result(list)
       type(surface_t), intent(in) :: surface(:)

@@ -5,7 +5,7 @@ module emcon_deck_ties
    use emcon_deck_options, only : choose_option
    use emcon_deck_reader, only : card_error, card_t, line_origin, n_lines, need_name, &
       option_name, option_real, option_word, reader_t
-   use emcon_deck_surfaces, only : get_surfaces
+   use emcon_deck_surfaces, only : get_surfaces, need_facets
    use emcon_diagnostics, only : quoted
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_scene, only : scene_t, where_text
@@ -118,9 +118,8 @@ contains
       end if
       do side = 1, 2
          i = merge(tie%slave, tie%master, side == 1)
-         if (scene%surface(i)%is_nodal) call data_error(reader, data, "the " // trim(role(side)) &
-            // " surface " // quoted(scene%surface(i)%name) // " has TYPE=NODE, but ties are " &
-            // "integrated over edges; define it by element faces (*SURFACE, TYPE=ELEMENT)")
+         call need_facets(reader, data, scene%surface(i), trim(role(side)) // " surface", &
+            ", but ties are integrated over edges; ")
       end do
    end subroutine check_sides
 

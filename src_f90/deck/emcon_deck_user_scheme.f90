@@ -3,7 +3,7 @@ module emcon_deck_user_scheme
    use emcon_deck_check_massless, only : check_massless_sections
    use emcon_deck_contact_damping, only : check_contact_damping
    use emcon_deck_damping, only : check_damping
-   use emcon_deck_dimension, only : check_dimension, n_plane
+   use emcon_deck_dimension, only : check_dimension
    use emcon_deck_friction, only : check_friction
    use emcon_deck_reader, only : reader_t
    use emcon_deck_scheme, only : check_schemes
@@ -11,6 +11,7 @@ module emcon_deck_user_scheme
    use emcon_errors, only : err_input, error_t, raise
    use emcon_host_scheme, only : host_scheme_find, host_scheme_row, host_scheme_t
    use emcon_scene, only : scene_t
+   use emcon_scene_motions, only : scene_is_flat
    use emcon_scheme_registry, only : scheme_user
    use emcon_text, only : string_t
    implicit none
@@ -49,10 +50,10 @@ contains
       reader%log%file_name = scene%deck%file
       call check_schemes(reader, scene%pair, scene%step)
       call check_damping(reader, scene)
-      call check_friction(reader, scene%pair, scene%step, scene%surface%is_nodal)
+      call check_friction(reader, scene%pair, scene%step, scene%surface)
       call check_contact_damping(reader, scene%pair, scene%step)
       call check_massless_sections(reader, scene)
-      if (scene%n_dim /= n_plane .or. scene%is_axial) call check_dimension(reader, scene)
+      if (.not. scene_is_flat(scene)) call check_dimension(reader, scene)
       if (reader%log%n_errors == 0) return
       text = diagnostics_texts(reader%log)
       do i = 1, size(text)

@@ -31,7 +31,7 @@ module emcon_march
    use emcon_system, only : system_init
    use emcon_term_registry, only : terms_massless
    use emcon_text, only : to_text
-   use emcon_velocity_update, only : velocity_update_free
+   use emcon_velocity_mass, only : velocity_update_free
    implicit none
    private
    public :: march_t, increment_t, march_init, march_begin_step, march_increment, march_is_done, &
@@ -64,9 +64,7 @@ contains
          allocate(state%u_start, state%contact, state%reaction, state%internal, &
             source=self%end_state%v)
          allocate(state%contacts%has_mass(size(scene%x, 2)), source=.false.)
-         allocate(state%contacts%is_active(self%system%n_constraint), source=.false.)
-         allocate(state%contacts%lam(self%system%n_constraint), source=0.0_wp)
-         allocate(state%contacts%closure, source=state%contacts%lam)
+         call state%contacts%begin(self%system%n_constraint)
          allocate(state%energy(size(scene%element%kind)), source=0.0_wp)
       end associate
       call pair_record_init(self%state%pairs, self%system)
@@ -163,7 +161,7 @@ contains
          end if
          state%clock%increment = state%clock%increment + 1
          state%clock%time = state%clock%start_time + state%clock%step_time
-         increment%n_active = count(state%contacts%is_active(self%system%first_constraint(1) + 1:))
+         increment%n_active = n_acting(self)
          if (increment%n_cut > 0) then
             state%clock%n_easy = 0
             state%clock%grid_stride = max(1, state%clock%grid_stride/2)
@@ -259,9 +257,16 @@ contains
       end if
       self%state%clock%increment = self%state%clock%increment + 1
       call march_set_time(self, scene, before%clock%step_time + h)
-      increment%n_active = count(self%state%contacts%is_active( &
-         self%system%first_constraint(1) + 1:))
+      increment%n_active = n_acting(self)
       call ledger_measure(self%ledger, self%system, scene%x, self%state)
    end subroutine march_free_increment
+
+   !> How many contacts act at the end of an increment.
+   pure integer function n_acting(self)
+      type(march_t), intent(in) :: self
+
+      n_acting = self%state%contacts%n_acting(self%system%first_constraint(1) + 1, &
+         self%system%n_constraint)
+   end function n_acting
 
 end module emcon_march

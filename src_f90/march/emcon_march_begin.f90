@@ -15,7 +15,7 @@ module emcon_march_begin
    use emcon_overlap_check, only : overlap_check_excuse, overlap_check_smooth, overlap_check_step, &
       overlap_t
    use emcon_kinds, only : wp
-   use emcon_layer, only : layer_begin_step, layer_mark
+   use emcon_layer, only : layer_begin_step, layer_count, layer_mark
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_overlap_query, only : overlap_text
    use emcon_march_accuracy, only : accuracy_begin
@@ -43,7 +43,7 @@ module emcon_march_begin
    use emcon_term, only : role_internal
    use emcon_text, only : note_add, to_text
    use emcon_unresolved_rows, only : report_unresolved
-   use emcon_velocity_update, only : velocity_update_reset
+   use emcon_velocity_mass, only : velocity_update_reset
    implicit none
    private
    public :: march_begin_step, march_resume, march_renumber
@@ -339,7 +339,7 @@ contains
          if (scene%pair(i)%initiation == initiation_persistent) cycle
          is_slave(self%system%contact(i)%contact%node) = .true.
       end do
-      n = count(self%layer%is_massless .and. is_slave)
+      n = layer_count(self%layer, is_slave)
       call note_add(self%system%notes, "contact surfaces without mass: " // to_text(n) // &
          " nodes; " // to_text(count(is_slave) - n) // " slave nodes keep theirs, as they are " // &
          "prescribed, tied, or given mass, or as too few others hold them")

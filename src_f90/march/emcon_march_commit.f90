@@ -21,6 +21,8 @@ module emcon_march_commit
    use emcon_pair_sums, only : pair_sums_add, pair_sums_begin, pair_sums_jump
    use emcon_phases, only : phase_enter, phase_leave, phase_restitution
    use emcon_evaluation, only : evaluation_contact_place, evaluation_has_inertia
+   use emcon_active_set, only : active_set_brought
+   use emcon_layer, only : layer_take_velocities
    use emcon_quasi_static, only : quasi_static_move
    use emcon_restitution, only : restitution_take
    use emcon_scene, only : scene_t
@@ -220,28 +222,25 @@ contains
    !> of what has no mass.
    subroutine keep_constraints(self)
       type(march_t), intent(inout) :: self
+      logical :: acts
       integer :: k
 
       associate (state => self%state, set => self%active%set, layer => self%layer, &
             penalty => self%explicit%penalty(self%explicit%i_start))
-         state%contacts%is_active = .false.
-         state%contacts%lam = 0.0_wp
-         state%contacts%closure = 0.0_wp
-         state%contacts%slides_along = 0.0_wp
-         state%contacts%drag = 0.0_wp
+         call state%contacts%clear()
          call penalty_keep(self%active%penalty, set, state%contacts%closure)
          if (self%active%penalty%is_at_ends) then
-            state%contacts%is_active(penalty%id) = .true.
-            state%contacts%lam(penalty%id) = penalty%lam
+            do k = 1, size(penalty%id)
+               call state%contacts%keep(penalty%id(k), penalty%lam(k), .true.)
+            end do
             call penalty_keep(self%active%penalty, penalty, state%contacts%closure)
          end if
          do k = 1, set%n
-            state%contacts%is_active(set%id(k)) = .true.
-            state%contacts%lam(set%id(k)) = set%lam(k)
+            acts = .true.
             ! What has opened stores nothing that a later step could give back.
-            if (set%penalty%is_on .and. set%penalty%is_stored .and. k > set%n_permanent) then
-               state%contacts%is_active(set%id(k)) = set%law(k)%row%closure() < 0.0_wp
-            end if
+            if (set%penalty%is_on .and. set%penalty%is_stored .and. k > set%n_permanent) acts = &
+               set%law(k)%row%closure() < 0.0_wp
+            call state%contacts%keep(set%id(k), set%lam(k), acts)
             if (size(state%contacts%drag) > 0) call keep_slip(self, k)
          end do
          if (.not. layer%is_settled) return
@@ -276,12 +275,10 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: lost
       logical :: has_root
-      integer :: i, k
+      integer :: k
 
       associate (layer => self%layer, set => self%active%set)
-         do i = 1, size(self%end_state%v, 2)
-            if (layer%is_massless(i)) self%end_state%v(:, i) = self%end_state%du(:, i)/h
-         end do
+         call layer_take_velocities(layer, h, self%end_state%du, self%end_state%v)
          if (.not. layer%is_settled) return
          lost = 0.0_wp
          do k = set%n_permanent + 1, set%n
@@ -329,14 +326,15 @@ contains
    subroutine book_stabilization(self, increment)
       type(march_t), intent(inout) :: self
       type(increment_t), intent(inout) :: increment
+      real(wp) :: brought
       integer :: i, a
 
       associate (support => self%active%support, system => self%system, &
             body => self%system%space%body)
          if (.not. support%is_needed) return
-         if (any(support%brought > 0.0_wp .and. self%active%is_active)) call note_add( &
-            increment%warnings, support%brought_text // ", on which no load does work: moved " // &
-            "over a gap of " // to_text(maxval(support%brought, mask=self%active%is_active), 3) &
+         brought = active_set_brought(self%active)
+         if (brought > 0.0_wp) call note_add(increment%warnings, support%brought_text // ", on " &
+            // "which no load does work: moved over a gap of " // to_text(brought, 3) &
             // " onto the surface nearest to it")
          if (.not. allocated(support%text)) return
          call tell_stabilized(self%active%support, increment)

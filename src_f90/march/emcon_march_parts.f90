@@ -11,7 +11,7 @@ module emcon_march_parts
    use emcon_march_begin, only : march_renumber
    use emcon_march_step, only : march_step, nodes_text
    use emcon_march_types, only : increment_t, march_t, part_t, rollback_t
-   use emcon_mass_return, only : mass_find_troubled, mass_match, mass_return
+   use emcon_mass_return, only : mass_find_troubled, mass_match, mass_may_return, mass_return
    use emcon_mechanism_text, only : free_motion_text
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
@@ -197,8 +197,7 @@ contains
       type(march_t), intent(in) :: self
       integer, intent(in) :: status, level
 
-      may_return = any(self%layer%is_massless .and. .not. self%massless%without_density) &
-         .and. evaluation_has_inertia(self%motion%evaluation) &
+      may_return = any(mass_may_return(self)) .and. evaluation_has_inertia(self%motion%evaluation) &
          .and. any(status == [step_refused, step_diverged, &
          step_singular, step_cycling, step_too_far, step_unbalanced]) .and. &
          level >= min(return_level, self%grid%n_level)

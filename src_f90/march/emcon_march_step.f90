@@ -301,9 +301,8 @@ contains
       do pair = 1, size(self%system%contact)
          associate (contact => self%system%contact(pair)%contact, &
                is_active => self%active%is_active(self%system%first_constraint(pair) + 1:))
-            if (.not. contact%both_sides) cycle
-            goes_in = goes_in .or. any(.not. is_active(:contact%n_constraint) .and. &
-               overlap_names(overlap, contact%node))
+            goes_in = goes_in .or. contact%could_hold( &
+               .not. is_active(:contact%n_constraint) .and. overlap_names(overlap, contact%node))
          end associate
       end do
       if (.not. goes_in) return

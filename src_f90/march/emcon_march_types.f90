@@ -18,7 +18,7 @@ module emcon_march_types
    use emcon_system, only : system_t
    use emcon_text, only : notes_t
    use emcon_velocity_jumps, only : velocity_jump_t
-   use emcon_velocity_update, only : velocity_update_t
+   use emcon_velocity_mass, only : velocity_update_t
    implicit none
    private
    public :: march_t, time_grid_t, increment_t, part_t, end_state_t, rollback_t, step_check_t, &

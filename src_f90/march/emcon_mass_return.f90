@@ -16,7 +16,7 @@ module emcon_mass_return
    use emcon_term_registry, only : terms_return_mass, terms_solid
    implicit none
    private
-   public :: mass_match, mass_return, mass_find_troubled
+   public :: mass_match, mass_return, mass_find_troubled, mass_is_at, mass_may_return
 
 contains
 
@@ -49,7 +49,7 @@ contains
       logical :: may_have_mass(size(needs_mass))
       integer :: i
 
-      may_have_mass = self%layer%is_massless .and. .not. self%massless%without_density
+      may_have_mass = mass_may_return(self)
       needs_mass = self%layer%needs_mass
       if (.not. any(needs_mass)) then
          left = 0.0_wp
@@ -68,6 +68,24 @@ contains
       end do
       if (.not. any(needs_mass)) needs_mass = may_have_mass
    end subroutine mass_find_troubled
+
+   !> Do nodes have mass now?
+   pure function mass_is_at(self, node) result(is_there)
+      type(march_t), intent(in) :: self
+      integer, intent(in) :: node(:)             !! (any)
+      logical :: is_there(size(node))
+
+      is_there = .not. self%massless%without_density(node)
+      if (self%layer%is_on) is_there = is_there .and. .not. self%layer%is_massless(node)
+   end function mass_is_at
+
+   !> Nodes without mass that could take it back.
+   pure function mass_may_return(self) result(may_return)
+      type(march_t), intent(in) :: self
+      logical :: may_return(size(self%layer%is_massless))
+
+      may_return = self%layer%is_massless .and. .not. self%massless%without_density
+   end function mass_may_return
 
    !> The slave nodes of contacts that act, if one of them is massless; else all nodes.
    subroutine mark_active(self, is_marked)

@@ -13,9 +13,11 @@ module emcon_restitution
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_march_types, only : march_t
+   use emcon_mass_return, only : mass_is_at
+   use emcon_rate_jump, only : rate_jump_t, velocity_update_change
    use emcon_text, only : note_add, notes_t
    use emcon_velocity_jumps, only : jumps_add, jumps_rub
-   use emcon_velocity_update, only : rate_jump_t, velocity_update_change, velocity_update_hold
+   use emcon_velocity_update, only : velocity_update_hold
    implicit none
    private
    public :: restitution_take
@@ -182,9 +184,7 @@ contains
       associate (set => self%active%set)
          do k = set%n_permanent + 1, set%n
             associate (node => set%item(k)%node(:set%item(k)%n_node))
-               has_impact(k) = .not. any(self%massless%without_density(node))
-               if (self%layer%is_on) has_impact(k) = has_impact(k) &
-                  .and. .not. any(self%layer%is_massless(node))
+               has_impact(k) = all(mass_is_at(self, node))
             end associate
          end do
       end associate

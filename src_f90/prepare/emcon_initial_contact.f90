@@ -9,7 +9,7 @@ module emcon_initial_contact
    use emcon_guards, only : guard_slack
    use emcon_host, only : host_find_contact, host_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_user, &
-      formulation_nts
+      formulation_nts, pair_has_order, pair_holds_nodes, pair_may_exchange
    use emcon_kinds, only : wp
    use emcon_massless_surfaces, only : pair_sheds_mass, surface_keeps_mass
    use emcon_scene, only : scene_t, where_text
@@ -79,7 +79,7 @@ contains
                noise = coordinate_noise(scene)
             end if
             ! Bodies of one surface may cross each other where their overlap is to be resolved.
-            if (contact%is_self .and. .not. (is_meant .and. pair%both_sides)) then
+            if (contact%is_self .and. .not. (is_meant .and. pair_holds_nodes(pair))) then
                call check_crossing(scene, pair%slave, contact, is_slave, is_checked, error)
             end if
             if (is_meant .and. .not. allocated(error)) cycle
@@ -112,7 +112,7 @@ contains
       if (.not. allocated(error)) call check_crossing(scene, pair%master, contact, is_master, &
          is_checked, error)
       if (.not. allocated(error)) call check_sides(scene, pair, contact, noise, "master", error)
-      if (.not. allocated(error)) call check_slave_sides(scene, pair, noise, error)
+      if (.not. allocated(error)) call check_slave_side(scene, pair, contact, noise, error)
    end subroutine check_two
 
    !> Do the nodes of a half of a pair keep their mass where those of the other half do not? As rows
@@ -122,8 +122,8 @@ contains
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
 
-      waits_for_mass = pair%both_sides .and. (pair%may_choose .or. .not. pair%is_asked) &
-         .and. pair%slave /= pair%master .and. pair_sheds_mass(scene, pair)
+      waits_for_mass = .not. pair_has_order(pair) .and. pair%slave /= pair%master .and. &
+         (pair%may_choose .or. .not. pair%is_asked) .and. pair_sheds_mass(scene, pair)
       if (waits_for_mass) waits_for_mass = surface_keeps_mass(scene, pair%slave) .and. .not. &
          surface_keeps_mass(scene, pair%master)
    end function waits_for_mass
@@ -146,10 +146,8 @@ contains
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
 
-      may_exchange = pair%may_choose .and. .not. (pair%both_sides .or. pair%slave == pair%master &
-         .or. pair%adjust%distance >= 0.0_wp .or. pair%adjust%set > 0)
-      may_exchange = may_exchange .and. .not. any(scene%pair%slave == pair%master .and. &
-         scene%pair%master == pair%slave)
+      may_exchange = pair_may_exchange(pair) .and. .not. any(scene%pair%slave == pair%master &
+         .and. scene%pair%master == pair%slave)
    end function may_exchange
 
    !> The finer of two polygons of curves that fit each other may begin with nodes behind edges of
@@ -211,18 +209,19 @@ contains
    end function reversed
 
    !> Master nodes are all behind the slave surface.
-   subroutine check_slave_sides(scene, pair, noise, error)
+   subroutine check_slave_side(scene, pair, measured, noise, error)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
+      class(start_gaps_t), intent(in) :: measured      !! of the slave nodes
       real(wp), intent(in) :: noise              !! of coordinates [L]
       type(error_t), allocatable, intent(out) :: error
       class(start_gaps_t), allocatable :: contact
 
-      if (scene%surface(pair%slave)%is_nodal) return
+      if (measured%surface(is_slave)%n_facet == 0) return
       call new_start_gaps(scene, reversed(pair), contact, error)
       if (allocated(error)) return
       call check_sides(scene, reversed(pair), contact, noise, "slave", error)
-   end subroutine check_slave_sides
+   end subroutine check_slave_side
 
    !> Slave nodes are all behind the master surface: its normals point away from them. Or they are
    !> within its pad only, deeper than any overlap that a step may begin with.
@@ -402,7 +401,7 @@ contains
 
       if (pair%slave == pair%master .or. pair%is_reverse) return
       if (pair%formulation == formulation_nts) then
-         if (.not. (pair%both_sides .and. pair%may_choose)) return
+         if (pair_has_order(pair) .or. .not. pair%may_choose) return
       end if
       call new_start_gaps(scene, reversed(pair), contact, error)
       if (allocated(error)) return

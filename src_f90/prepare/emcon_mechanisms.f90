@@ -74,8 +74,7 @@ contains
       end if
       allocate(bodies%is_free(bodies%n_motion, bodies%n), source=.false.)
       do b = 1, bodies%n_mesh
-         bodies%is_free(:, b) = .not. touches(b)
-         if (scene%is_axial) bodies%is_free([1, 3], b) = .false.
+         bodies%is_free(:, b) = system%space%has_motion .and. .not. touches(b)
       end do
       do i = 1, size(bodies%of_node)
          b = bodies%of_node(i)

@@ -4,6 +4,7 @@ module emcon_unresolved_rows
    use emcon_kinds, only : wp
    use emcon_linear_rows, only : linear_rows_t
    use emcon_numbering, only : unresolved_t
+   use emcon_prescribed, only : prescribed_way
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : unique_sorted
    use emcon_system, only : system_t
@@ -59,10 +60,7 @@ contains
       largest = 0.0_wp
       associate (prescribed => scene%step(i_step)%prescribed)
          do k = 1, size(prescribed)
-            if (prescribed(k)%is_frozen) cycle
-            motion = prescribed(k)%value
-            if (prescribed(k)%amplitude == 0) motion = motion - u(prescribed(k)%dof, &
-               prescribed(k)%node)
+            motion = prescribed_way(prescribed(k), u(prescribed(k)%dof, prescribed(k)%node))
             do i = 1, size(item%dof)
                if (item%dof(i) /= size(u, 1)*(prescribed(k)%node - 1) + prescribed(k)%dof) cycle
                part = item%weight(i)*motion

@@ -84,7 +84,7 @@ contains
       associate (system => stepper%march%system, state => stepper%march%state)
          do k = 1, size(system%contact)
             associate (n => active(abs(state%sums%of_pair(k))), first => system%first_constraint)
-               n = n + count(state%contacts%is_active(first(k) + 1:first(k + 1)))
+               n = n + state%contacts%n_acting(first(k) + 1, first(k + 1))
             end associate
          end do
       end associate

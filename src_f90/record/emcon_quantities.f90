@@ -254,7 +254,7 @@ contains
       character(len=*), intent(in) :: variable
       real(dp), allocatable :: values(:, :)
       type(gap_state_t), allocatable :: gap(:)
-      integer :: n
+      integer :: i, n
 
       n = stepper%march%system%n_constraint
       associate (state => stepper%march%state, u => stepper%march%state%u)
@@ -273,7 +273,7 @@ contains
                where (state%pairs%area > 0.0_wp) values(1, :) = values(1, :) &
                   + real(state%pairs%jump_lam/state%pairs%area, dp)
             end if
-            values(2, :) = merge(1.0_dp, 0.0_dp, state%contacts%is_active)
+            values(2, :) = real(min(1, state%contacts%status([(i, i = 1, n)])), dp)
          case ("CSHEAR", "CSLIP")
             values = rubbing(stepper, variable)
          case ("CF")
@@ -308,8 +308,7 @@ contains
             if (allocated(state%pairs%jump_drag)) drag = drag + state%pairs%jump_drag(:, i)
             if (state%pairs%shear_area(i) > 0.0_wp) values(:n - 1, i) &
                = real(drag/state%pairs%shear_area(i), dp)
-            if (state%contacts%is_active(i) .and. law(i)%mu > 0.0_wp) values(n, i) = merge(2.0_dp, &
-               1.0_dp, any(abs(state%contacts%slides_along(:, i)) > 0.0_wp))
+            if (law(i)%mu > 0.0_wp) values(n, i) = real(state%contacts%status(i), dp)
          end do
       end associate
    end function rubbing

@@ -17,6 +17,7 @@ module emcon_recorder
    use emcon_run_mark, only : run_mark
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_t
+   use emcon_surface_facets, only : profile_facets
    use emcon_text, only : string_t
    use emcon_version, only : version
    use emcon_vtkhdf, only : field_t, vtkhdf_begin_frame, vtkhdf_close, vtkhdf_create, &
@@ -50,7 +51,7 @@ module emcon_recorder
    type(field_t), parameter :: body_field = field_t("body", is_cell=.true., is_sparse=.true.)
 
    !> The cell of VTK files that is a line between two nodes.
-   integer, parameter :: vtk_line = 3, n_end = 2
+   integer, parameter :: vtk_line = 3
 
    type :: recorder_t
       type(vtkhdf_t) :: fields
@@ -118,9 +119,10 @@ contains
       integer, allocatable :: line(:, :)
       integer :: e, n_element
 
-      call profile_lines(scene, line)
+      call profile_facets(scene, line)
       n_element = size(scene%element%node, 2)
-      allocate(node(max(n_end, size(scene%element%node, 1)), n_element + size(line, 2)), source=0)
+      allocate(node(max(size(line, 1), size(scene%element%node, 1)), n_element + size(line, 2)), &
+         source=0)
       allocate(vtk_type(size(node, 2)), source=vtk_line)
       do e = 1, n_element
          associate (kind => scene%element%kinds(scene%element%kind(e)))
@@ -128,29 +130,8 @@ contains
             vtk_type(e) = kind%vtk_type
          end associate
       end do
-      node(:n_end, n_element + 1:) = line
+      node(:size(line, 1), n_element + 1:) = line
    end subroutine find_cells
-
-   !> The edges of all profiles, which no element shows.
-   pure subroutine profile_lines(scene, line)
-      type(scene_t), intent(in) :: scene
-      integer, allocatable, intent(out) :: line(:, :)    !! (n_end, n_line)
-      integer :: i, n
-
-      n = 0
-      do i = 1, size(scene%surface)
-         if (scene%surface(i)%is_profile) n = n + size(scene%surface(i)%edge)/n_end
-      end do
-      allocate(line(n_end, n))
-      n = 0
-      do i = 1, size(scene%surface)
-         if (.not. scene%surface(i)%is_profile) cycle
-         associate (edge => scene%surface(i)%edge)
-            line(:, n + 1:n + size(edge)/n_end) = edge
-            n = n + size(edge)/n_end
-         end associate
-      end do
-   end subroutine profile_lines
 
    !> Go on with the files of `base` after `n_row` rows and `n_frame` frames.
    subroutine recorder_resume(self, stepper, base, n_row, n_frame, error)
@@ -312,7 +293,7 @@ contains
       real(dp), allocatable :: body(:, :)        !! (1, n_cell)
       integer, allocatable :: line(:, :)
 
-      call profile_lines(stepper%scene, line)
+      call profile_facets(stepper%scene, line)
       associate (first => [stepper%scene%element%node(1, :), line(1, :)])
          allocate(body(1, size(first)))
          body(1, :) = real(stepper%march%system%space%body(first), dp)
@@ -345,7 +326,7 @@ contains
       integer, allocatable :: line(:, :)
       integer :: i, first
 
-      call profile_lines(stepper%scene, line)
+      call profile_facets(stepper%scene, line)
       allocate(fields, source=quantity_fields(variable, stepper%scene%n_dim))
       allocate(values, source=quantity_of_field(stepper, variable))
       first = 1

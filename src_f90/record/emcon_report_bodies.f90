@@ -8,6 +8,7 @@ module emcon_report_bodies
    use emcon_report_row, only : report_row_t, report_rows_t, row_begin, row_put, rows_add
    use emcon_rotation, only : n_turn
    use emcon_scene, only : scene_t
+   use emcon_scene_motions, only : scene_inertia
    use emcon_solid, only : solid_t
    use emcon_stepper, only : stepper_t
    use emcon_term_registry, only : terms_mass, terms_solid
@@ -162,35 +163,21 @@ contains
                m = real(mass%value(k), wp)
                body(b)%mass = body(b)%mass + m
                body(b)%center = body(b)%center + m*x(:, i)
-               if (stepper%scene%is_axial) then
-                  body(b)%inertia = body(b)%inertia + m*x(1, i)*x(1, mass%column(k) + 1)
-                  cycle
-               end if
                body(b)%inertia = body(b)%inertia &
-                  + m*about_axes(x(:, i), x(:, mass%column(k) + 1))
+                  + scene_inertia(stepper%scene, m, x(:, i), x(:, mass%column(k) + 1))
             end do
          end do
       end associate
       do b = 1, size(body)
          if (.not. body(b)%mass > 0.0_wp) cycle
          body(b)%center = body(b)%center/body(b)%mass
-         if (stepper%scene%is_axial) then        ! on the axis, and about it
-            body(b)%center(1) = 0.0_wp
-            cycle
-         end if
-         body(b)%inertia = max(0.0_wp, body(b)%inertia &
-            - body(b)%mass*about_axes(body(b)%center, body(b)%center))
+         associate (has_motion => stepper%march%system%space%has_motion)
+            where (.not. has_motion(:size(body(b)%center))) body(b)%center = 0.0_wp
+         end associate
+         body(b)%inertia = max(0.0_wp, body(b)%inertia - scene_inertia(stepper%scene, &
+            body(b)%mass, body(b)%center, body(b)%center))
       end do
    end subroutine add_masses
-
-   !> a.b less what is along each axis of rotation.
-   pure function about_axes(a, b) result(square)
-      real(wp), intent(in) :: a(:), b(:)         !! (n_dim) [L]
-      real(wp) :: square(n_turn(size(a)))
-
-      square = dot_product(a, b)
-      if (size(square) == size(a)) square = square - a*b
-   end function about_axes
 
    !> A row for each body.
    subroutine bodies_rows(scene, body, rows)

@@ -287,7 +287,7 @@ contains
       logical :: is_nodes(size(pair)), is_one_sided, is_integrated
 
       is_nodes = pair%formulation == formulation_nts
-      is_one_sided = any(pair%is_guarded .and. is_nodes .and. .not. pair%both_sides)
+      is_one_sided = any(pair%is_guarded .and. is_nodes)
       is_integrated = any(pair%is_guarded .and. .not. is_nodes)
       advice = "a finer mesh there"
       if (is_one_sided .or. is_integrated) advice = "the other surface as slave or " // advice

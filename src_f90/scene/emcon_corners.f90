@@ -34,8 +34,7 @@ contains
 
       associate (step => scene%step(k))
          allocate(used, source=[step%load%amplitude, &
-            pack(step%prescribed%amplitude, .not. step%prescribed%is_frozen), &
-            pack(step%turn%angle%amplitude, .not. step%turn%angle%is_frozen), &
+            step%prescribed%amplitude, step%turn%angle%amplitude, &
             merge(step%contact%overclosure_amplitude, 0, step%contact%resolves_overclosure)])
          allocate(time(0))
          do i = 1, size(scene%amplitude)

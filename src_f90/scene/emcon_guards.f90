@@ -5,7 +5,7 @@
 !> small depth on: a corner at once, a node of a smooth side where means of gaps have failed.
 !> Source: docs/theory.md, section 4.11.
 module emcon_guards
-   use emcon_interactions, only : contact_pair_t, formulation_nts
+   use emcon_interactions, only : contact_pair_t, formulation_nts, pair_holds_nodes
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
@@ -34,7 +34,7 @@ contains
       integer :: i, n
 
       do i = 1, size(pair)
-         if (holds_nodes(pair(i))) call name_index_put(known, &
+         if (pair_holds_nodes(pair(i))) call name_index_put(known, &
             name_index_pair(pair(i)%slave, pair(i)%master), i)
       end do
       allocate(all(2*count(pair%is_guarded)))
@@ -72,13 +72,5 @@ contains
       n = n + 1
       guard(n) = new
    end subroutine watch
-
-   !> Does a pair hold each node of its slave in front of its master?
-   elemental logical function holds_nodes(pair)
-      type(contact_pair_t), intent(in) :: pair
-
-      holds_nodes = pair%formulation == formulation_nts .and. &
-         (pair%slave /= pair%master .or. pair%both_sides)
-   end function holds_nodes
 
 end module emcon_guards

@@ -5,6 +5,7 @@ module emcon_interactions
    implicit none
    private
    public :: contact_pair_t, contact_options_t, contact_damping_t, interaction_t, adjustment_t
+   public :: pair_has_order, pair_holds_nodes, pair_may_exchange
    public :: formulation_nts, formulation_segment, formulation_mortar, formulation_user
    public :: integration_segments, integration_elements
    public :: multiplier_standard, multiplier_dual
@@ -72,5 +73,30 @@ module emcon_interactions
       logical :: has_options = .false.               !! of its own, in place of the step's
       type(contact_options_t) :: options
    end type contact_pair_t
+
+contains
+
+   !> Does a pair hold each node of its slave in front of its master?
+   elemental logical function pair_holds_nodes(pair) result(holds_nodes)
+      type(contact_pair_t), intent(in) :: pair
+
+      holds_nodes = pair%formulation == formulation_nts .and. &
+         (pair%slave /= pair%master .or. pair%both_sides)
+   end function pair_holds_nodes
+
+   !> Does it make a difference which of its two surfaces is the slave?
+   elemental logical function pair_has_order(pair) result(has_order)
+      type(contact_pair_t), intent(in) :: pair
+
+      has_order = .not. (pair%both_sides .or. pair%slave == pair%master)
+   end function pair_has_order
+
+   !> Does the deck leave it open which one that is? What is adjusted is the slave.
+   elemental logical function pair_may_exchange(pair) result(may_exchange)
+      type(contact_pair_t), intent(in) :: pair
+
+      may_exchange = pair%may_choose .and. pair_has_order(pair) .and. &
+         .not. (pair%adjust%distance >= 0.0_wp .or. pair%adjust%set > 0)
+   end function pair_may_exchange
 
 end module emcon_interactions

@@ -25,7 +25,7 @@ module emcon_options
    implicit none
    private
    public :: option_row_t, n_option_row, option_row, option_code, option_default, option_refusal, &
-      option_words, option_text
+      option_models, option_words, option_text
 
    integer, parameter :: n_plane = 2
 
@@ -150,11 +150,11 @@ contains
    end function option_code
 
    !> Why a model cannot have a value, and what it can have instead; "": it can.
-   pure subroutine option_refusal(kind, code, n_dim, is_axial, text)
+   pure subroutine option_refusal(kind, code, n_dim, is_flat, text)
       character(len=*), intent(in) :: kind
       integer, intent(in) :: code                !! one of that kind
       integer, intent(in) :: n_dim               !! of the model
-      logical, intent(in) :: is_axial            !! it is one of solids of revolution
+      logical, intent(in) :: is_flat             !! it is plane, and not of solids of revolution
       character(len=:), allocatable, intent(out) :: text
       type(option_row_t) :: row
       integer :: i
@@ -166,11 +166,21 @@ contains
          if (row%n_dim > 0 .and. row%n_dim /= n_dim) then
             text = trim(row%word) // " is for plane models, and this one has three dimensions" &
                // "; use " // trim(row%instead)
-         else if (is_axial .and. .not. row%is_axial) then
+         else if (n_dim == n_plane .and. .not. (is_flat .or. row%is_axial)) then
             text = trim(row%word) // " is not for solids of revolution; use " // trim(row%instead)
          end if
       end do
    end subroutine option_refusal
+
+   !> The models that may have a value, words of `emcon_get_option`.
+   pure subroutine option_models(row, text)
+      type(option_row_t), intent(in) :: row
+      character(len=:), allocatable, intent(out) :: text
+
+      text = "plane"
+      if (row%is_axial) text = text // " axial"
+      if (row%n_dim == 0) text = text // " space"
+   end subroutine option_models
 
    !> Code of an option that a deck does not speak of; < 0: it has to.
    pure integer function option_default(kind) result(code)

@@ -3,9 +3,10 @@ module emcon_surface_facets
    use emcon_face_facets, only : face_facets, n_face_facet, n_facet_node
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
+   use emcon_sort, only : unique_sorted
    implicit none
    private
-   public :: surface_facets, faces_of_facets
+   public :: surface_facets, facet_nodes, faces_of_facets, profile_facets
 
 contains
 
@@ -21,7 +22,7 @@ contains
          allocate(facet, source=surface%edge)
          return
       end if
-      if (surface%is_nodal .or. .not. allocated(surface%element)) then
+      if (.not. allocated(surface%element)) then
          allocate(facet(scene%n_dim, 0))
          return
       end if
@@ -42,6 +43,33 @@ contains
          end associate
       end do
    end subroutine surface_facets
+
+   !> The nodes of `surface` that its facets have; of a nodal one those that it names.
+   pure subroutine facet_nodes(surface, facet, node)
+      type(surface_t), intent(in) :: surface
+      integer, intent(in) :: facet(:, :)                   !! of `surface_facets`
+      integer, allocatable, intent(out) :: node(:)         !! ascending
+
+      node = pack(facet, facet > 0)
+      if (allocated(surface%node)) node = [node, surface%node]
+      node = unique_sorted(node)
+   end subroutine facet_nodes
+
+   !> The facets of all profiles, which no element shows.
+   pure subroutine profile_facets(scene, facet)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: facet(:, :)     !! (n_dim, n_facet)
+      integer, allocatable :: more(:, :), node(:)
+      integer :: i
+
+      allocate(node(0))
+      do i = 1, size(scene%surface)
+         if (.not. scene%surface(i)%is_profile) cycle
+         call surface_facets(scene, scene%surface(i), more)
+         node = [node, more]
+      end do
+      facet = reshape(node, [scene%n_dim, size(node)/scene%n_dim])
+   end subroutine profile_facets
 
    !> The face that each facet of a surface of faces is of.
    pure subroutine faces_of_facets(scene, surface, face)

@@ -7,7 +7,8 @@ module emcon_evaluation
    private
    public :: instant_t, evaluation_t, evaluation_at_end, most_past
    public :: evaluation_moving, evaluation_velocity, evaluation_displacement, &
-      evaluation_has_inertia, evaluation_is_equilibrium, evaluation_contact_place, instant_later
+      evaluation_has_inertia, evaluation_is_equilibrium, evaluation_is_at_start, &
+      evaluation_contact_place, evaluation_contact_conserves, evaluation_conserves, instant_later
 
    !> Fields that a scheme keeps of the steps before, at most.
    integer, parameter :: most_past = 2
@@ -99,6 +100,28 @@ contains
       place = merge(0.5_wp, 1.0_wp, evaluation_has_inertia(evaluation) &
          .and. .not. evaluation%pushes_at_end)
    end function evaluation_contact_place
+
+   !> Are forces along gradients where the step starts?
+   elemental logical function evaluation_is_at_start(evaluation) result(is_at_start)
+      type(evaluation_t), intent(in) :: evaluation
+
+      is_at_start = evaluation%is_gradient .and. .not. evaluation%at > 0.0_wp
+   end function evaluation_is_at_start
+
+   !> Do contact forces act along discrete gradients over the step alone?
+   elemental logical function evaluation_contact_conserves(evaluation) result(conserves)
+      type(evaluation_t), intent(in) :: evaluation
+
+      conserves = .not. (evaluation%pushes_at_end .or. evaluation%start_weight > 0.0_wp)
+   end function evaluation_contact_conserves
+
+   !> And all other forces, without dissipation?
+   elemental logical function evaluation_conserves(evaluation) result(conserves)
+      type(evaluation_t), intent(in) :: evaluation
+
+      conserves = evaluation_contact_conserves(evaluation) .and. &
+         .not. (evaluation%is_gradient .or. evaluation%dissipation > 0.0_wp)
+   end function evaluation_conserves
 
    elemental type(instant_t) function instant_later(instant, h) result(later)
       type(instant_t), intent(in) :: instant

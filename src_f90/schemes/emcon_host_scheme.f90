@@ -2,7 +2,8 @@
 module emcon_host_scheme
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_evaluation, only : instant_t, most_past, evaluation_t
+   use emcon_evaluation, only : evaluation_conserves, evaluation_contact_conserves, evaluation_t, &
+      instant_t, most_past
    use emcon_kinds, only : wp
    use emcon_scheme, only : scheme_row_t, scheme_t
    use emcon_scheme_registry, only : scheme_user_row
@@ -72,13 +73,10 @@ contains
       do k = 1, size(before)
          evaluation = scheme%evaluation(instant_t(h_before=before(k)), 1.0_wp)
          row%dissipates = row%dissipates .or. evaluation%dissipation > 0.0_wp
-         if (evaluation%pushes_at_end .or. evaluation%start_weight > 0.0_wp) then
-            row%takes_jumps = .false.
-            row%takes_damping = .false.
-         end if
-         if (evaluation%is_gradient .or. row%dissipates) row%takes_massless = .false.
+         row%takes_jumps = row%takes_jumps .and. evaluation_contact_conserves(evaluation)
+         row%takes_massless = row%takes_massless .and. evaluation_conserves(evaluation)
       end do
-      row%takes_massless = row%takes_massless .and. row%takes_damping
+      row%takes_damping = row%takes_damping .and. row%takes_jumps
    end function host_scheme_row
 
    !> Are the weights and places of `scheme` ones, as seen for a first step of size 1 and one that

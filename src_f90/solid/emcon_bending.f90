@@ -122,7 +122,7 @@ contains
             do b = 1, n
                slope(:n, b) = slope(:n, b) + u(:, i)*geometry%gradient(b, i, k)
             end do
-            if (solid%is_axial) slope(n_axis, n_axis) = slope(n_axis, n_axis) &
+            if (allocated(geometry%circle)) slope(n_axis, n_axis) = slope(n_axis, n_axis) &
                + u(1, i)*geometry%circle(i, k)
          end do
       end associate

@@ -21,16 +21,20 @@ module emcon_locking
       bent_in_space = "take C3D8I, C3D10 or C3D20R, or more elements across", &
       bent_of_rings = "take CAX6 or CAX8R, or more elements across"
 
+   !> Dimensions of space.
+   integer, parameter :: n_space = 3
+
 contains
 
-   !> What to take in place of elements of `solid` that lock.
+   !> What to take in place of elements of `solid` that lock. In the plane those of rings respond
+   !> one by one.
    pure function locking_advice(solid) result(text)
       type(solid_t), intent(in) :: solid
       character(len=len(in_plane)) :: text
 
       text = in_plane
-      if (solid%is_single) text = in_space
-      if (solid%is_axial) text = of_rings
+      if (solid%is_single) text = of_rings
+      if (solid%n_dim == n_space) text = in_space
    end function locking_advice
 
    !> What to take in place of elements of `solid` that are too stiff where they bend.
@@ -40,8 +44,8 @@ contains
 
       text = bent_in_plane
       if (all(solid%trait%is_thin)) text = bent_thin
-      if (solid%is_single) text = bent_in_space
-      if (solid%is_axial) text = bent_of_rings
+      if (solid%is_single) text = bent_of_rings
+      if (solid%n_dim == n_space) text = bent_in_space
    end function bending_advice
 
    !> The ratio of Poisson of element `e` if it locks, else 0.
@@ -97,7 +101,7 @@ contains
 
       n_component = sum([(a, a = 1, solid%n_dim)])
       do e = solid%n_element, 1, -1
-         if (solid%is_axial .or. solid%trait%is_rigid(e)) cycle
+         if (allocated(solid%geometry(e)%circle) .or. solid%trait%is_rigid(e)) cycle
          if (n_component*(solid%geometry(e)%n_gp + 1) < solid%n_dim*solid%geometry(e)%n_node) return
       end do
    end function strainless_element

@@ -111,7 +111,7 @@ contains
 
       associate (node => solid%node(:solid%geometry(e)%n_node, e))
          n = solid%n_dim
-         if (solid%is_axial) then
+         if (allocated(solid%geometry(e)%circle)) then
             local%from(:n, :size(node)) = motion%from(:, node)
             local%by(:n, :size(node)) = motion%by(:, node)
          else
@@ -137,7 +137,7 @@ contains
          if (solid%host%first_point(e) > 0) then
             call user_space_respond(solid%geometry(e), solid%host%first_point(e), &
                user%points(solid%law_of(e)), local, with_tangent, part)
-         else if (solid%is_axial) then
+         else if (allocated(solid%geometry(e)%circle)) then
             call axial_element_respond(solid%geometry(e), law%law, local, with_tangent, part)
          else if (solid%trait%has_mean(e)) then
             call mean_volume_space_respond(solid%geometry(e), law%law, rest%law, local, &

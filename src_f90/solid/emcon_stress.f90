@@ -97,7 +97,7 @@ contains
 
       motion%nlgeom = nlgeom .and. .not. solid%trait%is_small(e)
       associate (node => solid%node(:solid%geometry(e)%n_node, e))
-         if (solid%is_axial) then
+         if (allocated(solid%geometry(e)%circle)) then
             motion%from(:size(u, 1), :size(node)) = u(:, node)
             call axial_element_hold(solid%geometry(e), solid%law(solid%law_of(e))%law, motion, &
                stress, strain)

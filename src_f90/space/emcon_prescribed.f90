@@ -9,7 +9,7 @@ module emcon_prescribed
    use emcon_turn_plane, only : turn_arm, turn_of, turned_by
    implicit none
    private
-   public :: amplitude_at, prescribed_motion, ramp_at, ramp_turn
+   public :: amplitude_at, prescribed_way, prescribed_motion, ramp_at, ramp_turn
 
 contains
 
@@ -25,6 +25,17 @@ contains
       if (amplitude%is_total_time) time = instant%total_time
       call find_amplitude_value(amplitude, time, value, rate)
    end subroutine amplitude_at
+
+   !> How far a freedom is to be moved: by so much times its amplitude, or without one, by so much
+   !> from where it is.
+   elemental real(wp) function prescribed_way(prescribed, u) result(way)
+      type(prescribed_t), intent(in) :: prescribed
+      real(wp), intent(in) :: u                  !! where it is [L]
+
+      way = prescribed%value
+      if (prescribed%amplitude == 0) way = way - u
+      if (prescribed%is_frozen) way = 0.0_wp
+   end function prescribed_way
 
    !> Displacement and velocity of a prescribed degree of freedom at `instant`; `u_start` are the
    !> displacements at the start of the step. The velocity is the slope to the left.

@@ -8,6 +8,7 @@ module emcon_space
    use emcon_numbering, only : numbering_init, numbering_t, unresolved_t
    use emcon_reduction, only : freedom_numbers, reduction_init, reduction_t
    use emcon_scene, only : scene_t
+   use emcon_scene_motions, only : scene_motions
    use emcon_steps, only : method_saddle_point
    implicit none
    private
@@ -22,7 +23,7 @@ module emcon_space
    end type lists_t
 
    type :: space_t
-      logical :: is_axial = .false.              !! circles about the axis of y: momentum along it
+      logical, allocatable :: has_motion(:)      !! (n_dim + turns) rigid ones, and so momenta
       integer :: n_body = 0
       integer, allocatable :: body(:)            !! (n_node) connected part; 0: of none
       logical, allocatable :: is_alive(:, :)     !! (n_dim, n_node) in a term, a row
@@ -86,7 +87,7 @@ contains
       integer :: i, n_node
 
       n_node = size(scene%x, 2)
-      self%is_axial = scene%is_axial
+      self%has_motion = scene_motions(scene)
       call linear_rows_init(self%linear, scene)
       call bodies_find_lists(lists%start, (lists%freedom - 1)/lists%n_dim + 1, n_node, self%body, &
          self%n_body)

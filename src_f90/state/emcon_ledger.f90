@@ -70,7 +70,7 @@ contains
          place(:n_dim) = x(:, i) + state%u(:, i)
          call add_moments(place(:n_dim), self%work(:, i), self%angular)
       end do
-      if (system%space%is_axial) call leave_axis(self%momentum, self%angular)
+      call keep_motions(system%space, self%momentum, self%angular)
    end subroutine ledger_measure
 
    !> Linear and angular momentum of each body, rows px, py, lz, in space px to pz and lx to lz, in
@@ -116,20 +116,20 @@ contains
             call add_moments(place(:n), momentum(:, i), to(n + 1:))
          end associate
       end do
-      if (.not. space%is_axial) return
       do i = 1, size(momenta, 2)
-         call leave_axis(momenta(:n, i), momenta(n + 1:, i))
+         call keep_motions(space, momenta(:n, i), momenta(n + 1:, i))
       end do
    end subroutine add_up
 
-   !> Of whole circles only the momentum along the axis is not 0.
-   pure subroutine leave_axis(momentum, angular)
-      real(wp), intent(inout) :: momentum(:)     !! (n_dim) along the radius first [M L/T]
+   !> What bodies as a whole cannot do, as circles across their axis, has no momentum.
+   pure subroutine keep_motions(space, momentum, angular)
+      type(space_t), intent(in) :: space
+      real(wp), intent(inout) :: momentum(:)     !! (n_dim) [M L/T]
       real(wp), intent(inout) :: angular(:)      !! [M L^2/T]
 
-      momentum(1) = 0.0_wp
-      angular = 0.0_wp
-   end subroutine leave_axis
+      where (.not. space%has_motion(:size(momentum))) momentum = 0.0_wp
+      where (.not. space%has_motion(size(momentum) + 1:)) angular = 0.0_wp
+   end subroutine keep_motions
 
    !> Mass of each body.
    subroutine body_masses(system, mass)

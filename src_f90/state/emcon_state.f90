@@ -38,6 +38,14 @@ module emcon_state
       real(wp), allocatable :: drag(:, :)        !! (n_slip, n_constraint) friction against slip
       real(wp), allocatable :: slip(:, :)        !! (n_slip, n_constraint) so far, to and fro [L]
       real(wp), allocatable :: slip_path(:)      !! (n_constraint) the same, all of it >= 0 [L]
+   contains
+      procedure :: begin => contacts_begin
+      procedure :: clear => contacts_clear
+      procedure :: keep => contacts_keep
+      procedure :: get => contacts_get
+      procedure :: n_acting => contacts_n_acting
+      procedure :: stray => contacts_stray
+      procedure :: status => contacts_status
    end type contact_state_t
 
    !> What schemes look back on.
@@ -74,5 +82,76 @@ module emcon_state
       type(factor_base_t) :: base                !! of the factor that is kept over steps
       type(step_control_t) :: control            !! of the size of increments
    end type state_t
+
+contains
+
+   !> `n` constraints, of which none acts.
+   pure subroutine contacts_begin(self, n)
+      class(contact_state_t), intent(inout) :: self
+      integer, intent(in) :: n                   !! constraints
+
+      allocate(self%is_active(n), source=.false.)
+      allocate(self%lam(n), self%closure(n), source=0.0_wp)
+   end subroutine contacts_begin
+
+   !> Nothing acts, stores or rubs any more.
+   pure subroutine contacts_clear(self)
+      class(contact_state_t), intent(inout) :: self
+
+      self%is_active = .false.
+      self%lam = 0.0_wp
+      self%closure = 0.0_wp
+      self%slides_along = 0.0_wp
+      self%drag = 0.0_wp
+   end subroutine contacts_clear
+
+   !> What constraint `id` ends a step with.
+   pure subroutine contacts_keep(self, id, lam, acts)
+      class(contact_state_t), intent(inout) :: self
+      integer, intent(in) :: id                  !! 1 to n_constraint
+      real(wp), intent(in) :: lam                !! its multiplier [M L/T^2]
+      logical, intent(in) :: acts                !! it is closed
+
+      self%lam(id) = lam
+      self%is_active(id) = acts
+   end subroutine contacts_keep
+
+   !> What acts, with which multipliers, from constraint `first` on.
+   pure subroutine contacts_get(self, first, lam, acts)
+      class(contact_state_t), intent(in) :: self
+      integer, intent(in) :: first               !! from 1
+      real(wp), allocatable, intent(out) :: lam(:)       !! [M L/T^2]
+      logical, allocatable, intent(out) :: acts(:)       !! as long
+
+      lam = self%lam(first:)
+      acts = self%is_active(first:)
+   end subroutine contacts_get
+
+   !> How many of the constraints `first` to `last` act.
+   pure integer function contacts_n_acting(self, first, last) result(n)
+      class(contact_state_t), intent(in) :: self
+      integer, intent(in) :: first, last         !! numbers of constraints
+
+      n = count(self%is_active(first:last))
+   end function contacts_n_acting
+
+   !> The first constraint with a multiplier that does not act; 0: none.
+   pure integer function contacts_stray(self, lam) result(id)
+      class(contact_state_t), intent(in) :: self
+      real(wp), intent(in) :: lam(:)             !! (n_constraint) [M L/T^2]
+
+      id = findloc(abs(lam) > 0.0_wp .and. .not. self%is_active, .true., 1)
+   end function contacts_stray
+
+   !> 0: constraint `id` does not act, 1: it does, and nothing slides, 2: it slides.
+   elemental integer function contacts_status(self, id) result(status)
+      class(contact_state_t), intent(in) :: self
+      integer, intent(in) :: id                  !! 1 to n_constraint
+
+      status = merge(1, 0, self%is_active(id))
+      if (status == 0 .or. .not. allocated(self%slides_along)) return
+      if (size(self%slides_along) == 0) return
+      if (any(abs(self%slides_along(:, id)) > 0.0_wp)) status = 2
+   end function contacts_status
 
 end module emcon_state

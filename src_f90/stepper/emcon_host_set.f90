@@ -5,8 +5,8 @@
 !> start are held, which makes no energy, or where the host cannot cut the step; else it is to be
 !> tried with another size. Source: docs/theory.md, section 6.1.
 module emcon_host_set
-   use emcon_active_set, only : active_set_pass, active_set_t, active_set_update_gaps, &
-      step_cycling, step_done, step_too_far, touch_tol
+   use emcon_active_set, only : active_set_note_stale, active_set_pass, active_set_t, &
+      active_set_update_gaps, step_cycling, step_done, step_too_far, touch_tol
    use emcon_contact_conditions, only : begins_unseen, look_at_active, look_at_open, noise_at
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
@@ -15,9 +15,8 @@ module emcon_host_set
    private
    public :: host_set_t, host_set_begin, host_set_try, host_set_advance, host_set_drop
 
-   !> Sets of one step at most; a step is solved again so often at most because stencils were chosen
-   !> for another motion.
-   integer, parameter :: most_sets = 40, most_stale = 3
+   !> Sets of one step at most.
+   integer, parameter :: most_sets = 40
 
    type :: host_set_t
       logical, allocatable :: tried(:, :)        !! (n_constraint, most_sets)
@@ -59,9 +58,8 @@ contains
       call update(self, active, system, motion, status)
       is_done = status /= step_done
       if (active%is_stale) then
-         active%n_stale = active%n_stale + 1
-         is_done = active%n_stale > most_stale
-         status = merge(step_too_far, step_done, is_done)
+         call active_set_note_stale(active, status)
+         is_done = status /= step_done
          self%n_tried = 0
          return
       end if

@@ -166,7 +166,7 @@ contains
       if (.not. present(lam)) return
       call check_list("lam", lam, size(next%contacts%lam), error)
       if (allocated(error)) return
-      i = findloc(abs(lam) > 0.0_wp .and. .not. next%contacts%is_active, .true., 1)
+      i = next%contacts%stray(lam)
       call check_that(i == 0, "lam is not 0 at constraint " // to_text(i) // &
          ", which does not act", error)
       next%contacts%lam = lam

@@ -12,6 +12,7 @@ module emcon_stepper_loads
    use emcon_reduction, only : freedom_numbers
    use emcon_restart_data, only : restart_exchange, restart_offers, restart_size, restart_t
    use emcon_scene, only : scene_t
+   use emcon_scene_motions, only : scene_takes_force
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_choice, check_list, check_number, check_size, check_that, &
       stepper_check_open
@@ -175,7 +176,7 @@ contains
       call check_that(norm2(direction) > 0.0_wp, "the direction of gravity is 0", error)
       call check_that(.not. any(abs(direction(scene%n_dim + 1:)) > 0.0_wp), &
          "the model is plane: gravity has no third component", error)
-      call check_that(.not. (scene%is_axial .and. abs(direction(1)) > 0.0_wp), "gravity across " &
+      call check_that(scene_takes_force(scene, direction), "gravity across " &
          // "the axis of a solid of revolution (CAX) is not the same all around: its direction " &
          // "is 0, 1 or 0, -1", error)
    end subroutine check_direction

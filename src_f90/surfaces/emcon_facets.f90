@@ -9,8 +9,8 @@ module emcon_facets
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t, where_text
-   use emcon_sort, only : find_sorted, unique_sorted
-   use emcon_surface_facets, only : faces_of_facets, surface_facets
+   use emcon_sort, only : find_sorted
+   use emcon_surface_facets, only : facet_nodes, faces_of_facets, surface_facets
    use emcon_text, only : to_text
    implicit none
    private
@@ -48,11 +48,7 @@ contains
       self%n_dim = size(scene%x, 1)
       call surface_facets(scene, surface, self%facet)
       self%n_facet = size(self%facet, 2)
-      if (surface%is_nodal) then
-         self%node = unique_sorted(surface%node)
-      else
-         self%node = unique_sorted(pack(self%facet, self%facet > 0))
-      end if
+      call facet_nodes(surface, self%facet, self%node)
       call find_faces(self, scene, surface)
       allocate(self%corner(size(self%facet, 1), self%n_facet), source=0)
       allocate(self%size(self%n_facet))

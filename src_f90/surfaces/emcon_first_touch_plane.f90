@@ -4,7 +4,7 @@ module emcon_first_touch_plane
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
-   use emcon_surface_facets, only : surface_facets
+   use emcon_surface_facets, only : facet_nodes, surface_facets
    use emcon_vectors_plane, only : cross
    implicit none
    private
@@ -31,11 +31,7 @@ contains
          associate (pair => scene%pair(i))
             call surface_facets(scene, scene%surface(pair%slave), slave)
             call surface_facets(scene, scene%surface(pair%master), master)
-            if (scene%surface(pair%slave)%is_nodal) then
-               node = scene%surface(pair%slave)%node
-            else
-               node = unique_sorted(reshape(slave, [size(slave)]))
-            end if
+            call facet_nodes(scene%surface(pair%slave), slave, node)
          end associate
          touch_time = min(touch_time, nodes_time(node, master, scene%pair(i)%interaction%offset, &
             x, direction))

@@ -15,6 +15,7 @@ module emcon_outline_plane
    use emcon_outline, only : outline_t
    use emcon_scene, only : scene_t
    use emcon_sort, only : find_sorted, sort_order, unique_sorted
+   use emcon_surface_facets, only : profile_facets
    use emcon_surface_nodes, only : surface_nodes
    use emcon_tied_edges, only : tied_edges_find, tied_ends_find
    implicit none
@@ -72,12 +73,11 @@ contains
       integer, intent(in) :: edge(:, :)          !! (2, n_edge)
       type(scene_t), intent(in) :: scene
       logical :: is_of(size(scene%x, 2))
-      integer :: s
+      integer, allocatable :: of_profiles(:, :)
 
+      call profile_facets(scene, of_profiles)
       is_of = .false.
-      do s = 1, size(scene%surface)
-         if (scene%surface(s)%is_profile) is_of(scene%surface(s)%edge(1, :)) = .true.
-      end do
+      is_of(of_profiles(1, :)) = .true.
       self%is_profile = is_of(edge(1, :))
    end subroutine find_profiles
 

@@ -20,9 +20,8 @@ module emcon_touch_rule_plane
    integer, parameter :: most_classes = 4
 
    type :: touch_rule_t
-      logical :: both_sides = .false.
       integer :: n_class = 1
-      integer, allocatable :: body(:)            !! (n_edge) only with both sides
+      integer, allocatable :: body(:)            !! (n_edge) only where each body holds the other
       integer, allocatable :: host(:)            !! (n_node) edge that a tied end stands on; 0: none
       logical, allocatable :: is_buried(:)       !! (n_node) under a tied piece
    end type touch_rule_t
@@ -39,7 +38,6 @@ contains
       logical, allocatable :: is_buried(:)
       integer :: n_body
 
-      self%both_sides = both_sides
       call tied_ends_find(scene, chain%facet, host, is_buried)
       self%host = host(chain%node)
       self%is_buried = is_buried(chain%node)
@@ -71,14 +69,14 @@ contains
 
       may = .not. self%is_buried(k) .and. self%host(k) /= e
       if (.not. may) return
-      if (self%both_sides) then
+      if (allocated(self%body)) then
          own = maxval(chain%node_edge(:, k))
          if (self%body(own) /= self%body(e)) return
          associate (p => chain%part(own), q => chain%part(e))
             may = .not. (p /= q .and. chain%is_closed(p) .and. chain%is_closed(q))
          end associate
       end if
-      if (may) may = self_contact_is_meant(chain, k, e, self%both_sides)
+      if (may) may = self_contact_is_meant(chain, k, e, allocated(self%body))
    end function touch_rule_may
 
    !> And at x + u? On another body any edge that is the nearest one.
@@ -91,7 +89,7 @@ contains
 
       allows = touch_rule_may(self, chain, k, e)
       if (.not. allows) return
-      if (self%both_sides) then
+      if (allocated(self%body)) then
          if (self%body(maxval(chain%node_edge(:, k))) /= self%body(e)) return
       end if
       allows = self_contact_may_touch(chain, k, e, x, u)

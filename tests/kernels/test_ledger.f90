@@ -72,7 +72,7 @@ contains
          call check_near(error, momenta, expected, tol, 10.0_wp, "the same")
          call body_masses(system, masses)
          call check_near(error, real(masses, wp), mass, tol, 4.0_wp, "masses")
-         system%space%is_axial = .true.
+         system%space%has_motion([1, 3]) = .false.
          call ledger_measure(ledger, system, scene%x, state)
          call check_near(error, [ledger%momentum, ledger%angular], [0.0_wp, sum(expected(2, :)), &
             0.0_wp], tol, 10.0_wp, "circles move along their axis alone")

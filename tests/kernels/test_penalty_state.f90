@@ -77,7 +77,7 @@ contains
       call march_init(march, scene, error)
       if (allocated(error)) return
       associate (system => march%system)
-         system%contact(1)%contact%both_sides = k == 5
+         system%contact(1)%contact%area_factor = merge(0.5_wp, 1.0_wp, k == 5)
          call penalty_begin_step(state, system, scene, scene%step(1), error)
          if (allocated(error)) return
          inner = 0.0_wp

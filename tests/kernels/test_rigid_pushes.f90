@@ -19,8 +19,8 @@ module test_rigid_pushes
    use emcon_system, only : system_begin_step, system_init, system_respond, system_t
    use emcon_term, only : role_external
    use emcon_text, only : to_text
-   use emcon_velocity_update, only : push_t, velocity_update_accelerate, velocity_update_free, &
-      velocity_update_push, velocity_update_t
+   use emcon_velocity_mass, only : velocity_update_free, velocity_update_t
+   use emcon_velocity_update, only : push_t, velocity_update_accelerate, velocity_update_push
    use random_draws, only : draw_random
    use small_scenes, only : add_load, add_step, block_t, make_block, shake
    implicit none

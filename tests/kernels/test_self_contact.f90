@@ -192,7 +192,6 @@ contains
          chain, 8, 1)) .and. touch_rule_may(rule, chain, 1, 5), "ties")
       rule%is_buried = .false.
       rule%host = 0
-      rule%both_sides = .true.
       rule%n_class = 2
       rule%body = [1, 1, 1, 2, 3, 3, 3]
       call check_true(error, all([(touch_rule_sees(rule, 1, e), e = 1, n - 1)] .eqv. [.true., &

@@ -11,8 +11,9 @@ module test_velocity_pushes
    use emcon_scene, only : scene_t
    use emcon_system, only : mass_times, system_begin_step, system_init, system_t
    use emcon_text, only : to_text
-   use emcon_velocity_update, only : push_t, rate_jump_t, velocity_update_accelerate, &
-      velocity_update_change, velocity_update_free, velocity_update_push, velocity_update_t
+   use emcon_rate_jump, only : rate_jump_t, velocity_update_change
+   use emcon_velocity_mass, only : velocity_update_free, velocity_update_t
+   use emcon_velocity_update, only : push_t, velocity_update_accelerate, velocity_update_push
    use small_scenes, only : add_step, block_t, clamp, make_two_blocks, shake
    implicit none
    private

@@ -8,7 +8,8 @@ module test_velocity_update
    use emcon_motion, only : motion_of
    use emcon_scene, only : scene_t
    use emcon_system, only : mass_times, system_begin_step, system_init, system_t
-   use emcon_velocity_update, only : velocity_update_apply, velocity_update_free, velocity_update_t
+   use emcon_velocity_mass, only : velocity_update_free, velocity_update_t
+   use emcon_velocity_update, only : velocity_update_apply
    use small_scenes, only : add_step, block_t, clamp, make_two_blocks, shake
    implicit none
    private

@@ -300,6 +300,7 @@ contains
          swap = ", the other surface as slave or " // mesh
 
       both%both_sides = .true.
+      both%is_guarded = .false.
       segment%formulation = formulation_segment
       mortar%formulation = formulation_mortar
       call guard_advice([one, both], advice)

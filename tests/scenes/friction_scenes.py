@@ -6,6 +6,7 @@ import sys
 import numpy as np
 from plain_scenes import ONE, Scene
 from scene_tools import DECKS, ROOT, Deck
+from wheel_scenes import on_floor
 
 sys.path.insert(0, str(ROOT/"pywrap"))
 
@@ -146,38 +147,7 @@ def rolling_polygon(sides, turn, mu):
     middle = -0.5*min(math.sin(angle) for angle in angles)
     places = [(0.0, middle)] + [(0.5*math.cos(angle), middle + 0.5*math.sin(angle))
                                 for angle in angles]
-    nodes = "".join(f"{k}, {x!r}, {y!r}\n" for k, (x, y) in enumerate(places, 1))
-    wedges = "".join(f"{k}, 1, {k + 1}, {k % sides + 2}\n" for k in range(1, sides + 1))
-    return Deck(f"""*NODE
-{nodes}91, -4., -1.
-92, 12., -1.
-93, 12., 0.
-94, -4., 0.
-*ELEMENT, TYPE=CPE3, ELSET=P
-{wedges}*ELEMENT, TYPE=CPE4, ELSET=F
-91, 91, 92, 93, 94
-*MATERIAL, NAME=M
-*HYPERELASTIC, COUPLED NEO HOOKE
-1e4, .3
-*DENSITY
-1.
-*SOLID SECTION, ELSET=P, MATERIAL=M
-*SOLID SECTION, ELSET=F, MATERIAL=M
-*SURFACE, NAME=SP
-P
-*SURFACE, NAME=SF
-91, S3
-*RIGID BODY, ELSET=P, REF NODE=1
-*RIGID BODY, ELSET=F, REF NODE=91
-*SURFACE INTERACTION, NAME=I
-*FRICTION
-{mu!r}
-*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE
-SP, SF
-*BOUNDARY
-91, 1, 2
-91, 6, 6
-*INITIAL CONDITIONS, TYPE=ROTATING VELOCITY
+    return Deck(on_floor(places, mu) + f"""*INITIAL CONDITIONS, TYPE=ROTATING VELOCITY
 1, 0., 1., 0.
 0., {middle!r}
 *STEP, NLGEOM

@@ -14,6 +14,43 @@ RADIUS, SPEED, GRAVITY = 0.5, 1.0, 10.0
 TURN = 1e-3
 
 
+def on_floor(place, mu):
+    """The model of a rigid polygon, from its middle and its corners, over a rigid floor that is held."""
+    sides = len(place) - 1
+    nodes = "".join(f"{k}, {number(x)}, {number(y)}\n" for k, (x, y) in enumerate(place, 1))
+    wedges = "".join(f"{k}, 1, {k + 1}, {k % sides + 2}\n" for k in range(1, sides + 1))
+    return f"""*NODE
+{nodes}1001, -4., -1.
+1002, 20., -1.
+1003, 20., 0.
+1004, -4., 0.
+*ELEMENT, TYPE=CPE3, ELSET=P
+{wedges}*ELEMENT, TYPE=CPE4, ELSET=F
+1001, 1001, 1002, 1003, 1004
+*MATERIAL, NAME=M
+*HYPERELASTIC, COUPLED NEO HOOKE
+1e4, .3
+*DENSITY
+1.
+*SOLID SECTION, ELSET=P, MATERIAL=M
+*SOLID SECTION, ELSET=F, MATERIAL=M
+*SURFACE, NAME=SP
+P
+*SURFACE, NAME=SF
+1001, S3
+*RIGID BODY, ELSET=P, REF NODE=1
+*RIGID BODY, ELSET=F, REF NODE=1001
+*SURFACE INTERACTION, NAME=I
+*FRICTION
+{mu!r}
+*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE
+SP, SF
+*BOUNDARY
+1001, 1, 2
+1001, 6, 6
+"""
+
+
 @dataclasses.dataclass(frozen=True)
 class Wheel:
     """A regular polygon of density 1, thrown without spin along a surface that falls by `slope`
@@ -51,40 +88,8 @@ class Wheel:
 
     def deck(self):
         place = self.places()
-        nodes = "".join(f"{k}, {number(x)}, {number(y)}\n" for k, (x, y) in enumerate(place, 1))
-        wedges = "".join(f"{k}, 1, {k + 1}, {k % self.sides + 2}\n"
-                         for k in range(1, self.sides + 1))
         along = self.gravity/GRAVITY
-        return Deck(f"""*NODE
-{nodes}1001, -4., -1.
-1002, 20., -1.
-1003, 20., 0.
-1004, -4., 0.
-*ELEMENT, TYPE=CPE3, ELSET=P
-{wedges}*ELEMENT, TYPE=CPE4, ELSET=F
-1001, 1001, 1002, 1003, 1004
-*MATERIAL, NAME=M
-*HYPERELASTIC, COUPLED NEO HOOKE
-1e4, .3
-*DENSITY
-1.
-*SOLID SECTION, ELSET=P, MATERIAL=M
-*SOLID SECTION, ELSET=F, MATERIAL=M
-*SURFACE, NAME=SP
-P
-*SURFACE, NAME=SF
-1001, S3
-*RIGID BODY, ELSET=P, REF NODE=1
-*RIGID BODY, ELSET=F, REF NODE=1001
-*SURFACE INTERACTION, NAME=I
-*FRICTION
-{self.mu!r}
-*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE
-SP, SF
-*BOUNDARY
-1001, 1, 2
-1001, 6, 6
-*INITIAL CONDITIONS, TYPE=VELOCITY
+        return Deck(on_floor(place, self.mu) + f"""*INITIAL CONDITIONS, TYPE=VELOCITY
 1, 1, {SPEED!r}
 *STEP, NLGEOM, INC=100000
 *DYNAMIC, DIRECT
