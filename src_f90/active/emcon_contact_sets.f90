@@ -217,8 +217,6 @@ contains
             call constraint_index(system, id, pair, i)
             self%candidates%acts(id) = self%candidates%acts(id) .and. self%set%lam(k) >= &
                -noise_at(self, system, system%contact(pair)%contact%node(i))
-            if (self%support%is_needed .and. .not. self%candidates%acts(id)) &
-               self%support%has_pulled(id) = .true.
             if (.not. (self%candidates%acts(id) .and. self%friction%is_on)) cycle
             this_turns = .false.
             call friction_turn(self%friction, system, self%set, k, this_turns)

@@ -41,8 +41,6 @@ module emcon_contact_support
       character(len=:), allocatable :: told      !! whose motion the user has been told of
       !> (n_constraint) contacts that hold along the surface as well, by friction
       logical, allocatable :: grips(:)
-      !> (n_constraint) this step has let them go as they pulled: what they prevent no load needs
-      logical, allocatable :: has_pulled(:)
       !> (n_constraint) [L] gaps that were closed though no load closes them, and of which bodies
       real(wp), allocatable :: brought(:)
       character(len=:), allocatable :: brought_text
@@ -83,8 +81,7 @@ contains
          call mechanism_rows_find(system, step%prescribed, self%supports)
       end associate
       allocate(self%is_loose(system%space%n_body), self%hangs(system%space%n_body), source=.false.)
-      allocate(self%has_pulled(system%n_constraint), self%grips(system%n_constraint), &
-         source=.false.)
+      allocate(self%grips(system%n_constraint), source=.false.)
       allocate(self%brought(system%n_constraint), source=0.0_wp)
       if (size(system%contact) == 0) return
       call take_look(self, system, scene, u, look)
@@ -100,7 +97,6 @@ contains
       type(contact_support_t), intent(inout) :: self
 
       if (.not. self%is_needed) return
-      self%has_pulled = .false.
       self%brought = 0.0_wp
    end subroutine contact_support_forget
 
@@ -284,7 +280,7 @@ contains
    end subroutine follow_load
 
    !> Along motions that no load works on take in the contacts that touch already; where no load
-   !> acts on the bodies at all, those with the smallest gap. What has pulled is not asked again.
+   !> acts on the bodies at all, those with the smallest gap.
    subroutine take_nearest(self, system, scene, motion, bodies, free, is_active)
       type(contact_support_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -296,8 +292,7 @@ contains
       type(constraint_set_t) :: set
       logical :: is_next(size(is_active))
 
-      call gaps_evaluate(system, motion, gaps_that_can_act(system) &
-         .and. .not. (is_active .or. self%has_pulled), set)
+      call gaps_evaluate(system, motion, gaps_that_can_act(system) .and. .not. is_active, set)
       call gaps_nearest(set, bodies, free%member, free%z, is_next)
       if (free%is_loaded) call gaps_keep_closed(set, is_next)
       if (.not. any(is_next)) return

@@ -180,43 +180,31 @@ contains
    subroutine test_nearest(error)
       type(error_t), allocatable, intent(out) :: error
       type(block_t) :: lower, upper
-      integer :: k
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(motion_t) :: motion
+      real(wp) :: expected(3)
 
-      do k = 1, 2
-         block
-            type(scene_t) :: scene
-            type(march_t) :: march
-            type(motion_t) :: motion
-            real(wp) :: expected(3)
-
-            call make_two_blocks(scene, gap, lower, upper)
-            scene%x(2, 11:) = scene%x(2, 11:) + 0.01_wp*(scene%x(1, 11:) - scene%x(1, 11))
-            call begin(scene, [0.0_wp, 0.0_wp, 0.0_wp], march, motion, error)
-            if (allocated(error)) return
-            associate (holding => march%active%support, is_active => march%active%is_active)
-               expected = [gap, gap + 0.01_wp, 0.0_wp]
-               if (k == 2) then
-                  holding%has_pulled(2) = .true.
-                  expected(2:) = [0.0_wp, gap + 0.02_wp]
-               end if
-               call contact_support_complete(holding, march%system, scene, motion, is_active)
-               call check_near(error, holding%brought(1), expected(1), 64.0_wp*eps, 1.0_wp, "a gap")
-               call check_true(error, all(holding%brought <= expected .and. (holding%brought &
-                  > 0.0_wp .eqv. expected > 0.0_wp)), "and what is left of the next")
-               call check_true(error, all(is_active .eqv. expected > 0.0_wp), "the nearest two")
-               call check_true(error, allocated(holding%brought_text), "it is told")
-               call gaps_measure(march%system, motion)
-               call check_near(error, march%system%contact(1)%contact%state(1)%gap1, 0.0_wp, &
-                  64.0_wp*eps, 1.0_wp, "the first touches")
-               call check_true(error, .not. any(holding%is_loose), "all is held")
-               call contact_support_forget(holding)
-               call check_true(error, .not. any(holding%has_pulled) .and. &
-                  all(abs(holding%brought) <= 0.0_wp), "forgotten")
-            end associate
-            call march_free(march)
-         end block
-         if (allocated(error)) return
-      end do
+      call make_two_blocks(scene, gap, lower, upper)
+      scene%x(2, 11:) = scene%x(2, 11:) + 0.01_wp*(scene%x(1, 11:) - scene%x(1, 11))
+      call begin(scene, [0.0_wp, 0.0_wp, 0.0_wp], march, motion, error)
+      if (allocated(error)) return
+      associate (holding => march%active%support, is_active => march%active%is_active)
+         expected = [gap, gap + 0.01_wp, 0.0_wp]
+         call contact_support_complete(holding, march%system, scene, motion, is_active)
+         call check_near(error, holding%brought(1), expected(1), 64.0_wp*eps, 1.0_wp, "a gap")
+         call check_true(error, all(holding%brought <= expected .and. (holding%brought &
+            > 0.0_wp .eqv. expected > 0.0_wp)), "and what is left of the next")
+         call check_true(error, all(is_active .eqv. expected > 0.0_wp), "the nearest two")
+         call check_true(error, allocated(holding%brought_text), "it is told")
+         call gaps_measure(march%system, motion)
+         call check_near(error, march%system%contact(1)%contact%state(1)%gap1, 0.0_wp, &
+            64.0_wp*eps, 1.0_wp, "the first touches")
+         call check_true(error, .not. any(holding%is_loose), "all is held")
+         call contact_support_forget(holding)
+         call check_true(error, all(abs(holding%brought) <= 0.0_wp), "forgotten")
+      end associate
+      call march_free(march)
    end subroutine test_nearest
 
    !> Upwards nothing is in the way of a load.
