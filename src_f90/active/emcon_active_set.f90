@@ -3,24 +3,30 @@
 module emcon_active_set
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_select
    use emcon_contact, only : gap_state_t
-   use emcon_contact_support, only : contact_support_forget, contact_support_t
+   use emcon_contact_support, only : contact_support_complete, contact_support_forget, &
+      contact_support_t
    use emcon_near_laws, only : near_laws_are_none, near_laws_select, near_laws_t, near_laws_update
    use emcon_evaluation, only : evaluation_is_equilibrium
-   use emcon_friction, only : friction_begin, friction_init, friction_select, friction_t
+   use emcon_friction, only : friction_begin, friction_holds, friction_init, friction_select, &
+      friction_t
    use emcon_gaps, only : gaps_forget, pair_measure, pair_search
    use emcon_kinds, only : wp
    use emcon_motion, only : at_rest, motion_t
    use emcon_motion_bound, only : largest_motion, motion_bound_t, motion_bound_add
+   use emcon_overlap_query, only : overlap_names, overlap_t
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
    use emcon_penalty, only : penalty_owes, penalty_select, penalty_state_t
-   use emcon_state, only : state_t
+   use emcon_scene, only : scene_t
+   use emcon_state, only : contact_state_t, state_t
    use emcon_steps, only : step_is_dynamic, step_t
    use emcon_system, only : system_t
    implicit none
    private
    public :: active_set_t, active_set_init, active_set_suit, active_set_overclosure, &
       active_set_begin, active_set_restart, active_set_select, active_set_update_gaps
-   public :: active_set_pass, active_set_note_stale, active_set_brought
+   public :: active_set_pass, active_set_note_stale, active_set_brought, active_set_complete
+   public :: active_set_open_sets, active_set_repeats, active_set_take, active_set_is_empty, &
+      active_set_slides, active_set_could_hold, active_set_mark
    public :: candidates_t, candidates_clear, touch_tol
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
       step_stands_off, step_not_held, step_overlaps, step_unbalanced, step_rough, step_strikes, &
@@ -386,6 +392,95 @@ contains
       if (self%penalty%is_on .and. .not. self%penalty%augments) is_kept = .false.
       if (is_kept) target = gap%gap0
    end subroutine find_target
+
+   !> What acts at first is that of `contacts` which has a surface near.
+   pure subroutine active_set_take(self, system, contacts, is_near)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(contact_state_t), intent(in) :: contacts
+      logical, intent(in) :: is_near(:)          !! (n_constraint)
+
+      self%is_active = contacts%is_active .and. is_near
+      self%is_active(:system%first_constraint(1)) = system%acts
+      self%lam = contacts%lam
+      self%penalty%closure = contacts%closure
+      self%is_candidate = self%is_active
+   end subroutine active_set_take
+
+   !> The sets of a step begin with what acts now.
+   pure subroutine active_set_open_sets(self)
+      type(active_set_t), intent(inout) :: self
+
+      self%candidates%began(:) = self%is_active
+      self%candidates%is_new_set = .true.
+   end subroutine active_set_open_sets
+
+   !> Is the next set that of the last solve?
+   pure logical function active_set_repeats(self) result(repeats)
+      type(active_set_t), intent(in) :: self
+
+      repeats = all(self%is_active .eqv. self%candidates%acted)
+   end function active_set_repeats
+
+   !> Nothing acts, not even what always does.
+   pure logical function active_set_is_empty(self) result(is_empty_set)
+      type(active_set_t), intent(in) :: self
+
+      is_empty_set = .not. any(self%is_active)
+   end function active_set_is_empty
+
+   !> Close what holds the bodies that nothing else does, where statics need that.
+   subroutine active_set_complete(self, system, scene, motion)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(motion_t), intent(inout) :: motion    !! free of what is prescribed
+
+      if (self%friction%is_on) self%support%grips = friction_holds(self%friction)
+      call contact_support_complete(self%support, system, scene, motion, self%is_active)
+   end subroutine active_set_complete
+
+   !> Does some contact that acts slide?
+   pure logical function active_set_slides(self) result(slides)
+      type(active_set_t), intent(in) :: self
+
+      slides = self%friction%is_on
+      if (slides) slides = any(self%is_active .and. self%friction%law%mu > 0.0_wp &
+         .and. .not. friction_holds(self%friction))
+   end function active_set_slides
+
+   !> Could contacts hold the nodes of `overlap` that does not?
+   pure logical function active_set_could_hold(self, system, overlap) result(could_hold)
+      type(active_set_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      type(overlap_t), intent(in) :: overlap
+      integer :: pair
+
+      could_hold = .false.
+      do pair = 1, size(system%contact)
+         associate (contact => system%contact(pair)%contact, &
+               first => system%first_constraint(pair) + 1)
+            could_hold = could_hold .or. contact%could_hold( &
+               .not. self%is_active(first:first + contact%n_constraint - 1) &
+               .and. overlap_names(overlap, contact%node))
+         end associate
+      end do
+   end function active_set_could_hold
+
+   !> Mark the slave nodes of what acts, or did in `contacts`.
+   pure subroutine active_set_mark(self, system, contacts, is_marked)
+      type(active_set_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+      type(contact_state_t), intent(in) :: contacts
+      logical, intent(inout) :: is_marked(:)     !! (n_node)
+      integer :: id, pair, i
+
+      do id = system%first_constraint(1) + 1, system%n_constraint
+         if (.not. (self%is_active(id) .or. contacts%is_active(id))) cycle
+         call constraint_index(system, id, pair, i)
+         is_marked(system%contact(pair)%contact%node(i)) = .true.
+      end do
+   end subroutine active_set_mark
 
    !> The largest gap over which contact that acts was brought to hold a body; 0: none.
    pure real(wp) function active_set_brought(self) result(brought)

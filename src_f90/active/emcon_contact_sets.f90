@@ -6,7 +6,8 @@
 !> set; in statics trials of single contacts do. Contacts that give way are solved by sets alone.
 !> Source: docs/theory.md, section 6.1.
 module emcon_contact_sets
-   use emcon_active_set, only : active_set_t, step_cycling, step_done, step_loose, step_not_held
+   use emcon_active_set, only : active_set_complete, active_set_open_sets, active_set_repeats, &
+      active_set_t, step_cycling, step_done, step_loose, step_not_held
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_gives_back
    use emcon_contact_candidates, only : candidates_are_many, candidates_keep_forces, &
@@ -14,10 +15,9 @@ module emcon_contact_sets
    use emcon_contact_conditions, only : noise_at
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
       contact_problem_solve, contact_problem_status, contact_problem_t
-   use emcon_contact_support, only : contact_support_complete
    use emcon_coulomb_law, only : contact_open, slip_status_t
    use emcon_errors, only : error_t
-   use emcon_friction, only : friction_holds, friction_missed, friction_turn
+   use emcon_friction, only : friction_missed, friction_turn
    use emcon_gaps, only : pair_search
    use emcon_kept_factor, only : kept_factor_condense, kept_factor_has_room
    use emcon_kinds, only : wp
@@ -55,8 +55,7 @@ contains
 
       is_driven = .true.
       has_failed = .false.
-      self%candidates%began(:) = self%is_active
-      self%candidates%is_new_set = .true.
+      call active_set_open_sets(self)
       do i = 1, most_by_trials
          if (i > most_tried .and. self%rules%has_impacts &
             .and. .not. candidates_are_many(self)) return
@@ -65,7 +64,7 @@ contains
          status = step_not_held
          self%candidates%is_settled = allocated(self%support%text)
          if (self%candidates%is_settled) return
-         if (has_failed .and. all(self%is_active .eqv. self%candidates%acted)) then
+         if (has_failed .and. active_set_repeats(self)) then
             call begin_anew(self, newton, motion)
             return
          end if
@@ -143,8 +142,7 @@ contains
       integer :: pair
 
       motion%du = motion%du - driven
-      if (self%friction%is_on) self%support%grips = friction_holds(self%friction)
-      call contact_support_complete(self%support, system, scene, motion, self%is_active)
+      call active_set_complete(self, system, scene, motion)
       motion%du = motion%du + driven
       do pair = 1, size(system%contact)
          call pair_search(system, pair, motion)
@@ -160,7 +158,9 @@ contains
       goes_on = .false.
       do k = self%set%n_permanent + 1, self%set%n
          if (.not. self%set%lam(k) < 0.0_wp) cycle
-         self%is_active(self%set%id(k)) = .false.
+         associate (id => self%set%id(k))
+            self%is_active(id) = .false.
+         end associate
          goes_on = .true.
       end do
    end subroutine let_go_alone

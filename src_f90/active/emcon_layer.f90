@@ -27,7 +27,7 @@ module emcon_layer
    implicit none
    private
    public :: layer_t, layer_init, layer_renew, layer_begin_step, layer_mark, layer_settle, &
-      layer_count, layer_take_velocities, layer_free
+      layer_count, layer_find_acting, layer_take_velocities, layer_free
 
    !> Work below this part of what it is held against is round-off.
    real(wp), parameter :: rounding = 1.0e3_wp*epsilon(1.0_wp)
@@ -69,6 +69,16 @@ contains
       allocate(self%du, self%push, source=at_rest(scene%x))
       call active_set_init(self%active, self%system)
    end subroutine layer_init
+
+   !> What acts at the end of a solved step: what does in it, or in the balance of the layer.
+   pure subroutine layer_find_acting(self, active, acts)
+      type(layer_t), intent(in) :: self
+      type(active_set_t), intent(in) :: active   !! of the step
+      logical, intent(out) :: acts(:)            !! (n_constraint)
+
+      acts = active%is_active
+      if (self%is_settled) acts(self%n_before + 1:) = self%acts
+   end subroutine layer_find_acting
 
    !> How many of the marked nodes have no mass.
    pure integer function layer_count(self, is_meant)

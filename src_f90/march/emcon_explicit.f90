@@ -4,7 +4,7 @@
 !> them and by multipliers that hold its end, the way, and half a push by the forces at the end and
 !> by multipliers that hold velocities there. Source: docs/theory.md, section 14.
 module emcon_explicit
-   use emcon_active_set, only : active_set_select, step_done
+   use emcon_active_set, only : active_set_is_empty, active_set_select, step_done
    use emcon_contact_rounds, only : contact_rounds_stand
    use emcon_constraint, only : condition_rate
    use emcon_constraints, only : constraint_set_t, constraints_force
@@ -219,7 +219,7 @@ contains
          call system_respond(system, motion, .false., .false.)
          call pick_unknowns(system%space%numbering, system%response%residual, push)
          call add_to_dofs(system%space%numbering, push/self%explicit%mass, -0.5_wp*h*h, motion%du)
-         if (any(active%is_active)) return
+         if (.not. active_set_is_empty(active)) return
          call phase_enter(system%phases, phase_gaps, left)
          call active_set_select(active, system, motion)
          is_done = size(system%contact) == 0 .or. active%penalty%is_at_ends

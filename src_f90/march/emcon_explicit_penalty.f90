@@ -80,7 +80,7 @@ contains
                   associate (gap => contact%state(i))
                      if (.not. (gap%is_near .and. gap%is_over)) cycle
                      is_closed(id) = gap%gap1 < gap%closed &
-                        .and. (self%state%contacts%is_active(id) .or. gap%gap1 &
+                        .and. (self%state%contacts%status(id) > 0 .or. gap%gap1 &
                         - gap%closed > -contact%max_penetration_at_start*gap%size - margin)
                   end associate
                end do

@@ -4,6 +4,7 @@ module emcon_march_events
    use emcon_constraint, only : condition_rate
    use emcon_constraints, only : constraint_index
    use emcon_kinds, only : wp
+   use emcon_layer, only : layer_find_acting
    use emcon_march_types, only : increment_t, march_t, part_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : events_nodes, step_t
@@ -19,21 +20,12 @@ contains
       type(march_t), intent(inout) :: self       !! solved, not committed
       logical :: acts(size(self%active%start%was_active))
 
-      call find_acting(self, acts)
+      call layer_find_acting(self%layer, self%active, acts)
       associate (first => self%system%first_constraint)
          self%step_check%changes_contact = any(acts(first(1) + 1:first(self%system%n_pair + 1)) &
             .neqv. self%active%start%was_active(first(1) + 1:first(self%system%n_pair + 1)))
       end associate
    end subroutine events_look
-
-   !> What acts at the end of the solved step.
-   pure subroutine find_acting(self, acts)
-      type(march_t), intent(in) :: self
-      logical, intent(out) :: acts(:)            !! (n_constraint)
-
-      acts = self%active%is_active
-      if (self%layer%is_settled) acts(self%layer%n_before + 1:) = self%layer%acts
-   end subroutine find_acting
 
    !> A step longer than `window` in which an event lies is to be made shorter.
    subroutine events_judge(self, step, part, window, status)
@@ -45,7 +37,7 @@ contains
       logical, dimension(size(self%active%start%was_active)) :: acts, is_event
 
       if (.not. self%step_check%changes_contact .or. part%h <= window) return
-      call find_acting(self, acts)
+      call layer_find_acting(self%layer, self%active, acts)
       call find_events(self, step, self%active%start%was_active, acts, is_event)
       if (.not. any(is_event)) return
       status = step_passes_event
@@ -108,18 +100,18 @@ contains
       type(step_t), intent(in) :: step
       type(part_t), intent(in) :: part
       type(increment_t), intent(inout) :: increment
-      logical :: is_event(size(self%active%start%was_active))
+      logical, dimension(size(self%active%start%was_active)) :: is_event, acts
       character(len=:), allocatable :: what
       integer :: pair, i, id
 
-      call find_events(self, step, self%active%start%was_active, self%state%contacts%is_active, &
-         is_event)
+      acts = self%state%contacts%status([(id, id = 1, size(is_event))]) > 0
+      call find_events(self, step, self%active%start%was_active, acts, is_event)
       do pair = 1, self%system%n_pair
          do i = 1, self%system%contact(pair)%contact%n_constraint
             id = self%system%first_constraint(pair) + i
             if (.not. is_event(id)) cycle
             what = "ends"
-            if (self%state%contacts%is_active(id)) what = "begins"
+            if (acts(id)) what = "begins"
             self%state%control%n_event = self%state%control%n_event + 1
             call note_add(increment%notes, "event: contact " // what // " in pair " // &
                to_text(pair) // " at slave node " // &

@@ -1,11 +1,10 @@
 !> One increment in one step, or in dyadic parts of it where a step fails.
 module emcon_march_parts
-   use emcon_active_set, only : step_cycling, step_diverged, step_done, step_not_held, &
-      step_loose, step_overlaps, step_passes_event, step_refused, step_rough, step_singular, &
-      step_stands_off, step_strikes, step_too_far, step_unbalanced
+   use emcon_active_set, only : active_set_slides, step_cycling, step_diverged, step_done, &
+      step_not_held, step_loose, step_overlaps, step_passes_event, step_refused, step_rough, &
+      step_singular, step_stands_off, step_strikes, step_too_far, step_unbalanced
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_evaluation, only : evaluation_has_inertia
-   use emcon_friction, only : friction_holds
    use emcon_kinds, only : wp
    use emcon_locking, only : strainless_element
    use emcon_march_begin, only : march_renumber
@@ -95,18 +94,19 @@ contains
       type(part_t), intent(in) :: part
       logical, intent(in) :: is_cut              !! it is a part, or to be cut into some
       type(parts_t), intent(inout) :: parts
+      logical :: acts(self%system%n_constraint)
+      integer :: id
 
       parts%n = parts%n + 1
       if (.not. is_cut) return
       if (parts%n == 1 .or. part%h < parts%h_least) parts%h_least = part%h
-      associate (is_active => self%state%contacts%is_active)
-         if (.not. allocated(parts%changes)) then
-            parts%was_active = is_active
-            allocate(parts%changes(size(is_active)), source=.false.)
-         end if
-         parts%changes = parts%changes .or. (parts%was_active .neqv. is_active)
-         parts%was_active = is_active
-      end associate
+      acts = self%state%contacts%status([(id, id = 1, size(acts))]) > 0
+      if (.not. allocated(parts%changes)) then
+         parts%was_active = acts
+         allocate(parts%changes(size(acts)), source=.false.)
+      end if
+      parts%changes = parts%changes .or. (parts%was_active .neqv. acts)
+      parts%was_active = acts
       if (associated(self%watcher)) call self%watcher%tell(self%state%clock%increment + 1, &
          part%start%total_time, parts%n, parts%h_least)
    end subroutine count_part
@@ -238,15 +238,6 @@ contains
          (self%active%n_newton == 0 .or. .not. self%active%support%is_pushed)
    end function is_hopeless
 
-   !> Does some contact of the step that failed slide?
-   pure logical function slides(self)
-      type(march_t), intent(in) :: self
-
-      slides = self%active%friction%is_on
-      if (slides) slides = any(self%active%is_active .and. self%active%friction%law%mu > 0.0_wp &
-         .and. .not. friction_holds(self%active%friction))
-   end function slides
-
    !> A singular system; elements with few points keep motions without strain that neighbours on
    !> two sides would stop.
    pure subroutine singular_text(solid, scene, text)
@@ -295,7 +286,7 @@ contains
       case (step_not_held)
          text = "nothing holds what moves without resistance: " // self%active%support%text
          if (.not. self%active%support%is_pushed) text = text // ", on which no load does work"
-         if (slides(self)) text = text // ", where friction is at its limit"
+         if (active_set_slides(self%active)) text = text // ", where friction is at its limit"
          text = text // "; add *BOUNDARY conditions"
          if (.not. self%active%support%is_pushed) text = text // &
             ", or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"
@@ -380,7 +371,8 @@ contains
          if (len(motion) > 0) then
             call holders_text(self%system, size(scene%x, 2), holders)
             text = text // "; without " // holders // " " // motion
-            if (slides(self)) text = text // "; friction is at its limit at contacts that slide"
+            if (active_set_slides(self%active)) text = text // &
+               "; friction is at its limit at contacts that slide"
          end if
       end if
       if (evaluation_has_inertia(self%motion%evaluation) &

@@ -1,7 +1,7 @@
 !> One step in time: first guess, solution, the judge's look at it, and what follows from it.
 module emcon_march_step
-   use emcon_active_set, only : active_set_begin, step_diverged, step_done, step_overlaps, &
-      step_refused, step_singular, step_unbalanced
+   use emcon_active_set, only : active_set_begin, active_set_could_hold, step_diverged, &
+      step_done, step_overlaps, step_refused, step_singular, step_unbalanced
    use emcon_active_set_solve, only : active_set_solve
    use emcon_amplitudes, only : find_amplitude_value
    use emcon_blocked_contact, only : blocked_contact_text
@@ -13,7 +13,6 @@ module emcon_march_step
    use emcon_factor_policy, only : factor_policy_forget, factor_policy_step
    use emcon_kept_factor, only : kept_factor_renew
    use emcon_kinds, only : wp
-   use emcon_overlap_query, only : overlap_names
    use emcon_march_accuracy, only : accuracy_judge
    use emcon_march_commit, only : march_commit
    use emcon_march_events, only : events_judge, events_look
@@ -294,18 +293,10 @@ contains
       type(scene_t), intent(in) :: scene
       type(overlap_t), intent(in) :: overlap
       type(overlap_t) :: before
-      integer :: pair
 
       goes_in = .false.
       if (overlap%depth <= deepest_new .or. self%active%penalty%is_on) return
-      do pair = 1, size(self%system%contact)
-         associate (contact => self%system%contact(pair)%contact, &
-               is_active => self%active%is_active(self%system%first_constraint(pair) + 1:))
-            goes_in = goes_in .or. contact%could_hold( &
-               .not. is_active(:contact%n_constraint) .and. overlap_names(overlap, contact%node))
-         end associate
-      end do
-      if (.not. goes_in) return
+      if (.not. active_set_could_hold(self%active, self%system, overlap)) return
       call overlap_check_step(self%overlap_check, scene%x, self%state%u, at_rest(self%motion%du), &
          before)
       goes_in = overlap%depth > before%depth + 0.1_wp*deepest_new

@@ -6,7 +6,7 @@
 !> back is inertia relative to what has mass around the node, so that momenta and kinetic energy
 !> stay where it moves with that. Source: docs/theory.md, section 6.4.
 module emcon_mass_return
-   use emcon_constraints, only : constraint_index
+   use emcon_active_set, only : active_set_mark
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_layer, only : layer_renew
@@ -59,7 +59,8 @@ contains
          if (maxval(left) > 0.0_wp .and. maxval(left) <= huge(left)) then
             needs_mass(maxloc(left, 1)) = .true.
          else
-            call mark_active(self, needs_mass)
+            call active_set_mark(self%active, self%system, self%state%contacts, needs_mass)
+            if (.not. any(needs_mass .and. self%layer%is_massless)) needs_mass = .true.
          end if
       end if
       call mark_elements(scene, self%layer%is_massless .and. needs_mass, needs_mass)
@@ -86,20 +87,6 @@ contains
 
       may_return = self%layer%is_massless .and. .not. self%massless%without_density
    end function mass_may_return
-
-   !> The slave nodes of contacts that act, if one of them is massless; else all nodes.
-   subroutine mark_active(self, is_marked)
-      type(march_t), intent(in) :: self
-      logical, intent(inout) :: is_marked(:)
-      integer :: id, pair, i
-
-      do id = self%system%first_constraint(1) + 1, self%system%n_constraint
-         if (.not. (self%active%is_active(id) .or. self%state%contacts%is_active(id))) cycle
-         call constraint_index(self%system, id, pair, i)
-         is_marked(self%system%contact(pair)%contact%node(i)) = .true.
-      end do
-      if (.not. any(is_marked .and. self%layer%is_massless)) is_marked = .true.
-   end subroutine mark_active
 
    !> The nodes of all elements on nodes `of`.
    pure subroutine mark_elements(scene, of, is_marked)

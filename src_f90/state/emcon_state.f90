@@ -43,6 +43,7 @@ module emcon_state
       procedure :: clear => contacts_clear
       procedure :: keep => contacts_keep
       procedure :: get => contacts_get
+      procedure :: take => contacts_take
       procedure :: n_acting => contacts_n_acting
       procedure :: stray => contacts_stray
       procedure :: status => contacts_status
@@ -126,6 +127,16 @@ contains
       lam = self%lam(first:)
       acts = self%is_active(first:)
    end subroutine contacts_get
+
+   !> What acts, with which multipliers, in place of what did, as far as given.
+   pure subroutine contacts_take(self, lam, acts)
+      class(contact_state_t), intent(inout) :: self
+      real(wp), intent(in), optional :: lam(:)   !! (n_constraint) [M L/T^2]
+      logical, intent(in), optional :: acts(:)   !! (n_constraint)
+
+      if (present(acts)) self%is_active = acts
+      if (present(lam)) self%lam = lam
+   end subroutine contacts_take
 
    !> How many of the constraints `first` to `last` act.
    pure integer function contacts_n_acting(self, first, last) result(n)

@@ -13,7 +13,8 @@ module emcon_host_set
    use emcon_system, only : system_t
    implicit none
    private
-   public :: host_set_t, host_set_begin, host_set_try, host_set_advance, host_set_drop
+   public :: host_set_t, host_set_begin, host_set_choose, host_set_try, host_set_advance, &
+      host_set_drop, host_set_next
 
    !> Sets of one step at most.
    integer, parameter :: most_sets = 40
@@ -33,6 +34,24 @@ contains
 
       allocate(self%tried(n, most_sets), source=.false.)
    end subroutine host_set_begin
+
+   !> The set that the host is to solve with.
+   pure function host_set_next(active) result(acts)
+      type(active_set_t), intent(in) :: active
+      logical :: acts(size(active%is_active))    !! (n_constraint)
+
+      acts = active%is_active
+   end function host_set_next
+
+   !> The host solves with a set of its choice.
+   pure subroutine host_set_choose(self, active, acts)
+      type(host_set_t), intent(inout) :: self
+      type(active_set_t), intent(inout) :: active
+      logical, intent(in) :: acts(:)             !! (n_constraint)
+
+      active%is_active = acts
+      call host_set_try(self, active)
+   end subroutine host_set_choose
 
    !> The host solves with what acts.
    pure subroutine host_set_try(self, active)

@@ -17,7 +17,8 @@ module emcon_stepper_contact
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
    use emcon_contact_support, only : contact_support_t
-   use emcon_host_set, only : host_set_advance, host_set_begin, host_set_drop, host_set_try
+   use emcon_host_set, only : host_set_advance, host_set_begin, host_set_choose, &
+      host_set_drop, host_set_next
    use emcon_overlap_check, only : overlap_check_step, overlap_t
    use emcon_kinds, only : wp
    use emcon_evaluation, only : evaluation_at_end, evaluation_t
@@ -59,14 +60,13 @@ contains
       associate (march => self%march)
          call gaps_forget(march%system)
          march%state%u = u0
-         march%state%contacts%is_active = was_active
-         march%state%contacts%lam = 0.0_wp
+         call march%state%contacts%take(spread(0.0_wp, 1, size(was_active)), was_active)
          march%active%rules%puts_off = .false.
          march%active%support = contact_support_t()
          call constraints_select(march%active%set, [integer ::])
          call active_set_begin(march%active, march%system, march%motion, march%state)
          call host_set_begin(self%host_set, march%system%n_constraint)
-         active = march%active%is_active
+         active = host_set_next(march%active)
       end associate
    end subroutine query_begin_contact
 
@@ -124,8 +124,7 @@ contains
       call check_flags(self, "active", active, error)
       call check_near(self, stepper, pack([(i, i = 1, size(active))], active), error)
       if (allocated(error)) return
-      self%march%active%is_active = active
-      call host_set_try(self%host_set, self%march%active)
+      call host_set_choose(self%host_set, self%march%active, active)
       call active_set_select(self%march%active, self%march%system, self%march%motion)
       self%has_set = self%march%active%set%n == 0
       self%has_null_space = .false.
@@ -218,8 +217,8 @@ contains
       call check_flags(self, "active", active, error)
       if (present(magnitude)) call check_field("magnitude", magnitude, stepper%scene, error)
       if (.not. allocated(error)) call check_that(count(active) == size(lam) .and. &
-         all(active .eqv. self%march%active%is_active), "active is not the set that was selected", &
-         error)
+         all(active .eqv. host_set_next(self%march%active)), &
+         "active is not the set that was selected", error)
       if (allocated(error)) return
       associate (march => self%march, own => self%march%active)
          own%set%lam = lam
@@ -232,7 +231,7 @@ contains
          end if
          march%state%u = march%motion%u0
          call host_set_advance(self%host_set, own, march%system, march%motion, is_done, outcome)
-         active = own%is_active
+         active = host_set_next(own)
       end associate
    end subroutine query_update_active
 
@@ -250,7 +249,7 @@ contains
       end do
       if (allocated(error)) return
       call host_set_drop(self%host_set, self%march%active, redundant)
-      active = self%march%active%is_active
+      active = host_set_next(self%march%active)
    end subroutine query_drop
 
    !> Area of each possible contact over the step that ended at `u1`, whose constraints were

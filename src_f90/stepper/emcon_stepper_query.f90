@@ -6,7 +6,7 @@
 !> its changes. Unknowns are those of the present step of the deck, `query_unknowns` numbers them.
 module emcon_stepper_query
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
-   use emcon_active_set, only : active_set_select
+   use emcon_active_set, only : active_set_select, active_set_take
    use emcon_constraint_rows, only : constraints_add_curvature, constraints_merge_pattern, &
       constraints_rows
    use emcon_constraints, only : constraints_evaluate, constraints_force
@@ -200,8 +200,7 @@ contains
          if (present(is_active)) call check_size("the active set", size(is_active), &
             size(state%contacts%lam), error)
          if (allocated(error)) return
-         if (present(is_active)) state%contacts%is_active = is_active
-         if (present(lam)) state%contacts%lam = lam
+         call state%contacts%take(lam, is_active)
       end associate
    end subroutine take_contact
 
@@ -241,11 +240,7 @@ contains
       associate (system => self%march%system, active => self%march%active, &
             state => self%march%state)
          call gaps_search(system, self%march%motion, gap)
-         active%is_active = state%contacts%is_active .and. gap%is_near
-         active%is_active(:system%first_constraint(1)) = system%acts
-         active%lam = state%contacts%lam
-         active%penalty%closure = state%contacts%closure
-         active%is_candidate = active%is_active
+         call active_set_take(active, system, state%contacts, gap%is_near)
       end associate
    end subroutine begin_contact
 
