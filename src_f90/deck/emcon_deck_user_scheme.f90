@@ -49,7 +49,7 @@ contains
       reader%log%file_name = scene%deck%file
       call check_schemes(reader, scene%pair, scene%step)
       call check_damping(reader, scene)
-      call check_friction(reader, scene%pair, scene%step, scene%surface%is_nodal)
+      call check_friction(reader, scene)
       call check_contact_damping(reader, scene%pair, scene%step)
       call check_massless_sections(reader, scene)
       if (scene%n_dim /= n_plane .or. scene%is_axial) call check_dimension(reader, scene)
