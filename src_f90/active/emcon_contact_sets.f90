@@ -15,9 +15,10 @@ module emcon_contact_sets
    use emcon_contact_conditions, only : noise_at
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
       contact_problem_solve, contact_problem_status, contact_problem_t
+   use emcon_contact_support, only : contact_support_find_jam
    use emcon_coulomb_law, only : contact_open, slip_status_t
    use emcon_errors, only : error_t
-   use emcon_friction, only : friction_missed, friction_turn
+   use emcon_friction, only : friction_holds, friction_missed, friction_turn, friction_use
    use emcon_gaps, only : pair_search
    use emcon_kept_factor, only : kept_factor_condense, kept_factor_has_room
    use emcon_kinds, only : wp
@@ -35,6 +36,8 @@ module emcon_contact_sets
    integer, parameter :: most_tried = 6, most_by_trials = 20
    !> By so much of the largest push friction may miss its law: what a solve leaves.
    real(wp), parameter :: least_missed = 1.0e4_wp*epsilon(1.0_wp)
+   !> Contacts that jam slide alone if others use less than this part of what they do.
+   real(wp), parameter :: alike = 0.5_wp
    !> Rounds with contacts that give way at most.
    integer, parameter :: most_rounds = 100
 
@@ -51,6 +54,7 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       logical :: goes_on, has_failed, is_early, is_driven, obeys
+      logical, allocatable :: gripped(:)
       integer :: i
 
       is_driven = .true.
@@ -59,8 +63,7 @@ contains
       do i = 1, most_by_trials
          if (i > most_tried .and. self%rules%has_impacts &
             .and. .not. candidates_are_many(self)) return
-         if (self%support%is_needed) call contact_sets_hold(self, system, scene, newton%driven, &
-            motion)
+         if (self%support%is_needed) call hold_on(self, system, scene, newton, motion, gripped)
          status = step_not_held
          self%candidates%is_settled = allocated(self%support%text)
          if (self%candidates%is_settled) return
@@ -101,6 +104,52 @@ contains
          if (.not. (self%candidates%is_new_set .or. is_early .or. self%is_stale)) return
       end do
    end subroutine contact_sets_solve
+
+   !> Take in what holds bodies, with friction that has gripped in the set before, if there was one.
+   subroutine hold_on(self, system, scene, newton, motion, gripped)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(newton_t), intent(in) :: newton
+      type(motion_t), intent(inout) :: motion
+      logical, allocatable, intent(inout) :: gripped(:)  !! (n_constraint) out: in the next one
+
+      if (allocated(gripped)) call keep_hold(self, system, scene, motion, gripped)
+      call contact_sets_hold(self, system, scene, newton%driven, motion)
+      if (self%friction%is_on) gripped = friction_holds(self%friction)
+   end subroutine hold_on
+
+   !> Contacts that jam, as they hold along the surface in turn, would all slide by their trials:
+   !> where that leaves a body to its load only those do that miss their law the most.
+   subroutine keep_hold(self, system, scene, motion, gripped)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(motion_t), intent(in) :: motion
+      logical, intent(in) :: gripped(:)          !! (n_constraint) before their trials
+      real(wp) :: use(self%set%n), friction(self%friction%n_slip, size(gripped))
+      logical :: turned(self%set%n), jams
+      integer :: k
+
+      self%support%grips = friction_holds(self%friction)
+      turned = .false.
+      use = 0.0_wp
+      friction = 0.0_wp
+      do k = self%set%n_permanent + 1, self%set%n
+         associate (id => self%set%id(k))
+            turned(k) = self%is_active(id) .and. gripped(id) .and. .not. self%support%grips(id)
+            if (turned(k)) call friction_use(self%friction, self%set, k, friction(:, id), use(k))
+         end associate
+      end do
+      if (count(turned) < 2) return
+      call contact_support_find_jam(self%support, system, scene, motion, self%is_active, friction, &
+         jams)
+      if (.not. jams) return
+      do k = self%set%n_permanent + 1, self%set%n
+         if (turned(k) .and. use(k) < alike*maxval(use)) &
+            self%friction%law(self%set%id(k))%status = slip_status_t()
+      end do
+   end subroutine keep_hold
 
    !> Newton's method has failed for a set: with `goes_on` what pulls in its last iterate goes, if
    !> some does, and the motion is that before; else no set stands.

@@ -11,7 +11,8 @@ module emcon_contact_support
    use emcon_first_touch_plane, only : touch_time
    use emcon_free_motions, only : find_assemblies, find_free_motions
    use emcon_contact_support_gaps, only : gaps_evaluate, gaps_keep_closed, gaps_measure, &
-      gaps_nearest, gaps_next_to_close, gaps_that_can_act, gaps_that_leave, in_the_way
+      gaps_nearest, gaps_next_guards, gaps_next_to_close, gaps_of_guards, gaps_that_can_act, &
+      gaps_that_leave, in_the_way
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_numbering, only : add_to_dofs
@@ -24,7 +25,7 @@ module emcon_contact_support
    implicit none
    private
    public :: contact_support_t, contact_support_begin, contact_support_forget, &
-      contact_support_complete, contact_support_find_free
+      contact_support_complete, contact_support_find_jam, contact_support_find_free
 
    !> Bodies turn by less than this at once, in radians: then gaps are measured anew.
    real(wp), parameter :: largest_turn = 0.1_wp
@@ -175,6 +176,42 @@ contains
       is_held = k == 0 .or. (self%stabilizes .and. .not. self%is_pushed)
    end subroutine contact_support_find_free
 
+   !> Does friction that has let go drive a body that is left to its load? Then it jams: a body that
+   !> slides is braked by all of it.
+   subroutine contact_support_find_jam(self, system, scene, motion, is_active, friction, jams)
+      type(contact_support_t), intent(inout) :: self     !! with the grips that are left
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(motion_t), intent(in) :: motion                       !! placed
+      logical, intent(in) :: is_active(:)                        !! (n_constraint)
+      real(wp), intent(in) :: friction(:, :)     !! (n_slip, n_constraint) of what let go, else 0
+      logical, intent(out) :: jams               !! some of it drives
+      type(overlap_query_t) :: look
+      type(free_t), allocatable :: free(:)
+      type(constraint_set_t) :: set
+      real(wp) :: direction(size(motion%du, 1), size(motion%du, 2)), rate(size(friction, 1))
+      logical :: has_let_go(size(is_active))
+      integer :: i, k, s
+
+      has_let_go = any(abs(friction) > 0.0_wp, 1)
+      call look_at_contacts(self, system, scene, motion, is_active, look)
+      call find_free(look, free)
+      call gaps_evaluate(system, motion, has_let_go, set, has_let_go)
+      jams = .false.
+      do i = 1, size(free)
+         call find_load(self, system, motion, look%bodies, free(i))
+         if (.not. norm2(free(i)%along) > 0.0_dp) cycle
+         call mechanism_field(look%bodies, free(i)%member, &
+            matmul(free(i)%z, free(i)%along/norm2(free(i)%along)), direction)
+         do k = 1, set%n
+            rate = [(condition_rate(set%item(k), direction, s), s = 1, size(rate))]
+            associate (push => friction(:, set%id(k)))
+               jams = jams .or. dot_product(push, rate) > in_the_way*norm2(push)*norm2(rate)
+            end associate
+         end do
+      end do
+   end subroutine contact_support_find_jam
+
    !> The bodies of an assembly that move, and how.
    subroutine tell(bodies, system, scene, free, text)
       type(mechanisms_t), intent(in) :: bodies
@@ -260,8 +297,17 @@ contains
       share = free%along/norm2(free%along)
       rigid = matmul(free%z, share)
       call mechanism_field(bodies, free%member, rigid, direction)
-      call gaps_evaluate(system, motion, gaps_that_can_act(system) .and. .not. is_active, set)
-      call gaps_next_to_close(set, direction, time, is_next)
+      associate (may => gaps_that_can_act(system) .and. .not. is_active)
+         call gaps_evaluate(system, motion, may .and. .not. gaps_of_guards(system), set)
+         call gaps_next_to_close(set, direction, time, is_next)
+         turn = turn_of(bodies, free, rigid)
+         if (.not. any(is_next) .and. turn*maxval(bodies%size(free%member)) &
+            > in_the_way*maxval(abs(direction))) then
+            ! Nothing that pairs hold is in the way, and a body tips.
+            call gaps_evaluate(system, motion, may .and. gaps_of_guards(system), set)
+            call gaps_next_guards(set, direction, time, is_next)
+         end if
+      end associate
       self%is_pushed = .not. any(is_next)
       if (self%is_pushed) then
          time = touch_time(scene, bodies%x, direction)
@@ -270,7 +316,6 @@ contains
          if (time*maxval(abs(direction)) <= in_the_way*maxval(bodies%size(free%member))) return
       end if
       self%is_pushed = .false.
-      turn = turn_of(bodies, free, rigid)
       if (time*turn > largest_turn) then
          time = largest_turn/turn
          is_next = .false.
@@ -292,7 +337,8 @@ contains
       type(constraint_set_t) :: set
       logical :: is_next(size(is_active))
 
-      call gaps_evaluate(system, motion, gaps_that_can_act(system) .and. .not. is_active, set)
+      call gaps_evaluate(system, motion, gaps_that_can_act(system) &
+         .and. .not. (is_active .or. gaps_of_guards(system)), set)
       call gaps_nearest(set, bodies, free%member, free%z, is_next)
       if (free%is_loaded) call gaps_keep_closed(set, is_next)
       if (.not. any(is_next)) return

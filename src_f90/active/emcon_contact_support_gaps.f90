@@ -10,8 +10,8 @@ module emcon_contact_support_gaps
    use emcon_system, only : system_t
    implicit none
    private
-   public :: gaps_measure, gaps_evaluate, gaps_that_can_act, gaps_that_leave, gaps_next_to_close, &
-      gaps_nearest, gaps_keep_closed
+   public :: gaps_measure, gaps_evaluate, gaps_of_guards, gaps_that_can_act, gaps_that_leave, &
+      gaps_next_to_close, gaps_next_guards, gaps_nearest, gaps_keep_closed
    public :: in_the_way
 
    !> Contacts that close at the same time, by this fraction of an edge, are taken in together.
@@ -48,7 +48,9 @@ contains
       do k = 1, set%n
          id = set%id(k)
          call constraint_index(system, id, pair, i)
-         set%target(k) = system%contact(pair)%contact%state(i)%gap1
+         associate (gap => system%contact(pair)%contact%state(i))
+            set%target(k) = gap%gap1 - gap%closed
+         end associate
          if (present(grips)) set%item(k)%has_friction = grips(id)
       end do
       call constraints_evaluate(set, system, motion)
@@ -65,14 +67,26 @@ contains
          associate (contact => system%contact(pair)%contact, &
                first => system%first_constraint(pair) + 1, &
                last => system%first_constraint(pair + 1))
-            if (contact%slack > 0.0_wp) cycle
             is_meant(first:last) = contact%state%is_near .and. contact%state%is_over &
                .and. .not. contact%state%is_leaving
-            is_meant(first:last) = is_meant(first:last) .and. &
-               contact%state%gap1 > -contact%max_penetration_at_start*contact%state%size
+            is_meant(first:last) = is_meant(first:last) .and. contact%state%gap1 &
+               > contact%state%closed - contact%max_penetration_at_start*contact%state%size
          end associate
       end do
    end function gaps_that_can_act
+
+   !> Contacts that are guards.
+   pure function gaps_of_guards(system) result(is_guard)
+      type(system_t), intent(in) :: system
+      logical :: is_guard(system%n_constraint)
+      integer :: pair
+
+      is_guard = .false.
+      do pair = 1, size(system%contact)
+         is_guard(system%first_constraint(pair) + 1:system%first_constraint(pair + 1)) = &
+            system%contact(pair)%contact%slack > 0.0_wp
+      end do
+   end function gaps_of_guards
 
    !> Contacts that have lost their surface at the end of the motion that was measured.
    pure function gaps_that_leave(system) result(is_leaving)
@@ -113,6 +127,22 @@ contains
             gap(k) - time*rate(k) <= together*set%item(k)%size
       end do
    end subroutine gaps_next_to_close
+
+   !> Guards that close first on a way, within an edge of their nodes: what slides along a surface
+   !> they do not hold.
+   pure subroutine gaps_next_guards(set, direction, time, is_next)
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in) :: direction(:, :)    !! (n_dim, n_node) per time
+      real(wp), intent(out) :: time              !! as `gaps_next_to_close` has it
+      logical, intent(out) :: is_next(:)         !! (n_constraint)
+      integer :: k
+
+      call gaps_next_to_close(set, direction, time, is_next)
+      do k = 1, set%n
+         if (time*maxval(abs(direction)) > set%item(k)%size) is_next(set%id(k)) = .false.
+      end do
+      if (.not. any(is_next)) time = huge(time)
+   end subroutine gaps_next_guards
 
    !> Of the contacts `set` those with the smallest gap that prevent a motion that is left.
    pure subroutine gaps_nearest(set, bodies, member, z, is_next)

@@ -3,7 +3,7 @@
 !> What closes begins in the way that its slip tells, by the trial of emcon_coulomb_law; how it goes
 !> on is found in emcon_contact_newton. Source: docs/theory.md, section 4.13.
 module emcon_friction
-   use emcon_constraint, only : condition_friction, condition_normal, condition_t
+   use emcon_constraint, only : condition_friction, condition_normal, condition_t, most_slips
    use emcon_constraints, only : constraint_set_t, constraints_stick
    use emcon_contact, only : contact_t
    use emcon_contact_law, only : contact_laws_add
@@ -17,7 +17,8 @@ module emcon_friction
    implicit none
    private
    public :: friction_t, friction_init, friction_begin, friction_select, friction_keep, &
-      friction_close, friction_turn, friction_missed, friction_holds, friction_stiffness
+      friction_close, friction_turn, friction_use, friction_missed, friction_holds, &
+      friction_stiffness
 
    !> So much of the friction of a contact may act on another node than its push, and a step is
    !> solved again so often at most for more.
@@ -220,6 +221,21 @@ contains
          law%status = next
       end associate
    end subroutine friction_turn
+
+   !> Friction of a contact of a set, and how much it is over what its push allows.
+   pure subroutine friction_use(self, set, k, tau, use)
+      type(friction_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set
+      integer, intent(in) :: k                   !! > n_permanent
+      real(wp), intent(out) :: tau(:)            !! (n_slip) [M L/T^2]
+      real(wp), intent(out) :: use               !! above 1: it slides
+      real(wp) :: all(most_slips), most
+
+      all = condition_friction(set%item(k), set%lam(k))
+      tau = all(:size(tau))
+      most = self%law(set%id(k))%mu*max(set%item(k)%normal*set%lam(k), 0.0_wp)
+      use = norm2(tau)/max(most, epsilon(most)*norm2(tau), tiny(most))
+   end subroutine friction_use
 
    !> How far the laws of contact and friction are missed at worst, and the largest push.
    pure subroutine friction_missed(self, system, set, missed, largest)

@@ -20,6 +20,7 @@ module emcon_nts
    use emcon_nts_gap_value, only : nts_gap_value
    use emcon_nts_stencil, only : most_nodes, polygon_slip, stencil_gather, stencil_length
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
+   use emcon_roll_plane, only : roll_over
    use emcon_scene, only : scene_t
    use emcon_slip_point, only : slip_list_t, slip_over
    implicit none
@@ -407,6 +408,7 @@ contains
       if (self%other(i) > 0) n = size(self%polygon, 1)
       do k = 1, n
          slip = slip + slip_over(polygon_slip(self%polygon(k, i), 1.0_wp/n), x, u0, du)
+         if (self%arm(i) > 0) slip = slip + roll_over(self%polygon(k, i), 1.0_wp/n, x, u0, du)
       end do
    end function nts_slip
 

@@ -15,6 +15,7 @@ module emcon_nts_choice
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
    use emcon_nts_stencil, only : edge_distance, edge_of_sector, is_outside, polygon_stencil, &
       polygon_stencil_t, smooth_stencil, smooth_stencil_t
+   use emcon_rigid_bodies, only : rigid_far_node
    use emcon_scene, only : scene_t
    use emcon_seams_plane, only : chain_join
    use emcon_self_contact_plane, only : self_contact_is_apart
@@ -49,6 +50,8 @@ module emcon_nts_choice
       integer, allocatable :: other(:)                !! (n_constraint) the other one where the
                                                       !! node stands over two; 0: none
       type(polygon_stencil_t), allocatable :: polygon(:, :)   !! (2, n_constraint) over these
+      integer, allocatable :: arm(:)                  !! (n_constraint) another node of the rigid
+                                                      !! body of a node with a pad; 0: none
       logical, allocatable :: is_corner(:)            !! (n_edge) the smoothed master has one at its
                                                       !! first node
       type(smooth_stencil_t), allocatable :: smooth(:)   !! (n_constraint) only if smoothed
@@ -91,6 +94,10 @@ contains
       allocate(self%edge(self%n_constraint), self%other(self%n_constraint), source=0)
       allocate(self%polygon(2, self%n_constraint))
       self%offset = pair%interaction%offset
+      self%arm = [(0, i = 1, self%n_constraint)]
+      if (self%offset > 0.0_wp .and. self%slave%n_facet == 0) then
+         self%arm = [(rigid_far_node(scene%rigid, self%node(i), scene%x), i = 1, self%n_constraint)]
+      end if
       self%both_sides = pair%both_sides
       if (self%both_sides) self%area_factor = 0.5_wp
       self%own_size = [(chain_shortest(self%slave, self%chain_node(i)), i = 1, self%n_constraint)]
@@ -267,6 +274,8 @@ contains
          call corner_tops(self%slave, self%chain_node(i), self%master, middle, x, u0, stencil)
       end if
       stencil%goes_around = self%offset > 0.0_wp
+      stencil%arm = self%arm(i)
+      stencil%radius = self%offset
       associate (n => stencil%n, before => stencil%before, after => stencil%after)
          if (after > 0) then
             if (.not. bears(self, i, self%master%neighbour(next, middle), x, u0)) then

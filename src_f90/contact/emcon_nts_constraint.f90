@@ -17,8 +17,10 @@ module emcon_nts_constraint
    use emcon_kinds, only : wp
    use emcon_nts_gap, only : nts_gap
    use emcon_nts_gap_first, only : nts_gap_first => nts_gap
+   use emcon_nts_gap_value, only : slave
    use emcon_nts_stencil, only : most_nodes, polygon_slip, polygon_stencil_t, smooth_stencil_t, &
       stencil_gather, stencil_length
+   use emcon_roll_plane, only : roll_add
    use emcon_slip_point, only : slip_add
    implicit none
    private
@@ -35,13 +37,17 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (2, n_node)
       real(wp), intent(in) :: target             !! gap to hold [L]
       type(condition_t), intent(inout) :: item
-      integer :: n, i, list(sum(stencil%n))
+      integer :: n, i, list(sum(stencil%n) + 1)
 
       n = 0
+      if (item%has_friction .and. stencil(1)%arm > 0) then
+         call nodes_append([stencil(1)%node(slave), stencil(1)%arm], list, n)
+      end if
       do i = 1, size(stencil)
          call nodes_append(stencil(i)%node(:stencil(i)%n), list, n)
       end do
-      call begin_constraint(item, x, list(:n))
+      call begin_constraint(item, x, list(:n), stencil(1)%node)
+      if (item%has_friction .and. stencil(1)%arm > 0) item%n_slave = 2
       item%gap0 = -target
       item%gap1 = -target
       item%dgap = 0.0_wp
@@ -51,8 +57,9 @@ contains
       if (item%has_friction) call condition_resize_slip(item)
       do i = 1, size(stencil)
          call add_polygon(stencil(i), 1.0_wp/size(stencil), x, u0, du, item)
-         if (item%has_friction) call slip_add(polygon_slip(stencil(i), 1.0_wp/size(stencil)), &
-            x, u0, du, item)
+         if (.not. item%has_friction) cycle
+         call slip_add(polygon_slip(stencil(i), 1.0_wp/size(stencil)), x, u0, du, item)
+         if (stencil(i)%arm > 0) call roll_add(stencil(i), 1.0_wp/size(stencil), x, u0, du, item)
       end do
    end subroutine polygon_constraint
 
@@ -122,13 +129,13 @@ contains
          if (item%leaves_second) then
             call hermite_gap_first(curve, local(:, :n), dlocal(:, :n), place, first, is_found)
             if (.not. is_found) return
-            call begin_constraint(item, x, smooth%node(:n))
+            call begin_constraint(item, x, smooth%node(:n), smooth%node)
             call take_gap(change_t(first%f0 - target, first%f1 - target, first%df), first%g, &
                first%c, item)
          else
             call hermite_gap(curve, local(:, :n), dlocal(:, :n), place, gap, is_found)
             if (.not. is_found) return
-            call begin_constraint(item, x, smooth%node(:n))
+            call begin_constraint(item, x, smooth%node(:n), smooth%node)
             call take_gap(change_t(gap%f0 - target, gap%f1 - target, gap%df), gap%g, gap%c, item)
             item%h(:size(x, 1)*n, :size(x, 1)*n) = 0.0_wp
             call nodes_add_second(1.0_wp, size(x, 1), gap%h, in_order(:n), item%h)
@@ -190,16 +197,17 @@ contains
       call nodes_add_first(1.0_wp, part, in_order(:size(full, 2)), full)
    end subroutine take_first
 
-   !> Nodes and size of a constraint over `node`: slave node, edge, further ones.
-   pure subroutine begin_constraint(item, x, node)
+   !> Nodes and size of a constraint over `node`: slave node, and others.
+   pure subroutine begin_constraint(item, x, node, stencil)
       type(condition_t), intent(inout) :: item
       real(wp), intent(in) :: x(:, :)
       integer, intent(in) :: node(:)
+      integer, intent(in) :: stencil(:)          !! slave node, edge
 
       call condition_resize(item, size(node))
       item%n_slave = 1
       item%node(:size(node)) = node
-      item%size = stencil_length(x, node)
+      item%size = stencil_length(x, stencil)
    end subroutine begin_constraint
 
 end module emcon_nts_constraint

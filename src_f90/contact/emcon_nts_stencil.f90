@@ -30,6 +30,9 @@ module emcon_nts_stencil
       integer :: node(5) = 0
       integer :: before = 0, after = 0           !! local numbers of the neighbours' nodes; 0: none
       logical :: goes_around = .false.           !! convex corners, as a circle does
+      integer :: arm = 0                         !! another node of a rigid body of which the slave
+                                                 !! node is one; 0: nothing rolls
+      real(wp) :: radius = 0.0_wp                !! of the disc that rolls [L]
       real(wp) :: rounding(2, 2) = 0.0_wp        !! (concave, convex; before and after) half widths
                                                  !! of the corners [L]
    end type polygon_stencil_t

@@ -4,10 +4,11 @@ module emcon_deck_friction
       refuse_lines
    use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
    use emcon_diagnostics, only : add_error, add_warning
-   use emcon_interactions, only : contact_pair_t
+   use emcon_interactions, only : contact_pair_t, smoothing_hermite
    use emcon_kinds, only : wp
-   use emcon_mesh, only : surface_t
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
+   use emcon_rigid_bodies, only : rigid_far_node
+   use emcon_scene, only : scene_t
    use emcon_steps, only : initiation_massless, initiation_velocity_update, method_null_space, &
       method_saddle_point, step_initiation, step_t
    use emcon_text, only : to_text
@@ -60,31 +61,50 @@ contains
 
    !> Friction is in steps whose scheme has its forces along discrete gradients or which are static,
    !> and which hold contact exactly.
-   subroutine check_friction(reader, pair, step, surface)
+   subroutine check_friction(reader, scene)
       type(reader_t), intent(inout) :: reader
-      type(contact_pair_t), intent(in) :: pair(:)
-      type(step_t), intent(in) :: step(:)
-      type(surface_t), intent(in) :: surface(:)  !! those that pairs name
+      type(scene_t), intent(in) :: scene
       type(name_index_t) :: given                !! pairs so far, by slave and master
       integer :: i, k
 
-      do i = 1, size(pair)
-         if (pair(i)%slave == 0 .or. pair(i)%master == 0) cycle   ! its surface is unknown, and told
-         call check_other_way(reader, pair(:i), given)
-         if (.not. pair(i)%interaction%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
-         do k = 1, size(step)
-            call check_step(reader, pair(i), step(k), k)
+      associate (pair => scene%pair, step => scene%step)
+         do i = 1, size(pair)
+            if (pair(i)%slave == 0 .or. pair(i)%master == 0) cycle   ! unknown surfaces are told
+            call check_other_way(reader, pair(:i), given)
+            if (.not. pair(i)%interaction%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
+            do k = 1, size(step)
+               call check_step(reader, pair(i), step(k), k)
+            end do
+            call check_pad(reader, scene, pair(i))
+            if (any(step_initiation(step) == initiation_massless)) then
+               call add_warning(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface " &
+                  // "interaction has *FRICTION: both surfaces keep their mass, and hold gaps as " &
+                  // "PERSISTENT does")
+            end if
          end do
-         if (pair(i)%interaction%offset > 0.0_wp &
-            .and. surface(pair(i)%slave)%is_nodal) call add_warning(reader%log, &
-            pair(i)%origin, "*CONTACT PAIR: its surface interaction has *FRICTION and a PAD " &
-            // "THICKNESS: friction acts at the nodes, so that discs slide, but do not roll")
-         if (any(step_initiation(step) == initiation_massless)) then
-            call add_warning(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
-               // "has *FRICTION: both surfaces keep their mass, and hold gaps as PERSISTENT does")
-         end if
-      end do
+      end associate
    end subroutine check_friction
+
+   !> Nodes with a pad are discs. They roll if a rigid body turns them, over edges.
+   subroutine check_pad(reader, scene, pair)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      integer :: i
+      logical :: rolls
+
+      if (.not. pair%interaction%offset > 0.0_wp) return
+      if (.not. scene%surface(pair%slave)%is_nodal) return
+      rolls = .not. any(scene%step%contact%options%smoothing == smoothing_hermite)
+      associate (node => scene%surface(pair%slave)%node)
+         do i = 1, size(node)
+            rolls = rolls .and. rigid_far_node(scene%rigid, node(i), scene%x) > 0
+         end do
+      end associate
+      if (.not. rolls) call add_warning(reader%log, pair%origin, "*CONTACT PAIR: its surface " &
+         // "interaction has *FRICTION and a PAD THICKNESS: friction acts at the nodes, so that " &
+         // "discs slide, but do not roll; they do on nodes of a *RIGID BODY, without HERMITE")
+   end subroutine check_pad
 
    !> Two surfaces that are named in both orders rub in the same way in both.
    subroutine check_other_way(reader, pair, given)

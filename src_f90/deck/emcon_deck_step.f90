@@ -96,7 +96,7 @@ contains
       call check_restitution(reader, scene%pair, scene%step)
       call check_penalty(reader, scene%pair, scene%step)
       call check_damping(reader, scene)
-      call check_friction(reader, scene%pair, scene%step, scene%surface)
+      call check_friction(reader, scene)
       call check_contact_damping(reader, scene%pair, scene%step)
       call corners_find(scene)
       if (n_step == 0 .and. .not. reader%doubt%names) then

@@ -50,7 +50,7 @@ contains
       reader%log%file_name = scene%deck%file
       call check_schemes(reader, scene%pair, scene%step)
       call check_damping(reader, scene)
-      call check_friction(reader, scene%pair, scene%step, scene%surface)
+      call check_friction(reader, scene)
       call check_contact_damping(reader, scene%pair, scene%step)
       call check_massless_sections(reader, scene)
       if (.not. scene_is_flat(scene)) call check_dimension(reader, scene)

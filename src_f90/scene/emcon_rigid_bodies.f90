@@ -7,7 +7,7 @@ module emcon_rigid_bodies
    use emcon_origin, only : origin_t
    implicit none
    private
-   public :: rigid_body_t, rigid_frame_choose, rigid_weights
+   public :: rigid_body_t, rigid_far_node, rigid_frame_choose, rigid_weights
 
    type :: rigid_body_t
       type(origin_t) :: origin
@@ -68,6 +68,25 @@ contains
       end function beyond
 
    end subroutine rigid_frame_choose
+
+   !> The node of a body's frame that is farthest from `node`, which is one of the body; 0 if there
+   !> is no such body.
+   pure integer function rigid_far_node(rigid, node, x)
+      type(rigid_body_t), intent(in) :: rigid(:)     !! with their frames
+      integer, intent(in) :: node                    !! of the scene
+      real(wp), intent(in) :: x(:, :)                !! (n_dim, n_node) [L]
+      integer :: b, k
+
+      rigid_far_node = 0
+      do b = 1, size(rigid)
+         if (.not. any(rigid(b)%node == node)) cycle
+         associate (frame => rigid(b)%frame)
+            k = maxloc([(norm2(x(:, frame(k)) - x(:, node)), k = 1, size(frame))], 1)
+            rigid_far_node = frame(k)
+         end associate
+         return
+      end do
+   end function rigid_far_node
 
    !> The affine combination of the nodes of a frame that a place is; the weights sum up to 1.
    pure subroutine rigid_weights(frame, place, weight)

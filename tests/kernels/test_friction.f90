@@ -14,6 +14,7 @@ module test_friction
    use emcon_lemke, only : lemke_solve
    use emcon_nts_constraint, only : polygon_constraint
    use emcon_nts_stencil, only : polygon_stencil_t
+   use emcon_roll_plane, only : roll_over
    use emcon_slip_point, only : slip_add, slip_over, slip_point, slip_point_t
    use emcon_text, only : to_text
    use random_draws, only : draw_random
@@ -39,6 +40,7 @@ contains
          test_case_t("the slope of the natural map is its derivative", test_slope), &
          test_case_t("as a law beside the rows of a condition", test_law), &
          test_case_t("slip: work, rigid motions, differences", test_slip), &
+         test_case_t("a disc rolls: work, rigid motions, differences", test_roll), &
          test_case_t("mean slip of points of an edge", test_points), &
          test_case_t("slip along an edge, and of the force", test_along), &
          test_case_t("Lemke: a problem by hand, and one without solution", test_lemke)]
@@ -379,6 +381,61 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_slip
+
+   !> The outside of a disc: what friction does on the way, what no rigid motion sees, derivatives
+   !> by differences, the value alone, and no slip where a disc rolls along an edge.
+   subroutine test_roll(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: small = epsilon(1.0_wp)**(1.0_wp/3.0_wp), turn = 0.75_wp
+      type(polygon_stencil_t) :: stencil(1)
+      type(condition_t) :: item, other
+      real(wp), dimension(2, 4) :: x, du, moved, mid, still
+      real(wp) :: worst
+      integer :: i, j
+
+      stencil(1)%n = 3
+      stencil(1)%node(:3) = [1, 2, 3]
+      stencil(1)%arm = 4
+      stencil(1)%radius = 0.5_wp
+      still = 0.0_wp
+      item%has_friction = .true.
+      other%has_friction = .true.
+      do i = 1, 20
+         call shake(x, 0.1_wp)
+         x = x + reshape([0.4_wp, 0.5_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.1_wp, 0.8_wp], [2, 4])
+         call shake(du, 0.3_wp)
+         call polygon_constraint(stencil, x, still, du, 0.0_wp, item)
+         mid = x + 0.5_wp*du
+         associate (t => item%t(:, :4, 1), at => item%node(:4))
+            call check_equal(error, [item%n_slave, at], [2, 1, 4, 2, 3], "its nodes first")
+            call check_near(error, [sum(t*du(:, at)), slip_over(slip_point([1, 1, 2, 3], 0.0_wp, &
+               1.0_wp), x, still, du) + roll_over(stencil(1), 1.0_wp, x, still, du)], &
+               item%slip([1, 1]), 4.0_wp*tol, 1.0_wp, "T.D, and its value")
+            call check_near(error, [sum(t(1, :)), sum(t(2, :)), &
+               sum(t(2, :)*mid(1, at) - t(1, :)*mid(2, at))], [0.0_wp, 0.0_wp, 0.0_wp], &
+               8.0_wp*tol, 1.0_wp, "rigid motions of the middle")
+         end associate
+         worst = 0.0_wp
+         do j = 1, 8
+            associate (a => 1 + mod(j - 1, 2), k => 1 + (j - 1)/2)
+               moved = du
+               moved(a, item%node(k)) = du(a, item%node(k)) + small
+               call polygon_constraint(stencil, x, still, moved, 0.0_wp, other)
+               worst = max(worst, abs((other%slip(1) - item%slip(1))/small - item%t1(a, k, 1)), &
+                  maxval(abs(reshape((other%t(:, :4, 1) - item%t(:, :4, 1))/small, [8]) &
+                  - item%ht(:8, j, 1))))
+            end associate
+         end do
+         call check_true(error, worst < 100.0_wp*small, "differences: " // to_text(worst))
+         if (allocated(error)) return
+      end do
+      x = reshape([0.5_wp, 0.5_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.5_wp, 2.5_wp], [2, 4])
+      du = 0.0_wp
+      du(1, 1) = 2.0_wp*tan(0.5_wp*turn)*stencil(1)%radius
+      du(:, 4) = du(:, 1) + 2.0_wp*[sin(turn), cos(turn) - 1.0_wp]
+      call polygon_constraint(stencil, x, still, du, 0.0_wp, item)
+      call check_near(error, item%slip(:1), [0.0_wp], tol, 1.0_wp, "it rolls")
+   end subroutine test_roll
 
    !> Points of a slave edge over two master edges: work, rigid motions, differences, and the
    !> middle of an edge that slides as one body.

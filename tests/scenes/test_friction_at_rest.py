@@ -14,10 +14,11 @@ from friction_scenes import (
     block_on_floor,
     partial_slip,
     pressed_round,
+    rubbing,
     stack_on_slope,
     way,
 )
-from plain_scenes import BOTH, ONE
+from plain_scenes import BOTH, ONE, Scene, below
 from scene_tools import run_deck
 
 
@@ -141,6 +142,34 @@ def test_a_stack_lies_by_friction_alone(sides, formulation, tmp_path):
     run = run_deck(deck, tmp_path, formulation=formulation)
     assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] <= 1e-9
     assert run.history["cuts"].sum() == 0 and (np.diff(run.history["friction_loss"]) >= -1e-18).all()
+
+
+def overhanging(shift):
+    """A block of 1 by 1 on another one, with its middle `shift` before the end of that."""
+    scene = Scene(1.0, 1.0, gravity=1.0)
+    scene.block("LOW", (0, 0), (1, 1), (4, 4), stiffness=1e5)
+    scene.block("HIGH", (0.5 - shift, 1), (1, 1), (4, 4), stiffness=1e5)
+    scene.block("FLOOR", (-3, -1), (6, 1), (12, 2), stiffness=1e5)
+    scene.hold("FLOOR", below(-1.0))
+    scene.pairs = [("LOW", "FLOOR"), ("HIGH", "LOW")]
+    return static(rubbing(scene.deck("AUTO"), 0.5))
+
+
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
+@pytest.mark.parametrize("shift", [0.12, 0.07, 0.05, 0.03])
+def test_a_block_stands_over_an_end(shift, formulation, tmp_path):
+    """By `SEGMENT` the last slave node over the end, below its middle, bears it, and the guard of the
+    corner from 8e-4 of an edge on: it tips by that over the way between them, and what is elastic."""
+    run = run_deck(overhanging(shift), tmp_path, formulation=formulation)
+    assert run.verdict["verdict"] == "good" and run.verdict["law_violation"] <= 1e-9
+    assert run.history["cuts"].sum() == 0
+    names = [n for n in run.history.dtype.names if n.endswith("_force_y") and n.startswith("pair")]
+    force = np.array([run.history[name][-1] for name in names])
+    assert np.abs(force).sum() == pytest.approx(3.0, abs=1e-9)     # of both, and of the upper one
+    moved = np.abs(run.fields()["displacement"][-1]).max()
+    tips = 8e-4*0.25/shift if formulation == "SEGMENT" else 0.0
+    elastic = 10*1.0/1e5                                # a weight over the stiffness, at one corner
+    assert moved < 1.5*(tips + elastic/shift)
 
 
 def test_friction_without_a_push_holds_nothing(tmp_path):

@@ -141,6 +141,99 @@ def test_disc_on_a_corner(e, mu, slide, spin, tmp_path):
     holds_laws(history)
 
 
+# ---- circles ------------------------------------------------------------------------------------
+
+
+def circle(**more):
+    """A disc of radius 1/2 with the mass of an octagon: its centre with a pad as thick as that."""
+    deck = disc(8, **more)
+    text = deck.text().replace("*SURFACE, NAME=BODY\nBODY,", "*SURFACE, NAME=BODY, TYPE=NODE\n9")
+    return Deck(text.replace("NAME=ROUGH,", "NAME=ROUGH, PAD THICKNESS=0.5,"))
+
+
+def circle_mass():
+    """Mass, and what its inertia about the centre adds at the radius."""
+    mass = 8*0.5*0.25*math.sin(math.pi/4)
+    return mass, mass/6*(2 + math.cos(math.pi/4))
+
+
+@pytest.mark.parametrize("mu", [0.05, 0.5])
+def test_a_circle_rolls_down_a_slope(mu, tmp_path):
+    """Or slides, if the coefficient is less than what rolling takes: both with a constant
+    acceleration, which steps have exactly but for the angle that one turns by, squared."""
+    slope, h, t_end = 0.35, 0.01, 1.0
+    deck = circle(e=0.0, mu=mu, h=h, t_end=t_end, weight=8.0, slope=slope)
+    deck.replace("FREQUENCY=100000\nU", "FREQUENCY=1\nV, VR")
+    run = run_deck(deck, tmp_path)
+    mass, added = circle_mass()
+    drag = min(mu*mass*8*math.cos(slope), mass*8*math.sin(slope)*added/(mass + added))
+    speed = 8*math.sin(slope)*t_end - drag/mass*t_end
+    spin = drag*t_end/(0.5*added)                      # drag R = I times its rate, I = added R^2
+    assert run.verdict["verdict"] == "good" and "do not roll" not in run.log
+    history = run.history
+    near = (spin*h)**2                                 # of what a step turns by
+    assert history["px"][-1] == pytest.approx(mass*speed, rel=near)
+    kinetic = 0.5*mass*speed**2 + 0.5*added*(0.5*spin)**2
+    assert history["kinetic"][-1] == pytest.approx(kinetic, rel=2*near)
+    slid = (speed - 0.5*spin)*0.5*t_end
+    assert history["friction_loss"][-1] == pytest.approx(drag*slid, abs=near*kinetic)
+    assert balance(history) < 1e-11
+
+
+def polygon_rolls(n, weight, slope, t_end, dt):
+    """The spin of a polygon of radius 1/2 that falls over its corners without slip and rebound, by
+    the angular momentum about the next corner, and how many corners it falls over."""
+    turn = 2*math.pi/n
+    gyration = 0.25/6*(2 + math.cos(turn))             # squared, about the centre
+    lean, spin, corners = 0.0, 0.0, 0
+    for _ in range(round(t_end/dt)):
+        rate = 0.5*weight*math.sin(lean + slope)/(0.25 + gyration)
+        middle = 0.5*weight*math.sin(lean + 0.5*dt*spin + slope)/(0.25 + gyration)
+        lean, spin = lean + dt*spin + 0.5*dt*dt*rate, spin + dt*middle
+        if lean >= 0.5*turn:
+            spin *= (gyration + 0.25*math.cos(turn))/(gyration + 0.25)
+            lean, corners = lean - turn, corners + 1
+    return spin, corners
+
+
+@pytest.mark.parametrize("n", [12, 36])
+def test_a_polygon_falls_over_its_corners(n, tmp_path):
+    """Without rebound: what it loses is that of corners, not of a disc. A corner lands up to a step late,
+    and its pull turns from forth to back as late."""
+    slope, h, t_end, weight = 0.35, 0.001, 1.0, 8.0
+    deck = disc(n, e=0.0, mu=1.0, h=h, t_end=t_end, weight=weight, slope=slope)
+    history = run_deck(deck, tmp_path).history
+    spin, corners = polygon_rolls(n, weight, slope, t_end, 1e-5)
+    mass = 0.5*n*0.25*math.sin(2*math.pi/n)
+    added = 0.25 + 0.25/6*(2 + math.cos(2*math.pi/n))
+    found = math.sqrt(2*history["kinetic"][-1]/(mass*added))
+    late = weight*math.sin(math.pi/n)*math.cos(slope)/added*h
+    assert corners >= 3
+    assert found == pytest.approx(spin, abs=corners*late)
+    holds_laws(history)
+
+
+@pytest.mark.parametrize("e", [0.0, 0.5, 1.0])
+@pytest.mark.parametrize(("mu", "slide", "spin"), [(0.05, 1.0, 0.0), (0.3, 2.0, 3.0), (1.0, 0.4, 1.0)])
+def test_a_circle_falls(e, mu, slide, spin, tmp_path):
+    """As `test_disc_on_a_corner`, wherever it lands; of what a step turns by is left its square."""
+    h = 0.001
+    deck = circle(turn=0.3, lift=0.0505, e=e, mu=mu, h=h, t_end=0.06, velocity=(slide, -1.0, spin),
+                  weight=0)
+    history = run_deck(deck, tmp_path).history
+    mass, added = circle_mass()
+    slip = slide + 0.5*spin
+    push = mass*(1 + e)
+    drag = min(mu*push, slip/(1/mass + 1/added))
+    near = mass*((spin + 2*slip)*h)**2             # of what a step may turn it by
+    along, left = slide - drag/mass, 0.5*spin - drag/added
+    assert history["py"][-1] - history["py"][0] == pytest.approx(push, abs=ROUND)
+    assert history["px"][-1] == pytest.approx(mass*along, abs=near)
+    kinetic = 0.5*(mass*(along**2 + e*e) + added*left**2)
+    assert history["kinetic"][-1] == pytest.approx(kinetic, abs=2*near)
+    holds_laws(history)
+
+
 # ---- to rest ------------------------------------------------------------------------------------
 
 
