@@ -81,6 +81,8 @@ program main
    use test_interlock, only : collect_interlock
    use test_joints, only : collect_joints
    use test_lapack, only : collect_lapack
+   use test_step_overlap, only : collect_step_overlap
+   use test_nodal_pull, only : collect_nodal_pull
    use test_judge, only : collect_judge
    use test_law, only : collect_law
    use test_law_points, only : collect_law_points
@@ -159,6 +161,7 @@ program main
    use test_solid_parts, only : collect_solid_parts
    use test_solid_threads, only : collect_solid_threads
    use test_bending, only : collect_bending
+   use test_bent_bodies, only : collect_bent_bodies
    use test_solvers, only : collect_solvers
    use test_start_gaps, only : collect_start_gaps
    use test_stepper_free, only : collect_stepper_free
@@ -239,6 +242,8 @@ program main
    call run("stabilization", collect_stabilization)
    call run("point_function", collect_point_function)
    call run("shape", collect_shape)
+   call run("step_overlap", collect_step_overlap)
+   call run("nodal_pull", collect_nodal_pull)
    call run("judge", collect_judge)
    call run("law", collect_law)
    call run("law_points", collect_law_points)
@@ -257,6 +262,7 @@ program main
    call run("solid_parts", collect_solid_parts)
    call run("solid_threads", collect_solid_threads)
    call run("bending", collect_bending)
+   call run("bent_bodies", collect_bent_bodies)
    call run("facets", collect_facets)
    call run("chain", collect_chain)
    call run("search", collect_search)
