@@ -29,6 +29,7 @@ program main
    use test_contact_rounds, only : collect_contact_rounds
    use test_constraints, only : collect_constraints
    use test_contact_scales, only : collect_contact_scales
+   use test_condition_reuse, only : collect_condition_reuse
    use test_contact_states, only : collect_contact_states
    use test_step_begin, only : collect_step_begin
    use test_contact_laws, only : collect_contact_laws
@@ -216,6 +217,7 @@ program main
    call run("solvers", collect_solvers)
    call run("start_gaps", collect_start_gaps)
    call run("contact_scales", collect_contact_scales)
+   call run("condition_reuse", collect_condition_reuse)
    call run("contact_states", collect_contact_states)
    call run("step_begin", collect_step_begin)
 #ifndef EMCON_PERMISSIVE
