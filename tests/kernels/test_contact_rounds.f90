@@ -2,8 +2,8 @@
 !> obeys the laws, from wherever it is begun; and who takes part, by what contacts tell.
 module test_contact_rounds
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_active_set, only : active_set_begin, active_set_init, active_set_t, step_done, &
-      step_stands_off, step_too_far, touch_tol
+   use emcon_active_set, only : active_set_begin, active_set_init, active_set_t, candidates_clear, &
+      candidates_t, step_done, step_stands_off, step_too_far, touch_tol
    use emcon_active_set_solve, only : active_set_solve
    use emcon_contact_law, only : contact_laws_add
    use emcon_correction, only : correction_free, correction_reset
@@ -67,6 +67,7 @@ contains
          test_case_t("friction that acts elsewhere", test_lagged), &
          test_case_t("stencils of another motion", test_stale), &
          test_case_t("what cannot begin", test_begins), &
+         test_case_t("nothing is known of the step before", test_clear), &
          test_case_t("a guard waits for the pairs", test_guard)]
    end subroutine collect_contact_rounds
 
@@ -210,6 +211,8 @@ contains
          call check_true(error, all(gap1 >= held - tol), what // ": what does not act is open")
          call check_true(error, all(lam >= -tol*scale), what // ": pushes")
          call check_true(error, all(abs(tau) <= self%mu*lam + tol*scale), what // ": friction")
+         if (abs(self%way) > 0.0_wp) call check_near(error, motion%u0(1, 6) + motion%du(1, 6), &
+            self%way, 4.0_wp*eps, 1.0_wp, what // ": prescribed")
       end associate
       if (self%mu > 0.0_wp) call check_friction(self, what, lam, tau, s, lead, scale, error)
    end subroutine check_laws
@@ -274,6 +277,10 @@ contains
             call check_laws(self, "case " // to_text(i), error)
             if (allocated(error)) return
             associate (active => self%active)
+               call check_true(error, all(active%candidates%n_change > 0 .or. active%is_active &
+                  .or. .not. active%candidates%takes_part), "that one has opened is counted, case " &
+                  // to_text(i))
+               call check_true(error, active%n_newton > 0, "iterations are counted")
                n_open = n_open + count(active%is_candidate .and. .not. active%is_active)
                n_act = n_act + count(active%is_active)
                if (.not. active%friction%is_on) cycle
@@ -288,6 +295,28 @@ contains
          " that act " // to_text(n_stick) // " stick, " // to_text(n_slide) // " slide; " // &
          to_text(n_open) // " open")
    end subroutine test_laws
+
+   !> Whatever was found of candidates, a step knows nothing of it when it begins.
+   subroutine test_clear(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(candidates_t) :: known, none
+
+      allocate(known%takes_part(3), known%acts(3), known%acted(3), known%has_left(3), &
+         known%is_back(3), known%is_blamed(3), source=.true.)
+      allocate(known%n_change(3), source=7)
+      known%is_measured = .true.
+      known%have_changed = .true.
+      known%is_settled = .true.
+      known%one_closes = .true.
+      known%is_new_set = .true.
+      call candidates_clear(known)
+      call check_true(error, .not. any([known%takes_part, known%acts, known%acted, &
+         known%has_left, known%is_back, known%is_blamed]), "of each")
+      call check_equal(error, known%n_change, [0, 0, 0], "changes")
+      call check_true(error, all([known%is_measured, known%have_changed, known%is_settled, &
+         known%one_closes, known%is_new_set] .eqv. [none%is_measured, none%have_changed, &
+         none%is_settled, none%one_closes, none%is_new_set]), "of all")
+   end subroutine test_clear
 
    !> There is one solution: with a kept factor it is found too.
    subroutine test_kept(error)
