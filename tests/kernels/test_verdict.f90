@@ -272,6 +272,13 @@ contains
       end do
       call scatter_follow(comb, pair_sum_t(weight=1.0_wp, span=1.0_wp), .true.)
       call check_equal(error, comb%n_dip, 0, "teeth")
+      ! One tooth, however long it rises.
+      comb = force_scatter_t()
+      do k = 1, 6
+         call scatter_follow(comb, pair_sum_t(weight=merge(9.0_wp, real(k, wp), k == 1), &
+            span=1.0_wp), .true.)
+      end do
+      call check_equal(error, comb%n_dip, 1, "one tooth")
       ! Nor is anything off its neighbours across statics: squares of both parts add up.
       comb = force_scatter_t()
       wave = force_scatter_t()
