@@ -61,6 +61,7 @@ contains
       tests = [ &
          test_case_t("what is found balances and obeys the laws", test_laws), &
          test_case_t("with a kept factor and without", test_kept), &
+         test_case_t("in any unit of length", test_units), &
          test_case_t("rows that follow from others", test_redundant), &
          test_case_t("what has lost its surface does not come back", test_left), &
          test_case_t("unless it closes again, and once alone", test_back), &
@@ -317,6 +318,67 @@ contains
          known%one_closes, known%is_new_set] .eqv. [none%is_measured, none%have_changed, &
          none%is_settled, none%one_closes, none%is_new_set]), "of all")
    end subroutine test_clear
+
+   !> In a unit of length that is a power of two, with density and modulus in it, every number is the
+   !> same but for that power: in the same iterations.
+   subroutine test_units(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: power(3) = [0, 24, -17]
+      real(wp) :: u(6)
+      integer :: i, k
+
+      do i = 0, 15
+         block
+            type(case_t) :: self(3)
+
+            call draw_random(u)
+            call make_case(self(1), 3.0_wp*u(1) - 1.5_wp)
+            do k = 1, 3
+               associate (case => self(k), unit => 2.0_wp**power(k))
+                  case%scene = self(1)%scene
+                  case%mu = merge(0.0_wp, 0.6_wp*u(2), mod(i, 2) == 0)
+                  case%holds_gap = mod(i/2, 2) == 1
+                  if (mod(i/8, 2) == 1) case%way = 0.1_wp*(u(3) - 0.5_wp)*unit
+                  case%was_active = u(4:6) > 0.6_wp
+                  case%slides_along = real(mod(i/2, 3) - 1, wp)
+                  allocate(case%floor(1))
+                  call floor_make(case%floor(1), [1, 2, 3], (case%scene%u0(2, :3) - merge(0.0_wp, &
+                     0.1_wp*u(4:6), case%was_active))*unit)
+                  case%floor(1)%size = unit
+               end associate
+            end do
+            do k = 3, 1, -1
+               call scale_scene(self(k)%scene, 2.0_wp**power(k))
+               call solve(self(k), error)
+               call check_equal(error, self(k)%status, step_done, "status, case " // to_text(i))
+               if (allocated(error)) return
+            end do
+            do k = 2, 3
+               associate (unit => 2.0_wp**power(k), one => self(1)%active, other => self(k)%active)
+                  call check_near(error, self(k)%motion%du/unit, self(1)%motion%du, 0.0_wp, 1.0_wp, &
+                     "motion, case " // to_text(i))
+                  call check_equal(error, [other%n_newton, other%set%n], [one%n_newton, one%set%n], &
+                     "iterations and contacts")
+                  if (allocated(error)) return
+                  call check_near(error, other%set%lam(:one%set%n)/unit, one%set%lam(:one%set%n), &
+                     0.0_wp, 1.0_wp, "forces, case " // to_text(i))
+               end associate
+            end do
+         end block
+      end do
+   end subroutine test_units
+
+   subroutine scale_scene(scene, unit)
+      type(scene_t), intent(inout) :: scene
+      real(wp), intent(in) :: unit               !! > 0
+
+      scene%x = unit*scene%x
+      scene%u0 = unit*scene%u0
+      scene%v0 = unit*scene%v0
+      scene%section%thickness = unit*scene%section%thickness
+      scene%material%density = scene%material%density/unit**3
+      scene%material(1)%constant(1) = scene%material(1)%constant(1)/unit
+   end subroutine scale_scene
 
    !> There is one solution: with a kept factor it is found too.
    subroutine test_kept(error)
