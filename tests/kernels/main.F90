@@ -100,6 +100,7 @@ program main
    use test_march_check, only : collect_march_check
    use test_march_commit, only : collect_march_commit
    use test_march_control, only : collect_march_control
+   use test_march_units, only : collect_march_units
    use test_march_contact, only : collect_march_contact
    use test_march_impulse, only : collect_march_impulse
    use test_march_guess, only : collect_march_guess
@@ -355,6 +356,7 @@ program main
    call run("march_check", collect_march_check)
    call run("march_commit", collect_march_commit)
    call run("march_control", collect_march_control)
+   call run("march_units", collect_march_units)
    call run("march_contact", collect_march_contact)
    call run("march_grid", collect_march_grid)
    call run("march_guess", collect_march_guess)
