@@ -154,7 +154,6 @@ contains
       associate (set => self%set, friction => self%friction)
          call candidates_keep_forces(self)
          self%candidates%acted(:) = self%candidates%acts
-         self%candidates%acts = self%candidates%takes_part
          do k = 1, size(law)
             associate (id => set%id(set%n_permanent + k))
                acts = law(k)%status%kind /= contact_open

@@ -161,7 +161,6 @@ contains
          call hermite_slip(smooth%curve, local, dlocal, smooth%place(1), slip)
          item%slip(1) = slip%df
          call take_directions(slip%g, slip%c, item)
-         item%ht(:size(local), :size(local), 1) = 0.0_wp
          call nodes_add_second(1.0_wp, size(local, 1), slip%h, in_order(:size(local, 2)), &
             item%ht(:, :, 1))
       end if

@@ -256,7 +256,7 @@ contains
       class(corotated_term_t), intent(in) :: self
       type(motion_t), intent(in) :: motion       !! placed
 
-      is_symmetric = motion%evaluation%is_gradient .or. size(self%frame) == 0
+      is_symmetric = motion%evaluation%is_gradient
    end function is_symmetric
 
 end module emcon_corotated_term

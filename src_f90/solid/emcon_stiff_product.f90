@@ -115,7 +115,6 @@ contains
       do g = 1, size(self%first) - 1
          do l = 1, n_lane
             i = n_lane*(g - 1) + l
-            self%column(l, self%first(g) + 1:self%first(g + 1)) = i
             if (i > self%n) cycle
             slot = self%first(g)
             associate (node => self%node(i))

@@ -19,6 +19,7 @@ module floor_contact
       real(wp) :: shift = 0.0_wp                     !! of slip, at each look up to number `until`
       real(wp) :: drift = 0.0_wp                     !! gaps are measured by so much too large then
       integer :: until = huge(1)
+      real(wp) :: size = 1.0_wp                      !! of an edge [L]
    contains
       procedure :: configure
       procedure :: begin_points
@@ -80,7 +81,7 @@ contains
             state%is_leaving = self%leaves(i)
             if (allocated(self%leaves_at)) state%is_leaving = state%is_leaving .and. &
                any(self%n_look == self%leaves_at)
-            state%size = 1.0_wp
+            state%size = self%size
             state%closed = self%closed
             state%gap0 = gap_of(self, i, x, u0)
             state%gap1 = gap_of(self, i, x, u0 + du)
@@ -105,7 +106,7 @@ contains
             call condition_resize(item, 1)
             item%n_slave = 1
             item%node(1) = node
-            item%size = 1.0_wp
+            item%size = self%size
             item%gap0 = gap_of(self, wanted(k), x, u0) - target(k)
             item%gap1 = gap_of(self, wanted(k), x, u0 + du) - target(k)
             item%dgap = du(2, node)

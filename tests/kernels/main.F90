@@ -29,6 +29,7 @@ program main
    use test_contact_rounds, only : collect_contact_rounds
    use test_constraints, only : collect_constraints
    use test_contact_scales, only : collect_contact_scales
+   use test_condition_reuse, only : collect_condition_reuse
    use test_contact_states, only : collect_contact_states
    use test_step_begin, only : collect_step_begin
    use test_contact_laws, only : collect_contact_laws
@@ -81,6 +82,8 @@ program main
    use test_interlock, only : collect_interlock
    use test_joints, only : collect_joints
    use test_lapack, only : collect_lapack
+   use test_step_overlap, only : collect_step_overlap
+   use test_nodal_pull, only : collect_nodal_pull
    use test_judge, only : collect_judge
    use test_law, only : collect_law
    use test_law_points, only : collect_law_points
@@ -97,6 +100,7 @@ program main
    use test_march_check, only : collect_march_check
    use test_march_commit, only : collect_march_commit
    use test_march_control, only : collect_march_control
+   use test_march_units, only : collect_march_units
    use test_march_contact, only : collect_march_contact
    use test_march_impulse, only : collect_march_impulse
    use test_march_guess, only : collect_march_guess
@@ -159,6 +163,7 @@ program main
    use test_solid_parts, only : collect_solid_parts
    use test_solid_threads, only : collect_solid_threads
    use test_bending, only : collect_bending
+   use test_bent_bodies, only : collect_bent_bodies
    use test_solvers, only : collect_solvers
    use test_start_gaps, only : collect_start_gaps
    use test_stepper_free, only : collect_stepper_free
@@ -213,6 +218,7 @@ program main
    call run("solvers", collect_solvers)
    call run("start_gaps", collect_start_gaps)
    call run("contact_scales", collect_contact_scales)
+   call run("condition_reuse", collect_condition_reuse)
    call run("contact_states", collect_contact_states)
    call run("step_begin", collect_step_begin)
 #ifndef EMCON_PERMISSIVE
@@ -239,6 +245,8 @@ program main
    call run("stabilization", collect_stabilization)
    call run("point_function", collect_point_function)
    call run("shape", collect_shape)
+   call run("step_overlap", collect_step_overlap)
+   call run("nodal_pull", collect_nodal_pull)
    call run("judge", collect_judge)
    call run("law", collect_law)
    call run("law_points", collect_law_points)
@@ -257,6 +265,7 @@ program main
    call run("solid_parts", collect_solid_parts)
    call run("solid_threads", collect_solid_threads)
    call run("bending", collect_bending)
+   call run("bent_bodies", collect_bent_bodies)
    call run("facets", collect_facets)
    call run("chain", collect_chain)
    call run("search", collect_search)
@@ -347,6 +356,7 @@ program main
    call run("march_check", collect_march_check)
    call run("march_commit", collect_march_commit)
    call run("march_control", collect_march_control)
+   call run("march_units", collect_march_units)
    call run("march_contact", collect_march_contact)
    call run("march_grid", collect_march_grid)
    call run("march_guess", collect_march_guess)

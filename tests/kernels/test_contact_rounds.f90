@@ -2,8 +2,8 @@
 !> obeys the laws, from wherever it is begun; and who takes part, by what contacts tell.
 module test_contact_rounds
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_active_set, only : active_set_begin, active_set_init, active_set_t, step_done, &
-      step_stands_off, step_too_far, touch_tol
+   use emcon_active_set, only : active_set_begin, active_set_init, active_set_t, candidates_clear, &
+      candidates_t, step_done, step_stands_off, step_too_far, touch_tol
    use emcon_active_set_solve, only : active_set_solve
    use emcon_contact_law, only : contact_laws_add
    use emcon_correction, only : correction_free, correction_reset
@@ -61,12 +61,14 @@ contains
       tests = [ &
          test_case_t("what is found balances and obeys the laws", test_laws), &
          test_case_t("with a kept factor and without", test_kept), &
+         test_case_t("in any unit of length", test_units), &
          test_case_t("rows that follow from others", test_redundant), &
          test_case_t("what has lost its surface does not come back", test_left), &
          test_case_t("unless it closes again, and once alone", test_back), &
          test_case_t("friction that acts elsewhere", test_lagged), &
          test_case_t("stencils of another motion", test_stale), &
          test_case_t("what cannot begin", test_begins), &
+         test_case_t("nothing is known of the step before", test_clear), &
          test_case_t("a guard waits for the pairs", test_guard)]
    end subroutine collect_contact_rounds
 
@@ -210,6 +212,8 @@ contains
          call check_true(error, all(gap1 >= held - tol), what // ": what does not act is open")
          call check_true(error, all(lam >= -tol*scale), what // ": pushes")
          call check_true(error, all(abs(tau) <= self%mu*lam + tol*scale), what // ": friction")
+         if (abs(self%way) > 0.0_wp) call check_near(error, motion%u0(1, 6) + motion%du(1, 6), &
+            self%way, 4.0_wp*eps, 1.0_wp, what // ": prescribed")
       end associate
       if (self%mu > 0.0_wp) call check_friction(self, what, lam, tau, s, lead, scale, error)
    end subroutine check_laws
@@ -274,6 +278,10 @@ contains
             call check_laws(self, "case " // to_text(i), error)
             if (allocated(error)) return
             associate (active => self%active)
+               call check_true(error, all(active%candidates%n_change > 0 .or. active%is_active &
+                  .or. .not. active%candidates%takes_part), "that one has opened is counted, case " &
+                  // to_text(i))
+               call check_true(error, active%n_newton > 0, "iterations are counted")
                n_open = n_open + count(active%is_candidate .and. .not. active%is_active)
                n_act = n_act + count(active%is_active)
                if (.not. active%friction%is_on) cycle
@@ -288,6 +296,89 @@ contains
          " that act " // to_text(n_stick) // " stick, " // to_text(n_slide) // " slide; " // &
          to_text(n_open) // " open")
    end subroutine test_laws
+
+   !> Whatever was found of candidates, a step knows nothing of it when it begins.
+   subroutine test_clear(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(candidates_t) :: known, none
+
+      allocate(known%takes_part(3), known%acts(3), known%acted(3), known%has_left(3), &
+         known%is_back(3), known%is_blamed(3), source=.true.)
+      allocate(known%n_change(3), source=7)
+      known%is_measured = .true.
+      known%have_changed = .true.
+      known%is_settled = .true.
+      known%one_closes = .true.
+      known%is_new_set = .true.
+      call candidates_clear(known)
+      call check_true(error, .not. any([known%takes_part, known%acts, known%acted, &
+         known%has_left, known%is_back, known%is_blamed]), "of each")
+      call check_equal(error, known%n_change, [0, 0, 0], "changes")
+      call check_true(error, all([known%is_measured, known%have_changed, known%is_settled, &
+         known%one_closes, known%is_new_set] .eqv. [none%is_measured, none%have_changed, &
+         none%is_settled, none%one_closes, none%is_new_set]), "of all")
+   end subroutine test_clear
+
+   !> In a unit of length that is a power of two, with density and modulus in it, every number is the
+   !> same but for that power: in the same iterations.
+   subroutine test_units(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: power(3) = [0, 24, -17]
+      real(wp) :: u(6)
+      integer :: i, k
+
+      do i = 0, 15
+         block
+            type(case_t) :: self(3)
+
+            call draw_random(u)
+            call make_case(self(1), 3.0_wp*u(1) - 1.5_wp)
+            do k = 1, 3
+               associate (case => self(k), unit => 2.0_wp**power(k))
+                  case%scene = self(1)%scene
+                  case%mu = merge(0.0_wp, 0.6_wp*u(2), mod(i, 2) == 0)
+                  case%holds_gap = mod(i/2, 2) == 1
+                  if (mod(i/8, 2) == 1) case%way = 0.1_wp*(u(3) - 0.5_wp)*unit
+                  case%was_active = u(4:6) > 0.6_wp
+                  case%slides_along = real(mod(i/2, 3) - 1, wp)
+                  allocate(case%floor(1))
+                  call floor_make(case%floor(1), [1, 2, 3], (case%scene%u0(2, :3) - merge(0.0_wp, &
+                     0.1_wp*u(4:6), case%was_active))*unit)
+                  case%floor(1)%size = unit
+               end associate
+            end do
+            do k = 3, 1, -1
+               call scale_scene(self(k)%scene, 2.0_wp**power(k))
+               call solve(self(k), error)
+               call check_equal(error, self(k)%status, step_done, "status, case " // to_text(i))
+               if (allocated(error)) return
+            end do
+            do k = 2, 3
+               associate (unit => 2.0_wp**power(k), one => self(1)%active, other => self(k)%active)
+                  call check_near(error, self(k)%motion%du/unit, self(1)%motion%du, 0.0_wp, 1.0_wp, &
+                     "motion, case " // to_text(i))
+                  call check_equal(error, [other%n_newton, other%set%n], [one%n_newton, one%set%n], &
+                     "iterations and contacts")
+                  if (allocated(error)) return
+                  call check_near(error, other%set%lam(:one%set%n)/unit, one%set%lam(:one%set%n), &
+                     0.0_wp, 1.0_wp, "forces, case " // to_text(i))
+               end associate
+            end do
+         end block
+      end do
+   end subroutine test_units
+
+   subroutine scale_scene(scene, unit)
+      type(scene_t), intent(inout) :: scene
+      real(wp), intent(in) :: unit               !! > 0
+
+      scene%x = unit*scene%x
+      scene%u0 = unit*scene%u0
+      scene%v0 = unit*scene%v0
+      scene%section%thickness = unit*scene%section%thickness
+      scene%material%density = scene%material%density/unit**3
+      scene%material(1)%constant(1) = scene%material(1)%constant(1)/unit
+   end subroutine scale_scene
 
    !> There is one solution: with a kept factor it is found too.
    subroutine test_kept(error)

@@ -6,12 +6,13 @@ module test_corotated
    use emcon_corotated_plane, only : corotated_energy, corotated_image, corotated_motion_t, &
       corotated_move, corotated_t
    use emcon_errors, only : error_t
-   use emcon_evaluation, only : evaluation_t
+   use emcon_evaluation, only : evaluation_at_end, evaluation_t
    use emcon_kinds, only : wp
    use emcon_materials, only : kinematics_corotated
    use emcon_motion, only : motion_of, motion_t
    use emcon_scene, only : scene_t
-   use emcon_system, only : system_begin_step, system_init, system_t, system_tangent_times
+   use emcon_system, only : system_begin_step, system_init, system_respond, system_t, &
+      system_tangent_times
    use kind_rows, only : law_code
    use small_scenes, only : add_step, block_t, make_block, shake
    implicit none
@@ -31,6 +32,7 @@ contains
          test_case_t("identity and momenta", test_identity), &
          test_case_t("tangent", test_tangent), &
          test_case_t("rigid motions cost nothing", test_rigid), &
+         test_case_t("where the tangent is symmetric", test_symmetric), &
          test_case_t("no tangent where an element is a point", test_point)]
    end subroutine collect_corotated
 
@@ -175,6 +177,45 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_rigid
+
+   !> As the second derivative of an energy, at the end of a step; not that of a discrete gradient,
+   !> where elements turn.
+   subroutine test_symmetric(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(system_t) :: system
+      type(motion_t) :: motion
+      real(wp) :: u0(2, 6), du(2, 6)
+      real(wp), allocatable :: full(:, :)
+      integer :: k, i
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      scene%section(1)%kinematics = kinematics_corotated
+      scene%material(1)%law = law_code("linear")
+      call add_step(scene, .false., 0.1_wp, 1)
+      call system_init(system, scene, error)
+      if (.not. allocated(error)) call system_begin_step(system, scene, 1, error)
+      if (allocated(error)) return
+      call shake(u0, 0.1_wp)
+      call shake(du, 0.1_wp)
+      do k = 1, 2
+         if (k == 1) motion = motion_of(evaluation_at_end, scene%x, u0, du)
+         if (k == 2) motion = motion_of(evaluation_t(), scene%x, u0, du)
+         call system_respond(system, motion, .true.)
+         associate (a => system%matrix)
+            if (allocated(full)) deallocate(full)
+            allocate(full(a%n_row, a%n_row), source=0.0_wp)
+            do i = 1, a%n_row
+               full(i, a%column(a%row_start(i) + 1:a%row_start(i + 1)) + 1) &
+                  = real(a%value(a%row_start(i) + 1:a%row_start(i + 1)), wp)
+            end do
+         end associate
+         call check_true(error, system%is_symmetric .eqv. k == 1, "as it is told")
+         call check_true(error, maxval(abs(full - transpose(full))) <= tol*maxval(abs(full)) &
+            .eqv. k == 1, "as it is")
+      end do
+   end subroutine test_symmetric
 
    !> At the end of a step; half of the way there is one.
    subroutine test_point(error)

@@ -41,6 +41,7 @@ contains
 
       tests = [ &
          test_case_t("identity and force along the axis of a step", test_step), &
+         test_case_t("sizes of forces, which no sign changes", test_sizes), &
          test_case_t("tangent against differences", test_tangent), &
          test_case_t("patch: energy and work of a uniform strain", test_patch), &
          test_case_t("Cauchy stress, by the whole deformation gradient", test_stress), &
@@ -182,6 +183,33 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_step
+
+   !> Of the linear law at small strains forces turn round with the motion, their sizes stay; no
+   !> force is larger than its size.
+   subroutine test_sizes(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      type(space_part_t) :: there, back
+      real(wp) :: zero(2, m), du(2, m)
+      integer :: i, k
+
+      do i = 1, n_axial_row()
+         call make_sample(i, 1, .false., 0.2_wp, sample, error)
+         if (allocated(error)) return
+         do k = 1, 4
+            call draw(sample, zero, du)
+            zero = 0.0_wp
+            call respond(sample, zero, du, .false., there)
+            call respond(sample, zero, -du, .false., back)
+            call check_near(error, back%force(:2, :m), -there%force(:2, :m), tol, young, &
+               sample%what // ": force")
+            call check_near(error, back%magnitude(:2, :m), there%magnitude(:2, :m), tol, young, &
+               sample%what // ": size")
+            call check_true(error, all(abs(there%force(:2, :m)) <= (1.0_wp + tol) &
+               *there%magnitude(:2, :m)), sample%what // ": is its size at most")
+         end do
+      end do
+   end subroutine test_sizes
 
    !> A motion that leaves the part `left` of one length at the point next to the axis: along the
    !> axis, along the radius or of the circle, and all of the others there. With a law of the volume

@@ -8,7 +8,7 @@ module test_friction_ways
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_at_end, evaluation_moving
    use emcon_friction, only : friction_begin, friction_close, friction_holds, friction_keep, &
-      friction_missed
+      friction_missed, friction_turn
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_t
    use emcon_system, only : system_t
@@ -31,6 +31,7 @@ contains
          test_case_t("a step begins", test_begin), &
          test_case_t("rows of what sticks", test_select), &
          test_case_t("what closes", test_close), &
+         test_case_t("what acts goes on, or turns", test_turn), &
          test_case_t("what a held node is missed by", test_held), &
          test_case_t("what is missed", test_missed)]
    end subroutine collect_friction_ways
@@ -188,6 +189,47 @@ contains
          end associate
       end do
    end subroutine test_close
+
+   !> A push of 2 bears friction of 1/2. Rows hold the slip, whatever it is rounded to: what they
+   !> take more than that it slides by, against it. What nothing pushes goes on as it was.
+   subroutine test_turn(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: stick(6) = [0.4_wp, -0.4_wp, 0.6_wp, -0.6_wp, 0.0_wp, 0.6_wp], &
+         lam(6) = [2.0_wp, 2.0_wp, 2.0_wp, 2.0_wp, 0.0_wp, 2.0_wp]
+      real(wp), parameter :: direction(6) = [0.0_wp, 0.0_wp, 1.0_wp, -1.0_wp, 0.0_wp, 0.0_wp]
+      logical, parameter :: turned(6) = [.false., .false., .true., .true., .false., .false.]
+      type(system_t) :: system
+      type(active_set_t) :: active
+      type(motion_t) :: motion
+      logical :: turns
+      integer :: k, side
+
+      do k = 1, size(stick)
+         do side = -1, 1, 2
+            call open(system, active, motion)
+            call select(system, active, motion, [.true., .false., .false., .false.])
+            associate (law => active%friction%law(1), item => active%set%item(1))
+               law%status = slip_status_t(kind=contact_sticks)
+               law%slip_target(1) = 0.5_wp*(-1)**(k - 1)
+               if (k == 6) law%mu = 0.0_wp
+               item%has_friction = .true.
+               item%slip(1) = law%slip_target(1) + 0.125_wp*side
+               item%response%stick(1) = stick(k)
+               active%set%lam(1) = lam(k)
+               turns = .false.
+               call friction_turn(active%friction, system, active%set, 1, turns)
+               call check_true(error, turns .eqv. turned(k), "turns " // to_text(k))
+               call check_equal(error, law%status%kind, merge(contact_slides, contact_sticks, &
+                  turned(k)), "kind " // to_text(k))
+               call check_near(error, law%status%direction(1), direction(k), tol, 1.0_wp, &
+                  "direction " // to_text(k))
+               turns = .true.
+               call friction_turn(active%friction, system, active%set, 1, turns)
+               call check_true(error, turns, "what others do is left")
+            end associate
+         end do
+      end do
+   end subroutine test_turn
 
    !> At a node that is held by the stiffness of the next one: (2 + 4)/2, without what follows by a
    !> half.

@@ -3,8 +3,8 @@ module test_hermite_gap
    use check, only : check_near, check_true, test_case_t
    use emcon_dgrad13, only : dg_t
    use emcon_errors, only : error_t
-   use emcon_hermite, only : hermite_curve, hermite_point, hermite_point_t, hermite_stencil_t, &
-      joined_pieces
+   use emcon_hermite, only : hermite_closest, hermite_curve, hermite_curve_t, hermite_point, &
+      hermite_point_t, hermite_stencil_t, joined_pieces
    use emcon_hermite_gap, only : hermite_gap_of => hermite_gap, hermite_slip_of => hermite_slip
    use emcon_hermite_gap_value, only : hermite_begin, hermite_gap_value, hermite_slip_value
    use emcon_kinds, only : wp
@@ -42,6 +42,7 @@ contains
          test_case_t("circle: error of order 4", test_circle), &
          test_case_t("circle: ends and unequal edges", test_unequal), &
          test_case_t("closest point", test_closest), &
+         test_case_t("of several the one that a way downhill comes to", test_downhill), &
          test_case_t("corners: maximum if convex, minimum if concave", test_corner), &
          test_case_t("rounded corners", test_rounded), &
          test_case_t("lost near the centre of curvature", test_focal), &
@@ -262,6 +263,53 @@ contains
          call check_true(error, abs(gap) <= nearest + tol, "no closer point")
       end do
    end subroutine test_closest
+
+   !> A wave of one crest every two edges: from wherever one starts, the first place where a walk in
+   !> small steps towards the point comes no nearer.
+   subroutine test_downhill(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: small = 1.0_wp/256.0_wp
+      type(hermite_curve_t) :: curve
+      real(wp) :: u(3), nodes(2, 6), edge(2, 5), b(2), s, walked
+      integer :: i, j, k, n_place(-2:3)
+      logical :: is_found
+
+      curve = hermite_curve(stencil_of(1), joined_pieces)
+      do k = 1, 6
+         nodes(:, k) = [3.0_wp - real(k, wp), merge(0.4_wp, -0.4_wp, mod(k, 2) == 0)]
+      end do
+      edge = nodes(:, 2:) - nodes(:, :5)
+      n_place = 0
+      do i = 1, 200
+         call draw_random(u)
+         b = [-0.5_wp, 0.8_wp] - nodes(:, 3) + [u(1) - 0.5_wp, u(2)]
+         s = 4.0_wp*u(3) - 1.5_wp
+         walked = s
+         k = nint(sign(1.0_wp, towards(s)))
+         do while (k*towards(walked) > 0.0_wp .and. abs(walked) < 8.0_wp)
+            walked = walked + k*small
+         end do
+         ! Two places within half an edge are not told apart.
+         if (any([(k*towards(walked + j*k*small) > 0.0_wp, j = 0, 128)])) cycle
+         call hermite_closest(curve, edge, b, s, is_found)
+         call check_true(error, abs(walked - 0.5_wp*k*small - s) <= 0.5_wp*small + tol, "place " &
+            // to_text(s) // ", walked to " // to_text(walked))
+         if (abs(s) < 2.0_wp) n_place(nint(s)) = n_place(nint(s)) + 1
+      end do
+      call check_true(error, count(n_place > 10) > 1, "several places")
+
+   contains
+
+      !> > 0: places further on are nearer.
+      pure real(wp) function towards(s)
+         real(wp), intent(in) :: s
+         type(hermite_point_t) :: p
+
+         p = hermite_point(curve, edge, s)
+         towards = dot_product(b - p%y, p%tangent)
+      end function towards
+
+   end subroutine test_downhill
 
    !> Gap over the line from `a` to `b`.
    pure real(wp) function line_gap(s, a, b)

@@ -12,6 +12,8 @@ module test_march_commit
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
    use emcon_march_commit, only : march_commit
+   use emcon_nodal_pull, only : nodal_pull_add, nodal_pull_t
+   use emcon_rigid_bodies, only : rigid_frame_choose
    use emcon_scene, only : scene_t
    use emcon_stand_off, only : stand_off_add, stand_off_t
    use emcon_state, only : state_t
@@ -41,6 +43,8 @@ contains
          test_case_t("a step with friction", test_step), &
          test_case_t("works in statics", test_statics), &
          test_case_t("what is told of a step", test_told), &
+         test_case_t("nothing is left of contacts before", test_forgotten), &
+         test_case_t("what always holds is no contact", test_permanent), &
          test_case_t("what is told of bodies that nothing holds", test_stabilized), &
          test_case_t("friction above what one contact bears", test_limit), &
          test_case_t("impacts that keep a part", test_restitution)]
@@ -319,6 +323,109 @@ contains
       end do
       call march_free(march)
    end subroutine test_told
+
+   !> Whatever the state has of contacts before the step: what acts has that of the step, all else
+   !> nothing, but for how far it has slid.
+   subroutine test_forgotten(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(nodal_pull_t) :: pull
+      real(wp) :: expected(3)
+      integer :: k
+
+      call begin(scene, .false., march, error)
+      do k = 1, 40
+         if (allocated(error)) return
+         call march_increment(march, scene, increment, error)
+         if (any(increment%n_active == [1, 2])) exit
+      end do
+      if (allocated(error)) return
+      associate (now => march%state%contacts, set => march%active%set)
+         now%is_active = .true.
+         now%lam = 7.0_wp
+         now%closure = 7.0_wp
+         now%drag = 7.0_wp
+         now%slides_along = 7.0_wp
+         now%slip = 7.0_wp
+         now%slip_path = 7.0_wp
+         ! As if gaps were integrals, of one node that is pulled.
+         set%item(:set%n)%is_mean = .true.
+         increment = increment_t()
+         call march_commit(march, scene, h, increment, error)
+         if (allocated(error)) return
+         expected = 0.0_wp
+         expected(set%id(:set%n)) = set%lam(:set%n)
+         call check_true(error, any(set%n == [1, 2]) .and. all(abs(set%lam(:set%n)) > 0.0_wp), "some act")
+         call check_near(error, now%lam, expected, 0.0_wp, 1.0_wp, "multipliers")
+         call check_true(error, all(now%is_active .eqv. abs(expected) > 0.0_wp), "what acts")
+         call check_near(error, now%closure, 0.0_wp*expected, 0.0_wp, 1.0_wp, "nothing gives way")
+         where (now%is_active) expected = now%drag(1, :)
+         call check_near(error, now%drag(1, :), expected, 0.0_wp, 1.0_wp, "friction")
+         where (now%is_active) expected = now%slides_along(1, :)
+         call check_near(error, now%slides_along(1, :), expected, 0.0_wp, 1.0_wp, "directions")
+         call check_true(error, all(abs(now%slides_along(1, :)) <= 1.0_wp), "they are directions")
+         where (now%is_active) expected = now%slip(1, :) - 7.0_wp
+         call check_near(error, now%slip(1, :), 7.0_wp + expected, tol, 1.0_wp, "slips")
+         call check_true(error, all(now%slip_path >= 7.0_wp), "ways")
+         call nodal_pull_add(pull, set, 16)
+         call check_true(error, pull%force > 0.0_wp, "nodes are pushed")
+         call check_near(error, [increment%nodal_pull%pull, increment%nodal_pull%force], &
+            [pull%pull, pull%force], 0.0_wp, 1.0_wp, "at single nodes")
+      end associate
+      call march_free(march)
+   end subroutine test_forgotten
+
+   !> A rigid block falls on another: forces of contact are those of gaps, not those that keep it
+   !> rigid, and all of the set act.
+   subroutine test_permanent(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(march_t) :: march
+      type(increment_t) :: increment
+      real(wp) :: force(2, 16)
+      integer :: k, i, j, n_seen
+
+      call make_two_blocks(scene, 0.03_wp, lower, upper)
+      call add_step(scene, .false., h, 8)
+      call clamp(scene%step(1), [(i, i = 1, 5)])
+      deallocate(scene%rigid)
+      allocate(scene%rigid(1))
+      associate (body => scene%rigid(1))
+         body%name = "UPPER"
+         body%reference = 11
+         body%element = upper%elements_before + [1, 2]
+         body%node = [(i, i = 11, 16)]
+         call rigid_frame_choose(scene%x, body%node, body%reference, body%frame)
+      end associate
+      scene%v0(2, 11:) = -1.0_wp
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      n_seen = 0
+      do k = 1, 8
+         if (allocated(error)) return
+         call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         force = 0.0_wp
+         associate (set => march%active%set)
+            call check_true(error, set%n_permanent > 0, "the body is rigid")
+            call check_true(error, all(march%active%is_active(set%id(:set%n))), "what acts")
+            do i = set%n_permanent + 1, set%n
+               do j = 1, set%item(i)%n_node
+                  associate (node => set%item(i)%node(j))
+                     force(:, node) = force(:, node) + condition_force(set%item(i), set%lam(i), j)
+                  end associate
+               end do
+            end do
+            if (set%n > set%n_permanent) n_seen = n_seen + 1
+         end associate
+         call check_near(error, march%state%contact, force, tol, 10.0_wp, "forces of contact")
+      end do
+      call check_true(error, n_seen > 0, "contact")
+      call march_free(march)
+   end subroutine test_permanent
 
    !> The lower block moves as nothing holds it: what the balance leaves over does work; told once
    !> of each body, and of gaps that were closed where contact acts.

@@ -256,6 +256,7 @@ contains
          if (allocated(error)) return
          call check_equal(error, at_once%n_cut, 0, "at once")
          associate (now => march%state, then => other%state)
+            call check_true(error, now%base%is_set, "a factor is kept")
             call check_near(error, [increment%h, increment%done, now%clock%time, now%base%h], &
                [at_once%h, at_once%done, then%clock%time, then%base%h], 0.0_wp, 1.0_wp, "sizes")
             call check_near(error, [now%u, now%v, now%internal], [then%u, then%v, then%internal], &

@@ -28,6 +28,7 @@ contains
       tests = [ &
          test_case_t("points and corners", test_points), &
          test_case_t("units between the points", test_units), &
+         test_case_t("units late in a long step", test_late), &
          test_case_t("a time that is set", test_set), &
          test_case_t("sizes that the error asks for", test_sizes), &
          test_case_t("increments of a step", test_count)]
@@ -107,6 +108,36 @@ contains
       end function at
 
    end subroutine test_units
+
+   !> Quarters of the last interval, which is shorter, after a thousand: they are quarters of it, not
+   !> differences of times, whose rounding is a thousand times theirs.
+   subroutine test_late(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(block_t) :: block
+      real(wp) :: whole
+      integer :: k
+      integer(int64) :: first, quarter
+
+      call make_block(scene, "CPE4", [1, 1], block)
+      call add_step(scene, .false., 0.1_wp, 1)
+      associate (step => scene%step(1), grid => march%grid)
+         step%time%is_direct = .false.
+         step%time%duration = 100.03_wp
+         step%time%tolerance = 1.0e-3_wp
+         call march_count_grid(march, step)
+         call check_equal(error, grid%n_grid, 1001, "intervals")
+         first = (grid%n_grid - 1)*grid%n_unit
+         quarter = grid%n_unit/4
+         whole = march_size(march, step, first, grid%n_unit)
+         call check_near(error, whole, 0.03_wp, 4.0_wp*epsilon(1.0_wp), step%time%duration, "last")
+         do k = 0, 3
+            call check_near(error, march_size(march, step, first + k*quarter, quarter), &
+               0.25_wp*whole, 2.0_wp*epsilon(1.0_wp), whole, "quarter " // to_text(k + 1))
+         end do
+      end associate
+   end subroutine test_late
 
    !> Of twenty increments: halved down to h_min, else six times for the error and twelve in all;
    !> doubled up to h_max, else to the whole step. Events lie in a part of the increment, which has

@@ -13,6 +13,7 @@ module test_march_snap
    use emcon_term, only : role_internal
    use emcon_term_registry, only : terms_stabilization
    use emcon_text, only : to_text
+   use emcon_verdict, only : verdict_start, verdict_t, verdict_update
    use small_scenes, only : add_step, block_t, clamp, make_block, prescribe, shake
    implicit none
    private
@@ -21,6 +22,8 @@ module test_march_snap
    real(wp), parameter :: eps = max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp))
    !> Part of what is stored that work may differ by.
    real(wp), parameter :: bar = 0.02_wp
+   !> Viscous forces that are told, by those of the elements.
+   real(wp), parameter :: told_share = 1.0e-3_wp
 
 contains
 
@@ -32,7 +35,8 @@ contains
          test_case_t("where there is hardly energy, but round-off", test_rounding), &
          test_case_t("a balance that is no minimum", test_minimum), &
          test_case_t("contact that takes works", test_taken), &
-         test_case_t("what viscous forces are of all", test_left)]
+         test_case_t("what viscous forces are of all", test_left), &
+         test_case_t("told where the body is on its way", test_told)]
    end subroutine collect_march_snap
 
    !> A strip of `n` squares that is pulled, after its first increment.
@@ -220,5 +224,51 @@ contains
       end associate
       call march_free(march)
    end subroutine test_left
+
+   !> At the end of a step viscous forces of a thousandth are told, by the root of what is stored: of
+   !> the largest energy before, or of this one where it is larger; not without STABILIZE.
+   subroutine test_told(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: part(6) = [1.05_wp, 0.95_wp, 1.05_wp, 0.95_wp, 1.05_wp, 1.05_wp], &
+         largest(6) = [0.25_wp, 0.25_wp, 4.0_wp, 4.0_wp, 0.25_wp, 0.25_wp]
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(verdict_t) :: verdict
+      real(wp), dimension(2, 6) :: viscous
+      real(wp) :: none
+      integer :: k
+
+      call begin(scene, march, 2, error)
+      if (allocated(error)) return
+      call terms_stabilization(march%system%term, none, viscous)
+      do k = 1, size(part)
+         march%state%energy = 1.0_wp/size(march%state%energy)
+         march%state%clock%n_grid = merge(3, march%grid%n_grid, k == 5)
+         if (k == 6) scene%step(1)%stabilization = 0.0_wp
+         associate (response => march%system%response)
+            response%rounding = 0.0_wp
+            response%part(role_internal)%magnitude = norm2(viscous)/sqrt(12.0_wp) &
+               /(told_share*part(k)*sqrt(max(1.0_wp, largest(k))))
+         end associate
+         call verdict_start(verdict, march)
+         verdict%energy%largest = largest(k)
+         call verdict_update(verdict, scene, march, increment)
+         call check_equal(error, count_told(verdict), merge(1, 0, k < 5 .and. part(k) > 1.0_wp), &
+            "told " // to_text(k))
+      end do
+      call march_free(march)
+   end subroutine test_told
+
+   pure integer function count_told(verdict) result(n)
+      type(verdict_t), intent(in) :: verdict
+      integer :: i
+
+      n = 0
+      do i = 1, verdict%warnings%n
+         if (index(verdict%warnings%item(i)%text, "at the end of step 1 STABILIZE bears ") == 1) &
+            n = n + 1
+      end do
+   end function count_told
 
 end module test_march_snap

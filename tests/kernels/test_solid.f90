@@ -38,6 +38,7 @@ contains
          test_case_t("forces and energies are the sums over the elements", test_sums), &
          test_case_t("translation by 1e8 costs nothing", test_translation), &
          test_case_t("modes inside let rectangles bend", test_bent), &
+         test_case_t("what displacements round", test_rounding), &
          test_case_t("first inverted element is named", test_inverted), &
          test_case_t("tangents that are symmetric", test_symmetric), &
          test_case_t("clockwise element", test_clockwise), &
@@ -276,6 +277,40 @@ contains
          end do
       end do
    end subroutine test_symmetric
+
+   !> Of a triangle with the sides 1 at a right angle slopes of shape functions are 1, twice so at
+   !> the corner; in a ring they are N/r around it, at three points.
+   subroutine test_rounding(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: modulus = young*(1.0_wp - poisson)/((1.0_wp + poisson)*(1.0_wp &
+         - 2.0_wp*poisson))
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(solid_t) :: solid
+      real(wp) :: expected(3), around(3)
+      integer :: k, j
+
+      do k = 1, 2
+         call make_block(scene, "CPE3", [1, 1], block)
+         scene%x(1, :) = scene%x(1, :) + 0.5_wp
+         if (k == 2) scene%element%kind = find_element_row("CAX3")
+         scene%is_axial = k == 2
+         call solid_init(solid, scene, error)
+         if (allocated(error)) return
+         expected = 0.0_wp
+         around = 0.0_wp
+         associate (geometry => solid%geometry(1))
+            do j = 1, geometry%n_gp
+               if (k == 2) around = abs(geometry%circle(:, j))
+               expected = expected + geometry%weight(j)*(4.0_wp + sum(around)) &
+                  *([1.0_wp, 2.0_wp, 1.0_wp] + around)
+            end do
+         end associate
+         ! By the law's half of its modulus, as over a step.
+         call check_near(error, solid%stiffness(:3, 1), 0.5_wp*modulus*expected, tol, &
+            modulus*expected(2), "stiffness by slopes")
+      end do
+   end subroutine test_rounding
 
    !> Of a small curvature k, -k x y and k x**2/2 at nodes, a beam of CPE4I stores what one in plane
    !> strain does, E/(1 - nu**2) k**2/24 of its moment of inertia and length, side by side or alone.

@@ -1,11 +1,12 @@
 !> Impulses of contacts: what is collected of a set, and how it turns with a motion.
 module test_velocity_jumps
    use check, only : check_equal, check_near, test_case_t
-   use emcon_condition_nodes, only : condition_resize
+   use emcon_condition_nodes, only : condition_resize, condition_resize_slip
    use emcon_constraints, only : constraint_set_t, constraints_select
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_velocity_jumps, only : jumps_add, jumps_begin, jumps_join, jumps_scale, velocity_jump_t
+   use emcon_velocity_jumps, only : jumps_add, jumps_begin, jumps_join, jumps_rub, jumps_scale, &
+      velocity_jump_t
    use small_scenes, only : shake
    implicit none
    private
@@ -21,6 +22,7 @@ contains
       tests = [ &
          test_case_t("impulses of contacts, not of what always holds", test_add), &
          test_case_t("what pushes turn by on a way", test_turn), &
+         test_case_t("friction of those that rub", test_rub), &
          test_case_t("a part of all, and others behind", test_parts)]
    end subroutine collect_velocity_jumps
 
@@ -93,6 +95,31 @@ contains
          end associate
       end do
    end subroutine test_turn
+
+   !> The last of two takes friction as well, of impulses appended last alone.
+   subroutine test_rub(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: drag(1, 3) = reshape([7.0_wp, 8.0_wp, -0.5_wp], [1, 3]), &
+         rubbed(3) = [5.0_wp, 6.0_wp, 0.75_wp]
+      type(constraint_set_t) :: set
+      type(velocity_jump_t), allocatable :: jump(:), before(:)
+
+      call make_set(set)
+      set%item%has_friction = [.true., .false., .true.]
+      call condition_resize_slip(set%item(3))
+      call shake(set%item(3)%t1(:, :, 1), 1.0_wp)
+      call jumps_begin(jump)
+      call jumps_add(jump, set, [0.0_wp, 2.0_wp, -4.0_wp])
+      call jumps_add(jump, set, [0.0_wp, 1.0_wp, 3.0_wp])
+      before = jump
+      call jumps_rub(jump, set, drag, rubbed)
+      call check_near(error, [jump%rubbed, jump%drag(1)], [0.0_wp, 0.0_wp, 0.0_wp, 0.75_wp, &
+         0.0_wp, 0.0_wp, 0.0_wp, -0.5_wp], 0.0_wp, 1.0_wp, "what it takes")
+      before(4)%impulse = before(4)%impulse + 0.5_wp*set%item(3)%t1(:, :3, 1)
+      call check_near(error, [jump(1)%impulse, jump(2)%impulse, jump(3)%impulse, &
+         jump(4)%impulse], [before(1)%impulse, before(2)%impulse, before(3)%impulse, &
+         before(4)%impulse], tol, 4.0_wp, "impulses")
+   end subroutine test_rub
 
    subroutine test_parts(error)
       type(error_t), allocatable, intent(out) :: error

@@ -272,6 +272,25 @@ contains
       end do
       call scatter_follow(comb, pair_sum_t(weight=1.0_wp, span=1.0_wp), .true.)
       call check_equal(error, comb%n_dip, 0, "teeth")
+      ! One tooth, however long it rises.
+      comb = force_scatter_t()
+      do k = 1, 6
+         call scatter_follow(comb, pair_sum_t(weight=merge(9.0_wp, real(k, wp), k == 1), &
+            span=1.0_wp), .true.)
+      end do
+      call check_equal(error, comb%n_dip, 1, "one tooth")
+      ! Nor is anything off its neighbours across statics: squares of both parts add up.
+      comb = force_scatter_t()
+      wave = force_scatter_t()
+      push = force_scatter_t()
+      do k = 1, 5
+         if (k < 3) call scatter_follow(wave, pair_sum_t(weight=2.0_wp**k, span=1.0_wp), .true.)
+         if (k > 3) call scatter_follow(push, pair_sum_t(weight=3.0_wp**k, span=1.0_wp), .true.)
+         call scatter_follow(comb, pair_sum_t(weight=merge(2.0_wp, 3.0_wp, k < 3)**k, &
+            span=1.0_wp), k /= 3)
+      end do
+      call check_near(error, comb%off, hypot(wave%off, push%off), 8.0_wp*epsilon(1.0_wp), &
+         comb%off, "before statics and behind them")
    end subroutine test_scatter
 
    subroutine test_failed(error)
