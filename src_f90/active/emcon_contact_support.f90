@@ -16,8 +16,8 @@ module emcon_contact_support
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_numbering, only : add_to_dofs
-   use emcon_mechanisms, only : mechanisms_find, mechanisms_t, mechanism_field, mechanism_force, &
-      mechanism_places
+   use emcon_mechanisms, only : held_places, mechanisms_find, mechanisms_t, mechanism_field, &
+      mechanism_force, mechanism_places
    use emcon_mechanism_text, only : describe_motion
    use emcon_mechanism_rows, only : mechanism_rows_append, mechanism_rows_find, mechanism_rows_t
    use emcon_scene, only : scene_t
@@ -234,11 +234,8 @@ contains
       type(overlap_query_t), intent(out) :: look
 
       look%rows = self%supports
-      if (scene%step(system%i_step)%nlgeom) then
-         call mechanisms_find(system, scene, scene%x + u, look%rows, .false., .true., look%bodies)
-      else
-         call mechanisms_find(system, scene, scene%x, look%rows, .false., .true., look%bodies)
-      end if
+      call mechanisms_find(system, scene, held_places(system, scene, u), look%rows, .false., &
+         .true., look%bodies)
    end subroutine take_look
 
    !> The same with the contacts `is_active`; gaps have been measured.

@@ -94,13 +94,13 @@ contains
       type(part_t), intent(in) :: part
       logical, intent(in) :: is_cut              !! it is a part, or to be cut into some
       type(parts_t), intent(inout) :: parts
-      logical :: acts(self%system%n_constraint)
+      logical, allocatable :: acts(:)
       integer :: id
 
       parts%n = parts%n + 1
       if (.not. is_cut) return
       if (parts%n == 1 .or. part%h < parts%h_least) parts%h_least = part%h
-      acts = self%state%contacts%status([(id, id = 1, size(acts))]) > 0
+      acts = self%state%contacts%status([(id, id = 1, self%system%n_constraint)]) > 0
       if (.not. allocated(parts%changes)) then
          parts%was_active = acts
          allocate(parts%changes(size(acts)), source=.false.)

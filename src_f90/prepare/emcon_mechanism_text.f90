@@ -5,8 +5,8 @@ module emcon_mechanism_text
    use emcon_free_motions, only : find_assemblies, find_free_motions
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_null_space
-   use emcon_mechanisms, only : mechanisms_find, mechanisms_t, mechanism_places, &
-      rigid_motions_as_one
+   use emcon_mechanisms, only : held_places, mechanisms_find, mechanisms_t, &
+      mechanism_places, rigid_motions_as_one
    use emcon_mechanism_rows, only : mechanism_rows_find, mechanism_rows_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : prescribed_t
@@ -46,9 +46,7 @@ contains
       contact_holds = .true.
       if (present(with_contact)) contact_holds = .not. with_contact
       x = scene%x
-      if (present(u)) then
-         if (scene%step(system%i_step)%nlgeom) x = x + u
-      end if
+      if (present(u)) x = held_places(system, scene, u)
       call mechanism_rows_find(system, prescribed, rows)
       call mechanisms_find(system, scene, x, rows, contact_holds, &
          contact_holds .or. present(is_held), bodies)

@@ -14,7 +14,7 @@ module emcon_mechanisms
    implicit none
    private
    public :: mechanisms_t, mechanisms_find, mechanism_free, mechanism_places, rigid_motions_at
-   public :: rigid_motions_as_one, mechanism_force, mechanism_field
+   public :: rigid_motions_as_one, mechanism_force, mechanism_field, held_places
 
    !> The bodies: first those of elements and given forces, as numbered in `system_t`, then single
    !> nodes of equations.
@@ -32,6 +32,17 @@ module emcon_mechanisms
    end type mechanisms_t
 
 contains
+
+   !> Where supports hold bodies: as they lie at `u` where displacements are large, else at rest.
+   pure function held_places(system, scene, u) result(x)
+      type(system_t), intent(in) :: system
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node) [L]
+      real(wp) :: x(size(u, 1), size(u, 2))      !! [L]
+
+      x = scene%x
+      if (scene%step(system%i_step)%nlgeom) x = x + u
+   end function held_places
 
    !> Bodies at `x`, and which of their motions need to be prevented. Those of bodies that contact
    !> (`contact_holds`) or a given force or constraint (`host_holds`) may hold need not.

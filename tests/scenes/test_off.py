@@ -122,7 +122,8 @@ def test_without_a_pair_no_code_of_contact_runs(plain):
     sets = {"constraints_select", "constraints_evaluate", "constraints_rows", "linearise"}
     assert not [name for name in calls if name.split("_MOD_")[-1] in sets]
     assert not called(calls, "emcon_layer", "emcon_layer_push", "emcon_velocity_update",
-                      "emcon_gaps", "emcon_contact_support_gaps", "emcon_overclosure")
+                      "emcon_velocity_mass", "emcon_rate_jump", "emcon_gaps",
+                      "emcon_contact_support_gaps", "emcon_overclosure")
 
 
 def test_without_a_tie_nothing_is_eliminated(plain):
