@@ -128,7 +128,7 @@ contains
       self%excused = meant
    end subroutine excuse_points
 
-   !> Where the bodies of the overlap `found` have gone through themselves, with nothing to hold them.
+   !> Where the bodies of the overlap `found` have gone through themselves, which no pair prevents.
    subroutine overlap_check_own(self, x, u, found, own)
       type(overlap_check_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
@@ -153,18 +153,18 @@ contains
       integer :: p, f
 
       rest = 0.0_wp
-      associate (outline => self%query%outline)
+      associate (mesh => self%query%outline)
          is_named = .false.
          do p = 1, self%n_piece
-            do f = outline%start(p), outline%start(p + 1) - 1
-               is_named(p) = is_named(p) .or. any(outline%facet(:, f) > 0 &
-                  .and. overlap_names(found, outline%facet(:, f)))
+            do f = mesh%start(p), mesh%start(p + 1) - 1
+               is_named(p) = is_named(p) .or. any(mesh%facet(:, f) > 0 &
+                  .and. overlap_names(found, mesh%facet(:, f)))
             end do
          end do
          self%query%is_passing = .false.
          do p = 1, self%n_piece
-            if (.not. any(is_named .and. outline%body == outline%body(p))) cycle
-            if (outline_meets(outline, p, p)) cycle
+            if (.not. any(is_named .and. mesh%body == mesh%body(p))) cycle
+            if (.not. is_excused(self, p, p)) cycle
             call self%query%place(p, x, u, rest, 1.0_wp)
             call self%query%overlap(p, p, x, self%query%longest(p, x, u), own)
          end do

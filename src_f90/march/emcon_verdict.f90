@@ -279,8 +279,8 @@ contains
       end if
       if (.not. own%depth > 0.0_wp) return
       call overlap_text(own, scene%node%label, march%system%space%body, text)
-      self%overlap%place = self%overlap%place // "; a body has gone through itself by then, " // text &
-         // ": name that surface in a *CONTACT PAIR with itself"
+      self%overlap%place = self%overlap%place // "; a body has gone through itself by then, " &
+         // text // ": name that surface in a *CONTACT PAIR with itself"
    end subroutine tell_own
 
    !> Linear sections: a warning where one leaves the range of small kinematics.
