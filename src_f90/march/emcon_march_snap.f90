@@ -6,6 +6,8 @@
 !> such a place. Source: docs/theory.md, section 3.
 module emcon_march_snap
    use emcon_active_set, only : step_done, step_rough
+   use emcon_constraint_rows, only : constraints_rows
+   use emcon_constraints, only : constraints_evaluate
    use emcon_correction, only : correction_try_minimum
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
@@ -36,23 +38,28 @@ contains
 
       if (.not. scene%step(self%state%clock%i_step)%stabilization > 0.0_wp) return
       call judge(self, part, status)
-      if (status /= step_done .or. .not. part%may_cut) return
+      if (status /= step_done) return
       call find_minimum(self, is_minimum, error)
       if (.not. is_minimum) status = step_rough
    end subroutine snap_judge
 
-   !> Is the end of the increment a minimum, as far as that is asked: where no contact acts and
-   !> forces have an energy?
+   !> Is the end of the increment a minimum, where forces have an energy: without friction, and
+   !> contact that holds gaps?
    subroutine find_minimum(self, is_minimum, error)
       type(march_t), intent(inout) :: self
       logical, intent(out) :: is_minimum
       type(error_t), allocatable, intent(out) :: error
 
       is_minimum = .true.
-      if (self%active%set%n_condition > 0) return
-      call system_respond(self%system, self%motion, .true.)
-      if (self%system%is_symmetric) call correction_try_minimum(self%newton%correction, &
-         self%system%matrix, is_minimum, error)
+      associate (set => self%active%set)
+         if (set%n_condition > set%n .or. set%penalty%is_on) return
+         if (any(set%item(:set%n)%has_friction)) return
+         call system_respond(self%system, self%motion, .true.)
+         if (.not. self%system%is_symmetric) return
+         call constraints_evaluate(set, self%system, self%motion)
+         if (set%n > 0) call constraints_rows(set, self%system%space%numbering)
+         call correction_try_minimum(self%newton%correction, self%system, set, is_minimum, error)
+      end associate
    end subroutine find_minimum
 
    !> Works and energies of a step that has them. Contact without friction takes none: where what

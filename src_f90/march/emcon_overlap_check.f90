@@ -11,13 +11,13 @@ module emcon_overlap_check
    use emcon_mesh, only : surface_t
    use emcon_midside_plane, only : midside_init, midside_points, midside_stretch, midside_t
    use emcon_outline, only : outline_meets
-   use emcon_overlap_query, only : overlap_query_t, overlap_t
+   use emcon_overlap_query, only : overlap_names, overlap_query_t, overlap_t
    use emcon_overlap_query_registry, only : new_overlap_query
    use emcon_scene, only : scene_t
    implicit none
    private
    public :: overlap_check_t, overlap_t, overlap_check_init, overlap_check_smooth, &
-      overlap_check_excuse, overlap_check_step
+      overlap_check_excuse, overlap_check_own, overlap_check_step
 
    !> Between two looks pieces move against each other by less than this part of the thinnest
    !> element: one look at what goes through it is then at least half as deep.
@@ -127,6 +127,49 @@ contains
       end do
       self%excused = meant
    end subroutine excuse_points
+
+   !> Where the bodies of the overlap `found` have gone through themselves, which no pair prevents.
+   subroutine overlap_check_own(self, x, u, found, own)
+      type(overlap_check_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+      type(overlap_t), intent(in) :: found       !! of bodies
+      type(overlap_t), intent(out) :: own        !! the deepest of one of them in itself
+
+      if (self%midside%n == 0) then
+         call own_points(self, x, u, found, own)
+      else
+         call own_points(self, x, midside_points(self%midside, u), found, own)
+      end if
+   end subroutine overlap_check_own
+
+   !> The same, by the displacements of contact points.
+   subroutine own_points(self, x, u, found, own)
+      type(overlap_check_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+      type(overlap_t), intent(in) :: found
+      type(overlap_t), intent(out) :: own
+      real(wp) :: rest(size(u, 1), size(u, 2))
+      logical :: is_named(self%n_piece)
+      integer :: p, f
+
+      rest = 0.0_wp
+      associate (mesh => self%query%outline)
+         is_named = .false.
+         do p = 1, self%n_piece
+            do f = mesh%start(p), mesh%start(p + 1) - 1
+               is_named(p) = is_named(p) .or. any(mesh%facet(:, f) > 0 &
+                  .and. overlap_names(found, mesh%facet(:, f)))
+            end do
+         end do
+         self%query%is_passing = .false.
+         do p = 1, self%n_piece
+            if (.not. any(is_named .and. mesh%body == mesh%body(p))) cycle
+            if (.not. is_excused(self, p, p)) cycle
+            call self%query%place(p, x, u, rest, 1.0_wp)
+            call self%query%overlap(p, p, x, self%query%longest(p, x, u), own)
+         end do
+      end associate
+   end subroutine own_points
 
    !> The deepest overlap in the step from `u0` by `du`.
    subroutine overlap_check_step(self, x, u0, du, overlap)

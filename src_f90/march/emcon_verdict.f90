@@ -14,7 +14,8 @@ module emcon_verdict
    use emcon_kinds, only : wp
    use emcon_locking, only : locking_advice, locking_element
    use emcon_ledger, only : ledger_t
-   use emcon_overlap_query, only : overlap_text
+   use emcon_overlap_check, only : overlap_check_own, overlap_check_t
+   use emcon_overlap_query, only : overlap_t, overlap_text
    use emcon_march, only : increment_t, march_is_done, march_t
    use emcon_march_snap, only : snap_left
    use emcon_nodal_pull, only : nodal_pull_join, nodal_pull_t
@@ -257,7 +258,30 @@ contains
             self%overlap%place = self%overlap%place // unpaired
          end if
       end associate
+      if (self%overlap%deepest > most_overlap(self)) call tell_own(self, scene, march, increment)
    end subroutine follow_overlaps
+
+   !> What has gone through itself may come to others from behind.
+   subroutine tell_own(self, scene, march, increment)
+      type(verdict_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      type(march_t), intent(in) :: march
+      type(increment_t), intent(in) :: increment !! with an overlap
+      type(overlap_check_t) :: check
+      type(overlap_t) :: own
+      character(len=:), allocatable :: text
+
+      check = march%overlap_check
+      if (increment%overlap%depth >= increment%stray%depth) then
+         call overlap_check_own(check, scene%x, march%state%u, increment%overlap, own)
+      else
+         call overlap_check_own(check, scene%x, march%state%u, increment%stray, own)
+      end if
+      if (.not. own%depth > 0.0_wp) return
+      call overlap_text(own, scene%node%label, march%system%space%body, text)
+      self%overlap%place = self%overlap%place // "; a body has gone through itself by then, " &
+         // text // ": name that surface in a *CONTACT PAIR with itself"
+   end subroutine tell_own
 
    !> Linear sections: a warning where one leaves the range of small kinematics.
    subroutine follow_linear(self, scene, march)

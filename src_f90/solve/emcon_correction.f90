@@ -307,19 +307,43 @@ contains
       is_singular = self%solver%is_singular
    end subroutine factorise_free
 
-   !> Is the symmetric matrix of a system without contact positive definite?
-   subroutine correction_try_minimum(self, matrix, is_minimum, error)
+   !> Is the symmetric tangent of a system positive definite along what the constraints of `set`
+   !> leave free? They are evaluated at the end of a static step: P is DF.
+   subroutine correction_try_minimum(self, system, set, is_minimum, error)
       type(correction_t), intent(inout) :: self
-      type(csr_t), intent(in) :: matrix          !! of the system
-      logical, intent(out) :: is_minimum         !! also where there is an error
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      logical, intent(out) :: is_minimum         !! also where there is an error, or no null space
       type(error_t), allocatable, intent(out) :: error
+      logical :: is_singular
 
       is_minimum = .true.
+      if (set%n_condition == 0) then
+         call try_matrix(self, system%matrix, is_minimum, error)
+         return
+      end if
+      call correction_lay_out(self, system, set)
+      if (self%n_redundant > 0 .or. .not. self%uses_null_space .or. set%n == 0) return
+      call merge_all(self, system, set)
+      call null_space_factorise(self%null_space, set, self%layout%merged, is_singular, error)
+      if (allocated(error) .or. self%null_space%obstacle /= obstacle_none) return
+      if (self%null_space%n_free > 0) call try_matrix(self, self%null_space%reduced, is_minimum, &
+         error)
+   end subroutine correction_try_minimum
+
+   !> Is a symmetric matrix positive definite?
+   subroutine try_matrix(self, matrix, is_definite, error)
+      type(correction_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      logical, intent(out) :: is_definite        !! also where there is an error
+      type(error_t), allocatable, intent(out) :: error
+
+      is_definite = .true.
       self%n_factorisation = self%n_factorisation + 1
       call self%definite_solver%analyse(matrix, error)
       if (.not. allocated(error)) call solver_renew(self%definite_solver, matrix%value, error)
-      if (.not. allocated(error)) is_minimum = .not. self%definite_solver%is_singular
-   end subroutine correction_try_minimum
+      if (.not. allocated(error)) is_definite = .not. self%definite_solver%is_singular
+   end subroutine try_matrix
 
    !> The multipliers that belong to `residual` (without contact forces), by null space only: the
    !> saddle point has them as unknowns.

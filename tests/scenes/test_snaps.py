@@ -101,6 +101,43 @@ def test_arch_stops_without_stabilize(tmp_path):
         assert word in run.errors
 
 
+def pressed_strut(option, way):
+    """A strut of 20 by 1, held below; a rigid plate without friction on its flat top comes down."""
+    n = 20
+    nodes = [f"{1 + 2*i + j}, {j - 0.5}, {float(i)}" for i in range(n + 1) for j in (0, 1)]
+    elements = [f"{i + 1}, {2*i + 1}, {2*i + 2}, {2*i + 4}, {2*i + 3}" for i in range(n)]
+    return Deck("\n".join([
+        "*NODE", *nodes, "1001, -3., 20.", "1002, 3., 20.", "1003, 3., 21.", "1004, -3., 21.",
+        "*ELEMENT, TYPE=CPE4I, ELSET=STRUT", *elements, "*ELEMENT, TYPE=CPE4, ELSET=PLATE",
+        "1001, 1001, 1002, 1003, 1004", "*SURFACE, NAME=TOP", f"{n}, S3", "*SURFACE, NAME=PLATE",
+        "1001, S1", "*MATERIAL, NAME=M", "*HYPERELASTIC, COUPLED NEO HOOKE", "1000., 0.3",
+        "*SOLID SECTION, ELSET=STRUT, MATERIAL=M", "1.", "*SOLID SECTION, ELSET=PLATE, MATERIAL=M", "1.",
+        "*RIGID BODY, ELSET=PLATE, REF NODE=1003", "*SURFACE INTERACTION, NAME=I",
+        "*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE", "TOP, PLATE", "*NSET, NSET=ENDS",
+        f"{2*n + 1}, {2*n + 2}", "*BOUNDARY", "1, 1, 2", "2, 1, 2", "*STEP, NLGEOM, INC=10000",
+        "*STATIC" + option, "0.05, 1.", "*BOUNDARY", "1003, 1", "1003, 6", f"1003, 2, 2, {-way!r}",
+        "*NODE PRINT, NSET=ENDS", "U", "*END STEP", ""]), "strut")
+
+
+@pytest.mark.parametrize("option", ["", ", STABILIZE"])
+def test_strut_buckles_under_a_plate(option, tmp_path):
+    """Its flat top slides along the plate and stays flat: clamped and guided, at the strain
+    pi^2 h^2/(12 l^2). What it is shortened by more is the slope of (w/2)(1 - cos(pi y/l)), squared,
+    to the square of the slope itself, and the critical strain to its square. Without STABILIZE the straight strut is a balance, too."""
+    way, long = 0.06, 20.0
+    run = run_deck(pressed_strut(option, way), tmp_path)
+    assert run.verdict["verdict"] == "good" and not run.verdict["warnings"]
+    _, moved = run.series("ENDS", "U")
+    aside = np.abs(moved.reshape(len(moved), 2, -1)[-1, :, 0]).mean()
+    critical = math.pi**2/(12*long)
+    bent = 4/math.pi*math.sqrt((way - critical)*long)
+    slope = math.pi*bent/(2*long)
+    if option:
+        assert aside == pytest.approx(bent, rel=slope**2 + critical**2/long/(way - critical))
+    else:
+        assert aside < way/long
+
+
 def hook(option, way=14.0):
     """An arm of 30 by 2 with a nose of height 2 on its end, undercut behind, and a rigid
     catch that moves by `way` along the arm over the nose."""

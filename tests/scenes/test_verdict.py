@@ -4,6 +4,7 @@ import re
 
 import numpy as np
 import pytest
+from plain_scenes import BOTH, Scene
 from scene_tools import DECKS, Deck, emcon, run_deck
 
 
@@ -217,3 +218,20 @@ def test_a_node_inside_is_named(tmp_path):
     assert found["penetration"] == pytest.approx(0.025/0.5, rel=1e-9)
     assert re.fullmatch(r"bodies overlap by 0.05 of an edge at time 0.125, node [56] of body 2 is "
                         r"0.025 behind the edge from node 3 to 4 of body 1", found["reasons"][0])
+
+
+def test_a_body_that_goes_through_itself_is_told(tmp_path):
+    """A soft ring between plates, with pairs of its outer side alone: what is above its bore comes
+    out below. The verdict is bad for that, and says what nothing has held apart before."""
+    scene = Scene(0.02, 1.0)
+    scene.ring("RING", lambda a, s: ((1 - 0.15*s)*np.cos(a), 1 + (1 - 0.15*s)*np.sin(a)), (24, 1),
+               stiffness=10.0)
+    scene.block("FLOOR", (-2, -0.5), (4, 0.5), (7, 1), stiffness=1e4).hold("FLOOR", lambda *_: True)
+    scene.block("PLATE", (-2, 2.02), (4, 0.5), (7, 1), stiffness=1e4)
+    scene.hold("PLATE", lambda *_: True, "1, 1")
+    scene.hold("PLATE", lambda *_: True, "2, 2", -1.95)
+    scene.side("OUTER", "RING", lambda x, y: np.hypot(x, y - 1) > 0.99)
+    scene.pairs = [("OUTER", "FLOOR"), ("OUTER", "PLATE")]
+    found = run_deck(scene.deck(BOTH), tmp_path, code=3, formulation="NODE TO SURFACE").verdict
+    assert found["verdict"] == "bad"
+    assert any("a body has gone through itself by then" in text for text in found["reasons"])
