@@ -131,10 +131,11 @@ contains
       call make_two_blocks(scene, merge(0.0_wp, 0.07_wp, is_static), lower, upper)
       scene%x = unit%length*scene%x
       associate (step_length => unit%length, pair => scene%pair(1))
-         pair%interaction%friction = merge(0.2_wp, 0.0_wp, is_static .or. any(k == [1, 2, 3, 11, 20]))
+         pair%interaction%friction = merge(0.2_wp, 0.0_wp, is_static .or. any(k == [1, 2, 3, 6, 11, 20]))
          if (any(k == [2, 8])) pair%formulation = formulation_mortar
          if (k == 3) pair%formulation = formulation_segment
          if (k == 6) pair%interaction%restitution = 0.5_wp
+         if (k == 6) pair%interaction%rebound = 0.5_wp
          if (k == 11) then
             pair%interaction%damping%coefficient = unit%mass/(unit%length**2*unit%time)
             pair%interaction%damping%clearance = 0.1_wp*step_length
@@ -222,6 +223,7 @@ contains
                call check_equal(error, [as_well%n_newton, as_well%n_active, as_well%n_cut], &
                   [increment%n_newton, increment%n_active, increment%n_cut], what // ": counts")
                call check_state(error, march, again, other(j), what // ", increment " // to_text(i))
+               call check_books(error, march, what)
                call check_told(error, increment, as_well, other(j), what)
                if (allocated(error)) return
             end do
@@ -259,6 +261,20 @@ contains
             /unit%mass, [one%momentum, one%angular], 0.0_wp, 1.0_wp, what // ": momenta")
       end associate
    end subroutine check_state
+
+   !> What pairs take is what the ledger has of them.
+   subroutine check_books(error, march, what)
+      type(error_t), allocatable, intent(inout) :: error
+      type(march_t), intent(in) :: march
+      character(len=*), intent(in) :: what
+
+      associate (sums => march%state%sums%sum, ledger => march%ledger)
+         call check_near(error, sum(sums%friction), ledger%friction, tol, ledger%friction, what &
+            // ": friction of pairs")
+         call check_near(error, sum(sums%damping), ledger%contact_damping, tol, &
+            ledger%contact_damping, what // ": damping of pairs")
+      end associate
+   end subroutine check_books
 
    subroutine check_told(error, one, two, unit, what)
       type(error_t), allocatable, intent(inout) :: error
