@@ -368,7 +368,7 @@ contains
       if (allocated(self%dlam)) then
          if (size(self%dlam) /= n_constraint) deallocate(self%dlam)
       end if
-      if (.not. allocated(self%dlam)) allocate(self%dlam(n_constraint))
+      if (.not. allocated(self%dlam)) allocate(self%dlam(n_constraint), source=0.0_wp)
       call convergence_begin(self%convergence)
       self%n_solve = 0
       self%work = 0.0_wp

@@ -14,11 +14,11 @@ module test_host_law
    use emcon_march, only : increment_t
    use emcon_motion, only : motion_of, motion_t
    use emcon_point_function, only : point_failed, point_function_t, point_ok, point_outside
-   use emcon_evaluation, only : evaluation_t
+   use emcon_evaluation, only : evaluation_at_end, evaluation_t
    use emcon_restart_data, only : restart_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
-   use emcon_term, only : response_init, response_t, role_internal
+   use emcon_term, only : fastest_t, response_init, response_t, role_internal
    use emcon_term_registry, only : terms_mass_rows, terms_solid
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_read_source, &
       stepper_t
@@ -193,6 +193,22 @@ contains
       end associate
    end subroutine solid_times
 
+   !> The fastest of them.
+   type(fastest_t) function fastest_of(stepper, motion) result(fastest)
+      type(stepper_t), intent(inout) :: stepper
+      type(motion_t), intent(in) :: motion
+      logical :: is_bounded
+      integer :: k
+
+      fastest = fastest_t()
+      associate (term => stepper%march%system%term)
+         do k = 1, size(term)
+            if (term(k)%term%role == role_internal) call term(k)%term%find_fastest(motion, &
+               fastest, is_bounded)
+         end do
+      end associate
+   end function fastest_of
+
    !> Of a quadratic energy the discrete gradients are the same, of the other the gradients are.
    subroutine test_forces(error)
       type(error_t), allocatable, intent(out) :: error
@@ -211,6 +227,7 @@ contains
       type(block_t) :: block
       type(stepper_t) :: given, own
       type(response_t) :: one, other
+      type(fastest_t) :: fast(2)
       real(wp) :: u0(2, 16), du(2, 16), way(2, 16), product(2, 16), expected(2, 16)
 
       call make_block(scene, name, [3, 3], block)
@@ -231,6 +248,12 @@ contains
       call solid_times(given, motion_of(evaluation_t(), scene%x, u0, du), way, product)
       call solid_times(own, motion_of(evaluation_t(), scene%x, u0, du), way, expected)
       call check_near(error, product, expected, 256.0_wp*eps, young, "tangent")
+      fast(1) = fastest_of(given, motion_of(evaluation_at_end, scene%x, u0, du))
+      fast(2) = fastest_of(own, motion_of(evaluation_at_end, scene%x, u0, du))
+      call check_true(error, fast(2)%element > 0, "some element is the fastest")
+      call check_equal(error, fast(1)%element, fast(2)%element, "fastest")
+      call check_near(error, fast(1)%square, fast(2)%square, 1.0e3_wp*eps, fast(2)%square, &
+         "its frequency")
       call stepper_close(given)
       call stepper_close(own)
    end subroutine compare_forces

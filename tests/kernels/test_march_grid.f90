@@ -176,8 +176,10 @@ contains
                grid%n_window]), grid%least_power, grid%largest_power], [n_level(k), n_unit(k), &
                n_least(k), n_window(k), least(k), largest(k)], "sizes " // to_text(k))
          end do
-         step%time%tolerance = 0.0_wp
          step%time%event_fraction = 0.0_wp
+         call march_count_grid(march, step)
+         call check_equal(error, int(grid%n_window), 0, "no window any more")
+         step%time%tolerance = 0.0_wp
          call march_count_grid(march, step)
          call check_true(error, .not. grid%is_controlled, "neither errors nor events")
          step%time%tolerance = 1.0e-3_wp

@@ -8,11 +8,13 @@ module test_march_units
    use emcon_kinds, only : dp, wp
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
+   use emcon_rigid_bodies, only : rigid_frame_choose
    use emcon_scene, only : scene_t
-   use emcon_steps, only : initiation_massless, initiation_persistent, initiation_velocity_update, &
+   use emcon_scheme_registry, only : scheme_row
+   use emcon_steps, only : load_gravity, load_t, initiation_massless, initiation_persistent, initiation_velocity_update, &
       method_augmented_lagrange, method_penalty
    use emcon_text, only : to_text
-   use small_scenes, only : add_step, block_t, clamp, make_two_blocks, prescribe, young
+   use small_scenes, only : add_load, add_step, block_t, clamp, make_two_blocks, prescribe, young
    implicit none
    private
    public :: collect_march_units
@@ -25,13 +27,16 @@ module test_march_units
    type :: units_t
       real(wp) :: length = 1.0_wp, time = 1.0_wp, mass = 1.0_wp
    end type units_t
-   type(units_t), parameter :: other(2) = [units_t(2.0_wp**24, 2.0_wp**(-10), 2.0_wp**16), &
-      units_t(2.0_wp**(-18), 2.0_wp**8, 2.0_wp**(-20))]
+   type(units_t), parameter :: other(2) = [units_t(2.0_wp**8, 2.0_wp**(-6), 2.0_wp**6), &
+      units_t(2.0_wp**(-6), 2.0_wp**4, 2.0_wp**(-8))]
    !> What the scenes are.
-   character(len=20), parameter :: name(13) = [character(len=20) :: "nodes that rub", &
+   character(len=20), parameter :: name(20) = [character(len=20) :: "nodes that rub", &
       "mortar that rubs", "segments that rub", "both sides", "smoothed", "restitution", &
       "massless", "massless mortar", "penalty", "augmented", "damped", "velocities updated", &
-      "sizes by the error"]
+      "sizes by the error", "ENERGYDECAYING", "TRAPEZOIDAL", "GENERALIZEDALPHA", "BDF2", &
+      "CENTRALDIFFERENCE", "explicit penalty", "rigid"]
+   !> Behind these statics, with and without viscous forces.
+   integer, parameter :: n_scene = size(name) + 2
 
 contains
 
@@ -57,7 +62,12 @@ contains
    subroutine test_pushed(error)
       type(error_t), allocatable, intent(out) :: error
 
-      call compare(size(name) + 1, "statics", error)
+      integer :: k
+
+      do k = size(name) + 1, n_scene
+         call compare(k, "statics " // to_text(k), error)
+         if (allocated(error)) return
+      end do
    end subroutine test_pushed
 
    !> To the left as to the right.
@@ -66,10 +76,11 @@ contains
       type(scene_t) :: scene, mirrored
       integer :: k, i
 
-      do k = 1, size(name) + 1
+      do k = 1, n_scene
          call make(scene, k, units_t())
          mirrored = scene
          mirrored%x(1, :) = -scene%x(1, :)
+         mirrored%step(1)%load%direction(1) = -scene%step(1)%load%direction(1)
          mirrored%v0(1, :) = -scene%v0(1, :)
          mirrored%element%node = scene%element%node([2, 1, 4, 3], :)
          associate (held => mirrored%step(1)%prescribed)
@@ -112,16 +123,19 @@ contains
       integer, intent(in) :: k
       type(units_t), intent(in) :: unit
       type(block_t) :: lower, upper
+      type(load_t) :: weight
       logical :: is_static
       integer :: i
 
       is_static = k > size(name)
       call make_two_blocks(scene, merge(0.0_wp, 0.07_wp, is_static), lower, upper)
+      scene%x = unit%length*scene%x
       associate (step_length => unit%length, pair => scene%pair(1))
-         pair%interaction%friction = merge(0.2_wp, 0.0_wp, any(k == [1, 2, 3, 11, 14]))
+         pair%interaction%friction = merge(0.2_wp, 0.0_wp, is_static .or. any(k == [1, 2, 3, 6, 11, 20]))
          if (any(k == [2, 8])) pair%formulation = formulation_mortar
          if (k == 3) pair%formulation = formulation_segment
          if (k == 6) pair%interaction%restitution = 0.5_wp
+         if (k == 6) pair%interaction%rebound = 0.5_wp
          if (k == 11) then
             pair%interaction%damping%coefficient = unit%mass/(unit%length**2*unit%time)
             pair%interaction%damping%clearance = 0.1_wp*step_length
@@ -131,9 +145,12 @@ contains
       call add_step(scene, is_static, h*unit%time, n_step)
       associate (step => scene%step(1))
          step%contact%initiation = merge(initiation_massless, initiation_persistent, any(k == [7, 8]))
+         if (k >= 14 .and. k <= 18) step%scheme = scheme_row("DYNAMIC", trim(name(k)))
+         if (k == 19) step%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+         if (k == n_scene) step%stabilization = 0.01_wp
          if (k == 12) step%contact%initiation = initiation_velocity_update
          if (k == 5) step%contact%options%smoothing = smoothing_hermite
-         if (k == 9) step%contact%method = method_penalty
+         if (any(k == [9, 19])) step%contact%method = method_penalty
          if (k == 10) step%contact%method = method_augmented_lagrange
          step%time%is_direct = k /= 13
          if (k == 13) step%time%tolerance = 1.0e-3_wp
@@ -144,13 +161,39 @@ contains
             if (is_static) call prescribe(step, i, 1, 0.06_wp*unit%length)
          end do
       end associate
+      weight%kind = load_gravity
+      weight%direction(:2) = [0.6_wp, -0.8_wp]
+      weight%value = unit%length/unit%time**2
+      do i = 1, size(scene%element%kind)
+         weight%target = i
+         call add_load(scene%step(1), weight)
+      end do
+      if (k == 20) call make_rigid(scene, upper, unit%length)
       if (.not. is_static) scene%v0(1, 11:) = 0.3_wp*unit%length/unit%time
       if (.not. is_static) scene%v0(2, 11:) = -unit%length/unit%time
-      scene%x = unit%length*scene%x
       scene%section%thickness = unit%length*scene%section%thickness
       scene%material%density = unit%mass/unit%length**3*scene%material%density
       scene%material(1)%constant(1) = unit%mass/(unit%length*unit%time**2)*young
    end subroutine make
+
+   !> Let the upper block be rigid.
+   subroutine make_rigid(scene, upper, length)
+      type(scene_t), intent(inout) :: scene
+      type(block_t), intent(in) :: upper
+      real(wp), intent(in) :: length             !! of the unit
+      integer :: i
+
+      deallocate(scene%rigid)
+      allocate(scene%rigid(1))
+      associate (body => scene%rigid(1))
+         body%name = "UPPER"
+         body%reference = 11
+         body%element = upper%elements_before + [1, 2]
+         body%node = [(i, i = 11, 16)]
+         ! Of a rectangle two corners are as good: in one unit, that rounding chooses the same.
+         call rigid_frame_choose(scene%x/length, body%node, body%reference, body%frame)
+      end associate
+   end subroutine make_rigid
 
    subroutine compare(k, what, error)
       integer, intent(in) :: k
@@ -180,6 +223,7 @@ contains
                call check_equal(error, [as_well%n_newton, as_well%n_active, as_well%n_cut], &
                   [increment%n_newton, increment%n_active, increment%n_cut], what // ": counts")
                call check_state(error, march, again, other(j), what // ", increment " // to_text(i))
+               call check_books(error, march, what)
                call check_told(error, increment, as_well, other(j), what)
                if (allocated(error)) return
             end do
@@ -217,6 +261,20 @@ contains
             /unit%mass, [one%momentum, one%angular], 0.0_wp, 1.0_wp, what // ": momenta")
       end associate
    end subroutine check_state
+
+   !> What pairs take is what the ledger has of them.
+   subroutine check_books(error, march, what)
+      type(error_t), allocatable, intent(inout) :: error
+      type(march_t), intent(in) :: march
+      character(len=*), intent(in) :: what
+
+      associate (sums => march%state%sums%sum, ledger => march%ledger)
+         call check_near(error, sum(sums%friction), ledger%friction, tol, ledger%friction, what &
+            // ": friction of pairs")
+         call check_near(error, sum(sums%damping), ledger%contact_damping, tol, &
+            ledger%contact_damping, what // ": damping of pairs")
+      end associate
+   end subroutine check_books
 
    subroutine check_told(error, one, two, unit, what)
       type(error_t), allocatable, intent(inout) :: error

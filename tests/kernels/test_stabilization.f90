@@ -46,6 +46,7 @@ contains
 
       tests = [ &
          test_case_t("derivatives of the potential", test_derivatives), &
+         test_case_t("small motions, with large rotations and without", test_small), &
          test_case_t("tangent times a field; entries of a condensed one", test_times), &
          test_case_t("laws that are given, as elastic ones of their modulus", test_given), &
          test_case_t("the part of the strain energy that is asked for", test_part), &
@@ -142,6 +143,36 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_derivatives
+
+   !> Where nothing has moved both are the same, in rings too.
+   subroutine test_small(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample
+      real(wp), allocatable :: force(:)
+      real(wp) :: work
+      real(dp), allocatable :: tangent(:, :)
+      integer :: i, j, k
+
+      do k = 1, size(kinds)
+         call begin(kinds(k), 0.0_wp, sample, error)
+         if (allocated(error)) return
+         associate (n => size(sample%motion%du))
+            allocate(force(n), tangent(n**2, 2))
+            do j = 1, 2
+               sample%scene%step(1)%nlgeom = j == 1
+               call sample%term%begin_step(sample%scene, 1, sample%space, sample%matrix, [(i, &
+                  i = 1, n**2)])
+               call find(sample, sample%motion%du, work, force, tangent(:, j))
+            end do
+         end associate
+         call check_near(error, real(tangent(:, 1), wp), real(tangent(:, 2), wp), &
+            256.0_wp*max(epsilon(1.0_wp), real(epsilon(1.0_dp), wp)), &
+            real(maxval(abs(tangent)), wp), trim(kinds(k)) // ": tangent")
+         call check_true(error, maxval(abs(tangent)) > 0.0_dp, "there is one")
+         deallocate(force, tangent)
+         if (allocated(error)) return
+      end do
+   end subroutine test_small
 
    !> The tangent that the matrix is given, and nothing where there is no time; entries of the slots
    !> below 0 go to the side.
