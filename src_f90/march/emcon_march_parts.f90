@@ -298,6 +298,7 @@ contains
          if (.not. self%active%support%is_pushed) text = text // ", on which no load does work"
          if (slides(self)) text = text // ", where friction is at its limit"
          text = text // "; add *BOUNDARY conditions"
+         if (slides(self)) text = text // ", or more *FRICTION"
          if (.not. self%active%support%is_pushed) text = text // &
             ", or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"
       case (step_unbalanced)
@@ -382,6 +383,9 @@ contains
             call holders_text(self%system, size(scene%x, 2), holders)
             text = text // "; without " // holders // " " // motion
             if (slides(self)) text = text // "; friction is at its limit at contacts that slide"
+            if (size(self%system%contact) > 0) text = text // "; if contact does not hold it " // &
+               "there, as it tips or slides off, add *BOUNDARY conditions or go on with *DYNAMIC"
+            if (size(self%system%contact) == 0) text = text // "; add *BOUNDARY conditions"
          end if
       end if
       if (evaluation_has_inertia(self%motion%evaluation) &
