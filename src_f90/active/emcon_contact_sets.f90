@@ -137,13 +137,14 @@ contains
       friction = 0.0_wp
       do k = self%set%n_permanent + 1, self%set%n
          associate (id => self%set%id(k))
-            turned(k) = self%is_active(id) .and. gripped(id) .and. .not. self%support%grips(id)
+            turned(k) = self%candidates%acts(id) .and. gripped(id) &
+               .and. .not. self%support%grips(id)
             if (turned(k)) call friction_use(self%friction, self%set, k, friction(:, id), use(k))
          end associate
       end do
       if (count(turned) < 2) return
-      call contact_support_find_jam(self%support, system, scene, motion, self%is_active, friction, &
-         jams)
+      call contact_support_find_jam(self%support, system, scene, motion, self%candidates%acts, &
+         friction, jams)
       if (.not. jams) return
       do k = self%set%n_permanent + 1, self%set%n
          if (turned(k) .and. use(k) < alike*maxval(use)) &

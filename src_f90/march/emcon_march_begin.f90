@@ -100,7 +100,7 @@ contains
          end if
          call free_motion_text(self%system, scene, step%prescribed, text, u=self%state%u)
          if (len(text) > 0) call raise(error, err_analysis, "the static problem is singular: " &
-            // text)
+            // text // "; add *BOUNDARY conditions")
       end associate
    end subroutine check_held
 

@@ -288,6 +288,7 @@ contains
          if (.not. self%active%support%is_pushed) text = text // ", on which no load does work"
          if (active_set_slides(self%active)) text = text // ", where friction is at its limit"
          text = text // "; add *BOUNDARY conditions"
+         if (active_set_slides(self%active)) text = text // ", or more *FRICTION"
          if (.not. self%active%support%is_pushed) text = text // &
             ", or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"
       case (step_unbalanced)
@@ -373,6 +374,9 @@ contains
             text = text // "; without " // holders // " " // motion
             if (active_set_slides(self%active)) text = text // &
                "; friction is at its limit at contacts that slide"
+            if (size(self%system%contact) > 0) text = text // "; if contact does not hold it " // &
+               "there, as it tips or slides off, add *BOUNDARY conditions or go on with *DYNAMIC"
+            if (size(self%system%contact) == 0) text = text // "; add *BOUNDARY conditions"
          end if
       end if
       if (evaluation_has_inertia(self%motion%evaluation) &

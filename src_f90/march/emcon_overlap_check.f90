@@ -65,9 +65,11 @@ contains
       call new_overlap_query(scene, self%query)
       self%is_able = allocated(self%query)
       if (self%is_able) then
-         self%n_piece = self%query%outline%n_piece
-         self%n_facet = size(self%query%outline%facet, 2)
-         outline%edge = self%query%outline%facet
+         associate (mesh => self%query%outline)
+            self%n_piece = mesh%n_piece
+            self%n_facet = size(mesh%facet, 2)
+            outline%edge = mesh%facet
+         end associate
          call midside_init(self%midside, scene, [integer ::], outline)
       end if
       associate (n => self%n_piece)

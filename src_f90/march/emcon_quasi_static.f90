@@ -38,7 +38,7 @@ contains
       call free_motion_text(self%system, scene, scene%step(self%state%clock%i_step)%prescribed, &
          text, with_contact=.true., is_held=mass > 0.0_dp, u=self%state%u)
       if (len(text) > 0) call raise(error, err_analysis, "a MASSLESS section has no inertia to " &
-         // "hold it, and contact may open: " // text)
+         // "hold it, and contact may open: " // text // "; add *BOUNDARY conditions")
    end subroutine quasi_static_hold
 
    !> A warning if the forces on nodes without mass do not balance as a dynamic step begins.

@@ -68,7 +68,6 @@ contains
          call find_free_motions(bodies, rows, order(first:last), member, z, noise)
          if (size(z, 2) == 0) cycle
          call describe_motion(bodies, system, scene, noise, member, z, text)
-         text = text // "; add *BOUNDARY conditions"
          return
       end do
    end subroutine free_motion_text
@@ -156,7 +155,7 @@ contains
       if (size(member) == 1) then
          text = text // " is"
       else
-         text = text // ", tied to each other, are"
+         text = text // ", held together, are"
       end if
 
    contains
