@@ -195,7 +195,7 @@ contains
       call name_index_put(reader%names%surfaces, exterior_name, all)
       call append_pairs(scene, card, [all])
       do i = 1, all
-         if (is_analytical(scene%surface(i))) call append_pairs(scene, card, [all, i])
+         if (scene%surface(i)%is_profile) call append_pairs(scene, card, [all, i])
       end do
    end subroutine include_exterior
 
@@ -218,7 +218,7 @@ contains
          end do
       end do
       do i = 1, size(scene%surface)
-         if (.not. is_analytical(scene%surface(i))) cycle
+         if (.not. scene%surface(i)%is_profile) cycle
          call surface_nodes(scene, scene%surface(i), node)
          if (size(node) == 0) cycle
          do body = 1, size(scene%rigid)
@@ -233,13 +233,6 @@ contains
       allocate(surface%node(0))
       surface%is_exterior = .true.
    end subroutine find_exterior
-
-   !> Is a surface made neither of faces nor of nodes?
-   pure logical function is_analytical(surface)
-      type(surface_t), intent(in) :: surface
-
-      is_analytical = size(surface%element) + size(surface%node) == 0
-   end function is_analytical
 
    !> The names in *CONTACT PROPERTY ASSIGNMENT: surface, surface, interaction. All interactions
    !> mean the same, hard contact; pads, restitution, friction and damping are of pairs only.
