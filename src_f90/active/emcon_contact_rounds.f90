@@ -154,6 +154,8 @@ contains
       associate (set => self%set, friction => self%friction)
          call candidates_keep_forces(self)
          self%candidates%acted(:) = self%candidates%acts
+         ! Rows that always hold have no law below.
+         self%candidates%acts = self%candidates%takes_part
          do k = 1, size(law)
             associate (id => set%id(set%n_permanent + k))
                acts = law(k)%status%kind /= contact_open

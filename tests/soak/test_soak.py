@@ -51,8 +51,8 @@ def test_bits_of_two_programs(tmp_path, capsys, monkeypatch):
 
 def test_drawn_scenes_are_right_and_called_right(tmp_path):
     """Rigid, static, rubbing, mortar and segments: a corner that mortar alone lets in is seed 16, a
-    static body of which all contacts slide seed 225."""
-    results = [judge_seed(seed, tmp_path / str(seed)) for seed in (1, 6, 15, 16, 30, 79, 225)]
+    static body of which all contacts slide seed 225, rows of rigid bodies beside them seed 470."""
+    results = [judge_seed(seed, tmp_path / str(seed)) for seed in (1, 6, 15, 16, 30, 79, 225, 470)]
     lines, wrong = table(results)
     assert not wrong and [r["verdict"] for r in results] == ["good"]*7, lines
 
