@@ -42,9 +42,9 @@ contains
                n = n + 1
                reader%interaction_name(n)%text = name
                if (name /= "") call name_index_put(reader%names%interactions, name, n)
-               call option_number(reader, card, "PAD THICKNESS", "a length from 0 to 1e100: it " &
+               call option_number(reader, card, "PAD THICKNESS", "a length from 0 to 1e30: it " &
                   // "keeps surfaces apart; overlap at the start is resolved by *CONTACT " // &
-                  "INTERFERENCE", 0.0_wp, 1.0e100_wp, reader%interaction(n)%offset)
+                  "INTERFERENCE", 0.0_wp, 1.0e30_wp, reader%interaction(n)%offset)
                call option_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
                   // "left of the velocity at which bodies meet", 0.0_wp, 1.0_wp, &
                   reader%interaction(n)%restitution)
