@@ -173,6 +173,7 @@ contains
       call layer_mark(self, self%system, self%active%rules%closes)
       self%active%rules%holds_gap = .true.
       self%active%rules%has_impacts = .false.
+      self%active%rules%puts_off = .true.
       self%active%rules%may_cut = .false.
    end subroutine layer_begin_step
 

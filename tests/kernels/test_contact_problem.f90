@@ -598,7 +598,7 @@ contains
 
       call draw_random(u)
       call draw_random(v)
-      x = sqrt(-2.0_wp*log(1.0_wp - u))*cos(8.0_wp*atan(1.0_wp)*v)
+      x = sqrt(-2.0_wp*log(max(tiny(u), 1.0_wp - u)))*cos(8.0_wp*atan(1.0_wp)*v)
    end subroutine draw_normal
 
 end module test_contact_problem

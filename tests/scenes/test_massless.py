@@ -161,6 +161,17 @@ def test_the_side_that_can_lose_its_mass_is_the_slave(formulation, tmp_path):
 # ---- free bodies, and bodies that lie on others -------------------------------------------------
 
 
+@pytest.mark.parametrize("h", [0.02, 0.01, 0.005])
+def test_twins_whose_nodes_meet(h, tmp_path):
+    """All nodes of two squares on each other: rows of both sides are nearly the same, and what the
+    contacts took as they closed is given back along those that stand alone."""
+    run = run_deck(SCENES["twin"]().deck(AUTO), tmp_path, h=h, **MASSLESS,
+                   formulation="NODE TO SURFACE")
+    assert run.verdict["verdict"] == "good" and balances(run.history) < 1e-11
+    assert run.history["penetration"].max() < 1e-8
+
+
+
 @pytest.mark.parametrize("name", ["two_bodies", "three_bodies", "self_contact"])
 def test_balances_of_free_bodies(name, tmp_path):
     history = run_deck(DECKS/f"{name}.inp", tmp_path, h=0.01, frame=1, **MASSLESS, **NTS).history
