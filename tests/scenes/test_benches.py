@@ -86,8 +86,9 @@ def test_targets(tmp_path):
     options = bench_targets.arguments().parse_args(["--short"])
     rows = [*bench_targets.whole_runs(tmp_path, 1, options),
             *bench_targets.decks(tmp_path, 1, options)]
-    # Times of milliseconds on a busy machine grow by any exponent.
-    assert len(rows) == 9 and all(row.found > 0 for row in rows if "exponent" not in row.scene)
+    # The system counts the time of a process in ticks: that of a run of milliseconds may be 0.
+    assert len(rows) == 9 and all(row.found >= 0 for row in rows if "exponent" not in row.scene)
+    assert sum(row.found for row in rows if row.unit == " s") > 0
     assert all(row.error < 1e-10 for row in rows if row.error is not None)
 
 
