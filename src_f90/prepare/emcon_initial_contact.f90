@@ -15,6 +15,7 @@ module emcon_initial_contact
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted
    use emcon_start_gaps, only : is_master, is_slave, start_gaps_t
+   use emcon_surface_shape_plane, only : surface_shape, surface_shape_t
    use emcon_steps, only : step_is_dynamic
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
    implicit none
@@ -115,17 +116,22 @@ contains
       if (.not. allocated(error)) call check_slave_side(scene, pair, contact, noise, error)
    end subroutine check_two
 
-   !> Do the nodes of a half of a pair keep their mass where those of the other half do not? As rows
-   !> beside those of the massless nodes they would be a second one on the same nodes, which cannot
-   !> follow both.
-   pure logical function waits_for_mass(scene, pair)
+   !> Do the nodes of a half of a pair keep their mass where those of the other half do not, and
+   !> stand no denser? As rows beside those of the massless nodes they would be a second one on the
+   !> same nodes, which cannot follow both. Denser ones would go in between massless nodes.
+   logical function waits_for_mass(scene, pair)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
+      type(surface_shape_t) :: slave, master
 
       waits_for_mass = .not. pair_has_order(pair) .and. pair%slave /= pair%master .and. &
          (pair%may_choose .or. .not. pair%is_asked) .and. pair_sheds_mass(scene, pair)
       if (waits_for_mass) waits_for_mass = surface_keeps_mass(scene, pair%slave) .and. .not. &
          surface_keeps_mass(scene, pair%master)
+      if (.not. waits_for_mass) return
+      slave = surface_shape(scene, scene%surface(pair%slave))
+      master = surface_shape(scene, scene%surface(pair%master))
+      waits_for_mass = slave%mean >= master%mean
    end function waits_for_mass
 
    !> Nodes that cannot be held at their master, as where polygons of one curve dip into each other,

@@ -106,6 +106,18 @@ def test_a_disc_on_a_shifted_floor(angle, shift, order, tmp_path):
     assert rough[1] < 0.5*rough[0]
 
 
+@pytest.mark.parametrize(("cells", "aside"), [((3, 2), 0.0), ((3, 2), 0.13), ((6, 4), 0.0), ((6, 4), 0.13)])
+def test_denser_nodes_that_keep_their_mass_are_held(cells, aside, tmp_path):
+    """A block falls on a fixed ball, whose nodes stand between those of the block: guards would let
+    them in."""
+    scene = Scene(0.01, 0.5)
+    scene.block("BLOCK", (-0.75 + aside, 0.52), (1.5, 0.8), cells, velocity=(0.0, -1.0))
+    scene.disc("BALL", (0.0, 0.0), 0.5, (12, 4)).hold("BALL", lambda x, y: True)
+    run = run_deck(scene.deck(AUTO), tmp_path, **MASSLESS, formulation="NODE TO SURFACE")
+    assert run.verdict["verdict"] == "good" and "guarded, not held" not in run.log
+    assert balances(run.history) < 1e-12 and run.history["penetration"].max() < ROUNDING
+
+
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
 def test_half_a_block_is_half_of_the_whole(formulation, tmp_path):
     """A block falls flat on a rigid floor; of the half on a line of symmetry the node on the line
