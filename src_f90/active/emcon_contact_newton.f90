@@ -25,7 +25,7 @@ module emcon_contact_newton
    use emcon_lane_sums, only : relative_size
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_newton, only : newton_check_interrupt, newton_converged, newton_diverged, &
-      newton_early, newton_has_load, newton_measure_forces, newton_pick_residual, newton_refused, &
+      newton_early, newton_find_idle, newton_measure_forces, newton_pick_residual, newton_refused, &
       newton_singular, newton_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_phases, only : phase_eliminate, phase_enter, phase_factorise, phase_gaps, phase_leave
@@ -45,7 +45,7 @@ module emcon_contact_newton
    !> the tangent for as many, and so on in turn.
    integer, parameter :: stall_turn = 7
    !> Parts of its W by which a row gives way where the condensed problem has no solution, in turn.
-   real(wp), parameter :: softer(*) = [1.0e-7_wp, 1.0e-5_wp, 1.0e-3_wp]
+   real(wp), parameter :: softer(*) = [1.0e-7_wp, 1.0e-5_wp, 1.0e-3_wp, 1.0e-1_wp, 10.0_wp]
    !> Once it is within the tolerance an iterate that leaves more than this part is the last.
    real(wp), parameter :: polish_gain = 0.3_wp
 
@@ -254,7 +254,7 @@ contains
       self%size = max(relative_size(newton%residual, newton%forces), defect, missed)
       self%is_rounding = relative_size(newton%residual, newton%rounding) <= round_off &
          .and. rounded <= round_off .and. missed <= newton%convergence%tolerance
-      newton%is_idle = self%is_rounding .and. .not. newton_has_load(system)
+      call newton_find_idle(newton, system, self%is_rounding)
       if (.not. newton%is_idle) self%is_rounding = self%is_rounding .and. &
          self%size <= most_rounding
    end subroutine measure

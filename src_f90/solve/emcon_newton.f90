@@ -36,7 +36,7 @@ module emcon_newton
    implicit none
    private
    public :: newton_t, newton_init, newton_solve, interrupt_interface
-   public :: newton_has_load, newton_check_interrupt, newton_pick_residual, newton_measure_forces
+   public :: newton_find_idle, newton_check_interrupt, newton_pick_residual, newton_measure_forces
    public :: newton_converged, newton_refused, newton_diverged, newton_singular, newton_redundant, &
       newton_early
 
@@ -515,7 +515,7 @@ contains
       end do
       if (set%penalty%is_under_way) call measure_lack(self, system, set, norm, is_rounding)
       ! A body that moves as a rigid one has no forces to compare its round-off with.
-      self%is_idle = is_rounding .and. .not. newton_has_load(system)
+      call newton_find_idle(self, system, is_rounding)
       if (.not. self%is_idle) is_rounding = is_rounding .and. norm <= most_rounding
    end subroutine measure
 
@@ -584,14 +584,22 @@ contains
       self%rounding = yardstick_of(self%scale)
    end subroutine take_sizes
 
-   !> Is there any force but those of elements and contact?
-   pure logical function newton_has_load(system)
-      type(system_t), intent(in) :: system
+   !> Does nothing but round-off move? No force but those of elements and contact acts on an unknown,
+   !> and inertia is no more there than round-off of these.
+   subroutine newton_find_idle(self, system, is_rounding)
+      type(newton_t), intent(inout) :: self
+      type(system_t), intent(in) :: system       !! it has responded
+      logical, intent(in) :: is_rounding         !! nothing else is left of the residual
 
-      associate (part => system%response%part)
-         newton_has_load = any(abs(part(role_external)%force) > 0.0_wp) &
-            .or. any(abs(part(role_inertia)%force) > 0.0_wp)
+      self%is_idle = is_rounding
+      if (.not. is_rounding) return
+      associate (part => system%response%part, numbering => system%space%numbering)
+         call pick_unknowns(numbering, part(role_external)%force, self%scale)
+         self%is_idle = .not. any(abs(self%scale) > 0.0_wp)
+         call pick_unknowns(numbering, part(role_inertia)%force, self%scale)
+         self%is_idle = self%is_idle .and. .not. any(abs(self%scale) &
+            > round_off*maxval(system%response%rounding))
       end associate
-   end function newton_has_load
+   end subroutine newton_find_idle
 
 end module emcon_newton
