@@ -10,6 +10,7 @@ module emcon_constraints
    use emcon_contact_law, only : contact_laws_dissipated, contact_laws_respond, contact_laws_t, &
       contact_values_t
    use emcon_csr, only : csr_t
+   use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_system, only : system_t
@@ -150,6 +151,7 @@ contains
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       logical, intent(in), optional :: leaves_second       !! no second derivatives
+      logical :: has_way
       integer :: k
 
       if (self%n_condition == 0) return
@@ -160,8 +162,12 @@ contains
       self%frequency = motion%evaluation%mass_scale
       call linearise_range(self, self%n + 1, self%n_condition, system, motion)
       call linearise_range(self, 1, self%n, system, motion)
+      ! In equilibrium a contact is measured at the end alone, also one that keeps the gap of the
+      ! start.
+      has_way = .not. evaluation_is_equilibrium(motion%evaluation)
       do k = 1, self%n
-         self%defect(k) = merge(self%item(k)%dgap, self%item(k)%gap1, self%is_kept(k))
+         self%defect(k) = merge(self%item(k)%dgap, self%item(k)%gap1, &
+            self%is_kept(k) .and. (has_way .or. k <= self%n_linear))
       end do
       do k = self%n + 1, self%n_row
          associate (item => self%item(self%condition(k)), s => self%slip(k))
