@@ -23,7 +23,7 @@ module emcon_march_parts
    public :: march_in_parts, march_attempt, march_match, march_stop, march_reason
 
    !> Halvings of an increment after which nodes without mass take it back.
-   integer, parameter :: return_level = 3
+   integer, parameter :: return_level = 1
    !> Parts of an increment that are tried at most.
    integer, parameter :: most_parts = 4000
    !> Nodes named in a message.
