@@ -20,6 +20,10 @@ module emcon_layer_push
    private
    public :: layer_find_push
 
+   !> What is left on z of the largest force: the energy that it would give to what has no mass goes
+   !> with its square, which is round-off.
+   real(wp), parameter :: uncondensed = sqrt(epsilon(1.0_wp))
+
 contains
 
    !> The forces on the massive freedoms of contacts with the multipliers `weight`, condensed: z
@@ -57,6 +61,8 @@ contains
          do k = 1, set%n
             call condition_add_field(set%item(k), mu(k), set%item(k)%c, self%push)
          end do
+         call pick_unknowns(system%space%numbering, self%push, y)
+         is_singular = maxval(abs(y)) > uncondensed*maxval(abs(self%push))
       end associate
    end subroutine layer_find_push
 
