@@ -44,7 +44,8 @@ module emcon_contact_newton
    !> After so many iterates without half of the best size the curvature of contacts is left out of
    !> the tangent for as many, and so on in turn.
    integer, parameter :: stall_turn = 7
-   !> Parts of its W by which a row gives way where the condensed problem has no solution, in turn.
+   !> Parts of its W by which a row gives way where the condensed problem has no solution, in turn;
+   !> by the last ones an iterate goes a part of the way only.
    real(wp), parameter :: softer(*) = [1.0e-7_wp, 1.0e-5_wp, 1.0e-3_wp, 1.0e-1_wp, 10.0_wp]
    !> Once it is within the tolerance an iterate that leaves more than this part is the last.
    real(wp), parameter :: polish_gain = 0.3_wp

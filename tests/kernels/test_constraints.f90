@@ -1,17 +1,20 @@
 !> The constraint set: selection, rows, forces, merged pattern, curvature.
 module test_constraints
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_constraints, only : constraint_index, constraints_force, constraints_select
+   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate, &
+      constraints_force, constraints_select
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
+   use emcon_evaluation, only : evaluation_at_end, evaluation_moving, evaluation_t
    use emcon_kinds, only : dp, wp
    use emcon_linear_rows, only : linear_rows_t
+   use emcon_motion, only : motion_of, motion_t
    use emcon_numbering, only : pick_unknowns
    use emcon_scene, only : scene_t
-   use emcon_system, only : system_init, system_t
+   use emcon_system, only : system_begin_step, system_init, system_t
    use linear_scenes, only : dense_terms, make_random_rows
    use random_constraints, only : make_problem, problem_t, tol_dp
-   use small_scenes, only : block_t, make_two_blocks
+   use small_scenes, only : add_step, block_t, make_two_blocks, shake
    use sparse_samples, only : dense_of
    implicit none
    private
@@ -29,6 +32,7 @@ contains
          test_case_t("contact forces", test_force), &
          test_case_t("rows, curvature and forces over dependent freedoms", test_dependent), &
          test_case_t("a smaller set after a larger one", test_select), &
+         test_case_t("gaps that are kept, in motion and in equilibrium", test_kept), &
          test_case_t("numbers over several pairs", test_place)]
    end subroutine collect_constraints
 
@@ -169,6 +173,44 @@ contains
       call constraints_select(problem%set, none)
       call check_equal(error, problem%set%n, 0, "empty set")
    end subroutine test_select
+
+   !> What a gap has changed by since the start is left of one that is kept there, also where forces
+   !> are of the end alone.
+   subroutine test_kept(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(system_t) :: system
+      type(constraint_set_t) :: set
+      type(motion_t) :: motion
+      type(evaluation_t) :: evaluation(2)
+      real(wp), allocatable :: du(:, :)
+      integer :: i, k
+
+      call make_two_blocks(scene, 0.5_wp, lower, upper)
+      call add_step(scene, .false., 0.1_wp, 1)
+      call system_init(system, scene, error)
+      if (.not. allocated(error)) call system_begin_step(system, scene, 1, error)
+      if (allocated(error)) return
+      evaluation = [evaluation_at_end, evaluation_moving(0.1_wp, 0.1_wp, 1.0_wp)]
+      allocate(du, source=scene%x)
+      call shake(du, 0.1_wp)
+      associate (contact => system%contact(1)%contact)
+         call contact%begin_step(scene%x, scene%u0, du)
+         call contact%measure(scene%x, scene%u0, du)
+         call constraints_select(set, [1, 2, 3])
+         do i = 1, size(evaluation)
+            motion = motion_of(evaluation(i), scene%x, scene%u0, du)
+            do k = 1, 2
+               set%is_kept = k == 1
+               set%target = merge(contact%state%gap0, 0.25_wp, set%is_kept)
+               call constraints_evaluate(set, system, motion)
+               call check_near(error, set%defect, contact%state%gap1 - set%target, &
+                  64.0_wp*epsilon(1.0_wp), 1.0_wp, "what is left of gaps")
+            end do
+         end do
+      end associate
+   end subroutine test_kept
 
    !> Two pairs of 3 and 5 constraints: numbers 1..3 and 4..8.
    subroutine test_place(error)

@@ -6,15 +6,15 @@ module test_newton
    use emcon_errors, only : error_t
    use emcon_evaluation, only : instant_t
    use emcon_kinds, only : dp, wp
-   use emcon_motion, only : motion_init, motion_t
-   use emcon_newton, only : newton_converged, newton_diverged, newton_init, newton_refused, &
-      newton_singular, newton_solve, newton_t
+   use emcon_motion, only : motion_evaluate, motion_init, motion_t
+   use emcon_newton, only : newton_converged, newton_diverged, newton_find_idle, newton_init, &
+      newton_refused, newton_singular, newton_solve, newton_t
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_solver_registry, only : solver_default
    use emcon_steps, only : load_point, load_t, method_null_space, method_saddle_point
-   use emcon_system, only : system_begin_step, system_init, system_t
-   use emcon_term, only : role_internal
+   use emcon_system, only : system_begin_step, system_init, system_respond, system_t
+   use emcon_term, only : role_external, role_inertia, role_internal
    use emcon_text, only : to_text
    use small_scenes, only : add_load, add_step, block_t, clamp, make_block, make_two_blocks, &
       poisson, prescribe, shake, young
@@ -50,7 +50,8 @@ contains
          test_case_t("too few iterations", test_diverged), &
          test_case_t("singular system", test_singular), &
          test_case_t("inverted first guess", test_inverted), &
-         test_case_t("corrections that invert are halved", test_damping)]
+         test_case_t("corrections that invert are halved", test_damping), &
+         test_case_t("what moves nothing but round-off", test_idle)]
    end subroutine collect_newton
 
    !> The first step of `scene`, a dynamic one of size `h` or, for h = 0, a static one.
@@ -359,5 +360,56 @@ contains
          1.0e4_wp*epsilon(1.0_wp), young, "internal forces balance the loads")
       call correction_free(trial%newton%correction)
    end subroutine test_damping
+
+   !> Forces on what is prescribed, and inertia below round-off, leave a body idle.
+   subroutine test_idle(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(trial_t) :: trial
+      integer :: held, free
+
+      call make_block(scene, "CPE4", [1, 1], block)
+      call add_step(scene, .false., 0.1_wp, 1)
+      held = 1
+      free = 4
+      call prescribe(scene%step(1), held, 1, 0.0_wp)
+      call prescribe(scene%step(1), held, 2, 0.0_wp)
+      call prepare(trial, scene, 0.1_wp, 20, method_null_space, error)
+      if (allocated(error)) return
+      trial%motion%du = 1.0_wp
+      call motion_evaluate(trial%motion)
+      call system_respond(trial%system, trial%motion, .true.)
+      associate (rounding => epsilon(1.0_wp)*maxval(trial%system%response%rounding))
+         call check_true(error, rounding > 0.0_wp, "forces are rounded")
+         call check(role_external, held, 1.0_wp, .true., "a force on what is prescribed")
+         call check(role_external, free, rounding, .false., "a force on an unknown")
+         call check(role_inertia, held, 1.0_wp, .true., "inertia of what is prescribed")
+         call check(role_inertia, free, rounding, .true., "inertia as small as round-off")
+         call check(role_inertia, free, -16.0_wp*rounding, .false., "inertia above round-off")
+      end associate
+      call newton_find_idle(trial%newton, trial%system, .false.)
+      call check_true(error, .not. trial%newton%is_idle, "a residual above round-off")
+      call correction_free(trial%newton%correction)
+
+   contains
+
+      !> One component of one force, all others 0.
+      subroutine check(role, node, value, is_idle, what)
+         integer, intent(in) :: role, node
+         real(wp), intent(in) :: value
+         logical, intent(in) :: is_idle          !! expected
+         character(len=*), intent(in) :: what
+
+         associate (part => trial%system%response%part)
+            part(role_external)%force = 0.0_wp
+            part(role_inertia)%force = 0.0_wp
+            part(role)%force(2, node) = value
+         end associate
+         call newton_find_idle(trial%newton, trial%system, .true.)
+         call check_true(error, trial%newton%is_idle .eqv. is_idle, what)
+      end subroutine check
+
+   end subroutine test_idle
 
 end module test_newton

@@ -57,6 +57,13 @@ def test_drawn_scenes_are_right_and_called_right(tmp_path):
     assert not wrong and [r["verdict"] for r in results] == ["good"]*8, lines
 
 
+def test_scenes_whose_contacts_need_a_soft_problem(tmp_path):
+    """Iterates that no forces solve unless contacts give way by a good part of W: stiffer ones were
+    cut five times."""
+    results = [judge_seed(seed, tmp_path / str(seed)) for seed in (8, 234, 426)]
+    assert sum(r["cuts"] for r in results) <= 1 and [r["verdict"] for r in results] == ["good"]*3
+
+
 def test_what_a_warning_tells_is_not_called_good(tmp_path):
     """Directions of forces, of contact across gaps; nothing else, and no other warning."""
     result = judge_seed(1, tmp_path)
