@@ -584,8 +584,8 @@ contains
       self%rounding = yardstick_of(self%scale)
    end subroutine take_sizes
 
-   !> Does nothing but round-off move? No force but those of elements and contact acts on an unknown,
-   !> and inertia is no more there than round-off of these.
+   !> Does nothing but round-off move? No force but those of elements and contact acts on an
+   !> unknown, and inertia is no more there than round-off of these.
    subroutine newton_find_idle(self, system, is_rounding)
       type(newton_t), intent(inout) :: self
       type(system_t), intent(in) :: system       !! it has responded
