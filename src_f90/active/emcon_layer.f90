@@ -243,7 +243,7 @@ contains
       call correction_free(self%newton%correction)
    end subroutine layer_free
 
-   !> Balance z at the end of a solved step, if that has opened or closed contacts. `active` are the
+   !> Balance z at the end of a solved step, if that has opened, closed or moved contacts. `active` are the
    !> contacts of the model in the step, `load` its external forces at the end.
    subroutine layer_settle(self, motion, active, load, status, error)
       type(layer_t), intent(inout) :: self
@@ -261,6 +261,7 @@ contains
       self%needs_mass = .false.
       self%acts = active%is_active(self%n_before + 1:)
       has_changed = self%acts .neqv. active%start%was_active(self%n_before + 1:)
+      call mark_moved(self, active%set, has_changed)
       if (.not. any(has_changed)) return
       call take_multipliers(self, active)
       call begin(self, motion, load)
@@ -302,6 +303,20 @@ contains
       status = step_singular
       call mark_trouble(self, has_changed)
    end subroutine layer_settle
+
+   !> Contacts whose gap has moved by more than a solve leaves: over the edges of their new stencils
+   !> the step began with another gap than the last one has ended with.
+   pure subroutine mark_moved(self, set, has_changed)
+      type(layer_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set  !! of the step
+      logical, intent(inout) :: has_changed(:)   !! (contacts)
+      integer :: k
+
+      do k = set%n_permanent + 1, set%n
+         if (abs(set%item(k)%dgap) > self%newton%convergence%tolerance*set%item(k)%size) &
+            has_changed(set%id(k) - self%n_before) = .true.
+      end do
+   end subroutine mark_moved
 
    !> Solve for z and its contacts; those that stay do not act.
    subroutine balance(self, stays, status, error)
