@@ -30,8 +30,9 @@ module emcon_nts
    !> So far past the end of a surface, per edge, a node is still over it: a node that meets the end
    !> exactly (as on a plane of symmetry) must not be lost to round-off.
    real(wp), parameter :: end_tol = 1.0e-3_wp
-   !> A node counts as outside at the start of a step down to this fraction of a master edge.
-   real(wp), parameter :: touch_tol = sqrt(epsilon(1.0_wp))
+   !> A node counts as outside at the start of a step down to this fraction of a master edge: by
+   !> about as much gaps may change where edges are chosen anew, and no overlap is told of less.
+   real(wp), parameter :: touch_tol = 1.0e-3_wp
 
    !> A gap over a polygon as a step begins.
    type :: start_gap_t

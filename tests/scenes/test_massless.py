@@ -332,11 +332,14 @@ FINER = {"corners": lambda: corners(cells=(3, 3)), "crossing": lambda: crossing(
 @pytest.mark.parametrize(("name", "choice"), [
     ("crossing", {"formulation": "MORTAR", "sides": "UNGUARDED"}),      # a guard would hold them
     ("slide off", MORTAR | {"h": 0.006}),
-    ("pile", NTS), ("pile", NTS | {"h": 0.01})], ids=["crossing", "slide off", "pile", "pile h/2"])
+    ("pile", NTS), ("pile", NTS | {"h": 0.01}), ("pile", NTS | {"h": 0.0025})],
+    ids=["crossing", "slide off", "pile", "pile h/2", "pile h/8"])
 def test_soft_bodies_on_corners(name, choice, tmp_path):
     """A massless node slips off a corner at once; with its mass back it takes its time.
 
-    Forces that z does not follow exactly give no energy back: in the pile they took 2e-8 of it.
+    Forces that z does not follow exactly give no energy back: in the pile they took 2e-8 of it. Gaps
+    of other edges than before took 1e-5 of it at h/8, and a node that was in by 1e-6 of an edge as
+    its contact opened was never held again.
     """
     scene = (SCENES | FINER)[name]()
     choice = dict(choice)
@@ -344,6 +347,7 @@ def test_soft_bodies_on_corners(name, choice, tmp_path):
     assert BACK in run.log
     assert run.history["time"][-1] == pytest.approx(scene.t_end)
     assert balances(run.history) < 1e-12
+    assert run.verdict["verdict"] == "good" or name == "crossing"
 
 
 @pytest.mark.parametrize("part", [1.0, 0.5])
