@@ -243,8 +243,8 @@ contains
       call correction_free(self%newton%correction)
    end subroutine layer_free
 
-   !> Balance z at the end of a solved step, if that has opened, closed or moved contacts. `active` are the
-   !> contacts of the model in the step, `load` its external forces at the end.
+   !> Balance z at the end of a solved step, if that has opened, closed or moved contacts. `active`
+   !> are the contacts of the model in the step, `load` its external forces at the end.
    subroutine layer_settle(self, motion, active, load, status, error)
       type(layer_t), intent(inout) :: self
       type(motion_t), intent(in) :: motion       !! of the step
