@@ -1,7 +1,8 @@
 !> What follows from a solved step: velocities, works, forces, and what the user is told.
 module emcon_march_commit
    use emcon_constraint, only : condition_friction, most_slips
-   use emcon_constraints, only : constraints_dissipated, constraints_force
+   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_dissipated, &
+      constraints_force
    use emcon_correction, only : correction_reason
    use emcon_contact_law, only : loss_damping, loss_friction
    use emcon_errors, only : error_t
@@ -29,6 +30,7 @@ module emcon_march_commit
    use emcon_penalty, only : penalty_depth, penalty_keep, penalty_stored
    use emcon_stand_off, only : stand_off_add
    use emcon_steps, only : initiation_velocity_update, step_initiation
+   use emcon_system, only : system_t
    use emcon_term, only : role_external, role_inertia, role_internal
    use emcon_term_registry, only : terms_dissipation, terms_stabilization
    use emcon_text, only : note_add, notes_t, to_text
@@ -90,8 +92,7 @@ contains
          call friction_limit_tell(self, scene, increment, error)
          if (allocated(error)) return
          call interlock_tell(self, scene, increment)
-         increment%is_guarded = increment%is_guarded .or. &
-            any(set%id(:set%n) > system%first_constraint(system%n_pair + 1))
+         increment%is_guarded = increment%is_guarded .or. guards_act(system, set)
       end associate
       call tell_residual(self, increment)
       call keep_constraints(self)
@@ -100,6 +101,19 @@ contains
          self%state%base, is_due)
       if (is_due) self%system%phases%n_factorisation = self%system%phases%n_factorisation + 1
    end subroutine march_commit
+
+   !> Does a guard hold a node, one of corners or the other side of a pair?
+   pure logical function guards_act(system, set)
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      integer :: k, pair, i
+
+      guards_act = .false.
+      do k = set%n_permanent + 1, set%n
+         call constraint_index(system, set%id(k), pair, i)
+         guards_act = guards_act .or. system%contact(pair)%contact%slack > 0.0_wp
+      end do
+   end function guards_act
 
    !> The residuals that were reached, and whether more than Newton's tolerance was accepted.
    subroutine tell_residual(self, increment)

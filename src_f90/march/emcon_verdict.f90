@@ -105,9 +105,12 @@ contains
    subroutine verdict_start(self, march)
       type(verdict_t), intent(out) :: self
       type(march_t), intent(in) :: march
+      integer :: k
 
       call energy_start(self%energy, march%ledger)
-      if (size(march%system%contact) > march%system%n_pair) self%overlap%bar = overlap_bar
+      do k = 1, size(march%system%contact)
+         if (march%system%contact(k)%contact%slack > 0.0_wp) self%overlap%bar = overlap_bar
+      end do
       self%overlap%place = ""
       self%message = ""
       call small_range_init(self%small, terms_solid(march%system%term))

@@ -118,6 +118,20 @@ def test_denser_nodes_that_keep_their_mass_are_held(cells, aside, tmp_path):
     assert balances(run.history) < 1e-12 and run.history["penetration"].max() < ROUNDING
 
 
+def test_guarded_nodes_may_go_in_as_far_as_guards_allow(tmp_path):
+    """The ball's nodes stand as dense as the block's: they go in by less than a twentieth of an edge,
+    and the verdict tells that guards held them."""
+    scene = Scene(0.01, 0.5)
+    scene.block("BLOCK", (-0.75, 0.52), (1.5, 0.8), (6, 4), velocity=(0.0, -1.0))
+    scene.disc("BALL", (0.0, 0.0), 0.5, (3, 2)).hold("BALL", lambda x, y: True)
+    run = run_deck(scene.deck(AUTO), tmp_path, **MASSLESS, formulation="NODE TO SURFACE")
+    assert "guarded, not held" in run.log
+    assert 1e-3 < worst(run.fields()).by_edge < 0.055
+    assert run.verdict["verdict"] == "good" and run.verdict["guarded_increments"] > 0
+    assert any("as guards allow" in text for text in run.verdict["warnings"])
+    assert balances(run.history) < 1e-12
+
+
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
 def test_half_a_block_is_half_of_the_whole(formulation, tmp_path):
     """A block falls flat on a rigid floor; of the half on a line of symmetry the node on the line
