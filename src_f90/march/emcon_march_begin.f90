@@ -23,6 +23,7 @@ module emcon_march_begin
    use emcon_march_past, only : march_past_forget
    use emcon_march_types, only : march_t
    use emcon_mass_return, only : mass_match
+   use emcon_massless, only : massless_share
    use emcon_mechanism_text, only : free_motion_text
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_newton, only : newton_init
@@ -41,6 +42,7 @@ module emcon_march_begin
    use emcon_system, only : system_begin_step, system_check_response, system_find_energy, &
       system_respond
    use emcon_term, only : role_internal
+   use emcon_term_registry, only : terms_solid
    use emcon_text, only : note_add, to_text
    use emcon_unresolved_rows, only : report_unresolved
    use emcon_velocity_mass, only : velocity_update_reset
@@ -325,7 +327,9 @@ contains
       type(step_t), intent(in) :: step
       type(error_t), allocatable, intent(out) :: error
       logical :: is_slave(size(scene%x, 2))
-      integer :: i, n
+      character(len=:), allocatable :: moved
+      real(wp) :: share
+      integer :: i, n, body
 
       if (step_initiation(step) /= initiation_massless) return
       call warn_of_mass(self, scene)
@@ -340,9 +344,14 @@ contains
          is_slave(self%system%contact(i)%contact%node) = .true.
       end do
       n = layer_count(self%layer, is_slave)
+      moved = ""
+      call massless_share(terms_solid(self%system%term), self%layer%is_massless, &
+         self%system%space%body, share, body)
+      if (body > 0) moved = "; " // to_text(100.0_wp*share, 2) // " % of the mass of body " // &
+         to_text(body) // " moves inwards, of others less"
       call note_add(self%system%notes, "contact surfaces without mass: " // to_text(n) // &
-         " nodes; " // to_text(count(is_slave) - n) // " slave nodes keep theirs, as they are " // &
-         "prescribed, tied, or given mass, or as too few others hold them")
+         " nodes" // moved // "; " // to_text(count(is_slave) - n) // " slave nodes keep " // &
+         "theirs, as they are prescribed, tied, or given mass, or as too few others hold them")
    end subroutine begin_massless
 
    !> Tell of pairs whose surfaces were to be massless and are not; one side of two is enough.

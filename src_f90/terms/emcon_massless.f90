@@ -17,7 +17,8 @@ module emcon_massless
    use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
-   public :: massless_bare, massless_find, massless_shed, massless_return, massless_follow
+   public :: massless_bare, massless_find, massless_shed, massless_return, massless_follow, &
+      massless_share
 
    !> Those around a node that have kept their mass.
    type :: stencil_t
@@ -199,6 +200,36 @@ contains
       end do
       mass = mass*(total/sum(mass))
    end subroutine shed
+
+   !> The largest part of its mass that a body has moved off massless nodes, and which body: of each
+   !> element as many parts as such nodes.
+   pure subroutine massless_share(solid, is_massless, body, share, largest)
+      type(solid_t), intent(in) :: solid
+      logical, intent(in) :: is_massless(:)      !! (n_node)
+      integer, intent(in) :: body(:)             !! (n_node) number of its body; 0: of none
+      real(wp), intent(out) :: share             !! 0 to 1
+      integer, intent(out) :: largest            !! number of the body; 0: no mass is moved
+      real(wp), dimension(maxval(body)) :: moved, total
+      integer :: e
+
+      moved = 0.0_wp
+      total = 0.0_wp
+      do e = 1, solid%n_element
+         associate (node => solid%node(:solid%geometry(e)%n_node, e), n => solid%geometry(e)%n_node)
+            associate (mass => sum(solid%mass%consistent(:n, :n, e)), k => body(node(1)))
+               total(k) = total(k) + mass
+               moved(k) = moved(k) + mass*count(is_massless(node))/n
+            end associate
+         end associate
+      end do
+      share = 0.0_wp
+      largest = 0
+      do e = 1, size(total)
+         if (.not. moved(e) > share*total(e)) cycle
+         share = moved(e)/total(e)
+         largest = e
+      end do
+   end subroutine massless_share
 
    !> Mass that comes back to nodes: that of their motion relative to what has kept its mass around
    !> them, m d d^T with d = 1 at the node and its weights of `massless_follow` taken from it. Total

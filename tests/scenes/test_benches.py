@@ -12,6 +12,7 @@ sys.path.insert(0, str(BENCH))
 
 import bench_targets  # noqa: E402
 import kept_runs  # noqa: E402
+import trade_coarse  # noqa: E402
 import trade_first  # noqa: E402
 import trade_knobs  # noqa: E402
 import trade_studies  # noqa: E402
@@ -192,3 +193,12 @@ def test_generator_of_decks(generator, tmp_path):
 def test_every_deck_has_a_generator():
     made = {f"make_{p.stem}.py" for p in DECKS.glob("*.inp")}
     assert made == {p.name for p in DECKS.glob("make_*.py")}
+
+
+def test_what_massless_surfaces_cost_coarse_bodies(tmp_path):
+    """Of four elements across seven sixteenths of the mass move, and the momentum comes back."""
+    make = trade_coarse.BODIES["square on its side"]
+    for treatment, moved in (("PERSISTENT", 0.0), ("MASSLESS", 44.0)):
+        momentum, cuts, found = trade_coarse.fall(make, 4, 0.01, treatment, tmp_path)
+        assert cuts == 0 and found == moved
+        assert momentum[0] < 0 < momentum[-1]
