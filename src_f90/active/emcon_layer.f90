@@ -17,6 +17,7 @@ module emcon_layer
    use emcon_kinds, only : wp
    use emcon_layer_push, only : layer_find_push
    use emcon_layer_type, only : layer_t
+   use emcon_massless, only : massless_share
    use emcon_motion, only : at_rest, motion_init, motion_evaluate, motion_t
    use emcon_newton, only : newton_init
    use emcon_scene, only : scene_t
@@ -24,10 +25,11 @@ module emcon_layer
    use emcon_steps, only : load_point, load_t, method_saddle_point, prescribed_t, step_t
    use emcon_system, only : system_begin_step, system_find_energy, system_init, system_renew, &
       system_respond, system_t
+   use emcon_term_registry, only : terms_solid
    implicit none
    private
    public :: layer_t, layer_init, layer_renew, layer_begin_step, layer_mark, layer_settle, &
-      layer_count, layer_find_acting, layer_take_velocities, layer_free
+      layer_count, layer_share, layer_find_acting, layer_take_velocities, layer_free
 
    !> Work below this part of what it is held against is round-off.
    real(wp), parameter :: rounding = 1.0e3_wp*epsilon(1.0_wp)
@@ -87,6 +89,16 @@ contains
 
       layer_count = count(self%is_massless .and. is_meant)
    end function layer_count
+
+   !> The largest part of its mass that a body of `model` has moved off massless nodes.
+   subroutine layer_share(self, model, share, body)
+      type(layer_t), intent(in) :: self
+      type(system_t), intent(in), target :: model
+      real(wp), intent(out) :: share             !! 0 to 1
+      integer, intent(out) :: body               !! its number; 0: no mass is moved
+
+      call massless_share(terms_solid(model%term), self%is_massless, model%space%body, share, body)
+   end subroutine layer_share
 
    !> What has no mass moves as its displacement says.
    pure subroutine layer_take_velocities(self, h, du, v)

@@ -15,7 +15,7 @@ module emcon_march_begin
    use emcon_overlap_check, only : overlap_check_excuse, overlap_check_smooth, overlap_check_step, &
       overlap_t
    use emcon_kinds, only : wp
-   use emcon_layer, only : layer_begin_step, layer_count, layer_mark
+   use emcon_layer, only : layer_begin_step, layer_count, layer_share, layer_mark
    use emcon_ledger, only : ledger_measure, ledger_t
    use emcon_overlap_query, only : overlap_text
    use emcon_march_accuracy, only : accuracy_begin
@@ -23,7 +23,6 @@ module emcon_march_begin
    use emcon_march_past, only : march_past_forget
    use emcon_march_types, only : march_t
    use emcon_mass_return, only : mass_match
-   use emcon_massless, only : massless_share
    use emcon_mechanism_text, only : free_motion_text
    use emcon_motion, only : at_rest, motion_of, motion_t
    use emcon_newton, only : newton_init
@@ -42,7 +41,6 @@ module emcon_march_begin
    use emcon_system, only : system_begin_step, system_check_response, system_find_energy, &
       system_respond
    use emcon_term, only : role_internal
-   use emcon_term_registry, only : terms_solid
    use emcon_text, only : note_add, to_text
    use emcon_unresolved_rows, only : report_unresolved
    use emcon_velocity_mass, only : velocity_update_reset
@@ -345,8 +343,7 @@ contains
       end do
       n = layer_count(self%layer, is_slave)
       moved = ""
-      call massless_share(terms_solid(self%system%term), self%layer%is_massless, &
-         self%system%space%body, share, body)
+      call layer_share(self%layer, self%system, share, body)
       if (body > 0) moved = "; " // to_text(100.0_wp*share, 2) // " % of the mass of body " // &
          to_text(body) // " moves inwards, of others less"
       call note_add(self%system%notes, "contact surfaces without mass: " // to_text(n) // &
