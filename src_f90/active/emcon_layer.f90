@@ -9,10 +9,13 @@ module emcon_layer
    use emcon_active_set, only : active_set_begin, active_set_init, active_set_t, step_done, &
       step_singular, step_too_far, touch_tol
    use emcon_active_set_solve, only : active_set_solve
-   use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_select
+   use emcon_constraints, only : constraint_set_t, constraints_dissipated, constraints_evaluate, &
+      constraints_select
+   use emcon_contact_law, only : loss_friction
    use emcon_correction, only : correction_free, correction_reset
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_at_end
+   use emcon_friction, only : friction_init, friction_t
    use emcon_host, only : host_t
    use emcon_kinds, only : wp
    use emcon_layer_push, only : layer_find_push
@@ -33,6 +36,9 @@ module emcon_layer
 
    !> Work below this part of what it is held against is round-off.
    real(wp), parameter :: rounding = 1.0e3_wp*epsilon(1.0_wp)
+   !> With friction the balance is found so often at most: each time it acts where it did at the end
+   !> of the one before.
+   integer, parameter :: most_balances = 6
 
 contains
 
@@ -182,12 +188,24 @@ contains
          if (allocated(self%system%contact(i)%contact)) deallocate(self%system%contact(i)%contact)
          allocate(self%system%contact(i)%contact, source=model%contact(i)%contact)
       end do
+      call begin_friction(self)
       call layer_mark(self, self%system, self%active%rules%closes)
       self%active%rules%holds_gap = .true.
       self%active%rules%has_impacts = .false.
       self%active%rules%puts_off = .true.
       self%active%rules%may_cut = .false.
    end subroutine layer_begin_step
+
+   !> The contacts of the layer rub as those of the model do.
+   subroutine begin_friction(self)
+      type(layer_t), intent(inout) :: self
+
+      call friction_init(self%active%friction, self%system)
+      associate (contacts => self%state%contacts, friction => self%active%friction)
+         contacts%slides_along = 0.0_wp*friction%tau
+         contacts%drag = 0.0_wp*friction%tau
+      end associate
+   end subroutine begin_friction
 
    !> The contacts of `system` whose slave nodes have no mass.
    pure subroutine layer_mark(self, system, is_of_z)
@@ -293,7 +311,8 @@ contains
       self%du = self%motion%du
       self%work = sum(load*self%du)
       call system_find_energy(self%system, self%motion)
-      self%released = before - sum(self%system%response%energy) + self%work
+      self%rubbed = dissipated(self%active%set)
+      self%released = before - sum(self%system%response%energy) + self%work - self%rubbed
       weight = active%start%lam0(self%n_before + 1:) + self%lam
       where (.not. stays)
          has_changed = has_changed .or. (self%acts .neqv. self%active%is_active)
@@ -336,15 +355,24 @@ contains
       logical, intent(in) :: stays(:)            !! (contacts)
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
+      real(wp) :: before(size(self%du, 1), size(self%du, 2))
+      integer :: i
 
       self%state%contacts%is_active = self%acts .and. .not. stays
       self%state%contacts%lam = self%lam
-      call active_set_begin(self%active, self%system, self%motion, self%state)
-      self%active%is_left_out = stays
-      self%newton%driven = 0.0_wp
-      call active_set_solve(self%active, self%system, self%scene, self%newton, self%motion, &
-         status, error)
-      if (status /= step_done .or. allocated(error)) return
+      do i = 1, merge(most_balances, 1, self%active%friction%is_on)
+         before = self%motion%du
+         call active_set_begin(self%active, self%system, self%motion, self%state)
+         self%active%is_left_out = stays
+         self%newton%driven = 0.0_wp
+         call active_set_solve(self%active, self%system, self%scene, self%newton, self%motion, &
+            status, error)
+         if (status /= step_done .or. allocated(error)) return
+         if (maxval(abs(self%motion%du - before)) <= rounding*maxval(abs(before))) exit
+         self%state%contacts%is_active = self%active%is_active
+         self%state%contacts%lam = self%active%lam
+         call take_friction(self, self%active%friction, 0)
+      end do
       if (any(have_closed(self) .and. .not. stays)) status = step_too_far
    end subroutine balance
 
@@ -410,7 +438,18 @@ contains
       end do
    end subroutine find_apart
 
-   !> The mean multipliers of the step.
+   !> What friction takes in the balance.
+   pure real(wp) function dissipated(set)
+      type(constraint_set_t), intent(in) :: set
+      integer :: k
+
+      dissipated = 0.0_wp
+      do k = set%n_permanent + 1, set%n_condition
+         dissipated = dissipated + constraints_dissipated(set, k, loss_friction)
+      end do
+   end function dissipated
+
+   !> The mean multipliers of the step, and friction.
    pure subroutine take_multipliers(self, active)
       type(layer_t), intent(inout) :: self
       type(active_set_t), intent(in) :: active
@@ -420,7 +459,25 @@ contains
       do k = active%set%n_permanent + 1, active%set%n
          self%lam(active%set%id(k) - self%n_before) = active%set%lam(k)
       end do
+      call take_friction(self, active%friction, self%n_before)
    end subroutine take_multipliers
+
+   !> The balance begins with this friction, of contacts behind the first `n_before`.
+   pure subroutine take_friction(self, friction, n_before)
+      type(layer_t), intent(inout) :: self
+      type(friction_t), intent(in) :: friction
+      integer, intent(in) :: n_before
+      integer :: k
+
+      if (.not. friction%is_on) return
+      associate (contacts => self%state%contacts)
+         contacts%drag = friction%tau(:, n_before + 1:)
+         do k = 1, size(contacts%drag, 2)
+            contacts%slides_along(:, k) &
+               = friction%law(n_before + k)%status%direction(:friction%n_slip)
+         end do
+      end associate
+   end subroutine take_friction
 
    !> Place the layer at the end of the step, under its loads.
    subroutine begin(self, motion, load)

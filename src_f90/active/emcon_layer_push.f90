@@ -3,19 +3,18 @@
 !>
 !> Source: docs/theory.md, eq. (22c).
 module emcon_layer_push
-   use emcon_constraint, only : condition_add_field
+   use emcon_constraint, only : condition_add_field, condition_row_force, condition_stiffness
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate, &
       constraints_force, constraints_select
    use emcon_correction, only : correction_factorise, correction_lay_out, correction_solve
-   use emcon_curvature, only : curvature_add_times
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_layer_type, only : layer_t
    use emcon_numbering, only : add_to_dofs, pick_unknowns
    use emcon_system, only : system_t, system_tangent_times
-   use emcon_velocity_jumps, only : jumps_add, jumps_begin
+   use emcon_velocity_jumps, only : jumps_add, jumps_begin, jumps_rub
    implicit none
    private
    public :: layer_find_push
@@ -48,19 +47,18 @@ contains
          opened%lam = weight(opened%id)
          call constraints_evaluate(opened, system, self%motion)
          call constraints_force(opened, 1, self%push)
-         allocate(y(system%space%numbering%n_unknown), mu(set%n), source=0.0_wp)
+         allocate(y(system%space%numbering%n_unknown), mu(set%n_row), source=0.0_wp)
          call respond_to(self, weight, y, mu, is_singular, error)
          if (is_singular .or. allocated(error)) return
+         call add_response(self, y, mu)
          field = 0.0_wp
          call add_to_dofs(system%space%numbering, y, 1.0_wp, field)
          call jumps_begin(self%jump)
          call jumps_add(self%jump, opened, opened%lam)
-         call jumps_add(self%jump, set, mu, field)
+         call jumps_add(self%jump, set, mu(:set%n), field)
+         if (self%active%friction%is_on) call jumps_rub(self%jump, set, &
+            drags(set, mu, self%active%friction%n_slip), 0.0_wp*mu(:set%n))
          self%jump%id = self%n_before + self%jump%id
-         call add_tangent(self, field)
-         do k = 1, set%n
-            call condition_add_field(set%item(k), mu(k), set%item(k)%c, self%push)
-         end do
          call pick_unknowns(system%space%numbering, self%push, y)
          is_singular = maxval(abs(y)) > uncondensed*maxval(abs(self%push))
       end associate
@@ -86,7 +84,7 @@ contains
       type(layer_t), intent(inout) :: self
       real(wp), intent(in) :: weight(:)
       real(wp), intent(out), contiguous :: y(:)  !! (n_unknown) [L]
-      real(wp), intent(out), contiguous :: mu(:)   !! (n) [M L/T^2]
+      real(wp), intent(out), contiguous :: mu(:)   !! (n_row) [M L/T^2]
       logical, intent(out) :: is_singular
       type(error_t), allocatable, intent(out) :: error
       integer, allocatable :: closed(:)
@@ -106,7 +104,7 @@ contains
          if (allocated(error) .or. is_singular) return
          closed = pack([(k, k = 1, set%n)], abs(weight(set%id(:set%n))) > 0.0_wp)
          n = size(closed)
-         allocate(residual(size(y)), ways(size(y), 0:n), forces(set%n, 0:n))
+         allocate(residual(size(y)), ways(size(y), 0:n), forces(set%n_row, 0:n))
          call pick_unknowns(system%space%numbering, self%push, residual)
          residual = -residual
          set%defect = 0.0_wp
@@ -127,15 +125,53 @@ contains
       end associate
    end subroutine respond_to
 
-   !> Subtract what the forces on all freedoms change by where z moves by `way`.
-   subroutine add_tangent(self, displacement)
+   !> Add what the forces on all freedoms change by where z moves by `y`, and the rows of the set
+   !> push with `mu` more.
+   subroutine add_response(self, y, mu)
       type(layer_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: displacement(:, :)
-      real(wp) :: product(size(displacement, 1), size(displacement, 2))
+      real(wp), intent(in), contiguous :: y(:)   !! (n_unknown) [L]
+      real(wp), intent(in) :: mu(:)              !! (n_row) [M L/T^2]
+      real(wp), dimension(size(self%du, 1), size(self%du, 2)) :: displacement, product
+      real(wp), allocatable :: part(:, :)
+      integer :: k
 
+      displacement = 0.0_wp
+      call add_to_dofs(self%system%space%numbering, y, 1.0_wp, displacement)
       call system_tangent_times(self%system, self%motion, displacement, product)
       self%push = self%push - product
-      call curvature_add_times(self%active%set, self%active%set%lam, displacement, self%push)
-   end subroutine add_tangent
+      associate (set => self%active%set, n_dim => size(displacement, 1))
+         do k = 1, set%n
+            associate (item => set%item(k), node => set%item(k)%node(:set%item(k)%n_node))
+               part = reshape(matmul(condition_stiffness(item, set%lam(k)), &
+                  reshape(displacement(:, node), [n_dim*item%n_node])), [n_dim, item%n_node])
+               call condition_add_field(item, -1.0_wp, part, self%push)
+            end associate
+         end do
+         do k = 1, set%n_row
+            associate (item => set%item(set%condition(k)))
+               call condition_add_field(item, mu(k), condition_row_force(item, set%slip(k)), &
+                  self%push)
+            end associate
+         end do
+      end associate
+   end subroutine add_response
+
+   !> Friction in forces `mu` of rows: of slips that stick, and by pushes where a contact slides.
+   pure function drags(set, mu, n_slip) result(drag)
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(in) :: mu(:)              !! (n_row) [M L/T^2]
+      integer, intent(in) :: n_slip              !! slips of a contact
+      real(wp) :: drag(n_slip, set%n)            !! [M L/T^2]
+      integer :: k
+
+      do k = 1, set%n
+         drag(:, k) = set%item(k)%response%mu_sigma(:n_slip)*set%item(k)%normal*mu(k)
+      end do
+      do k = set%n + 1, set%n_row
+         associate (s => set%slip(k), condition => set%condition(k))
+            drag(s, condition) = drag(s, condition) + mu(k)
+         end associate
+      end do
+   end function drags
 
 end module emcon_layer_push

@@ -31,6 +31,7 @@ module emcon_layer_type
       real(wp), allocatable :: du(:, :)          !! (n_dim, n_node) how z has moved [L]
       real(wp) :: released = 0.0_wp              !! energy that z has given up [M L^2/T^2]
       real(wp) :: work = 0.0_wp                  !! of the loads on z [M L^2/T^2]
+      real(wp) :: rubbed = 0.0_wp                !! what friction took in that [M L^2/T^2]
       real(wp), allocatable :: push(:, :)        !! (n_dim, n_node) forces to give energy back along
       type(velocity_jump_t), allocatable :: jump(:)  !! what they are of each contact
       logical, allocatable :: acts(:)            !! (contacts) at the end

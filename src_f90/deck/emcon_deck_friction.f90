@@ -6,6 +6,7 @@ module emcon_deck_friction
    use emcon_diagnostics, only : add_error, add_warning
    use emcon_interactions, only : contact_pair_t, smoothing_hermite
    use emcon_kinds, only : wp
+   use emcon_massless_surfaces, only : pair_keeps_mass
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_rigid_bodies, only : rigid_far_node
    use emcon_scene, only : scene_t
@@ -76,10 +77,11 @@ contains
                call check_step(reader, pair(i), step(k), k)
             end do
             call check_pad(reader, scene, pair(i))
-            if (any(step_initiation(step) == initiation_massless)) then
+            if (any(step_initiation(step) == initiation_massless) &
+               .and. pair_keeps_mass(pair(i))) then
                call add_warning(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface " &
-                  // "interaction has *FRICTION: both surfaces keep their mass, and hold gaps as " &
-                  // "PERSISTENT does")
+                  // "interaction has *FRICTION and RESTITUTION or *DAMPING: both surfaces keep " &
+                  // "their mass, and hold gaps as PERSISTENT does")
             end if
          end do
       end associate

@@ -299,6 +299,7 @@ contains
             lost = lost - set%lam(k)*set%item(k)%dgap
          end do
          self%ledger%external_work = self%ledger%external_work + layer%work
+         self%ledger%friction = self%ledger%friction + layer%rubbed
          call velocity_update_push(self%velocity_update, self%system, set, &
             push_t(layer%push, lost + layer%released), self%end_state%v, has_root, error)
          if (allocated(error)) return

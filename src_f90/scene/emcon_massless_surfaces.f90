@@ -10,19 +10,28 @@ module emcon_massless_surfaces
    use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
-   public :: pair_sheds_mass, surface_keeps_mass, nodes_that_keep_mass
+   public :: pair_keeps_mass, pair_sheds_mass, surface_keeps_mass, nodes_that_keep_mass
 
 contains
 
-   !> Are the slave nodes of `pair` to lose their mass in some step? Where they rub or are damped
-   !> they keep it.
+   !> Do both surfaces of a pair keep their mass? With damping what has none would jump to where it
+   !> rests; rebounds along the surface, and along the normal beside friction, are impulses.
+   pure logical function pair_keeps_mass(pair)
+      type(contact_pair_t), intent(in) :: pair
+
+      associate (law => pair%interaction)
+         pair_keeps_mass = law%damping%coefficient > 0.0_wp .or. (law%friction > 0.0_wp .and. &
+            (law%rebound > 0.0_wp .or. law%restitution < 1.0_wp))
+      end associate
+   end function pair_keeps_mass
+
+   !> Are the slave nodes of `pair` to lose their mass in some step?
    pure logical function pair_sheds_mass(scene, pair)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
 
       pair_sheds_mass = any(step_initiation(scene%step) == initiation_massless) .and. .not. &
-         (pair%initiation == initiation_persistent .or. pair%interaction%friction > 0.0_wp .or. &
-         pair%interaction%damping%coefficient > 0.0_wp)
+         (pair%initiation == initiation_persistent .or. pair_keeps_mass(pair))
    end function pair_sheds_mass
 
    !> Do all nodes of a surface keep their mass?

@@ -132,6 +132,8 @@ contains
 
       jump%impulse = part*jump%impulse
       jump%lam = part*jump%lam
+      jump%drag = part*jump%drag
+      jump%rubbed = part*jump%rubbed
       jump%slave_moment = part*jump%slave_moment
       jump%master_moment = part*jump%master_moment
    end subroutine jumps_scale

@@ -10,7 +10,7 @@ module emcon_massless
    use emcon_csr, only : csr_from_elements, csr_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
-   use emcon_massless_surfaces, only : nodes_that_keep_mass
+   use emcon_massless_surfaces, only : nodes_that_keep_mass, pair_keeps_mass
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_steps, only : initiation_massless, initiation_persistent, step_initiation
@@ -72,8 +72,8 @@ contains
    end subroutine leave_joined
 
    !> The slave nodes of all pairs but persistent ones, if dynamic steps ask; less those of surfaces
-   !> that rub, those that are driven in such a step, of rigid bodies, in ties and equations, or
-   !> given mass or forces, and those of elements that would keep none, and those that others would
+   !> that are damped or rebound, those that are driven in such a step, of rigid bodies, in ties and
+   !> equations, or given mass or forces, and those of elements that would keep none, and those that others would
    !> not hold. And all nodes that have none anyway.
    pure subroutine massless_find(scene, solid, is_given, without_density, is_massless)
       type(scene_t), intent(in) :: scene
@@ -89,11 +89,8 @@ contains
          if (scene%pair(i)%initiation == initiation_persistent) cycle
          call mark_surface(scene, scene%pair(i)%slave, .true., is_massless)
       end do
-      ! With friction what has no mass would balance without a minimum principle, with damping it
-      ! would jump to where it rests.
       do i = 1, size(scene%pair)
-         if (.not. (scene%pair(i)%interaction%friction > 0.0_wp &
-            .or. scene%pair(i)%interaction%damping%coefficient > 0.0_wp)) cycle
+         if (.not. pair_keeps_mass(scene%pair(i))) cycle
          call mark_surface(scene, scene%pair(i)%slave, .false., is_massless)
          call mark_surface(scene, scene%pair(i)%master, .false., is_massless)
       end do

@@ -291,7 +291,7 @@ contains
       type(scene_t) :: scene
       type(march_t) :: march
       type(increment_t) :: increment
-      integer :: k, n_pair
+      integer :: k
       logical :: is_told
 
       call begin(scene, .false., march, error)
@@ -299,13 +299,12 @@ contains
          if (allocated(error)) return
          call march_increment(march, scene, increment, error)
       end do
-      n_pair = march%system%n_pair
       do k = 1, 4
          increment = increment_t(unconverged=before(k))
          march%newton%convergence%last = merge(1.0e-12_wp, 0.25_wp, k == 3)
          march%newton%is_idle = k == 4
          march%newton%correction%fell_back = k == 1
-         march%system%n_pair = merge(0, n_pair, k == 2)
+         march%system%contact(1)%contact%slack = merge(0.05_wp, 0.0_wp, k == 2)
          call march_commit(march, scene, h, increment, error)
          if (allocated(error)) return
          is_told = .false.

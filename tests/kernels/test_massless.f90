@@ -90,6 +90,7 @@ contains
          scene%pair(1)%initiation = initiation_persistent
       case (4)
          scene%pair(1)%interaction%friction = 0.1_wp
+         scene%pair(1)%interaction%rebound = 0.5_wp
       case (5)
          scene%pair(1)%interaction%damping%coefficient = 0.1_wp
       case (6)

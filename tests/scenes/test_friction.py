@@ -486,11 +486,13 @@ def test_a_ring_on_a_smoothed_surface(mu, more, tmp_path):
 # ---- mass, and the limit of one solution --------------------------------------------------------
 
 
-def test_what_rubs_keeps_its_mass(tmp_path):
+def test_what_rebounds_along_the_surface_keeps_its_mass(tmp_path):
     """A step without mass at the surfaces is for other pairs: the run is that of PERSISTENT."""
-    runs = [run_deck(ring(0.8), tmp_path/word, **NODES, h=0.02, t_end=0.3, initiation=word)
+    deck = ring(0.8)
+    deck.replace("*FRICTION", "*FRICTION, RESTITUTION=0.5")
+    runs = [run_deck(deck, tmp_path/word, **NODES, h=0.02, t_end=0.3, initiation=word)
             for word in ("PERSISTENT", "MASSLESS")]
-    assert "both surfaces keep their mass" in runs[1].log
+    assert "both surfaces keep their mass" in runs[1].log.replace("\n", " ")
     assert runs[0].digits() == runs[1].digits()
 
 

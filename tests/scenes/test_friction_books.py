@@ -82,12 +82,19 @@ def test_work_of_every_node(name, tmp_path):
     pressure, shear, status, slip, path = books(run)
     assert len(pressure) == len(history)
     whole = history["cuts"][1:] == 0
+    steps = np.ones_like(whole)
+    if name == "massless":
+        # Where contacts open or close z is balanced, and slides in that; what gives energy back for
+        # it is an impulse beside the forces of the step.
+        acts = status > 0
+        steps = (acts[1:] == acts[:-1]).all(1)
     moved = np.diff(slip, axis=0)
-    work = (shear[1:]*moved)[whole]
+    work = (shear[1:]*moved)[whole & steps]
     size = mu*pressure.max()
     assert (status == 2).any() and work.max() > 1e-9*size*np.abs(moved).max()
     # Slip is a difference of places, held to some ten of their roundings.
     assert work.min() >= -16*EPS*size*np.abs(run.fields()["displacement"]).max()
+    pressure, shear, status = (a[1:][steps] for a in (pressure, shear, status))
     assert (np.abs(shear) <= mu*pressure + 1e-9*size).all()
     slides = status == 2
     assert np.abs(shear[slides]) == pytest.approx(mu*pressure[slides], rel=1e-9, abs=1e-12*size)

@@ -335,6 +335,51 @@ def test_nodes_around_one_other_keep_their_mass(tmp_path):
     assert change <= 1e3*EPS*np.abs(momentum).max()
 
 
+# ---- friction without mass -----------------------------------------------------------------------
+
+
+def rubbing_blocks(h, deck_sides):
+    """A spinning block is thrown on a free one, at an angle, with friction of 0.3."""
+    scene = Scene(h, 0.8)
+    scene.block("LOW", (0.0, 0.0), (1.0, 0.5), (8, 4), velocity=(0.5, 0.0), stiffness=1e3)
+    scene.block("HIGH", (0.13, 0.51), (0.7, 0.5), (7, 4), velocity=(-1.0, -1.0), spin=0.5, stiffness=1e3)
+    deck = scene.deck(deck_sides)
+    deck.replace("*SURFACE INTERACTION, NAME=SMOOTH", "*SURFACE INTERACTION, NAME=SMOOTH\n*FRICTION\n0.3")
+    return deck
+
+
+def jumps(run):
+    """Rms of second differences of the force along the surfaces, over the mean force."""
+    _, momentum = run.series("BODIES", "MOMENTUM")
+    force = np.diff(momentum[:, 1, 0])/np.diff(run.history["time"])
+    return np.sqrt(np.mean(np.diff(force, 2)**2))/np.abs(force[np.abs(force) > 1e-9]).mean()
+
+
+@pytest.mark.parametrize("choice", [NTS, MORTAR, MORTAR | {"formulation": "SEGMENT"}],
+                         ids=["nodes", "mortar", "segments"])
+def test_friction_on_nodes_without_mass(choice, tmp_path):
+    """Energy and what friction takes, momenta and the law, as with mass; forces less than half as
+    rough, and smoother with h, where those of nodes with mass are not."""
+    choice = dict(choice)
+    sides = choice.pop("sides")
+    rough = []
+    for h in (0.005, 0.0025):
+        run = run_deck(rubbing_blocks(h, sides), tmp_path/str(h), **MASSLESS, **choice)
+        history = run.history
+        total = history["total"] + history["friction_loss"]
+        assert np.abs(total - total[0]).max() < 1e-12*history["kinetic"].max()
+        assert np.diff(history["friction_loss"]).min() >= -16*EPS*history["kinetic"].max()
+        assert history["friction_loss"][-1] > 0.01*history["kinetic"][0]
+        momentum = run.series("BODIES", "MOMENTUM")[1].sum(1)
+        assert np.abs(momentum - momentum[0]).max() < 1e-12
+        assert run.verdict["law_violation"] < 1e-10 and run.verdict["verdict"] == "good"
+        assert BACK not in run.log and history["cuts"].sum() == 0
+        rough.append(jumps(run))
+    assert rough[1] < 0.7*rough[0]
+    run = run_deck(rubbing_blocks(0.0025, sides), tmp_path/"massive", **choice)
+    assert jumps(run) > 2*rough[1]
+
+
 # ---- nodes that find no balance without their mass ----------------------------------------------
 
 
