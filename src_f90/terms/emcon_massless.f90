@@ -73,8 +73,8 @@ contains
 
    !> The slave nodes of all pairs but persistent ones, if dynamic steps ask; less those of surfaces
    !> that are damped or rebound, those that are driven in such a step, of rigid bodies, in ties and
-   !> equations, or given mass or forces, and those of elements that would keep none, and those that others would
-   !> not hold. And all nodes that have none anyway.
+   !> equations, or given mass or forces, and those of elements that would keep none, and those that
+   !> others would not hold. And all nodes that have none anyway.
    pure subroutine massless_find(scene, solid, is_given, without_density, is_massless)
       type(scene_t), intent(in) :: scene
       type(solid_t), intent(in) :: solid
