@@ -13,6 +13,7 @@ module emcon_friction
    use emcon_evaluation, only : evaluation_is_equilibrium, evaluation_displacement
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
+   use emcon_numbering, only : numbering_fixes
    use emcon_system, only : system_t
    implicit none
    private
@@ -25,11 +26,15 @@ module emcon_friction
    real(wp), parameter, public :: most_shift = 5.0e-3_wp
    integer, parameter, public :: most_lagged = 2
 
+   !> Displacements of this part of an edge tell whether a contact slides by them.
+   real(wp), parameter :: still = 1.0e-3_wp
+
    type :: friction_t
       logical :: is_on = .false. !! some contact has friction; else nothing is allocated
       integer :: n_slip = 1                      !! n_dim - 1
       !> (n_constraint) Coulomb's law of each, with mu = 0 where there is none: how what acts holds
       type(coulomb_t), allocatable :: law(:)
+      real(wp), allocatable :: mu(:)             !! (n_constraint) of these, where slip is possible
       !> (n_slip, n_constraint) friction to start from, and at the end of the step before
       real(wp), allocatable :: tau(:, :), tau0(:, :)
       !> (n_slip, n_constraint) of slip, where it slid then, of length 1; else 0
@@ -65,6 +70,7 @@ contains
       do i = 1, size(system%contact)
          self%law(system%first_constraint(i) + 1:system%first_constraint(i + 1)) = law(i)
       end do
+      self%mu = self%law%mu
    end subroutine friction_init
 
    !> Coulomb's law of a contact; without friction that with mu = 0.
@@ -102,6 +108,8 @@ contains
       end do
       self%tau = self%tau0
       self%n_lagged = 0
+      self%law%mu = self%mu
+      call leave_still(self, system, motion)
       if (.not. evaluation_is_equilibrium(motion%evaluation)) call find_targets(self, system, &
          motion, was_active)
    end subroutine friction_begin
@@ -127,6 +135,54 @@ contains
          end associate
       end do
    end subroutine find_targets
+
+   !> Contacts whose slave node is held in some direction, and which nothing that is free to move
+   !> makes slide, as on a line of symmetry, do not rub: any friction would satisfy the law there, and
+   !> none is what two halves leave each other. What is driven along a surface does.
+   pure subroutine leave_still(self, system, motion)
+      type(friction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(motion_t), intent(in) :: motion       !! the guess, with what is prescribed
+      real(wp), dimension(size(motion%du, 1), size(motion%du, 2)) :: free, driven, own
+      logical :: holds(size(motion%du, 1), size(motion%du, 2))
+      integer :: pair, i, a
+
+      do i = 1, size(holds, 2)
+         holds(:, i) = [(numbering_fixes(system%space%numbering, a, i), a = 1, size(holds, 1))]
+         ! Unlike ones: what moves all together slides nowhere.
+         free(:, i) = merge(0.0_wp, still*(0.5_wp + modulo(0.618_wp*i, 1.0_wp)), holds(:, i))
+      end do
+      if (.not. any(holds)) return
+      driven = merge(motion%du, 0.0_wp, holds)
+      own = 0.0_wp
+      do pair = 1, size(system%contact)
+         associate (contact => system%contact(pair)%contact, before => system%first_constraint(pair))
+            do i = 1, contact%n_constraint
+               associate (node => contact%node(i), size => contact%state(i)%size)
+                  if (.not. (self%mu(before + i) > 0.0_wp .and. any(holds(:, node)))) cycle
+                  own(:, node) = size
+                  if (slides_by(contact, i, motion, own, size)) then
+                     if (.not. (slides_by(contact, i, motion, size*free, size) .or. &
+                        slides_by(contact, i, motion, driven, size))) self%law(before + i)%mu &
+                        = 0.0_wp
+                  end if
+                  own(:, node) = 0.0_wp
+               end associate
+            end do
+         end associate
+      end do
+   end subroutine leave_still
+
+   !> Does a displacement make the `i`-th constraint of `contact` slide?
+   pure logical function slides_by(contact, i, motion, du, size) result(slides)
+      class(contact_t), intent(in) :: contact
+      integer, intent(in) :: i
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in), contiguous :: du(:, :)     !! (n_dim, n_node) [L]
+      real(wp), intent(in) :: size               !! of an edge [L]
+
+      slides = norm2(contact%slip(i, motion%x, motion%u0, du)) > still*still*size
+   end function slides_by
 
    !> Give the conditions of `set`, just selected, their laws, and what sticks rows of its slips.
    pure subroutine friction_select(self, set)

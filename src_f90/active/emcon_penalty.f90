@@ -104,7 +104,8 @@ contains
          end if
          by_area = given
          if (.not. given > 0.0_wp) by_area = factor*sum(inner(contact%node))/sum(area)
-         if (.not. by_area > 0.0_wp) by_area = factor*of_opposite(system, k, inner)/sum(area)
+         if (.not. by_area > 0.0_wp) by_area = factor &
+            *of_opposite(system, scene, k, inner)/sum(area)
          if (.not. by_area > 0.0_wp) then
             call raise(error, err_input, where_text(scene, step%contact%penalty%origin) &
                // ": error: " &
@@ -122,16 +123,22 @@ contains
       end associate
    end subroutine set_contact
 
-   !> The stiffness at the nodes of the other side of contact `k`, if these are some contact's.
-   pure real(wp) function of_opposite(system, k, inner) result(total)
+   !> The stiffness at the nodes of the other side of contact `k`, if these are some contact's: of its
+   !> pair, or of that the other way round.
+   pure real(wp) function of_opposite(system, scene, k, inner) result(total)
       type(system_t), intent(in) :: system
+      type(scene_t), intent(in) :: scene
       integer, intent(in) :: k
       real(wp), intent(in) :: inner(:)           !! (n_node)
       integer :: i
 
       total = 0.0_wp
       do i = 1, size(system%contact)
-         if (i == k .or. abs(system%contact(i)%of_pair) /= abs(system%contact(k)%of_pair)) cycle
+         associate (own => abs(system%contact(k)%of_pair), other => abs(system%contact(i)%of_pair))
+            if (i == k) cycle
+            if (own /= other .and. (scene%pair(own)%slave /= scene%pair(other)%master &
+               .or. scene%pair(own)%master /= scene%pair(other)%slave)) cycle
+         end associate
          total = total + sum(inner(system%contact(i)%contact%node))
       end do
    end function of_opposite

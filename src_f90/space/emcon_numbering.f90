@@ -14,7 +14,8 @@ module emcon_numbering
    use emcon_steps, only : prescribed_t
    implicit none
    private
-   public :: numbering_t, numbering_init, numbering_holds, pick_unknowns, pick_magnitudes, &
+   public :: numbering_t, numbering_init, numbering_holds, numbering_fixes, &
+      pick_unknowns, pick_magnitudes, &
       add_to_dofs
    public :: spread_dependent, gather_dependent, numbering_matrix, numbering_links, unresolved_t
 
@@ -242,6 +243,17 @@ contains
       end function is_dependent
 
    end subroutine collect_terms
+
+   !> Does freedom `a` of a node follow from no unknown?
+   elemental logical function numbering_fixes(self, a, node)
+      type(numbering_t), intent(in) :: self
+      integer, intent(in) :: a                   !! 1 to n_dim
+      integer, intent(in) :: node                !! of the scene
+
+      associate (d => size(self%unknown, 1)*(node - 1) + a)
+         numbering_fixes = all(self%column(self%start(d) + 1:self%start(d + 1)) == 0)
+      end associate
+   end function numbering_fixes
 
    !> Are all freedoms of a node prescribed, or follow from what is?
    elemental logical function numbering_holds(self, node)

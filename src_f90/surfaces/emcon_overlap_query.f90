@@ -87,11 +87,16 @@ contains
       character(len=:), allocatable, intent(out) :: text   !! one line
 
       associate (facet => self%facet)
-         text = "node " // to_text(label(self%node)) // " of body " // &
-            to_text(body(self%node)) // " is " // to_text(self%depth*self%length, 3) // &
-            " behind the edge from node " // &
-            to_text(label(facet(1))) // " to " // to_text(label(facet(2))) // " of body " // &
-            to_text(body(facet(1)))
+         text = "a point of an analytical surface"
+         if (body(self%node) > 0) text = "node " // to_text(label(self%node)) // " of body " // &
+            to_text(body(self%node))
+         text = text // " is " // to_text(self%depth*self%length, 3) // " behind "
+         if (body(facet(1)) > 0) then
+            text = text // "the edge from node " // to_text(label(facet(1))) // " to " // &
+               to_text(label(facet(2))) // " of body " // to_text(body(facet(1)))
+         else
+            text = text // "an analytical surface"
+         end if
       end associate
    end subroutine overlap_text
 
