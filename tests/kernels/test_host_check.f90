@@ -10,6 +10,7 @@ module test_host_check
    use emcon_stepper_user, only : stepper_give_force, stepper_give_mass
    use given_hosts, only : chain_host_init, chain_host_t
    use given_scenes, only : lump, make_line, open_given
+   use small_scenes, only : clamp
    implicit none
    private
    public :: collect_host_check
@@ -121,7 +122,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: raised
       type(scene_t) :: scene
-      type(stepper_t) :: empty, massless, stepper
+      type(stepper_t) :: empty, massless, linked, loose, stepper
       type(chain_host_t) :: chain
       type(csr_t) :: mass
 
@@ -141,6 +142,21 @@ contains
       call check_error(error, raised, err_input, "no forces were given", "nothing given")
       call open_given(massless, scene, chain, 0.0_wp, raised)
       call check_error(error, raised, err_input, "node 10 has given forces but no mass", "no mass")
+      call make_line(scene, 3, .true., 0.1_wp, 100)
+      call chain_host_init(chain, [1, 2], 3, error)
+      if (allocated(error)) return
+      scene%host%node = [1, 2]
+      call clamp(scene%step(1), [1, 2, 3])
+      call open_given(linked, scene, chain, 0.0_wp, error)
+      if (allocated(error)) return
+      call stepper_close(linked)
+      scene%host%node = [1, 3]
+      call open_given(loose, scene, chain, 0.0_wp, raised)
+      call check_error(error, raised, err_input, "names node 30, which has neither forces nor " &
+         // "mass", "of a node without a spring")
+      call make_line(scene, 2, .false., 0.1_wp, 100)
+      call chain_host_init(chain, [1, 2], 2, error)
+      if (allocated(error)) return
       scene%host%node = [1, 2]
       call open_given(stepper, scene, chain, 1.0_wp, error)
       if (allocated(error)) return

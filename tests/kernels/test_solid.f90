@@ -17,8 +17,10 @@ module test_solid
    use emcon_space, only : space_t
    use emcon_system, only : system_begin_step, system_init, system_respond, system_t
    use emcon_term, only : response_begin, response_init, response_t, role_internal
+   use emcon_stepper, only : stepper_t
    use emcon_text, only : to_text
    use kind_rows, only : law_code
+   use one_element, only : read_one
    use small_scenes, only : add_block, add_step, block_t, make_block, poisson, shake, young
    implicit none
    private
@@ -279,15 +281,17 @@ contains
    end subroutine test_symmetric
 
    !> Of a triangle with the sides 1 at a right angle slopes of shape functions are 1, twice so at
-   !> the corner; in a ring they are N/r around it, at three points.
+   !> the corner; in a ring they are N/r around it, at three points. Those of corners are below 0
+   !> where there are nodes between them.
    subroutine test_rounding(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: modulus = young*(1.0_wp - poisson)/((1.0_wp + poisson)*(1.0_wp &
          - 2.0_wp*poisson))
       type(scene_t) :: scene
       type(block_t) :: block
-      type(solid_t) :: solid
-      real(wp) :: expected(3), around(3)
+      type(solid_t) :: solid, quadratic
+      type(stepper_t) :: stepper
+      real(wp) :: expected(3), around(3), own(6), sums(6)
       integer :: k, j
 
       do k = 1, 2
@@ -310,6 +314,19 @@ contains
          call check_near(error, solid%stiffness(:3, 1), 0.5_wp*modulus*expected, tol, &
             modulus*expected(2), "stiffness by slopes")
       end do
+      call read_one("CAX6", 3, "NONLINEAR", stepper, error)
+      if (.not. allocated(error)) call solid_init(quadratic, stepper%scene, error)
+      if (allocated(error)) return
+      associate (geometry => quadratic%geometry(1))
+         sums = 0.0_wp
+         do j = 1, geometry%n_gp
+            own = sum(abs(geometry%gradient(:, :, j)), 1) + abs(geometry%circle(:, j))
+            sums = sums + geometry%weight(j)*sum(own)*own
+         end do
+         call check_true(error, any(geometry%circle < 0.0_wp), "below 0")
+         call check_near(error, quadratic%stiffness(:6, 1), 0.5_wp*modulus*sums, tol, &
+            modulus*maxval(sums), "with nodes between")
+      end associate
    end subroutine test_rounding
 
    !> Of a small curvature k, -k x y and k x**2/2 at nodes, a beam of CPE4I stores what one in plane

@@ -30,7 +30,8 @@ contains
       tests = [ &
          test_case_t("as a march that starts there, by all schemes", test_schemes), &
          test_case_t("other conditions within a step", test_renumber), &
-         test_case_t("what overlaps as it begins goes over the step", test_overclosure)]
+         test_case_t("what overlaps as it begins goes over the step", test_overclosure), &
+         test_case_t("and is told where no pair is there to hold it", test_overlap)]
    end subroutine collect_step_begin
 
    !> A block that is held at its left and pulled at its right, in two steps of `n` increments; the
@@ -225,5 +226,36 @@ contains
          end block
       end do
    end subroutine test_overclosure
+
+   !> Node 13 is the deepest, below the edge from node 10 to node 9; with a pair nothing is told.
+   subroutine test_overlap(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      character(len=:), allocatable :: told
+      integer :: k
+
+      do k = 0, 1
+         call make_two_blocks(scene, -0.0625_wp, lower, upper)
+         scene%x(2, 13) = -0.125_wp
+         scene%pair = scene%pair(:k)
+         call add_step(scene, .false., h, 4)
+         block
+            type(march_t) :: march
+
+            call march_init(march, scene, error)
+            if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+            if (allocated(error)) return
+            told = ""
+            if (march%warnings%n > 0) told = march%warnings%item(1)%text
+            call check_equal(error, march%warnings%n, 1 - k, "warnings, first: " // told)
+            if (k == 0) call check_equal(error, told, "bodies overlap as a step begins, by 0.125 " &
+               // "of an edge, node 13 of body 2 is 0.125 behind the edge from node 10 to 9 of " // &
+               "body 1: no contact pair brings the two together, and their overlap is not " // &
+               "looked at further", "told")
+            call march_free(march)
+         end block
+      end do
+   end subroutine test_overlap
 
 end module test_step_begin
