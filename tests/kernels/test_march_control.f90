@@ -41,6 +41,7 @@ contains
          test_case_t("masses that errors are weighed by", test_masses), &
          test_case_t("an event is found by the velocities", test_event), &
          test_case_t("an event that comes before they say", test_early), &
+         test_case_t("a second half that is cut", test_second), &
          test_case_t("solves that take long", test_slow), &
          test_case_t("long increments while bodies are apart", test_apart), &
          test_case_t("a body that may touch itself is never apart", test_self), &
@@ -435,6 +436,35 @@ contains
          increment%n_cut*window*longest, 1.0_wp, "as far as nothing meets")
       call march_free(march)
    end subroutine test_early
+
+   !> A spring that may not be longer than a part of h, at the velocity 1: the first half of the first
+   !> increment is shorter, the second one is cut until it is, to a sixteenth of the increment.
+   subroutine test_second(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: longest = 0.7_wp*h
+      type(scene_t) :: scene
+      type(stepper_t) :: stepper
+      type(chain_host_t) :: chain
+      type(increment_t) :: increment
+
+      call make_line(scene, 2, .false., h, n)
+      scene%step(1)%time%is_direct = .false.
+      scene%step(1)%time%tolerance = 1.0_wp
+      scene%v0(1, 2) = 1.0_wp
+      call chain_host_init(chain, [1, 2], 2, error)
+      if (allocated(error)) return
+      chain%k = 0.01_wp
+      chain%longest = longest
+      call open_given(stepper, scene, chain, 1.0_wp, error)
+      if (.not. allocated(error)) call stepper_advance(stepper, increment, error)
+      if (allocated(error)) return
+      associate (state => stepper%march%state)
+         call check_near(error, [increment%h, increment%done, state%clock%time, &
+            state%clock%step_time], spread(0.625_wp*h, 1, 4), 16.0_wp*eps, h, "in all")
+         call check_near(error, state%u(1, 2) - state%u(1, 1), 0.625_wp*h, h**2, h, "as far")
+      end associate
+      call stepper_close(stepper)
+   end subroutine test_second
 
    !> More than half of the iterations allowed: the next increments are shorter if the error counts.
    subroutine test_slow(error)

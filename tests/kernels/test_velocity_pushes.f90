@@ -3,6 +3,7 @@
 module test_velocity_pushes
    use check, only : check_near, check_true, test_case_t
    use emcon_contact_problem, only : contact_problem_create
+   use emcon_constraint, only : condition_rate
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_select
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_t
@@ -12,7 +13,7 @@ module test_velocity_pushes
    use emcon_system, only : mass_times, system_begin_step, system_init, system_t
    use emcon_text, only : to_text
    use emcon_rate_jump, only : rate_jump_t, velocity_update_change
-   use emcon_velocity_mass, only : velocity_update_free, velocity_update_t
+   use emcon_velocity_mass, only : velocity_update_free, velocity_update_reset, velocity_update_t
    use emcon_velocity_update, only : push_t, velocity_update_accelerate, &
       velocity_update_hold, velocity_update_push
    use small_scenes, only : add_step, block_t, clamp, make_two_blocks, shake
@@ -29,6 +30,7 @@ contains
 
       tests = [ &
          test_case_t("rates of gaps change as asked for", test_change), &
+         test_case_t("beside one that rubs and sticks", test_stick), &
          test_case_t("no jump that would give energy", test_gain), &
          test_case_t("no energy but what solves leave", test_uncertain), &
          test_case_t("a force gives or takes an energy", test_push), &
@@ -154,6 +156,50 @@ contains
       jump%problem%free(0, :) = -change(row)
       jump%problem%base(0, :) = 8.0_wp
    end subroutine ask
+
+   !> Contact 2 sticks, far within its cone: what it has slid by is taken out along the surface, as
+   !> asked; contacts 1 and 3 without friction push along normals alone.
+   subroutine test_stick(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: slide = 0.125_wp
+      type(system_t) :: system
+      type(constraint_set_t) :: set
+      type(velocity_update_t) :: update
+      type(rate_jump_t) :: jump
+      real(wp) :: rate(3), slip
+      real(wp), allocatable :: v(:, :), v0(:, :), x(:, :)
+
+      call begin(system, set, v, x, .false., error)
+      if (allocated(error)) return
+      set%item(2)%has_friction = .true.
+      call constraints_evaluate(set, system, motion_of(evaluation_t(), x, 0.0_wp*v, 0.0_wp*v))
+      v0 = v
+      rate = rates_of(set, v)
+      slip = condition_rate(set%item(2), v, 1)
+      jump%row = [1, 2, 3]
+      call contact_problem_create(jump%problem, 1, 3)
+      allocate(jump%rate(0:1, 3), jump%taken(3), source=0.0_wp)
+      jump%rate(0, :) = rate
+      jump%rate(1, 2) = slip
+      jump%problem%free(0, :) = 0.5_wp*rate
+      jump%problem%free(1, 2) = slide
+      jump%problem%base(0, :) = 8.0_wp
+      jump%problem%mu(2) = 10.0_wp
+      call velocity_update_change(update, system, set, jump, v, error)
+      if (allocated(error)) return
+      call check_true(error, jump%is_done, "it is taken")
+      associate (now => rates_of(set, v))
+         call check_near(error, now, 0.5_wp*rate, tol, 1.0_wp, "rates")
+      end associate
+      call check_near(error, condition_rate(set%item(2), v, 1), slip - slide, tol, 1.0_wp, "slips")
+      call check_near(error, jump%impulse(1, [1, 3]), [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, &
+         "without friction")
+      call check_near(error, jump%gained, energy_of(system, v) - energy_of(system, v0), tol, &
+         1.0_wp, "energy")
+      call check_near(error, momenta_of(system, v, x), momenta_of(system, v0, x), tol, 1.0_wp, &
+         "momenta")
+      call velocity_update_free(update)
+   end subroutine test_stick
 
    subroutine test_gain(error)
       type(error_t), allocatable, intent(out) :: error
@@ -300,8 +346,9 @@ contains
          if (k == 1) call check_near(error, momenta_of(system, v, x), momenta_of(system, v0, x), &
             tol, 1.0_wp, "momenta")
          if (k == 2) call check_near(error, v(:, :5), v0(:, :5), 0.0_wp, 1.0_wp, "held")
-         call velocity_update_free(update)
+         call velocity_update_reset(update, update%choice)
       end do
+      call velocity_update_free(update)
    end subroutine test_hold
 
    !> Linear conditions hold anyway, and one that is there twice cannot be solved for.
@@ -310,8 +357,9 @@ contains
       type(system_t) :: system
       type(constraint_set_t) :: set
       type(velocity_update_t) :: update
+      type(rate_jump_t) :: jump
       real(wp), allocatable :: v(:, :), v0(:, :), x(:, :)
-      real(wp) :: lost, gained
+      real(wp) :: lost, gained, rate(3)
       integer :: k
 
       call begin(system, set, v, x, .false., error)
@@ -326,6 +374,12 @@ contains
          call check_near(error, [lost, gained], [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "no energy")
          call check_near(error, v, v0, 0.0_wp, 1.0_wp, "no jump")
       end do
+      rate = rates_of(set, v)
+      call ask(jump, [1, 2, 3], rate, -0.5_wp*rate)
+      call velocity_update_change(update, system, set, jump, v, error)
+      if (allocated(error)) return
+      call check_true(error, jump%is_idle .and. .not. jump%is_done, "nor of contacts")
+      call check_near(error, v, v0, 0.0_wp, 1.0_wp, "velocities")
       call velocity_update_free(update)
    end subroutine test_not_held
 
