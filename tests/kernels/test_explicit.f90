@@ -477,7 +477,7 @@ contains
 
       well%k = k
       well%n_variable = 2
-      call open_well(stepper, well, 0.5_wp, h, 20, error)
+      call open_well(stepper, well, -0.5_wp, h, 20, error)
       do i = -2, 5
          if (i == 1 .and. .not. allocated(error)) call stepper_set_state(stepper, error, &
             u=reshape([1.0_wp, 0.0_wp], [2, 1]), v=reshape([0.0_wp, 0.0_wp], [2, 1]))

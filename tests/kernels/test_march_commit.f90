@@ -301,7 +301,8 @@ contains
       end do
       n_pair = march%system%n_pair
       do k = 1, 4
-         increment = increment_t(unconverged=before(k))
+         increment = increment_t(unconverged=before(k), n_augmentation=k)
+         march%active%penalty%n_augmentation = 3
          march%newton%convergence%last = merge(1.0e-12_wp, 0.25_wp, k == 3)
          march%newton%is_idle = k == 4
          march%newton%correction%fell_back = k == 1
@@ -312,6 +313,7 @@ contains
          if (increment%notes%n > 0) is_told = index(increment%notes%item(increment%notes%n)%text, &
             "a relative residual of 0.25 is accepted") == 1
          call check_true(error, is_told .eqv. k < 3, "told " // to_text(k))
+         call check_equal(error, increment%n_augmentation, max(k, 3), "the most augmentations")
          call check_near(error, increment%unconverged, max(before(k), merge(0.25_wp, 0.0_wp, &
             k < 3)), 0.0_wp, 1.0_wp, "accepted")
          associate (reached => march%newton%convergence)

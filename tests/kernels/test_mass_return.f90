@@ -96,6 +96,22 @@ contains
 
    end subroutine test_troubled
 
+   !> Contacts close as those of the layer do where their slave node has no mass.
+   subroutine check_marks(error, march)
+      type(error_t), allocatable, intent(inout) :: error
+      type(march_t), intent(in) :: march
+      integer :: i, k
+
+      do i = 1, size(march%system%contact)
+         associate (contact => march%system%contact(i)%contact)
+            do k = 1, contact%n_constraint
+               call check_true(error, march%active%rules%closes(march%system%first_constraint(i) &
+                  + k) .eqv. march%layer%is_massless(contact%node(k)), "marks")
+            end do
+         end associate
+      end do
+   end subroutine check_marks
+
    !> Masses are whole again, and energy and momenta stay when they come back and after that.
    subroutine test_flight(error)
       type(error_t), allocatable, intent(out) :: error
@@ -113,6 +129,7 @@ contains
       call march_increment(march, scene, increment, error)
       if (allocated(error)) return
       call check_true(error, all(march%layer%is_massless(surface)), "without mass")
+      call check_marks(error, march)
       if (allocated(error)) return
       is_back = .false.
       is_back([11, 12]) = .true.
@@ -123,6 +140,7 @@ contains
       if (allocated(error)) return
       call check_true(error, .not. any(march%layer%is_massless(11:12)) .and. &
          march%layer%is_massless(13), "two have it again")
+      call check_marks(error, march)
       call terms_massless(march%system%term, is_massless, is_bare)
       call check_true(error, all(is_massless .eqv. march%layer%is_massless) .and. .not. &
          any(is_bare), "the model says the same")

@@ -208,6 +208,7 @@ contains
             call march_init(march, scene, error)
             if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
             call check_near(error, march%overlap_check%meant_overlap, depth, tol, 1.0_wp, "meant")
+            call check_true(error, march%system%contact(1)%contact%meets_statics, "for statics")
             do i = 1, 4
                if (allocated(error)) return
                call march_increment(march, scene, increment, error)
