@@ -59,6 +59,7 @@ contains
 
       tests = [ &
          test_case_t("forces and tangents of our own laws", test_forces), &
+         test_case_t("and of small strains", test_small), &
          test_case_t("tangent against differences", test_tangent), &
          test_case_t("far from where it began", test_far), &
          test_case_t("two blocks meet, one of a given law", test_drop), &
@@ -175,6 +176,34 @@ contains
          end do
       end associate
    end subroutine solid_answers
+
+   !> Without NLGEOM strains are linear in displacements, however large these are.
+   subroutine test_small(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(stepper_t) :: given, own
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(response_t) :: one, two
+      type(motion_t) :: motion
+      real(wp) :: u(2, 6), du(2, 6)
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      call add_step(scene, .false., 0.1_wp, 1)
+      scene%step(1)%nlgeom = .false.
+      call open_both(given, own, scene, law_linear, error)
+      if (allocated(error)) return
+      call shake(u, 0.25_wp)
+      call shake(du, 0.25_wp)
+      motion = motion_of(evaluation_t(), scene%x, u, du)
+      call solid_answers(given, motion, one)
+      call solid_answers(own, motion, two)
+      associate (force => one%part(role_internal)%force, expected => two%part(role_internal)%force)
+         call check_near(error, force, expected, 64.0_wp*eps, young, "forces")
+         call check_near(error, sum(one%energy), sum(two%energy), 64.0_wp*eps, young, "energy")
+      end associate
+      call stepper_close(given)
+      call stepper_close(own)
+   end subroutine test_small
 
    !> Their tangent times `way`.
    subroutine solid_times(stepper, motion, way, product)

@@ -6,7 +6,9 @@ module test_march_commit
    use emcon_constraints, only : constraints_dissipated
    use emcon_contact_law, only : loss_friction
    use emcon_errors, only : error_t
+   use emcon_flexibility, only : flexibility_free, flexibility_make, flexibility_t
    use emcon_friction, only : friction_missed
+   use emcon_friction_limit, only : friction_limit_find, friction_limit_tell
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
@@ -47,6 +49,7 @@ contains
          test_case_t("what always holds is no contact", test_permanent), &
          test_case_t("what is told of bodies that nothing holds", test_stabilized), &
          test_case_t("friction above what one contact bears", test_limit), &
+         test_case_t("the contact that bears least is named", test_least), &
          test_case_t("impacts that keep a part", test_restitution)]
    end subroutine collect_march_commit
 
@@ -515,6 +518,52 @@ contains
       end subroutine look_at
 
    end subroutine test_limit
+
+   !> Of those that rub it is named, whichever is pushed most.
+   subroutine test_least(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(flexibility_t) :: flexibility
+      real(wp) :: limit(3)
+      character(len=:), allocatable :: told
+      integer :: i, k, least
+
+      call begin(scene, .false., march, error)
+      do while (march%active%set%n < 2)
+         if (allocated(error)) return
+         call march_increment(march, scene, increment, error)
+      end do
+      if (allocated(error)) return
+      associate (set => march%active%set, friction => march%active%friction)
+         call flexibility_make(flexibility, march%system, set, march%newton%correction, error)
+         if (.not. allocated(error)) call friction_limit_find(march%system, set, &
+            [(k, k = 1, set%n)], flexibility, limit(:set%n), error)
+         call flexibility_free(flexibility)
+         if (allocated(error)) return
+         least = minloc(limit(:set%n), 1)
+         call check_true(error, maxval(limit(:set%n)) > 1.01_wp*limit(least), "unlike")
+         friction%law%mu = 2.0_wp*maxval(limit(:set%n))
+         do i = 1, set%n
+            set%lam(:set%n) = 1.0_wp
+            set%lam(i) = 2.0_wp
+            friction%knows_limit = .false.
+            increment = increment_t()
+            call friction_limit_tell(march, scene, increment, error)
+            if (allocated(error)) return
+            told = "the contact of slave node " // to_text(scene%node%label( &
+               march%system%contact(1)%contact%node(set%id(least)))) // " by itself"
+            call check_equal(error, increment%notes%n, 1, "told")
+            if (allocated(error)) return
+            call check_true(error, index(increment%notes%item(1)%text, told) > 0, told // ": " &
+               // increment%notes%item(1)%text)
+         end do
+         call friction_limit_tell(march, scene, increment, error)
+         call check_equal(error, increment%notes%n, 1, "told once")
+      end associate
+      call march_free(march)
+   end subroutine test_least
 
    !> Of two free blocks: each gap that was held and opens keeps a part of its rate; what that takes
    !> is told, momenta stay.

@@ -39,6 +39,7 @@ contains
          test_case_t("total mass and row sums of a distorted mesh", test_total), &
          test_case_t("forces and energies are the sums over the elements", test_sums), &
          test_case_t("translation by 1e8 costs nothing", test_translation), &
+         test_case_t("which elements are too stiff in bending", test_stiff_bent), &
          test_case_t("modes inside let rectangles bend", test_bent), &
          test_case_t("what displacements round", test_rounding), &
          test_case_t("first inverted element is named", test_inverted), &
@@ -279,6 +280,34 @@ contains
          end do
       end do
    end subroutine test_symmetric
+
+   !> Those with nodes at corners alone and no modes, unless they are rigid.
+   subroutine test_stiff_bent(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=*), parameter :: name(6) = [character(len=5) :: "CPE3", "CPE4", "CPE4I", &
+         "CPE6", "CPE8", "C3D4"]
+      logical, parameter :: is_stiff(6) = [.true., .true., .false., .false., .false., .true.]
+      type(stepper_t) :: stepper
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(solid_t) :: solid
+      integer :: k
+
+      do k = 1, size(name)
+         call read_one(trim(name(k)), 3, "NONLINEAR", stepper, error)
+         if (.not. allocated(error)) call solid_init(solid, stepper%scene, error)
+         if (allocated(error)) return
+         call check_true(error, all(solid%trait%is_stiff_bent .eqv. is_stiff(k)), trim(name(k)))
+         stepper = stepper_t()
+      end do
+      call make_block(scene, "CPE4", [2, 1], block)
+      deallocate(scene%rigid)
+      allocate(scene%rigid(1))
+      scene%rigid(1)%element = [2]
+      call solid_init(solid, scene, error)
+      if (allocated(error)) return
+      call check_true(error, all(solid%trait%is_stiff_bent .eqv. [.true., .false.]), "a rigid one")
+   end subroutine test_stiff_bent
 
    !> Of a triangle with the sides 1 at a right angle slopes of shape functions are 1, twice so at
    !> the corner; in a ring they are N/r around it, at three points. Those of corners are below 0

@@ -1,9 +1,9 @@
 !> A step of the deck begins with displacements and velocities alone: what a march does in its
 !> second step is what one does that starts there.
 module test_step_begin
-   use check, only : check_equal, check_near, check_true, test_case_t
+   use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_amplitudes, only : amplitude_t
-   use emcon_errors, only : error_t
+   use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
@@ -13,6 +13,7 @@ module test_step_begin
    use emcon_scheme, only : scheme_row_t
    use emcon_scheme_registry, only : n_scheme_row, scheme_row
    use emcon_state, only : state_t
+   use linear_scenes, only : add_equation
    use small_scenes, only : add_step, block_t, clamp, make_block, make_two_blocks, prescribe, &
       shake
    implicit none
@@ -30,6 +31,7 @@ contains
       tests = [ &
          test_case_t("as a march that starts there, by all schemes", test_schemes), &
          test_case_t("other conditions within a step", test_renumber), &
+         test_case_t("and such as equations contradict", test_contradiction), &
          test_case_t("what overlaps as it begins goes over the step", test_overclosure), &
          test_case_t("and is told where no pair is there to hold it", test_overlap)]
    end subroutine collect_step_begin
@@ -182,6 +184,26 @@ contains
       call march_free(march)
       call march_free(new)
    end subroutine test_renumber
+
+   !> Two nodes that an equation lets move alike, and that are to move otherwise from then on.
+   subroutine test_contradiction(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: refused
+      type(scene_t) :: scene
+      type(march_t) :: march
+
+      call make_pulled(scene, scheme_row("DYNAMIC", ""), 3)
+      call add_equation(scene, [3, 6], [1, 1], [1.0_wp, -1.0_wp])
+      scene%v0(1, 6) = scene%v0(1, 3)
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      if (allocated(error)) return
+      call prescribe(scene%step(1), 3, 1, 0.125_wp)
+      call prescribe(scene%step(1), 6, 1, 0.25_wp)
+      call march_renumber(march, scene, refused)
+      call check_error(error, refused, err_input, "", "contradiction")
+      call march_free(march)
+   end subroutine test_contradiction
 
    !> Held blocks that overlap by 1/20: gaps rise to 0 over the step, or by an amplitude.
    subroutine test_overclosure(error)
