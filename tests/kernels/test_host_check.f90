@@ -6,6 +6,7 @@ module test_host_check
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : dp, wp
    use emcon_scene, only : scene_t
+   use emcon_solver_registry, only : solver_default, solver_names, solver_user
    use emcon_stepper, only : stepper_build, stepper_close, stepper_t
    use emcon_stepper_user, only : stepper_give_force, stepper_give_mass
    use given_hosts, only : chain_host_init, chain_host_t
@@ -122,7 +123,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: raised
       type(scene_t) :: scene
-      type(stepper_t) :: empty, massless, linked, loose, stepper
+      type(stepper_t) :: empty, massless, linked, loose, unsolved, stepper
+      character(len=:), allocatable :: known
       type(chain_host_t) :: chain
       type(csr_t) :: mass
 
@@ -150,6 +152,15 @@ contains
       call open_given(linked, scene, chain, 0.0_wp, error)
       if (allocated(error)) return
       call stepper_close(linked)
+      scene%step(1)%solution%solver = solver_user
+      scene%step(1)%solution%solver_name = "NOBODY"
+      call open_given(unsolved, scene, chain, 0.0_wp, raised)
+      call check_error(error, raised, err_input, "SOLVER=NOBODY: no program has given this " &
+         // "solver, see docs/embedding.md; those of EMCON are ", "a solver that is not there")
+      call solver_names(known)
+      if (allocated(raised)) call check_true(error, index(raised%message, known) > 0, &
+         raised%message)
+      scene%step(1)%solution%solver = solver_default
       scene%host%node = [1, 3]
       call open_given(loose, scene, chain, 0.0_wp, raised)
       call check_error(error, raised, err_input, "names node 30, which has neither forces nor " &

@@ -142,6 +142,7 @@ contains
             if (.not. scene%step(1)%scheme%is_explicit) call check_near(error, ledger%total &
                - ledger%contact_work + ledger%friction, total, tol, total, "energy, " // what)
          end associate
+         call check_massless(error, march, scene%step(1)%time%h, what)
          if (increment%n_cut == 0 .and. scene%pair(1)%interaction%restitution < 1.0_wp) &
             call check_cone(error, march, scene%pair(1)%interaction%friction, what)
          do i = 1, increment%notes%n
@@ -157,6 +158,23 @@ contains
       call check_true(error, n_pushed > 2, "contact, " // what)
       call march_free(march)
    end subroutine follow
+
+   !> What has no mass moves as its displacement says, but for a jump where it was balanced anew.
+   subroutine check_massless(error, march, h, what)
+      type(error_t), allocatable, intent(inout) :: error
+      type(march_t), intent(in) :: march
+      real(wp), intent(in) :: h                  !! of an increment that was not cut [T]
+      character(len=*), intent(in) :: what
+      integer :: i
+
+      if (.not. march%layer%is_on .or. march%layer%is_settled) return
+      do i = 1, size(march%layer%is_massless)
+         if (.not. march%layer%is_massless(i)) cycle
+         if (.not. any(abs(march%motion%du(:, i)) > 0.0_wp)) cycle
+         call check_near(error, h*march%state%v(:, i), march%motion%du(:, i), tol, h, &
+            "velocities without mass, " // what)
+      end do
+   end subroutine check_massless
 
    !> Impulses of the step and of the jump at its end together: friction is in the cone of all, but
    !> where a jump is one along normals alone.

@@ -348,7 +348,9 @@ contains
          if (k == 2) call check_near(error, v(:, :5), v0(:, :5), 0.0_wp, 1.0_wp, "held")
          call velocity_update_reset(update, update%choice)
       end do
+      update%is_ready = .true.
       call velocity_update_free(update)
+      call check_true(error, .not. update%is_ready, "nothing is left")
    end subroutine test_hold
 
    !> Linear conditions hold anyway, and one that is there twice cannot be solved for.
