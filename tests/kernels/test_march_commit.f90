@@ -111,6 +111,7 @@ contains
          call march_increment(march, scene, increment, error)
          if (allocated(error)) return
          if (increment%n_cut > 0) cycle
+         call check_equal(error, increment%n_newton, march%active%n_newton, "solved once")
          call check_motion(error, march, before, books)
          associate (response => march%system%response, state => march%state)
             call check_near(error, increment%work_scale, (norm2(state%contact) &
