@@ -151,6 +151,12 @@ contains
       call mass_times(march%system, field, product)
       call check_near(error, sum(product, 2), [6.0_wp, 2.0_wp*0.125_wp], tol, 6.0_wp, &
          "mass and its moment")
+      ! Node 11 is of one element of four nodes, and moves against the others there.
+      field = 0.0_wp
+      field(1, 11) = 1.0_wp
+      call mass_times(march%system, field, product)
+      call check_near(error, [product(1, 11), sum(product(1, :))], [0.25_wp, 0.0_wp], tol, 1.0_wp, &
+         "its own mass")
       do k = 2, 4
          if (allocated(error)) return
          call march_increment(march, scene, increment, error)

@@ -196,6 +196,7 @@ contains
          call check_near(error, restored, merge(0.0_wp, sum(lam)*way, k == 1), 0.01_wp, &
             sum(lam)*way, "what is given back")
          call check_true(error, maxval(abs(v)) > 0.0_wp .eqv. k == 2, "a jump")
+         call check_true(error, has_root, "nothing is left over")
       end do
       call velocity_update_free(update)
    end subroutine test_noise

@@ -59,13 +59,15 @@ contains
          call add_step(scene, .false., 0.1_wp, 1)
          block
             type(march_t) :: march
-            type(verdict_t) :: verdict
+            type(verdict_t) :: verdict, fresh
 
             call march_init(march, scene, error)
             if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
             if (allocated(error)) return
             call verdict_start(verdict, march)
             call check_equal(error, verdict%n_warning, k - 1, "warnings")
+            call check_near(error, verdict%overlap%bar, fresh%overlap%bar, 0.0_wp, 1.0_wp, &
+               "no guards give way")
             if (k == 2) call check_true(error, index(verdict%warnings%item(1)%text, &
                "element 10 at nu = 0.499 locks: ") == 1, verdict%warnings%item(1)%text)
             call march_free(march)
