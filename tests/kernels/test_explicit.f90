@@ -369,9 +369,10 @@ contains
    end subroutine test_squeezed
 
    !> After 200 increments of the step: at rest the critical step of a free block is the one of its
-   !> start. Of a step below the bound by elements nothing is found anew.
+   !> start. Of a step below the bound by elements nothing is found anew; one above is not taken.
    subroutine test_looked_at(error)
       type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: stopped
       real(wp), parameter :: unknown = 100.0_wp
       type(scene_t) :: scene
       type(block_t) :: block
@@ -410,6 +411,12 @@ contains
             call check_equal(error, found%critical_element, merge(element, 0, k == 1), "of which")
          end associate
       end do
+      scene%step(1)%time%h = 1.1_wp*sharp
+      march%state%clock%increment = 200
+      march%state%clock%n_before = 0
+      call march_increment(march, scene, increment, stopped)
+      call check_error(error, stopped, err_analysis, " is larger than the critical step ", "found")
+      call check_equal(error, march%state%clock%increment, 200, "before the increment")
       call march_free(march)
    end subroutine test_looked_at
 

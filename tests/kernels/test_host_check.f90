@@ -87,6 +87,8 @@ contains
       bad = mass
       bad%value(2) = 1.5_dp
       call refuse(bad, "between nodes 10 and 20 is not that of the other way round: 1.5, 1")
+      bad%value(2:3) = [1.0_dp, 1.5_dp]
+      call refuse(bad, "between nodes 10 and 20 is not that of the other way round: 1, 1.5")
       bad = mass
       bad%value(4) = -2.0_dp
       call refuse(bad, "between nodes 10 and 20 is larger than")

@@ -173,6 +173,8 @@ contains
       type(state_t), intent(in) :: before
       type(increment_t), intent(in) :: increment
       type(stand_off_t) :: stand_off
+      real(wp), allocatable :: lam(:)
+      logical, allocatable :: is_active(:)
       real(wp) :: drag(most_slips), missed, largest
       logical :: acts(3)
       integer :: k
@@ -192,6 +194,10 @@ contains
             end associate
          end do
          call check_true(error, all(now%is_active .eqv. acts), "what acts")
+         call now%get(2, lam, is_active)
+         call check_near(error, lam, now%lam(2:), 0.0_wp, 1.0_wp, "multipliers from there on")
+         call check_equal(error, size(is_active), size(now%is_active) - 1, "as many")
+         call check_true(error, all(is_active .eqv. now%is_active(2:)), "and what acts")
          do k = 1, 3
             if (acts(k)) cycle
             call check_near(error, [now%lam(k), now%drag(1, k), now%slides_along(1, k)], &
