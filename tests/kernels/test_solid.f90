@@ -7,6 +7,7 @@ module test_solid
    use emcon_host_law, only : host_response_t
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
+   use emcon_law_registry, only : law_linear
    use emcon_materials, only : kinematics_linear
    use emcon_motion, only : motion_of, motion_t
    use emcon_evaluation, only : evaluation_at_end, evaluation_t
@@ -40,6 +41,7 @@ contains
          test_case_t("forces and energies are the sums over the elements", test_sums), &
          test_case_t("translation by 1e8 costs nothing", test_translation), &
          test_case_t("which elements are too stiff in bending", test_stiff_bent), &
+         test_case_t("laws of elements that are not of small strains", test_linear_laws), &
          test_case_t("modes inside let rectangles bend", test_bent), &
          test_case_t("what displacements round", test_rounding), &
          test_case_t("first inverted element is named", test_inverted), &
@@ -280,6 +282,31 @@ contains
          end do
       end do
    end subroutine test_symmetric
+
+   !> Of three materials the second is linear; elements of small strains are others' matter.
+   subroutine test_linear_laws(error)
+      type(error_t), allocatable, intent(out) :: error
+      !> Material of each of three elements, of which the first has small strains
+      integer, parameter :: material(3, 4) = reshape([1, 2, 2, 1, 2, 3, 3, 1, 2, 2, 3, 2], [3, 4])
+      logical, parameter :: are_linear(4) = [.true., .false., .false., .false.]
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(solid_term_t) :: term
+      integer :: k
+
+      do k = 1, 4
+         call make_block(scene, "CPE4", [3, 1], block)
+         scene%material = scene%material([1, 1, 1])
+         scene%material(2)%law = law_linear
+         scene%section = scene%section([1, 1, 1])
+         scene%section(1)%kinematics = kinematics_linear
+         scene%section%material = material(:, k)
+         scene%element%section = [1, 2, 3]
+         call solid_term_init(term, scene, error)
+         if (allocated(error)) return
+         call check_true(error, term%has_linear_laws .eqv. are_linear(k), "case " // to_text(k))
+      end do
+   end subroutine test_linear_laws
 
    !> Those with nodes at corners alone and no modes, unless they are rigid.
    subroutine test_stiff_bent(error)
