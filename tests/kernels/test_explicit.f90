@@ -460,6 +460,7 @@ contains
          call stepper_advance(stepper, increment, error)
          if (allocated(error)) return
          call check_equal(error, increment%n_newton, 0, "nothing is solved")
+         call check_near(error, increment%residual, [0.0_wp], 0.0_wp, 1.0_wp, "nothing is left")
          associate (state => stepper%march%state, ledger => stepper%march%ledger, &
                x => [cos(i*phi), v*h/sin(phi)*sin(i*phi)], &
                rate => [-sin(i*phi)*sin(phi)/h, v*cos(i*phi)])

@@ -2,7 +2,7 @@
 !> ways in which contact begins and all formulations, with friction, restitution and penalties.
 module test_march_impulse
    use check, only : check_near, check_true, test_case_t
-   use emcon_constraint, only : condition_friction, most_slips
+   use emcon_constraint, only : condition_friction, condition_rate, most_slips
    use emcon_errors, only : error_t
    use emcon_interactions, only : formulation_mortar, formulation_nts, formulation_segment
    use emcon_kinds, only : dp, wp
@@ -176,15 +176,17 @@ contains
       end do
    end subroutine check_massless
 
-   !> Impulses of the step and of the jump at its end together: friction is in the cone of all, but
-   !> where a jump is one along normals alone.
+   !> Impulses of the step and of the jump at its end together: friction is in the cone of all, and
+   !> within it no jump moves along the surface; but where a jump is one along normals alone.
    subroutine check_cone(error, march, mu, what)
       type(error_t), allocatable, intent(inout) :: error
       type(march_t), intent(in) :: march
       real(wp), intent(in) :: mu
       character(len=*), intent(in) :: what
-      real(wp) :: push, drag(most_slips)
+      real(wp) :: push, drag(most_slips), change(2, 16)
       integer :: k
+
+      change = march%state%v - (2.0_wp/h*march%motion%du - march%motion%v0)
 
       associate (set => march%active%set, jump => march%end_state%jump)
          if (size(jump) > 0 .and. .not. any(abs(jump%drag(1)) > 0.0_wp)) return
@@ -195,6 +197,8 @@ contains
             drag(1) = drag(1) + sum(jump%drag(1), jump%id == set%id(k))
             call check_true(error, push >= -tol, "pushes, " // what)
             call check_true(error, abs(drag(1)) <= mu*push + tol, "friction, " // what)
+            if (abs(drag(1)) < mu*push - sqrt(tol)) call check_near(error, &
+               condition_rate(set%item(k), change, 1), 0.0_wp, tol, 2.0_wp, "sticks, " // what)
          end do
       end associate
    end subroutine check_cone
