@@ -194,6 +194,9 @@ contains
       call check_near(error, condition_rate(set%item(2), v, 1), slip - slide, tol, 1.0_wp, "slips")
       call check_near(error, jump%impulse(1, [1, 3]), [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, &
          "without friction")
+      ! What sticks does no work.
+      call check_near(error, jump%rubbed, [0.0_wp, 0.0_wp, 0.0_wp], tol, 1.0_wp, "friction")
+      call check_true(error, abs(jump%impulse(1, 2)) > 1.0e-3_wp, "an impulse")
       call check_near(error, jump%gained, energy_of(system, v) - energy_of(system, v0), tol, &
          1.0_wp, "energy")
       call check_near(error, momenta_of(system, v, x), momenta_of(system, v0, x), tol, 1.0_wp, &
