@@ -2,7 +2,7 @@
 module test_host_force
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_couplings, only : equation_t
-   use emcon_csr, only : csr_from_elements, csr_t
+   use emcon_csr, only : csr_from_elements, csr_multiply, csr_t
    use emcon_errors, only : err_analysis, err_input, error_t
    use emcon_interactions, only : formulation_mortar, formulation_nts
    use emcon_evaluation, only : evaluation_t
@@ -17,11 +17,13 @@ module test_host_force
    use emcon_stepper_user, only : stepper_give_force, stepper_give_mass
    use emcon_stepper_query, only : query_evaluate, query_free, query_residual, query_t
    use emcon_steps, only : initiation_velocity_update
-   use emcon_system, only : mass_times
+   use emcon_system, only : mass_times, system_respond
    use emcon_term, only : response_init, response_t, role_internal
    use emcon_text, only : to_text
    use given_hosts, only : chain_host_init, chain_host_t
    use given_scenes, only : eps => given_eps, lump, make_line, open_both, open_given, run_conserving
+   use linear_scenes, only : add_equation
+   use random_draws, only : draw_random
    use small_scenes, only : add_step, block_t, make_block, prescribe, shake
    use stepper_scenes, only : drop_h, make_drop, make_tied_drop
    implicit none
@@ -39,6 +41,7 @@ contains
          test_case_t("a host's solid that is tied", test_host_tied), &
          test_case_t("a host that tells no magnitudes", test_host_silent), &
          test_case_t("sizes of forces that a host does not tell", test_magnitude), &
+         test_case_t("a matrix over what is linked", test_linked), &
          test_case_t("masses between nodes are lumped by their rows", test_lumped), &
          test_case_t("contact between elements and a host", test_host_mixed), &
          test_case_t("a host in contact, VELOCITY UPDATE", test_host_update), &
@@ -163,6 +166,39 @@ contains
       call stepper_close(own)
       call stepper_close(hosted)
    end subroutine test_magnitude
+
+   !> Two nodes of the host hang on others of it: the matrix is that of elements with the same links.
+   subroutine test_linked(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(stepper_t) :: own, hosted
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(motion_t) :: motion
+      real(wp) :: du(2, 8)
+      real(wp), allocatable :: x(:), product(:), expected(:)
+
+      call make_block(scene, "CPE4", [3, 1], block)
+      call add_step(scene, .false., 0.1_wp, 1)
+      call add_equation(scene, [4, 8, 3], [1, 1, 2], [1.0_wp, -2.0_wp, 0.5_wp])
+      call add_equation(scene, [1, 5], [2, 1], [1.0_wp, 3.0_wp])
+      call open_both(scene, [.false., .false., .false.], .true., own, hosted, error)
+      if (allocated(error)) return
+      call shake(du, 0.1_wp)
+      associate (a => own%march%system, b => hosted%march%system)
+         motion = motion_of(evaluation_t(), scene%x, 0.0_wp*du, du)
+         call system_respond(a, motion, .true.)
+         call system_respond(b, motion, .true.)
+         allocate(x(a%space%numbering%n_unknown))
+         call draw_random(x)
+         allocate(product, expected, mold=x)
+         call csr_multiply(a%matrix, x, expected)
+         call csr_multiply(b%matrix, x, product)
+         call check_near(error, product, expected, 64.0_wp*eps, maxval(abs(expected)), "matrix")
+         call check_equal(error, size(x), 14, "unknowns")
+      end associate
+      call stepper_close(own)
+      call stepper_close(hosted)
+   end subroutine test_linked
 
    !> Of 2 and 1 between three nodes in a row; explicit steps take the sums of the rows.
    subroutine test_lumped(error)
