@@ -30,7 +30,8 @@ contains
       tests = [ &
          test_case_t("bodies that no pair brings together", test_stray), &
          test_case_t("by facets and by what they stand for", test_smooth), &
-         test_case_t("steps that go deeper than guards allow", test_deeper)]
+         test_case_t("steps that go deeper than guards allow", test_deeper), &
+         test_case_t("a body that goes through another one in a step", test_through)]
    end subroutine collect_step_overlap
 
    subroutine begin(scene, march, part, error)
@@ -77,6 +78,35 @@ contains
       call check_true(error, height > 0.0_wp .and. deepest > 0.5_wp*gap, "in and out")
       call march_free(march)
    end subroutine test_stray
+
+   !> The upper block is below the lower one in the end, or the lower one above it, while the left
+   !> end of the other moves with it: seen on the way.
+   subroutine test_through(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: way = 3.0_wp
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(overlap_check_t) :: judge
+      type(overlap_t) :: overlap
+      real(wp) :: du(2, 16)
+      integer :: k
+
+      call make_two_blocks(scene, gap, lower, upper)
+      call add_step(scene, .false., h, n_step)
+      do k = 1, 3
+         du = 0.0_wp
+         if (k == 1) du(2, [1, 6, 11, 12, 13, 14, 15, 16]) = -way
+         if (k == 2) du(2, [1, 2, 3, 4, 5, 6, 7, 8, 9, 10]) = way
+         if (k == 3) du(2, [1, 6, 11, 12, 13, 14, 15, 16]) = way
+         call overlap_check_init(judge, scene)
+         call overlap_check_smooth(judge, scene, contact_options_t())
+         call overlap_check_step(judge, scene%x, 0.0_wp*du, du, overlap)
+         call check_true(error, overlap%depth > 0.1_wp .eqv. k < 3, "way " // to_text(k))
+         ! In the end there is none.
+         call overlap_check_step(judge, scene%x, du, 0.0_wp*du, overlap)
+         call check_near(error, overlap%depth, 0.0_wp, 0.0_wp, 1.0_wp, "end " // to_text(k))
+      end do
+   end subroutine test_through
 
    !> Blocks that are too deep in each other for contact to begin fly on: a step by which they come
    !> deeper than a tenth of what guards let in is to be smaller, if nodes of both sides are held,
