@@ -87,6 +87,9 @@ contains
       bad = mass
       bad%value(2) = 1.5_dp
       call refuse(bad, "between nodes 10 and 20 is not that of the other way round: 1.5, 1")
+      bad%value = 2.0_dp                         ! as large as it may be
+      call refuse(bad, "")
+      bad = mass
       bad%value(2:3) = [1.0_dp, 1.5_dp]
       call refuse(bad, "between nodes 10 and 20 is not that of the other way round: 1, 1.5")
       bad = mass

@@ -42,6 +42,7 @@ contains
          test_case_t("an event is found by the velocities", test_event), &
          test_case_t("an event that comes before they say", test_early), &
          test_case_t("a second half that is cut", test_second), &
+         test_case_t("cuts where the error does not count", test_cut), &
          test_case_t("solves that take long", test_slow), &
          test_case_t("long increments while bodies are apart", test_apart), &
          test_case_t("a body that may touch itself is never apart", test_self), &
@@ -436,6 +437,39 @@ contains
          increment%n_cut*window*longest, 1.0_wp, "as far as nothing meets")
       call march_free(march)
    end subroutine test_early
+
+   !> Where increments end at events alone one that is cut says nothing of the next ones: twice from
+   !> the size of the deck, to a half of it and then to an eighth.
+   subroutine test_cut(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: part(2) = [0.5_wp, 0.625_wp]
+      integer, parameter :: n_cut(2) = [1, 2]
+      type(scene_t) :: scene
+      type(stepper_t) :: stepper
+      type(chain_host_t) :: chain
+      type(increment_t) :: increment
+      integer :: k
+
+      call make_line(scene, 2, .false., h, n)
+      scene%step(1)%time%is_direct = .false.
+      scene%step(1)%time%event_fraction = 0.01_wp
+      scene%v0(1, 2) = 1.0_wp
+      call chain_host_init(chain, [1, 2], 2, error)
+      if (allocated(error)) return
+      chain%k = 0.01_wp
+      chain%longest = 0.7_wp*h
+      call open_given(stepper, scene, chain, 1.0_wp, error)
+      do k = 1, 2
+         if (.not. allocated(error)) call stepper_advance(stepper, increment, error)
+         if (allocated(error)) return
+         associate (state => stepper%march%state)
+            call check_near(error, state%clock%time, part(k)*h, 16.0_wp*eps, h, "time")
+            call check_equal(error, [increment%n_cut, state%control%power], [n_cut(k), 0], &
+               "cuts, and the size that comes")
+         end associate
+      end do
+      call stepper_close(stepper)
+   end subroutine test_cut
 
    !> A spring that may not be longer than a part of h, at the velocity 1: the first half of the first
    !> increment is shorter, the second one is cut until it is, to a sixteenth of the increment.

@@ -30,13 +30,13 @@ contains
          test_case_t("by null space and multipliers, with and without links", test_links), &
          test_case_t("no jump without a loss", test_no_loss), &
          test_case_t("no jump without contact", test_no_contact), &
-         test_case_t("no jump of what is prescribed", test_prescribed), &
+         test_case_t("no jump of what is prescribed, or has no mass", test_prescribed), &
          test_case_t("gaps that change by round-off have lost nothing", test_noise)]
    end subroutine collect_velocity_update
 
    !> A step that closes the gaps of 1/8 under multipliers `lam`, then the jump on top of random
    !> velocities and a relative one of `speed`, > 0: parting.
-   subroutine jump(lam, speed, gain, lost, change, error, is_held, method, is_linked)
+   subroutine jump(lam, speed, gain, lost, change, error, is_held, method, is_linked, has_mass)
       real(wp), intent(in) :: lam, speed
       real(wp), intent(out) :: gain              !! of kinetic energy
       real(wp), intent(out) :: lost              !! work of the multipliers, taken from the bodies
@@ -45,6 +45,7 @@ contains
       logical, intent(in), optional :: is_held   !! nodes of both surfaces are prescribed
       integer, intent(in), optional :: method    !! of contact
       logical, intent(in), optional :: is_linked !! with it: the upper corners move alike along x
+      logical, intent(in), optional :: has_mass  !! present: nothing has
       type(scene_t) :: scene
       type(block_t) :: lower, upper
       type(system_t) :: system
@@ -58,6 +59,7 @@ contains
       call make_two_blocks(scene, 0.125_wp, lower, upper)
       call add_step(scene, .false., 0.1_wp, 1)
       if (present(is_held)) call clamp(scene%step(1), [(i, i = 6, 13)])
+      if (present(has_mass)) scene%material(1)%density = 0.0_wp
       if (present(method)) then
          scene%step(1)%contact%method = method
          call add_equation(scene, [14, 16], [1, 1], [1.0_wp, -1.0_wp])
@@ -91,7 +93,9 @@ contains
       if (present(method)) call check_true(error, .not. is_linked .or. abs(v1(1, 16) - v1(1, 14)) &
          <= tol, "nodes that are linked move alike")
       call check_near(error, gain, restored, tol, 10.0_wp, "gain and what is said of it")
-      call check_true(error, has_root .neqv. present(is_held), "a way to give it back")
+      call check_true(error, has_root .neqv. (present(is_held) .or. present(has_mass)), &
+         "a way to give it back")
+      if (present(has_mass)) call check_near(error, v1, v0, 0.0_wp, 1.0_wp, "no jump")
    end subroutine jump
 
    subroutine test_parting(error)
@@ -160,6 +164,7 @@ contains
       call jump(1.0_wp, 2.0_wp, gain, lost, change, error, is_held=.true.)
       if (allocated(error)) return
       call check_near(error, [gain, change], spread(0.0_wp, 1, 4), 0.0_wp, 1.0_wp, "no jump")
+      call jump(1.0_wp, 2.0_wp, gain, lost, change, error, has_mass=.false.)
    end subroutine test_prescribed
 
    !> Edges of the length 2, of which one contact pulls: 64 epsilon of them, by the sizes of forces.
