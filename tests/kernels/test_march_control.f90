@@ -6,8 +6,8 @@ module test_march_control
    use emcon_errors, only : err_analysis, error_t
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : dp, wp
-   use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
-      march_is_done, march_resume, march_t
+   use emcon_march, only : increment_t, march_begin_step, march_free, march_free_increment, &
+      march_increment, march_init, march_is_done, march_resume, march_t
    use emcon_rigid_bodies, only : rigid_frame_choose
    use emcon_scene, only : scene_t
    use emcon_step_control, only : why_error, why_event, why_newton
@@ -37,6 +37,7 @@ contains
          test_case_t("sizes, times and counts of a stretched block that spins", test_counts), &
          test_case_t("the error of increments, by their forces", test_error), &
          test_case_t("first sizes that were too large leave nothing", test_retry), &
+         test_case_t("nothing is known after a size of its own", test_own_size), &
          test_case_t("the error of what equations link", test_linked), &
          test_case_t("masses that errors are weighed by", test_masses), &
          test_case_t("an event is found by the velocities", test_event), &
@@ -233,6 +234,27 @@ contains
       end function error_of
 
    end subroutine test_error
+
+   !> An increment of a size of its own says nothing of the error of those that follow.
+   subroutine test_own_size(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+
+      call make_spin(scene, 1.0e-3_wp, 60)
+      call begin(scene, march, error)
+      if (.not. allocated(error)) call march_increment(march, scene, increment, error)
+      if (allocated(error)) return
+      call check_true(error, march%state%control%h_before > 0.0_wp .and. &
+         march%state%control%n_known > 0, "the error is known")
+      call march_free_increment(march, scene, 0.3_wp*h, increment, error)
+      if (allocated(error)) return
+      call check_near(error, march%state%control%h_before, 0.0_wp, 0.0_wp, 1.0_wp, "size before")
+      call check_equal(error, march%state%control%n_known, 0, "increments known")
+      call check_true(error, .not. march%grid%judges_size, "no size was judged")
+      call march_free(march)
+   end subroutine test_own_size
 
    !> An increment of a size that was found by trying is, bit by bit, the same as one that is tried
    !> at once; of long ones the factor was made on the way.

@@ -105,7 +105,7 @@ contains
       type(block_t) :: block
       type(march_t) :: march
       type(increment_t) :: increment
-      real(wp) :: drift, largest, put_in
+      real(wp) :: drift, largest, put_in, before(2)
       integer :: i
 
       call make_block(scene, "CPE4", [2, 2], block)
@@ -128,8 +128,11 @@ contains
       largest = 0.0_wp
       put_in = 0.0_wp
       do i = 1, 200
+         before = march%ledger%momentum
          call march_increment(march, scene, increment, error)
          if (allocated(error)) return
+         call check_near(error, march%ledger%momentum - before, &
+            0.0025_wp*sum(march%state%reaction, 2), 1.0e3_wp*epsilon(1.0_wp), 4.0_wp, "impulse")
          drift = max(drift, abs(march%ledger%kinetic + march%ledger%strain &
             - march%ledger%external_work))
          largest = max(largest, march%ledger%kinetic + march%ledger%strain)

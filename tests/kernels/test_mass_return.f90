@@ -193,6 +193,8 @@ contains
             march%state%v(2, 11:16:2) = 40.0_wp
             call march_begin_step(march, scene, 1, error)
             if (allocated(error)) return
+            ! As a step before may have left it.
+            march%layer%needs_mass(11) = .true.
             call march_increment(march, scene, increment, stopped)
             n_told = 0
             do i = 1, increment%notes%n
