@@ -38,6 +38,9 @@ contains
       call refuse(chain, "has 8 rows and 8 columns, not those of 2 freedoms for each of 3 nodes")
       call chain_host_init(chain, [1, 2, 3], 3, error)
       bad = chain
+      bad%pattern%n_col = 8
+      call refuse(bad, "has 6 rows and 8 columns, not those of 2 freedoms for each of 3 nodes")
+      bad = chain
       bad%pattern%column(1) = 6
       call refuse(bad, "column 6 in row 1 is not in 0..5")
       bad = chain
