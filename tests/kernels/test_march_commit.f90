@@ -199,6 +199,8 @@ contains
          call check_equal(error, size(is_active), size(now%is_active) - 1, "as many")
          call check_true(error, all(is_active .eqv. now%is_active(2:)), "and what acts")
          do k = 1, 3
+            call check_equal(error, now%status(k), merge(merge(2, 1, abs(now%slides_along(1, k)) &
+               > 0.0_wp), 0, acts(k)), "how it acts")
             if (acts(k)) cycle
             call check_near(error, [now%lam(k), now%drag(1, k), now%slides_along(1, k)], &
                spread(0.0_wp, 1, 3), 0.0_wp, 1.0_wp, "what does not")
