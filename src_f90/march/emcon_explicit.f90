@@ -51,7 +51,6 @@ contains
       logical :: is_known, is_bounded
 
       self%newton%correction%kept%most_products = most_products
-      self%system%lagged%is_known = .false.
       call check_mass(self, scene, error)
       if (allocated(error)) return
       call explicit_penalty_limit(self, scene)

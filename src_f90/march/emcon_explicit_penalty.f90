@@ -112,18 +112,13 @@ contains
       if (.not. self%active%penalty%is_at_ends) return
       associate (bound => self%explicit%stiffness, system => self%system, &
             numbering => self%system%space%numbering)
-         do k = 1, size(system%contact)
+         do k = 1, system%n_pair             ! guards do not give way
             associate (contact => system%contact(k)%contact, stiffness => &
                   self%active%penalty%stiffness, first => system%first_constraint(k) + 1, &
-                  last => system%first_constraint(k + 1), &
-                  pair => scene%pair(abs(system%contact(k)%of_pair)))
-               if (contact%slack > 0.0_wp) cycle
-               associate (is_meant => system%contact(k)%of_pair > 0)
-                  call facets_init(slave, scene, &
-                     scene%surface(merge(pair%slave, pair%master, is_meant)), error)
-                  if (.not. allocated(error)) call facets_init(master, scene, &
-                     scene%surface(merge(pair%master, pair%slave, is_meant)), error)
-               end associate
+                  last => system%first_constraint(k + 1), pair => scene%pair(k))
+               call facets_init(slave, scene, scene%surface(pair%slave), error)
+               if (.not. allocated(error)) call facets_init(master, scene, &
+                  scene%surface(pair%master), error)
                if (allocated(error)) return      ! contact of them would not have been built
                twice = 1.0_wp
                if (.not. (all(numbering_holds(numbering, contact%node)) .or. &

@@ -106,14 +106,13 @@ contains
                   normal, error)
                if (allocated(error)) return
                row = flexibility_row(numbering, item, item%c)
-               wnt = 0.0_wp
                do s = 1, size(item%t, 3)
                   call flexibility_move(flexibility, flexibility_row(numbering, item, &
                      item%t(:, :, s)), along, error)
                   if (allocated(error)) return
                   wnt(s) = item%normal*dot_product(row, along)
                end do
-               associate (wnn => dot_product(row, normal), most => norm2(wnt))
+               associate (wnn => dot_product(row, normal), most => norm2(wnt(:size(item%t, 3))))
                   if (wnn > 0.0_wp .and. most > depends*wnn) limit(k) = wnn/most
                end associate
             end associate

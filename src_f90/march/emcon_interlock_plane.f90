@@ -31,7 +31,7 @@ contains
       integer :: pair
 
       if (.not. march%active%friction%is_on) return
-      do pair = 1, min(size(march%system%contact), size(scene%pair))
+      do pair = 1, size(scene%pair)
          associate (mu => scene%pair(pair)%interaction%friction, &
                knows => march%active%friction%knows_corners(pair))
             if (knows .or. .not. mu > 0.0_wp) cycle

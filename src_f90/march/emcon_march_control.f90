@@ -221,15 +221,13 @@ contains
       integer, intent(in) :: status              !! why it failed
       integer(int64), intent(inout) :: n         !! units that were tried; out: fewer
       integer(int64) :: before
-      real(wp) :: window
       integer :: power
 
       before = n
       if (status == step_passes_event) then
          self%state%control%n_less(why_event) = self%state%control%n_less(why_event) + 1
-         window = real(self%grid%n_window, wp)
          n = int(min(real(n, wp), max(0.0_wp, self%step_check%event_at*real(n, wp) &
-            - margin*window)), int64)
+            - margin*real(self%grid%n_window, wp))), int64)
          n = max(n, before/least_share, self%grid%n_window)
          return
       end if

@@ -44,18 +44,19 @@ contains
    end subroutine snap_judge
 
    !> Is the end of the increment a minimum, where forces have an energy: without friction, and
-   !> contact that holds gaps?
+   !> contact that holds gaps? Elsewhere it counts as one.
    subroutine find_minimum(self, is_minimum, error)
       type(march_t), intent(inout) :: self
       logical, intent(out) :: is_minimum
       type(error_t), allocatable, intent(out) :: error
 
-      is_minimum = .true.
       associate (set => self%active%set)
-         if (set%n_condition > set%n .or. set%penalty%is_on) return
-         if (any(set%item(:set%n)%has_friction)) return
+         is_minimum = set%n_condition > set%n .or. set%penalty%is_on &
+            .or. any(set%item(:set%n)%has_friction)
+         if (is_minimum) return
          call system_respond(self%system, self%motion, .true.)
-         if (.not. self%system%is_symmetric) return
+         is_minimum = .not. self%system%is_symmetric
+         if (is_minimum) return
          call constraints_evaluate(set, self%system, self%motion)
          if (set%n > 0) call constraints_rows(set, self%system%space%numbering)
          call correction_try_minimum(self%newton%correction, self%system, set, is_minimum, error)

@@ -15,7 +15,7 @@ module emcon_rate_jump
    private
    public :: rate_jump_t, velocity_update_change
 
-   !> Jumps make no energy that is less than this part of what they move: a sum of some products.
+   !> Laws that are met to this part need no jump: a sum of some products.
    real(wp), parameter :: rounded = 64.0_wp*epsilon(1.0_wp)
 
    !> A jump that changes the rates of contacts by impulses along the gradients C of their gaps and
@@ -82,20 +82,17 @@ contains
    pure subroutine measure_losses(jump, change)
       type(rate_jump_t), intent(inout) :: jump
       real(wp), intent(in) :: change(0:, :)      !! (0:n_slip, n) of rates by it [L/T]
-      real(wp), dimension(size(jump%row)) :: taken, uncertain
+      real(wp) :: taken(size(jump%row))
 
       ! Slips are by half of the size of the step, so that they are twice their mean rates.
       associate (problem => jump%problem, more => jump%impulse, s => jump%problem%n_slip)
          taken = -0.5_wp*sum((problem%base(1:s, :) + more(1:s, :)) &
             *(problem%free(1:s, :) + change(1:s, :)), 1)
-         uncertain = sum((abs(problem%base(1:s, :)) + abs(more(1:s, :))) &
-            *(abs(problem%free(1:s, :)) + abs(change(1:s, :))), 1) &
-            + sum(abs(more)*(abs(jump%rate) + abs(change)), 1)
          jump%rubbed = taken - jump%taken
          jump%lost = -sum(more*(jump%rate + 0.5_wp*change)) - sum(jump%rubbed)
          ! Impulses are as exact as their problem is solved.
-         jump%is_done = jump%lost >= -rounded*sum(uncertain) &
-            - met*maxval(abs(problem%base))*sum(abs(jump%rate) + abs(change))
+         jump%is_done = jump%lost >= -met*maxval(abs(problem%base) + abs(more)) &
+            *sum(abs(jump%rate) + abs(problem%free) + abs(change))
       end associate
    end subroutine measure_losses
 

@@ -61,7 +61,6 @@ contains
       type(solid_t), intent(in) :: solid
       integer :: e
 
-      self%role = role_internal
       self%solid = solid
       allocate(self%lame(solid%n_element))
       allocate(self%force(solid%n_dim, solid%n_node), source=0.0_wp)

@@ -106,7 +106,6 @@ contains
       integer :: row(meets%n_row)
       integer :: g, i, k, l, other, slot
 
-      row = 0
       row(self%node) = [(i, i = 1, self%n)]
       associate (n_slot => self%first(size(self%first)))
          allocate(self%column(n_lane, n_slot), source=1)

@@ -191,7 +191,7 @@ contains
 
       work = 0.0_wp
       damping = 0.0_wp
-      do k = n_own + 1, size(term)
+      do k = 1, size(term)
          select type (part => term(k)%term)
          type is (dissipation_term_t)
             work = part%work
@@ -205,7 +205,7 @@ contains
 
       work = 0.0_wp
       if (present(force)) force = 0.0_wp
-      do k = n_own + 1, size(term)
+      do k = 1, size(term)
          select type (part => term(k)%term)
          type is (stabilization_term_t)
             work = part%work

@@ -37,7 +37,8 @@ contains
          test_case_t("flat sides, kinks and waves are no arcs", test_no_arc), &
          test_case_t("gaps between chords of one circle are 0", test_gaps), &
          test_case_t("interference of circles", test_interference), &
-         test_case_t("surfaces that are measured as they are", test_as_they_are)]
+         test_case_t("surfaces that are measured as they are", test_as_they_are), &
+         test_case_t("what is closed is so at rest, whatever was before", test_at_rest)]
    end subroutine collect_arcs
 
    !> Chords of unequal lengths: their arcs lie on the circle, also beside the ends of the surface.
@@ -324,5 +325,27 @@ contains
          call check_near(error, contact%state%gap0, chords%state%gap0, 0.0_wp, 1.0_wp, "once more")
       end do
    end subroutine test_as_they_are
+
+   !> A hub that is larger by as much as an edge is in no touch as nothing moves: nothing changes,
+   !> even if all was near in a step before.
+   subroutine test_at_rest(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      class(contact_t), allocatable :: contact
+      type(contact_options_t) :: options
+      real(wp) :: largest
+      integer :: k, formulation
+
+      do k = 1, 6
+         call make_rings(scene, unlike, 2.0_wp*turn, .false.)
+         call make(scene, k, .false., contact, error)
+         if (allocated(error)) return
+         call choose(k, formulation, options)
+         contact%reach = 10.0_wp
+         call overclosure_follow_arcs(contact, scene%x, scene%u0, options, largest)
+         call check_near(error, largest, 0.0_wp, 0.0_wp, 1.0_wp, "combination " // to_text(k))
+         call check_true(error, .not. any(contact%state%is_near), "far")
+      end do
+   end subroutine test_at_rest
 
 end module test_arcs

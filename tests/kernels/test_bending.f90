@@ -302,6 +302,7 @@ contains
                call check_near(error, bending%missed, [lessened**2*part*missed], tol, &
                   part*lambda*a**2, trim(name(k)) // ": missed")
             end associate
+            if (turned == 0 .and. .not. allocated(error)) call stretch()
             if (allocated(error)) return
          end do
          call turn_large()
@@ -309,6 +310,20 @@ contains
       end do
 
    contains
+
+      !> Of a stretch along x elements of all kinds store the same, and are not bent.
+      subroutine stretch()
+         real(wp) :: pulled(size(x, 1), size(x, 2))
+
+         pulled = 0.0_wp
+         pulled(1, :) = curvature*x(1, :)
+         call measure(scene, pulled, .false., bending, error)
+         if (allocated(error)) return
+         call check_near(error, bending%strain, [area*(lambda + 2.0_wp*shear)*curvature**2], tol, &
+            lambda*area*curvature**2, trim(name(k)) // ": stretched")
+         call check_near(error, bending%missed, [0.0_wp], tol, lambda*area*curvature**2, &
+            trim(name(k)) // ": not bent")
+      end subroutine stretch
 
       !> With large rotations a turn of the bent bar changes nothing.
       subroutine turn_large()

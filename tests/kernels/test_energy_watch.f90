@@ -1,7 +1,7 @@
 !> The energy balance of a run, by increments of several schemes whose figures are known.
 module test_energy_watch
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_energy_watch, only : energy_bar, energy_follow, energy_is_failure, energy_move, &
+   use emcon_energy_watch, only : closing_text, energy_bar, energy_follow, energy_is_failure, energy_move, &
       energy_reasons, energy_rounding, energy_start, energy_warnings, energy_watch_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
@@ -171,6 +171,7 @@ contains
       real(wp), parameter :: largest = 4.0_wp
       type(energy_watch_t) :: watch
       type(notes_t) :: reasons
+      character(len=:), allocatable :: digits
       real(wp) :: x
       integer :: k, over
 
@@ -200,6 +201,12 @@ contains
             reasons = notes_t()
             call energy_reasons(watch, reasons)
             call check_equal(error, reasons%n, merge(over, 0, k < 7), "reasons")
+            if (k == 3 .and. over == 1) then
+               call closing_text(digits)
+               call check_true(error, index(reasons%item(1)%text, "the energy balance does NOT " &
+                  // "close to " // digits // " digits (") == 1, reasons%item(1)%text)
+               if (precision(1.0_wp) == 15) call check_equal(error, digits, "ten", "in double")
+            end if
             if (k >= 6) cycle
             watch%scale = 0.3_wp*x*sqrt(eps)/(16.0_wp*eps)
             reasons = notes_t()

@@ -369,9 +369,10 @@ contains
    end subroutine test_squeezed
 
    !> After 200 increments of the step: at rest the critical step of a free block is the one of its
-   !> start. Of a step below the bound by elements nothing is found anew.
+   !> start. Of a step below the bound by elements nothing is found anew; one above is not taken.
    subroutine test_looked_at(error)
       type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: stopped
       real(wp), parameter :: unknown = 100.0_wp
       type(scene_t) :: scene
       type(block_t) :: block
@@ -410,6 +411,12 @@ contains
             call check_equal(error, found%critical_element, merge(element, 0, k == 1), "of which")
          end associate
       end do
+      scene%step(1)%time%h = 1.1_wp*sharp
+      march%state%clock%increment = 200
+      march%state%clock%n_before = 0
+      call march_increment(march, scene, increment, stopped)
+      call check_error(error, stopped, err_analysis, " is larger than the critical step ", "found")
+      call check_equal(error, march%state%clock%increment, 200, "before the increment")
       call march_free(march)
    end subroutine test_looked_at
 
@@ -453,6 +460,7 @@ contains
          call stepper_advance(stepper, increment, error)
          if (allocated(error)) return
          call check_equal(error, increment%n_newton, 0, "nothing is solved")
+         call check_near(error, increment%residual, [0.0_wp], 0.0_wp, 1.0_wp, "nothing is left")
          associate (state => stepper%march%state, ledger => stepper%march%ledger, &
                x => [cos(i*phi), v*h/sin(phi)*sin(i*phi)], &
                rate => [-sin(i*phi)*sin(phi)/h, v*cos(i*phi)])
@@ -477,7 +485,7 @@ contains
 
       well%k = k
       well%n_variable = 2
-      call open_well(stepper, well, 0.5_wp, h, 20, error)
+      call open_well(stepper, well, -0.5_wp, h, 20, error)
       do i = -2, 5
          if (i == 1 .and. .not. allocated(error)) call stepper_set_state(stepper, error, &
             u=reshape([1.0_wp, 0.0_wp], [2, 1]), v=reshape([0.0_wp, 0.0_wp], [2, 1]))

@@ -6,10 +6,12 @@ module test_host_check
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : dp, wp
    use emcon_scene, only : scene_t
+   use emcon_solver_registry, only : solver_default, solver_names, solver_user
    use emcon_stepper, only : stepper_build, stepper_close, stepper_t
    use emcon_stepper_user, only : stepper_give_force, stepper_give_mass
    use given_hosts, only : chain_host_init, chain_host_t
    use given_scenes, only : lump, make_line, open_given
+   use small_scenes, only : clamp
    implicit none
    private
    public :: collect_host_check
@@ -35,6 +37,9 @@ contains
       if (allocated(error)) return
       call refuse(chain, "has 8 rows and 8 columns, not those of 2 freedoms for each of 3 nodes")
       call chain_host_init(chain, [1, 2, 3], 3, error)
+      bad = chain
+      bad%pattern%n_col = 8
+      call refuse(bad, "has 6 rows and 8 columns, not those of 2 freedoms for each of 3 nodes")
       bad = chain
       bad%pattern%column(1) = 6
       call refuse(bad, "column 6 in row 1 is not in 0..5")
@@ -85,6 +90,11 @@ contains
       bad = mass
       bad%value(2) = 1.5_dp
       call refuse(bad, "between nodes 10 and 20 is not that of the other way round: 1.5, 1")
+      bad%value = 2.0_dp                         ! as large as it may be
+      call refuse(bad, "")
+      bad = mass
+      bad%value(2:3) = [1.0_dp, 1.5_dp]
+      call refuse(bad, "between nodes 10 and 20 is not that of the other way round: 1, 1.5")
       bad = mass
       bad%value(4) = -2.0_dp
       call refuse(bad, "between nodes 10 and 20 is larger than")
@@ -121,7 +131,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(error_t), allocatable :: raised
       type(scene_t) :: scene
-      type(stepper_t) :: empty, massless, stepper
+      type(stepper_t) :: empty, massless, linked, loose, unsolved, stepper
+      character(len=:), allocatable :: known
       type(chain_host_t) :: chain
       type(csr_t) :: mass
 
@@ -141,6 +152,30 @@ contains
       call check_error(error, raised, err_input, "no forces were given", "nothing given")
       call open_given(massless, scene, chain, 0.0_wp, raised)
       call check_error(error, raised, err_input, "node 10 has given forces but no mass", "no mass")
+      call make_line(scene, 3, .true., 0.1_wp, 100)
+      call chain_host_init(chain, [1, 2], 3, error)
+      if (allocated(error)) return
+      scene%host%node = [1, 2]
+      call clamp(scene%step(1), [1, 2, 3])
+      call open_given(linked, scene, chain, 0.0_wp, error)
+      if (allocated(error)) return
+      call stepper_close(linked)
+      scene%step(1)%solution%solver = solver_user
+      scene%step(1)%solution%solver_name = "NOBODY"
+      call open_given(unsolved, scene, chain, 0.0_wp, raised)
+      call check_error(error, raised, err_input, "SOLVER=NOBODY: no program has given this " &
+         // "solver, see docs/embedding.md; those of EMCON are ", "a solver that is not there")
+      call solver_names(known)
+      if (allocated(raised)) call check_true(error, index(raised%message, known) > 0, &
+         raised%message)
+      scene%step(1)%solution%solver = solver_default
+      scene%host%node = [1, 3]
+      call open_given(loose, scene, chain, 0.0_wp, raised)
+      call check_error(error, raised, err_input, "names node 30, which has neither forces nor " &
+         // "mass", "of a node without a spring")
+      call make_line(scene, 2, .false., 0.1_wp, 100)
+      call chain_host_init(chain, [1, 2], 2, error)
+      if (allocated(error)) return
       scene%host%node = [1, 2]
       call open_given(stepper, scene, chain, 1.0_wp, error)
       if (allocated(error)) return

@@ -2,22 +2,29 @@
 module test_host_force
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_couplings, only : equation_t
-   use emcon_csr, only : csr_t
+   use emcon_csr, only : csr_from_elements, csr_multiply, csr_t
    use emcon_errors, only : err_analysis, err_input, error_t
    use emcon_interactions, only : formulation_mortar, formulation_nts
+   use emcon_evaluation, only : evaluation_t
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t
+   use emcon_motion, only : motion_of, motion_t
    use emcon_scene, only : scene_t
+   use emcon_scheme_registry, only : scheme_row
    use emcon_stepper, only : stepper_advance, stepper_build, stepper_close, stepper_is_done, &
       stepper_t
    use emcon_stepper_free, only : stepper_set_state
    use emcon_stepper_user, only : stepper_give_force, stepper_give_mass
    use emcon_stepper_query, only : query_evaluate, query_free, query_residual, query_t
    use emcon_steps, only : initiation_velocity_update
+   use emcon_system, only : mass_times, system_respond
+   use emcon_term, only : response_init, response_t, role_internal
    use emcon_text, only : to_text
    use given_hosts, only : chain_host_init, chain_host_t
    use given_scenes, only : eps => given_eps, lump, make_line, open_both, open_given, run_conserving
-   use small_scenes, only : prescribe
+   use linear_scenes, only : add_equation
+   use random_draws, only : draw_random
+   use small_scenes, only : add_step, block_t, make_block, prescribe, shake
    use stepper_scenes, only : drop_h, make_drop, make_tied_drop
    implicit none
    private
@@ -33,6 +40,9 @@ contains
          test_case_t("a host's solid in contact, MORTAR", test_host_mortar), &
          test_case_t("a host's solid that is tied", test_host_tied), &
          test_case_t("a host that tells no magnitudes", test_host_silent), &
+         test_case_t("sizes of forces that a host does not tell", test_magnitude), &
+         test_case_t("a matrix over what is linked", test_linked), &
+         test_case_t("masses between nodes are lumped by their rows", test_lumped), &
          test_case_t("contact between elements and a host", test_host_mixed), &
          test_case_t("a host in contact, VELOCITY UPDATE", test_host_update), &
          test_case_t("chain of springs in motion", test_chain), &
@@ -121,6 +131,104 @@ contains
       call make_tied_drop(scene, 12, .true.)
       call compare(error, scene, .true.)
    end subroutine test_host_tied
+
+   !> At each freedom the largest force of those that depend on it: of its node and of all nodes of
+   !> its elements.
+   subroutine test_magnitude(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(stepper_t) :: own, hosted
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(response_t) :: response
+      type(motion_t) :: motion
+      real(wp) :: u(2, 8), largest(2, 8)
+      integer :: e
+
+      call make_block(scene, "CPE4", [3, 1], block)
+      call add_step(scene, .false., 0.1_wp, 1)
+      call open_both(scene, [.false., .false., .false.], .false., own, hosted, error)
+      if (allocated(error)) return
+      call shake(u, 0.1_wp)
+      motion = motion_of(evaluation_t(), scene%x, 0.0_wp*u, u)
+      call response_init(response, 2, 8, 0)
+      associate (term => hosted%march%system%term)
+         call term(size(term))%term%respond(motion, response)
+      end associate
+      largest = 0.0_wp
+      do e = 1, 3
+         associate (node => scene%element%node(:, e), force => response%part(role_internal)%force)
+            largest(:, node) = max(largest(:, node), maxval(abs(force(:, node))))
+         end associate
+      end do
+      call check_near(error, response%part(role_internal)%magnitude, largest, 0.0_wp, 1.0_wp, &
+         "sizes")
+      call check_true(error, maxval(largest(:, [1, 5])) < maxval(largest), "of those nearby alone")
+      call stepper_close(own)
+      call stepper_close(hosted)
+   end subroutine test_magnitude
+
+   !> Two nodes of the host hang on others of it: the matrix is that of elements with the same links.
+   subroutine test_linked(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(stepper_t) :: own, hosted
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(motion_t) :: motion
+      real(wp) :: du(2, 8)
+      real(wp), allocatable :: x(:), product(:), expected(:)
+
+      call make_block(scene, "CPE4", [3, 1], block)
+      call add_step(scene, .false., 0.1_wp, 1)
+      call add_equation(scene, [4, 8, 3], [1, 1, 2], [1.0_wp, -2.0_wp, 0.5_wp])
+      call add_equation(scene, [1, 5], [2, 1], [1.0_wp, 3.0_wp])
+      call open_both(scene, [.false., .false., .false.], .true., own, hosted, error)
+      if (allocated(error)) return
+      call shake(du, 0.1_wp)
+      associate (a => own%march%system, b => hosted%march%system)
+         motion = motion_of(evaluation_t(), scene%x, 0.0_wp*du, du)
+         call system_respond(a, motion, .true.)
+         call system_respond(b, motion, .true.)
+         allocate(x(a%space%numbering%n_unknown))
+         call draw_random(x)
+         allocate(product, expected, mold=x)
+         call csr_multiply(a%matrix, x, expected)
+         call csr_multiply(b%matrix, x, product)
+         call check_near(error, product, expected, 64.0_wp*eps, maxval(abs(expected)), "matrix")
+         call check_equal(error, size(x), 14, "unknowns")
+      end associate
+      call stepper_close(own)
+      call stepper_close(hosted)
+   end subroutine test_linked
+
+   !> Of 2 and 1 between three nodes in a row; explicit steps take the sums of the rows.
+   subroutine test_lumped(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(stepper_t) :: stepper
+      type(scene_t) :: scene
+      type(chain_host_t) :: chain
+      type(csr_t) :: mass
+      integer, allocatable :: slot(:)
+      real(wp) :: field(2, 3), product(2, 3)
+
+      call make_line(scene, 3, .false., 0.01_wp, 4)
+      scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+      call chain_host_init(chain, [1, 2, 3], 3, error)
+      if (.not. allocated(error)) call csr_from_elements(mass, 3, [1, 3, 5], [1, 2, 2, 3], slot, &
+         error)
+      if (allocated(error)) return
+      mass%value = [2.0_wp, 1.0_wp, 1.0_wp, 4.0_wp, 1.0_wp, 1.0_wp, 2.0_wp]
+      stepper%scene = scene
+      stepper%is_read = .true.
+      call stepper_give_force(stepper, chain, error)
+      if (.not. allocated(error)) call stepper_give_mass(stepper, mass, error)
+      if (.not. allocated(error)) call stepper_build(stepper, error)
+      if (allocated(error)) return
+      call shake(field, 1.0_wp)
+      call mass_times(stepper%march%system, field, product)
+      call check_near(error, product, field*spread([3.0_wp, 6.0_wp, 3.0_wp], 1, 2), &
+         16.0_wp*epsilon(1.0_wp), 6.0_wp, "lumped")
+      call stepper_close(stepper)
+   end subroutine test_lumped
 
    !> Contact between elements and nodes of the host, which is master, then slave.
    subroutine test_host_mixed(error)

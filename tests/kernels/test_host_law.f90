@@ -7,6 +7,7 @@ module test_host_law
    use emcon_diagnostics, only : diagnostics_t
    use emcon_element_kind, only : find_element_kind
    use emcon_errors, only : err_analysis, err_input, error_t
+   use emcon_host, only : host_add_law, host_t
    use emcon_kinds, only : dp, wp
    use emcon_law, only : lame_constants
    use emcon_law_linear, only : law_linear_t
@@ -59,6 +60,7 @@ contains
 
       tests = [ &
          test_case_t("forces and tangents of our own laws", test_forces), &
+         test_case_t("and of small strains", test_small), &
          test_case_t("tangent against differences", test_tangent), &
          test_case_t("far from where it began", test_far), &
          test_case_t("two blocks meet, one of a given law", test_drop), &
@@ -72,6 +74,7 @@ contains
          test_case_t("a type of law that takes the constants of the deck", test_taken), &
          test_case_t("where the stress normal to the plane is asked for", test_normal), &
          test_case_t("where modes ask for moduli", test_modes), &
+         test_case_t("laws are kept as others come", test_kept), &
          test_case_t("wrong order of calls, wrong names", test_bad_calls), &
          test_case_t("restart file of a deck with a given law", test_restart)]
    end subroutine collect_host_law
@@ -175,6 +178,34 @@ contains
          end do
       end associate
    end subroutine solid_answers
+
+   !> Without NLGEOM strains are linear in displacements, however large these are.
+   subroutine test_small(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(stepper_t) :: given, own
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(response_t) :: one, two
+      type(motion_t) :: motion
+      real(wp) :: u(2, 6), du(2, 6)
+
+      call make_block(scene, "CPE4", [2, 1], block)
+      call add_step(scene, .false., 0.1_wp, 1)
+      scene%step(1)%nlgeom = .false.
+      call open_both(given, own, scene, law_linear, error)
+      if (allocated(error)) return
+      call shake(u, 0.25_wp)
+      call shake(du, 0.25_wp)
+      motion = motion_of(evaluation_t(), scene%x, u, du)
+      call solid_answers(given, motion, one)
+      call solid_answers(own, motion, two)
+      associate (force => one%part(role_internal)%force, expected => two%part(role_internal)%force)
+         call check_near(error, force, expected, 64.0_wp*eps, young, "forces")
+         call check_near(error, sum(one%energy), sum(two%energy), 64.0_wp*eps, young, "energy")
+      end associate
+      call stepper_close(given)
+      call stepper_close(own)
+   end subroutine test_small
 
    !> Their tangent times `way`.
    subroutine solid_times(stepper, motion, way, product)
@@ -720,6 +751,26 @@ contains
          end block
       end do
    end subroutine test_normal
+
+   !> Energies and laws by turns, each by its name.
+   subroutine test_kept(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=*), parameter :: name(4) = ["A", "B", "C", "D"]
+      type(host_t) :: host
+      type(law_linear_t) :: law
+      integer :: i
+
+      do i = 1, 4
+         if (mod(i, 2) == 1) call host_add_law(host, name(i), energy=elastic_of(law_linear))
+         if (mod(i, 2) == 0) call host_add_law(host, name(i), law=law)
+      end do
+      call check_equal(error, size(host%law), 4, "laws")
+      do i = 1, 4
+         call check_equal(error, host%law(i)%material, name(i), "name")
+         call check_true(error, (allocated(host%law(i)%energy) .eqv. mod(i, 2) == 1) .and. &
+            (allocated(host%law(i)%law) .eqv. mod(i, 2) == 0), "what was given " // to_text(i))
+      end do
+   end subroutine test_kept
 
    subroutine test_bad_calls(error)
       type(error_t), allocatable, intent(out) :: error

@@ -416,7 +416,8 @@ contains
       end do
    end subroutine test_amplitude
 
-   !> From the value of the step before, over the 2 units of time of the step; dynamic: at once.
+   !> From the value of the step before, over the 2 units of time of the step, and no farther;
+   !> dynamic: at once.
    subroutine test_ramp(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -439,6 +440,8 @@ contains
          call forces(system, scene, instant_t(0.5_wp, 77.5_wp), u, force)
          call check_near(error, force(1, 5), merge(4.0_wp, 10.0_wp, k == 1), 0.0_wp, 1.0_wp, &
             "at a quarter of the step")
+         call forces(system, scene, instant_t(2.5_wp, 79.5_wp), u, force)
+         call check_near(error, force(1, 5), 10.0_wp, 0.0_wp, 1.0_wp, "beyond its end")
       end do
    end subroutine test_ramp
 

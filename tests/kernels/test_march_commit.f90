@@ -6,7 +6,9 @@ module test_march_commit
    use emcon_constraints, only : constraints_dissipated
    use emcon_contact_law, only : loss_friction
    use emcon_errors, only : error_t
+   use emcon_flexibility, only : flexibility_free, flexibility_make, flexibility_t
    use emcon_friction, only : friction_missed
+   use emcon_friction_limit, only : friction_limit_find, friction_limit_tell
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
@@ -47,6 +49,7 @@ contains
          test_case_t("what always holds is no contact", test_permanent), &
          test_case_t("what is told of bodies that nothing holds", test_stabilized), &
          test_case_t("friction above what one contact bears", test_limit), &
+         test_case_t("the contact that bears least is named", test_least), &
          test_case_t("impacts that keep a part", test_restitution)]
    end subroutine collect_march_commit
 
@@ -108,6 +111,7 @@ contains
          call march_increment(march, scene, increment, error)
          if (allocated(error)) return
          if (increment%n_cut > 0) cycle
+         call check_equal(error, increment%n_newton, march%active%n_newton, "solved once")
          call check_motion(error, march, before, books)
          associate (response => march%system%response, state => march%state)
             call check_near(error, increment%work_scale, (norm2(state%contact) &
@@ -169,6 +173,8 @@ contains
       type(state_t), intent(in) :: before
       type(increment_t), intent(in) :: increment
       type(stand_off_t) :: stand_off
+      real(wp), allocatable :: lam(:)
+      logical, allocatable :: is_active(:)
       real(wp) :: drag(most_slips), missed, largest
       logical :: acts(3)
       integer :: k
@@ -188,7 +194,13 @@ contains
             end associate
          end do
          call check_true(error, all(now%is_active .eqv. acts), "what acts")
+         call now%get(2, lam, is_active)
+         call check_near(error, lam, now%lam(2:), 0.0_wp, 1.0_wp, "multipliers from there on")
+         call check_equal(error, size(is_active), size(now%is_active) - 1, "as many")
+         call check_true(error, all(is_active .eqv. now%is_active(2:)), "and what acts")
          do k = 1, 3
+            call check_equal(error, now%status(k), merge(merge(2, 1, abs(now%slides_along(1, k)) &
+               > 0.0_wp), 0, acts(k)), "how it acts")
             if (acts(k)) cycle
             call check_near(error, [now%lam(k), now%drag(1, k), now%slides_along(1, k)], &
                spread(0.0_wp, 1, 3), 0.0_wp, 1.0_wp, "what does not")
@@ -300,7 +312,8 @@ contains
          call march_increment(march, scene, increment, error)
       end do
       do k = 1, 4
-         increment = increment_t(unconverged=before(k))
+         increment = increment_t(unconverged=before(k), n_augmentation=k)
+         march%active%penalty%n_augmentation = 3
          march%newton%convergence%last = merge(1.0e-12_wp, 0.25_wp, k == 3)
          march%newton%is_idle = k == 4
          march%newton%correction%fell_back = k == 1
@@ -311,6 +324,7 @@ contains
          if (increment%notes%n > 0) is_told = index(increment%notes%item(increment%notes%n)%text, &
             "a relative residual of 0.25 is accepted") == 1
          call check_true(error, is_told .eqv. k < 3, "told " // to_text(k))
+         call check_equal(error, increment%n_augmentation, max(k, 3), "the most augmentations")
          call check_near(error, increment%unconverged, max(before(k), merge(0.25_wp, 0.0_wp, &
             k < 3)), 0.0_wp, 1.0_wp, "accepted")
          associate (reached => march%newton%convergence)
@@ -512,6 +526,52 @@ contains
       end subroutine look_at
 
    end subroutine test_limit
+
+   !> Of those that rub it is named, whichever is pushed most.
+   subroutine test_least(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+      type(flexibility_t) :: flexibility
+      real(wp) :: limit(3)
+      character(len=:), allocatable :: told
+      integer :: i, k, least
+
+      call begin(scene, .false., march, error)
+      do while (march%active%set%n < 2)
+         if (allocated(error)) return
+         call march_increment(march, scene, increment, error)
+      end do
+      if (allocated(error)) return
+      associate (set => march%active%set, friction => march%active%friction)
+         call flexibility_make(flexibility, march%system, set, march%newton%correction, error)
+         if (.not. allocated(error)) call friction_limit_find(march%system, set, &
+            [(k, k = 1, set%n)], flexibility, limit(:set%n), error)
+         call flexibility_free(flexibility)
+         if (allocated(error)) return
+         least = minloc(limit(:set%n), 1)
+         call check_true(error, maxval(limit(:set%n)) > 1.01_wp*limit(least), "unlike")
+         friction%law%mu = 2.0_wp*maxval(limit(:set%n))
+         do i = 1, set%n
+            set%lam(:set%n) = 1.0_wp
+            set%lam(i) = 2.0_wp
+            friction%knows_limit = .false.
+            increment = increment_t()
+            call friction_limit_tell(march, scene, increment, error)
+            if (allocated(error)) return
+            told = "the contact of slave node " // to_text(scene%node%label( &
+               march%system%contact(1)%contact%node(set%id(least)))) // " by itself"
+            call check_equal(error, increment%notes%n, 1, "told")
+            if (allocated(error)) return
+            call check_true(error, index(increment%notes%item(1)%text, told) > 0, told // ": " &
+               // increment%notes%item(1)%text)
+         end do
+         call friction_limit_tell(march, scene, increment, error)
+         call check_equal(error, increment%notes%n, 1, "told once")
+      end associate
+      call march_free(march)
+   end subroutine test_least
 
    !> Of two free blocks: each gap that was held and opens keeps a part of its rate; what that takes
    !> is told, momenta stay.

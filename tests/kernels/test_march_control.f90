@@ -4,9 +4,10 @@ module test_march_control
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_amplitudes, only : amplitude_t
    use emcon_errors, only : err_analysis, error_t
+   use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : dp, wp
-   use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
-      march_is_done, march_resume, march_t
+   use emcon_march, only : increment_t, march_begin_step, march_free, march_free_increment, &
+      march_increment, march_init, march_is_done, march_resume, march_t
    use emcon_rigid_bodies, only : rigid_frame_choose
    use emcon_scene, only : scene_t
    use emcon_step_control, only : why_error, why_event, why_newton
@@ -17,8 +18,8 @@ module test_march_control
    use given_hosts, only : chain_host_init, chain_host_t
    use given_scenes, only : make_line, open_given
    use linear_scenes, only : add_equation
-   use small_scenes, only : add_block, add_load, add_step, block_t, clamp, make_block, &
-      make_two_blocks, prescribe
+   use small_scenes, only : add_block, add_load, add_step, add_surface, block_t, bottom, clamp, &
+      left, make_block, make_two_blocks, prescribe, right, top
    implicit none
    private
    public :: collect_march_control
@@ -36,12 +37,16 @@ contains
          test_case_t("sizes, times and counts of a stretched block that spins", test_counts), &
          test_case_t("the error of increments, by their forces", test_error), &
          test_case_t("first sizes that were too large leave nothing", test_retry), &
+         test_case_t("nothing is known after a size of its own", test_own_size), &
          test_case_t("the error of what equations link", test_linked), &
          test_case_t("masses that errors are weighed by", test_masses), &
          test_case_t("an event is found by the velocities", test_event), &
          test_case_t("an event that comes before they say", test_early), &
+         test_case_t("a second half that is cut", test_second), &
+         test_case_t("cuts where the error does not count", test_cut), &
          test_case_t("solves that take long", test_slow), &
          test_case_t("long increments while bodies are apart", test_apart), &
+         test_case_t("a body that may touch itself is never apart", test_self), &
          test_case_t("no smaller increment is allowed", test_least), &
          test_case_t("the smallest one fails", test_failure), &
          test_case_t("below all sizes that accuracy asks for", test_far_below)]
@@ -230,22 +235,56 @@ contains
 
    end subroutine test_error
 
+   !> An increment of a size of its own says nothing of the error of those that follow.
+   subroutine test_own_size(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(march_t) :: march
+      type(increment_t) :: increment
+
+      call make_spin(scene, 1.0e-3_wp, 60)
+      call begin(scene, march, error)
+      if (.not. allocated(error)) call march_increment(march, scene, increment, error)
+      if (allocated(error)) return
+      call check_true(error, march%state%control%h_before > 0.0_wp .and. &
+         march%state%control%n_known > 0, "the error is known")
+      call march_free_increment(march, scene, 0.3_wp*h, increment, error)
+      if (allocated(error)) return
+      call check_near(error, march%state%control%h_before, 0.0_wp, 0.0_wp, 1.0_wp, "size before")
+      call check_equal(error, march%state%control%n_known, 0, "increments known")
+      call check_true(error, .not. march%grid%judges_size, "no size was judged")
+      call march_free(march)
+   end subroutine test_own_size
+
    !> An increment of a size that was found by trying is, bit by bit, the same as one that is tried
-   !> at once.
+   !> at once; of long ones the factor was made on the way.
    subroutine test_retry(error)
       type(error_t), allocatable, intent(out) :: error
+      integer :: k
+
+      do k = 1, 5, 4
+         call look_at_retry(error, real(k, wp))
+         if (allocated(error)) return
+      end do
+   end subroutine test_retry
+
+   subroutine look_at_retry(error, times)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(in) :: times              !! of h, that the increments of the deck take
       type(scene_t) :: scene
       type(march_t) :: march
       type(increment_t) :: increment, at_once
       integer :: power
 
       call make_spin(scene, 1.0e-5_wp, 60)
+      scene%step(1)%time%h = times*h
+      scene%step(1)%time%duration = n*times*h
       scene%step(1)%solution%newton = newton_kept
       call begin(scene, march, error)
       if (.not. allocated(error)) call march_increment(march, scene, increment, error)
       if (allocated(error)) return
       call check_true(error, increment%n_cut > 0, "tried larger ones")
-      power = nint(log(0.5_wp*increment%h/h)/log(2.0_wp)) + 1
+      power = nint(log(0.5_wp*increment%h/(times*h))/log(2.0_wp)) + 1
       block
          type(march_t) :: other
 
@@ -271,7 +310,7 @@ contains
          call march_free(other)
       end block
       call march_free(march)
-   end subroutine test_retry
+   end subroutine look_at_retry
 
    !> Two halves of a block whose nodes move alike have the errors of the block.
    subroutine test_linked(error)
@@ -421,6 +460,68 @@ contains
       call march_free(march)
    end subroutine test_early
 
+   !> Where increments end at events alone one that is cut says nothing of the next ones: twice from
+   !> the size of the deck, to a half of it and then to an eighth.
+   subroutine test_cut(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: part(2) = [0.5_wp, 0.625_wp]
+      integer, parameter :: n_cut(2) = [1, 2]
+      type(scene_t) :: scene
+      type(stepper_t) :: stepper
+      type(chain_host_t) :: chain
+      type(increment_t) :: increment
+      integer :: k
+
+      call make_line(scene, 2, .false., h, n)
+      scene%step(1)%time%is_direct = .false.
+      scene%step(1)%time%event_fraction = 0.01_wp
+      scene%v0(1, 2) = 1.0_wp
+      call chain_host_init(chain, [1, 2], 2, error)
+      if (allocated(error)) return
+      chain%k = 0.01_wp
+      chain%longest = 0.7_wp*h
+      call open_given(stepper, scene, chain, 1.0_wp, error)
+      do k = 1, 2
+         if (.not. allocated(error)) call stepper_advance(stepper, increment, error)
+         if (allocated(error)) return
+         associate (state => stepper%march%state)
+            call check_near(error, state%clock%time, part(k)*h, 16.0_wp*eps, h, "time")
+            call check_equal(error, [increment%n_cut, state%control%power], [n_cut(k), 0], &
+               "cuts, and the size that comes")
+         end associate
+      end do
+      call stepper_close(stepper)
+   end subroutine test_cut
+
+   !> A spring that may not be longer than a part of h, at the velocity 1: the first half of the first
+   !> increment is shorter, the second one is cut until it is, to a sixteenth of the increment.
+   subroutine test_second(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: longest = 0.7_wp*h
+      type(scene_t) :: scene
+      type(stepper_t) :: stepper
+      type(chain_host_t) :: chain
+      type(increment_t) :: increment
+
+      call make_line(scene, 2, .false., h, n)
+      scene%step(1)%time%is_direct = .false.
+      scene%step(1)%time%tolerance = 1.0_wp
+      scene%v0(1, 2) = 1.0_wp
+      call chain_host_init(chain, [1, 2], 2, error)
+      if (allocated(error)) return
+      chain%k = 0.01_wp
+      chain%longest = longest
+      call open_given(stepper, scene, chain, 1.0_wp, error)
+      if (.not. allocated(error)) call stepper_advance(stepper, increment, error)
+      if (allocated(error)) return
+      associate (state => stepper%march%state)
+         call check_near(error, [increment%h, increment%done, state%clock%time, &
+            state%clock%step_time], spread(0.625_wp*h, 1, 4), 16.0_wp*eps, h, "in all")
+         call check_near(error, state%u(1, 2) - state%u(1, 1), 0.625_wp*h, h**2, h, "as far")
+      end associate
+      call stepper_close(stepper)
+   end subroutine test_second
+
    !> More than half of the iterations allowed: the next increments are shorter if the error counts.
    subroutine test_slow(error)
       type(error_t), allocatable, intent(out) :: error
@@ -517,6 +618,49 @@ contains
       end subroutine run
 
    end subroutine test_apart
+
+   !> A block that flies has no error: its increments grow, unless its surface is paired with itself.
+   subroutine test_self(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      integer :: k
+
+      do k = 0, 1
+         call make_block(scene, "CPE4", [2, 1], block)
+         call add_surface(scene, "ALL", block, [bottom, right, top, left])
+         if (k == 1) scene%pair = [contact_pair_t(slave=1, master=1)]
+         call add_step(scene, .false., h, 4*n)
+         scene%step(1)%time%is_direct = .false.
+         scene%step(1)%time%tolerance = 1.0_wp
+         scene%v0(1, :) = 1.0_wp
+         call run()
+         if (allocated(error)) return
+      end do
+
+   contains
+
+      subroutine run()
+         type(march_t) :: march
+         type(increment_t) :: increment
+         real(wp) :: longest
+         integer :: i
+
+         call begin(scene, march, error)
+         if (allocated(error)) return
+         longest = 0.0_wp
+         do i = 1, n
+            call march_increment(march, scene, increment, error)
+            if (allocated(error)) return
+            longest = max(longest, increment%h)
+         end do
+         call check_equal(error, march%system%space%n_body, 1, "bodies")
+         call check_true(error, longest > 1.5_wp*h .eqv. k == 0, "the longest is " &
+            // to_text(longest))
+         call march_free(march)
+      end subroutine run
+
+   end subroutine test_self
 
    !> With the increment of the deck as the smallest each is taken as it is, and told.
    subroutine test_least(error)

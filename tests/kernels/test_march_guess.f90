@@ -46,6 +46,7 @@ contains
       call prescribe(scene%step(1), 1, 1, 1.0_wp)
       call prescribe(scene%step(1), 1, 2, 0.0_wp)
       call prescribe(scene%step(1), 2, 2, 0.0_wp)
+      if (is_static) call prescribe(scene%step(1), 4, 1, 0.25_wp)
       scene%step(1)%prescribed(1)%amplitude = 1
       call march_init(march, scene, error)
       if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
@@ -105,6 +106,8 @@ contains
       expected = 0.0_wp
       expected(1, 1) = 2.0_wp*(t0 + h) - march%state%u(1, 1)
       expected(2, :2) = -(t0 + h)*march%state%u(2, :2)
+      expected(1, 4) = (t0 + h)*(0.25_wp - march%state%u(1, 4))
+      expected(1, 10) = 0.5_wp*expected(1, 4)
       call check_near(error, march%motion%du, expected, tol, 1.0_wp, "motion")
       call check_near(error, march%newton%driven, expected, tol, 1.0_wp, "all of it is driven")
       call check_near(error, march%motion%offset, 0.0_wp*expected, 0.0_wp, 1.0_wp, "no offset")

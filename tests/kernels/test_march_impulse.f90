@@ -2,6 +2,7 @@
 !> ways in which contact begins and all formulations, with friction, restitution and penalties.
 module test_march_impulse
    use check, only : check_near, check_true, test_case_t
+   use emcon_constraint, only : condition_friction, condition_rate, most_slips
    use emcon_errors, only : error_t
    use emcon_interactions, only : formulation_mortar, formulation_nts, formulation_segment
    use emcon_kinds, only : dp, wp
@@ -141,9 +142,14 @@ contains
             if (.not. scene%step(1)%scheme%is_explicit) call check_near(error, ledger%total &
                - ledger%contact_work + ledger%friction, total, tol, total, "energy, " // what)
          end associate
+         call check_massless(error, march, scene%step(1)%time%h, what)
+         if (increment%n_cut == 0 .and. scene%pair(1)%interaction%restitution < 1.0_wp) &
+            call check_cone(error, march, scene%pair(1)%interaction%friction, what)
          do i = 1, increment%notes%n
             call check_true(error, index(increment%notes%item(i)%text, "saddle point") == 0, &
                "by the null space, " // what)
+            call check_true(error, index(increment%notes%item(i)%text, "rebound fully") == 0, &
+               "a part is kept, " // what)
          end do
          if (allocated(error)) return
          if (norm2(now(:2, 2) - before(:2, 2)) > 1.0e-3_wp) n_pushed = n_pushed + 1
@@ -152,6 +158,50 @@ contains
       call check_true(error, n_pushed > 2, "contact, " // what)
       call march_free(march)
    end subroutine follow
+
+   !> What has no mass moves as its displacement says, but for a jump where it was balanced anew.
+   subroutine check_massless(error, march, h, what)
+      type(error_t), allocatable, intent(inout) :: error
+      type(march_t), intent(in) :: march
+      real(wp), intent(in) :: h                  !! of an increment that was not cut [T]
+      character(len=*), intent(in) :: what
+      integer :: i
+
+      if (.not. march%layer%is_on .or. march%layer%is_settled) return
+      do i = 1, size(march%layer%is_massless)
+         if (.not. march%layer%is_massless(i)) cycle
+         if (.not. any(abs(march%motion%du(:, i)) > 0.0_wp)) cycle
+         call check_near(error, h*march%state%v(:, i), march%motion%du(:, i), tol, h, &
+            "velocities without mass, " // what)
+      end do
+   end subroutine check_massless
+
+   !> Impulses of the step and of the jump at its end together: friction is in the cone of all, and
+   !> within it no jump moves along the surface; but where a jump is one along normals alone.
+   subroutine check_cone(error, march, mu, what)
+      type(error_t), allocatable, intent(inout) :: error
+      type(march_t), intent(in) :: march
+      real(wp), intent(in) :: mu
+      character(len=*), intent(in) :: what
+      real(wp) :: push, drag(most_slips), change(2, 16)
+      integer :: k
+
+      change = march%state%v - (2.0_wp/h*march%motion%du - march%motion%v0)
+
+      associate (set => march%active%set, jump => march%end_state%jump)
+         if (size(jump) > 0 .and. .not. any(abs(jump%drag(1)) > 0.0_wp)) return
+         do k = set%n_permanent + 1, set%n
+            push = h*set%lam(k)*set%item(k)%normal + sum(jump%lam, jump%id == set%id(k)) &
+               *set%item(k)%normal
+            drag = h*condition_friction(set%item(k), set%lam(k))
+            drag(1) = drag(1) + sum(jump%drag(1), jump%id == set%id(k))
+            call check_true(error, push >= -tol, "pushes, " // what)
+            call check_true(error, abs(drag(1)) <= mu*push + tol, "friction, " // what)
+            if (abs(drag(1)) < mu*push - sqrt(tol)) call check_near(error, &
+               condition_rate(set%item(k), change, 1), 0.0_wp, tol, 2.0_wp, "sticks, " // what)
+         end do
+      end associate
+   end subroutine check_cone
 
    !> (px, py, moment about the origin) of the lower and the upper block.
    function momenta_of(system, place, v) result(momenta)

@@ -2,10 +2,13 @@
 !> interrupt leaves.
 module test_march_parts
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
-   use emcon_active_set, only : step_cycling, step_too_far
+   use emcon_active_set, only : step_cycling, step_diverged, step_loose, step_not_held, &
+      step_overlaps, step_passes_event, step_refused, step_rough, step_singular, step_stands_off, &
+      step_strikes, step_too_far, step_unbalanced
    use emcon_amplitudes, only : amplitude_t
    use emcon_csr, only : csr_from_elements
    use emcon_errors, only : err_analysis, err_interrupt, error_t
+   use emcon_evaluation, only : instant_t
    use emcon_host_force, only : force_response_t, host_force_t, host_outside
    use emcon_interactions, only : formulation_mortar, formulation_nts
    use emcon_kinds, only : wp
@@ -24,6 +27,7 @@ module test_march_parts
    use emcon_scheme_registry, only : scheme_row
    use emcon_text, only : to_text
    use given_scenes, only : given_eps, make_line, open_given
+   use one_element, only : read_one
    use small_scenes, only : add_step, block_t, clamp, make_two_blocks, prescribe
    implicit none
    private
@@ -67,7 +71,9 @@ contains
          test_case_t("what is told where statics end", test_end), &
          test_case_t("an interrupt leaves the increment before", test_interrupt), &
          test_case_t("two halves are two increments", test_pieces), &
-         test_case_t("what fails at which nodes", test_reasons)]
+         test_case_t("what fails at which nodes", test_reasons), &
+         test_case_t("each reason in its words", test_words), &
+         test_case_t("elements that keep motions without strain are named", test_strainless)]
    end subroutine collect_march_parts
 
    !> Nodes whose contacts change more than once, and those that go too far, are named; where no
@@ -105,6 +111,89 @@ contains
       end associate
       call stepper_close(stepper)
    end subroutine test_reasons
+
+   !> Every status by itself, in dynamics and in statics.
+   subroutine test_words(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: status(11) = [step_refused, step_diverged, step_singular, &
+         step_stands_off, step_overlaps, step_unbalanced, step_rough, step_strikes, step_loose, &
+         step_passes_event, 99]
+      character(len=*), parameter :: told(11) = [character(len=90) :: "it is refused", &
+         "Newton's method does not converge (relative residual 0.25 after 7 iterations)", &
+         "the system is singular", "a contact would close over more than the gap tolerance", &
+         "bodies would overlap where no contact acts", &
+         "nodes without mass find no balance where contacts open or close", &
+         "the error is 0.5 times TOLERANCE", &
+         "contact begins or ends: the error is 0.5 times TOLERANCE", &
+         "gaps do not close to TOLERANCE of *CONSTRAINT METHOD in ", &
+         "contact begins or ends in it", "reason 99"]
+      type(stepper_t) :: stepper
+      character(len=:), allocatable :: text, expected
+      integer :: i, k
+
+      do k = 1, kind_static, kind_static - 1
+         call open_thrown(stepper, k, 0.1_wp, 4, 1.0_wp, error)
+         if (allocated(error)) return
+         associate (march => stepper%march, reached => stepper%march%newton%convergence)
+            march%system%response%refusal = "it is refused"
+            reached%history(2) = 0.25_wp
+            reached%n_history = 2
+            reached%n_iteration = 7
+            march%step_check%ratio = 0.5_wp
+            march%motion%evaluation = march%scheme%evaluation(instant_t(), 0.1_wp)
+            do i = 1, size(status)
+               call march_reason(march, stepper%scene, status(i), text)
+               expected = trim(told(i))
+               if (status(i) == step_loose) expected = told(i)(:56) // "50 augmentations; give a " &
+                  // "larger FACTOR"
+               if (status(i) == step_rough .and. k == kind_static) expected = "it snaps: the " &
+                  // "works of the increment miss 50 % of what the elements store"
+               call check_equal(error, text, expected, "status " // to_text(status(i)))
+            end do
+            march%step_check%ratio = -1.0_wp
+            if (k == kind_static) then
+               call march_reason(march, stepper%scene, step_rough, text)
+               call check_equal(error, text, "it snaps: the balance that was found is not stable", &
+                  "statics")
+            end if
+            march%active%support%text = "body A"
+            do i = 0, 1
+               march%active%support%is_pushed = i == 1
+               call march_reason(march, stepper%scene, step_not_held, text)
+               expected = "nothing holds what moves without resistance: body A"
+               if (i == 0) expected = expected // ", on which no load does work; add *BOUNDARY " &
+                  // "conditions, or ask for the smallest motion by *CONTACT CONTROLS, STABILIZE"
+               if (i == 1) expected = expected // "; add *BOUNDARY conditions"
+               call check_equal(error, text, expected, "not held")
+            end do
+         end associate
+         call stepper_close(stepper)
+         stepper = stepper_t()
+      end do
+   end subroutine test_words
+
+   !> Four points of three strains are fewer than the motions of eight nodes that are not rigid.
+   subroutine test_strainless(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=*), parameter :: name(2) = ["CPE8 ", "CPE8R"]
+      type(stepper_t) :: stepper
+      character(len=:), allocatable :: text, expected
+      integer :: k
+
+      do k = 1, 2
+         call read_one(trim(name(k)), 3, "NONLINEAR", stepper, error)
+         if (.not. allocated(error)) call stepper_build(stepper, error)
+         if (allocated(error)) return
+         call march_reason(stepper%march, stepper%scene, step_singular, text)
+         expected = "the system is singular"
+         if (k == 2) expected = expected // "; elements of type CPE8R, as 1, have motions " &
+            // "without strain, which a single one or a single row of them keeps: take two " &
+            // "across, or CPE8"
+         call check_equal(error, text, expected, "reason")
+         call stepper_close(stepper)
+         stepper = stepper_t()
+      end do
+   end subroutine test_strainless
 
    subroutine gate_respond(self, u0, du, wants_tangent, response)
       class(gate_t), intent(inout) :: self

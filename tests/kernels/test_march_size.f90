@@ -1,6 +1,7 @@
 !> How long increments may be, and what driven explicit steps put in.
 module test_march_size
    use check, only : check_near, check_true, test_case_t
+   use emcon_amplitudes, only : amplitude_t
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
@@ -24,7 +25,8 @@ contains
 
       tests = [ &
          test_case_t("increments end before boxes can meet", test_apart), &
-         test_case_t("work of explicit steps that are driven", test_driven)]
+         test_case_t("work of explicit steps that are driven", test_driven), &
+         test_case_t("and of a push at once, to either side", test_pushed)]
    end subroutine collect_march_size
 
    !> Block 1 is a unit square at the origin, block 2 one at `place`; both fly, with `v1` and `v2`.
@@ -103,7 +105,7 @@ contains
       type(block_t) :: block
       type(march_t) :: march
       type(increment_t) :: increment
-      real(wp) :: drift, largest, put_in
+      real(wp) :: drift, largest, put_in, before(2)
       integer :: i
 
       call make_block(scene, "CPE4", [2, 2], block)
@@ -126,8 +128,11 @@ contains
       largest = 0.0_wp
       put_in = 0.0_wp
       do i = 1, 200
+         before = march%ledger%momentum
          call march_increment(march, scene, increment, error)
          if (allocated(error)) return
+         call check_near(error, march%ledger%momentum - before, &
+            0.0025_wp*sum(march%state%reaction, 2), 1.0e3_wp*epsilon(1.0_wp), 4.0_wp, "impulse")
          drift = max(drift, abs(march%ledger%kinetic + march%ledger%strain &
             - march%ledger%external_work))
          largest = max(largest, march%ledger%kinetic + march%ledger%strain)
@@ -138,5 +143,46 @@ contains
       call check_near(error, put_in, largest, 0.025_wp, largest, "at most")
       call march_free(march)
    end subroutine test_driven
+
+   !> The bottom moves at once, to the left as to the right: in the first step masses there take the
+   !> work of their velocity before and after, and elements theirs, while nothing else has moved.
+   subroutine test_pushed(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: h = 0.0025_wp, speed = 0.5_wp
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(increment_t) :: increment
+      real(wp) :: work(4, -1:1), strain
+      integer :: i, k
+
+      do k = -1, 1, 2
+         call make_block(scene, "CPE4", [2, 2], block)
+         call add_step(scene, .false., h, 4)
+         scene%step(1)%scheme = scheme_row("DYNAMIC", "CENTRALDIFFERENCE")
+         do i = 1, 3
+            call prescribe(scene%step(1), i, 1, speed*k)
+         end do
+         scene%amplitude = [amplitude_t(name="A", time=[0.0_wp, 1.0_wp], value=[0.0_wp, 1.0_wp])]
+         scene%step(1)%prescribed%amplitude = 1
+         block
+            type(march_t) :: march
+
+            call march_init(march, scene, error)
+            if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+            do i = 1, 4
+               if (allocated(error)) return
+               call march_increment(march, scene, increment, error)
+               if (allocated(error)) return
+               work(i, k) = march%ledger%external_work
+               if (i == 1) strain = march%ledger%strain
+            end do
+            call march_free(march)
+         end block
+      end do
+      ! Three of nine nodes of a mass of 4 have a quarter of it; a shear is linear in so short a way.
+      call check_near(error, work(1, 1), 0.5_wp*1.0_wp*speed**2 + strain, 64.0_wp*epsilon(1.0_wp), &
+         1.0_wp, "energy of what is driven")
+      call check_near(error, work(:, -1), work(:, 1), 64.0_wp*epsilon(1.0_wp), 1.0_wp, "mirrored")
+   end subroutine test_pushed
 
 end module test_march_size

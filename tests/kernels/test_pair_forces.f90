@@ -466,6 +466,8 @@ contains
          call check_near(error, sum(abs(record%jump_lam)), 7.0_wp/h, tol, 100.0_wp, "and no others")
          call check_near(error, record%force(:, own), jump(1)%impulse(:, 1)/h, tol, &
             100.0_wp, "on a slave node")
+         call check_near(error, record%force(:, jump(2)%id), jump(2)%impulse(:, 1)/h, tol, &
+            100.0_wp, "on one of the other contact")
          call check_near(error, sum(abs(record%force)), 7.5_wp/h, tol, 100.0_wp, "and no others")
          allocate(sums%sum(1))
          sums%of_pair = [1, -1]

@@ -7,6 +7,7 @@ module test_solid
    use emcon_host_law, only : host_response_t
    use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : wp
+   use emcon_law_registry, only : law_linear
    use emcon_materials, only : kinematics_linear
    use emcon_motion, only : motion_of, motion_t
    use emcon_evaluation, only : evaluation_at_end, evaluation_t
@@ -17,8 +18,10 @@ module test_solid
    use emcon_space, only : space_t
    use emcon_system, only : system_begin_step, system_init, system_respond, system_t
    use emcon_term, only : response_begin, response_init, response_t, role_internal
+   use emcon_stepper, only : stepper_t
    use emcon_text, only : to_text
    use kind_rows, only : law_code
+   use one_element, only : read_one
    use small_scenes, only : add_block, add_step, block_t, make_block, poisson, shake, young
    implicit none
    private
@@ -37,6 +40,8 @@ contains
          test_case_t("total mass and row sums of a distorted mesh", test_total), &
          test_case_t("forces and energies are the sums over the elements", test_sums), &
          test_case_t("translation by 1e8 costs nothing", test_translation), &
+         test_case_t("which elements are too stiff in bending", test_stiff_bent), &
+         test_case_t("laws of elements that are not of small strains", test_linear_laws), &
          test_case_t("modes inside let rectangles bend", test_bent), &
          test_case_t("what displacements round", test_rounding), &
          test_case_t("first inverted element is named", test_inverted), &
@@ -278,16 +283,71 @@ contains
       end do
    end subroutine test_symmetric
 
+   !> Of three materials the second is linear; elements of small strains are others' matter.
+   subroutine test_linear_laws(error)
+      type(error_t), allocatable, intent(out) :: error
+      !> Material of each of three elements, of which the first has small strains
+      integer, parameter :: material(3, 4) = reshape([1, 2, 2, 1, 2, 3, 3, 1, 2, 2, 3, 2], [3, 4])
+      logical, parameter :: are_linear(4) = [.true., .false., .false., .false.]
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(solid_term_t) :: term
+      integer :: k
+
+      do k = 1, 4
+         call make_block(scene, "CPE4", [3, 1], block)
+         scene%material = scene%material([1, 1, 1])
+         scene%material(2)%law = law_linear
+         scene%section = scene%section([1, 1, 1])
+         scene%section(1)%kinematics = kinematics_linear
+         scene%section%material = material(:, k)
+         scene%element%section = [1, 2, 3]
+         call solid_term_init(term, scene, error)
+         if (allocated(error)) return
+         call check_true(error, term%has_linear_laws .eqv. are_linear(k), "case " // to_text(k))
+      end do
+   end subroutine test_linear_laws
+
+   !> Those with nodes at corners alone and no modes, unless they are rigid.
+   subroutine test_stiff_bent(error)
+      type(error_t), allocatable, intent(out) :: error
+      character(len=*), parameter :: name(6) = [character(len=5) :: "CPE3", "CPE4", "CPE4I", &
+         "CPE6", "CPE8", "C3D4"]
+      logical, parameter :: is_stiff(6) = [.true., .true., .false., .false., .false., .true.]
+      type(stepper_t) :: stepper
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(solid_t) :: solid
+      integer :: k
+
+      do k = 1, size(name)
+         call read_one(trim(name(k)), 3, "NONLINEAR", stepper, error)
+         if (.not. allocated(error)) call solid_init(solid, stepper%scene, error)
+         if (allocated(error)) return
+         call check_true(error, all(solid%trait%is_stiff_bent .eqv. is_stiff(k)), trim(name(k)))
+         stepper = stepper_t()
+      end do
+      call make_block(scene, "CPE4", [2, 1], block)
+      deallocate(scene%rigid)
+      allocate(scene%rigid(1))
+      scene%rigid(1)%element = [2]
+      call solid_init(solid, scene, error)
+      if (allocated(error)) return
+      call check_true(error, all(solid%trait%is_stiff_bent .eqv. [.true., .false.]), "a rigid one")
+   end subroutine test_stiff_bent
+
    !> Of a triangle with the sides 1 at a right angle slopes of shape functions are 1, twice so at
-   !> the corner; in a ring they are N/r around it, at three points.
+   !> the corner; in a ring they are N/r around it, at three points. Those of corners are below 0
+   !> where there are nodes between them.
    subroutine test_rounding(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: modulus = young*(1.0_wp - poisson)/((1.0_wp + poisson)*(1.0_wp &
          - 2.0_wp*poisson))
       type(scene_t) :: scene
       type(block_t) :: block
-      type(solid_t) :: solid
-      real(wp) :: expected(3), around(3)
+      type(solid_t) :: solid, quadratic
+      type(stepper_t) :: stepper
+      real(wp) :: expected(3), around(3), own(6), sums(6)
       integer :: k, j
 
       do k = 1, 2
@@ -310,6 +370,19 @@ contains
          call check_near(error, solid%stiffness(:3, 1), 0.5_wp*modulus*expected, tol, &
             modulus*expected(2), "stiffness by slopes")
       end do
+      call read_one("CAX6", 3, "NONLINEAR", stepper, error)
+      if (.not. allocated(error)) call solid_init(quadratic, stepper%scene, error)
+      if (allocated(error)) return
+      associate (geometry => quadratic%geometry(1))
+         sums = 0.0_wp
+         do j = 1, geometry%n_gp
+            own = sum(abs(geometry%gradient(:, :, j)), 1) + abs(geometry%circle(:, j))
+            sums = sums + geometry%weight(j)*sum(own)*own
+         end do
+         call check_true(error, any(geometry%circle < 0.0_wp), "below 0")
+         call check_near(error, quadratic%stiffness(:6, 1), 0.5_wp*modulus*sums, tol, &
+            modulus*maxval(sums), "with nodes between")
+      end associate
    end subroutine test_rounding
 
    !> Of a small curvature k, -k x y and k x**2/2 at nodes, a beam of CPE4I stores what one in plane

@@ -1,9 +1,9 @@
 !> A step of the deck begins with displacements and velocities alone: what a march does in its
 !> second step is what one does that starts there.
 module test_step_begin
-   use check, only : check_equal, check_near, check_true, test_case_t
+   use check, only : check_equal, check_error, check_near, check_true, test_case_t
    use emcon_amplitudes, only : amplitude_t
-   use emcon_errors, only : error_t
+   use emcon_errors, only : err_input, error_t
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
@@ -13,6 +13,7 @@ module test_step_begin
    use emcon_scheme, only : scheme_row_t
    use emcon_scheme_registry, only : n_scheme_row, scheme_row
    use emcon_state, only : state_t
+   use linear_scenes, only : add_equation
    use small_scenes, only : add_step, block_t, clamp, make_block, make_two_blocks, prescribe, &
       shake
    implicit none
@@ -30,7 +31,9 @@ contains
       tests = [ &
          test_case_t("as a march that starts there, by all schemes", test_schemes), &
          test_case_t("other conditions within a step", test_renumber), &
-         test_case_t("what overlaps as it begins goes over the step", test_overclosure)]
+         test_case_t("and such as equations contradict", test_contradiction), &
+         test_case_t("what overlaps as it begins goes over the step", test_overclosure), &
+         test_case_t("and is told where no pair is there to hold it", test_overlap)]
    end subroutine collect_step_begin
 
    !> A block that is held at its left and pulled at its right, in two steps of `n` increments; the
@@ -182,6 +185,26 @@ contains
       call march_free(new)
    end subroutine test_renumber
 
+   !> Two nodes that an equation lets move alike, and that are to move otherwise from then on.
+   subroutine test_contradiction(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(error_t), allocatable :: refused
+      type(scene_t) :: scene
+      type(march_t) :: march
+
+      call make_pulled(scene, scheme_row("DYNAMIC", ""), 3)
+      call add_equation(scene, [3, 6], [1, 1], [1.0_wp, -1.0_wp])
+      scene%v0(1, 6) = scene%v0(1, 3)
+      call march_init(march, scene, error)
+      if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+      if (allocated(error)) return
+      call prescribe(scene%step(1), 3, 1, 0.125_wp)
+      call prescribe(scene%step(1), 6, 1, 0.25_wp)
+      call march_renumber(march, scene, refused)
+      call check_error(error, refused, err_input, "", "contradiction")
+      call march_free(march)
+   end subroutine test_contradiction
+
    !> Held blocks that overlap by 1/20: gaps rise to 0 over the step, or by an amplitude.
    subroutine test_overclosure(error)
       type(error_t), allocatable, intent(out) :: error
@@ -207,6 +230,7 @@ contains
             call march_init(march, scene, error)
             if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
             call check_near(error, march%overlap_check%meant_overlap, depth, tol, 1.0_wp, "meant")
+            call check_true(error, march%system%contact(1)%contact%meets_statics, "for statics")
             do i = 1, 4
                if (allocated(error)) return
                call march_increment(march, scene, increment, error)
@@ -225,5 +249,36 @@ contains
          end block
       end do
    end subroutine test_overclosure
+
+   !> Node 13 is the deepest, below the edge from node 10 to node 9; with a pair nothing is told.
+   subroutine test_overlap(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      character(len=:), allocatable :: told
+      integer :: k
+
+      do k = 0, 1
+         call make_two_blocks(scene, -0.0625_wp, lower, upper)
+         scene%x(2, 13) = -0.125_wp
+         scene%pair = scene%pair(:k)
+         call add_step(scene, .false., h, 4)
+         block
+            type(march_t) :: march
+
+            call march_init(march, scene, error)
+            if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+            if (allocated(error)) return
+            told = ""
+            if (march%warnings%n > 0) told = march%warnings%item(1)%text
+            call check_equal(error, march%warnings%n, 1 - k, "warnings, first: " // told)
+            if (k == 0) call check_equal(error, told, "bodies overlap as a step begins, by 0.125 " &
+               // "of an edge, node 13 of body 2 is 0.125 behind the edge from node 10 to 9 of " // &
+               "body 1: no contact pair brings the two together, and their overlap is not " // &
+               "looked at further", "told")
+            call march_free(march)
+         end block
+      end do
+   end subroutine test_overlap
 
 end module test_step_begin

@@ -1,7 +1,7 @@
 !> What an increment of several steps tells of overlaps: the deepest, whatever came last.
 module test_step_overlap
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_active_set, only : step_done
+   use emcon_active_set, only : step_done, step_overlaps
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, smoothing_hermite
    use emcon_kinds, only : dp, wp
@@ -29,7 +29,9 @@ contains
 
       tests = [ &
          test_case_t("bodies that no pair brings together", test_stray), &
-         test_case_t("by facets and by what they stand for", test_smooth)]
+         test_case_t("by facets and by what they stand for", test_smooth), &
+         test_case_t("steps that go deeper than guards allow", test_deeper), &
+         test_case_t("a body that goes through another one in a step", test_through)]
    end subroutine collect_step_overlap
 
    subroutine begin(scene, march, part, error)
@@ -76,6 +78,75 @@ contains
       call check_true(error, height > 0.0_wp .and. deepest > 0.5_wp*gap, "in and out")
       call march_free(march)
    end subroutine test_stray
+
+   !> The upper block is below the lower one in the end, or the lower one above it, while the left
+   !> end of the other moves with it: seen on the way.
+   subroutine test_through(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: way = 3.0_wp
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(overlap_check_t) :: judge
+      type(overlap_t) :: overlap
+      real(wp) :: du(2, 16)
+      integer :: k
+
+      call make_two_blocks(scene, gap, lower, upper)
+      call add_step(scene, .false., h, n_step)
+      do k = 1, 3
+         du = 0.0_wp
+         if (k == 1) du(2, [1, 6, 11, 12, 13, 14, 15, 16]) = -way
+         if (k == 2) du(2, [1, 2, 3, 4, 5, 6, 7, 8, 9, 10]) = way
+         if (k == 3) du(2, [1, 6, 11, 12, 13, 14, 15, 16]) = way
+         call overlap_check_init(judge, scene)
+         call overlap_check_smooth(judge, scene, contact_options_t())
+         call overlap_check_step(judge, scene%x, 0.0_wp*du, du, overlap)
+         call check_true(error, overlap%depth > 0.1_wp .eqv. k < 3, "way " // to_text(k))
+         ! In the end there is none.
+         call overlap_check_step(judge, scene%x, du, 0.0_wp*du, overlap)
+         call check_near(error, overlap%depth, 0.0_wp, 0.0_wp, 1.0_wp, "end " // to_text(k))
+      end do
+   end subroutine test_through
+
+   !> Blocks that are too deep in each other for contact to begin fly on: a step by which they come
+   !> deeper than a tenth of what guards let in is to be smaller, if nodes of both sides are held,
+   !> contact does not give way and there is a smaller one.
+   subroutine test_deeper(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: deep = 0.4_wp, allowed = 1.2_wp*0.05_wp
+      real(wp), parameter :: way(7) = -[0.11_wp, 0.09_wp, -0.09_wp, 0.11_wp, 0.11_wp, 0.11_wp, &
+         0.11_wp]*allowed
+      integer, parameter :: expected(7) = [step_overlaps, step_done, step_done, step_done, &
+         step_done, step_done, step_done]
+      type(scene_t) :: scene
+      type(block_t) :: lower, upper
+      type(increment_t) :: increment
+      type(part_t) :: part
+      integer :: k, status
+
+      do k = 1, 7
+         call make_two_blocks(scene, 0.0_wp, lower, upper)
+         call add_step(scene, .false., h, n_step)
+         scene%pair(1)%both_sides = k /= 4
+         if (k == 5) scene%step(1)%contact%method = method_penalty
+         if (k == 5) scene%step(1)%contact%penalty%stiffness = 1.0e-6_wp
+         scene%v0(2, 11:) = way(k)/h
+         block
+            type(march_t) :: march
+
+            call begin(scene, march, part, error)
+            if (allocated(error)) return
+            march%state%u(2, 11:) = -merge(0.5_wp*allowed, deep, k == 7)
+            if (k == 7) march%system%contact(1)%contact%max_penetration_at_start = -1.0_wp
+            part%may_cut = k /= 6
+            increment = increment_t(h=h)
+            call march_step(march, scene, part, increment, status, error)
+            if (allocated(error)) return
+            call check_equal(error, status, expected(k), "case " // to_text(k))
+            call march_free(march)
+         end block
+      end do
+   end subroutine test_deeper
 
    !> A corner goes through a hollow arc of edges, with a contact that hardly pushes: it is deepest
    !> by the curve elsewhere than by the edges, which is told of each by itself.

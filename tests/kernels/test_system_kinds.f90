@@ -32,6 +32,7 @@ contains
 
       tests = [ &
          test_case_t("tangents of all kinds of sections", test_kinds), &
+         test_case_t("sections of all kinds side by side", test_mixed), &
          test_case_t("which matrices are symmetric", test_symmetric), &
          test_case_t("far from its place", test_far), &
          test_case_t("far bodies beside others", test_beside), &
@@ -91,6 +92,37 @@ contains
          end do
       end do
    end subroutine test_kinds
+
+   !> Elements by turns of each kinematics, and of a material with damping or of one without.
+   subroutine test_mixed(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: kinds(3) = [kinematics_nonlinear, kinematics_linear, &
+         kinematics_corotated]
+      type(scheme_energy_momentum_t) :: dynamic
+      type(scheme_static_t) :: static
+      type(scene_t) :: scene
+      type(evaluation_t) :: evaluation
+      integer :: turn, way, e
+
+      do turn = 0, 2
+         do way = 0, 2
+            evaluation = dynamic%evaluation(instant_t(0.5_wp, 0.5_wp), 0.25_wp)
+            if (way == 0) evaluation = static%evaluation(instant_t(0.5_wp, 0.5_wp), 0.25_wp)
+            call make_linked(scene, kinematics_nonlinear, way < 2, way == 0, 0.0_wp)
+            scene%section = scene%section(spread(1, 1, 3))
+            scene%section%kinematics = kinds
+            scene%material = scene%material([1, 1])
+            scene%section(2)%material = 2
+            if (way == 2) scene%material(2)%beta = 0.02_wp
+            do e = 1, size(scene%element%section)
+               scene%element%section(e) = 1 + mod(e + turn, 3)
+            end do
+            call check_tangent(error, scene, evaluation, merge(0.0_wp, 0.1_wp, way == 2), &
+               "turn " // to_text(turn) // ", way " // to_text(way))
+            if (allocated(error)) return
+         end do
+      end do
+   end subroutine test_mixed
 
    !> Along random ways of all unknowns, against central differences of step eps^(1/3): error a
    !> multiple of eps^(2/3). Forces on dependent freedoms go to those that they hang on.

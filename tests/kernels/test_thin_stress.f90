@@ -4,6 +4,7 @@ module test_thin_stress
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_t
    use emcon_kinds, only : wp
+   use emcon_law_registry, only : law_linear
    use emcon_motion, only : motion_of
    use emcon_scene, only : scene_t
    use emcon_solid_term, only : solid_term_init, solid_term_t
@@ -46,9 +47,9 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(block_t) :: block
-      type(solid_term_t) :: term
+      type(solid_term_t) :: term, linear
       real(wp), dimension(2, 4) :: u, force
-      real(wp) :: low, high, across, stress(6, 4)
+      real(wp) :: low, high, across, stress(6, 4), part(6, 4)
       integer :: k
 
       call make_block(scene, "CPS3", [1, 1], block)
@@ -72,6 +73,14 @@ contains
       call check_near(error, stress(1, :), spread(sum(force(1, [2, 4]))/(thickness*across**2), 1, &
          4), tol, 100.0_wp, "along")
       call check_near(error, stress(2:, :), 0.0_wp*stress(2:, :), tol, 100.0_wp, "nowhere else")
+      ! Of small strains the area stays, and all is linear.
+      scene%material(1)%law = law_linear
+      call solid_term_init(linear, scene, error)
+      if (allocated(error)) return
+      call nodal_stress(linear%solid, u, .false., stress)
+      call nodal_stress(linear%solid, 0.125_wp*u, .false., part)
+      call check_near(error, 8.0_wp*part, stress, tol, 100.0_wp, "linear")
+      call check_true(error, stress(1, 1) > 10.0_wp, "pulled")
    end subroutine test_strip
 
 end module test_thin_stress

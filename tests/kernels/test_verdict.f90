@@ -9,11 +9,14 @@ module test_verdict
    use emcon_far_nodes, only : far_element_find
    use emcon_force_scatter, only : force_scatter_t, scatter_follow, scatter_is_comb, scatter_of
    use emcon_kinds, only : wp
+   use emcon_march, only : march_begin_step, march_free, march_init, march_t
    use emcon_nodal_pull, only : nodal_pull_add, nodal_pull_share, nodal_pull_t, nodal_pull_text
    use emcon_pair_sums, only : pair_sum_t
-   use emcon_verdict, only : verdict_end, verdict_is_failure, verdict_is_good, &
+   use emcon_scene, only : scene_t
+   use emcon_verdict, only : verdict_end, verdict_is_failure, verdict_is_good, verdict_start, &
       verdict_t
    use emcon_verdict_lines, only : guard_advice, verdict_line
+   use small_scenes, only : add_step, block_t, make_block
    implicit none
    private
    public :: collect_verdict
@@ -36,9 +39,41 @@ contains
          test_case_t("elements far from the origin keep few digits", test_far), &
          test_case_t("scatter of a comb, of a smooth force, of one push", test_scatter), &
          test_case_t("pulls at single nodes are measured and told", test_pulls), &
+         test_case_t("elements that lock are told as it begins", test_locking), &
          test_case_t("a run that failed is not good", test_failed), &
          test_case_t("what pairs can do to need no guards", test_advice)]
    end subroutine collect_verdict
+
+   !> At nu = 0.3 nothing is told, at 0.499 the first element is.
+   subroutine test_locking(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: ratio(2) = [0.3_wp, 0.499_wp]
+      type(scene_t) :: scene
+      type(block_t) :: block
+      integer :: k
+
+      do k = 1, 2
+         call make_block(scene, "CPE4", [2, 1], block)
+         scene%element%label = [10, 20]
+         scene%material(1)%constant(2) = ratio(k)
+         call add_step(scene, .false., 0.1_wp, 1)
+         block
+            type(march_t) :: march
+            type(verdict_t) :: verdict, fresh
+
+            call march_init(march, scene, error)
+            if (.not. allocated(error)) call march_begin_step(march, scene, 1, error)
+            if (allocated(error)) return
+            call verdict_start(verdict, march)
+            call check_equal(error, verdict%n_warning, k - 1, "warnings")
+            call check_near(error, verdict%overlap%bar, fresh%overlap%bar, 0.0_wp, 1.0_wp, &
+               "no guards give way")
+            if (k == 2) call check_true(error, index(verdict%warnings%item(1)%text, &
+               "element 10 at nu = 0.499 locks: ") == 1, verdict%warnings%item(1)%text)
+            call march_free(march)
+         end block
+      end do
+   end subroutine test_locking
 
    subroutine test_good(error)
       type(error_t), allocatable, intent(out) :: error

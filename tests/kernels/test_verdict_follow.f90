@@ -28,6 +28,7 @@ contains
          test_case_t("the most, and when", test_most), &
          test_case_t("counts and sums", test_counts), &
          test_case_t("the deepest overlap, of a pair or of none", test_overlap), &
+         test_case_t("bodies in each other of which one has gone through itself", test_own), &
          test_case_t("warnings that differ", test_warnings), &
          test_case_t("linear sections that turn", test_turning), &
          test_case_t("a bent body is told once, at the end of a step", test_bent)]
@@ -138,6 +139,46 @@ contains
       end do
       call march_free(stepper%march)
    end subroutine test_overlap
+
+   !> The lower block is bent until its right end is in the top of its left one: told where an
+   !> overlap names that block, be it one of a pair or of none, and not where it names the other.
+   subroutine test_own(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: body(4) = [1, 2, 1, 2]
+      type(stepper_t) :: stepper
+      type(increment_t) :: increment
+      type(overlap_t) :: of_body(2)
+      integer :: k
+
+      of_body = overlap_t(length=1.0_wp)
+      of_body(1)%node = 6
+      of_body(1)%facet(:2) = [7, 8]
+      of_body(2)%node = 14
+      of_body(2)%facet(:2) = [15, 16]
+      do k = 1, 4
+         call open(stepper, error)
+         if (allocated(error)) return
+         associate (u => stepper%march%state%u, x => stepper%scene%x)
+            u(:, 4) = [1.3_wp, 0.8_wp] - x(:, 4)
+            u(:, 5) = [-1.25_wp, 0.8_wp] - x(:, 5)
+            u(:, 10) = [-1.25_wp, -0.25_wp] - x(:, 10)
+            u(:, 9) = [0.3_wp, 0.3_wp] - x(:, 9)
+         end associate
+         increment = increment_t()
+         increment%overlap = of_body(merge(body(k), 3 - body(k), k < 3))
+         increment%overlap%depth = merge(0.4_wp, 0.3_wp, k < 3)
+         increment%stray = of_body(merge(3 - body(k), body(k), k < 3))
+         increment%stray%depth = merge(0.3_wp, 0.4_wp, k < 3)
+         call follow(stepper, 1.0_wp, increment)
+         associate (place => stepper%verdict%overlap%place)
+            call check_true(error, (index(place, "a body has gone through itself by then, node " &
+               // "10 of body 1 is 0.25 behind the edge from node 7 to 6") > 0) .eqv. body(k) == 1, &
+               "own " // to_text(k) // ": " // place)
+         end associate
+         call march_free(stepper%march)
+         stepper = stepper_t()
+      end do
+   end subroutine test_own
 
    !> All are counted; the first twenty different ones are kept.
    subroutine test_warnings(error)
