@@ -544,3 +544,54 @@ def test_without_friction_nothing_of_it_runs(tmp_path):
     assert runs[0].digits() == runs[1].digits()
     assert runs[0].verdict["counts"] == runs[1].verdict["counts"]
     assert all("law_violation" not in run.verdict for run in runs)
+
+
+# ---- lines of symmetry --------------------------------------------------------------------------
+
+
+def pressed_blocks(half, statics=True):
+    """A block on a wider, softer one, pressed in by its top: the whole, or what is right of x = 0."""
+    scene = Scene(0.25 if statics else 0.01, 1.0 if statics else 0.25)
+    n = 1 if half else 2
+    for name, y, width, cells, stiffness in (("LOW", -1.0, 2.0, 5, 50.0), ("HIGH", 0.0, 1.0, 3, 100.0)):
+        scene.block(name, (-width*(n - 1), y), (n*width, 1.0), (n*cells, 3), stiffness=stiffness)
+        if half:
+            scene.hold(name, lambda x, y: abs(x) < 1e-9, "1, 1")
+    scene.pairs = [("HIGH", "LOW")]
+    scene.hold("LOW", lambda x, y: y < -0.99)
+    scene.hold("HIGH", lambda x, y: y > 0.99, "2, 2", -0.05)
+    scene.hold("HIGH", lambda x, y: y > 0.99 and abs(x) < 1e-9, "1, 1")
+    deck = rubbing(scene.deck("AUTO"), 0.3)
+    if statics:
+        deck.replace("*DYNAMIC, DIRECT", "*STATIC, DIRECT")
+    return deck
+
+
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
+def test_half_a_model_rubs_as_half_of_the_whole(formulation, tmp_path):
+    """On the line of symmetry nothing slides: no friction, though any would satisfy the law there."""
+    forces = []
+    for half in (False, True):
+        deck = pressed_blocks(half)
+        run = run_deck(deck, tmp_path/str(half), formulation=formulation)
+        assert run.verdict["verdict"] == "good"
+        fields = run.fields()
+        force = fields["contact_force"][-1]
+        right = fields.x[:, 0] > 1e-9
+        forces.append(force[right][np.lexsort(fields.x[right].T)])
+    assert np.abs(forces[0]).max() > 0.1
+    assert forces[1] == pytest.approx(forces[0], abs=1e-8*np.abs(forces[0]).max())
+
+
+def test_one_element_on_a_line_of_symmetry(tmp_path):
+    """Held on its left side, pressed on a profile: the weight of the load, and no search for what holds
+    the body."""
+    scene = Scene(1.0, 1.0)
+    scene.block("BODY", (0, 0), (2, 1), (1, 1), stiffness=1e3)
+    scene.hold("BODY", lambda x, y: x < 0.01, "1, 1")
+    deck = rubbing(with_profile(scene, "START, -5., 0.\nLINE, 9., 0."), 0.3)
+    deck.replace("*DYNAMIC, DIRECT", "*STATIC, DIRECT")
+    deck.replace("*CONSTRAINT METHOD", "*CLOAD\n3, 2, -5.\n4, 2, -5.\n*CONSTRAINT METHOD")
+    run = run_deck(deck, tmp_path, **NODES)
+    assert run.verdict["verdict"] == "good" and run.history["newton"].sum() < 30
+    assert run.history["pair1_force_y"][-1] == pytest.approx(10.0, rel=1e-9)
