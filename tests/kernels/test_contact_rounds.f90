@@ -6,6 +6,7 @@ module test_contact_rounds
       candidates_t, step_done, step_stands_off, step_too_far, touch_tol
    use emcon_active_set_solve, only : active_set_solve
    use emcon_contact_law, only : contact_laws_add
+   use emcon_contact_law_registry, only : contact_law_of_method
    use emcon_correction, only : correction_free, correction_reset
    use emcon_coulomb_law, only : contact_slides, contact_sticks, coulomb_t
    use emcon_errors, only : error_t
@@ -20,10 +21,12 @@ module test_contact_rounds
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_solver_registry, only : solver_default
    use emcon_state, only : state_t
-   use emcon_steps, only : method_null_space
+   use emcon_steps, only : method_augmented_lagrange, method_null_space, method_penalty, &
+      method_saddle_point
    use emcon_system, only : system_begin_step, system_init, system_respond, system_t
    use emcon_text, only : to_text
    use floor_contact, only : floor_contact_t, floor_make
+   use linear_scenes, only : add_equation
    use random_draws, only : draw_random
    use small_scenes, only : add_step, block_t, make_block, prescribe, shake
    implicit none
@@ -47,6 +50,10 @@ module test_contact_rounds
       real(wp) :: mu = 0.0_wp
       logical :: keeps_factor = .false.
       logical :: holds_gap = .false.             !! of the start
+      logical :: has_impacts = .true.            !! else sets are told by trials, as in statics
+      logical :: is_linked = .false.             !! nodes 4 and 6 move alike sideways
+      integer :: method = method_null_space
+      real(wp) :: stiffness = 0.0_wp             !! of the floor, where it gives way [M/T^2]
       logical, allocatable :: was_active(:)      !! contacts; not allocated: none
       real(wp) :: way = 0.0_wp                   !! prescribed of node 6, sideways [L]
       real(wp) :: slides_along = 0.0_wp          !! what slid before
@@ -61,6 +68,8 @@ contains
       tests = [ &
          test_case_t("what is found balances and obeys the laws", test_laws), &
          test_case_t("with a kept factor and without", test_kept), &
+         test_case_t("with a row that always holds, by trials or not", test_linked), &
+         test_case_t("a floor that gives way, or is pushed back", test_soft), &
          test_case_t("in any unit of length", test_units), &
          test_case_t("rows that follow from others", test_redundant), &
          test_case_t("what has lost its surface does not come back", test_left), &
@@ -96,17 +105,20 @@ contains
       logical :: is_lost
 
       if (abs(self%way) > 0.0_wp) call prescribe(self%scene%step(1), 6, 1, self%way)
+      if (self%is_linked) call add_equation(self%scene, [4, 6], [1, 1], [1.0_wp, -1.0_wp])
+      self%scene%step(1)%contact%method = self%method
       call system_init(self%system, self%scene, error)
       if (.not. allocated(error)) call system_begin_step(self%system, self%scene, 1, error)
       if (allocated(error)) return
       call put_floor(self)
-      n = self%system%n_constraint
       call active_set_init(self%active, self%system)
       self%active%rules%holds_gap = self%holds_gap
+      self%active%rules%has_impacts = self%has_impacts
       self%active%rules%puts_off = .true.
       call newton_init(self%newton, self%system%space%numbering%n_unknown, self%scene%x, &
          1.0e3_wp*epsilon(1.0_wp), 30)
-      call correction_reset(self%newton%correction, method_null_space, solver_default)
+      call correction_reset(self%newton%correction, merge(method_saddle_point, &
+         method_null_space, self%is_linked), solver_default)
       self%newton%factor_policy%is_allowed = self%keeps_factor
       call factor_policy_step(self%newton%factor_policy, self%newton%correction, base, &
          instant_t(), h, 0, is_lost)
@@ -116,21 +128,53 @@ contains
       self%motion%v0 = self%scene%v0
       self%motion%du = h*self%scene%v0
       if (abs(self%way) > 0.0_wp) then
-         self%newton%driven(1, 6) = self%way - self%motion%u0(1, 6) - self%motion%du(1, 6)
-         self%motion%du(1, 6) = self%way - self%motion%u0(1, 6)
+         ! What follows from a prescribed node by an eliminated row is prescribed too.
+         do n = merge(4, 6, self%is_linked .and. self%system%space%is_reduced), 6, 2
+            self%newton%driven(1, n) = self%way - self%motion%u0(1, n) - self%motion%du(1, n)
+            self%motion%du(1, n) = self%way - self%motion%u0(1, n)
+         end do
       end if
+      n = self%system%n_constraint
       associate (contacts => self%state%contacts)
          allocate(contacts%is_active(n), source=.false.)
-         if (allocated(self%was_active)) contacts%is_active = self%was_active
-         allocate(contacts%lam(n), contacts%closure(n), source=0.0_wp)
+         if (allocated(self%was_active)) contacts%is_active(size(self%system%acts) + 1:) &
+            = self%was_active
+         allocate(contacts%lam(n), source=0.0_wp)
+         allocate(contacts%closure(n), source=1.0_wp)
          allocate(contacts%slides_along(1, n), source=self%slides_along)
          allocate(contacts%drag(1, n), source=0.0_wp)
+         if (self%stiffness > 0.0_wp) call soften(self, contacts%closure)
       end associate
       call active_set_begin(self%active, self%system, self%motion, self%state)
       call active_set_solve(self%active, self%system, self%scene, self%newton, self%motion, &
          self%status, error)
       call correction_free(self%newton%correction)
    end subroutine solve
+
+   !> The floor gives way; `closure` is how far it does so as the step begins.
+   subroutine soften(self, closure)
+      type(case_t), intent(inout) :: self
+      real(wp), intent(inout) :: closure(:)      !! (n_constraint) [L]
+      integer :: i
+
+      associate (state => self%active%penalty, floor => self%floor(1), n => size(closure))
+         state%is_on = .true.
+         state%augments = self%method == method_augmented_lagrange
+         state%tolerance = 1.0e-3_wp*tol
+         call contact_law_of_method(self%method, state%law)
+         allocate(state%stiffness(n), source=self%stiffness)
+         allocate(state%area(n), state%edge(n), source=1.0_wp)
+         allocate(state%closure(n), source=1.0_wp)
+         self%system%contact(1)%contact%step%has_compliance = .true.
+         self%system%contact(1)%contact%step%is_penalty = .not. state%augments
+         do i = 1, n
+            associate (node => floor%node(i))
+               if (self%was_active(i)) closure(i) = min(0.0_wp, self%motion%x(2, node) &
+                  + self%motion%u0(2, node) - floor%height(i))
+            end associate
+         end do
+      end associate
+   end subroutine soften
 
    !> The contacts of the system are those of `floor`, all with friction.
    subroutine put_floor(self)
@@ -141,7 +185,7 @@ contains
          deallocate(system%contact, system%first_constraint)
          allocate(system%contact(size(self%floor)), &
             system%first_constraint(size(self%floor) + 1))
-         system%first_constraint = 0
+         system%first_constraint = size(system%acts)
          system%n_pair = count(.not. self%floor%slack > 0.0_wp)
          do k = 1, size(self%floor)
             if (self%mu > 0.0_wp) call contact_laws_add(self%floor(k)%laws, coulomb_t(mu=self%mu))
@@ -185,7 +229,16 @@ contains
          call system_respond(system, motion, .false., .true.)
          left = system%response%residual
          scale = maxval(system%response%magnitude)
-         k = 0
+         k = size(system%acts)
+         ! Where the row is eliminated the two nodes share what it takes.
+         if (self%is_linked .and. set%n_permanent == 0) left(1, [4, 6]) = merge(0.0_wp, &
+            left(1, 4) + left(1, 6), abs(self%way) > 0.0_wp)
+         do i = 1, set%n_permanent
+            associate (item => set%item(i), m => set%item(i)%n_node)
+               left(:, item%node(:m)) = left(:, item%node(:m)) - lam(i)*item%g(:, :m)
+               lam(i) = 0.0_wp
+            end associate
+         end do
          do pair = 1, size(system%contact)
             associate (floor => self%floor(pair))
                do i = 1, floor%n_constraint
@@ -214,6 +267,8 @@ contains
          call check_true(error, all(abs(tau) <= self%mu*lam + tol*scale), what // ": friction")
          if (abs(self%way) > 0.0_wp) call check_near(error, motion%u0(1, 6) + motion%du(1, 6), &
             self%way, 4.0_wp*eps, 1.0_wp, what // ": prescribed")
+         if (self%is_linked) call check_near(error, motion%u0(1, 4) + motion%du(1, 4), &
+            motion%u0(1, 6) + motion%du(1, 6), 64.0_wp*eps, 1.0_wp, what // ": alike")
       end associate
       if (self%mu > 0.0_wp) call check_friction(self, what, lam, tau, s, lead, scale, error)
    end subroutine check_laws
@@ -409,6 +464,118 @@ contains
          end do
       end do
    end subroutine test_kept
+
+   !> An equation that is solved with its multiplier, whatever tells which contacts act: there is one
+   !> solution, to whose motion all of that leads.
+   subroutine test_linked(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: u(6), du(2, 6)
+      integer :: i, k, n_act
+
+      n_act = 0
+      do i = 0, 15
+         call draw_random(u)
+         block
+            type(case_t) :: first
+
+            call make_case(first, 3.0_wp*u(1) - 1.5_wp)
+            first%scene%u0(1, 4) = first%scene%u0(1, 6)
+            if (mod(i/2, 2) == 1) first%way = 0.1_wp*(u(2) - 0.5_wp)
+            if (abs(first%way) > 0.0_wp) first%scene%v0(1, 4) = first%scene%v0(1, 6)
+            do k = 1, 4
+               block
+                  type(case_t) :: self
+
+                  self%scene = first%scene
+                  self%way = first%way
+                  self%mu = merge(0.0_wp, 0.2_wp, mod(i, 2) == 0)
+                  self%has_impacts = mod(k, 2) == 1
+                  self%is_linked = .true.
+                  if (k > 2) self%method = method_saddle_point
+                  self%was_active = u(4:6) > 0.6_wp
+                  allocate(self%floor(1))
+                  call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3) - merge(0.0_wp, &
+                     0.1_wp*u(4:6), self%was_active))
+                  call solve(self, error)
+                  call check_laws(self, "case " // to_text(i) // ", way " // to_text(k), error)
+                  if (allocated(error)) return
+                  if (k == 1) du = self%motion%du
+                  call check_near(error, self%motion%du, du, tol, 1.0_wp, "motion of case " &
+                     // to_text(i) // ", way " // to_text(k))
+                  n_act = n_act + count(self%active%is_active(2:))
+               end block
+            end do
+         end block
+      end do
+      call check_true(error, n_act > 64, "contacts act")
+   end subroutine test_linked
+
+   !> What a floor pushes is the discrete gradient of what it stores, also where a node has left it
+   !> or come onto it; with an augmented Lagrangian nothing is left of the gaps.
+   subroutine test_soft(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: u(7)
+      integer :: i, n_left, n_came
+
+      n_left = 0
+      n_came = 0
+      do i = 0, 47
+         block
+            type(case_t) :: self
+
+            call draw_random(u)
+            call make_case(self, 0.5_wp)
+            if (mod(i, 3) > 0) self%scene%v0(2, :) = self%scene%v0(2, :) + 3.0_wp*u(7) &
+               *(self%scene%x(1, :) - 0.5_wp)
+            self%stiffness = merge(1.0e5_wp, 100.0_wp*u(1), mod(i, 2) == 0)
+            self%method = merge(method_augmented_lagrange, method_penalty, mod(i, 2) == 0)
+            self%was_active = u(4:6) > 0.5_wp
+            allocate(self%floor(1))
+            call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3) + merge(merge(0.0_wp, &
+               0.05_wp, mod(i, 2) == 0), -0.1_wp, self%was_active)*u(4:6))
+            call solve(self, error)
+            if (self%method == method_penalty) then
+               call check_soft(self, "case " // to_text(i), n_left, n_came, error)
+            else
+               call check_laws(self, "case " // to_text(i), error)
+            end if
+            if (allocated(error)) return
+         end block
+      end do
+      call check_true(error, min(n_left, n_came) > 5, to_text(n_left) // " have left the floor, " &
+         // to_text(n_came) // " come onto it")
+   end subroutine test_soft
+
+   subroutine check_soft(self, what, n_left, n_came, error)
+      type(case_t), intent(inout) :: self
+      character(len=*), intent(in) :: what
+      integer, intent(inout) :: n_left, n_came
+      type(error_t), allocatable, intent(inout) :: error
+      real(wp), allocatable :: left(:, :)
+      real(wp) :: gap(0:1), push
+      integer :: i
+
+      call check_equal(error, self%status, step_done, what // ": status")
+      if (allocated(error)) return
+      call motion_evaluate(self%motion)
+      call system_respond(self%system, self%motion, .false., .true.)
+      left = self%system%response%residual
+      associate (motion => self%motion, floor => self%floor(1))
+         do i = 1, floor%n_constraint
+            associate (node => floor%node(i))
+               gap = motion%x(2, node) + motion%u0(2, node) - floor%height(i) + [0.0_wp, &
+                  motion%du(2, node)]
+               push = 0.5_wp*self%stiffness*(min(gap(0), 0.0_wp)**2 - min(gap(1), 0.0_wp)**2) &
+                  /(gap(1) - gap(0))
+               left(2, node) = left(2, node) - push
+               if (gap(0) < 0.0_wp .and. gap(1) > 0.0_wp) n_left = n_left + 1
+               if (gap(0) > 0.0_wp .and. gap(1) < 0.0_wp) n_came = n_came + 1
+            end associate
+         end do
+      end associate
+      call check_near(error, left, 0.0_wp*left, tol, maxval(self%system%response%magnitude), &
+         what // ": balance")
+   end subroutine check_soft
 
    !> Two contacts at one node, as corners have them: both may push, their sum is what counts.
    subroutine test_redundant(error)
