@@ -2,15 +2,18 @@
 !> obeys the laws, from wherever it is begun; and who takes part, by what contacts tell.
 module test_contact_rounds
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_active_set, only : active_set_begin, active_set_init, active_set_t, candidates_clear, &
-      candidates_t, step_done, step_stands_off, step_too_far, touch_tol
+   use emcon_active_set, only : active_set_begin, active_set_init, active_set_select, &
+      active_set_t, candidates_clear, candidates_t, step_done, step_stands_off, step_too_far, touch_tol
    use emcon_active_set_solve, only : active_set_solve
+   use emcon_constraints, only : constraints_evaluate
+   use emcon_contact_candidates, only : candidates_keep_forces, candidates_select
    use emcon_contact_law, only : contact_laws_add
    use emcon_contact_law_registry, only : contact_law_of_method
+   use emcon_contact_newton, only : contact_newton_solve
    use emcon_correction, only : correction_free, correction_reset
-   use emcon_coulomb_law, only : contact_slides, contact_sticks, coulomb_t
+   use emcon_coulomb_law, only : contact_open, contact_slides, contact_sticks, coulomb_t
    use emcon_errors, only : error_t
-   use emcon_evaluation, only : evaluation_displacement, instant_t
+   use emcon_evaluation, only : evaluation_at_end, evaluation_displacement, instant_t
    use emcon_factor_base, only : factor_base_t
    use emcon_factor_policy, only : factor_policy_step
    use emcon_friction, only : most_lagged
@@ -28,7 +31,7 @@ module test_contact_rounds
    use floor_contact, only : floor_contact_t, floor_make
    use linear_scenes, only : add_equation
    use random_draws, only : draw_random
-   use small_scenes, only : add_step, block_t, make_block, prescribe, shake
+   use small_scenes, only : add_step, block_t, clamp, make_block, prescribe, shake
    implicit none
    private
    public :: collect_contact_rounds
@@ -57,6 +60,9 @@ module test_contact_rounds
       logical, allocatable :: was_active(:)      !! contacts; not allocated: none
       real(wp) :: way = 0.0_wp                   !! prescribed of node 6, sideways [L]
       real(wp) :: slides_along = 0.0_wp          !! what slid before
+      logical :: is_at_once = .false.            !! all contacts are candidates from the start
+      logical :: is_static = .false.             !! the upper nodes are moved to `top`
+      real(wp) :: top(2) = 0.0_wp                !! displacement of them [L]
       integer :: status = 0
    end type case_t
 
@@ -70,6 +76,8 @@ contains
          test_case_t("with a kept factor and without", test_kept), &
          test_case_t("with a row that always holds, by trials or not", test_linked), &
          test_case_t("a floor that gives way, or is pushed back", test_soft), &
+         test_case_t("all at once, as Newton's method converges", test_at_once), &
+         test_case_t("statics by sets and all at once", test_static), &
          test_case_t("in any unit of length", test_units), &
          test_case_t("rows that follow from others", test_redundant), &
          test_case_t("what has lost its surface does not come back", test_left), &
@@ -105,6 +113,12 @@ contains
       logical :: is_lost
 
       if (abs(self%way) > 0.0_wp) call prescribe(self%scene%step(1), 6, 1, self%way)
+      if (self%is_static) then
+         deallocate(self%scene%step)
+         allocate(self%scene%step(0))
+         call add_step(self%scene, .true., h, 1)
+         call clamp(self%scene%step(1), [4, 5, 6])
+      end if
       if (self%is_linked) call add_equation(self%scene, [4, 6], [1, 1], [1.0_wp, -1.0_wp])
       self%scene%step(1)%contact%method = self%method
       call system_init(self%system, self%scene, error)
@@ -134,6 +148,12 @@ contains
             self%motion%du(1, n) = self%way - self%motion%u0(1, n)
          end do
       end if
+      if (self%is_static) then
+         self%motion%evaluation = evaluation_at_end
+         self%motion%du = 0.0_wp
+         self%motion%du(:, 4:) = spread(self%top, 2, 3) - self%motion%u0(:, 4:)
+         self%newton%driven(:, 4:) = self%motion%du(:, 4:)
+      end if
       n = self%system%n_constraint
       associate (contacts => self%state%contacts)
          allocate(contacts%is_active(n), source=.false.)
@@ -146,10 +166,40 @@ contains
          if (self%stiffness > 0.0_wp) call soften(self, contacts%closure)
       end associate
       call active_set_begin(self%active, self%system, self%motion, self%state)
-      call active_set_solve(self%active, self%system, self%scene, self%newton, self%motion, &
-         self%status, error)
+      if (self%is_at_once) then
+         call solve_at_once(self, error)
+      else
+         call active_set_solve(self%active, self%system, self%scene, self%newton, self%motion, &
+            self%status, error)
+      end if
       call correction_free(self%newton%correction)
    end subroutine solve
+
+   !> All contacts as one problem of what acts, sticks and slides, whatever acted before.
+   subroutine solve_at_once(self, error)
+      type(case_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+      type(coulomb_t), allocatable :: law(:)
+      integer, allocatable :: id(:)
+
+      associate (active => self%active, set => self%active%set)
+         call candidates_clear(active%candidates)
+         active%candidates%takes_part = .true.
+         active%candidates%takes_part(:size(self%system%acts)) = self%system%acts
+         call candidates_select(active, self%system, self%motion)
+         id = set%id(set%n_permanent + 1:set%n)
+         allocate(law(size(id)))
+         if (active%friction%is_on) law = active%friction%law(id)
+         call contact_newton_solve(self%newton, self%system, set, law, self%motion, self%status, &
+            error)
+         if (allocated(error)) return
+         call candidates_keep_forces(active)
+         active%is_active(id) = law%status%kind /= contact_open
+         if (active%friction%is_on) active%friction%law(id)%status = law%status
+         call active_set_select(active, self%system, self%motion)
+         call constraints_evaluate(set, self%system, self%motion, .true.)
+      end associate
+   end subroutine solve_at_once
 
    !> The floor gives way; `closure` is how far it does so as the step begins.
    subroutine soften(self, closure)
@@ -251,7 +301,7 @@ contains
                      held(k) = merge(gap0(k), floor%closed, self%holds_gap .and. &
                         active%is_candidate(k))
                      ! What slip leads to: with the velocity along the floor at an end of 0.
-                     if (active%is_candidate(k)) lead(k) = evaluation_displacement( &
+                     if (active%is_candidate(k) .and. .not. self%is_static) lead(k) = evaluation_displacement( &
                         motion%evaluation, motion%v0(1, node), 0.0_wp)
                      if (floor%leaves(i)) held(k) = -huge(scale)
                   end associate
@@ -509,6 +559,97 @@ contains
       end do
       call check_true(error, n_act > 64, "contacts act")
    end subroutine test_linked
+
+   !> With all contacts as candidates what comes out balances and obeys the laws, too, and once it is
+   !> near each iterate leaves the square of what the one before has left.
+   subroutine test_at_once(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: u(7)
+      integer :: i, k, n_fast
+
+      n_fast = 0
+      do i = 0, 63
+         block
+            type(case_t) :: self
+
+            call draw_random(u)
+            call make_case(self, 3.0_wp*u(1) - 1.5_wp)
+            self%is_at_once = .true.
+            self%mu = merge(0.0_wp, 0.6_wp*u(2), mod(i, 2) == 0)
+            self%is_linked = mod(i/4, 2) == 1
+            if (self%is_linked) self%scene%u0(1, 4) = self%scene%u0(1, 6)
+            self%method = merge(method_saddle_point, method_null_space, mod(i/8, 2) == 1)
+            if (mod(i/2, 2) == 1) self%way = 0.1_wp*(u(3) - 0.5_wp)
+            self%was_active = u(4:6) > 0.6_wp
+            allocate(self%floor(1))
+            call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3) - merge(0.0_wp, &
+               0.1_wp*u(4:6), self%was_active))
+            if (u(7) > 0.5_wp) self%scene%v0(2, :) = self%scene%v0(2, :) + self%scene%x(1, :)
+            call solve(self, error)
+            self%active%is_candidate = self%active%start%was_active
+            call check_laws(self, "case " // to_text(i), error)
+            if (allocated(error)) return
+            associate (convergence => self%newton%convergence)
+               do k = 2, convergence%n_history
+                  if (convergence%history(k - 1) > 0.01_wp) cycle
+                  if (convergence%history(k - 1) < convergence%tolerance) exit
+                  call check_true(error, convergence%history(k) <= convergence%history(k - 1)**2 &
+                     + tol, "iterate " // to_text(k) // " of case " // to_text(i) // " leaves " &
+                     // to_text(convergence%history(k), 3))
+                  n_fast = n_fast + 1
+               end do
+            end associate
+         end block
+      end do
+      call check_true(error, n_fast > 32, "iterates near the end: " // to_text(n_fast))
+   end subroutine test_at_once
+
+   !> In equilibrium, its upper nodes pushed down and aside: by sets that trials tell, and all at once,
+   !> a block comes to rest the same way.
+   subroutine test_static(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: u(6), du(2, 6)
+      integer :: i, k, n_stick, n_slide
+
+      n_stick = 0
+      n_slide = 0
+      do i = 0, 31
+         block
+            type(case_t) :: first
+
+            call draw_random(u)
+            call make_case(first, 0.0_wp)
+            do k = 1, 2
+               block
+                  type(case_t) :: self
+
+                  self%scene = first%scene
+                  self%is_static = .true.
+                  self%has_impacts = .false.
+                  self%is_at_once = k == 2
+                  self%top = [0.2_wp*u(1) - 0.1_wp, -0.03_wp - 0.1_wp*u(2)]
+                  self%mu = merge(0.0_wp, 0.3_wp, mod(i, 4) == 0)
+                  self%was_active = u(4:6) > 0.5_wp
+                  allocate(self%floor(1))
+                  call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3))
+                  call solve(self, error)
+                  call check_laws(self, "case " // to_text(i) // ", way " // to_text(k), error)
+                  if (allocated(error)) return
+                  if (k == 1) du = self%motion%du
+                  call check_near(error, self%motion%du, du, tol, 1.0_wp, "motion of case " &
+                     // to_text(i))
+                  if (.not. self%active%friction%is_on) cycle
+                  associate (kind => self%active%friction%law%status%kind)
+                     n_stick = n_stick + count(self%active%is_active .and. kind == contact_sticks)
+                     n_slide = n_slide + count(self%active%is_active .and. kind == contact_slides)
+                  end associate
+               end block
+            end do
+         end block
+      end do
+      call check_true(error, min(n_stick, n_slide) > 5, to_text(n_stick) // " stick, " // &
+         to_text(n_slide) // " slide")
+   end subroutine test_static
 
    !> What a floor pushes is the discrete gradient of what it stores, also where a node has left it
    !> or come onto it; with an augmented Lagrangian nothing is left of the gaps.

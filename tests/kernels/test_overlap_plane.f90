@@ -10,7 +10,7 @@ module test_overlap_plane
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
    use random_draws, only : draw_random
-   use small_scenes, only : add_block, add_surface, block_t, bottom, scene_begin, top
+   use small_scenes, only : add_block, add_surface, block_t, bottom, left, right, scene_begin, top
    implicit none
    private
    public :: collect_overlap_plane
@@ -31,7 +31,8 @@ contains
          test_case_t("in front of an outline and behind it", test_depth), &
          test_case_t("where edges cross", test_crossing), &
          test_case_t("lines that end", test_open), &
-         test_case_t("ends on sides, the middle inside", test_middle)]
+         test_case_t("ends on sides, the middle inside", test_middle), &
+         test_case_t("an edge across teeth, of another body or of its own", test_teeth)]
    end subroutine collect_overlap_plane
 
    !> Over an open line of five edges, one of which has no length: in either order the place is the
@@ -238,5 +239,49 @@ contains
             k == 1), tol, 1.0_wp, "rise " // to_text(k))
       end do
    end subroutine test_middle
+
+   !> A long edge at the height 0.9 cuts three teeth that stand on 1/2, of which one reaches up to 1.4
+   !> and the others to 1.2: deepest is its middle within the highest, by the side of that.
+   subroutine test_teeth(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: at = 0.9_wp, low = 0.5_wp, high = 1.4_wp
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(overlap_t) :: overlap
+      real(wp) :: teeth(2, 7)
+      integer :: i, k, highest
+
+      do k = 1, 2
+         do highest = 1, 3
+            teeth = reshape([(real(i, wp), merge(low, 1.2_wp, mod(i, 2) == 0), i = 0, 6)], [2, 7])
+            teeth(2, 2*highest) = high
+            call scene_begin(scene)
+            if (k == 1) then
+               call add_block(scene, "CPE4", [6, 1], [0.0_wp, -1.0_wp], [6.0_wp, 1.0_wp], block)
+               scene%x(:, 8:) = teeth
+               call add_surface(scene, "TEETH", block, [top])
+               call add_block(scene, "CPE4", [1, 1], [-0.5_wp, at], [7.0_wp, 1.5_wp], block)
+               call add_surface(scene, "BAR", block, [bottom])
+               scene%pair = [contact_pair_t(slave=2, master=1)]
+            else
+               ! A strip that is bent back above itself, the long edge its last one.
+               call add_block(scene, "CPE4", [9, 1], [0.0_wp, -1.0_wp], [9.0_wp, 1.0_wp], block)
+               scene%x(:, 11:) = reshape([teeth, 7.0_wp, 0.25_wp, 7.0_wp, at, -0.5_wp, at], [2, 10])
+               scene%x(:, 8:10) = reshape([8.0_wp, -1.0_wp, 8.0_wp, 2.4_wp, -0.5_wp, 2.4_wp], [2, 3])
+               call add_surface(scene, "SKIN", block, [bottom, right, top, left])
+               scene%pair = [contact_pair_t(slave=1, master=1)]
+            end if
+            call look(scene, 0.0_wp*scene%x, 1.0_wp, 3 - k, 1, overlap)
+            associate (height => high - low)
+               call check_near(error, overlap%depth, (high - at)/(height**2 + 1.0_wp), tol, &
+                  1.0_wp, "how deep in tooth " // to_text(highest))
+            end associate
+            call check_true(error, any(overlap%facet == merge(7, 10, k == 1) + 2*highest), &
+               "in the highest")
+            call check_true(error, any(overlap%node == merge([15, 16], [19, 20], k == 1)), &
+               "the long edge")
+         end do
+      end do
+   end subroutine test_teeth
 
 end module test_overlap_plane
