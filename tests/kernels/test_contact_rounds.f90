@@ -28,6 +28,7 @@ module test_contact_rounds
       method_saddle_point
    use emcon_system, only : system_begin_step, system_init, system_respond, system_t
    use emcon_text, only : to_text
+   use kind_rows, only : law_code
    use floor_contact, only : floor_contact_t, floor_make
    use linear_scenes, only : add_equation
    use random_draws, only : draw_random
@@ -60,6 +61,7 @@ module test_contact_rounds
       logical, allocatable :: was_active(:)      !! contacts; not allocated: none
       real(wp) :: way = 0.0_wp                   !! prescribed of node 6, sideways [L]
       real(wp) :: slides_along = 0.0_wp          !! what slid before
+      logical :: pushes_out = .false.            !! what is closed too far
       logical :: is_at_once = .false.            !! all contacts are candidates from the start
       logical :: is_static = .false.             !! the upper nodes are moved to `top`
       real(wp) :: top(2) = 0.0_wp                !! displacement of them [L]
@@ -77,6 +79,8 @@ contains
          test_case_t("with a row that always holds, by trials or not", test_linked), &
          test_case_t("a floor that gives way, or is pushed back", test_soft), &
          test_case_t("all at once, as Newton's method converges", test_at_once), &
+         test_case_t("where all is linear one correction does", test_linear), &
+         test_case_t("what a first guess leaves of gaps", test_first_guess), &
          test_case_t("statics by sets and all at once", test_static), &
          test_case_t("in any unit of length", test_units), &
          test_case_t("rows that follow from others", test_redundant), &
@@ -103,6 +107,14 @@ contains
       self%scene%v0(2, :) = self%scene%v0(2, :) - 1.0_wp
    end subroutine make_case
 
+   !> Nodes 4 and 6 begin alike sideways.
+   pure subroutine align(scene)
+      type(scene_t), intent(inout) :: scene
+
+      scene%u0(1, 4) = scene%u0(1, 6)
+      scene%v0(1, 4) = scene%v0(1, 6)
+   end subroutine align
+
    !> Solve the step over `floor`.
    subroutine solve(self, error)
       type(case_t), intent(inout) :: self
@@ -128,6 +140,7 @@ contains
       call active_set_init(self%active, self%system)
       self%active%rules%holds_gap = self%holds_gap
       self%active%rules%has_impacts = self%has_impacts
+      self%active%rules%pushes_out = self%pushes_out
       self%active%rules%puts_off = .true.
       call newton_init(self%newton, self%system%space%numbering%n_unknown, self%scene%x, &
          1.0e3_wp*epsilon(1.0_wp), 30)
@@ -529,9 +542,8 @@ contains
             type(case_t) :: first
 
             call make_case(first, 3.0_wp*u(1) - 1.5_wp)
-            first%scene%u0(1, 4) = first%scene%u0(1, 6)
+            call align(first%scene)
             if (mod(i/2, 2) == 1) first%way = 0.1_wp*(u(2) - 0.5_wp)
-            if (abs(first%way) > 0.0_wp) first%scene%v0(1, 4) = first%scene%v0(1, 6)
             do k = 1, 4
                block
                   type(case_t) :: self
@@ -577,7 +589,7 @@ contains
             self%is_at_once = .true.
             self%mu = merge(0.0_wp, 0.6_wp*u(2), mod(i, 2) == 0)
             self%is_linked = mod(i/4, 2) == 1
-            if (self%is_linked) self%scene%u0(1, 4) = self%scene%u0(1, 6)
+            if (self%is_linked) call align(self%scene)
             self%method = merge(method_saddle_point, method_null_space, mod(i/8, 2) == 1)
             if (mod(i/2, 2) == 1) self%way = 0.1_wp*(u(3) - 0.5_wp)
             self%was_active = u(4:6) > 0.6_wp
@@ -603,6 +615,80 @@ contains
       end do
       call check_true(error, n_fast > 32, "iterates near the end: " // to_text(n_fast))
    end subroutine test_at_once
+
+   !> Small displacements, a flat floor: one tangent and one correction, also with a prescribed
+   !> motion, leave nothing but round-off, whichever contacts come to act, stick and slide.
+   subroutine test_linear(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: u(7)
+      integer :: i
+
+      do i = 0, 31
+         block
+            type(case_t) :: self
+
+            call draw_random(u)
+            call make_case(self, 3.0_wp*u(1) - 1.5_wp)
+            self%scene%step(1)%nlgeom = .false.
+            self%scene%material(1)%law = law_code("linear")
+            self%is_at_once = .true.
+            self%mu = merge(0.0_wp, 0.4_wp*u(2), mod(i, 2) == 0)
+            if (mod(i/2, 2) == 1) self%way = 0.1_wp*(u(3) - 0.5_wp)
+            self%is_linked = mod(i/4, 2) == 1
+            if (self%is_linked) call align(self%scene)
+            self%method = merge(method_saddle_point, method_null_space, mod(i/8, 2) == 1)
+            self%was_active = u(4:6) > 0.6_wp
+            allocate(self%floor(1))
+            call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3) - merge(0.0_wp, &
+               0.1_wp*u(4:6), self%was_active))
+            call solve(self, error)
+            self%active%is_candidate = self%active%start%was_active
+            call check_laws(self, "case " // to_text(i), error)
+            if (allocated(error)) return
+            associate (convergence => self%newton%convergence, phases => self%system%phases)
+               call check_equal(error, convergence%n_iteration, 1, "tangents of case " // to_text(i))
+               call check_true(error, convergence%history(2) <= tol .and. convergence%last <= tol, &
+                  "what is left in case " // to_text(i) // ": " // to_text(convergence%history(2), 3))
+               ! The rest of it is made exact by the same tangent, as long as that gains.
+               call check_true(error, self%newton%n_solve <= 3, "corrections of case " // to_text(i))
+               call check_equal(error, [self%newton%n_solve, int(phases%n_solve), &
+                  int(phases%n_factorisation)], [convergence%n_history - 1, convergence%n_history &
+                  - 1, 1], "what is counted in case " // to_text(i))
+            end associate
+         end block
+      end do
+   end subroutine test_linear
+
+   !> A block at rest, without loads, one node of which is in the floor or over it: what its first
+   !> guess leaves is how far, by the edge. Where none is in it nothing is loaded in the end.
+   subroutine test_first_guess(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: edge = 2.0_wp, rise(3) = [0.01_wp, -0.01_wp, 0.0_wp]
+      integer :: k
+
+      do k = 1, size(rise)
+         block
+            type(case_t) :: self
+
+            call make_case(self, 0.0_wp)
+            self%scene%u0 = 0.0_wp
+            self%scene%v0 = 0.0_wp
+            self%is_at_once = .true.
+            self%mu = 0.3_wp
+            allocate(self%floor(1))
+            call floor_make(self%floor(1), [1, 2, 3], rise(k)*[1.0_wp, 0.0_wp, 0.0_wp])
+            self%floor(1)%size = edge
+            self%pushes_out = .true.
+            call solve(self, error)
+            self%active%is_candidate = .false.
+            call check_laws(self, "case " // to_text(k), error)
+            if (allocated(error)) return
+            call check_near(error, self%newton%convergence%history(1), abs(rise(k))/edge, &
+               64.0_wp*eps, 0.01_wp, "left at first, case " // to_text(k))
+            call check_true(error, self%newton%is_idle .eqv. k > 1, "idle, case " // to_text(k))
+         end block
+      end do
+   end subroutine test_first_guess
 
    !> In equilibrium, its upper nodes pushed down and aside: by sets that trials tell, and all at once,
    !> a block comes to rest the same way.
