@@ -94,8 +94,8 @@ contains
          integer, intent(in) :: a, b             !! 0: none
          real(wp) :: one(2), other(2)
 
-         turns = .true.
-         if (a == 0 .or. b == 0) return
+         turns = a == 0 .or. b == 0
+         if (turns) return
          one = scene%x(:, outline%facet(2, a)) - scene%x(:, outline%facet(1, a))
          other = scene%x(:, outline%facet(2, b)) - scene%x(:, outline%facet(1, b))
          turns = atan2(abs(one(1)*other(2) - one(2)*other(1)), dot_product(one, other)) &

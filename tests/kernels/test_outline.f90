@@ -187,7 +187,7 @@ contains
       type(scene_t) :: scene
       type(outline_t) :: outline
       type(outline_links_t) :: links
-      type(outline_curves_t) :: curves
+      type(outline_curves_t) :: curves, more
       type(contact_options_t) :: options
       real(wp), allocatable :: still(:, :)
       real(wp) :: length, share, overlap
@@ -220,6 +220,22 @@ contains
          end associate
       end do
       call check_true(error, n_seen == 18, "smoothed edges: " // to_text(n_seen))
+      ! A pair whose master is a part of that: the curves of the first one stay.
+      scene%surface = [scene%surface, scene%surface(scene%pair(1)%master)]
+      associate (part => scene%surface(size(scene%surface)))
+         part%element = part%element(4:9)
+         part%face = part%face(4:9)
+      end associate
+      scene%pair = [scene%pair, scene%pair]
+      scene%pair(2)%master = size(scene%surface)
+      call outline_curves_init(more, outline, links, scene, options)
+      do e = 1, size(outline%facet, 2)
+         associate (share => [0.25_wp, 0.25_wp])
+            call check_near(error, outline_curves_overlap(more, e, e, share, scene%x, still), &
+               outline_curves_overlap(curves, e, e, share, scene%x, still), 0.0_wp, 1.0_wp, &
+               "with a part of the master once more, edge " // to_text(e))
+         end associate
+      end do
    end subroutine test_curves
 
 end module test_outline
