@@ -395,6 +395,7 @@ contains
             call solve(self, error)
             call check_laws(self, "case " // to_text(i), error)
             if (allocated(error)) return
+            if (self%keeps_factor .and. .not. self%mu > 0.0_wp) call check_one_factor(self, error)
             associate (active => self%active)
                call check_true(error, all(active%candidates%n_change > 0 .or. active%is_active &
                   .or. .not. active%candidates%takes_part), "that one has opened is counted, case " &
@@ -498,7 +499,7 @@ contains
       scene%material(1)%constant(1) = scene%material(1)%constant(1)/unit
    end subroutine scale_scene
 
-   !> There is one solution: with a kept factor it is found too.
+   !> There is one solution: with a kept factor it is found too, by sets and with that factor alone.
    subroutine test_kept(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp) :: u(3), start(2, 6), velocity(2, 6), du(2, 6)
@@ -523,6 +524,7 @@ contains
                if (allocated(error)) return
                if (k == 1) du = self%motion%du
                call check_near(error, self%motion%du, du, tol, 1.0_wp, "motion " // to_text(i))
+               if (self%keeps_factor) call check_one_factor(self, error)
             end block
          end do
       end do
@@ -564,6 +566,8 @@ contains
                   if (k == 1) du = self%motion%du
                   call check_near(error, self%motion%du, du, tol, 1.0_wp, "motion of case " &
                      // to_text(i) // ", way " // to_text(k))
+                  if (.not. self%has_impacts) call check_true(error, &
+                     self%active%candidates%is_settled, "by sets")
                   n_act = n_act + count(self%active%is_active(2:))
                end block
             end do
@@ -724,6 +728,7 @@ contains
                   if (k == 1) du = self%motion%du
                   call check_near(error, self%motion%du, du, tol, 1.0_wp, "motion of case " &
                      // to_text(i))
+                  if (k == 1) call check_true(error, self%active%candidates%is_settled, "by sets")
                   if (.not. self%active%friction%is_on) cycle
                   associate (kind => self%active%friction%law%status%kind)
                      n_stick = n_stick + count(self%active%is_active .and. kind == contact_sticks)
@@ -803,6 +808,15 @@ contains
       call check_near(error, left, 0.0_wp*left, tol, maxval(self%system%response%magnitude), &
          what // ": balance")
    end subroutine check_soft
+
+   !> Sets have settled the step, with the factor of its first tangent.
+   subroutine check_one_factor(self, error)
+      type(case_t), intent(in) :: self
+      type(error_t), allocatable, intent(inout) :: error
+
+      call check_true(error, self%active%candidates%is_settled, "by sets")
+      call check_equal(error, int(self%system%phases%n_factorisation), 1, "factors")
+   end subroutine check_one_factor
 
    !> Two contacts at one node, as corners have them: both may push, their sum is what counts.
    subroutine test_redundant(error)
