@@ -44,6 +44,7 @@ contains
          test_case_t("what has no solution is told", test_no_solution), &
          test_case_t("held as W is found: the same forces", test_held), &
          test_case_t("a body that its contacts alone hold", test_alone), &
+         test_case_t("the same at random, with and without friction", test_at_rest), &
          test_case_t("random problems of all kinds", test_kinds)]
    end subroutine collect_contact_problem
 
@@ -463,6 +464,51 @@ contains
       call check_alone(error, [-1.0_wp, 3.0_wp], [0.75_wp, 0.25_wp])
       call check_alone(error, [0.0_wp, 2.0_wp], [1.0_wp, 0.0_wp])
    end subroutine test_alone
+
+   !> A rigid body rests on contacts under a load that some pushes at them balance, which is all that
+   !> is known of it: what is found balances the load, too, and obeys the law without any motion.
+   subroutine test_at_rest(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_problem_t) :: problem
+      type(contact_effort_t) :: effort
+      real(wp), allocatable :: rows(:, :), push(:, :), known(:, :), force(:, :)
+      real(dp), allocatable :: motion(:, :)
+      real(wp), allocatable :: load(:)
+      integer :: i, k, n, n_slip, rank
+      logical :: is_solved, is_singular
+
+      do i = 1, 200
+         n_slip = mod(i, 3)
+         rank = merge(6, 3, n_slip == 2)
+         n = 5 + mod(i, 3)
+         call contact_problem_create(problem, n_slip, n)
+         allocate(rows((1 + n_slip)*n, rank), motion(rank, 1 + (1 + n_slip)*n), known(0:n_slip, n))
+         call make_rigid(rows, n_slip, n)
+         call draw_random(problem%mu)
+         call draw_random(known)
+         known(1:, :) = (1.2_wp*known(1:, :) - 0.6_wp)*spread(problem%mu*known(0, :), 1, n_slip)
+         where (spread(mod([(k, k = 1, n)], 3) == 0, 1, 1 + n_slip)) known = 0.0_wp
+         load = matmul(reshape(known, [size(known)]), rows)
+         problem%hold = 1.0_wp
+         call dense_solve(real(matmul(transpose(rows), rows), dp), real(reshape([-load, &
+            transpose(rows)], shape(motion)), dp), motion, is_singular)
+         problem%free = reshape(matmul(rows, real(motion(:, 1), wp)), shape(problem%free))
+         problem%w = matmul(rows, real(motion(:, 2:), wp))
+         call solve(problem, push, effort, is_solved)
+         call check_true(error, is_solved, "case " // to_text(i))
+         force = contact_problem_force(problem, push)
+         associate (scale => maxval(abs(push)) + maxval(abs(load)))
+            call check_near(error, matmul(reshape(force, [size(force)]), rows), load, 1.0e6_wp*eps, &
+               scale, "balance of case " // to_text(i))
+            call check_true(error, all(norm2(force(2:, :), 1) <= problem%mu*force(1, :) &
+               + 1.0e6_wp*eps*scale), "friction of case " // to_text(i))
+         end associate
+         call check_true(error, contact_problem_missed(problem, push) <= 1.0e6_wp*eps, &
+            "law of case " // to_text(i))
+         if (allocated(error)) return
+         deallocate(rows, motion, known)
+      end do
+   end subroutine test_at_rest
 
    subroutine check_alone(error, at, expected)
       type(error_t), allocatable, intent(inout) :: error
