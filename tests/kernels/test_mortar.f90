@@ -866,7 +866,7 @@ contains
    end subroutine test_near
 
    !> The part of slip that is by the node itself: a step that is the same again changes nothing,
-   !> one to another place does.
+   !> one past the end of the master and the one back change it by as much.
    subroutine test_slip_share(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -888,6 +888,13 @@ contains
          call mortar%begin_step(scene%x, u, still)
          call check_near(error, mortar%state%slip_shift, 0.0_wp*first, tol, 1.0_wp, &
             "flat and covered all along")
+         u(1, 11:) = 2.75_wp
+         call mortar%begin_step(scene%x, u, still)
+         first = mortar%state%slip_shift
+         call check_true(error, maxval(first) > 0.01_wp, "past the end, pair " // to_text(i))
+         u(1, 11:) = 0.25_wp
+         call mortar%begin_step(scene%x, u, still)
+         call check_near(error, mortar%state%slip_shift, first, tol, 1.0_wp, "and back")
          if (allocated(error)) return
       end do
    end subroutine test_slip_share
