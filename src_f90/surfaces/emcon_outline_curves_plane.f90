@@ -212,7 +212,7 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
       type(hermite_stencil_t) :: stencil
       type(hermite_point_t) :: point
-      real(wp) :: edge(2, 5), offset(2)
+      real(wp) :: edge(2, 5)
       integer :: i
 
       edge = 0.0_wp
@@ -226,8 +226,7 @@ contains
          end associate
       end do
       point = hermite_point(hermite_curve(stencil, joined_pieces), edge, share)
-      offset = point%y - share*edge(:, 3)
-      piece_rise = -(edge(1, 3)*offset(2) - edge(2, 3)*offset(1)) &
+      piece_rise = -(edge(1, 3)*point%y(2) - edge(2, 3)*point%y(1)) &
          /sqrt(dot_product(edge(:, 3), edge(:, 3)))
    end function piece_rise
 

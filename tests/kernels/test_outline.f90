@@ -331,7 +331,7 @@ contains
          do turn = 1, 2
             call check_near(error, outline_curves_overlap(curves, e(turn), e(3 - turn), share([turn, &
                3 - turn]), scene%x, still), 4.0_wp*share(1)*(1.0_wp - share(1))*sagitta(1) &
-               + minval(sagitta), 0.05_wp, maxval(sagitta), "rings " // to_text(k))
+               + minval(sagitta), 0.03_wp, sagitta(1) + minval(sagitta), "rings " // to_text(k))
          end do
       end do
 
@@ -379,7 +379,8 @@ contains
          turn = 0.7_wp*k
          scene%x = matmul(reshape([cos(turn), sin(turn), -sin(turn), cos(turn)], [2, 2]), scene%x)
          call outline_init(outline, links, scene)
-         call outline_curves_init(curves, outline, links, scene, contact_options_t())
+         call outline_curves_init(curves, outline, links, scene, &
+            contact_options_t(smoothing_angle=20.0_wp))
          call check_equal(error, size(outline%facet, 2), 16, "edges")
          if (allocated(error)) return
          do e = 1, size(outline%facet, 2)
