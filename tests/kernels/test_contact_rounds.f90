@@ -63,8 +63,11 @@ module test_contact_rounds
       real(wp) :: slides_along = 0.0_wp          !! what slid before
       logical :: pushes_out = .false.            !! what is closed too far
       logical :: is_at_once = .false.            !! all contacts are candidates from the start
+      real(wp), allocatable :: start(:, :)       !! to begin at; not allocated: as things move [L]
+      real(wp), allocatable :: lam(:), tau(:)    !! with these forces of contacts [M L/T^2]
       logical :: is_static = .false.             !! the upper nodes are moved to `top`
       real(wp) :: top(2) = 0.0_wp                !! displacement of them [L]
+      real(wp) :: tilt = 0.0_wp                  !! and how much higher the last one ends [L]
       integer :: status = 0
    end type case_t
 
@@ -82,6 +85,8 @@ contains
          test_case_t("where all is linear one correction does", test_linear), &
          test_case_t("what a first guess leaves of gaps", test_first_guess), &
          test_case_t("statics by sets and all at once", test_static), &
+         test_case_t("begun where it ends nothing changes", test_again), &
+         test_case_t("of contacts the one that opens has changed", test_one_opens), &
          test_case_t("in any unit of length", test_units), &
          test_case_t("rows that follow from others", test_redundant), &
          test_case_t("what has lost its surface does not come back", test_left), &
@@ -165,7 +170,12 @@ contains
          self%motion%evaluation = evaluation_at_end
          self%motion%du = 0.0_wp
          self%motion%du(:, 4:) = spread(self%top, 2, 3) - self%motion%u0(:, 4:)
+         self%motion%du(2, 6) = self%motion%du(2, 6) + self%tilt
          self%newton%driven(:, 4:) = self%motion%du(:, 4:)
+      end if
+      if (allocated(self%start)) then
+         self%motion%du = self%start
+         self%newton%driven = 0.0_wp
       end if
       n = self%system%n_constraint
       associate (contacts => self%state%contacts)
@@ -176,6 +186,8 @@ contains
          allocate(contacts%closure(n), source=1.0_wp)
          allocate(contacts%slides_along(1, n), source=self%slides_along)
          allocate(contacts%drag(1, n), source=0.0_wp)
+         if (allocated(self%start)) contacts%lam = self%lam
+         if (allocated(self%start)) contacts%drag(1, :) = self%tau
          if (self%stiffness > 0.0_wp) call soften(self, contacts%closure)
       end associate
       call active_set_begin(self%active, self%system, self%motion, self%state)
@@ -741,6 +753,101 @@ contains
       call check_true(error, min(n_stick, n_slide) > 5, to_text(n_stick) // " stick, " // &
          to_text(n_slide) // " slide")
    end subroutine test_static
+
+   !> A block that is pushed onto a floor to which it sticks, and begun with what came out: the set
+   !> that acts is the first one and the last, and no tangent is asked for but to make it exact.
+   subroutine test_again(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: u(2)
+      integer :: i, k
+
+      do i = 0, 7
+         block
+            type(case_t) :: self(2)
+
+            call draw_random(u)
+            call make_case(self(1), 0.0_wp)
+            self(2)%scene = self(1)%scene
+            do k = 1, 2
+               associate (own => self(k))
+                  own%is_static = .true.
+                  own%has_impacts = .false.
+                  own%mu = merge(0.0_wp, 5.0_wp, mod(i, 2) == 0)
+                  own%top = [0.05_wp*u(1), -0.03_wp - 0.1_wp*u(2)]
+                  own%was_active = [.false., .false., .false.]
+                  allocate(own%floor(1))
+                  call floor_make(own%floor(1), [1, 2, 3], own%scene%u0(2, :3))
+                  if (k == 2) call begin_at_end(self(1), own)
+                  call solve(own, error)
+                  call check_laws(own, "turn " // to_text(k) // " of case " // to_text(i), error)
+                  if (allocated(error)) return
+               end associate
+            end do
+            associate (active => self(2)%active)
+               call check_equal(error, active%candidates%n_change, [0, 0, 0], "changes")
+               call check_true(error, active%n_newton <= 1 .and. active%candidates%is_settled, &
+                  "tangents: " // to_text(active%n_newton))
+               call check_near(error, self(2)%motion%du, self(1)%motion%du, tol, 1.0_wp, "motion")
+            end associate
+         end block
+      end do
+   end subroutine test_again
+
+   !> A block that sticks to its floor is lifted at one end: what goes on to stick has not changed;
+   !> what closes or opens has, once.
+   subroutine test_one_opens(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      do i = 0, 4
+         block
+            type(case_t) :: self
+
+            call make_case(self, 0.0_wp)
+            self%scene%u0 = 0.0_wp
+            self%is_static = .true.
+            self%has_impacts = .false.
+            self%mu = merge(0.0_wp, 5.0_wp, mod(i, 2) == 0)
+            self%top = [0.0_wp, -0.05_wp]
+            self%tilt = 0.15_wp
+            ! Pushed aside over a floor that is nearly smooth all come to slide.
+            if (i == 4) self%mu = 0.05_wp
+            if (i == 4) self%tilt = 0.0_wp
+            if (i == 4) self%top(1) = 0.1_wp
+            ! With a contact that closes beside the one that opens, or without.
+            self%was_active = [mod(i, 4) < 2, .true., .true.]
+            allocate(self%floor(1))
+            call floor_make(self%floor(1), [1, 2, 3], [0.0_wp, 0.0_wp, 0.0_wp])
+            call solve(self, error)
+            call check_laws(self, "case " // to_text(i), error)
+            if (allocated(error)) return
+            associate (own => self%active%candidates)
+               call check_true(error, all(self%active%is_active .eqv. [.true., .true., i == 4]), &
+                  "what acts")
+               call check_equal(error, own%n_change, merge([1, 1, 1], [merge(0, 1, i < 2), 0, 1], &
+                  i == 4), "changes of case " // to_text(i))
+               call check_true(error, own%is_settled, "by sets")
+            end associate
+         end block
+      end do
+   end subroutine test_one_opens
+
+   !> What acts, pushes and rubs, and the motion, as another has left them.
+   subroutine begin_at_end(before, self)
+      type(case_t), intent(in) :: before
+      type(case_t), intent(inout) :: self
+      integer :: k
+
+      self%start = before%motion%du
+      self%was_active = before%active%is_active
+      allocate(self%lam(3), self%tau(3), source=0.0_wp)
+      associate (set => before%active%set)
+         self%lam(set%id(:set%n)) = set%lam(:set%n)
+         do k = set%n + 1, set%n_row
+            self%tau(set%id(set%condition(k))) = set%lam(k)
+         end do
+      end associate
+   end subroutine begin_at_end
 
    !> What a floor pushes is the discrete gradient of what it stores, also where a node has left it
    !> or come onto it; with an augmented Lagrangian nothing is left of the gaps.
