@@ -7,7 +7,7 @@ module test_active_choice
       active_set_select, active_set_slides, active_set_t, active_set_take, active_set_update_gaps, &
       candidates_clear, step_cycling, step_done, step_stands_off, step_too_far, touch_tol
    use emcon_contact, only : gap_state_t
-   use emcon_contact_candidates, only : candidates_look
+   use emcon_contact_candidates, only : candidates_leave_out, candidates_look
    use emcon_coulomb_law, only : contact_slides, contact_sticks, coulomb_t
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_at_end, evaluation_moving
@@ -69,6 +69,7 @@ contains
          test_case_t("contacts that are dropped", test_drop), &
          test_case_t("candidates as they are looked at", test_look), &
          test_case_t("what is asked of a set", test_asked), &
+         test_case_t("rows that follow from others wait", test_leave_out), &
          test_case_t("overclosure of a step", test_overclosure)]
    end subroutine collect_active_choice
 
@@ -416,6 +417,39 @@ contains
          end associate
       end do
    end subroutine test_look
+
+   !> A row that always holds waits for the step, one of a gap for a try, or for the step where
+   !> nothing is free in it; rows of slips do not.
+   subroutine test_leave_out(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(system_t) :: system
+      type(active_set_t) :: active
+      type(motion_t) :: motion
+      integer :: k
+      logical :: goes_on
+
+      do k = 1, 6
+         call open_four(system, active, motion, spread(0.3_wp, 1, 4), spread(edge, 1, 4))
+         active%is_active = .true.
+         call candidates_clear(active%candidates)
+         active%candidates%takes_part = .true.
+         active%candidates%acts = .true.
+         call active_set_select(active, system, motion)
+         active%set%n_permanent = 1
+         ! Nothing is free in the third row.
+         active%set%force_rows%row_start = [1, 3, 5, 5, 7]
+         if (k < 5) call candidates_leave_out(active, [k], goes_on)
+         if (k == 5) call candidates_leave_out(active, [5], goes_on)
+         if (k == 6) call candidates_leave_out(active, [5, 2], goes_on)
+         call check_true(error, goes_on .eqv. k < 5, "goes on " // to_text(k))
+         call check_true(error, all(active%is_active .neqv. [k == 1, k == 2 .or. k == 6, k == 3, &
+            k == 4]), "acts " // to_text(k))
+         call check_true(error, all(active%candidates%takes_part .neqv. [k == 1, .false., k == 3, &
+            .false.]), "takes part " // to_text(k))
+         call check_true(error, all(active%is_left_out .eqv. [.false., .false., k == 3, .false.]) &
+            .and. all(active%candidates%acts .neqv. active%is_left_out), "left out " // to_text(k))
+      end do
+   end subroutine test_leave_out
 
    !> Two contacts with friction, of a node each.
    subroutine test_asked(error)

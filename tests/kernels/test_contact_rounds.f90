@@ -61,6 +61,7 @@ module test_contact_rounds
       logical, allocatable :: was_active(:)      !! contacts; not allocated: none
       real(wp) :: way = 0.0_wp                   !! prescribed of node 6, sideways [L]
       real(wp) :: slides_along = 0.0_wp          !! what slid before
+      logical :: is_bound = .false.              !! node 2 is prescribed, into the floor
       logical :: pushes_out = .false.            !! what is closed too far
       logical :: is_at_once = .false.            !! all contacts are candidates from the start
       real(wp), allocatable :: start(:, :)       !! to begin at; not allocated: as things move [L]
@@ -87,6 +88,7 @@ contains
          test_case_t("statics by sets and all at once", test_static), &
          test_case_t("begun where it ends nothing changes", test_again), &
          test_case_t("of contacts the one that opens has changed", test_one_opens), &
+         test_case_t("a node that is prescribed into its floor", test_bound), &
          test_case_t("in any unit of length", test_units), &
          test_case_t("rows that follow from others", test_redundant), &
          test_case_t("what has lost its surface does not come back", test_left), &
@@ -130,6 +132,7 @@ contains
       logical :: is_lost
 
       if (abs(self%way) > 0.0_wp) call prescribe(self%scene%step(1), 6, 1, self%way)
+      if (self%is_bound) call clamp(self%scene%step(1), [2])
       if (self%is_static) then
          deallocate(self%scene%step)
          allocate(self%scene%step(0))
@@ -172,6 +175,11 @@ contains
          self%motion%du(:, 4:) = spread(self%top, 2, 3) - self%motion%u0(:, 4:)
          self%motion%du(2, 6) = self%motion%du(2, 6) + self%tilt
          self%newton%driven(:, 4:) = self%motion%du(:, 4:)
+      end if
+      if (self%is_bound) then
+         self%newton%driven(:, 2) = [0.0_wp, self%floor(1)%height(2) - 0.03_wp] &
+            - self%motion%u0(:, 2) - self%motion%du(:, 2)
+         self%motion%du(:, 2) = self%motion%du(:, 2) + self%newton%driven(:, 2)
       end if
       if (allocated(self%start)) then
          self%motion%du = self%start
@@ -831,6 +839,38 @@ contains
          end block
       end do
    end subroutine test_one_opens
+
+   !> No force closes the contact of a node that nothing is free to move at: it is left out, and the
+   !> others obey the laws.
+   subroutine test_bound(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      do i = 0, 15
+         block
+            type(case_t) :: self
+
+            call make_case(self, 0.5_wp)
+            self%is_bound = .true.
+            self%mu = merge(0.0_wp, 0.3_wp, mod(i, 2) == 0)
+            self%is_at_once = mod(i/2, 2) == 1
+            self%has_impacts = mod(i/4, 2) == 1
+            self%was_active = [.true., i > 7, .false.]
+            allocate(self%floor(1))
+            call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3) - merge(0.0_wp, &
+               0.01_wp, self%was_active))
+            call solve(self, error)
+            if (self%is_at_once) self%active%is_candidate = self%active%start%was_active
+            self%floor(1)%leaves(2) = .true.
+            call check_laws(self, "case " // to_text(i), error)
+            if (allocated(error)) return
+            call check_true(error, all(self%active%is_left_out .eqv. [.false., .true., .false.]), &
+               "left out in case " // to_text(i))
+            call check_true(error, all(self%active%is_active .eqv. [.true., .false., .true.]), &
+               "acts in case " // to_text(i))
+         end block
+      end do
+   end subroutine test_bound
 
    !> What acts, pushes and rubs, and the motion, as another has left them.
    subroutine begin_at_end(before, self)
