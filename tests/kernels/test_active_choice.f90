@@ -70,6 +70,8 @@ contains
          test_case_t("candidates as they are looked at", test_look), &
          test_case_t("what is asked of a set", test_asked), &
          test_case_t("rows that follow from others wait", test_leave_out), &
+         test_case_t("a candidate that does not act closes, or not", test_closes), &
+         test_case_t("what closes sticks by how far it is closed", test_joins), &
          test_case_t("overclosure of a step", test_overclosure)]
    end subroutine collect_active_choice
 
@@ -450,6 +452,79 @@ contains
             .and. all(active%candidates%acts .neqv. active%is_left_out), "left out " // to_text(k))
       end do
    end subroutine test_leave_out
+
+   !> Below the gap to act at, with half of an overclosure left, or that of the start if it is lower.
+   subroutine test_closes(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(open_t), allocatable :: row(:)
+      type(system_t), target :: system
+      type(active_set_t) :: active
+      type(motion_t) :: motion
+      class(given_contact_t), pointer :: contact
+      integer :: k, status
+
+      row = [ &
+         open_t(closes=.true.), &
+         open_t(gap1=0.01_wp), &
+         open_t(gap1=-48.0_wp*eps*edge), &
+         open_t(gap1=-96.0_wp*eps*edge, closes=.true.), &
+         open_t(gap1=-96.0_wp*eps*edge, gap="F"), &
+         open_t(gap1=-96.0_wp*eps*edge, gap="E"), &
+         open_t(closed=-0.02_wp), &
+         open_t(gap1=-0.03_wp, closed=-0.02_wp, closes=.true.), &
+         open_t(gap1=-0.05_wp, closed=-0.02_wp, overclosure=-0.08_wp), &
+         open_t(gap1=-0.07_wp, closed=-0.02_wp, overclosure=-0.08_wp, closes=.true.), &
+         open_t(gap1=0.05_wp, step="H"), &
+         open_t(closed=-0.02_wp, step="H"), &
+         open_t(step="H", closes=.true.), &
+         open_t(gap0=-0.05_wp, gap1=-0.03_wp, step="H"), &
+         open_t(gap0=-0.05_wp, gap1=-0.06_wp, step="H", closes=.true.)]
+      do k = 1, size(row)
+         call open_four(system, active, motion, spread(0.3_wp, 1, 4), spread(edge, 1, 4))
+         contact => given_of(system, 1)
+         contact%given(3)%gap0 = row(k)%gap0
+         contact%given(3)%gap1 = row(k)%gap1
+         contact%given(3)%closed = row(k)%closed
+         contact%given(3)%is_near = .not. has(row(k)%gap, "F")
+         contact%given(3)%is_over = .not. has(row(k)%gap, "E")
+         active%rules%holds_gap = has(row(k)%step, "H")
+         active%start%left(1) = 0.5_wp
+         active%start%overclosure(3) = row(k)%overclosure
+         call candidates_clear(active%candidates)
+         active%candidates%takes_part(3) = .true.
+         call candidates_look(active, system, motion, status)
+         call check_true(error, active%candidates%one_closes .eqv. row(k)%closes, "closes " &
+            // to_text(k))
+         call check_true(error, active%candidates%acts(3) .eqv. row(k)%closes, "acts " // to_text(k))
+      end do
+   end subroutine test_closes
+
+   !> A contact that closes by 0.1, from a gap of 0.3, and slips by less than half of the way below
+   !> the gap that it will hold, or by more.
+   subroutine test_joins(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: slip(4) = [0.04_wp, 0.06_wp, 0.19_wp, 0.21_wp]
+      type(system_t), target :: system
+      type(active_set_t) :: active
+      type(motion_t) :: motion
+      class(given_contact_t), pointer :: contact
+      integer :: k, status
+
+      do k = 1, size(slip)
+         call open_given_contact(system, active, motion, reshape([gap_state_t(is_near=.true., &
+            is_over=.true., gap0=0.3_wp, gap1=-0.1_wp, size=edge)], [1, 1]), 0, coulomb_t(mu=0.5_wp))
+         contact => given_of(system, 1)
+         contact%slid = slip(k)
+         motion%evaluation = evaluation_at_end
+         active%rules%holds_gap = k > 2
+         active%start%was_active = [.false.]
+         call candidates_clear(active%candidates)
+         call candidates_look(active, system, motion, status)
+         call check_true(error, active%candidates%takes_part(1), "it closes")
+         call check_equal(error, active%friction%law(1)%status%kind, merge(contact_sticks, &
+            contact_slides, mod(k, 2) == 1), "slip " // to_text(slip(k)))
+      end do
+   end subroutine test_joins
 
    !> Two contacts with friction, of a node each.
    subroutine test_asked(error)

@@ -20,6 +20,7 @@ module test_contact_rounds
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_evaluate, motion_init, motion_t
    use emcon_newton, only : newton_init, newton_t
+   use emcon_phases, only : phase_enter, phase_vectors
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
    use emcon_solver_registry, only : solver_default
@@ -294,6 +295,8 @@ contains
       n = self%system%n_constraint
       allocate(lam(n), tau(n), gap0(n), gap1(n), held(n), lead(n), s(n), source=0.0_wp)
       call check_equal(error, self%status, step_done, what // ": status")
+      call phase_enter(self%system%phases, phase_vectors, k)
+      call check_equal(error, k, phase_vectors, what // ": phases that were entered were left")
       if (allocated(error)) return
       associate (active => self%active, set => self%active%set, system => self%system, &
             motion => self%motion)

@@ -10,6 +10,7 @@ module test_massless
    use emcon_massless, only : massless_bare, massless_find, massless_follow, massless_return, &
       massless_shed
    use emcon_motion, only : motion_evaluate
+   use emcon_phases, only : phase_enter, phase_vectors
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_t
    use emcon_steps, only : initiation_massless, initiation_persistent, load_point, load_t
@@ -303,7 +304,7 @@ contains
       type(increment_t) :: increment
       type(load_t) :: pull
       real(wp) :: total, drift
-      integer :: k, n_settled
+      integer :: k, n_settled, phase
 
       call make_two_blocks(scene, 0.0927_wp, lower, upper)
       call add_step(scene, .false., 0.02_wp, n_step)
@@ -328,6 +329,9 @@ contains
          call march_increment(march, scene, increment, error)
          if (allocated(error)) return
          drift = max(drift, abs(march%ledger%total - total))
+         call phase_enter(march%system%phases, phase_vectors, phase)
+         call check_equal(error, phase, phase_vectors, "phases that were entered were left")
+         if (allocated(error)) return
          if (.not. march%layer%is_settled) cycle
          call check_settled(march, error)
          if (allocated(error)) return
