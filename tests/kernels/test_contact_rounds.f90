@@ -10,6 +10,7 @@ module test_contact_rounds
    use emcon_contact_law, only : contact_laws_add
    use emcon_contact_law_registry, only : contact_law_of_method
    use emcon_contact_newton, only : contact_newton_solve
+   use emcon_convergence, only : round_off
    use emcon_correction, only : correction_free, correction_reset
    use emcon_coulomb_law, only : contact_open, contact_slides, contact_sticks, coulomb_t
    use emcon_errors, only : error_t
@@ -19,7 +20,7 @@ module test_contact_rounds
    use emcon_friction, only : most_lagged
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : motion_evaluate, motion_init, motion_t
-   use emcon_newton, only : newton_init, newton_t
+   use emcon_newton, only : newton_converged, newton_early, newton_init, newton_t
    use emcon_phases, only : phase_enter, phase_vectors
    use emcon_scene, only : scene_t
    use emcon_scheme_energy_momentum, only : scheme_energy_momentum_t
@@ -65,6 +66,8 @@ module test_contact_rounds
       logical :: is_bound = .false.              !! node 2 is prescribed, into the floor
       logical :: pushes_out = .false.            !! what is closed too far
       logical :: is_at_once = .false.            !! all contacts are candidates from the start
+      logical :: polishes = .true.               !! down to round-off
+      real(wp) :: largest_move = huge(1.0_wp)    !! of a correction, then [L]
       real(wp), allocatable :: start(:, :)       !! to begin at; not allocated: as things move [L]
       real(wp), allocatable :: lam(:), tau(:)    !! with these forces of contacts [M L/T^2]
       logical :: is_static = .false.             !! the upper nodes are moved to `top`
@@ -85,6 +88,7 @@ contains
          test_case_t("a floor that gives way, or is pushed back", test_soft), &
          test_case_t("all at once, as Newton's method converges", test_at_once), &
          test_case_t("where all is linear one correction does", test_linear), &
+         test_case_t("a correction that goes far is cut", test_early), &
          test_case_t("what a first guess leaves of gaps", test_first_guess), &
          test_case_t("statics by sets and all at once", test_static), &
          test_case_t("begun where it ends nothing changes", test_again), &
@@ -224,6 +228,8 @@ contains
          id = set%id(set%n_permanent + 1:set%n)
          allocate(law(size(id)))
          if (active%friction%is_on) law = active%friction%law(id)
+         self%newton%convergence%polishes = self%polishes
+         self%newton%convergence%largest_move = self%largest_move
          call contact_newton_solve(self%newton, self%system, set, law, self%motion, self%status, &
             error)
          if (allocated(error)) return
@@ -619,6 +625,7 @@ contains
             if (self%is_linked) call align(self%scene)
             self%method = merge(method_saddle_point, method_null_space, mod(i/8, 2) == 1)
             if (mod(i/2, 2) == 1) self%way = 0.1_wp*(u(3) - 0.5_wp)
+            self%polishes = mod(i/16, 2) == 0
             self%was_active = u(4:6) > 0.6_wp
             allocate(self%floor(1))
             call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3) - merge(0.0_wp, &
@@ -637,11 +644,61 @@ contains
                      // to_text(convergence%history(k), 3))
                   n_fast = n_fast + 1
                end do
+               do k = 2, convergence%n_history
+                  call check_true(error, ends_at(self, k) .eqv. k == convergence%n_history, &
+                     "the end of case " // to_text(i) // " at iterate " // to_text(k))
+               end do
             end associate
          end block
       end do
       call check_true(error, n_fast > 32, "iterates near the end: " // to_text(n_fast))
+
+   contains
+
+      !> Within the tolerance, and down to round-off as long as that gains more than two thirds.
+      pure logical function ends_at(self, k)
+         type(case_t), intent(in) :: self
+         integer, intent(in) :: k
+
+         associate (convergence => self%newton%convergence)
+            ends_at = convergence%history(k) <= convergence%tolerance
+            if (self%polishes) ends_at = convergence%history(k) <= round_off .or. (ends_at .and. &
+               convergence%history(k) > 0.3_wp*convergence%history(k - 1))
+         end associate
+      end function ends_at
+
    end subroutine test_at_once
+
+   !> Nothing moves farther in a correction than contacts that are no candidates allow, and the first
+   !> that would ends the solve.
+   subroutine test_early(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: u(7), start(2, 6)
+      integer :: i
+
+      do i = 0, 15
+         block
+            type(case_t) :: self
+
+            call draw_random(u)
+            call make_case(self, 3.0_wp*u(1) - 1.5_wp)
+            self%is_at_once = .true.
+            self%mu = merge(0.0_wp, 0.6_wp*u(2), mod(i, 2) == 0)
+            self%largest_move = merge(1.0e-3_wp, 1.0_wp, i < 12)
+            self%was_active = u(4:6) > 0.6_wp
+            allocate(self%floor(1))
+            call floor_make(self%floor(1), [1, 2, 3], self%scene%u0(2, :3) - merge(0.0_wp, &
+               0.1_wp*u(4:6), self%was_active))
+            start = h*self%scene%v0
+            call solve(self, error)
+            if (allocated(error)) return
+            call check_equal(error, self%status, merge(newton_early, newton_converged, i < 12), &
+               "status of case " // to_text(i))
+            if (i < 12) call check_near(error, maxval(abs(self%motion%du - start)), 1.0e-3_wp, tol, &
+               1.0_wp, "how far it goes in case " // to_text(i))
+         end block
+      end do
+   end subroutine test_early
 
    !> Small displacements, a flat floor: one tangent and one correction, also with a prescribed
    !> motion, leave nothing but round-off, whichever contacts come to act, stick and slide.
