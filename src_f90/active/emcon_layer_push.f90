@@ -69,8 +69,7 @@ contains
 
       do k = 1, size(id)
          call constraint_index(system, id(k), pair, i)
-         have_gaps(k) = pair == 0
-         if (pair > 0) have_gaps(k) = system%contact(pair)%contact%state(i)%is_near
+         have_gaps(k) = system%contact(pair)%contact%state(i)%is_near
       end do
    end function have_gaps
 
