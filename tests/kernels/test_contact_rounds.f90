@@ -228,6 +228,10 @@ contains
          id = set%id(set%n_permanent + 1:set%n)
          allocate(law(size(id)))
          if (active%friction%is_on) law = active%friction%law(id)
+         ! What another solve has counted does not matter.
+         self%newton%n_solve = 5
+         self%newton%convergence%n_iteration = 5
+         self%newton%convergence%n_history = 5
          self%newton%convergence%polishes = self%polishes
          self%newton%convergence%largest_move = self%largest_move
          call contact_newton_solve(self%newton, self%system, set, law, self%motion, self%status, &
