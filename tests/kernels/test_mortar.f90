@@ -518,7 +518,7 @@ contains
       type(condition_t) :: item(3)
       real(wp), allocatable :: still(:, :)
       real(wp) :: area(0:1)
-      integer :: i, j, k, n_part
+      integer :: e, i, j, k, n_part
 
       n_part = 0
       do i = 1, n_combination
@@ -536,6 +536,9 @@ contains
                if (area(1) < mortar%scale(j)) cycle
                mortar%scale(j) = 0.25_wp
                call mortar%evaluate([j], scene%x, still, still, [0.0_wp], item(j:j))
+               ! Of its edges and of no others.
+               call check_true(error, all(mortar%is_formed .eqv. [(any(mortar%node_edge(:, j) == e), &
+                  e = 1, 2)]), "edges that are formed" // text_of(i, k))
                if (area(1) < 0.9_wp*mortar%whole(j)) n_part = n_part + 1
                call check_near(error, condition_normal(item(j)), 4.0_wp*area(1), tol, 1.0_wp, &
                   "normal force" // text_of(i, k))
