@@ -267,10 +267,10 @@ contains
       do e = w%base, e_last
          call add_piece(curve, e, s + real(3 - e, wp), w)
       end do
-      if (w%base == curve%first .and. min(s0, s1) <= real(w%base - 3, wp) + at_end) then
+      if (min(s0, s1) <= real(curve%first - 3, wp) + at_end) then
          call add_straight(curve, w%base, dg_negative_part(s + real(3 - w%base, wp), at_end), w)
       end if
-      if (e_last == curve%last .and. max(s0, s1) >= real(e_last - 2, wp) - at_end) then
+      if (max(s0, s1) >= real(curve%last - 2, wp) - at_end) then
          call add_straight(curve, e_last + 1, &
             -dg_negative_part(-(s + real(2 - e_last, wp)), at_end), w)
       end if
