@@ -4,7 +4,8 @@ module test_active_choice
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_active_set, only : active_set_begin, active_set_could_hold, active_set_is_empty, &
       active_set_mark, active_set_overclosure, active_set_pass, active_set_repeats, &
-      active_set_select, active_set_slides, active_set_t, active_set_take, active_set_update_gaps, &
+      active_set_select, active_set_slides, active_set_suit, active_set_t, active_set_take, &
+      active_set_update_gaps, &
       candidates_clear, step_cycling, step_done, step_stands_off, step_too_far, touch_tol
    use emcon_contact, only : gap_state_t
    use emcon_contact_candidates, only : candidates_leave_out, candidates_look
@@ -16,7 +17,9 @@ module test_active_choice
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_overlap_query, only : overlap_t
+   use emcon_scheme_registry, only : scheme_row
    use emcon_state, only : contact_state_t, state_t
+   use emcon_steps, only : step_t
    use emcon_system, only : system_t
    use emcon_text, only : to_text
    use given_contact, only : given_contact_t, given_of, open_given_contact
@@ -69,6 +72,7 @@ contains
          test_case_t("contacts that are dropped", test_drop), &
          test_case_t("candidates as they are looked at", test_look), &
          test_case_t("what is asked of a set", test_asked), &
+         test_case_t("what a step asks of contact", test_suit), &
          test_case_t("rows that follow from others wait", test_leave_out), &
          test_case_t("a candidate that does not act closes, or not", test_closes), &
          test_case_t("what closes sticks by how far it is closed", test_joins), &
@@ -525,6 +529,23 @@ contains
             contact_slides, mod(k, 2) == 1), "slip " // to_text(slip(k)))
       end do
    end subroutine test_joins
+
+   !> Impacts in dynamics; in statics what is closed too far is pushed out.
+   subroutine test_suit(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(active_set_t) :: active
+      type(step_t) :: step
+      integer :: k
+
+      do k = 1, 2
+         step%scheme = scheme_row(merge("STATIC ", "DYNAMIC", k == 1), "")
+         step%contact%gap_tolerance = 0.25_wp
+         call active_set_suit(active, step)
+         call check_true(error, (active%rules%has_impacts .eqv. k == 2) .and. &
+            (active%rules%pushes_out .eqv. k == 1), "impacts " // to_text(k))
+         call check_near(error, active%rules%gap_tolerance, 0.25_wp, 0.0_wp, 1.0_wp, "stand-off")
+      end do
+   end subroutine test_suit
 
    !> Two contacts with friction, of a node each.
    subroutine test_asked(error)
