@@ -461,7 +461,7 @@ contains
       integer :: i, n_pivoted
 
       n_pivoted = 0
-      do i = 1, 600
+      do i = 1, 1200
          call make_problem(problem, 1, rigid, mod(i, 2) == 0, asked=2 + mod(i, 3))
          problem%mu = 2.0_wp*problem%mu
          call solve(problem, push, effort, is_solved)
