@@ -88,7 +88,7 @@ contains
 
       along = cshift(outline, 1, 2) - outline
       n_node = 0
-      do i = 1, 400
+      do i = 1, 2000
          call draw_random(b)
          b = 4.0_wp*b - 1.0_wp
          found = nearest_t()
