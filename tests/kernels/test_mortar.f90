@@ -49,6 +49,7 @@ contains
          test_case_t("gradient and second derivatives", test_derivatives), &
          test_case_t("normal force by the multiplier", test_normal), &
          test_case_t("and its derivatives", test_normal_slope), &
+         test_case_t("pushes at the end, slip of the step", test_pushes_at_end), &
          test_case_t("notch: nodes on both sides of a pair", test_notch), &
          test_case_t("the nearer of two layers", test_layers), &
          test_case_t("not the back of a thin body", test_thin), &
@@ -580,6 +581,52 @@ contains
       end subroutine by_schemes
 
    end subroutine test_normal
+
+   !> Where a scheme pushes at the end, and in equilibrium, slip and its gradient are those over the
+   !> step; what pushes at the end alone opens the gap of the step.
+   subroutine test_pushes_at_end(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: none(3) = 0.0_wp
+      type(scene_t) :: scene
+      type(mortar_t) :: mortar
+      type(motion_t) :: motion
+      type(condition_t), dimension(3) :: over, one
+      real(wp), allocatable :: u(:, :), du(:, :)
+      integer :: i, j, k, scheme, m
+
+      over%has_friction = .true.
+      one%has_friction = .true.
+      do i = 1, n_combination
+         do k = 1, 3
+            call draw(i, k, 0.1_wp, scene, mortar, u, du, error)
+            if (allocated(error)) return
+            call contact_laws_of_surface(interaction_t(friction=0.5_wp), mortar%laws)
+            call mortar%begin_step(scene%x, u, du)
+            call mortar%measure(scene%x, u, du)
+            call mortar%evaluate([1, 2, 3], scene%x, u, du, none, over)
+            call motion_init(motion, scene%x)
+            motion%u0 = u
+            motion%du = du
+            do scheme = 1, 2
+               motion%evaluation = evaluation_at_end
+               if (scheme == 2) motion%evaluation = evaluation_moving(1.0_wp, 0.5_wp, 1.0_wp)
+               if (scheme == 2) motion%evaluation%pushes_at_end = .true.
+               call motion_evaluate(motion)
+               call mortar%linearise([1, 2, 3], motion, none, one)
+               do j = 1, 3
+                  m = over(j)%n_node
+                  call check_equal(error, one(j)%node(:one(j)%n_node), over(j)%node(:m), "nodes")
+                  if (allocated(error)) return
+                  call check_near(error, one(j)%slip(1), over(j)%slip(1), 0.0_wp, 1.0_wp, "slip")
+                  call check_near(error, one(j)%t1(:, :m, 1), over(j)%t1(:, :m, 1), 0.0_wp, 1.0_wp, &
+                     "its gradient" // text_of(i, k))
+                  if (scheme == 2) call check_near(error, [one(j)%gap0, one(j)%dgap], &
+                     [over(j)%gap0, over(j)%dgap], 0.0_wp, 1.0_wp, "gap of the step")
+               end do
+            end do
+         end do
+      end do
+   end subroutine test_pushes_at_end
 
    !> Central differences, with the steps and bounds of `compare`; none where a gradient jumps.
    subroutine test_normal_slope(error)
