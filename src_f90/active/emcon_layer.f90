@@ -16,6 +16,7 @@ module emcon_layer
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_at_end
    use emcon_friction, only : friction_init, friction_t
+   use emcon_gaps, only : gaps_forget
    use emcon_host, only : host_t
    use emcon_kinds, only : wp
    use emcon_layer_push, only : layer_find_push
@@ -497,9 +498,7 @@ contains
       self%motion%u0 = motion%u0 + motion%du
       self%motion%du = 0.0_wp
       call motion_evaluate(self%motion)
-      do k = 1, size(self%system%contact)
-         self%system%contact(k)%contact%reach = 0.0_wp
-      end do
+      call gaps_forget(self%system)
       call system_respond(self%system, self%motion, .false.)
    end subroutine begin
 

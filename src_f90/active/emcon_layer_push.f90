@@ -47,7 +47,7 @@ contains
          opened%lam = weight(opened%id)
          call constraints_evaluate(opened, system, self%motion)
          call constraints_force(opened, 1, self%push)
-         allocate(y(system%space%numbering%n_unknown), mu(set%n_row), source=0.0_wp)
+         allocate(y(system%space%numbering%n_unknown), mu(set%n_row))
          call respond_to(self, weight, y, mu, is_singular, error)
          if (is_singular .or. allocated(error)) return
          call add_response(self, y, mu)
@@ -73,8 +73,7 @@ contains
 
       do k = 1, size(id)
          call constraint_index(system, id(k), pair, i)
-         have_gaps(k) = pair == 0
-         if (pair > 0) have_gaps(k) = system%contact(pair)%contact%state(i)%is_near
+         have_gaps(k) = system%contact(pair)%contact%state(i)%is_near
       end do
    end function have_gaps
 
@@ -83,8 +82,8 @@ contains
    subroutine respond_to(self, weight, y, mu, is_singular, error)
       type(layer_t), intent(inout) :: self
       real(wp), intent(in) :: weight(:)
-      real(wp), intent(out), contiguous :: y(:)  !! (n_unknown) [L]
-      real(wp), intent(out), contiguous :: mu(:)   !! (n_row) [M L/T^2]
+      !> (n_unknown) [L], (n_row) [M L/T^2]; undefined where they are not found
+      real(wp), intent(inout), contiguous :: y(:), mu(:)
       logical, intent(out) :: is_singular
       type(error_t), allocatable, intent(out) :: error
       integer, allocatable :: closed(:)
@@ -93,8 +92,6 @@ contains
       integer :: i, k, n
 
       is_singular = .false.
-      y = 0.0_wp
-      mu = 0.0_wp
       associate (set => self%active%set, system => self%system, &
             correction => self%newton%correction)
          call constraints_evaluate(set, system, self%motion)

@@ -162,7 +162,7 @@ contains
       integer :: i
 
       tau = 0.0_wp
-      do i = max(1, k - 2), min(5, k + 1)
+      do i = 1, 5
          if (abs(curve%tangent(i, k)) > 0.0_wp) tau = tau + curve%tangent(i, k)*edge(:, i)
       end do
    end function tangent_at
@@ -258,7 +258,7 @@ contains
       s = dg_variable(1, s0, s1 - s0)
       w%base = piece_of(curve, 2 + ceiling(held(min(s0, s1) - at_end)))
       e_last = piece_of(curve, 3 + floor(held(max(s0, s1) + at_end)))
-      do i = max(1, w%base - 1), min(5, e_last + 1)
+      do i = 1, 5
          if (.not. any(abs(curve%tangent(i, w%base:e_last + 1)) > 0.0_wp)) cycle
          w%n = w%n + 1
          w%edge(w%n) = i
@@ -267,10 +267,10 @@ contains
       do e = w%base, e_last
          call add_piece(curve, e, s + real(3 - e, wp), w)
       end do
-      if (w%base == curve%first .and. min(s0, s1) <= real(w%base - 3, wp) + at_end) then
+      if (min(s0, s1) <= real(curve%first - 3, wp) + at_end) then
          call add_straight(curve, w%base, dg_negative_part(s + real(3 - w%base, wp), at_end), w)
       end if
-      if (e_last == curve%last .and. max(s0, s1) >= real(e_last - 2, wp) - at_end) then
+      if (max(s0, s1) >= real(curve%last - 2, wp) - at_end) then
          call add_straight(curve, e_last + 1, &
             -dg_negative_part(-(s + real(2 - e_last, wp)), at_end), w)
       end if

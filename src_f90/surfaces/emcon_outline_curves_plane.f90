@@ -94,8 +94,8 @@ contains
          integer, intent(in) :: a, b             !! 0: none
          real(wp) :: one(2), other(2)
 
-         turns = .true.
-         if (a == 0 .or. b == 0) return
+         turns = a == 0 .or. b == 0
+         if (turns) return
          one = scene%x(:, outline%facet(2, a)) - scene%x(:, outline%facet(1, a))
          other = scene%x(:, outline%facet(2, b)) - scene%x(:, outline%facet(1, b))
          turns = atan2(abs(one(1)*other(2) - one(2)*other(1)), dot_product(one, other)) &
@@ -212,7 +212,7 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
       type(hermite_stencil_t) :: stencil
       type(hermite_point_t) :: point
-      real(wp) :: edge(2, 5), offset(2)
+      real(wp) :: edge(2, 5)
       integer :: i
 
       edge = 0.0_wp
@@ -226,8 +226,7 @@ contains
          end associate
       end do
       point = hermite_point(hermite_curve(stencil, joined_pieces), edge, share)
-      offset = point%y - share*edge(:, 3)
-      piece_rise = -(edge(1, 3)*offset(2) - edge(2, 3)*offset(1)) &
+      piece_rise = -(edge(1, 3)*point%y(2) - edge(2, 3)*point%y(1)) &
          /sqrt(dot_product(edge(:, 3), edge(:, 3)))
    end function piece_rise
 

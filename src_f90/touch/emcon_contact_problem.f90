@@ -117,7 +117,6 @@ contains
       logical :: is_singular
 
       apart = self
-      apart%hold = 0.0_wp
       apart%base = force_of(self, 0.0_wp*self%free, self%free)
       call find_yield(self, yields)
       call dense_solve(transpose(yields), real(transpose(self%w), dp), w, is_singular)

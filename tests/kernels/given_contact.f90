@@ -26,6 +26,7 @@ module given_contact
       procedure :: area_points
       procedure :: covers_points
       procedure :: slip_points
+      procedure :: could_hold
    end type given_contact_t
 
 contains
@@ -135,5 +136,13 @@ contains
 
       slip = self%slid(i)
    end function slip_points
+
+   !> By another choice all.
+   pure logical function could_hold(self, is_loose)
+      class(given_contact_t), intent(in) :: self
+      logical, intent(in) :: is_loose(:)
+
+      could_hold = any(is_loose)
+   end function could_hold
 
 end module given_contact

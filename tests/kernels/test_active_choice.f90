@@ -2,17 +2,24 @@
 !> of its bound, sets that come again; and what a step begins with.
 module test_active_choice
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_active_set, only : active_set_begin, active_set_overclosure, active_set_pass, &
-      active_set_select, active_set_t, active_set_update_gaps, step_cycling, step_done, &
-      step_stands_off, step_too_far, touch_tol
+   use emcon_active_set, only : active_set_begin, active_set_could_hold, active_set_is_empty, &
+      active_set_mark, active_set_overclosure, active_set_pass, active_set_repeats, &
+      active_set_select, active_set_slides, active_set_suit, active_set_t, active_set_take, &
+      active_set_update_gaps, &
+      candidates_clear, step_cycling, step_done, step_stands_off, step_too_far, touch_tol
    use emcon_contact, only : gap_state_t
+   use emcon_contact_candidates, only : candidates_leave_out, candidates_look
+   use emcon_coulomb_law, only : contact_slides, contact_sticks, coulomb_t
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_at_end, evaluation_moving
    use emcon_host_set, only : host_set_advance, host_set_begin, host_set_drop, host_set_t, &
       host_set_try
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
-   use emcon_state, only : state_t
+   use emcon_overlap_query, only : overlap_t
+   use emcon_scheme_registry, only : scheme_row
+   use emcon_state, only : contact_state_t, state_t
+   use emcon_steps, only : step_t
    use emcon_system, only : system_t
    use emcon_text, only : to_text
    use given_contact, only : given_contact_t, given_of, open_given_contact
@@ -63,6 +70,12 @@ contains
          test_case_t("what is too far to be looked at", test_pass), &
          test_case_t("gaps to hold", test_select), &
          test_case_t("contacts that are dropped", test_drop), &
+         test_case_t("candidates as they are looked at", test_look), &
+         test_case_t("what is asked of a set", test_asked), &
+         test_case_t("what a step asks of contact", test_suit), &
+         test_case_t("rows that follow from others wait", test_leave_out), &
+         test_case_t("a candidate that does not act closes, or not", test_closes), &
+         test_case_t("what closes sticks by how far it is closed", test_joins), &
          test_case_t("overclosure of a step", test_overclosure)]
    end subroutine collect_active_choice
 
@@ -351,6 +364,237 @@ contains
       call check_equal(error, sets%n_tried, 0, "sets tried")
    end subroutine test_drop
 
+   !> Contacts 1 and 2 act, 3 has opened, 4 is no candidate: each alone is stale, or is not seen, or
+   !> leaves, or closes. Who is blamed, takes part, acts next.
+   subroutine test_look(error)
+      type(error_t), allocatable, intent(out) :: error
+      !> S: stale, U: unseen, L: leaves, C: closes; on contact number.
+      character(len=2), parameter :: what(10) = ["  ", "S1", "S2", "U1", "U2", "L1", "L3", "C3", &
+         "C4", "L4"]
+      type(system_t), target :: system
+      type(active_set_t) :: active
+      type(motion_t) :: motion
+      class(given_contact_t), pointer :: contact
+      logical :: is_it(4), part(4), acts(4)
+      integer :: k, i, status
+
+      do k = 1, size(what)
+         call open_four(system, active, motion, [0.3_wp, 0.3_wp, 0.4_wp, 0.4_wp], &
+            spread(edge, 1, 4))
+         contact => given_of(system, 1)
+         is_it = [(index(what(k)(2:), achar(iachar("0") + i)) > 0, i = 1, 4)]
+         active%is_active = [.true., .true., .false., .false.]
+         active%start%was_active = [.true., .true., .false., .false.]
+         call candidates_clear(active%candidates)
+         active%candidates%takes_part = [.true., .true., .true., .false.]
+         active%candidates%acts = active%is_active
+         call active_set_select(active, system, motion)
+         active%set%lam = 1.0_wp
+         if (has(what(k), "S")) where (is_it) contact%given%gap1 = 0.35_wp
+         if (has(what(k), "C")) where (is_it) contact%given%gap1 = -0.1_wp
+         if (has(what(k), "L")) contact%given%is_leaving = is_it
+         if (has(what(k), "U")) contact%is_seen = .not. is_it
+         ! What was found at another look counts no more.
+         active%candidates%is_blamed = .true.
+         active%candidates%have_changed = .true.
+         active%candidates%one_closes = .true.
+         active%is_stale = .true.
+         call candidates_look(active, system, motion, status)
+         part = [.true., .true., .true., what(k) == "C4"]
+         acts = [.true., .true., what(k) == "C3", what(k) == "C4"]
+         if (has(what(k), "L")) then
+            part = part .and. .not. is_it
+            acts = acts .and. .not. is_it
+         end if
+         associate (own => active%candidates)
+            call check_equal(error, status, merge(step_too_far, step_done, has(what(k), "U")), &
+               "status " // what(k))
+            call check_true(error, all(own%takes_part .eqv. part), "takes part " // what(k))
+            call check_true(error, all(own%acts .eqv. acts), "acts " // what(k))
+            call check_true(error, all(own%is_blamed .eqv. (is_it .and. (has(what(k), "S") &
+               .or. has(what(k), "U")))), "blamed " // what(k))
+            call check_true(error, own%one_closes .eqv. what(k) == "C3", "closes " // what(k))
+            call check_true(error, own%have_changed .eqv. any(what(k) == ["S1", "S2", "L1", "L3", &
+               "C4"]), "has changed " // what(k))
+            call check_true(error, active%is_stale .eqv. has(what(k), "S"), "stale " // what(k))
+            call check_true(error, own%is_measured, "measured " // what(k))
+            call check_true(error, all(own%has_left .eqv. (is_it .and. any(what(k) == ["L1", &
+               "L3"]))), "has left " // what(k))
+         end associate
+      end do
+   end subroutine test_look
+
+   !> A row that always holds waits for the step, one of a gap for a try, or for the step where
+   !> nothing is free in it; rows of slips do not.
+   subroutine test_leave_out(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(system_t) :: system
+      type(active_set_t) :: active
+      type(motion_t) :: motion
+      integer :: k
+      logical :: goes_on
+
+      do k = 1, 6
+         call open_four(system, active, motion, spread(0.3_wp, 1, 4), spread(edge, 1, 4))
+         active%is_active = .true.
+         call candidates_clear(active%candidates)
+         active%candidates%takes_part = .true.
+         active%candidates%acts = .true.
+         call active_set_select(active, system, motion)
+         active%set%n_permanent = 1
+         ! Nothing is free in the third row.
+         active%set%force_rows%row_start = [1, 3, 5, 5, 7]
+         if (k < 5) call candidates_leave_out(active, [k], goes_on)
+         if (k == 5) call candidates_leave_out(active, [5], goes_on)
+         if (k == 6) call candidates_leave_out(active, [5, 2], goes_on)
+         call check_true(error, goes_on .eqv. k < 5, "goes on " // to_text(k))
+         call check_true(error, all(active%is_active .neqv. [k == 1, k == 2 .or. k == 6, k == 3, &
+            k == 4]), "acts " // to_text(k))
+         call check_true(error, all(active%candidates%takes_part .neqv. [k == 1, .false., k == 3, &
+            .false.]), "takes part " // to_text(k))
+         call check_true(error, all(active%is_left_out .eqv. [.false., .false., k == 3, .false.]) &
+            .and. all(active%candidates%acts .neqv. active%is_left_out), "left out " // to_text(k))
+      end do
+   end subroutine test_leave_out
+
+   !> Below the gap to act at, with half of an overclosure left, or that of the start if it is lower.
+   subroutine test_closes(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(open_t), allocatable :: row(:)
+      type(system_t), target :: system
+      type(active_set_t) :: active
+      type(motion_t) :: motion
+      class(given_contact_t), pointer :: contact
+      integer :: k, status
+
+      row = [ &
+         open_t(closes=.true.), &
+         open_t(gap1=0.01_wp), &
+         open_t(gap1=-48.0_wp*eps*edge), &
+         open_t(gap1=-96.0_wp*eps*edge, closes=.true.), &
+         open_t(gap1=-96.0_wp*eps*edge, gap="F"), &
+         open_t(gap1=-96.0_wp*eps*edge, gap="E"), &
+         open_t(closed=-0.02_wp), &
+         open_t(gap1=-0.03_wp, closed=-0.02_wp, closes=.true.), &
+         open_t(gap1=-0.05_wp, closed=-0.02_wp, overclosure=-0.08_wp), &
+         open_t(gap1=-0.07_wp, closed=-0.02_wp, overclosure=-0.08_wp, closes=.true.), &
+         open_t(gap1=0.05_wp, step="H"), &
+         open_t(closed=-0.02_wp, step="H"), &
+         open_t(step="H", closes=.true.), &
+         open_t(gap0=-0.05_wp, gap1=-0.03_wp, step="H"), &
+         open_t(gap0=-0.05_wp, gap1=-0.06_wp, step="H", closes=.true.)]
+      do k = 1, size(row)
+         call open_four(system, active, motion, spread(0.3_wp, 1, 4), spread(edge, 1, 4))
+         contact => given_of(system, 1)
+         contact%given(3)%gap0 = row(k)%gap0
+         contact%given(3)%gap1 = row(k)%gap1
+         contact%given(3)%closed = row(k)%closed
+         contact%given(3)%is_near = .not. has(row(k)%gap, "F")
+         contact%given(3)%is_over = .not. has(row(k)%gap, "E")
+         active%rules%holds_gap = has(row(k)%step, "H")
+         active%start%left(1) = 0.5_wp
+         active%start%overclosure(3) = row(k)%overclosure
+         call candidates_clear(active%candidates)
+         active%candidates%takes_part(3) = .true.
+         call candidates_look(active, system, motion, status)
+         call check_true(error, active%candidates%one_closes .eqv. row(k)%closes, "closes " &
+            // to_text(k))
+         call check_true(error, active%candidates%acts(3) .eqv. row(k)%closes, "acts " // to_text(k))
+      end do
+   end subroutine test_closes
+
+   !> A contact that closes by 0.1, from a gap of 0.3, and slips by less than half of the way below
+   !> the gap that it will hold, or by more.
+   subroutine test_joins(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: slip(4) = [0.04_wp, 0.06_wp, 0.19_wp, 0.21_wp]
+      type(system_t), target :: system
+      type(active_set_t) :: active
+      type(motion_t) :: motion
+      class(given_contact_t), pointer :: contact
+      integer :: k, status
+
+      do k = 1, size(slip)
+         call open_given_contact(system, active, motion, reshape([gap_state_t(is_near=.true., &
+            is_over=.true., gap0=0.3_wp, gap1=-0.1_wp, size=edge)], [1, 1]), 0, coulomb_t(mu=0.5_wp))
+         contact => given_of(system, 1)
+         contact%slid = slip(k)
+         motion%evaluation = evaluation_at_end
+         active%rules%holds_gap = k > 2
+         active%start%was_active = [.false.]
+         call candidates_clear(active%candidates)
+         call candidates_look(active, system, motion, status)
+         call check_true(error, active%candidates%takes_part(1), "it closes")
+         call check_equal(error, active%friction%law(1)%status%kind, merge(contact_sticks, &
+            contact_slides, mod(k, 2) == 1), "slip " // to_text(slip(k)))
+      end do
+   end subroutine test_joins
+
+   !> Impacts in dynamics; in statics what is closed too far is pushed out.
+   subroutine test_suit(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(active_set_t) :: active
+      type(step_t) :: step
+      integer :: k
+
+      do k = 1, 2
+         step%scheme = scheme_row(merge("STATIC ", "DYNAMIC", k == 1), "")
+         step%contact%gap_tolerance = 0.25_wp
+         call active_set_suit(active, step)
+         call check_true(error, (active%rules%has_impacts .eqv. k == 2) .and. &
+            (active%rules%pushes_out .eqv. k == 1), "impacts " // to_text(k))
+         call check_near(error, active%rules%gap_tolerance, 0.25_wp, 0.0_wp, 1.0_wp, "stand-off")
+      end do
+   end subroutine test_suit
+
+   !> Two contacts with friction, of a node each.
+   subroutine test_asked(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(system_t) :: system
+      type(active_set_t) :: active
+      type(motion_t) :: motion
+      type(contact_state_t) :: contacts
+      type(overlap_t) :: overlap
+      logical :: is_marked(2), acts(2)
+      integer :: k, i
+
+      call open_given_contact(system, active, motion, reshape([(gap_state_t(), i = 1, 2)], [1, 2]), &
+         0, coulomb_t(mu=0.5_wp))
+      contacts%lam = [1.0_wp, 2.0_wp]
+      contacts%closure = [-0.1_wp, -0.2_wp]
+      do k = 0, 3
+         acts = btest(k, [0, 1])
+         active%is_active = acts
+         do i = 1, 2
+            active%friction%law%status%kind = contact_sticks
+            call check_true(error, .not. active_set_slides(active), "all that acts sticks")
+            active%friction%law(i)%status%kind = contact_slides
+            call check_true(error, active_set_slides(active) .eqv. acts(i), "slides")
+            ! What holds a node already could not do so by another choice.
+            overlap%node = i
+            overlap%facet(:2) = [7, 8]
+            call check_true(error, active_set_could_hold(active, system, overlap) .neqv. acts(i), &
+               "could hold")
+            overlap%facet(:2) = [8, 3 - i]
+            call check_true(error, active_set_could_hold(active, system, overlap) .neqv. &
+               all(acts), "could hold one of both")
+         end do
+         contacts%is_active = [.true., .false.]
+         is_marked = .false.
+         call active_set_mark(active, system, contacts, is_marked)
+         call check_true(error, all(is_marked .eqv. [.true., acts(2)]), "marked")
+         active%candidates%acted = [.true., .false.]
+         call check_true(error, active_set_repeats(active) .eqv. k == 1, "repeats")
+         call check_true(error, active_set_is_empty(active) .eqv. k == 0, "empty")
+         contacts%is_active = [.true., .true.]
+         call active_set_take(active, system, contacts, acts)
+         call check_true(error, all(active%is_active .eqv. acts) .and. all(active%is_candidate &
+            .eqv. acts), "what is near is taken")
+         call check_near(error, [active%lam, active%penalty%closure], [contacts%lam, &
+            contacts%closure], 0.0_wp, 1.0_wp, "with its forces")
+      end do
+   end subroutine test_asked
+
    !> A guard closes with a contact of its pair in one step: it waits; alone it does not.
    subroutine test_guard(error)
       type(error_t), allocatable, intent(out) :: error
@@ -545,7 +789,12 @@ contains
       call check_near(error, active%start%overclosure, [-0.1_wp, 0.0_wp, 0.0_wp, 0.0_wp], 0.0_wp, &
          1.0_wp, "what is closed")
       call check_near(error, contact%reach, 0.0_wp, 0.0_wp, 1.0_wp, "a step begins")
+      call check_near(error, active%rules%largest_move, contact%mean_size(motion%x), 0.0_wp, &
+         1.0_wp, "the largest move")
+      active%rules%largest_move = 0.0_wp
       call active_set_overclosure(active, system, motion%x, motion%u0, .false.)
+      call check_near(error, active%rules%largest_move, contact%mean_size(motion%x), 0.0_wp, &
+         1.0_wp, "as large in any step")
       call check_near(error, active%start%overclosure, spread(0.0_wp, 1, 4), 0.0_wp, 1.0_wp, "none")
    end subroutine test_overclosure
 

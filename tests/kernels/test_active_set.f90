@@ -7,6 +7,7 @@ module test_active_set
    use emcon_ledger, only : ledger_t
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_t
+   use emcon_phases, only : phase_enter, phase_vectors
    use emcon_scene, only : scene_t
    use emcon_steps, only : initiation_admissible, initiation_persistent, &
       initiation_velocity_update, method_null_space, method_saddle_point
@@ -87,12 +88,15 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(increment_t) :: increment
       type(ledger_t) :: start
-      integer :: k, n_before
+      integer :: k, n_before, phase
 
       start = march%ledger
       do k = 1, n
          n_before = count(march%state%contacts%is_active)
          call march_increment(march, scene, increment, error)
+         if (allocated(error)) return
+         call phase_enter(march%system%phases, phase_vectors, phase)
+         call check_equal(error, phase, phase_vectors, "phases that were entered were left")
          if (allocated(error)) return
          seen%drift = max(seen%drift, abs(march%ledger%total - start%total))
          seen%gain = max(seen%gain, march%ledger%total - start%total)

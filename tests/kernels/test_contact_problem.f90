@@ -43,7 +43,9 @@ contains
          test_case_t("one body led to slips that differ", test_led_apart), &
          test_case_t("what has no solution is told", test_no_solution), &
          test_case_t("held as W is found: the same forces", test_held), &
+         test_case_t("by pivots as if nothing held them", test_held_pivots), &
          test_case_t("a body that its contacts alone hold", test_alone), &
+         test_case_t("the same at random, with and without friction", test_at_rest), &
          test_case_t("random problems of all kinds", test_kinds)]
    end subroutine collect_contact_problem
 
@@ -236,7 +238,7 @@ contains
          rows(4, 3) = reshape([0.0_wp, -1.0_wp, 0.0_wp, -1.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
          -0.5_wp, -0.5_wp, 0.5_wp, -0.5_wp], [4, 3])
       real(wp), parameter :: apart(3) = [1.0e-3_wp, 1.0e-6_wp, 1.0e-9_wp]
-      type(contact_problem_t) :: problem
+      type(contact_problem_t) :: problem, held
       type(contact_effort_t) :: effort
       real(wp) :: force(0:1, 2)
       integer :: k
@@ -253,6 +255,12 @@ contains
          call contact_problem_solve(problem, force, effort, is_solved)
          call check_true(error, is_solved, "solved")
          call check_near(error, force, reshape(pushes, [2, 2]), 1.0e6_wp*eps, 4.0_wp, "forces")
+         call hold_all(problem, reshape(1.0_wp + abs(normals(4)), [2, 2]), held)
+         force = 0.0_wp
+         call contact_problem_solve(held, force, effort, is_solved)
+         call check_true(error, is_solved, "solved as it is held")
+         call check_near(error, contact_problem_force(held, force), reshape(pushes, [2, 2]), &
+            1.0e6_wp*eps, 4.0_wp, "forces as it is held")
       end do
    end subroutine test_led_apart
 
@@ -419,9 +427,8 @@ contains
       type(contact_problem_t) :: problem, held
       type(contact_effort_t) :: effort
       real(wp), allocatable :: push(:, :), force(:, :)
-      real(dp), allocatable :: unit(:, :), gain(:, :)
-      logical :: is_solved, is_singular
-      integer :: case, n_slip, k, m
+      logical :: is_solved
+      integer :: case, n_slip, m
 
       do case = 1, 200
          n_slip = modulo(case, 3)
@@ -433,27 +440,67 @@ contains
          call check_true(error, is_solved, "solved as it is")
          if (allocated(error)) return
          force = contact_problem_force(problem, push)
-         held = problem
-         held%hold = reshape(abs(normals(m)), shape(held%hold))
-         held%start = reshape(normals(m), shape(held%start))
-         allocate(unit(m, m), gain(m, m), source=0.0_dp)
-         do k = 1, m
-            unit(k, k) = 1.0_dp
-         end do
-         call dense_solve(unit + real(problem%w*spread(reshape(held%hold, [m]), 1, m), dp), unit, &
-            gain, is_singular)
-         held%w = real(matmul(gain, real(problem%w, dp)), wp)
-         held%free = held%start + reshape(real(matmul(gain, reshape(real(problem%free &
-            - held%start, dp), [m])), wp), shape(held%free))
+         call hold_all(problem, reshape(abs(normals(m)), shape(problem%hold)), held)
          call solve(held, push, effort, is_solved)
          call check_true(error, is_solved, "solved as it is held")
          if (.not. allocated(error)) call check_near(error, reshape(contact_problem_force(held, &
             push), [m]), reshape(force, [m]), 1.0e6_wp*eps, maxval(abs(held%base) + abs(push)), &
             "forces")
          if (allocated(error)) return
-         deallocate(unit, gain)
       end do
    end subroutine test_held
+
+   !> Large coefficients, few contacts: of what neither trials nor sweeps solve as it is held pivots
+   !> solve some as if it were not, so that it obeys the law as it is held.
+   subroutine test_held_pivots(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_problem_t) :: problem, held
+      type(contact_effort_t) :: effort
+      real(wp), allocatable :: push(:, :)
+      logical :: is_solved
+      integer :: i, n_pivoted
+
+      n_pivoted = 0
+      do i = 1, 1200
+         call make_problem(problem, 1, rigid, mod(i, 2) == 0, asked=2 + mod(i, 3))
+         problem%mu = 2.0_wp*problem%mu
+         call solve(problem, push, effort, is_solved)
+         if (.not. is_solved) cycle
+         call hold_all(problem, 10.0_wp**mod(i, 4)*reshape(abs(normals(size(problem%hold))), &
+            shape(problem%hold)), held)
+         call solve(held, push, effort, is_solved)
+         if (effort%n_pivot == 0 .or. .not. is_solved) cycle
+         n_pivoted = n_pivoted + 1
+         call check_true(error, contact_problem_missed(held, push) <= 1.0e6_wp*eps, "law of case " &
+            // to_text(i))
+         if (allocated(error)) return
+      end do
+      call check_true(error, n_pivoted > 2, to_text(n_pivoted) // " by pivots")
+   end subroutine test_held_pivots
+
+   !> The same problem with c and a start to count from.
+   subroutine hold_all(problem, hold, held)
+      type(contact_problem_t), intent(in) :: problem
+      real(wp), intent(in) :: hold(:, :)             !! of the shape of `problem%hold`
+      type(contact_problem_t), intent(out) :: held
+      real(dp), dimension(size(hold), size(hold)) :: unit, gain
+      logical :: is_singular
+      integer :: k, m
+
+      m = size(hold)
+      held = problem
+      held%hold(:, :) = hold
+      held%start = reshape(normals(m), shape(held%start))
+      unit = 0.0_dp
+      do k = 1, m
+         unit(k, k) = 1.0_dp
+      end do
+      call dense_solve(unit + real(problem%w*spread(reshape(hold, [m]), 1, m), dp), unit, gain, &
+         is_singular)
+      held%w = real(matmul(gain, real(problem%w, dp)), wp)
+      held%free = held%start + reshape(real(matmul(gain, reshape(real(problem%free - held%start, &
+         dp), [m])), wp), shape(held%free))
+   end subroutine hold_all
 
    !> Two contacts under a body of weight 1 that nothing else holds, at 1 and 3 from its center on
    !> both sides: 3/4 and 1/4, and where it stands on one alone, that is under its center, all.
@@ -463,6 +510,51 @@ contains
       call check_alone(error, [-1.0_wp, 3.0_wp], [0.75_wp, 0.25_wp])
       call check_alone(error, [0.0_wp, 2.0_wp], [1.0_wp, 0.0_wp])
    end subroutine test_alone
+
+   !> A rigid body rests on contacts under a load that some pushes at them balance, which is all that
+   !> is known of it: what is found balances the load, too, and obeys the law without any motion.
+   subroutine test_at_rest(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_problem_t) :: problem
+      type(contact_effort_t) :: effort
+      real(wp), allocatable :: rows(:, :), push(:, :), known(:, :), force(:, :)
+      real(dp), allocatable :: motion(:, :)
+      real(wp), allocatable :: load(:)
+      integer :: i, k, n, n_slip, rank
+      logical :: is_solved, is_singular
+
+      do i = 1, 200
+         n_slip = mod(i, 3)
+         rank = merge(6, 3, n_slip == 2)
+         n = 5 + mod(i, 3)
+         call contact_problem_create(problem, n_slip, n)
+         allocate(rows((1 + n_slip)*n, rank), motion(rank, 1 + (1 + n_slip)*n), known(0:n_slip, n))
+         call make_rigid(rows, n_slip, n)
+         call draw_random(problem%mu)
+         call draw_random(known)
+         known(1:, :) = (1.2_wp*known(1:, :) - 0.6_wp)*spread(problem%mu*known(0, :), 1, n_slip)
+         where (spread(mod([(k, k = 1, n)], 3) == 0, 1, 1 + n_slip)) known = 0.0_wp
+         load = matmul(reshape(known, [size(known)]), rows)
+         problem%hold = 1.0_wp
+         call dense_solve(real(matmul(transpose(rows), rows), dp), real(reshape([-load, &
+            transpose(rows)], shape(motion)), dp), motion, is_singular)
+         problem%free = reshape(matmul(rows, real(motion(:, 1), wp)), shape(problem%free))
+         problem%w = matmul(rows, real(motion(:, 2:), wp))
+         call solve(problem, push, effort, is_solved)
+         call check_true(error, is_solved, "case " // to_text(i))
+         force = contact_problem_force(problem, push)
+         associate (scale => maxval(abs(push)) + maxval(abs(load)))
+            call check_near(error, matmul(reshape(force, [size(force)]), rows), load, 1.0e6_wp*eps, &
+               scale, "balance of case " // to_text(i))
+            call check_true(error, all(norm2(force(2:, :), 1) <= problem%mu*force(1, :) &
+               + 1.0e6_wp*eps*scale), "friction of case " // to_text(i))
+         end associate
+         call check_true(error, contact_problem_missed(problem, push) <= 1.0e6_wp*eps, &
+            "law of case " // to_text(i))
+         if (allocated(error)) return
+         deallocate(rows, motion, known)
+      end do
+   end subroutine test_at_rest
 
    subroutine check_alone(error, at, expected)
       type(error_t), allocatable, intent(inout) :: error

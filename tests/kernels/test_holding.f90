@@ -7,7 +7,8 @@ module test_holding
    use emcon_contact_support_gaps, only : gaps_measure
    use emcon_contact_support, only : contact_support_complete, contact_support_find_free, &
       contact_support_forget
-   use emcon_contact_support_gaps, only : gaps_keep_closed, gaps_measure, gaps_next_to_close
+   use emcon_contact_support_gaps, only : gaps_keep_closed, gaps_measure, &
+      gaps_next_guards, gaps_next_to_close
    use emcon_errors, only : error_t
    use emcon_evaluation, only : instant_t, evaluation_at_end
    use emcon_interactions, only : formulation_nts
@@ -23,6 +24,7 @@ module test_holding
 
    real(wp), parameter :: eps = epsilon(1.0_wp)
    real(wp), parameter :: gap = 0.01_wp, force = 0.02_wp
+   real(wp), parameter :: units(3) = [1.0_wp, 64.0_wp, 1.0_wp/64.0_wp]
 
 contains
 
@@ -37,25 +39,27 @@ contains
          test_case_t("what a load pulls away is told", test_away)]
    end subroutine collect_holding
 
-   !> Conditions k of node k alone, with the gradient `c` and the gap `target`; edges are 1 long.
-   subroutine make_set(set, c, target)
+   !> Conditions k of node k alone, with the gradient `c` and the gap `target`; edges are 1 long. All
+   !> that is a length in units.
+   subroutine make_set(set, c, target, unit)
       type(constraint_set_t), intent(inout) :: set
       real(wp), intent(in) :: c(:, :)            !! (2, n)
       real(wp), intent(in) :: target(:)          !! (n)
+      real(wp), intent(in) :: unit               !! > 0
       integer :: k
 
       call constraints_select(set, [(k, k = 1, size(target))])
-      set%target = target
+      set%target = unit*target
       do k = 1, set%n
          call condition_resize(set%item(k), 1)
          set%item(k)%node(1) = k
          set%item(k)%c(:, 1) = c(:, k)
-         set%item(k)%size = 1.0_wp
+         set%item(k)%size = unit
       end do
    end subroutine make_set
 
    !> gap/rate; what closes within a thousandth of an edge closes too; what slips or opens does not.
-   !> What is closed already is there at once.
+   !> What is closed already is there at once. In any unit of length. Guards hold what is near alone.
    subroutine test_next(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: c(2, 6) = reshape([0.0_wp, 1.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 2.0_wp, &
@@ -64,34 +68,49 @@ contains
       type(constraint_set_t) :: set
       real(wp) :: way(2, 6), time
       logical :: is_next(6)
+      integer :: k
 
-      way(1, :) = 0.0_wp
-      way(2, :) = -1.0_wp
-      call make_set(set, c, target)
-      call gaps_next_to_close(set, way, time, is_next)
-      call check_near(error, time, 0.1_wp, 4.0_wp*eps, 0.1_wp, "time")
-      call check_true(error, all(is_next(:3)) .and. .not. any(is_next(4:)), "what closes")
-      call gaps_next_to_close(set, -way, time, is_next)
-      call check_near(error, time, 0.05_wp, 4.0_wp*eps, 0.1_wp, "time of the way back")
-      call check_equal(error, [count(is_next), findloc(is_next, .true., 1)], [1, 4], "on it")
-      set%target(2) = -0.01_wp
-      call gaps_next_to_close(set, way, time, is_next)
-      call check_near(error, time, 0.0_wp, 0.0_wp, 1.0_wp, "closed already")
-      call check_equal(error, [count(is_next), findloc(is_next, .true., 1)], [1, 2], "that one")
-      call gaps_next_to_close(set, 0.0_wp*way, time, is_next)
-      call check_true(error, time >= huge(time) .and. .not. any(is_next), "no way")
+      do k = 1, size(units)
+         way(1, :) = 0.0_wp
+         way(2, :) = -units(k)
+         call make_set(set, c, target, units(k))
+         call gaps_next_to_close(set, way, time, is_next)
+         call check_near(error, time, 0.1_wp, 4.0_wp*eps, 0.1_wp, "time")
+         call check_true(error, all(is_next(:3)) .and. .not. any(is_next(4:)), "what closes")
+         call gaps_next_to_close(set, -way, time, is_next)
+         call check_near(error, time, 0.05_wp, 4.0_wp*eps, 0.1_wp, "time of the way back")
+         call check_equal(error, [count(is_next), findloc(is_next, .true., 1)], [1, 4], "on it")
+         set%item([1, 2])%size = [0.11_wp, 0.09_wp]*units(k)
+         call gaps_next_guards(set, way, time, is_next)
+         call check_near(error, time, 0.1_wp, 4.0_wp*eps, 0.1_wp, "time of guards")
+         call check_true(error, all(is_next .eqv. [.true., .false., .true., .false., .false., &
+            .false.]), "within an edge")
+         set%item(:3)%size = 0.09_wp*units(k)
+         call gaps_next_guards(set, way, time, is_next)
+         call check_true(error, time >= huge(time) .and. .not. any(is_next), "none is so near")
+         set%target(2) = -0.01_wp*units(k)
+         call gaps_next_to_close(set, way, time, is_next)
+         call check_near(error, time, 0.0_wp, 0.0_wp, 1.0_wp, "closed already")
+         call check_equal(error, [count(is_next), findloc(is_next, .true., 1)], [1, 2], "that one")
+         call gaps_next_to_close(set, 0.0_wp*way, time, is_next)
+         call check_true(error, time >= huge(time) .and. .not. any(is_next), "no way")
+      end do
    end subroutine test_next
 
    subroutine test_closed(error)
       type(error_t), allocatable, intent(out) :: error
       type(constraint_set_t) :: set
       logical :: is_meant(4)
+      integer :: k
 
-      call make_set(set, reshape(spread(1.0_wp, 1, 8), [2, 4]), &
-         [0.9e-3_wp, 1.1e-3_wp, -1.0_wp, 0.0_wp])
-      is_meant = [.true., .true., .true., .false.]
-      call gaps_keep_closed(set, is_meant)
-      call check_true(error, all(is_meant .eqv. [.true., .false., .true., .false.]), "closed ones")
+      do k = 1, size(units)
+         call make_set(set, reshape(spread(1.0_wp, 1, 8), [2, 4]), &
+            [0.9e-3_wp, 1.1e-3_wp, -1.0_wp, 0.0_wp], units(k))
+         is_meant = [.true., .true., .true., .false.]
+         call gaps_keep_closed(set, is_meant)
+         call check_true(error, all(is_meant .eqv. [.true., .false., .true., .false.]), &
+            "closed ones")
+      end do
    end subroutine test_closed
 
    !> The upper block over a clamped one, its node 12 held along the floor, in a static step; the

@@ -9,9 +9,12 @@ module test_massless
       march_t
    use emcon_massless, only : massless_bare, massless_find, massless_follow, massless_return, &
       massless_shed
+   use emcon_motion, only : motion_evaluate
+   use emcon_phases, only : phase_enter, phase_vectors
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_t
    use emcon_steps, only : initiation_massless, initiation_persistent, load_point, load_t
+   use emcon_system, only : system_respond
    use emcon_term, only : term_box_t
    use emcon_term_registry, only : terms_create, terms_mass_rows, terms_massless
    use emcon_text, only : to_text
@@ -291,7 +294,8 @@ contains
    end subroutine test_return
 
    !> A block is thrown on a clamped one, forces pull at its massless nodes: as these settle anew
-   !> the forces work on them, and the energy stands.
+   !> the forces work on them, and the energy stands; then they are in balance with contacts that
+   !> push.
    subroutine test_loads(error)
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: n_step = 40
@@ -301,7 +305,7 @@ contains
       type(increment_t) :: increment
       type(load_t) :: pull
       real(wp) :: total, drift
-      integer :: k, n_settled
+      integer :: k, n_settled, phase
 
       call make_two_blocks(scene, 0.0927_wp, lower, upper)
       call add_step(scene, .false., 0.02_wp, n_step)
@@ -326,12 +330,48 @@ contains
          call march_increment(march, scene, increment, error)
          if (allocated(error)) return
          drift = max(drift, abs(march%ledger%total - total))
+         call phase_enter(march%system%phases, phase_vectors, phase)
+         call check_equal(error, phase, phase_vectors, "phases that were entered were left")
+         if (allocated(error)) return
          if (.not. march%layer%is_settled) cycle
+         call check_settled(march, error)
+         if (allocated(error)) return
          if (abs(march%layer%work) > 1.0e-4_wp) n_settled = n_settled + 1
       end do
       call check_true(error, n_settled > 0, "forces work on what settles")
       call check_near(error, drift, 0.0_wp, 8.0_wp*real(n_step, wp)*tol, total, "energy")
       call march_free(march)
    end subroutine test_loads
+
+   !> Of a layer that has settled.
+   subroutine check_settled(march, error)
+      type(march_t), intent(inout) :: march
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), allocatable :: left(:, :)
+      integer :: k, i
+
+      associate (layer => march%layer, set => march%layer%active%set)
+         call motion_evaluate(layer%motion)
+         call system_respond(layer%system, layer%motion, .false., .true.)
+         left = layer%system%response%residual
+         do k = 1, set%n
+            associate (item => set%item(k), m => set%item(k)%n_node)
+               left(:, item%node(:m)) = left(:, item%node(:m)) - set%lam(k)*item%c(:, :m)
+            end associate
+         end do
+         do i = 1, size(left, 2)
+            if (layer%is_massless(i)) call check_near(error, left(:, i), [0.0_wp, 0.0_wp], &
+               1.0e4_wp*tol, maxval(layer%system%response%magnitude), "balance of node " &
+               // to_text(i))
+         end do
+         call check_true(error, count(layer%acts) == set%n .and. all(layer%acts(set%id(:set%n))), &
+            "what acts in it acts")
+         call check_near(error, layer%lam(set%id(:set%n)), set%lam(:set%n), 0.0_wp, 1.0_wp, &
+            "as it pushes")
+         call check_near(error, sum(layer%lam), sum(set%lam(:set%n)), tol, 10.0_wp, "and no other")
+         call check_true(error, minval(set%lam(:set%n)) >= -tol, "it pushes")
+         call check_true(error, .not. any(layer%needs_mass), "none needs mass")
+      end associate
+   end subroutine check_settled
 
 end module test_massless

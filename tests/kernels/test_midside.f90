@@ -32,6 +32,7 @@ contains
 
       tests = [ &
          test_case_t("a uniform pressure on a straight side", test_pressure), &
+         test_case_t("a node in the middle alone, and ends alone", test_few), &
          test_case_t("contact points turn and move with a curved side", test_rigid), &
          test_case_t("how far they move at most", test_stretch), &
          test_case_t("surfaces of faces, of edges and of nodes", test_surfaces), &
@@ -95,6 +96,38 @@ contains
          deallocate(item%node, item%g, item%c, item%h)
       end do
    end subroutine test_pressure
+
+   !> What pushes at the point in the middle alone is handed to its node and its ends by 4/3 and -1/6;
+   !> what pushes at ends alone stays there.
+   subroutine test_few(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(midside_t) :: midside
+      type(condition_t) :: item
+      integer :: k, side(3)
+
+      call make_rows(scene)
+      call midside_init(midside, scene, [2])
+      side = scene%element%node([1, 2, 5], 3)
+      do k = 1, 2
+         call condition_resize(item, k)
+         item%n_slave = k
+         item%node(:k) = merge(side([3, 3]), side([1, 2]), k == 1)
+         item%g(:, :k) = reshape([0.5_wp, 1.0_wp, 2.0_wp, 3.0_wp], [2, k])
+         item%c = item%g
+         item%h = 0.0_wp
+         call midside_distribute(midside, item)
+         call check_equal(error, item%n_slave, merge(3, 2, k == 1), "slave nodes")
+         if (k == 1) call check_equal(error, item%node(:item%n_node), side([3, 1, 2]), "nodes")
+         if (k == 2) call check_equal(error, item%node(:item%n_node), side([1, 2]), "the same")
+         if (allocated(error)) return
+         if (k == 1) call check_near(error, item%g(:, :3), reshape([0.5_wp, 1.0_wp, 0.5_wp, 1.0_wp, &
+            0.5_wp, 1.0_wp], [2, 3])*spread([8.0_wp, -1.0_wp, -1.0_wp]/6.0_wp, 1, 2), tol, 1.0_wp, &
+            "handed out")
+         if (k == 2) call check_near(error, item%g(:, :2), reshape([0.5_wp, 1.0_wp, 2.0_wp, 3.0_wp], &
+            [2, 2]), 0.0_wp, 1.0_wp, "as it was")
+      end do
+   end subroutine test_few
 
    !> A motion without strain, from any shape: contact points keep their places in the body, and at
    !> rest they are the nodes.

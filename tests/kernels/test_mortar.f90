@@ -49,6 +49,7 @@ contains
          test_case_t("gradient and second derivatives", test_derivatives), &
          test_case_t("normal force by the multiplier", test_normal), &
          test_case_t("and its derivatives", test_normal_slope), &
+         test_case_t("pushes at the end, slip of the step", test_pushes_at_end), &
          test_case_t("notch: nodes on both sides of a pair", test_notch), &
          test_case_t("the nearer of two layers", test_layers), &
          test_case_t("not the back of a thin body", test_thin), &
@@ -518,7 +519,7 @@ contains
       type(condition_t) :: item(3)
       real(wp), allocatable :: still(:, :)
       real(wp) :: area(0:1)
-      integer :: i, j, k, n_part
+      integer :: e, i, j, k, n_part
 
       n_part = 0
       do i = 1, n_combination
@@ -536,6 +537,9 @@ contains
                if (area(1) < mortar%scale(j)) cycle
                mortar%scale(j) = 0.25_wp
                call mortar%evaluate([j], scene%x, still, still, [0.0_wp], item(j:j))
+               ! Of its edges and of no others.
+               call check_true(error, all(mortar%is_formed .eqv. [(any(mortar%node_edge(:, j) == e), &
+                  e = 1, 2)]), "edges that are formed" // text_of(i, k))
                if (area(1) < 0.9_wp*mortar%whole(j)) n_part = n_part + 1
                call check_near(error, condition_normal(item(j)), 4.0_wp*area(1), tol, 1.0_wp, &
                   "normal force" // text_of(i, k))
@@ -577,6 +581,52 @@ contains
       end subroutine by_schemes
 
    end subroutine test_normal
+
+   !> Where a scheme pushes at the end, and in equilibrium, slip and its gradient are those over the
+   !> step; what pushes at the end alone opens the gap of the step.
+   subroutine test_pushes_at_end(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: none(3) = 0.0_wp
+      type(scene_t) :: scene
+      type(mortar_t) :: mortar
+      type(motion_t) :: motion
+      type(condition_t), dimension(3) :: over, one
+      real(wp), allocatable :: u(:, :), du(:, :)
+      integer :: i, j, k, scheme, m
+
+      over%has_friction = .true.
+      one%has_friction = .true.
+      do i = 1, n_combination
+         do k = 1, 3
+            call draw(i, k, 0.1_wp, scene, mortar, u, du, error)
+            if (allocated(error)) return
+            call contact_laws_of_surface(interaction_t(friction=0.5_wp), mortar%laws)
+            call mortar%begin_step(scene%x, u, du)
+            call mortar%measure(scene%x, u, du)
+            call mortar%evaluate([1, 2, 3], scene%x, u, du, none, over)
+            call motion_init(motion, scene%x)
+            motion%u0 = u
+            motion%du = du
+            do scheme = 1, 2
+               motion%evaluation = evaluation_at_end
+               if (scheme == 2) motion%evaluation = evaluation_moving(1.0_wp, 0.5_wp, 1.0_wp)
+               if (scheme == 2) motion%evaluation%pushes_at_end = .true.
+               call motion_evaluate(motion)
+               call mortar%linearise([1, 2, 3], motion, none, one)
+               do j = 1, 3
+                  m = over(j)%n_node
+                  call check_equal(error, one(j)%node(:one(j)%n_node), over(j)%node(:m), "nodes")
+                  if (allocated(error)) return
+                  call check_near(error, one(j)%slip(1), over(j)%slip(1), 0.0_wp, 1.0_wp, "slip")
+                  call check_near(error, one(j)%t1(:, :m, 1), over(j)%t1(:, :m, 1), 0.0_wp, 1.0_wp, &
+                     "its gradient" // text_of(i, k))
+                  if (scheme == 2) call check_near(error, [one(j)%gap0, one(j)%dgap], &
+                     [over(j)%gap0, over(j)%dgap], 0.0_wp, 1.0_wp, "gap of the step")
+               end do
+            end do
+         end do
+      end do
+   end subroutine test_pushes_at_end
 
    !> Central differences, with the steps and bounds of `compare`; none where a gradient jumps.
    subroutine test_normal_slope(error)
@@ -866,7 +916,7 @@ contains
    end subroutine test_near
 
    !> The part of slip that is by the node itself: a step that is the same again changes nothing,
-   !> one to another place does.
+   !> one past the end of the master and the one back change it by as much.
    subroutine test_slip_share(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
@@ -888,6 +938,13 @@ contains
          call mortar%begin_step(scene%x, u, still)
          call check_near(error, mortar%state%slip_shift, 0.0_wp*first, tol, 1.0_wp, &
             "flat and covered all along")
+         u(1, 11:) = 2.75_wp
+         call mortar%begin_step(scene%x, u, still)
+         first = mortar%state%slip_shift
+         call check_true(error, maxval(first) > 0.01_wp, "past the end, pair " // to_text(i))
+         u(1, 11:) = 0.25_wp
+         call mortar%begin_step(scene%x, u, still)
+         call check_near(error, mortar%state%slip_shift, first, tol, 1.0_wp, "and back")
          if (allocated(error)) return
       end do
    end subroutine test_slip_share

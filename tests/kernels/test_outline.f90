@@ -17,6 +17,9 @@ module test_outline
    private
    public :: collect_outline
 
+   !> Some dozen roundings of quantities of size 1.
+   real(wp), parameter :: tol = 64.0_wp*epsilon(1.0_wp)
+
 contains
 
    subroutine collect_outline(tests)
@@ -27,7 +30,10 @@ contains
          test_case_t("where outlines meet in a node", test_pinch), &
          test_case_t("edges of surfaces without elements", test_lone), &
          test_case_t("a single piece without a pair", test_single), &
-         test_case_t("curves of unequal edges rise as their circle", test_curves)]
+         test_case_t("curves of unequal edges rise as their circle", test_curves), &
+         test_case_t("smoothed edges as cubics", test_cubics), &
+         test_case_t("a hollow arc against a round one", test_hollow), &
+         test_case_t("arcs end at corners, to the left or right", test_corners)]
    end subroutine collect_outline
 
    !> Blocks of 3 x 2, 2 x 1 and 1 x 1 cells of heights 1/2, 1 and 2, of quadrilaterals or not.
@@ -187,7 +193,7 @@ contains
       type(scene_t) :: scene
       type(outline_t) :: outline
       type(outline_links_t) :: links
-      type(outline_curves_t) :: curves
+      type(outline_curves_t) :: curves, more
       type(contact_options_t) :: options
       real(wp), allocatable :: still(:, :)
       real(wp) :: length, share, overlap
@@ -220,6 +226,195 @@ contains
          end associate
       end do
       call check_true(error, n_seen == 18, "smoothed edges: " // to_text(n_seen))
+      ! A pair whose master is a part of that: the curves of the first one stay.
+      scene%surface = [scene%surface, scene%surface(scene%pair(1)%master)]
+      associate (part => scene%surface(size(scene%surface)))
+         part%element = part%element(4:9)
+         part%face = part%face(4:9)
+      end associate
+      scene%pair = [scene%pair, scene%pair]
+      scene%pair(2)%master = size(scene%surface)
+      call outline_curves_init(more, outline, links, scene, options)
+      do e = 1, size(outline%facet, 2)
+         associate (share => [0.25_wp, 0.25_wp])
+            call check_near(error, outline_curves_overlap(more, e, e, share, scene%x, still), &
+               outline_curves_overlap(curves, e, e, share, scene%x, still), 0.0_wp, 1.0_wp, &
+               "with a part of the master once more, edge " // to_text(e))
+         end associate
+      end do
    end subroutine test_curves
+
+   !> With the tangents of parabolas through three nodes at both ends, within the surface.
+   subroutine test_cubics(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: share = 0.3_wp
+      type(scene_t) :: scene
+      type(outline_t) :: outline
+      type(outline_links_t) :: links
+      type(outline_curves_t) :: curves
+      type(contact_options_t) :: options
+      real(wp), allocatable :: still(:, :)
+      real(wp) :: edge(2, 3), l(3), tangent(2, 2), offset(2)
+      integer :: e, i, n_seen
+
+      call make_rings(scene, [8, 20], 0.0_wp, .false.)
+      options%smoothing = smoothing_hermite
+      call outline_init(outline, links, scene)
+      call outline_curves_init(curves, outline, links, scene, options)
+      allocate(still, source=0.0_wp*scene%x)
+      n_seen = 0
+      do e = 1, size(outline%facet, 2)
+         if (curves%number(e) == 0) cycle
+         associate (piece => curves%piece(curves%number(e)), before => links%link(1, e), &
+               after => links%link(2, e))
+            call check_true(error, all(piece%node(:, 0) == outline%facet(:, e)), "its nodes")
+            do i = -1, 1, 2
+               associate (beside => merge(before, after, i < 0))
+                  ! Where the surface ends the outline goes on round a corner.
+                  call check_true(error, all(piece%node(:, i) == merge(outline%facet(:, beside), &
+                     0, curves%number(beside) > 0)), "what it is joined to")
+               end associate
+            end do
+            if (allocated(error)) return
+            if (any(piece%node == 0)) cycle
+            n_seen = n_seen + 1
+            edge = scene%x(:, piece%node(2, :)) - scene%x(:, piece%node(1, :))
+            l = norm2(edge, 1)
+            do i = 1, 2
+               tangent(:, i) = (l(i + 1)/l(i)*edge(:, i) + l(i)/l(i + 1)*edge(:, i + 1)) &
+                  /(l(i) + l(i + 1))
+            end do
+            offset = share*(1.0_wp - share)*l(2)*((1.0_wp - share)*tangent(:, 1) &
+               - share*tangent(:, 2)) + share*(1.0_wp - share)*(2.0_wp*share - 1.0_wp)*edge(:, 2)
+            ! To the right of the edge is in front of it: a hollow lies to the left.
+            call check_near(error, outline_curves_overlap(curves, e, e, [share, share], scene%x, &
+               still), 2.0_wp*(edge(1, 2)*offset(2) - edge(2, 2)*offset(1))/l(2), tol, l(2), &
+               "edge " // to_text(e))
+         end associate
+      end do
+      call check_equal(error, n_seen, 18, "edges within")
+      ! A pair with options of its own is smoothed as these say, or not at all.
+      scene%pair%has_options = .true.
+      call outline_curves_init(curves, outline, links, scene, options)
+      call check_true(error, all(curves%number == 0), "not by its own options")
+      scene%pair%options%smoothing = smoothing_hermite
+      call outline_curves_init(curves, outline, links, scene, contact_options_t())
+      call check_equal(error, count(curves%number > 0), 20, "by its own options alone")
+   end subroutine test_cubics
+
+   !> The inside of a sleeve and the outside of a hub of one radius: a hollow edge lies behind its
+   !> chord at its place, and rests on a round one by the smaller of both sagittas, but for the
+   !> square of the angle of an edge.
+   subroutine test_hollow(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: radius = 2.0_wp, share(2) = [0.3_wp, 0.1_wp]
+      integer, parameter :: n(2, 2) = reshape([8, 20, 20, 8], [2, 2])
+      type(scene_t) :: scene
+      type(outline_t) :: outline
+      type(outline_links_t) :: links
+      type(outline_curves_t) :: curves
+      real(wp), allocatable :: still(:, :)
+      real(wp) :: sagitta(2)
+      integer :: e(2), i, k, turn
+
+      do k = 1, 2
+         call make_rings(scene, n(:, k), 0.0_wp, .false.)
+         call outline_init(outline, links, scene)
+         call outline_curves_init(curves, outline, links, scene, contact_options_t())
+         still = 0.0_wp*scene%x
+         e = [edge_at(2, n(2, k)), edge_at(1, n(1, k))]
+         do i = 1, 2
+            associate (node => outline%facet(:, e(i)))
+               sagitta(i) = norm2(scene%x(:, node(2)) - scene%x(:, node(1)))**2/(8.0_wp*radius)
+            end associate
+         end do
+         do turn = 1, 2
+            call check_near(error, outline_curves_overlap(curves, e(turn), e(3 - turn), share([turn, &
+               3 - turn]), scene%x, still), 4.0_wp*share(1)*(1.0_wp - share(1))*sagitta(1) &
+               + minval(sagitta), 0.03_wp, sagitta(1) + minval(sagitta), "rings " // to_text(k))
+         end do
+      end do
+
+   contains
+
+      !> The edge in the middle of those of piece `p` that lie at the radius of both.
+      integer function edge_at(p, n) result(found)
+         integer, intent(in) :: p, n
+         integer :: f, n_found
+
+         n_found = 0
+         found = 0
+         do f = outline%start(p), outline%start(p + 1) - 1
+            associate (a => outline%facet(1, f), b => outline%facet(2, f))
+               if (max(abs(norm2(scene%x(:, a)) - radius), abs(norm2(scene%x(:, b)) - radius)) &
+                  > tol) cycle
+            end associate
+            n_found = n_found + 1
+            if (n_found == n/2) found = f
+         end do
+      end function edge_at
+
+   end subroutine test_hollow
+
+   !> An L of three cells of 2 x 2, anyhow turned: nodes along the sides as far as they are straight.
+   subroutine test_corners(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(block_t) :: block
+      type(outline_t) :: outline
+      type(outline_links_t) :: links
+      type(outline_curves_t) :: curves
+      integer :: e, i, f, k, at
+      real(wp) :: turn
+
+      do k = 0, 7
+         call make_block(scene, "CPE4", [4, 4], block)
+         associate (kept => [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 13, 14])
+            scene%element%node = scene%element%node(:, kept)
+            scene%element%kind = scene%element%kind(kept)
+            scene%element%section = scene%element%section(kept)
+         end associate
+         call add_surface(scene, "SELF", block_t(kind=block%kind, n=[1, 1]), [bottom])
+         scene%pair = [contact_pair_t(slave=1, master=1)]
+         turn = 0.7_wp*k
+         scene%x = matmul(reshape([cos(turn), sin(turn), -sin(turn), cos(turn)], [2, 2]), scene%x)
+         call outline_init(outline, links, scene)
+         call outline_curves_init(curves, outline, links, scene, &
+            contact_options_t(smoothing_angle=20.0_wp))
+         call check_equal(error, size(outline%facet, 2), 16, "edges")
+         if (allocated(error)) return
+         do e = 1, size(outline%facet, 2)
+            call check_true(error, all(curves%row(1:2, e) == outline%facet(:, e)), "its own nodes")
+            do i = 1, 2
+               f = e
+               do at = 1, 2
+                  if (f > 0) then
+                     if (is_straight(f, links%link(i, f))) then
+                        f = links%link(i, f)
+                     else
+                        f = 0
+                     end if
+                  end if
+                  associate (node => curves%row(merge(1 - at, 2 + at, i == 1), e))
+                     if (f == 0) call check_equal(error, node, 0, "beyond a corner")
+                     if (f > 0) call check_equal(error, node, outline%facet(i, f), "along a side")
+                  end associate
+               end do
+            end do
+         end do
+      end do
+
+   contains
+
+      pure logical function is_straight(a, b)
+         integer, intent(in) :: a, b
+
+         associate (x => scene%x, one => outline%facet(:, a), other => outline%facet(:, b))
+            is_straight = abs(dot_product(x(:, one(2)) - x(:, one(1)), x(:, other(2)) &
+               - x(:, other(1)))) > 0.5_wp
+         end associate
+      end function is_straight
+
+   end subroutine test_corners
 
 end module test_outline
