@@ -139,7 +139,8 @@ contains
             if (own /= other .and. (scene%pair(own)%slave /= scene%pair(other)%master &
                .or. scene%pair(own)%master /= scene%pair(other)%slave)) cycle
          end associate
-         total = total + sum(inner(system%contact(i)%contact%node))
+         total = sum(inner(system%contact(i)%contact%node))
+         return
       end do
    end function of_opposite
 

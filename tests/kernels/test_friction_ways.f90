@@ -47,6 +47,7 @@ contains
       call open_given_contact(system, active, motion, reshape(spread(gap_state_t(is_near=.true., &
          is_over=.true., size=1.0_wp), 1, n), [n, 1]), 0, coulomb_t(mu=mu, restitution=0.5_wp))
       active%friction%law(4)%mu = 0.0_wp
+      active%friction%mu = active%friction%law%mu
       active%start%was_active = spread(.false., 1, n)
       motion%evaluation = evaluation_moving(1.0_wp, 0.5_wp, 2.0_wp)
       associate (numbering => system%space%numbering)
