@@ -137,8 +137,8 @@ contains
    end subroutine find_targets
 
    !> Contacts whose slave node is held in some direction, and which nothing that is free to move
-   !> makes slide, as on a line of symmetry, do not rub: any friction would satisfy the law there, and
-   !> none is what two halves leave each other. What is driven along a surface does.
+   !> makes slide, as on a line of symmetry, do not rub: any friction would satisfy the law there,
+   !> and none is what two halves leave each other. What is driven along a surface does.
    pure subroutine leave_still(self, system, motion)
       type(friction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
@@ -156,7 +156,8 @@ contains
       driven = merge(motion%du, 0.0_wp, holds)
       own = 0.0_wp
       do pair = 1, size(system%contact)
-         associate (contact => system%contact(pair)%contact, before => system%first_constraint(pair))
+         associate (contact => system%contact(pair)%contact, &
+               before => system%first_constraint(pair))
             do i = 1, contact%n_constraint
                associate (node => contact%node(i), size => contact%state(i)%size)
                   if (.not. (self%mu(before + i) > 0.0_wp .and. any(holds(:, node)))) cycle

@@ -123,8 +123,8 @@ contains
       end associate
    end subroutine set_contact
 
-   !> The stiffness at the nodes of the other side of contact `k`, if these are some contact's: of its
-   !> pair, or of that the other way round.
+   !> The stiffness at the nodes of the other side of contact `k`, if these are some contact's: of
+   !> its pair, or of that the other way round.
    pure real(wp) function of_opposite(system, scene, k, inner) result(total)
       type(system_t), intent(in) :: system
       type(scene_t), intent(in) :: scene
