@@ -18,6 +18,8 @@ module emcon_mechanism_text
 
    !> Bodies of an assembly that are named.
    integer, parameter :: most_named = 10
+   !> What turns by less than this part of its way over its size slides, on a surface that is bent.
+   real(dp), parameter :: slides = 0.1_dp
 
 contains
 
@@ -215,6 +217,10 @@ contains
       if (allocated(error)) return
       call find_null_space(transpose(held), tol, g, error)
       if (allocated(error)) return
+      if (size(g, 2) == 1) then
+         if (norm2(g(bodies%n_dim + 1:, 1))*maxval(bodies%size(member)) < slides &
+            *norm2(g(:bodies%n_dim, 1))) g(bodies%n_dim + 1:, 1) = 0.0_dp
+      end if
       call find_null_space(g(bodies%n_dim + 1:, :), tol, shift, error)
       if (allocated(error)) return
       text = ""

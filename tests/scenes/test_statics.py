@@ -5,6 +5,7 @@ import math
 
 import numpy as np
 import pytest
+from plain_scenes import Scene
 
 from scene_tools import run_deck
 
@@ -541,3 +542,16 @@ def test_one_element_of_few_points(tmp_path):
     run = solve(tmp_path, "\n".join([*lines, "*CLOAD", "3, 1, 0.01", "*END STEP", ""]), code=3)
     assert "; elements of type CPE8R, as 7, have motions without strain" in run.errors
     assert run.errors.rstrip().endswith("take two across, or CPE8")
+
+
+def test_what_slides_on_a_bent_surface_is_not_said_to_rotate(tmp_path):
+    """A block lies on another one without friction, pressed by its weight: it is free to slide, and
+    turns as the surface under it bends."""
+    scene = Scene(1.0, 1.0, gravity=1.0)
+    scene.block("LOW", (0, 0), (2, 1), (4, 2)).hold("LOW", lambda x, y: y < 0.01)
+    scene.block("HIGH", (0.3, 1), (1, 0.5), (2, 1))
+    scene.pairs = [("HIGH", "LOW")]
+    deck = scene.deck("AUTO")
+    deck.replace("*DYNAMIC, DIRECT", "*STATIC, DIRECT")
+    run = run_deck(deck, tmp_path, code=3, formulation="MORTAR")
+    assert "body of element 9 is free to move in x" in run.errors and "rotate" not in run.errors
