@@ -22,9 +22,9 @@ module emcon_march_parts
    private
    public :: march_in_parts, march_attempt, march_match, march_stop, march_reason
 
-   !> Halvings of an increment after which nodes without mass take it back: what a shorter step does
-   !> not balance the next one does not.
-   integer, parameter :: return_level = 1
+   !> Halvings of an increment after which nodes without mass take it back: what two shorter steps do
+   !> not balance the next ones do not.
+   integer, parameter :: return_level = 2
    !> Parts of an increment that are tried at most.
    integer, parameter :: most_parts = 4000
    !> Nodes named in a message.

@@ -217,8 +217,8 @@ contains
       if (allocated(error)) return
       call find_null_space(transpose(held), tol, g, error)
       if (allocated(error)) return
-      if (size(g, 2) == 1) then
-         if (norm2(g(bodies%n_dim + 1:, 1))*maxval(bodies%size(member)) < slides &
+      if (size(g, 2) == 1 .and. size(member) == 1) then
+         if (norm2(g(bodies%n_dim + 1:, 1))*bodies%size(member(1)) < slides &
             *norm2(g(:bodies%n_dim, 1))) g(bodies%n_dim + 1:, 1) = 0.0_dp
       end if
       call find_null_space(g(bodies%n_dim + 1:, :), tol, shift, error)

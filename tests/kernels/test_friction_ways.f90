@@ -51,6 +51,7 @@ contains
       active%start%was_active = spread(.false., 1, n)
       motion%evaluation = evaluation_moving(1.0_wp, 0.5_wp, 2.0_wp)
       associate (numbering => system%space%numbering)
+         numbering%unknown = reshape([1, 2, 0, 0, 3, 4, 5, 6], [2, n])
          numbering%start = [0, 1, 2, 3, 4, 5, 6, 7, 9]
          numbering%column = [1, 2, 0, 0, 3, 4, 5, 6, 1]
          numbering%weight = [(1.0_wp, i = 1, 8), 0.5_wp]
