@@ -22,8 +22,8 @@ module emcon_march_parts
    private
    public :: march_in_parts, march_attempt, march_match, march_stop, march_reason
 
-   !> Halvings of an increment after which nodes without mass take it back: what two shorter steps do
-   !> not balance the next ones do not.
+   !> Halvings of an increment after which nodes without mass take it back: what two shorter steps
+   !> do not balance the next ones do not.
    integer, parameter :: return_level = 2
    !> Parts of an increment that are tried at most.
    integer, parameter :: most_parts = 4000
