@@ -8,6 +8,7 @@ module emcon_contact_rounds
    use emcon_constraints, only : constraints_evaluate
    use emcon_contact_candidates, only : candidates_are_many, candidates_keep_forces, &
       candidates_look, candidates_select
+   use emcon_contact_conditions, only : gap_noise
    use emcon_contact_newton, only : contact_newton_solve
    use emcon_contact_sets, only : contact_sets_hold, contact_sets_solve, &
       contact_sets_solve_by_laws
@@ -158,6 +159,11 @@ contains
          do k = 1, size(law)
             associate (id => set%id(set%n_permanent + k))
                acts = law(k)%status%kind /= contact_open
+               ! What touches holds a body that nothing pushes.
+               associate (place => set%n_permanent + k)
+                  if (self%support%is_needed) acts = acts .or. &
+                     abs(set%defect(place)) <= gap_noise*set%item(place)%size
+               end associate
                if (friction%is_on .and. acts) friction%law(id)%status = law(k)%status
                self%candidates%acts(id) = acts
             end associate
