@@ -26,8 +26,9 @@ module emcon_friction
    real(wp), parameter, public :: most_shift = 5.0e-3_wp
    integer, parameter, public :: most_lagged = 2
 
-   !> Displacements of this part of an edge tell whether a contact slides by them.
-   real(wp), parameter :: still = 1.0e-3_wp
+   !> Displacements of this part of an edge tell whether a contact slides by them: by that part of
+   !> them. What is driven slides by more than its rounding, by the edge.
+   real(wp), parameter :: still = 1.0e-3_wp, rounding = 64.0_wp*epsilon(1.0_wp)
 
    type :: friction_t
       logical :: is_on = .false. !! some contact has friction; else nothing is allocated
@@ -162,10 +163,10 @@ contains
                associate (node => contact%node(i), size => contact%state(i)%size)
                   if (.not. (self%mu(before + i) > 0.0_wp .and. any(holds(:, node)))) cycle
                   own(:, node) = size
-                  if (slides_by(contact, i, motion, own, size)) then
-                     if (.not. (slides_by(contact, i, motion, size*free, size) .or. &
-                        slides_by(contact, i, motion, driven, size))) self%law(before + i)%mu &
-                        = 0.0_wp
+                  if (slides_by(contact, i, motion, own, still*still*size)) then
+                     if (.not. (slides_by(contact, i, motion, size*free, still*still*size) &
+                        .or. slides_by(contact, i, motion, driven, rounding*size))) &
+                        self%law(before + i)%mu = 0.0_wp
                   end if
                   own(:, node) = 0.0_wp
                end associate
@@ -175,14 +176,14 @@ contains
    end subroutine leave_still
 
    !> Does a displacement make the `i`-th constraint of `contact` slide?
-   pure logical function slides_by(contact, i, motion, du, size) result(slides)
+   pure logical function slides_by(contact, i, motion, du, least) result(slides)
       class(contact_t), intent(in) :: contact
       integer, intent(in) :: i
       type(motion_t), intent(in) :: motion
       real(wp), intent(in), contiguous :: du(:, :)     !! (n_dim, n_node) [L]
-      real(wp), intent(in) :: size               !! of an edge [L]
+      real(wp), intent(in) :: least              !! slip that counts [L]
 
-      slides = norm2(contact%slip(i, motion%x, motion%u0, du)) > still*still*size
+      slides = norm2(contact%slip(i, motion%x, motion%u0, du)) > least
    end function slides_by
 
    !> Give the conditions of `set`, just selected, their laws, and what sticks rows of its slips.

@@ -599,3 +599,17 @@ def test_one_element_on_a_line_of_symmetry(tmp_path):
     run = run_deck(deck, tmp_path, **NODES)
     assert run.verdict["verdict"] == "good" and run.history["newton"].sum() < 30
     assert run.history["pair1_force_y"][-1] == pytest.approx(10.0, rel=1e-9)
+
+
+@pytest.mark.parametrize("way", [1e-2, 1e-8])
+def test_what_is_driven_along_a_fixed_surface_rubs(way, tmp_path):
+    """One element whose motion along is driven, however slowly: mu times what it is pressed by."""
+    scene = Scene(0.25, 1.0)
+    scene.block("BODY", (0, 0), (2, 1), (1, 1), stiffness=1e3)
+    scene.hold("BODY", lambda x, y: True, "1, 1", way)
+    deck = rubbing(with_profile(scene, "START, -5., 0.\nLINE, 9., 0."), 0.3)
+    deck.replace("*DYNAMIC, DIRECT", "*STATIC, DIRECT")
+    deck.replace("*CONSTRAINT METHOD", "*CLOAD\n3, 2, -5.\n4, 2, -5.\n*CONSTRAINT METHOD")
+    run = run_deck(deck, tmp_path, **NODES)
+    assert run.verdict["verdict"] == "good"
+    assert np.abs(run.history["pair1_force_x"][1:]/run.history["pair1_force_y"][1:]) == pytest.approx(0.3, rel=1e-9)
