@@ -1,5 +1,6 @@
 !> The first guess of a step: prescribed motion, and what the velocities lead to.
 module emcon_march_guess
+   use emcon_convergence, only : round_off
    use emcon_evaluation, only : evaluation_displacement, evaluation_has_inertia, &
       evaluation_velocity, instant_later, instant_t
    use emcon_kinds, only : wp
@@ -9,6 +10,7 @@ module emcon_march_guess
    use emcon_numbering, only : spread_dependent
    use emcon_prescribed, only : prescribed_motion
    use emcon_scene, only : scene_t
+   use emcon_space, only : space_t
    use emcon_system, only : system_t
    implicit none
    private
@@ -39,6 +41,8 @@ contains
       self%motion%du = 0.0_wp
       if (has_inertia .and. .not. is_at_rest) self%motion%du = h*self%state%v
       where (.not. self%system%space%is_alive) self%motion%du = 0.0_wp
+      if (.not. self%explicit%is_on) call round_to_rest(self%system%space, scene%x, &
+         self%state%u, self%motion%du)
       self%newton%driven = 0.0_wp
       associate (state => self%state, step => scene%step(self%state%clock%i_step))
          do k = 1, size(step%prescribed)
@@ -62,6 +66,31 @@ contains
       call follow_links(self%system, self%motion%offset)
       call follow_links(self%system, self%newton%driven)
    end subroutine march_guess
+
+   !> What holds a body at rest lets it move by round-off, which its velocity would carry on from
+   !> step to step: bodies that go no farther than their places are rounded stay.
+   pure subroutine round_to_rest(space, x, u, du)
+      type(space_t), intent(in) :: space
+      real(wp), intent(in) :: x(:, :), u(:, :)   !! (n_dim, n_node) places and the way to them [L]
+      real(wp), intent(inout) :: du(:, :)        !! (n_dim, n_node) the guess [L]
+      real(wp) :: farthest, moved
+      integer :: b, i
+
+      do b = 1, space%n_body
+         associate (member => space%member(space%first(b):space%first(b + 1) - 1))
+            farthest = 0.0_wp
+            moved = 0.0_wp
+            do i = 1, size(member)
+               farthest = max(farthest, maxval(abs(x(:, member(i)) + u(:, member(i)))))
+               moved = max(moved, maxval(abs(du(:, member(i)))))
+            end do
+            if (moved > round_off*farthest) cycle
+            do i = 1, size(member)
+               du(:, member(i)) = 0.0_wp
+            end do
+         end associate
+      end do
+   end subroutine round_to_rest
 
    !> The velocities at the end of the solved step; those that are prescribed stand.
    subroutine end_velocities(system, motion, v)

@@ -26,6 +26,8 @@ module emcon_space
       logical, allocatable :: has_motion(:)      !! (n_dim + turns) rigid ones, and so momenta
       integer :: n_body = 0
       integer, allocatable :: body(:)            !! (n_node) connected part; 0: of none
+      !> Nodes body by body, those of body b: member(first(b):first(b + 1) - 1)
+      integer, allocatable :: first(:), member(:)
       logical, allocatable :: is_alive(:, :)     !! (n_dim, n_node) in a term, a row
       type(linear_rows_t) :: linear              !! rows of rigid bodies, ties and equations
       type(numbering_t) :: linked                !! linear constraints eliminated; if there are any
@@ -91,6 +93,7 @@ contains
       call linear_rows_init(self%linear, scene)
       call bodies_find_lists(lists%start, (lists%freedom - 1)/lists%n_dim + 1, n_node, self%body, &
          self%n_body)
+      call list_members(self)
       allocate(is_alive(lists%n_dim*n_node), source=.false.)
       is_alive(lists%freedom) = .true.
       do i = 1, size(scene%equation)
@@ -105,6 +108,28 @@ contains
       end do
       allocate(self%unresolved(0))
    end subroutine space_init
+
+   !> The nodes of each body.
+   pure subroutine list_members(self)
+      type(space_t), intent(inout) :: self
+      integer :: last(self%n_body), b, i
+
+      last = 0
+      do i = 1, size(self%body)
+         if (self%body(i) > 0) last(self%body(i)) = last(self%body(i)) + 1
+      end do
+      allocate(self%first(self%n_body + 1), self%member(sum(last)))
+      self%first(1) = 1
+      do b = 1, self%n_body
+         self%first(b + 1) = self%first(b) + last(b)
+      end do
+      last = self%first(:self%n_body) - 1
+      do i = 1, size(self%body)
+         if (self%body(i) == 0) cycle
+         last(self%body(i)) = last(self%body(i)) + 1
+         self%member(last(self%body(i))) = i
+      end do
+   end subroutine list_members
 
    !> Number the unknowns of step `i_step` and lay out the matrix between them. Linear constraints
    !> are eliminated, less those that follow from others, unless the step asks for multipliers or
