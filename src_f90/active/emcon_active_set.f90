@@ -15,7 +15,7 @@ module emcon_active_set
    use emcon_motion_bound, only : largest_motion, motion_bound_t, motion_bound_add
    use emcon_overlap_query, only : overlap_names, overlap_t
    use emcon_phases, only : phase_enter, phase_gaps, phase_leave
-   use emcon_penalty, only : penalty_owes, penalty_select, penalty_state_t
+   use emcon_penalty, only : penalty_forget, penalty_owes, penalty_select, penalty_state_t
    use emcon_scene, only : scene_t
    use emcon_state, only : contact_state_t, state_t
    use emcon_steps, only : step_is_dynamic, step_t
@@ -246,7 +246,7 @@ contains
       self%lam = self%start%lam0
       self%n_newton = 0
       self%n_stale = 0
-      self%penalty%n_augmentation = 0
+      call penalty_forget(self%penalty)
       if (self%near_laws%is_on) self%near_laws%is_near = .false.
       self%is_candidate = self%start%was_active
       self%is_left_out = .false.

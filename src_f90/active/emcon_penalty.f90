@@ -13,13 +13,17 @@ module emcon_penalty
    use emcon_text, only : note_add, to_text
    implicit none
    private
-   public :: penalty_state_t, penalty_begin_step, penalty_select, penalty_augment, &
+   public :: penalty_state_t, penalty_begin_step, penalty_forget, penalty_select, penalty_augment, &
       penalty_stored, penalty_depth, penalty_keep, penalty_owes
 
    !> Solves with multipliers that are given, at most.
    integer, parameter, public :: most_augmentations = 50
    !> By default an augmented Lagrangian is so much stiffer than what it pushes at.
    real(wp), parameter :: augmented_factor = 3.0_wp
+   !> Where the largest gap that is left does not fall to this part, pushes are stiffer by `stiffer`
+   !> from then on, as of nodes on nodes that both sides hold, whose rows say nearly the same; by
+   !> `stiffest` at most.
+   real(wp), parameter :: least_gain = 0.25_wp, stiffer = 10.0_wp, stiffest = 1.0e4_wp
 
    type :: penalty_state_t
       logical :: is_on = .false.                 !! contact gives way in this step
@@ -27,6 +31,8 @@ module emcon_penalty
       logical :: is_at_ends = .false.            !! and pushes where steps begin and end: explicit
       real(wp) :: tolerance = 0.0_wp             !! of that, by the edge
       integer :: n_augmentation = 0              !! in the last increment
+      real(wp) :: left = huge(1.0_wp)            !! of the gaps before the last one, by the edge
+      real(wp) :: raised = 1.0_wp                !! `stiffness` is to be so much larger in the step
       class(contact_law_t), allocatable :: law   !! of all contacts, where it gives way
       real(wp), allocatable :: stiffness(:)      !! (n_constraint) of contacts [M/T^2]
       real(wp), allocatable :: area(:)           !! (n_constraint) of contacts [L^2]
@@ -159,8 +165,8 @@ contains
       do k = 1, set%n
          call constraint_index(system, set%id(k), pair, i)
          if (pair == 0) cycle
-         place = contact_place_t(self%area(set%id(k)), self%stiffness(set%id(k)), &
-            system%contact(pair)%contact%share(i))
+         place = contact_place_t(self%area(set%id(k)), self%raised &
+            *self%stiffness(set%id(k)), system%contact(pair)%contact%share(i))
          if (set%penalty%is_stored .and. .not. self%is_at_ends) place%closure = &
             self%closure(set%id(k))
          allocate(set%law(k)%row, source=self%law)
@@ -169,21 +175,36 @@ contains
       end do
    end subroutine penalty_select
 
+   !> A step begins: nothing was pushed back in it yet.
+   pure subroutine penalty_forget(self)
+      type(penalty_state_t), intent(inout) :: self
+
+      self%n_augmentation = 0
+      self%left = huge(self%left)
+      self%raised = 1.0_wp
+   end subroutine penalty_forget
+
    !> Take the multipliers as those to push with; `is_done` if that has closed what was left of the
    !> gaps.
    pure subroutine penalty_augment(self, set, is_done)
       type(penalty_state_t), intent(inout) :: self
       type(constraint_set_t), intent(inout) :: set
       logical, intent(out) :: is_done            !! else the step is to be solved again
+      real(wp) :: left
       integer :: k
 
       is_done = .true.
       if (.not. (self%augments .and. set%penalty%is_on)) return
       self%n_augmentation = self%n_augmentation + 1
+      left = 0.0_wp
       do k = set%n_permanent + 1, set%n
-         if (abs(set%penalty%left(k)) > self%tolerance*set%item(k)%size) is_done = .false.
+         left = max(left, abs(set%penalty%left(k))/set%item(k)%size)
          call set%law(k)%row%push_on(set%lam(k))
       end do
+      is_done = left <= self%tolerance
+      if (.not. is_done .and. left > least_gain*self%left) self%raised = min(stiffer*self%raised, &
+         stiffest)
+      self%left = left
    end subroutine penalty_augment
 
    !> What the contacts of `set` store at the end of the step [M L^2/T^2].

@@ -8,8 +8,8 @@ module test_penalty_state
    use emcon_kinds, only : wp
    use emcon_march, only : march_begin_step, march_free, march_init, march_t
    use emcon_motion, only : motion_t
-   use emcon_penalty, only : penalty_augment, penalty_begin_step, penalty_depth, penalty_keep, &
-      penalty_owes, penalty_select, penalty_state_t, penalty_stored
+   use emcon_penalty, only : penalty_augment, penalty_begin_step, penalty_depth, penalty_forget, &
+      penalty_keep, penalty_owes, penalty_select, penalty_state_t, penalty_stored
    use emcon_penalty_law, only : augmented_t, penalty_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : method_augmented_lagrange, method_penalty
@@ -37,6 +37,7 @@ contains
          test_case_t("laws of a set", test_laws), &
          test_case_t("what is stored and left", test_stored), &
          test_case_t("pushed back until it is closed", test_augment), &
+         test_case_t("stiffer where it does not close", test_raise), &
          test_case_t("how deep it is", test_depth)]
    end subroutine collect_penalty_state
 
@@ -282,6 +283,61 @@ contains
       call penalty_augment(state, active%set, is_done)
       call check_true(error, is_done .and. state%n_augmentation == 4, "which is not pushed back")
    end subroutine test_augment
+
+   !> Ten times stiffer for each gap that has not fallen to a quarter, until the step is begun anew.
+   subroutine test_raise(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: left(8) = [9.0_wp, 2.0_wp, 0.6_wp, 0.1_wp, 1.0_wp, 1.0_wp, 1.0_wp, &
+         1.0_wp]
+      real(wp), parameter :: raised(8) = [1.0_wp, 1.0_wp, 10.0_wp, 10.0_wp, 1.0e2_wp, 1.0e3_wp, &
+         1.0e4_wp, 1.0e4_wp]
+      type(system_t) :: system
+      type(penalty_state_t) :: state
+      type(active_set_t) :: active
+      real(wp) :: first
+      integer :: k
+      logical :: is_done
+
+      call open(system, state, active, method_augmented_lagrange)
+      call penalty_select(state, system, active%set, .true.)
+      first = stiffness_of(active)
+      call check_true(error, first > 0.0_wp, "it pushes")
+      do k = 1, size(left)
+         active%set%penalty%left = [0.0_wp, -left(k)]
+         call penalty_augment(state, active%set, is_done)
+         call select_anew(state, system, active)
+         call check_near(error, stiffness_of(active), raised(k)*first, 4*epsilon(first), 1.0_wp, &
+            "after " // to_text(k))
+      end do
+      call penalty_forget(state)
+      call check_equal(error, state%n_augmentation, 0, "none yet")
+      call select_anew(state, system, active)
+      call check_near(error, stiffness_of(active), first, 0.0_wp, 1.0_wp, "as at first")
+   end subroutine test_raise
+
+   !> As for another solve.
+   subroutine select_anew(state, system, active)
+      type(penalty_state_t), intent(in) :: state
+      type(system_t), intent(in) :: system
+      type(active_set_t), intent(inout) :: active
+      integer :: k
+
+      do k = 1, active%set%n
+         if (allocated(active%set%law(k)%row)) deallocate(active%set%law(k)%row)
+      end do
+      call penalty_select(state, system, active%set, .true.)
+   end subroutine select_anew
+
+   !> That of the contact in the set.
+   real(wp) function stiffness_of(active) result(stiffness)
+      type(active_set_t), intent(in) :: active
+
+      stiffness = 0.0_wp
+      select type (law => active%set%law(2)%row)
+      class is (augmented_t)
+         stiffness = law%stiffness
+      end select
+   end function stiffness_of
 
    !> By the shorter edge of both sides; of an augmented Lagrangian by that of its tolerance.
    subroutine test_depth(error)

@@ -209,6 +209,30 @@ def test_nodes_of_both_sides_that_meet_are_pushed_back_too(tmp_path):
     assert np.abs(soft - hard).max() < 1e-7*np.abs(hard).max()
 
 
+@pytest.mark.parametrize("is_static", [False, True])
+@pytest.mark.parametrize("upper, lower", [(4, 3), (3, 4), (2, 2)])
+def test_blocks_on_blocks_are_pushed_back_by_the_default(upper, lower, is_static, tmp_path):
+    """Rows of nodes of both sides say nearly the same: pushes grow stiffer until gaps close."""
+    found = []
+    for method in ("NULL SPACE", AUGMENTED):
+        scene = Scene(0.01, 0.08)                    # three increments with contact
+        scene.block("LOWER", (0.0, 0.0), (1.0, 1.0), (lower, lower)).hold("LOWER", below(0.0))
+        scene.block("UPPER", (0.0, 1.0) if is_static else (0.2, 1.05), (1.0, 1.0), (upper, upper),
+                    velocity=(0.3, -1.0))
+        scene.pairs = [("UPPER", "LOWER")]
+        if is_static:
+            scene.hold("UPPER", lambda x, _: x == 0.0, "1, 1")
+            scene.gravity = 10.0
+        deck = scene.deck(BOTH)
+        if is_static:
+            deck.replace("*DYNAMIC, DIRECT", "*STATIC")
+        run = run_deck(deck, tmp_path/method, method=method, formulation="NODE TO SURFACE")
+        assert run.verdict["verdict"] == "good" and run.history["cuts"].sum() == 0
+        found.append(run.fields()["displacement"][-1])
+    hard, soft = found
+    assert np.abs(soft - hard).max() < 1e-6*np.abs(hard).max()
+
+
 @pytest.mark.parametrize("scheme", ["MIDPOINT", "TRAPEZOIDAL", "GENERALIZED ALPHA", "BDF2",
                                     "ENERGY DECAYING"])
 def test_other_schemes_push_by_a_penalty_too(scheme, tmp_path):
