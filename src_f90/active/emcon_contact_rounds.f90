@@ -62,7 +62,7 @@ contains
          if (self%support%is_needed) then
             call contact_support_forget(self%support)
             call contact_sets_hold(self, system, scene, newton%driven, motion)
-            call system_stiffen(system, self%support%hangs)
+            call system_stiffen(system, self%support%hangs, motion)
          end if
          call begin_again(self, system, motion)
       end if

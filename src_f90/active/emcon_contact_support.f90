@@ -145,7 +145,7 @@ contains
       do i = 1, size(free)
          self%is_loose(pack(free(i)%member, free(i)%member <= system%space%n_body)) = .true.
       end do
-      call system_stiffen(system, self%is_loose)
+      call system_stiffen(system, self%is_loose, motion)
    end subroutine contact_support_complete
 
    !> Whether supports and the contacts `is_active` leave a motion at the end of the step; `is_held`

@@ -8,7 +8,7 @@ module emcon_stiffening
    use emcon_numbering, only : numbering_t
    implicit none
    private
-   public :: stiffening_t, stiffening_set, stiffening_add
+   public :: stiffening_t, stiffening_set, stiffening_add, least_stiffness
 
    !> Per stiffness of what stands on a node: far below what bends a body, far above the round-off
    !> of its rigid motions.

@@ -22,7 +22,7 @@ module emcon_system
    use emcon_scene, only : scene_t
    use emcon_space, only : lists_alone, lists_begin, lists_t, space_begin_step, space_init, space_t
    use emcon_steps, only : method_saddle_point, step_is_dynamic
-   use emcon_stiffening, only : stiffening_add, stiffening_set, stiffening_t
+   use emcon_stiffening, only : least_stiffness, stiffening_add, stiffening_set, stiffening_t
    use emcon_term, only : response_begin, response_init, response_t, role_external, &
       role_inertia, role_internal, term_box_t
    use emcon_term_registry, only : terms_create, terms_mass, terms_mass_times
@@ -347,11 +347,13 @@ contains
    end subroutine system_loads
 
    !> Let Newton's method not move the bodies `is_loose` farther than the residual calls for: a
-   !> small stiffness of their nodes in the tangent alone, which changes no solution.
-   subroutine system_stiffen(self, is_loose)
+   !> small stiffness of their nodes in the tangent alone, which changes no solution. Where nothing
+   !> deforms it lets loads move them by the size of the scene.
+   subroutine system_stiffen(self, is_loose, motion)
       type(system_t), intent(inout) :: self
       logical, intent(in) :: is_loose(:)         !! (n_body)
-      real(wp) :: stiffness(size(self%space%body))
+      type(motion_t), intent(in) :: motion       !! placed
+      real(wp) :: stiffness(size(self%space%body)), force(size(motion%x, 1), size(motion%x, 2))
       integer :: i, k
 
       stiffness = 0.0_wp
@@ -359,6 +361,11 @@ contains
          do k = 1, size(self%term)
             call self%term(k)%term%add_stiffness(stiffness)
          end do
+         if (.not. any(stiffness > 0.0_wp)) then
+            call system_loads(self, motion, force)
+            stiffness = maxval(abs(force))/(least_stiffness*maxval(maxval(motion%x, 2) &
+               - minval(motion%x, 2)))
+         end if
       end if
       ! What does not deform is moved as what does.
       where (.not. stiffness > 0.0_wp) stiffness = maxval(stiffness)

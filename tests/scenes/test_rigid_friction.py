@@ -373,3 +373,43 @@ def test_ten_dominoes(tmp_path):
     fields = run.fields()
     top = fields["displacement"][-1][[6*k + 4 for k in range(10)]]     # with reference nodes
     assert (top[:, 1] < -0.1).all()                   # of the upper left corners: all have fallen
+
+
+# ---- statics: nothing deforms -------------------------------------------------------------------
+
+
+def at_rest(n, slope, mu, unit=1.0, formulation="NODE TO SURFACE", gap=0.0):
+    """A rigid square of n edges, 1 and of density 1, in a static step; gravity 8 is turned."""
+    deck = block(n, lift=gap, e=1.0, mu=mu, h=1.0, t_end=1.0, weight=8.0*unit, slope=slope)
+    deck.replace("*DYNAMIC, DIRECT", "*STATIC")
+    deck.replace(", RESTITUTION=1.0", "")
+    deck.replace(", RESTITUTION=0.0", "")
+    deck.replace("SIDES=ONE", f"SIDES=ONE, TYPE={formulation}")
+    deck.insert("*CONTACT FILE\nCF")
+    deck.remove("*INITIAL CONDITIONS")
+    return deck
+
+
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
+@pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
+@pytest.mark.parametrize(("n", "slope", "gap"), [(1, 0.0, 0.0), (1, 0.4, 0.0), (3, 0.4, 0.0), (8, 0.0, 0.25)])
+def test_a_rigid_block_stands_in_statics(n, slope, gap, unit, formulation, tmp_path):
+    """Friction holds it on slopes below the coefficient, by as many contacts as there are."""
+    run = run_deck(at_rest(n, slope, 0.5, unit, formulation, gap), tmp_path)
+    assert run.verdict["verdict"] == "good" and run.verdict["cuts"] == 0
+    fields = run.fields()
+    body = np.flatnonzero(fields["displacement"].any(axis=(0, 2))) if gap else []
+    assert np.abs(fields["displacement"][-1][body] - [0.0, -gap]).max(initial=0.0) < ROUND
+    force = fields["contact_force"][-1]
+    push = force[force[:, 1] > 0].sum(axis=0)
+    weight = 8.0*unit
+    assert push == pytest.approx([-weight*math.sin(slope), weight*math.cos(slope)], abs=1e-10*weight)
+    at_nodes = force[force[:, 1] > 0]
+    assert (np.abs(at_nodes[:, 0]) <= 0.5*at_nodes[:, 1] + ROUND*weight).all()
+
+
+@pytest.mark.parametrize("slope", [0.47, 0.6])
+def test_a_rigid_block_that_slides_off_has_no_static_state(slope, tmp_path):
+    """tan(slope) above the coefficient."""
+    run = run_deck(at_rest(1, slope, 0.5), tmp_path, code=3)
+    assert "is free to move in x" in run.errors
