@@ -203,6 +203,7 @@ contains
             end where
          end associate
       end do
+      if (allocated(self%support%overclosure)) self%support%overclosure = self%start%overclosure
    end subroutine active_set_overclosure
 
    !> Begin a step from `state` with the motion that is expected: stencils, and the first set.

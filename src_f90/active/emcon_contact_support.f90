@@ -44,6 +44,8 @@ module emcon_contact_support
       logical, allocatable :: grips(:)
       !> (n_constraint) [L] gaps that were closed though no load closes them, and of which bodies
       real(wp), allocatable :: brought(:)
+      !> (n_constraint) gaps at the start of the step that it resolves, <= 0 [L]
+      real(wp), allocatable :: overclosure(:)
       character(len=:), allocatable :: brought_text
    end type contact_support_t
 
@@ -83,7 +85,8 @@ contains
       end associate
       allocate(self%is_loose(system%space%n_body), self%hangs(system%space%n_body), source=.false.)
       allocate(self%grips(system%n_constraint), source=.false.)
-      allocate(self%brought(system%n_constraint), source=0.0_wp)
+      allocate(self%brought(system%n_constraint), self%overclosure(system%n_constraint), &
+         source=0.0_wp)
       if (size(system%contact) == 0) return
       call take_look(self, system, scene, u, look)
       call find_free(look, free)
@@ -294,7 +297,7 @@ contains
       share = free%along/norm2(free%along)
       rigid = matmul(free%z, share)
       call mechanism_field(bodies, free%member, rigid, direction)
-      associate (may => gaps_that_can_act(system) .and. .not. is_active)
+      associate (may => gaps_that_can_act(system, self%overclosure) .and. .not. is_active)
          call gaps_evaluate(system, motion, may .and. .not. gaps_of_guards(system), set)
          call gaps_next_to_close(set, direction, time, is_next)
          turn = turn_of(bodies, free, rigid)
@@ -334,7 +337,7 @@ contains
       type(constraint_set_t) :: set
       logical :: is_next(size(is_active))
 
-      call gaps_evaluate(system, motion, gaps_that_can_act(system) &
+      call gaps_evaluate(system, motion, gaps_that_can_act(system, self%overclosure) &
          .and. .not. (is_active .or. gaps_of_guards(system)), set)
       call gaps_nearest(set, bodies, free%member, free%z, is_next)
       if (free%is_loaded) call gaps_keep_closed(set, is_next)

@@ -57,8 +57,9 @@ contains
    end subroutine gaps_evaluate
 
    !> Contacts that can act at the end of the motion that was measured.
-   pure function gaps_that_can_act(system) result(is_meant)
+   pure function gaps_that_can_act(system, overclosure) result(is_meant)
       type(system_t), intent(in) :: system
+      real(wp), intent(in) :: overclosure(:)     !! (n_constraint) that the step resolves, <= 0 [L]
       logical :: is_meant(system%n_constraint)
       integer :: pair
 
@@ -70,7 +71,8 @@ contains
             is_meant(first:last) = contact%state%is_near .and. contact%state%is_over &
                .and. .not. contact%state%is_leaving
             is_meant(first:last) = is_meant(first:last) .and. contact%state%gap1 &
-               > contact%state%closed - contact%max_penetration_at_start*contact%state%size
+               > contact%state%closed + overclosure(first:last) &
+               - contact%max_penetration_at_start*contact%state%size
          end associate
       end do
    end function gaps_that_can_act

@@ -110,6 +110,17 @@ def test_square_on_a_square(tmp_path, formulation, gap):
     # Newton's tolerance is 1e-10 of the forces; positions of size 1 + gap are rounded.
     assert np.allclose(top, -gap - shortening, rtol=0, atol=ACCURACY * shortening)
 
+@pytest.mark.parametrize("formulation", FORMULATIONS, ids=" ".join)
+@pytest.mark.parametrize("overlap", [1e-9, 1e-5, 1e-3, 0.02])
+def test_squares_that_overlap_and_that_contact_alone_holds(tmp_path, formulation, overlap):
+    """`SHRINK` pushes the upper one out as far, however it is held below."""
+    text = tower([-overlap], formulation)
+    text = text.replace("*CLOAD", "*CONTACT INTERFERENCE, SHRINK\n*CLOAD", 1)
+    run = solve(tmp_path, text)
+    top = displacement(run, 1)[-1, :, 1]
+    shortening = 2.0 * (1.0 - NU**2) * FORCE / E
+    assert np.allclose(top, overlap - shortening, rtol=0, atol=ACCURACY * (shortening + overlap))
+
 
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=" ".join)
 def test_tower_of_four(tmp_path, formulation):
