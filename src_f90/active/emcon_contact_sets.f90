@@ -65,8 +65,13 @@ contains
             .and. .not. candidates_are_many(self)) return
          if (self%support%is_needed) call hold_on(self, system, scene, newton, motion, gripped)
          status = step_not_held
-         self%candidates%is_settled = allocated(self%support%text)
-         if (self%candidates%is_settled) return
+         if (allocated(self%support%text)) then
+            ! What no load works on in a set that was tried on the way tells of that set alone.
+            self%candidates%is_settled = i == 1 .or. self%support%is_pushed
+            if (.not. self%candidates%is_settled) call begin_anew(self, newton, motion)
+            return
+         end if
+         self%candidates%is_settled = .false.
          if (has_failed .and. active_set_repeats(self)) then
             call begin_anew(self, newton, motion)
             return

@@ -230,13 +230,13 @@ contains
    end subroutine return_mass
 
    !> Whether a smaller step fails for the same reason: nothing was solved yet, or a larger load
-   !> could bring into contact what holds a body, not a smaller one.
+   !> could bring into contact what holds a body, not a smaller one, which friction may hold.
    pure logical function is_hopeless(self, status)
       type(march_t), intent(in) :: self
       integer, intent(in) :: status
 
-      is_hopeless = status == step_not_held .and. &
-         (self%active%n_newton == 0 .or. .not. self%active%support%is_pushed)
+      is_hopeless = status == step_not_held .and. (self%active%n_newton == 0 .or. &
+         .not. (self%active%support%is_pushed .or. self%active%friction%is_on))
    end function is_hopeless
 
    !> A singular system; elements with few points keep motions without strain that neighbours on

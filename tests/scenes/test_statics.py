@@ -166,6 +166,22 @@ def test_square_that_is_pulled_off(tmp_path, formulation, gap):
     assert "body of element 101 is free to move in y" in run.errors
 
 
+@pytest.mark.parametrize("formulation", FORMULATIONS[::2], ids=" ".join)
+@pytest.mark.parametrize("part", [0.5, 0.98])
+@pytest.mark.parametrize("first", [0.02, 0.2, 1.0])
+def test_a_push_below_the_limit_of_friction_is_held(tmp_path, formulation, part, first):
+    """At one corner: nodes slide there and the others hold; increments of any size come to it."""
+    push = part * 0.3 * FORCE
+    text = tower([0.0], formulation, held="", n=4, nlgeom=True)
+    text = text.replace("NAME=HARD", "NAME=HARD\n*FRICTION\n0.3", 1)
+    text += f"*STEP, NLGEOM\n*STATIC\n{first}, 1.\n*CLOAD\n101, 1, {push!r}\n*END STEP\n"
+    run = solve(tmp_path, text)
+    assert run.verdict["verdict"] == "good"
+    assert run.history["time"][-1] == 2.0
+    reaction = run.fields()["reaction_force"][-1].sum(axis=0)[:2]
+    assert reaction == pytest.approx([-push, FORCE], abs=1e-8 * FORCE)
+
+
 # ---- what is accepted as round-off ----------------------------------------------------------------
 
 
