@@ -174,6 +174,7 @@ def test_a_push_below_the_limit_of_friction_is_held(tmp_path, formulation, part,
     push = part * 0.3 * FORCE
     text = tower([0.0], formulation, held="", n=4, nlgeom=True)
     text = text.replace("NAME=HARD", "NAME=HARD\n*FRICTION\n0.3", 1)
+    text = text.replace("TYPE=NODE TO SURFACE", "TYPE=NODE TO SURFACE, SIDES=ONE")
     text += f"*STEP, NLGEOM\n*STATIC\n{first}, 1.\n*CLOAD\n101, 1, {push!r}\n*END STEP\n"
     run = solve(tmp_path, text)
     assert run.verdict["verdict"] == "good"
