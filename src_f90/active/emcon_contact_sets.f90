@@ -65,13 +65,8 @@ contains
             .and. .not. candidates_are_many(self)) return
          if (self%support%is_needed) call hold_on(self, system, scene, newton, motion, gripped)
          status = step_not_held
-         if (allocated(self%support%text)) then
-            ! What no load works on in a set that was tried on the way tells of that set alone.
-            self%candidates%is_settled = i == 1 .or. self%support%is_pushed
-            if (.not. self%candidates%is_settled) call begin_anew(self, newton, motion)
-            return
-         end if
-         self%candidates%is_settled = .false.
+         self%candidates%is_settled = is_left_free(self, is_first=i == 1)
+         if (allocated(self%support%text)) return
          if (has_failed .and. active_set_repeats(self)) then
             call begin_anew(self, newton, motion)
             return
@@ -109,6 +104,16 @@ contains
          if (.not. (self%candidates%is_new_set .or. is_early .or. self%is_stale)) return
       end do
    end subroutine contact_sets_solve
+
+   !> Does something stay free that contact is to hold? What no load works on in a set that was tried
+   !> on the way tells of that set alone.
+   pure logical function is_left_free(self, is_first)
+      type(active_set_t), intent(in) :: self
+      logical, intent(in) :: is_first            !! no set was tried before
+
+      is_left_free = allocated(self%support%text)
+      if (is_left_free) is_left_free = is_first .or. self%support%is_pushed
+   end function is_left_free
 
    !> Take in what holds bodies, with friction that has gripped in the set before, if there was one.
    subroutine hold_on(self, system, scene, newton, motion, gripped)
