@@ -105,8 +105,8 @@ contains
       end do
    end subroutine contact_sets_solve
 
-   !> Does something stay free that contact is to hold? What no load works on in a set that was tried
-   !> on the way tells of that set alone.
+   !> Does something stay free that contact is to hold? What no load works on in a set that was
+   !> tried on the way tells of that set alone.
    pure logical function is_left_free(self, is_first)
       type(active_set_t), intent(in) :: self
       logical, intent(in) :: is_first            !! no set was tried before
