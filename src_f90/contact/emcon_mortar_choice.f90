@@ -87,12 +87,17 @@ contains
    end function pair_is_meant
 
    !> Do both master nodes project from one place only: does (15f) fall over the whole slave edge?
-   !> Beyond the point where its normals cross it does not, and rounding would choose a root.
+   !> Beyond the point where its normals cross it does not, and rounding would choose a root. Nodes
+   !> that stand beside all of the edge project from none there.
    pure logical function is_before_focus(frame)
       type(frame_t), intent(in) :: frame
+      logical :: falls(2), is_beside(2)
 
-      associate (bend => frame%along(2, :2) - frame%along(1, :2), q => frame%edge_along)
-         is_before_focus = all(bend < q(1)) .and. all(bend < 2.0_wp*q(2) - q(1))
+      associate (p => frame%along(:, :2), q => frame%edge_along)
+         falls = p(2, :) - p(1, :) < min(q(1), 2.0_wp*q(2) - q(1))
+         is_beside = min(p(1, :), p(2, :) - q(2)) > 0.25_wp*abs(q(2) - q(1)) &
+            .or. max(p(1, :), p(2, :) - q(2)) < -0.25_wp*abs(q(2) - q(1))
+         is_before_focus = all(falls .or. is_beside)
       end associate
    end function is_before_focus
 

@@ -248,3 +248,25 @@ def test_hertz_by_load_without_support(guided, tmp_path, formulation):
     u = held.fields()["displacement"][-1]
     assert np.allclose(run.fields()["displacement"][-1], u, rtol=0, atol=1e-8*np.abs(u).max())
     assert np.abs(run.history["stabilization"]).max() < 1e-10*held.history["strain"][-1]
+
+
+@pytest.mark.parametrize("cuts", [1, 40])
+def test_a_disc_flattens_on_one_long_line(cuts, tmp_path):
+    """At the rim of the contact normals of the disc cross before the ends of the line, which stand
+    beside all edges: as on a line in pieces, and within 2 % of NODE TO SURFACE."""
+    scene = Scene(1.0, 1.0, gravity=30.0)
+    scene.disc("DISC", (0.0, 1.0), 1.0, (24, 6), stiffness=1000.0)
+    scene.hold("DISC", lambda x, _: abs(x) < 1e-9, "1, 1")
+    line = "\n".join(f"LINE, {-5 + 10*(k + 1)/cuts!r}, 0." for k in range(cuts))
+    scene.cards += ["*SURFACE, TYPE=SEGMENTS, NAME=FLOOR", "START, -5., 0.", *line.splitlines(),
+                    "*NODE", "99999, 0., 0.", "*RIGID BODY, ANALYTICAL SURFACE=FLOOR, REF NODE=99999",
+                    "*BOUNDARY", "99999, 1, 2", "99999, 6"]
+    scene.pairs = [("DISC", "FLOOR")]
+    deck = scene.deck()
+    deck.replace("*DYNAMIC, DIRECT", "*STATIC")
+    ends = []
+    for formulation in ("NODE TO SURFACE", "MORTAR"):
+        run = run_deck(deck, tmp_path/formulation, formulation=formulation)
+        assert run.verdict["verdict"] == "good"
+        ends.append(run.fields()["displacement"][-1])
+    assert np.abs(ends[1] - ends[0]).max() < 0.02*np.abs(ends[0]).max()
