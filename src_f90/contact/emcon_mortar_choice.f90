@@ -91,13 +91,12 @@ contains
    !> that stand beside all of the edge project from none there.
    pure logical function is_before_focus(frame)
       type(frame_t), intent(in) :: frame
-      logical :: falls(2), is_beside(2)
+      real(wp) :: bend                           ! of F
 
-      associate (p => frame%along(:, :2), q => frame%edge_along)
-         falls = p(2, :) - p(1, :) < min(q(1), 2.0_wp*q(2) - q(1))
-         is_beside = min(p(1, :), p(2, :) - q(2)) > 0.25_wp*abs(q(2) - q(1)) &
-            .or. max(p(1, :), p(2, :) - q(2)) < -0.25_wp*abs(q(2) - q(1))
-         is_before_focus = all(falls .or. is_beside)
+      bend = maxval(frame%edge_along) - minval(frame%edge_along)
+      associate (at_first => frame%along(1, :2), at_last => frame%along(2, :2) - frame%edge_along(2))
+         is_before_focus = all(at_last - at_first < -bend .or. &
+            min(at_first, at_last) > 0.25_wp*bend .or. max(at_first, at_last) < -0.25_wp*bend)
       end associate
    end function is_before_focus
 
