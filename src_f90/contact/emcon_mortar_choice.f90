@@ -93,10 +93,12 @@ contains
       type(frame_t), intent(in) :: frame
       real(wp) :: bend                           ! of F
 
-      bend = maxval(frame%edge_along) - minval(frame%edge_along)
-      associate (at_first => frame%along(1, :2), at_last => frame%along(2, :2) - frame%edge_along(2))
-         is_before_focus = all(at_last - at_first < -bend .or. &
-            min(at_first, at_last) > 0.25_wp*bend .or. max(at_first, at_last) < -0.25_wp*bend)
+      associate (q => frame%edge_along)
+         bend = maxval(q) - minval(q)
+         associate (at_first => frame%along(1, :2), at_last => frame%along(2, :2) - q(2))
+            is_before_focus = all(at_last - at_first < -bend .or. &
+               min(at_first, at_last) > 0.25_wp*bend .or. max(at_first, at_last) < -0.25_wp*bend)
+         end associate
       end associate
    end function is_before_focus
 
