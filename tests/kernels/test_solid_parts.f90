@@ -536,7 +536,7 @@ contains
    subroutine test_regular_space(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: far = 2.0_wp*huge(1.0_wp)**0.1_wp
-      integer, parameter :: n = 13
+      integer, parameter :: n = 14
       real(wp), parameter :: strain(6, n) = reshape([ &
          -0.4_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
          -0.6_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, &
@@ -550,10 +550,11 @@ contains
          0.0_wp, 0.0_wp, 0.0_wp, 0.7_wp, 0.7_wp, 0.7_wp, &
          0.0_wp, 0.0_wp, 0.0_wp, -0.7_wp, 0.7_wp, 0.7_wp, &
          0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 1.2_wp, 0.0_wp, &
+         1.5_wp, 1.5_wp, 0.0_wp, 2.0_wp, 0.0_wp, 0.0_wp, &
          far, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp], [6, n])
-      ! The last but two: 1 - 3 c^2 + 2 c^3 with c = 0.7, and with c = -0.7 once.
+      ! The tenth and the one behind it: 1 - 3 c^2 + 2 c^3 with c = 0.7, and with c = -0.7 once.
       logical, parameter :: regular(n) = [.true., .false., .false., .false., .false., .false., &
-         .true., .false., .false., .true., .false., .true., .false.]
+         .true., .false., .false., .true., .false., .true., .true., .false.]
       type(space_point_t) :: point
       integer :: k
 
