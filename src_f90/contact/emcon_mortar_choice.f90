@@ -87,8 +87,8 @@ contains
    end function pair_is_meant
 
    !> Do both master nodes project from one place only: does (15f) fall over the whole slave edge?
-   !> Beyond the point where its normals cross it does not, and rounding would choose a root. Nodes
-   !> that stand beside all of the edge project from none there.
+   !> Beyond the point where its normals cross it does not, and rounding would choose a root. Where
+   !> both stand beside all of the edge neither projects to it.
    pure logical function is_before_focus(frame)
       type(frame_t), intent(in) :: frame
       real(wp) :: bend                           ! of F
@@ -96,8 +96,8 @@ contains
       associate (q => frame%edge_along)
          bend = maxval(q) - minval(q)
          associate (at_first => frame%along(1, :2), at_last => frame%along(2, :2) - q(2))
-            is_before_focus = all(at_last - at_first < -bend .or. &
-               min(at_first, at_last) > 0.25_wp*bend .or. max(at_first, at_last) < -0.25_wp*bend)
+            is_before_focus = all(at_last - at_first < -bend) .or. all(min(abs(at_first), &
+               abs(at_last)) > 0.25_wp*bend .and. at_first*at_last > 0.0_wp)
          end associate
       end associate
    end function is_before_focus
