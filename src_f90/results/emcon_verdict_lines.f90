@@ -2,7 +2,7 @@
 module emcon_verdict_lines
    use emcon_energy_watch, only : closing_text, energy_bar, energy_rounding
    use emcon_force_scatter, only : scatter_is_comb, scatter_of
-   use emcon_guards, only : overlap_told
+   use emcon_guards, only : overlap_told, touching_bar
    use emcon_interactions, only : contact_pair_t, formulation_nts, multiplier_dual
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
@@ -192,10 +192,10 @@ contains
          call note_add(lines, "overlap checked: " // to_text(check%n_piece) // " bodies, " // &
             to_text(check%n_facet) // " edges; deepest penetration " // &
             to_text(self%overlap%deepest, 3) // " of an element")
-         if (self%overlap%of_facets > self%overlap%bar) call note_add(lines, &
-            "edges of curved surfaces " // &
-            "overlap by up to " // to_text(self%overlap%of_facets, 3) // &
-            " of their length, the curves that they are chords of do not")
+         if (self%overlap%of_facets > max(touching_bar, self%overlap%deepest)) &
+            call note_add(lines, "edges of curved surfaces overlap by up to " // &
+            to_text(self%overlap%of_facets, 3) // " of their length, the curves that they are " // &
+            "chords of do not")
       end associate
    end subroutine add_checked
 
