@@ -183,6 +183,40 @@ def test_a_push_below_the_limit_of_friction_is_held(tmp_path, formulation, part,
     assert reaction == pytest.approx([-push, FORCE], abs=1e-8 * FORCE)
 
 
+def grid(name, corner, size, cells, first):
+    """Cards of a rectangle, with a surface of its upper edges and one of its lower ones."""
+    (n, m), lines = cells, [f"*NODE, NSET={name}"]
+    lines += [f"{first + j * (n + 1) + i}, {corner[0] + size[0] * i / n!r}, {corner[1] + size[1] * j / m!r}"
+              for j in range(m + 1) for i in range(n + 1)]
+    lines += [f"*ELEMENT, TYPE=CPE4, ELSET={name}"]
+    for k in range(n * m):
+        a = first + k // n * (n + 1) + k % n
+        lines += [f"{first + k}, {a}, {a + 1}, {a + n + 2}, {a + n + 1}"]
+    lines += [f"*SOLID SECTION, ELSET={name}, MATERIAL=M", f"*SURFACE, NAME={name}_LOW"]
+    lines += [f"{first + k}, S1" for k in range(n)]
+    return [*lines, f"*SURFACE, NAME={name}_TOP", *(f"{first + (m - 1) * n + k}, S3" for k in range(n))]
+
+
+@pytest.mark.parametrize("cells", [(4, 2), (3, 2), (8, 4)])
+@pytest.mark.parametrize("first", [0.05, 0.1, 0.5, 1.0])
+def test_a_push_in_big_increments_on_a_wide_floor(cells, first, tmp_path):
+    """Other states that balance, as of a block on one corner, are not taken for its end."""
+    push, weight = 5.9, 20.0
+    lines = [*grid("BLOCK", (0.0, 0.0), (2.0, 1.0), cells, 1),
+             *grid("FLOOR", (-1.0, -1.0), (5.0, 1.0), (10, 2), 101),
+             "*MATERIAL, NAME=M", "*HYPERELASTIC, COUPLED NEO HOOKE", "10000., 0.3", "*DENSITY", "1.",
+             "*SURFACE INTERACTION, NAME=ROUGH", "*FRICTION", "0.3",
+             "*CONTACT PAIR, INTERACTION=ROUGH", "BLOCK_LOW, FLOOR_TOP",
+             "*BOUNDARY", *(f"{101 + i}, 1, 2" for i in range(11)),
+             "*STEP, NLGEOM", "*STATIC", "1., 1.", "*DLOAD", "BLOCK, GRAV, 10., 0., -1.", "*END STEP",
+             "*STEP, NLGEOM", "*STATIC", f"{first}, 1.", "*CLOAD", f"1, 1, {push}",
+             "*NODE FILE", "RF", "*END STEP", ""]
+    run = solve(tmp_path, "\n".join(lines))
+    assert run.verdict["verdict"] == "good"
+    reaction = run.fields()["reaction_force"][-1].sum(axis=0)[:2]
+    assert reaction == pytest.approx([-push, weight], abs=1e-8 * weight)
+
+
 # ---- what is accepted as round-off ----------------------------------------------------------------
 
 
