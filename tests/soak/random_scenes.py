@@ -117,9 +117,6 @@ def judge(scene, done, meets_itself):
     # thousandth on.
     chords = re.search(r"edges of curved surfaces overlap by up to (\S+) of their length", done.run.log)
     told = max(verdict["penetration"], float(chords[1])*(1 + 5e-3) if chords else 1e-3)
-    # Guards look at nodes; the middle of an edge between two may be a little deeper.
-    if verdict["guarded_increments"]:
-        told *= 1.1
     if is_meant and seen.by_edge > told*(1 + 1e-6) + ROUNDING:
         return f"told good and {told:.3g} deep, but {seen}"
     if verdict["largest_energy"] > 0 and done.energy_error > 1e-10:
