@@ -174,11 +174,7 @@ contains
 
       call displacement_gradient(self%n_node, self%gradient(:, :, :, k), motion%from, h)
       call displacement_gradient(self%n_node, self%gradient(:, :, :, k), motion%by, d)
-      if (motion%nlgeom) then
-         call large_strains(h, d, point)
-      else
-         call small_strains(h, d, point)
-      end if
+      call find_strains(h, d, merge(1.0_wp, 0.0_wp, motion%nlgeom), point)
    end subroutine pack_point
 
    !> grad(lane, a, b) = d u_a / d X_b.
@@ -206,61 +202,40 @@ contains
       end do
    end subroutine displacement_gradient
 
-   !> Of the gradients of the displacement at the start, `h`, and over the step, `d`.
-   pure subroutine large_strains(h, d, point)
+   !> Of the gradients of the displacement at the start, `h`, and over the step, `d`; small
+   !> strains are those without squares, and their deformation gradients are the identity.
+   pure subroutine find_strains(h, d, square, point)
       real(wp), intent(in) :: h(n_lane, 2, 2), d(n_lane, 2, 2)   !! (component, by X)
+      real(wp), intent(in) :: square             !! part of the squares in strains: 1, small 0
       type(pack_point_t), intent(inout) :: point
       integer :: l
 
-      point%geometric = 0.5_wp
+      point%geometric = 0.5_wp*square
       associate (e => point%law%strain, de => point%law%dstrain, f => point%f_mid, &
             f1 => point%f_end)
          !$omp simd
          do l = 1, n_lane
-            f(l, 1, 1) = 1.0_wp + (h(l, 1, 1) + 0.5_wp*d(l, 1, 1))
-            f(l, 2, 1) = h(l, 2, 1) + 0.5_wp*d(l, 2, 1)
-            f(l, 1, 2) = h(l, 1, 2) + 0.5_wp*d(l, 1, 2)
-            f(l, 2, 2) = 1.0_wp + (h(l, 2, 2) + 0.5_wp*d(l, 2, 2))
-            f1(l, 1, 1) = 1.0_wp + (h(l, 1, 1) + d(l, 1, 1))
-            f1(l, 2, 1) = h(l, 2, 1) + d(l, 2, 1)
-            f1(l, 1, 2) = h(l, 1, 2) + d(l, 1, 2)
-            f1(l, 2, 2) = 1.0_wp + (h(l, 2, 2) + d(l, 2, 2))
-            e(l, 1) = h(l, 1, 1) + 0.5_wp*(h(l, 1, 1)*h(l, 1, 1) + h(l, 2, 1)*h(l, 2, 1))
-            e(l, 2) = h(l, 2, 2) + 0.5_wp*(h(l, 1, 2)*h(l, 1, 2) + h(l, 2, 2)*h(l, 2, 2))
+            f(l, 1, 1) = 1.0_wp + square*(h(l, 1, 1) + 0.5_wp*d(l, 1, 1))
+            f(l, 2, 1) = square*(h(l, 2, 1) + 0.5_wp*d(l, 2, 1))
+            f(l, 1, 2) = square*(h(l, 1, 2) + 0.5_wp*d(l, 1, 2))
+            f(l, 2, 2) = 1.0_wp + square*(h(l, 2, 2) + 0.5_wp*d(l, 2, 2))
+            f1(l, 1, 1) = 1.0_wp + square*(h(l, 1, 1) + d(l, 1, 1))
+            f1(l, 2, 1) = square*(h(l, 2, 1) + d(l, 2, 1))
+            f1(l, 1, 2) = square*(h(l, 1, 2) + d(l, 1, 2))
+            f1(l, 2, 2) = 1.0_wp + square*(h(l, 2, 2) + d(l, 2, 2))
+            e(l, 1) = h(l, 1, 1) + 0.5_wp*(square*h(l, 1, 1)*h(l, 1, 1) &
+               + square*h(l, 2, 1)*h(l, 2, 1))
+            e(l, 2) = h(l, 2, 2) + 0.5_wp*(square*h(l, 1, 2)*h(l, 1, 2) &
+               + square*h(l, 2, 2)*h(l, 2, 2))
             e(l, 3) = (h(l, 1, 2) + h(l, 2, 1)) &
-               + (h(l, 1, 1)*h(l, 1, 2) + h(l, 2, 1)*h(l, 2, 2))
+               + (square*h(l, 1, 1)*h(l, 1, 2) + square*h(l, 2, 1)*h(l, 2, 2))
             de(l, 1) = f(l, 1, 1)*d(l, 1, 1) + f(l, 2, 1)*d(l, 2, 1)
             de(l, 2) = f(l, 1, 2)*d(l, 1, 2) + f(l, 2, 2)*d(l, 2, 2)
             de(l, 3) = (f(l, 1, 1)*d(l, 1, 2) + f(l, 2, 1)*d(l, 2, 2)) &
                + (f(l, 1, 2)*d(l, 1, 1) + f(l, 2, 2)*d(l, 2, 1))
          end do
       end associate
-   end subroutine large_strains
-
-   !> The same without NLGEOM.
-   pure subroutine small_strains(h, d, point)
-      real(wp), intent(in) :: h(n_lane, 2, 2), d(n_lane, 2, 2)   !! (component, by X)
-      type(pack_point_t), intent(inout) :: point
-      integer :: a, l
-
-      point%geometric = 0.0_wp
-      point%f_mid = 0.0_wp
-      do a = 1, 2
-         point%f_mid(:, a, a) = 1.0_wp
-      end do
-      point%f_end = point%f_mid
-      associate (e => point%law%strain, de => point%law%dstrain)
-         !$omp simd
-         do l = 1, n_lane
-            e(l, 1) = h(l, 1, 1)
-            e(l, 2) = h(l, 2, 2)
-            e(l, 3) = h(l, 1, 2) + h(l, 2, 1)
-            de(l, 1) = d(l, 1, 1)
-            de(l, 2) = d(l, 2, 2)
-            de(l, 3) = d(l, 1, 2) + d(l, 2, 1)
-         end do
-      end associate
-   end subroutine small_strains
+   end subroutine find_strains
 
    !> Is the end of the motion one that the law can answer to? Newton's method tries all kinds of
    !> things. Where it is not, the element is inverted, and the law is asked for a point at rest.
