@@ -6,6 +6,7 @@ module emcon_bent_bodies
    use emcon_march_types, only : march_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
+   use emcon_steps, only : step_square
    use emcon_term_registry, only : terms_solid
    implicit none
    private
@@ -40,7 +41,7 @@ contains
       solid => terms_solid(march%system%term)
       if (.not. any(solid%trait%is_stiff_bent) .or. march%state%clock%i_step == 0) return
       call bending_measure(bending, solid, march%system%space%body, scene%x, march%state%u, &
-         scene%step(march%state%clock%i_step)%nlgeom)
+         step_square(scene%step(march%state%clock%i_step)))
       do b = 1, size(bending%strain)
          if (.not. bending%strain(b) > rounding*largest_energy) cycle
          if (.not. bending%missed(b) > told_part*bending%strain(b)) cycle

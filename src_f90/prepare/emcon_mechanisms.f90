@@ -9,6 +9,7 @@ module emcon_mechanisms
    use emcon_mechanism_rows, only : mechanism_rows_t
    use emcon_rotation, only : cross_product, n_turn
    use emcon_scene, only : scene_t
+   use emcon_steps, only : step_square
    use emcon_surface_nodes, only : surface_nodes
    use emcon_system, only : system_may_hold, system_t
    implicit none
@@ -40,8 +41,7 @@ contains
       real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node) [L]
       real(wp) :: x(size(u, 1), size(u, 2))      !! [L]
 
-      x = scene%x
-      if (scene%step(system%i_step)%nlgeom) x = x + u
+      x = scene%x + step_square(scene%step(system%i_step))*u
    end function held_places
 
    !> Bodies at `x`, and which of their motions need to be prevented. Those of bodies that contact

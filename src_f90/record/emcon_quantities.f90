@@ -15,6 +15,7 @@ module emcon_quantities
    use emcon_rotation, only : n_turn
    use emcon_solid, only : solid_t
    use emcon_stepper, only : stepper_t
+   use emcon_steps, only : step_square
    use emcon_stress, only : element_energies, element_means, nodal_stress, von_mises
    use emcon_term_registry, only : terms_solid
    use emcon_text, only : string_t
@@ -157,7 +158,7 @@ contains
             end do
          case ("S")
             allocate(stress(6, size(state%u, 2)), values(7, size(state%u, 2)))
-            call nodal_stress(solid, state%u, is_large(stepper), stress)
+            call nodal_stress(solid, state%u, square(stepper), stress)
             values(:6, :) = real(stress, dp)
             do i = 1, size(values, 2)
                values(7, i) = real(von_mises(stress(:, i)), dp)
@@ -225,7 +226,7 @@ contains
          case ("S", "E", "EVOL")
             allocate(stress(6, n), volume(n), &
                strain(quantity_components("E", at_elements, stepper%scene%n_dim), n))
-            call element_means(solid, state%u, is_large(stepper), stress, strain, volume)
+            call element_means(solid, state%u, square(stepper), stress, strain, volume)
             if (variable == "S") then
                values = real(stress, dp)
             else if (variable == "E") then
@@ -239,12 +240,12 @@ contains
       end associate
    end function element_quantity
 
-   !> Does the step take displacements as large?
-   pure logical function is_large(stepper)
+   !> Part of squares in the strains of the step.
+   pure real(wp) function square(stepper)
       type(stepper_t), intent(in) :: stepper
 
-      is_large = stepper%scene%step(stepper%march%state%clock%i_step)%nlgeom
-   end function is_large
+      square = step_square(stepper%scene%step(stepper%march%state%clock%i_step))
+   end function square
 
    !> CDIS gap, + open, NaN where not measured (1); CSTR pressure and active flag (2); CF force of
    !> the pair on the slave node, or both at a joint (2); CSHEAR and CSLIP as `rubbing` has them;

@@ -18,7 +18,7 @@ module emcon_steps
    public :: newton_kept, newton_full
    public :: events_pairs, events_nodes
    public :: most_stand_off
-   public :: prescribed_find, prescribed_rests, step_is_dynamic, step_initiation
+   public :: prescribed_find, prescribed_rests, step_is_dynamic, step_initiation, step_square
 
    integer, parameter :: load_point = 1, load_pressure = 2, load_gravity = 3, load_moment = 4, &
       load_centrifugal = 5
@@ -128,7 +128,7 @@ module emcon_steps
       type(origin_t) :: origin
       type(scheme_row_t) :: scheme                   !! code 0: no procedure was read
       type(scheme_choice_t) :: choice                !! by *TIME INTEGRATION
-      logical :: nlgeom = .false.
+      logical :: nlgeom = .false.                    !! displacements are large
       logical :: stabilizes = .false.                !! statics: what no load works on may be free
       !> Statics: part of its strain energy that viscous stress takes from the first increment
       real(wp) :: stabilization = 0.0_wp
@@ -149,6 +149,13 @@ contains
 
       step_is_dynamic = step%scheme%has_inertia
    end function step_is_dynamic
+
+   !> The part that the squares of displacements have in its strains: theory (6).
+   elemental real(wp) function step_square(step)
+      type(step_t), intent(in) :: step
+
+      step_square = merge(1.0_wp, 0.0_wp, step%nlgeom)
+   end function step_square
 
    !> How contact begins in a step: one of `initiation_`, none in statics.
    elemental integer function step_initiation(step)

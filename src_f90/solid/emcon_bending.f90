@@ -50,13 +50,13 @@ module emcon_bending
 contains
 
    !> Measure all bodies at the displacements `u`.
-   subroutine bending_measure(self, solid, body, x, u, nlgeom)
+   subroutine bending_measure(self, solid, body, x, u, square)
       type(bending_t), intent(out) :: self
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: body(:)             !! (n_node) 1 to n_body, 0: none
       real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) [L]
       real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node) [L]
-      logical, intent(in) :: nlgeom              !! .false.: small strains
+      real(wp), intent(in) :: square             !! part of squares in strains; 0: small
       type(moduli_t) :: moduli(size(solid%law))
       type(plate_t) :: plate
       real(wp) :: curve(n_axis, n_axis)
@@ -74,9 +74,9 @@ contains
          if (.not. allocated(solid%law(solid%law_of(e))%law)) cycle
          if (self%element(b) == 0) self%element(b) = e
          associate (own => moduli(solid%law_of(e)))
-            self%strain(b) = self%strain(b) + strain_energy(solid, e, u, nlgeom, own)
+            self%strain(b) = self%strain(b) + strain_energy(solid, e, u, square, own)
             if (.not. solid%trait%is_stiff_bent(e)) cycle
-            call find_curvature(self, solid, e, nlgeom, curve)
+            call find_curvature(self, solid, e, square, curve)
             call take_plate(curve, plate)
             if (maxval(abs(plate%bend)) > 0.0_wp) call add_missed(self, solid, e, x, plate, own, &
                self%missed(b))
@@ -177,11 +177,11 @@ contains
    end subroutine take_moduli
 
    !> Of an element, by the moduli of its law at rest.
-   pure real(wp) function strain_energy(solid, e, u, nlgeom, moduli) result(energy)
+   pure real(wp) function strain_energy(solid, e, u, square, moduli) result(energy)
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e
       real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node) [L]
-      logical, intent(in) :: nlgeom
+      real(wp), intent(in) :: square
       type(moduli_t), intent(in) :: moduli
       real(wp) :: slope(n_axis, n_axis), strain(n_strain), mean(n_strain), volume
       integer :: k
@@ -192,9 +192,8 @@ contains
          volume = sum(geometry%weight)
          do k = 1, geometry%n_gp
             call gradient_at(solid, e, k, u(:, solid%node(:geometry%n_node, e)), slope)
-            if (nlgeom .and. .not. solid%trait%is_linear(e)) slope = slope &
-               + 0.5_wp*matmul(transpose(slope), slope)
-            strain = components(slope)
+            strain = components(slope + (0.5_wp*solid%trait%square_of(e, square)) &
+               *matmul(transpose(slope), slope))
             mean = mean + (geometry%weight(k)/volume)*strain
             if (solid%trait%has_mean(e)) then
                energy = energy + geometry%weight(k)*work(moduli%rest, strain)
@@ -227,11 +226,11 @@ contains
 
    !> d omega_a / d X_b, the rotations of the elements beside `e` against its own, by least squares
    !> over the directions in which they lie.
-   pure subroutine find_curvature(self, solid, e, nlgeom, curve)
+   pure subroutine find_curvature(self, solid, e, square, curve)
       type(bending_t), intent(in) :: self
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e
-      logical, intent(in) :: nlgeom
+      real(wp), intent(in) :: square
       real(wp), intent(out) :: curve(n_axis, n_axis)     !! [1/L]
       real(wp) :: offset(n_axis), turn(n_axis), spread(n_axis, n_axis), size_of
       integer :: b, i, k
@@ -243,7 +242,7 @@ contains
             do k = self%start(node) + 1, self%start(node + 1)
                offset = self%center(:, self%beside(k)) - self%center(:, e)
                turn = turn_between(self%slope(:, :, e), self%slope(:, :, self%beside(k)), &
-                  nlgeom .and. .not. solid%trait%is_linear(e))
+                  solid%trait%square_of(e, square))
                do b = 1, n_axis
                   curve(:, b) = curve(:, b) + turn*offset(b)
                   spread(:, b) = spread(:, b) + offset*offset(b)
@@ -263,14 +262,14 @@ contains
    end subroutine find_curvature
 
    !> The rotation from one mean gradient to another, as a vector.
-   pure function turn_between(from, to, nlgeom) result(turn)
+   pure function turn_between(from, to, square) result(turn)
       real(wp), intent(in) :: from(n_axis, n_axis), to(n_axis, n_axis)
-      logical, intent(in) :: nlgeom
+      real(wp), intent(in) :: square
       real(wp) :: turn(n_axis), f(n_axis, n_axis)
       integer :: a
 
       f = to - from
-      if (nlgeom) f = f + matmul(transpose(from), f)
+      f = f + square*matmul(transpose(from), f)
       do a = 1, n_axis
          turn(a) = 0.5_wp*(f(last(a), behind(a)) - f(behind(a), last(a)))
       end do

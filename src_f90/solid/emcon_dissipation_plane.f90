@@ -15,6 +15,7 @@ module emcon_dissipation_plane
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_space, only : lists_append, lists_t, space_t
+   use emcon_steps, only : step_square
    use emcon_term, only : response_t, role_internal, term_t
    implicit none
    private
@@ -32,7 +33,7 @@ module emcon_dissipation_plane
       !> (3, 3, 2 n_law) of laws at rest, then of what `rest` leaves of them [M/(L T^2)]
       real(wp), allocatable, private :: moduli(:, :, :)
       integer, allocatable, private :: moduli_of(:)      !! (n_element) which of these
-      logical, private :: nlgeom = .true.
+      real(wp), private :: square = 1.0_wp               !! part of squares in strains
       integer, allocatable, private :: slot(:)           !! element matrices by columns
       ! Of the last motion's forces [M L^2/T^2]:
       real(wp) :: work = 0.0_wp                  !! taken by the scheme
@@ -97,7 +98,7 @@ contains
       type(csr_t), intent(in) :: matrix
       integer, intent(in) :: slot(:)             !! element matrices by columns
 
-      self%nlgeom = scene%step(i_step)%nlgeom
+      self%square = step_square(scene%step(i_step))
       self%slot = slot
    end subroutine begin_step
 
@@ -129,9 +130,8 @@ contains
       type(element_motion_t), intent(out) :: now, before
       integer :: i
 
-      now%nlgeom = (self%nlgeom .or. self%solid%trait%is_corotated(e)) &
-         .and. .not. self%solid%trait%is_linear(e)
-      before%nlgeom = now%nlgeom
+      now%square = self%solid%trait%square_of(e, self%square)
+      before%square = now%square
       do i = 1, self%solid%geometry(e)%n_node
          associate (node => self%solid%node(i, e), u0 => motion%u0)
             now%from(:, i) = u0(:, node) - u0(:, self%solid%node(1, e))
@@ -295,7 +295,7 @@ contains
       class(dissipation_term_t), intent(in) :: self
       type(motion_t), intent(in) :: motion       !! placed
 
-      is_symmetric = .not. (motion%evaluation%mass_scale > 0.0_wp .and. (self%nlgeom .or. &
+      is_symmetric = .not. (motion%evaluation%mass_scale > 0.0_wp .and. (self%square > 0.0_wp .or. &
          any(self%solid%trait%is_corotated)))
    end function is_symmetric
 

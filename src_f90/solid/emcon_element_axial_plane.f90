@@ -110,18 +110,15 @@ contains
       do a = 1, n_dim
          point%f_mid(a, a) = 1.0_wp
       end do
-      point%f_end = point%f_mid
-      c = h + transpose(h)
-      point%strain(circle) = grown
-      if (motion%nlgeom) then
-         c = c + matmul(transpose(h), h)
-         point%strain(circle) = grown + 0.5_wp*grown**2
-         point%f_mid = point%f_mid + (h + 0.5_wp*d)
-         point%f_end = point%f_end + (h + d)
-         point%stretch_mid = 1.0_wp + (grown + 0.5_wp*growth)
-         point%stretch_end = 1.0_wp + (grown + growth)
-         point%geometric = 0.5_wp
-      end if
+      associate (square => motion%square)
+         point%f_end = point%f_mid + square*(h + d)
+         point%f_mid = point%f_mid + square*(h + 0.5_wp*d)
+         point%stretch_mid = 1.0_wp + square*(grown + 0.5_wp*growth)
+         point%stretch_end = 1.0_wp + square*(grown + growth)
+         point%geometric = 0.5_wp*square
+         point%strain(circle) = grown + square*(0.5_wp*grown**2)
+         c = h + transpose(h) + square*matmul(transpose(h), h)
+      end associate
       point%strain([radial, axial, shear]) = [0.5_wp*c(1, 1), 0.5_wp*c(2, 2), c(1, 2)]
       c = matmul(transpose(point%f_mid), d)
       point%dstrain([radial, axial, shear]) = [c(1, 1), c(2, 2), c(1, 2) + c(2, 1)]

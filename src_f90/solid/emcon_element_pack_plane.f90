@@ -34,17 +34,17 @@ module emcon_element_pack_plane
    !> Motion of the nodes, from `from` by `by`, relative to the first node of each element, which
    !> does not round them with the distance that a body has flown.
    type :: pack_motion_t
-      logical :: nlgeom = .true.                 !! .false.: small strains
+      real(wp) :: square = 1.0_wp                !! part of squares in strains; 0: small strains
       real(wp) :: from(n_lane, 2, max_node) = 0.0_wp     !! displacement at the start [L]
       real(wp) :: by(n_lane, 2, max_node) = 0.0_wp       !! displacement over the span [L]
    end type pack_motion_t
 
-   !> One quadrature point of each; without NLGEOM deformation gradients are the identity.
+   !> One quadrature point of each; of small strains deformation gradients are the identity.
    type :: pack_point_t
       type(law_points_t) :: law                  !! strains, and what the law answers
       real(wp) :: f_mid(n_lane, 2, 2) = 0.0_wp   !! of the mid-configuration
       real(wp) :: f_end(n_lane, 2, 2) = 0.0_wp   !! of the end
-      real(wp) :: geometric = 0.0_wp             !! df_mid/df_end: 1/2 or 0
+      real(wp) :: geometric = 0.0_wp             !! df_mid/df_end: 1/2, small strains 0
    end type pack_point_t
 
    type :: pack_response_t
@@ -174,7 +174,7 @@ contains
 
       call displacement_gradient(self%n_node, self%gradient(:, :, :, k), motion%from, h)
       call displacement_gradient(self%n_node, self%gradient(:, :, :, k), motion%by, d)
-      call find_strains(h, d, merge(1.0_wp, 0.0_wp, motion%nlgeom), point)
+      call find_strains(h, d, motion%square, point)
    end subroutine pack_point
 
    !> grad(lane, a, b) = d u_a / d X_b.
@@ -206,7 +206,7 @@ contains
    !> strains are those without squares, and their deformation gradients are the identity.
    pure subroutine find_strains(h, d, square, point)
       real(wp), intent(in) :: h(n_lane, 2, 2), d(n_lane, 2, 2)   !! (component, by X)
-      real(wp), intent(in) :: square             !! part of the squares in strains: 1, small 0
+      real(wp), intent(in) :: square             !! part of squares in strains; 0: small
       type(pack_point_t), intent(inout) :: point
       integer :: l
 

@@ -13,18 +13,18 @@ module emcon_element_plane
 
    !> Motion of the nodes of an element, from `from` by `by`.
    type :: element_motion_t
-      logical :: nlgeom = .true.                           !! .false.: small strains
+      real(wp) :: square = 1.0_wp                          !! part of squares; 0: small strains
       real(wp) :: from(2, max_node) = 0.0_wp               !! displacement at the start [L]
       real(wp) :: by(2, max_node) = 0.0_wp                 !! displacement over the span [L]
    end type element_motion_t
 
-   !> Motion of one quadrature point; without NLGEOM deformation gradients are the identity.
+   !> Motion of one quadrature point; of small strains deformation gradients are the identity.
    type :: point_motion_t
       real(wp) :: strain(3) = 0.0_wp                       !! at the start: E11, E22, 2 E12
       real(wp) :: dstrain(3) = 0.0_wp                      !! its increment E1 - E0
       real(wp) :: f_mid(2, 2) = 0.0_wp                     !! of the mid-configuration
       real(wp) :: f_end(2, 2) = 0.0_wp                     !! of the end
-      real(wp) :: geometric = 0.0_wp                       !! df_mid/df_end: 1/2 or 0
+      real(wp) :: geometric = 0.0_wp                       !! df_mid/df_end: 1/2, small strains 0
    end type point_motion_t
 
    type :: element_response_t
@@ -72,7 +72,7 @@ contains
 
       call displacement_gradient(geometry%n_node, geometry%gradient(:, :, k), motion%from, grad0)
       call displacement_gradient(geometry%n_node, geometry%gradient(:, :, k), motion%by, dgrad)
-      call point_strain(grad0, dgrad, motion%nlgeom, point)
+      call point_strain(grad0, dgrad, motion%square, point)
    end subroutine element_point
 
    !> Is the end of the motion one that the law can answer to? Newton's method tries all kinds of
@@ -112,21 +112,18 @@ contains
 
    !> Strain and deformation gradients from those of the displacement at the start, `grad0`, and
    !> of its increment; the strain's increment to relative accuracy: docs/theory.md, eq. (6).
-   pure subroutine point_strain(grad0, dgrad, nlgeom, point)
+   pure subroutine point_strain(grad0, dgrad, square, point)
       real(wp), intent(in) :: grad0(2, 2), dgrad(2, 2)   !! (component, by X)
-      logical, intent(in) :: nlgeom              !! .false.: small strains
+      real(wp), intent(in) :: square             !! part of squares in strains; 0: small
       type(point_motion_t), intent(inout) :: point
+      real(wp), parameter :: one(2, 2) = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
 
-      point%strain = [grad0(1, 1), grad0(2, 2), grad0(1, 2) + grad0(2, 1)]
-      point%f_mid = reshape([1.0_wp, 0.0_wp, 0.0_wp, 1.0_wp], [2, 2])
-      point%f_end = point%f_mid
-      if (nlgeom) then
-         point%strain = point%strain + [0.5_wp*dot_product(grad0(:, 1), grad0(:, 1)), &
-            0.5_wp*dot_product(grad0(:, 2), grad0(:, 2)), dot_product(grad0(:, 1), grad0(:, 2))]
-         point%f_mid = point%f_mid + (grad0 + 0.5_wp*dgrad)
-         point%f_end = point%f_end + (grad0 + dgrad)
-      end if
-      point%geometric = merge(0.5_wp, 0.0_wp, nlgeom)
+      point%strain = [grad0(1, 1), grad0(2, 2), grad0(1, 2) + grad0(2, 1)] &
+         + square*[0.5_wp*dot_product(grad0(:, 1), grad0(:, 1)), &
+         0.5_wp*dot_product(grad0(:, 2), grad0(:, 2)), dot_product(grad0(:, 1), grad0(:, 2))]
+      point%f_mid = one + square*(grad0 + 0.5_wp*dgrad)
+      point%f_end = one + square*(grad0 + dgrad)
+      point%geometric = 0.5_wp*square
       associate (f => point%f_mid)
          point%dstrain = [dot_product(f(:, 1), dgrad(:, 1)), dot_product(f(:, 2), dgrad(:, 2)), &
             dot_product(f(:, 1), dgrad(:, 2)) + dot_product(f(:, 2), dgrad(:, 1))]

@@ -24,7 +24,7 @@ module emcon_element_space
 
    !> Motion of the nodes, from `from` by `by`.
    type :: space_motion_t
-      logical :: nlgeom = .true.                 !! .false.: small strains
+      real(wp) :: square = 1.0_wp                !! part of squares in strains; 0: small strains
       real(wp) :: from(n_dim, max_node) = 0.0_wp !! displacement at the start [L]
       real(wp) :: by(n_dim, max_node) = 0.0_wp   !! displacement over the span [L]
    end type space_motion_t
@@ -38,13 +38,13 @@ module emcon_element_space
       logical :: is_inverted = .false.           !! det F <= 0 at some point at the end
    end type space_part_t
 
-   !> One point; without NLGEOM deformation gradients are the identity.
+   !> One point; of small strains deformation gradients are the identity.
    type :: space_point_t
       real(wp) :: strain(n_strain) = 0.0_wp      !! at the start
       real(wp) :: dstrain(n_strain) = 0.0_wp
       real(wp) :: f_mid(n_dim, n_dim) = 0.0_wp
       real(wp) :: f_end(n_dim, n_dim) = 0.0_wp
-      real(wp) :: geometric = 0.0_wp             !! df_mid/df_end: 1/2 or 0
+      real(wp) :: geometric = 0.0_wp             !! df_mid/df_end: 1/2, small strains 0
    end type space_point_t
 
 contains
@@ -224,15 +224,10 @@ contains
       do a = 1, n_dim
          point%f_mid(a, a) = 1.0_wp
       end do
-      point%f_end = point%f_mid
-      c = h + transpose(h)
-      if (motion%nlgeom) then
-         c = c + matmul(transpose(h), h)
-         point%f_mid = point%f_mid + (h + 0.5_wp*d)
-         point%f_end = point%f_end + (h + d)
-         point%geometric = 0.5_wp
-      end if
-      point%strain = strain_of(c)
+      point%f_end = point%f_mid + motion%square*(h + d)
+      point%f_mid = point%f_mid + motion%square*(h + 0.5_wp*d)
+      point%geometric = 0.5_wp*motion%square
+      point%strain = strain_of(h + transpose(h) + motion%square*matmul(transpose(h), h))
       c = matmul(transpose(point%f_mid), d)
       point%dstrain = strain_of(c + transpose(c))
    end subroutine space_point

@@ -34,7 +34,7 @@ module emcon_host_law
 
    !> What the given laws answer to a step.
    type :: host_response_t
-      logical :: nlgeom = .true.                 !! .false.: to small strains
+      real(wp) :: square = 1.0_wp                !! part of squares in the strains of the step
       type(host_points_t), allocatable :: points(:)         !! one per material
       integer :: inverted_element = 0            !! first one that cannot be answered for, or 0
       integer :: material = 0                    !! that has no value there, or 0: det F <= 0

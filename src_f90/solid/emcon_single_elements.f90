@@ -49,7 +49,7 @@ contains
       with_tangent = present(value)
       n = merge(n_block, 1, response%n_thread > 1)
       allocate(local(n), part(n))
-      local%nlgeom = user%nlgeom
+      local%square = user%square
       do first = 0, solid%n_element - 1, n
          n = min(n, solid%n_element - first)
          !$omp parallel do default(none) num_threads(response%n_thread) if(n > 1) &
@@ -91,7 +91,7 @@ contains
       type(space_part_t) :: part
       type(host_response_t) :: none
 
-      rest%nlgeom = .false.
+      rest%square = 0.0_wp
       call respond_to(solid, none, e, rest, .true., part)
       associate (n => solid%geometry(e)%n_node, m => solid%n_dim)
          tangent = reshape(part%tangent(:m, :n, :m, :n), [m*n, m*n])
@@ -105,7 +105,7 @@ contains
       integer, intent(in) :: e                   !! 1..n_element
       type(motion_t), intent(in) :: motion       !! placed
       logical, intent(in) :: with_tangent        !! else no tangent is computed
-      type(space_motion_t), intent(inout) :: local     !! all but `nlgeom` is set
+      type(space_motion_t), intent(inout) :: local     !! all but `square` is set
       type(space_part_t), intent(inout) :: part
       integer :: i, n
 
@@ -222,7 +222,7 @@ contains
       type(space_part_t) :: part
       integer :: a, e, i, j
 
-      local%nlgeom = user%nlgeom
+      local%square = user%square
       do e = 1, solid%n_element
          associate (node => solid%node(:solid%geometry(e)%n_node, e))
             if (.not. (is_here(solid, e) .and. any(abs(direction(:, node)) > 0.0_wp))) cycle
@@ -250,7 +250,7 @@ contains
       type(space_part_t) :: part
       integer :: e
 
-      local%nlgeom = user%nlgeom
+      local%square = user%square
       do e = 1, solid%n_element
          if (.not. is_here(solid, e)) cycle
          call respond_at(solid, user, e, motion, .true., local, part)

@@ -14,6 +14,7 @@ module emcon_solid
    use emcon_materials, only : kinematics_corotated, kinematics_linear
    use emcon_scene, only : scene_t, where_text
    use emcon_shape, only : shape_table_t, shape_tabulate
+   use emcon_steps, only : step_square
    use emcon_text, only : string_t, to_text
    implicit none
    private
@@ -42,6 +43,8 @@ module emcon_solid
       logical, allocatable :: is_stiff_bent(:)           !! where it bends
       logical, allocatable :: has_mean(:)                !! volume resists in the mean
       logical, allocatable :: has_inertia(:)
+   contains
+      procedure :: square_of
    end type element_traits_t
 
    !> Laws that a program gives.
@@ -239,7 +242,7 @@ contains
             self%trait%has_mean(e) = kind%has_mean_volume
             ! Modes give way to a change of volume that is linear in the displacements.
             self%trait%may_lock(e) = kind%may_lock() .or. (kind%has_modes &
-               .and. any(scene%step%nlgeom))
+               .and. any(step_square(scene%step) > 0.0_wp))
             self%trait%is_stiff_bent(e) = kind%is_stiff_bent() .and. is_free
             self%trait%has_inertia(e) = .not. section%is_massless
             self%trait%is_linear(e) = section%kinematics == kinematics_linear .and. is_free
@@ -248,6 +251,18 @@ contains
       end do
       self%trait%is_small = self%trait%is_linear .or. self%trait%is_corotated
    end subroutine tell_apart
+
+   !> Part of squares in the strains of element `e` in a step in which they have `square`; a frame
+   !> that turns needs them in all steps.
+   pure real(wp) function square_of(self, e, square)
+      class(element_traits_t), intent(in) :: self
+      integer, intent(in) :: e                   !! 1..n_element
+      real(wp), intent(in) :: square             !! 1, or 0: small strains
+
+      square_of = square
+      if (self%is_corotated(e)) square_of = 1.0_wp
+      if (self%is_linear(e)) square_of = 0.0_wp
+   end function square_of
 
    !> Pack the elements of each kind and law, as they come in the scene.
    pure subroutine make_packs(self)

@@ -72,7 +72,7 @@ contains
       integer :: i, n
 
       call pack_fill(pack, [e], self%law_of(e), self%node, self%geometry)
-      motions%nlgeom = motion%nlgeom
+      motions%square = motion%square
       n = pack%n_node
       do i = 1, n
          motions%from(:, :, i) = spread(motion%from(:, i) - motion%from(:, 1), 1, n_lane)
@@ -88,22 +88,22 @@ contains
    end subroutine solid_element_respond
 
    !> Let the given laws answer to the step, each in one call for all its points.
-   subroutine solid_evaluate_user(self, u0, du, nlgeom, with_tangent, user)
+   subroutine solid_evaluate_user(self, u0, du, square, with_tangent, user)
       type(solid_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (n_dim, n_node)
-      logical, intent(in) :: nlgeom              !! .false.: small strains
+      real(wp), intent(in) :: square             !! part of squares in strains; 0: small
       logical, intent(in) :: with_tangent        !! else no tangent is computed
       type(host_response_t), intent(inout) :: user
       integer :: k
 
       user%material = 0
       user%status = point_ok
-      user%nlgeom = nlgeom
+      user%square = square
       call make_room(self, user)
       if (self%is_single) then
          call gather_in_space(self, u0, du, user)
       else
-         call gather_strains(self, u0, du, nlgeom, user)
+         call gather_strains(self, u0, du, user)
       end if
       if (user%inverted_element > 0) return
       do k = 1, size(self%host%law)
@@ -132,17 +132,16 @@ contains
    end subroutine make_room
 
    !> The strains of the elements of given laws, and the first of these that is inverted.
-   pure subroutine gather_strains(self, u0, du, nlgeom, user)
+   pure subroutine gather_strains(self, u0, du, user)
       type(solid_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u0(:, :), du(:, :)     !! (2, n_node)
-      logical, intent(in) :: nlgeom
       type(host_response_t), intent(inout) :: user
       type(element_motion_t) :: local
       type(point_motion_t) :: point
       integer :: e, i, k
 
       user%inverted_element = 0
-      local%nlgeom = nlgeom
+      local%square = user%square
       do e = 1, self%n_element
          if (self%host%first_point(e) == 0) cycle
          call solid_gather(self%node(:self%geometry(e)%n_node, e), u0, du, local)
@@ -171,7 +170,7 @@ contains
       integer :: e, i
 
       user%inverted_element = 0
-      local%nlgeom = user%nlgeom
+      local%square = user%square
       do e = 1, self%n_element
          if (self%host%first_point(e) == 0) cycle
          associate (node => self%node(:self%geometry(e)%n_node, e))

@@ -20,6 +20,7 @@ module emcon_solid_term
    use emcon_single_elements, only : compare_frequency, element_slots_t, single_find_fastest, &
       single_respond, single_tangent_times
    use emcon_space, only : lists_append, lists_t, space_t
+   use emcon_steps, only : step_square
    use emcon_term, only : fastest_t, response_t, role_internal, term_t
    use emcon_text, only : to_text
    implicit none
@@ -28,7 +29,7 @@ module emcon_solid_term
 
    type, extends(term_t) :: solid_term_t
       type(solid_t) :: solid
-      logical :: nlgeom = .true.                 !! .false.: small strains
+      real(wp) :: square = 1.0_wp                !! part of squares in strains; 0: small strains
       logical :: has_linear_laws = .false.       !! all materials of its elements are
       logical, private :: is_empty = .false.     !! no elements are left
       type(element_slots_t), private :: to       !! places of element matrices
@@ -87,8 +88,8 @@ contains
       integer, intent(in) :: slot(:)             !! element matrices by columns
       integer :: e, next
 
-      self%nlgeom = scene%step(i_step)%nlgeom
-      self%user%nlgeom = self%nlgeom
+      self%square = step_square(scene%step(i_step))
+      self%user%square = self%square
       self%to%slot = slot
       if (allocated(self%to%first)) deallocate(self%to%first)
       allocate(self%to%first(self%solid%n_element), source=0)
@@ -109,7 +110,7 @@ contains
       integer :: t
 
       if (self%solid%host%is_used) then
-         call solid_evaluate_user(self%solid, motion%from, motion%by, self%nlgeom, &
+         call solid_evaluate_user(self%solid, motion%from, motion%by, self%square, &
             present(value), self%user)
          if (self%user%inverted_element > 0) call refuse(self, self%user%inverted_element, &
             response)
@@ -165,7 +166,7 @@ contains
       real(wp) :: largest(n_lane)
       integer :: k, l
 
-      local%nlgeom = self%nlgeom
+      local%square = self%square
       part%with_sizes = response%with_sizes
       self%shares%inverted(share) = 0
       do k = self%shares%first(share) + 1, self%shares%first(share + 1)
@@ -318,7 +319,7 @@ contains
       integer :: k
 
       if (self%solid%host%is_used) then
-         call solid_evaluate_user(self%solid, motion%from, motion%by, self%nlgeom, .true., &
+         call solid_evaluate_user(self%solid, motion%from, motion%by, self%square, .true., &
             self%user)
          if (self%user%inverted_element > 0) return
       end if
@@ -326,7 +327,7 @@ contains
          call single_tangent_times(self%solid, self%user, motion, direction, product)
          return
       end if
-      local%nlgeom = self%nlgeom
+      local%square = self%square
       do k = 1, size(self%solid%pack)
          associate (pack => self%solid%pack(k))
             if (.not. touches(pack, direction)) cycle
@@ -400,7 +401,7 @@ contains
       type(motion_t), intent(in) :: motion       !! placed
 
       is_symmetric = motion%evaluation%is_gradient .or. self%is_empty &
-         .or. (self%has_linear_laws .and. .not. self%nlgeom)
+         .or. (self%has_linear_laws .and. .not. self%square > 0.0_wp)
    end function is_symmetric
 
    !> The fastest of the elements.
@@ -415,7 +416,7 @@ contains
       integer :: k, l
 
       if (self%solid%host%is_used) then
-         call solid_evaluate_user(self%solid, motion%from, motion%by, self%nlgeom, .true., &
+         call solid_evaluate_user(self%solid, motion%from, motion%by, self%square, .true., &
             self%user)
          if (self%user%inverted_element > 0) return
       end if
@@ -423,7 +424,7 @@ contains
          call single_find_fastest(self%solid, self%user, motion, fastest)
          return
       end if
-      local%nlgeom = self%nlgeom
+      local%square = self%square
       do k = 1, size(self%solid%pack)
          associate (pack => self%solid%pack(k))
             call pack_gather(pack, motion%from, motion%by, local)

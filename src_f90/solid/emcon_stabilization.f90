@@ -16,6 +16,7 @@ module emcon_stabilization
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_space, only : lists_append, lists_t, space_t
+   use emcon_steps, only : step_square
    use emcon_term, only : response_t, role_internal, term_t
    implicit none
    private
@@ -34,7 +35,7 @@ module emcon_stabilization
       type(solid_t), private :: solid
       logical, allocatable, private :: acts(:)           !! (n_element)
       type(moduli_t), allocatable, private :: lame(:)    !! (n_element) at rest
-      logical, private :: nlgeom = .true.
+      real(wp), private :: square = 1.0_wp               !! part of squares in strains
       real(wp), private :: lapse = 0.0_wp                !! of the stress, in this step; 0: none [T]
       integer, allocatable, private :: slot(:)           !! element matrices by columns
       real(wp), allocatable, private :: force(:, :)      !! (n_dim, n_node) of the last motion
@@ -139,7 +140,7 @@ contains
       integer, intent(in) :: slot(:)             !! element matrices by columns
 
       associate (step => scene%step(i_step))
-         self%nlgeom = step%nlgeom
+         self%square = step_square(step)
          self%lapse = 0.5_wp*step%stabilization*step%time%h
       end associate
       self%slot = slot
@@ -292,10 +293,11 @@ contains
       integer :: g
 
       associate (geometry => self%solid%geometry(e), n => size(by, 1) &
-            + n_shear(size(by, 1)) + count([allocated(self%solid%geometry(e)%circle)]))
+            + n_shear(size(by, 1)) + count([allocated(self%solid%geometry(e)%circle)]), &
+            square => self%solid%trait%square_of(e, self%square))
          allocate(strain(n, geometry%n_gp))
          do g = 1, geometry%n_gp
-            strain(:, g) = matmul(rows(geometry, g, from + 0.5_wp*by, is_large(self, e), n), &
+            strain(:, g) = matmul(rows(geometry, g, from + 0.5_wp*by, square, n), &
                reshape(by, [size(by)]))
          end do
          if (allocated(geometry%mode)) call modes_relax(geometry, strain)
@@ -308,15 +310,6 @@ contains
 
       n_shear = merge(size(one_of), 1, n_dim == size(one_of))
    end function n_shear
-
-   !> Are the strains of element `e` those of large displacements?
-   pure logical function is_large(self, e)
-      type(stabilization_term_t), intent(in) :: self
-      integer, intent(in) :: e
-
-      is_large = (self%nlgeom .or. self%solid%trait%is_corotated(e)) &
-         .and. .not. self%solid%trait%is_linear(e)
-   end function is_large
 
    !> Force and tangent of element `e`: derivatives by the end of 1/2 (lapse/h) int dE.C dE.
    pure subroutine find_part(self, e, motion, with_tangent, part)
@@ -331,13 +324,14 @@ contains
 
       associate (geometry => self%solid%geometry(e), n => size(motion%du, 1) &
             *self%solid%geometry(e)%n_node, node => self%solid%node( &
-            :self%solid%geometry(e)%n_node, e), nlgeom => is_large(self, e))
+            :self%solid%geometry(e)%n_node, e), &
+            square => self%solid%trait%square_of(e, self%square))
          from = motion%u0(:, node)
          by = motion%du(:, node)
          call find_strain(self, e, from, by, strain)
          allocate(last(size(strain, 1), n, geometry%n_gp))
          do g = 1, geometry%n_gp
-            last(:, :, g) = rows(geometry, g, from + by, nlgeom, size(strain, 1))
+            last(:, :, g) = rows(geometry, g, from + by, square, size(strain, 1))
          end do
          part%force = spread(0.0_wp, 1, n)
          part%work = 0.0_wp
@@ -347,7 +341,7 @@ contains
             stress = factor*stress_of(self%lame(e), size(by, 1), strain(:, g))
             part%work = part%work + dot_product(stress, strain(:, g))
             part%force = part%force + matmul(stress, last(:, :, g))
-            if (with_tangent .and. nlgeom) call add_geometric(geometry, g, stress, part%tangent)
+            if (with_tangent) call add_geometric(geometry, g, square*stress, part%tangent)
          end do
          if (.not. with_tangent) return
          if (allocated(geometry%mode)) call relax_rows(geometry, last)
@@ -361,19 +355,18 @@ contains
    !> The strains at point `g` by the components of displacements, node by node, about the
    !> displacements `u`: 11, 22, (33,) shears, doubled; of solids of revolution 11, 22, 12 and the
    !> circle.
-   pure function rows(geometry, g, u, nlgeom, n_strain) result(row)
+   pure function rows(geometry, g, u, square, n_strain) result(row)
       type(element_geometry_t), intent(in) :: geometry
       integer, intent(in) :: g
       real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node) [L]
-      logical, intent(in) :: nlgeom
+      real(wp), intent(in) :: square             !! part of squares in strains
       integer, intent(in) :: n_strain
       real(wp) :: row(n_strain, size(u))
       real(wp) :: f(size(u, 1), size(u, 1)), grown
       integer :: a, b, i, k, n_dim
 
       n_dim = size(u, 1)
-      f = 0.0_wp
-      if (nlgeom) f = matmul(u, transpose(geometry%gradient(:, :, g)))
+      f = square*matmul(u, transpose(geometry%gradient(:, :, g)))
       do a = 1, n_dim
          f(a, a) = f(a, a) + 1.0_wp
       end do
@@ -392,8 +385,7 @@ contains
          end associate
       end do
       if (.not. allocated(geometry%circle)) return
-      grown = 1.0_wp
-      if (nlgeom) grown = 1.0_wp + dot_product(geometry%circle(:, g), u(1, :))
+      grown = 1.0_wp + square*dot_product(geometry%circle(:, g), u(1, :))
       row(n_strain, 1::n_dim) = grown*geometry%circle(:, g)
    end function rows
 

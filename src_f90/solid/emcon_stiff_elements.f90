@@ -85,7 +85,7 @@ contains
       call element_lists(solid, n_dim, self%start, self%freedom, is_in)
       m = n_dim*size(self%node, 1)
       allocate(self%stiffness(m, m, size(self%element)), source=0.0_wp)
-      rest%nlgeom = .false.
+      rest%square = 0.0_wp
       do k = 1, size(self%element)
          m = n_dim*self%n_node(k)
          if (solid%is_single) then

@@ -28,21 +28,21 @@ module emcon_stress
 contains
 
    !> Stress at the nodes: each element's field through its quadrature points, mean over elements.
-   subroutine nodal_stress(solid, u, nlgeom, stress)
+   subroutine nodal_stress(solid, u, square, stress)
       type(solid_t), intent(in) :: solid
       real(wp), intent(in), contiguous :: u(:, :)            !! (n_dim, n_node)
-      logical, intent(in) :: nlgeom              !! .false.: small strains
+      real(wp), intent(in) :: square             !! part of squares in strains; 0: small
       real(wp), intent(out), contiguous :: stress(:, :)      !! (6, n_node)
       type(host_response_t) :: user
       integer :: count_at(solid%n_node), e, i, k, node
       real(wp), dimension(6, maxval(solid%geometry%n_gp)) :: at_gp, strain
 
-      call respond_at(solid, u, nlgeom, user)
+      call respond_at(solid, u, square, user)
       stress = 0.0_wp
       count_at = 0
       do e = 1, solid%n_element
          if (solid%trait%is_rigid(e)) cycle
-         call state_of(solid, e, u, nlgeom, user, at_gp, strain)
+         call state_of(solid, e, u, square, user, at_gp, strain)
          do k = 1, solid%geometry(e)%n_gp
             do i = 1, solid%geometry(e)%n_node
                node = solid%node(i, e)
@@ -60,11 +60,11 @@ contains
    end subroutine nodal_stress
 
    !> Stress and strain at the quadrature points of element `e`, whatever it is.
-   pure subroutine state_of(solid, e, u, nlgeom, user, stress, strain)
+   pure subroutine state_of(solid, e, u, square, user, stress, strain)
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e
       real(wp), intent(in), contiguous :: u(:, :)
-      logical, intent(in) :: nlgeom
+      real(wp), intent(in) :: square
       type(host_response_t), intent(in) :: user
       real(wp), intent(inout) :: stress(:, :), strain(:, :)
       type(law_points_t) :: points
@@ -73,10 +73,10 @@ contains
       integer :: k
 
       if (solid%is_single) then
-         call state_of_single(solid, e, u, nlgeom, user, stress, strain)
+         call state_of_single(solid, e, u, square, user, stress, strain)
          return
       end if
-      motion%nlgeom = nlgeom .and. .not. solid%trait%is_small(e)
+      motion%square = merge(0.0_wp, square, solid%trait%is_small(e))
       call place(solid, e, u, motion, turn)
       call element_state(solid, e, motion, user, points, stress, strain)
       if (.not. solid%trait%is_corotated(e)) return
@@ -85,17 +85,17 @@ contains
       end do
    end subroutine state_of
 
-   pure subroutine state_of_single(solid, e, u, nlgeom, user, stress, strain)
+   pure subroutine state_of_single(solid, e, u, square, user, stress, strain)
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e
       real(wp), intent(in), contiguous :: u(:, :)
-      logical, intent(in) :: nlgeom
+      real(wp), intent(in) :: square
       type(host_response_t), intent(in) :: user
       real(wp), intent(inout) :: stress(:, :), strain(:, :)
       type(space_motion_t) :: motion
       integer :: i
 
-      motion%nlgeom = nlgeom .and. .not. solid%trait%is_small(e)
+      motion%square = merge(0.0_wp, square, solid%trait%is_small(e))
       associate (node => solid%node(:solid%geometry(e)%n_node, e))
          if (allocated(solid%geometry(e)%circle)) then
             motion%from(:size(u, 1), :size(node)) = u(:, node)
@@ -121,17 +121,17 @@ contains
    end subroutine state_of_single
 
    !> What the given laws answer at the displacement `u`.
-   subroutine respond_at(solid, u, nlgeom, user)
+   subroutine respond_at(solid, u, square, user)
       type(solid_t), intent(in) :: solid
       real(wp), intent(in), contiguous :: u(:, :)
-      logical, intent(in) :: nlgeom
+      real(wp), intent(in) :: square
       type(host_response_t), intent(inout) :: user
       real(wp), allocatable :: zero(:, :)
 
       if (.not. solid%host%is_used) return
       allocate(zero, mold=u)
       zero = 0.0_wp
-      call solid_evaluate_user(solid, u, zero, nlgeom, .false., user)
+      call solid_evaluate_user(solid, u, zero, square, .false., user)
    end subroutine respond_at
 
    !> No motion of element `e` from displacements `u`; those of a corotated one are what is left in
@@ -201,7 +201,7 @@ contains
          do l = 1, n
             call push_forward(f(:, :, l), points%stress(l, :), points%stress_33(l), &
                stress(:, before + l))
-            if (motion%nlgeom .and. solid%trait%is_thin(e)) stress(:, before + l) &
+            if (motion%square > 0.0_wp .and. solid%trait%is_thin(e)) stress(:, before + l) &
                = stress(:, before + l)/points%stretch_33(l)
          end do
       end do
@@ -224,10 +224,10 @@ contains
    end subroutine hold_user
 
    !> Means over the reference volume of each element, and that volume.
-   subroutine element_means(solid, u, nlgeom, stress, strain, volume)
+   subroutine element_means(solid, u, square, stress, strain, volume)
       type(solid_t), intent(in) :: solid
       real(wp), intent(in), contiguous :: u(:, :)   !! (n_dim, n_node) [L]
-      logical, intent(in) :: nlgeom              !! .false.: small strains
+      real(wp), intent(in) :: square             !! part of squares in strains; 0: small
       real(wp), intent(out) :: stress(:, :)      !! (6, n_element)
       !> (3 or 6, n_element) E11, E22, 2 E12, or E11, E22, E33, 2 E12, 2 E23, 2 E13
       real(wp), intent(out) :: strain(:, :)
@@ -237,13 +237,13 @@ contains
       real(wp) :: weight
       integer :: e, k
 
-      call respond_at(solid, u, nlgeom, user)
+      call respond_at(solid, u, square, user)
       stress = 0.0_wp
       strain = 0.0_wp
       do e = 1, solid%n_element
          volume(e) = sum(solid%geometry(e)%weight)
          if (solid%trait%is_rigid(e)) cycle
-         call state_of(solid, e, u, nlgeom, user, stress_k, strain_k)
+         call state_of(solid, e, u, square, user, stress_k, strain_k)
          do k = 1, solid%geometry(e)%n_gp
             weight = solid%geometry(e)%weight(k)/volume(e)
             stress(:, e) = stress(:, e) + weight*stress_k(:, k)

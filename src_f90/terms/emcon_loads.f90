@@ -19,7 +19,7 @@ module emcon_loads
    use emcon_solid, only : solid_t
    use emcon_space, only : lists_append, lists_t, space_t
    use emcon_steps, only : load_centrifugal, load_gravity, load_moment, load_point, &
-      load_pressure, load_t
+      load_pressure, load_t, step_square
    use emcon_term, only : response_t, role_external, term_t
    implicit none
    private
@@ -148,7 +148,7 @@ contains
       call self%renew(scene, i_step)
       associate (step => scene%step(i_step))
          self%is_ramped = step%scheme%loads_ramp
-         self%follows = step%nlgeom .and. self%load%kind == load_pressure
+         self%follows = step_square(step) > 0.0_wp .and. self%load%kind == load_pressure
          do i = 1, size(self%load)
             if (self%follows(i)) self%follows(i) = .not. self%is_linear(self%load(i)%target)
          end do

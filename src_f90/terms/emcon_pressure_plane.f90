@@ -18,18 +18,18 @@ module emcon_pressure_plane
 contains
 
    !> Half of -p n |b - a| on either node of a straight edge, n outwards.
-   pure subroutine add_pressure(edge, p, x, u, nlgeom, force)
+   pure subroutine add_pressure(edge, p, x, u, follows, force)
       integer, intent(in) :: edge(:)                       !! (2 or 3) a, b, m
       real(wp), intent(in) :: p                            !! [M/T^2]: pressure times thickness
       real(wp), intent(in) :: x(:, :), u(:, :)             !! (2, n_node) [L]
-      logical, intent(in) :: nlgeom                        !! it follows the displacements
+      logical, intent(in) :: follows                       !! it follows the displacements
       real(wp), intent(inout) :: force(:, :)               !! (2, n_node) [M L/T^2]
       real(wp) :: d(2, 2:size(edge)), half(2)
       integer :: i, j
 
       do j = 2, size(edge)
          d(:, j) = x(:, edge(j)) - x(:, edge(1))
-         if (nlgeom) d(:, j) = d(:, j) + (u(:, edge(j)) - u(:, edge(1)))
+         if (follows) d(:, j) = d(:, j) + (u(:, edge(j)) - u(:, edge(1)))
       end do
       if (size(edge) == size(straight, 1)) then
          half = 0.5_wp*p*turned_left(d(:, 2))

@@ -77,7 +77,8 @@ contains
 
       call solid_init(solid, scene, error)
       if (allocated(error)) return
-      call bending_measure(bending, solid, spread(1, 1, size(u, 2)), scene%x, u, nlgeom)
+      call bending_measure(bending, solid, spread(1, 1, size(u, 2)), scene%x, u, &
+         merge(1.0_wp, 0.0_wp, nlgeom))
    end subroutine measure
 
    !> Strains along it, -k y, whose mean square is k^2 b^2/12; in place of the strain across it,
@@ -183,28 +184,28 @@ contains
       call solid_init(solid, scene, error)
       if (allocated(error)) return
       body = 2
-      call bending_measure(bending, solid, body, scene%x, u, .false.)
+      call bending_measure(bending, solid, body, scene%x, u, 0.0_wp)
       call check_equal(error, bending%element, [0, 1], "elements")
       call check_near(error, [bending%strain, bending%missed], [0.0_wp, alone%strain(1), 0.0_wp, &
          alone%missed(1)], tol, alone%strain(1), "of the second body")
       body(:2) = 1
-      call bending_measure(bending, solid, body, scene%x, u, .false.)
+      call bending_measure(bending, solid, body, scene%x, u, 0.0_wp)
       call check_equal(error, bending%element, [1, 3], "first elements of both")
       call check_near(error, bending%strain, [2.0_wp, 3.0_wp]/n*alone%strain(1), tol, &
          alone%strain(1), "two elements and three")
       call check_near(error, bending%missed, [2.0_wp, 3.0_wp]/n*alone%missed(1), tol, &
          alone%missed(1), "and what they miss")
       body = 0
-      call bending_measure(bending, solid, body, scene%x, u, .false.)
+      call bending_measure(bending, solid, body, scene%x, u, 0.0_wp)
       call check_equal(error, size(bending%strain), 0, "of none")
       body = 1
       solid%trait%is_rigid(1) = .true.
-      call bending_measure(bending, solid, body, scene%x, u, .false.)
+      call bending_measure(bending, solid, body, scene%x, u, 0.0_wp)
       call check_equal(error, bending%element, [2], "but for the rigid one")
       call check_near(error, bending%strain, alone%strain*(n - 1)/n, tol, alone%strain(1), &
          "four of five")
       solid%trait%is_stiff_bent = .false.
-      call bending_measure(bending, solid, body, scene%x, u, .false.)
+      call bending_measure(bending, solid, body, scene%x, u, 0.0_wp)
       call check_near(error, bending%missed, [0.0_wp], 0.0_wp, 1.0_wp, "elements that follow")
    end subroutine test_bodies
 

@@ -113,7 +113,7 @@ contains
       solid => terms_solid(march%system%term)
       call bend(scene, [0.0_wp, curvature], march%state%u)
       call bent_body_find(march, scene, 0.0_wp, found)
-      call bending_measure(bending, solid, march%system%space%body, scene%x, march%state%u, .false.)
+      call bending_measure(bending, solid, march%system%space%body, scene%x, march%state%u, 0.0_wp)
       call check_equal(error, [found%body, found%label], [2, 101 + n], "the second")
       call check_near(error, found%percent, 100.0_wp*bending%missed(2)/bending%strain(2), &
          8.0_wp*eps, found%percent, "per cent of it")
@@ -138,7 +138,7 @@ contains
       if (allocated(error)) return
       solid => terms_solid(march%system%term)
       call bend(scene, [curvature, 0.0_wp], march%state%u)
-      call bending_measure(bending, solid, march%system%space%body, scene%x, march%state%u, .false.)
+      call bending_measure(bending, solid, march%system%space%body, scene%x, march%state%u, 0.0_wp)
       associate (largest => bending%strain(1)/sqrt(epsilon(1.0_wp)))
          do k = 1, 2
             call bent_body_find(march, scene, merge(0.9_wp, 1.1_wp, k == 1)*largest, found)

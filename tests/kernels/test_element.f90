@@ -85,7 +85,7 @@ contains
       type(element_motion_t) :: motion
       type(host_response_t) :: none
 
-      motion%nlgeom = sample%nlgeom
+      motion%square = merge(1.0_wp, 0.0_wp, sample%nlgeom)
       response = element_response_t()
       motion%from(:, :4) = u0
       motion%by(:, :4) = du
@@ -315,7 +315,7 @@ contains
          f(2, 2) = f(2, 2) + 1.0_wp
          expected = matmul(transpose(f), dgrad) + matmul(transpose(dgrad), f) &
             + matmul(transpose(dgrad), dgrad)
-         call point_strain(grad0, dgrad, .true., point)
+         call point_strain(grad0, dgrad, 1.0_wp, point)
          call check_near(error, point%dstrain, [0.5_wp*expected(1, 1), 0.5_wp*expected(2, 2), &
             expected(1, 2)], 8.0_wp*eps, 4.0_wp*maxval(abs(dgrad)), "at 2^-" // to_text(k))
          call check_near(error, point%f_end - point%f_mid, 0.5_wp*dgrad, 2.0_wp*eps, &

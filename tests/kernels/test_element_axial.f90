@@ -132,7 +132,7 @@ contains
       type(space_part_t), intent(inout) :: part
       type(space_motion_t) :: motion
 
-      motion%nlgeom = sample%nlgeom
+      motion%square = merge(1.0_wp, 0.0_wp, sample%nlgeom)
       motion%from(:2, :m) = u0
       motion%by(:2, :m) = du
       part = space_part_t(energy=1.0_wp, is_inverted=.true.)
@@ -280,7 +280,7 @@ contains
          call make_sample(n_axial_row(), 1 + mod(i, n_law), i < n_law, 0.2_wp, sample, error)
          if (allocated(error)) return
          call shake(grad, 0.2_wp)
-         motion%nlgeom = sample%nlgeom
+         motion%square = merge(1.0_wp, 0.0_wp, sample%nlgeom)
          associate (x => sample%x, n => sample%n, geometry => sample%solid%geometry(1), &
                law => sample%solid%law(sample%solid%law_of(1))%law)
             motion%from(:2, :n) = matmul(grad, x(:, :n))
@@ -289,8 +289,7 @@ contains
                h = 0.0_wp
                h(:2, :2) = grad
                h(3, 3) = dot_product(motion%from(1, :n), geometry%circle(:n, k))
-               f = 0.0_wp
-               if (motion%nlgeom) f = h
+               f = motion%square*h
                e = 0.5_wp*(h + transpose(h) + matmul(transpose(f), f))
                f = f + reshape([1, 0, 0, 0, 1, 0, 0, 0, 1], [3, 3])
                one = [e(1, 1), e(2, 2), e(3, 3), 2.0_wp*e(1, 2), 0.0_wp, 0.0_wp]

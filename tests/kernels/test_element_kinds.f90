@@ -129,7 +129,7 @@ contains
       type(element_motion_t) :: motion
       type(host_response_t) :: none
 
-      motion%nlgeom = sample%nlgeom
+      motion%square = merge(1.0_wp, 0.0_wp, sample%nlgeom)
       response = element_response_t()
       motion%from(:, :m) = u0
       motion%by(:, :m) = du

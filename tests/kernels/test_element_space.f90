@@ -153,7 +153,7 @@ contains
       type(space_part_t), intent(inout) :: part
       type(space_motion_t) :: motion
 
-      motion%nlgeom = sample%nlgeom
+      motion%square = merge(1.0_wp, 0.0_wp, sample%nlgeom)
       motion%from = u0
       motion%by = du
       part = space_part_t(energy=1.0_wp, is_inverted=.true.)

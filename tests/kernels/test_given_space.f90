@@ -122,7 +122,7 @@ contains
 
       call make_sample(sample, error)
       do k = 1, 6
-         motion%nlgeom = mod(k, 2) == 0
+         motion%square = real(mod(k + 1, 2), wp)
          call shake(motion%from, 0.2_wp)
          call shake(motion%by, 0.2_wp)
          call answer(sample, motion, is_inverted)
@@ -249,7 +249,7 @@ contains
          do k = 1, 2
             if (k == 1) solid => terms_solid(one%term)
             if (k == 2) solid => terms_solid(two%term)
-            call nodal_stress(solid, u0, .true., stress(:, :, k))
+            call nodal_stress(solid, u0, 1.0_wp, stress(:, :, k))
          end do
       end associate
       ! In the plane the stress across is not known of a given law.

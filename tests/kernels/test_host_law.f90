@@ -446,9 +446,9 @@ contains
       call check_near(error, given%march%state%reaction, own%march%state%reaction, 1.0e3_wp*eps, &
          young, "reactions")
       solid => terms_solid(given%march%system%term)
-      call nodal_stress(solid, given%march%state%u, .true., stress)
+      call nodal_stress(solid, given%march%state%u, 1.0_wp, stress)
       solid => terms_solid(own%march%system%term)
-      call nodal_stress(solid, own%march%state%u, .true., expected)
+      call nodal_stress(solid, own%march%state%u, 1.0_wp, expected)
       call check_true(error, all(abs(expected(3, :)) > 1.0_wp), "there is a stress zz")
       expected(3, :) = 0.0_wp
       call check_near(error, stress, expected, 1.0e3_wp*eps, young, "stress")
@@ -527,9 +527,9 @@ contains
       call check_true(error, stepper%march%state%u(1, 2) < sqrt(1.0_wp + 2.0_wp*0.38_wp) - 1.0_wp, &
          "what succeeded is inside")
       solid => terms_solid(stepper%march%system%term)
-      call nodal_stress(solid, stepper%march%state%u, .true., stress)
+      call nodal_stress(solid, stepper%march%state%u, 1.0_wp, stress)
       call check_true(error, .not. any(ieee_is_nan(stress)), "stress inside")
-      call nodal_stress(solid, 2.0_wp*stepper%march%state%u, .true., stress)
+      call nodal_stress(solid, 2.0_wp*stepper%march%state%u, 1.0_wp, stress)
       call check_true(error, all(ieee_is_nan(stress(1, :))), "no stress outside")
       call stepper_close(stepper)
    end subroutine test_outside
@@ -614,9 +614,9 @@ contains
       if (allocated(error)) return
       call shake(u, 0.2_wp)
       solid => terms_solid(own%march%system%term)
-      call element_means(solid, u, .true., expected, strain, volume)
+      call element_means(solid, u, 1.0_wp, expected, strain, volume)
       solid => terms_solid(given%march%system%term)
-      call element_means(solid, u, .true., stress, strain, volume)
+      call element_means(solid, u, 1.0_wp, stress, strain, volume)
       expected(3, 2) = 0.0_wp
       call check_near(error, stress, expected, 1.0e3_wp*eps, young, "stress")
       law = elastic_of(coupled_neo_hooke())
@@ -629,7 +629,7 @@ contains
       if (.not. allocated(error)) call stepper_build(short, error)
       if (allocated(error)) return
       solid => terms_solid(short%march%system%term)
-      call element_means(solid, u, .true., stress, strain, volume)
+      call element_means(solid, u, 1.0_wp, stress, strain, volume)
       call check_true(error, all(ieee_is_nan(stress([1, 2, 4], 2))), "beyond the law")
       call check_near(error, stress(:, 1), expected(:, 1), 1.0e3_wp*eps, young, "beside it")
       call stepper_close(given)

@@ -311,7 +311,7 @@ contains
       real(wp), dimension(6, n_element) :: stress, strain
       real(wp) :: found(n_element), f(3, 3), c(3, 3), s(3, 3), voigt(6), cauchy(6)
       real(wp), allocatable :: at_node(:, :)
-      logical :: nlgeom
+      real(wp) :: square
       integer :: e, i, k
 
       call make_scene([1, 2, 3, 4, 5], scene)
@@ -319,16 +319,12 @@ contains
       if (allocated(error)) return
       allocate(at_node(6, size(scene%x, 2)))
       do k = 1, 2
-         nlgeom = k == 1
-         c = grad + transpose(grad)
-         f = 0.0_wp
+         square = real(2 - k, wp)
+         c = grad + transpose(grad) + square*matmul(transpose(grad), grad)
+         f = square*grad
          do i = 1, 3
-            f(i, i) = 1.0_wp
+            f(i, i) = 1.0_wp + f(i, i)
          end do
-         if (nlgeom) then
-            c = c + matmul(transpose(grad), grad)
-            f = f + grad
-         end if
          voigt = [(c(row(i), column(i))*merge(0.5_wp, 1.0_wp, i <= 3), i = 1, 6)]
          call law_response_space(solid%law(1)%law, voigt, 0.0_wp*voigt, state)
          s = reshape([state%stress([1, 4, 6]), state%stress([4, 2, 5]), state%stress([6, 5, 3])], &
@@ -336,8 +332,8 @@ contains
          s = matmul(f, matmul(s, transpose(f)))/(dot_product(f(:, 1), [f(2, 2)*f(3, 3) - f(3, 2) &
             *f(2, 3), f(3, 2)*f(1, 3) - f(1, 2)*f(3, 3), f(1, 2)*f(2, 3) - f(2, 2)*f(1, 3)]))
          cauchy = [(s(row(i), column(i)), i = 1, 6)]
-         call element_means(solid, matmul(grad, scene%x), nlgeom, stress, strain, found)
-         call nodal_stress(solid, matmul(grad, scene%x), nlgeom, at_node)
+         call element_means(solid, matmul(grad, scene%x), square, stress, strain, found)
+         call nodal_stress(solid, matmul(grad, scene%x), square, at_node)
          call check_near(error, found, volume, tol, 1.0_wp, "volume")
          do e = 1, n_element
             call check_near(error, strain(:, e), voigt, tol, 1.0_wp, name(e) // ": strain")

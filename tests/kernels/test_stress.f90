@@ -66,7 +66,7 @@ contains
       associate (x => stepper%scene%x, system => stepper%march%system)
          u = moved(grad, x)
          call system_respond(system, motion_of(evaluation_at_end, x, u, 0.0_wp*u), .false.)
-         call element_means(solid, u, .true., mean, strain, volume)
+         call element_means(solid, u, 1.0_wp, mean, strain, volume)
          place = x
          if (is_large) place = x + u
          change = 1.0_wp
@@ -105,11 +105,11 @@ contains
       solid => terms_solid(stepper%march%system%term)
       u = moved(grad, stepper%scene%x)
       allocate(stress(6, size(u, 2)))
-      call nodal_stress(solid, u, .true., stress)
+      call nodal_stress(solid, u, 1.0_wp, stress)
       do i = 1, size(u, 2)
          call check_near(error, stress(:, i), in_list(expected), tol, stress_size, what // ", node")
       end do
-      call element_means(solid, u, .true., mean, strain, volume)
+      call element_means(solid, u, 1.0_wp, mean, strain, volume)
       call check_near(error, mean(:, 1), in_list(expected), tol, stress_size, what // ", mean")
       if (what(:3) /= "CAX" .and. index(what, "COROTATED") == 0) call check_strain(error, grad, &
          index(what, "LINEAR") == 0, strain(:, 1), what)
@@ -351,8 +351,8 @@ contains
          call shake(u, 0.05_wp)
          u = least*anint(u/least)
          solid => terms_solid(stepper%march%system%term)
-         call element_means(solid, u, .true., near, strain, volume)
-         call element_means(solid, u + way, .true., far, strain, volume)
+         call element_means(solid, u, 1.0_wp, near, strain, volume)
+         call element_means(solid, u + way, 1.0_wp, far, strain, volume)
          call check_near(error, far, near, 64.0_wp*epsilon(1.0_wp), stress_size, trim(kind))
          call check_true(error, maxval(abs(near)) > 1.0e-3_wp*stress_size, "stress")
          call stepper_close(stepper)

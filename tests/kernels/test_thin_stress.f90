@@ -68,7 +68,7 @@ contains
             low = across
          end if
       end do
-      call nodal_stress(term%solid, u, .true., stress)
+      call nodal_stress(term%solid, u, 1.0_wp, stress)
       call check_true(error, across < 0.95_wp, "it is narrower")
       call check_near(error, stress(1, :), spread(sum(force(1, [2, 4]))/(thickness*across**2), 1, &
          4), tol, 100.0_wp, "along")
@@ -77,8 +77,8 @@ contains
       scene%material(1)%law = law_linear
       call solid_term_init(linear, scene, error)
       if (allocated(error)) return
-      call nodal_stress(linear%solid, u, .false., stress)
-      call nodal_stress(linear%solid, 0.125_wp*u, .false., part)
+      call nodal_stress(linear%solid, u, 0.0_wp, stress)
+      call nodal_stress(linear%solid, 0.125_wp*u, 0.0_wp, part)
       call check_near(error, 8.0_wp*part, stress, tol, 100.0_wp, "linear")
       call check_true(error, stress(1, 1) > 10.0_wp, "pulled")
    end subroutine test_strip
