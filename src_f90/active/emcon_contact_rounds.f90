@@ -17,7 +17,6 @@ module emcon_contact_rounds
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_evaluate, motion_t
-   use emcon_motion_bound, only : largest_motion
    use emcon_newton, only : newton_converged, newton_early, newton_measure_forces, &
       newton_refused, newton_solve, newton_t
    use emcon_scene, only : scene_t
@@ -54,16 +53,13 @@ contains
       if (self%candidates%is_settled .or. allocated(error)) return
       if (size(system%contact) == 0) return
       if (status == newton_refused .and. newton%n_solve == 0) return    ! nor are there forces below
-      if (self%support%is_needed .or. (.not. self%rules%has_impacts .and. &
-         largest_motion(motion%du - self%guess%first) > self%rules%largest_move)) then
+      if (self%support%is_needed) then
          motion%du = self%guess%first
          newton%driven = self%guess%driven
          self%is_active = self%candidates%began
-         if (self%support%is_needed) then
-            call contact_support_forget(self%support)
-            call contact_sets_hold(self, system, scene, newton%driven, motion)
-            call system_stiffen(system, self%support%hangs, motion)
-         end if
+         call contact_support_forget(self%support)
+         call contact_sets_hold(self, system, scene, newton%driven, motion)
+         call system_stiffen(system, self%support%hangs, motion)
          call begin_again(self, system, motion)
       end if
       status = step_cycling
