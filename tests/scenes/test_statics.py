@@ -617,3 +617,36 @@ def test_what_slides_on_a_bent_surface_is_not_said_to_rotate(tmp_path):
     deck.replace("*DYNAMIC, DIRECT", "*STATIC, DIRECT")
     run = run_deck(deck, tmp_path, code=3, formulation="MORTAR")
     assert "body of element 9 is free to move in x" in run.errors and "rotate" not in run.errors
+
+
+def test_a_beam_between_three_rollers(tmp_path):
+    """Nothing but arcs above and below holds it; their ends have twelve digits, so that one of them
+    touches first and pushes nothing. Force and sag of theory with shear, to (height/span)**2."""
+    height, ends = 5.0, range(1, 42)
+    x = [(-60 + 3 * i, 1.25 * j) for j in range(5) for i in range(41)]
+    cells = [41 * j + i + 1 for j in range(4) for i in range(40)]
+    lines = ["*NODE", *(f"{k}, {a}, {b}" for k, (a, b) in enumerate(x, 1))]
+    lines += ["901, -50., -3.05", "902, 50., -3.05", "903, 0., 8.1"]
+    lines += ["*ELEMENT, TYPE=CPE4I, ELSET=BEAM"]
+    lines += [f"{k}, {a}, {a + 1}, {a + 42}, {a + 41}" for k, a in enumerate(cells, 1)]
+    lines += ["*SURFACE, NAME=LOWER", *(f"{k}, S1" for k in ends[:40])]
+    lines += ["*SURFACE, NAME=UPPER", *(f"{k + 120}, S3" for k in ends[:40])]
+    a, b = 1.5 * math.sqrt(3), 1.5
+    for k, (cx, cy, up) in enumerate([(-50, -3.05, 1), (50, -3.05, 1), (0, 8.1, -1)], 1):
+        lines += [f"*SURFACE, TYPE=SEGMENTS, NAME=S{k}", f"START, {cx - up * a:.12g}, {cy + up * b:.12g}"]
+        lines += [f"CIRCL, {cx + up * a:.12g}, {cy + up * b:.12g}, {cx}, {cy}"]
+        lines += [f"*RIGID BODY, ANALYTICAL SURFACE=S{k}, REF NODE=90{k}"]
+    lines += ["*MATERIAL, NAME=M", "*ELASTIC", "1e4, 0.3", "*SOLID SECTION, ELSET=BEAM, MATERIAL=M"]
+    lines += ["*SURFACE INTERACTION, NAME=I", "*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE"]
+    lines += ["LOWER, S1", "LOWER, S2", "UPPER, S3", "*BOUNDARY", "901, ENCASTRE", "902, ENCASTRE"]
+    lines += ["903, 1", "903, 6", *(f"{21 + 41 * j}, 1" for j in range(5))]
+    lines += ["*STEP, NLGEOM", "*STATIC", "0.1, 1.", "*BOUNDARY", "903, 2, 2, -1.", "*NODE FILE", "U"]
+    run = solve(tmp_path, "\n".join([*lines, "*CONTACT PRINT, TOTALS=ONLY", "CF", "*END STEP", ""]))
+    assert run.verdict["verdict"] == "good", run.verdict["reasons"]
+    fields = run.fields()
+    # The supports lie 0.05 below it.
+    sag = -fields["displacement"][-1][20, 1] - 0.05
+    stiffness = 1e4 / (1 - 0.3**2)
+    give = 1e6 / 48 / (stiffness * height**3 / 12) + 100 / 4 / (1e4 / 2.6 * height * 5 / 6)
+    force = abs(run.history["pair3_force_y"][-1])
+    assert force == pytest.approx(sag / give, rel=8 * (height / 100)**2)
