@@ -76,6 +76,7 @@ contains
       reader%n_dim = scene%n_dim
       reader%is_flat = scene_is_flat(scene)
       if (size(reader%card) > 0) call read_scene(reader, scene)
+      if (allocated(reader%log%idle)) scene%deck%idle = reader%log%idle
       diagnostics = reader%log
    end subroutine deck_read
 

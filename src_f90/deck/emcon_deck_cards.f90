@@ -5,7 +5,8 @@ module emcon_deck_cards
       mark_without_effect, parameter_mark, parameter_names, parameter_reason, refusal_of, refusal_t
    use emcon_deck_parameters, only : parameter_define, parameters_init, parameters_t, &
       substitute_parameters, unused_override
-   use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, option_t, reader_t
+   use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, note_idle, &
+      option_t, reader_t
    use emcon_diagnostics, only : add_error, quoted, suggestion
    use emcon_law_registry, only : law_variants
    use emcon_origin, only : origin_t
@@ -206,7 +207,10 @@ contains
       call split_options(text(i_comma:), card%option)
       i = find_keyword(card%name)
       if (i == 0) refusal = refusal_of(card%name)
-      if (refusal%reason /= "") then
+      if (is_idle(card, refusal)) then
+         call note_idle(reader, card%title, trim(refusal%reason))
+         card%name = ""
+      else if (refusal%reason /= "") then
          call refuse_unsupported(reader, card, refusal)
       else if (i == 0) then
          call refuse_keyword(reader, card)
@@ -231,6 +235,20 @@ contains
       reader%doubt%names = .true.
       card%name = ""
    end subroutine refuse_keyword
+
+   !> Does a card of another program change nothing, as it is given here?
+   pure logical function is_idle(card, refusal)
+      type(card_t), intent(in) :: card
+      type(refusal_t), intent(in) :: refusal
+      integer :: i
+
+      is_idle = refusal%is_idle .or. refusal%parameters /= ""
+      if (refusal%is_idle) return
+      do i = 1, size(card%option)
+         is_idle = is_idle .and. is_neutral(refusal%parameters, card%option(i)%name, &
+            card%option(i)%value)
+      end do
+   end function is_idle
 
    subroutine refuse_unsupported(reader, card, refusal)
       type(reader_t), intent(inout) :: reader

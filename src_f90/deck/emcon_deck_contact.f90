@@ -2,12 +2,13 @@
 module emcon_deck_contact
    use emcon_deck_contact_damping, only : read_contact_damping
    use emcon_deck_contact_settings, only : read_pair_initiation
-   use emcon_deck_fields, only : data_error, data_open, data_t, next_line, refuse_lines
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, &
+      next_line, refuse_lines
    use emcon_deck_friction, only : read_friction
    use emcon_deck_named, only : set_names
    use emcon_deck_options, only : check_option
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, n_lines, need_name, &
-      option_name, option_number, option_word, reader_t, refuse_option
+      note_idle, option_name, option_number, option_word, reader_t, refuse_option
    use emcon_deck_surfaces, only : get_surfaces, need_facets
    use emcon_diagnostics, only : add_error, quoted, suggestion
    use emcon_interactions, only : adjustment_t, contact_damping_t, contact_pair_t, &
@@ -17,7 +18,7 @@ module emcon_deck_contact
    use emcon_options, only : option_code, option_default, option_words
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t, where_text
-   use emcon_text, only : read_real
+   use emcon_text, only : read_real, to_text
    implicit none
    private
    public :: read_interactions, read_pairs
@@ -48,6 +49,7 @@ contains
                call option_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
                   // "left of the velocity at which bodies meet", 0.0_wp, 1.0_wp, &
                   reader%interaction(n)%restitution)
+               call read_thickness(reader, card)
             case ("SURFACEBEHAVIOR", "FRICTION", "CONTACTDAMPING")
                if (n == 0 .and. .not. reader%doubt%names) call card_error(reader, card, &
                   "there is no *SURFACE INTERACTION before")
@@ -71,6 +73,25 @@ contains
       reader%interaction = reader%interaction(:n)
       reader%interaction_name = reader%interaction_name(:n)
    end subroutine read_interactions
+
+   !> The thickness of an interaction of the plane, which sections have here.
+   subroutine read_thickness(reader, card)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(data_t) :: data
+      real(wp) :: thickness
+
+      thickness = 1.0_wp
+      call data_open(data, card)
+      if (.not. next_line(reader, data)) return
+      call get_real(reader, data, 1, "thickness", thickness)
+      if (data%ok .and. thickness <= 0.0_wp) call data_error(reader, data, "the thickness " &
+         // to_text(thickness) // " is not positive")
+      call check_count(reader, data, 0, 1, "thickness")
+      if (data%n == 1) call note_idle(reader, "thickness of *SURFACE INTERACTION", &
+         "that of the sections counts")
+      if (next_line(reader, data)) call data_error(reader, data, "is the second data line")
+   end subroutine read_thickness
 
    subroutine check_behavior(reader, card)
       type(reader_t), intent(inout) :: reader

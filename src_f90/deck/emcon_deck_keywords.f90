@@ -29,11 +29,13 @@ module emcon_deck_keywords
       logical :: has_data = .true.           !! data lines may follow
    end type keyword_t
 
-   !> Why keywords are not supported.
+   !> Keywords of other programs that are known, and why they do nothing here.
    type :: refusal_t
       character(len=64) :: reason = ""
       character(len=180) :: names = ""       !! with commas between them
       logical :: is_output = .false.         !! --lenient reads on
+      logical :: is_idle = .false.           !! taken: they would change nothing
+      character(len=32) :: parameters = ""   !! also with none but these, as they are given here
    end type refusal_t
 
    character(len=*), parameter :: printed = "FREQUENCY=,TIMEPOINTS=,TOTALS=,~GLOBAL:YES"
@@ -69,8 +71,7 @@ module emcon_deck_keywords
       keyword_t("INITIAL CONDITIONS", in_model, "TYPE=,!USER"), &
       keyword_t("AMPLITUDE", in_both, "NAME=,TIME=,DEFINITION=,!USER,!VALUE:RELATIVE,!SMOOTH:0"), &
       keyword_t("TIME POINTS", in_both, "NAME=,GENERATE"), &
-      keyword_t("SURFACE INTERACTION", in_model, "NAME=,PADTHICKNESS=,RESTITUTION=", &
-         has_data=.false.), &
+      keyword_t("SURFACE INTERACTION", in_model, "NAME=,PADTHICKNESS=,RESTITUTION="), &
       keyword_t("SURFACE BEHAVIOR", in_model, "PRESSURE-OVERCLOSURE=,DIRECT,!NOSEPARATION," &
          // "!PENALTY,!AUGMENTEDLAGRANGE"), &
       keyword_t("FRICTION", in_model, "RESTITUTION=,ROUGH,~SLIPTOLERANCE,~ELASTICSLIP," &
@@ -123,13 +124,12 @@ module emcon_deck_keywords
       keyword_t("RESTART", in_both, "WRITE,FREQUENCY=,~OVERLAY,!READ", has_data=.false.), &
       keyword_t("END STEP", in_step, has_data=.false.)]
 
-   !> Keywords of other programs that are known but not supported.
+   !> Keywords of other programs that are known but not supported, and those that change nothing.
    type(refusal_t), parameter :: refusals(*) = [ &
       refusal_t("linear couplings go by *EQUATION", &
          "MPC,COUPLING,KINEMATIC,DISTRIBUTING,EMBEDDED ELEMENT"), &
       refusal_t("use *RIGID BODY and TYPE=SEGMENTS", "RIGID SURFACE"), &
       refusal_t("degrees of freedom are those of the global axes", "TRANSFORM"), &
-      refusal_t("materials are isotropic", "ORIENTATION"), &
       refusal_t("coordinates are those of the global axes", "SYSTEM"), &
       refusal_t("nodes are given one by one by *NODE", "NGEN,NCOPY,NFILL"), &
       refusal_t("elements are given one by one by *ELEMENT", "ELGEN,ELCOPY"), &
@@ -138,9 +138,10 @@ module emcon_deck_keywords
       refusal_t("materials are elastic", "PLASTIC,CYCLIC HARDENING,CREEP,VISCOELASTIC"), &
       refusal_t("use *HYPERELASTIC, NEO HOOKE", "HYPERFOAM"), &
       refusal_t("materials have no state variables", "DEPVAR"), &
+      refusal_t("there is no temperature", "TEMPERATURE,DFLUX,FILM,RADIATE,HEAT TRANSFER"), &
       refusal_t("there is no temperature", &
-         "EXPANSION,CONDUCTIVITY,SPECIFIC HEAT,PHYSICAL CONSTANTS,TEMPERATURE,DFLUX,FILM," &
-         // "RADIATE,HEAT TRANSFER"), &
+         "EXPANSION,CONDUCTIVITY,SPECIFIC HEAT,PHYSICAL CONSTANTS", is_idle=.true.), &
+      refusal_t("no section asks for it", "ORIENTATION", is_idle=.true.), &
       refusal_t("use *SOLID SECTION", "UEL PROPERTY"), &
       refusal_t("bodies are solids; forces, potentials and masses of others a program may give", &
          "SHELL SECTION,BEAM SECTION,MEMBRANE SECTION,SPRING,DASHPOT,MASS"), &
@@ -151,18 +152,23 @@ module emcon_deck_keywords
       refusal_t("coefficients hold for the whole run", "CHANGE FRICTION"), &
       refusal_t("pairs and elements stay for the whole run", "MODEL CHANGE"), &
       refusal_t("use *BOUNDARY with an amplitude", "BASE MOTION"), &
-      refusal_t("use *NEWTON", "CONTROLS"), &
+      refusal_t("*NEWTON and the procedure say how steps are solved", "CONTROLS", &
+         is_idle=.true.), &
       refusal_t("the procedures are *STATIC and *DYNAMIC", &
          "FREQUENCY,BUCKLE,MODAL DYNAMIC,STEADY STATE DYNAMICS,VISCO"), &
       refusal_t("results go by *NODE FILE, *EL FILE and *... PRINT", &
-         "OUTPUT,SECTION PRINT,SECTION FILE,FILE FORMAT,MONITOR,INTEGRATED OUTPUT," &
-         // "INTEGRATED OUTPUT SECTION,INCREMENTATION OUTPUT,FILTER,PRINT", .true.), &
+         "SECTION PRINT,SECTION FILE,INTEGRATED OUTPUT,INTEGRATED OUTPUT SECTION", .true.), &
+      refusal_t("results go by *NODE FILE, *EL FILE and *... PRINT", "OUTPUT", .true., &
+         parameters="~FREQUENCY:1,~FREQUENCYF:1"), &
+      refusal_t("it names no results", "FILE FORMAT,MONITOR,INCREMENTATION OUTPUT,FILTER,PRINT", &
+         is_idle=.true.), &
       refusal_t("use *NODE FILE or *NODE PRINT", "NODE OUTPUT", .true.), &
       refusal_t("use *EL FILE or *EL PRINT", "ELEMENT OUTPUT", .true.), &
       refusal_t("use *CONTACT FILE or *CONTACT PRINT", "CONTACT OUTPUT", .true.), &
       refusal_t("use *ENERGY PRINT", "ENERGY OUTPUT", .true.), &
       refusal_t("use *EL FILE", "ELEMENT FILE", .true.), &
-      refusal_t("diagnostics are in the log", "DIAGNOSTICS", .true.)]
+      refusal_t("the log has diagnostics", "DIAGNOSTICS", is_idle=.true.), &
+      refusal_t("emcon check reads a deck without running it", "NO ANALYSIS")]
 
 contains
 

@@ -42,6 +42,10 @@ module emcon_deck_output
       output_row_t("CONTACTPRINT", output_contact_print, at_contacts), &
       output_row_t("ENERGYPRINT", output_energy_print)]
 
+   !> Variables that exporters name and that are not written here: a warning says so.
+   character(len=*), parameter :: unwritten(*) = [character(len=4) :: "PE", "PEEQ", "ME", "NOE", &
+      "ERR", "ZZS"]
+
    character(len=*), parameter :: energies(4) = [character(len=6) :: "ALLKE", "ALLSE", "ALLWK", &
       "ETOTAL"]
 
@@ -141,7 +145,7 @@ contains
             end do
             if (i <= size(list)) then
                is_wanted(i) = .true.
-            else if (reader%is_lenient) then
+            else if (reader%is_lenient .or. any(unwritten == name)) then
                call data_warning(reader, data, "output variable " // quoted(name) &
                   // " is not supported, left out; supported: " // known)
             else

@@ -12,7 +12,7 @@ module emcon_deck_reader
    implicit none
    private
    public :: reader_t, doubts_t, names_t, card_t, option_t, max_name
-   public :: line_origin, source_line, card_error, card_warning, bare_name
+   public :: line_origin, source_line, card_error, card_warning, note_idle, bare_name
    public :: n_cards, n_lines
    public :: has_option, option_name, option_count, option_number, option_real, option_angle
    public :: need_name, option_word, refuse_option
@@ -137,6 +137,20 @@ contains
          call add_error(reader%log, card%origin, card%title // ": " // text)
       end if
    end subroutine card_error
+
+   !> Keep `name`, which changes nothing for this `reason`, for the log: each is named once.
+   subroutine note_idle(reader, name, reason)
+      type(reader_t), intent(inout) :: reader
+      character(len=*), intent(in) :: name, reason
+      character(len=:), allocatable :: line
+
+      line = name // " (" // reason // ")"
+      if (.not. allocated(reader%log%idle)) then
+         reader%log%idle = line
+      else if (index(", " // reader%log%idle, ", " // line) == 0) then
+         reader%log%idle = reader%log%idle // ", " // line
+      end if
+   end subroutine note_idle
 
    subroutine card_warning(reader, card, text)
       type(reader_t), intent(inout) :: reader

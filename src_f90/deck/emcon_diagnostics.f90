@@ -26,6 +26,7 @@ module emcon_diagnostics
    type :: diagnostics_t
       integer :: n_errors = 0
       integer :: n_warnings = 0
+      character(len=:), allocatable :: idle              !! what is taken and changes nothing, why
       type(string_t), allocatable :: file_name(:)        !! as the user typed them
       type(diagnostic_t), allocatable, private :: item(:)
    end type diagnostics_t

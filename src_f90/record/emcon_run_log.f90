@@ -66,6 +66,8 @@ contains
 
       associate (scene => stepper%scene, system => stepper%march%system)
          if (len_trim(scene%deck%heading) > 0) call note_add(notes, trim(scene%deck%heading))
+         if (allocated(scene%deck%idle)) call note_add(notes, "changes nothing: " &
+            // scene%deck%idle)
          call note_add(notes, to_text(size(scene%x, 2)) // " nodes, " // &
             to_text(system%space%numbering%n_unknown) // " unknowns in step 1, " // &
             to_text(system%space%n_body) // " bodies")

@@ -23,6 +23,7 @@ module emcon_scene
    type :: scene_deck_t
       type(string_t), allocatable :: file(:)         !! names of the deck files
       character(len=:), allocatable :: heading
+      character(len=:), allocatable :: idle          !! cards that change nothing, and why
    end type scene_deck_t
 
    !> What the deck calls its nodes.

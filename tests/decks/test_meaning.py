@@ -299,6 +299,51 @@ def test_neutral_values_change_nothing(plain, neutral, tmp_path):
     assert done.digits() == run(tmp_path/"plain", moving()).digits()
 
 
+#: What exporters write before the material, into it and into steps, with what the log says of it.
+EXPORTED = [
+    ("*MATERIAL, NAME=M\n", "*PHYSICAL CONSTANTS, ABSOLUTE ZERO=0, STEFAN BOLTZMANN=5.67e-11\n",
+     "*PHYSICAL CONSTANTS (there is no temperature)"),
+    ("*DENSITY\n", "*EXPANSION, ZERO=0.\n1.2e-5\n*CONDUCTIVITY\n50., 0.\n*SPECIFIC HEAT\n500.\n",
+     "*SPECIFIC HEAT (there is no temperature)"),
+    ("*MATERIAL, NAME=M\n", "*ORIENTATION, NAME=O, SYSTEM=CYLINDRICAL\n0., 0., 0., 0., 0., 1.\n",
+     "*ORIENTATION (no section asks for it)"),
+    ("*CLOAD\n", "*CONTROLS, PARAMETERS=TIME INCREMENTATION\n8, 10, , , , , , 5\n0.25, 0.5\n",
+     "*CONTROLS ("),
+    ("*CLOAD\n", "*OUTPUT, FREQUENCY=1\n", "*OUTPUT (results go by *NODE FILE"),
+    ("*CLOAD\n", "*PRINT, CONTACT=YES\n*MONITOR, NODE=1, DOF=2\n*FILE FORMAT, ASCII\n",
+     "*MONITOR (it names no results)"),
+    ("*BOUNDARY\n", "*SURFACE INTERACTION, NAME=I\n1.,\n*FRICTION\n0.3\n*BOUNDARY\n*FILTER, NAME=F\n",
+     "thickness of *SURFACE INTERACTION (that of the sections counts)"),
+]
+
+
+@pytest.mark.parametrize("before, cards, told", EXPORTED, ids=lambda text: text.split("\n")[0])
+def test_cards_of_exporters_change_nothing_and_the_log_names_them(before, cards, told, tmp_path):
+    plain = run(tmp_path/"plain", moving())
+    assert before in moving()
+    done = run(tmp_path/"exported", moving().replace(before, cards + before, 1))
+    assert "warning: " not in done.errors and "changes nothing" not in plain.log
+    assert [told in line for line in done.log.splitlines() if line.startswith("changes nothing: ")] == [True]
+    assert done.digits() == plain.digits()
+
+
+@pytest.mark.parametrize("before, cards", [
+    ("*CLOAD\n", "*OUTPUT, FREQUENCY=2\n"),
+    ("*CLOAD\n", "*OUTPUT, FIELD\n"),
+    ("ELSET=BAR, MATERIAL=M\n", "ELSET=BAR, MATERIAL=M, ORIENTATION=O\n"),
+    ("*BOUNDARY\n", "*SURFACE INTERACTION, NAME=I\n0.\n"),
+    ("*BOUNDARY\n", "*SURFACE INTERACTION, NAME=I\n1., 2.\n"),
+    ("*BOUNDARY\n", "*SURFACE INTERACTION, NAME=I\n1.\n2.\n"),
+    ("*CLOAD\n", "*NO ANALYSIS\n"),
+], ids=["frequency", "field", "orientation", "thin", "fields", "lines", "no-analysis"])
+def test_cards_of_exporters_that_would_change_something_are_refused(before, cards, tmp_path):
+    text = moving().replace(before, cards if cards.startswith("ELSET") else cards + before, 1)
+    deck = tmp_path/"deck.inp"
+    deck.write_text(text)
+    told = emcon("check", deck).stderr
+    assert len(re.findall(r"deck\.inp:\d+: error: ", told)) == 1, told
+
+
 @pytest.mark.parametrize("plain, other", [
     ("*STEP\n", "*STEP, UNSYMM=YES\n"),
     ("*DYNAMIC, DIRECT\n", "*DYNAMIC, DIRECT, ALPHA=-0.05\n"),
