@@ -207,7 +207,7 @@ contains
       call split_options(text(i_comma:), card%option)
       i = find_keyword(card%name)
       if (i == 0) refusal = refusal_of(card%name)
-      if (is_idle(card, refusal)) then
+      if (refusal%is_idle) then
          call note_idle(reader, card%title, trim(refusal%reason))
          card%name = ""
       else if (refusal%reason /= "") then
@@ -235,20 +235,6 @@ contains
       reader%doubt%names = .true.
       card%name = ""
    end subroutine refuse_keyword
-
-   !> Does a card of another program change nothing, as it is given here?
-   pure logical function is_idle(card, refusal)
-      type(card_t), intent(in) :: card
-      type(refusal_t), intent(in) :: refusal
-      integer :: i
-
-      is_idle = refusal%is_idle .or. refusal%parameters /= ""
-      if (refusal%is_idle) return
-      do i = 1, size(card%option)
-         is_idle = is_idle .and. is_neutral(refusal%parameters, card%option(i)%name, &
-            card%option(i)%value)
-      end do
-   end function is_idle
 
    subroutine refuse_unsupported(reader, card, refusal)
       type(reader_t), intent(inout) :: reader

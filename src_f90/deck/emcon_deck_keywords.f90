@@ -35,7 +35,6 @@ module emcon_deck_keywords
       character(len=180) :: names = ""       !! with commas between them
       logical :: is_output = .false.         !! --lenient reads on
       logical :: is_idle = .false.           !! taken: they would change nothing
-      character(len=32) :: parameters = ""   !! also with none but these, as they are given here
    end type refusal_t
 
    character(len=*), parameter :: printed = "FREQUENCY=,TIMEPOINTS=,TOTALS=,~GLOBAL:YES"
@@ -121,6 +120,15 @@ module emcon_deck_keywords
       keyword_t("EL PRINT", in_step, "ELSET=," // printed), &
       keyword_t("CONTACT PRINT", in_step, "~NSET,~SET," // printed), &
       keyword_t("ENERGY PRINT", in_step, "~ELSET,~FREQUENCY:1,~TIMEPOINTS"), &
+      keyword_t("OUTPUT", in_step, "FIELD,HISTORY,VARIABLE=,FREQUENCY=,TIMEPOINTS=,~NAME," &
+         // "~FREQUENCYF:1,~TIMEINTERVAL,~NUMBERINTERVAL,~TIMEMARKS,~OP:NEW,~FILTER", &
+         has_data=.false.), &
+      keyword_t("NODE OUTPUT", in_step, "NSET=,VARIABLE=,~EXTERIOR"), &
+      keyword_t("ELEMENT OUTPUT", in_step, "ELSET=,VARIABLE=,~DIRECTIONS:YES,~POSITION," &
+         // "~EXTERIOR"), &
+      keyword_t("CONTACT OUTPUT", in_step, "VARIABLE=,~NSET,~MASTER,~SLAVE,~SURFACE," &
+         // "~GENERALCONTACT"), &
+      keyword_t("ENERGY OUTPUT", in_step, "VARIABLE=,~ELSET"), &
       keyword_t("RESTART", in_both, "WRITE,FREQUENCY=,~OVERLAY,!READ", has_data=.false.), &
       keyword_t("END STEP", in_step, has_data=.false.)]
 
@@ -158,14 +166,8 @@ module emcon_deck_keywords
          "FREQUENCY,BUCKLE,MODAL DYNAMIC,STEADY STATE DYNAMICS,VISCO"), &
       refusal_t("results go by *NODE FILE, *EL FILE and *... PRINT", &
          "SECTION PRINT,SECTION FILE,INTEGRATED OUTPUT,INTEGRATED OUTPUT SECTION", .true.), &
-      refusal_t("results go by *NODE FILE, *EL FILE and *... PRINT", "OUTPUT", .true., &
-         parameters="~FREQUENCY:1,~FREQUENCYF:1"), &
       refusal_t("it names no results", "FILE FORMAT,MONITOR,INCREMENTATION OUTPUT,FILTER,PRINT", &
          is_idle=.true.), &
-      refusal_t("use *NODE FILE or *NODE PRINT", "NODE OUTPUT", .true.), &
-      refusal_t("use *EL FILE or *EL PRINT", "ELEMENT OUTPUT", .true.), &
-      refusal_t("use *CONTACT FILE or *CONTACT PRINT", "CONTACT OUTPUT", .true.), &
-      refusal_t("use *ENERGY PRINT", "ENERGY OUTPUT", .true.), &
       refusal_t("use *EL FILE", "ELEMENT FILE", .true.), &
       refusal_t("the log has diagnostics", "DIAGNOSTICS", is_idle=.true.), &
       refusal_t("emcon check reads a deck without running it", "NO ANALYSIS")]

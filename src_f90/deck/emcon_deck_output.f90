@@ -1,11 +1,12 @@
-!> Output requests: *NODE FILE and its kin.
+!> Output requests: *NODE FILE and its kin, and *OUTPUT with *NODE OUTPUT and its kin: with FIELD
+!> they ask for what FILE requests do, with HISTORY for what PRINT requests do.
 !>
 !> Requests carry over to later steps until a step has a request of the same kind.
 module emcon_deck_output
    use emcon_deck_fields, only : data_error, data_open, data_t, data_warning, get_name, next_line
    use emcon_deck_named, only : hint_at_set, set_names
-   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
-      option_name, option_word, reader_t
+   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, note_idle, &
+      option_count, option_name, option_word, reader_t
    use emcon_deck_tables, only : table_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_mesh, only : named_set_t
@@ -23,6 +24,7 @@ module emcon_deck_output
    type :: requests_t
       type(output_t), allocatable :: output(:)
       integer, allocatable :: step(:)              !! the step that gave each
+      type(card_t) :: heading                      !! the last *OUTPUT
    end type requests_t
 
    !> One keyword, and the quantities that it can write; place 0: the energies of the model.
@@ -31,15 +33,16 @@ module emcon_deck_output
       integer :: kind
       integer :: place = 0                         !! one of the `at_` codes
       logical :: to_field_file = .false.
+      character(len=14) :: preselect = ""          !! what PRESELECT asks for; none: all
    end type output_row_t
 
    type(output_row_t), parameter :: output_rows(*) = [ &
-      output_row_t("NODEFILE", output_node_file, at_nodes, .true.), &
-      output_row_t("NODEPRINT", output_node_print, at_nodes), &
-      output_row_t("ELFILE", output_element_file, at_elements, .true.), &
-      output_row_t("ELPRINT", output_element_print, at_elements), &
-      output_row_t("CONTACTFILE", output_contact_file, at_contacts, .true.), &
-      output_row_t("CONTACTPRINT", output_contact_print, at_contacts), &
+      output_row_t("NODEFILE", output_node_file, at_nodes, .true., "U V RF"), &
+      output_row_t("NODEPRINT", output_node_print, at_nodes, .false., "U V RF"), &
+      output_row_t("ELFILE", output_element_file, at_elements, .true., "S E"), &
+      output_row_t("ELPRINT", output_element_print, at_elements, .false., "S E"), &
+      output_row_t("CONTACTFILE", output_contact_file, at_contacts, .true., "CDIS CSTR"), &
+      output_row_t("CONTACTPRINT", output_contact_print, at_contacts, .false., "CDIS CSTR"), &
       output_row_t("ENERGYPRINT", output_energy_print)]
 
    !> Variables that exporters name and that are not written here: a warning says so.
@@ -60,31 +63,109 @@ contains
    pure logical function is_output(card)
       type(card_t), intent(in) :: card
 
-      is_output = any(output_rows%keyword == card%name)
+      is_output = any(output_rows%keyword == card%name) .or. is_below(card) &
+         .or. card%name == "OUTPUT"
    end function is_output
 
-   !> Take in the request of one card of step `card%step`.
+   !> Is it one of those that stand below *OUTPUT?
+   pure logical function is_below(card)
+      type(card_t), intent(in) :: card
+
+      is_below = any(card%name == [character(len=13) :: "NODEOUTPUT", "ELEMENTOUTPUT", &
+         "CONTACTOUTPUT", "ENERGYOUTPUT"])
+   end function is_below
+
+   !> The row of `output_rows` of a card; 0: there is no *OUTPUT above it.
+   pure integer function row_of(self, card) result(i_row)
+      type(requests_t), intent(in) :: self
+      type(card_t), intent(in) :: card
+      character(len=:), allocatable :: name
+
+      name = card%name
+      if (is_below(card)) then
+         name = name(:index(name, "OUTPUT") - 1)
+         if (name == "ELEMENT") name = "EL"
+         if (has_option(self%heading, "FIELD") .and. name /= "ENERGY") then
+            name = name // "FILE"
+         else
+            name = name // "PRINT"
+         end if
+         if (self%heading%step /= card%step) name = ""
+      end if
+      i_row = findloc(output_rows%keyword == name, .true., 1)
+   end function row_of
+
+   !> Take in a card of step `card%step`.
    subroutine read_output(reader, card, scene, self)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(requests_t), intent(inout) :: self
+      integer :: i_row
+
+      if (card%name == "OUTPUT") then
+         call read_heading(reader, card, scene, self)
+         return
+      end if
+      i_row = row_of(self, card)
+      if (i_row > 0) then
+         call read_request(reader, card, output_rows(i_row), scene, self)
+      else
+         call card_error(reader, card, "there is no *OUTPUT before it in the step")
+      end if
+   end subroutine read_output
+
+   !> *OUTPUT: what PRESELECT and ALL ask for; the rest stands below it.
+   subroutine read_heading(reader, card, scene, self)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(requests_t), intent(inout) :: self
+      logical :: is_field, is_history
+      integer :: i, n_errors
+
+      self%heading = card
+      n_errors = reader%log%n_errors
+      is_field = has_option(card, "FIELD")
+      is_history = has_option(card, "HISTORY")
+      if (.not. (is_field .or. is_history) .and. any(option_name(card, "FREQUENCY") &
+         == [character(len=1) :: "", "1"])) then
+         call note_idle(reader, card%title, "the requests that follow say what is written")
+      else if (is_field .eqv. is_history) then
+         call card_error(reader, card, "either FIELD or HISTORY is to be given")
+      else if (has_option(card, "VARIABLE")) then
+         do i = 1, size(output_rows)
+            if (output_rows(i)%to_field_file .neqv. is_field) cycle
+            if (is_history .and. output_rows(i)%place > 0) cycle
+            if (output_rows(i)%place == at_contacts .and. size(scene%pair) == 0) cycle
+            call read_request(reader, card, output_rows(i), scene, self)
+            if (reader%log%n_errors > n_errors) exit
+         end do
+      end if
+   end subroutine read_heading
+
+   !> Take in a request for variables of `row`.
+   subroutine read_request(reader, card, row, scene, self)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(output_row_t), intent(in) :: row
       type(scene_t), intent(in) :: scene
       type(requests_t), intent(inout) :: self
       type(output_t) :: new
       type(output_t), allocatable :: grown(:)
       integer, allocatable :: kept(:)
       character(len=:), allocatable :: word
-      integer :: i, i_row, n
+      integer :: i, n
 
-      i_row = 1
-      do i = 1, size(output_rows)
-         if (output_rows(i)%keyword == card%name) i_row = i
-      end do
-      new%kind = output_rows(i_row)%kind
+      new%kind = row%kind
       new%origin = card%origin
-      call read_variables(reader, card, output_rows(i_row), new)
+      call read_variables(reader, card, row, new)
       call read_set(reader, card, scene, new)
-      call option_count(reader, card, "FREQUENCY", 0, new%frequency)
-      call read_times(reader, card, new)
+      if (is_below(card)) then
+         call read_times(reader, self%heading, new)
+      else
+         call read_times(reader, card, new)
+      end if
       if (option_name(card, "TOTALS") /= "") then
          call option_word(reader, card, "TOTALS", "YES, ONLY, NO", word)
          new%totals = word == "YES" .or. word == "ONLY"
@@ -101,7 +182,7 @@ contains
       grown(n + 1) = new
       self%step = [self%step(kept), card%step]
       call move_alloc(grown, self%output)
-   end subroutine read_output
+   end subroutine read_request
 
    !> Contact output needs contact, and totals of pairs are totals of forces.
    subroutine check_contact(reader, card, scene, new)
@@ -135,17 +216,22 @@ contains
       call list_variables(row, list, longer, known)
       allocate(is_wanted(size(list)), source=.false.)
       n_before = reader%log%n_errors + reader%log%n_warnings
+      if (has_option(card, "VARIABLE")) then
+         call option_word(reader, card, "VARIABLE", "PRESELECT, ALL", name)
+         is_wanted = name == "ALL" .or. preselected(row, list)
+      end if
       call data_open(data, card)
       do while (next_line(reader, data))
          do k = 1, data%n
             if (data%to(k) < data%from(k)) cycle
             call get_name(reader, data, k, "variable", name)
+            if (is_below(card)) name = whole_of(name)
             do i = 1, size(list)
                if (list(i)%text == name .or. longer(i)%text == name) exit
             end do
             if (i <= size(list)) then
                is_wanted(i) = .true.
-            else if (reader%is_lenient .or. any(unwritten == name)) then
+            else if (reader%is_lenient .or. is_below(card) .or. any(unwritten == name)) then
                call data_warning(reader, data, "output variable " // quoted(name) &
                   // " is not supported, left out; supported: " // known)
             else
@@ -167,6 +253,25 @@ contains
          new%variable(k) = list(i)
       end do
    end subroutine read_variables
+
+   !> The variable of which `name` is a component: U of U2, S of S11.
+   pure function whole_of(name) result(whole)
+      character(len=*), intent(in) :: name
+      character(len=max(1, verify(name, "0123456789", .true.))) :: whole
+
+      whole = name
+   end function whole_of
+
+   !> What PRESELECT asks for, of the variables of a row.
+   pure function preselected(row, list)
+      type(output_row_t), intent(in) :: row
+      type(string_t), intent(in) :: list(:)
+      logical :: preselected(size(list))
+      integer :: i
+
+      preselected = [(row%preselect == "" .or. index(" " // trim(row%preselect) // " ", &
+         " " // list(i)%text // " ") > 0, i = 1, size(list))]
+   end function preselected
 
    !> What a card may ask for, other names of the same, and all of them in one text.
    pure subroutine list_variables(row, list, longer, known)
@@ -226,6 +331,7 @@ contains
 
    end subroutine read_set
 
+   !> When: by FREQUENCY or at the times of a table.
    subroutine read_times(reader, card, new)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
@@ -233,6 +339,7 @@ contains
       character(len=:), allocatable :: name
       integer :: i
 
+      call option_count(reader, card, "FREQUENCY", 0, new%frequency)
       name = option_name(card, "TIMEPOINTS")
       if (name == "") return
       if (has_option(card, "FREQUENCY")) then

@@ -3,6 +3,7 @@
 import pathlib
 import re
 
+import h5py
 import numpy as np
 import pytest
 from scene_tools import EPSILON, Deck, emcon, run_deck
@@ -309,7 +310,7 @@ EXPORTED = [
      "*ORIENTATION (no section asks for it)"),
     ("*CLOAD\n", "*CONTROLS, PARAMETERS=TIME INCREMENTATION\n8, 10, , , , , , 5\n0.25, 0.5\n",
      "*CONTROLS ("),
-    ("*CLOAD\n", "*OUTPUT, FREQUENCY=1\n", "*OUTPUT (results go by *NODE FILE"),
+    ("*CLOAD\n", "*OUTPUT, FREQUENCY=1\n", "*OUTPUT (the requests that follow say what is written)"),
     ("*CLOAD\n", "*PRINT, CONTACT=YES\n*MONITOR, NODE=1, DOF=2\n*FILE FORMAT, ASCII\n",
      "*MONITOR (it names no results)"),
     ("*BOUNDARY\n", "*SURFACE INTERACTION, NAME=I\n1.,\n*FRICTION\n0.3\n*BOUNDARY\n*FILTER, NAME=F\n",
@@ -327,15 +328,52 @@ def test_cards_of_exporters_change_nothing_and_the_log_names_them(before, cards,
     assert done.digits() == plain.digits()
 
 
+#: Requests in the words of *OUTPUT, and the same as *... FILE and *... PRINT.
+REQUESTS = [
+    ("*OUTPUT, FIELD, VARIABLE=PRESELECT\n", "*NODE FILE\nU, V, RF\n*EL FILE\nS, E\n"),
+    ("*OUTPUT, FIELD, FREQUENCY=2\n*NODE OUTPUT\nU2, RF\n*ELEMENT OUTPUT, DIRECTIONS=YES\nS11, E\n",
+     "*NODE FILE, FREQUENCY=2\nU, RF\n*EL FILE, FREQUENCY=2\nS, E\n"),
+    ("*OUTPUT, HISTORY, VARIABLE=PRESELECT\n*NODE OUTPUT, NSET=END\nU1, V2\n",
+     "*ENERGY PRINT\n*NODE PRINT, NSET=END\nU, V\n"),
+    ("*OUTPUT, HISTORY\n*ELEMENT OUTPUT, ELSET=BAR, VARIABLE=PRESELECT\n*ENERGY OUTPUT\nALLKE\n",
+     "*EL PRINT, ELSET=BAR\nS, E\n*ENERGY PRINT\nALLKE\n"),
+]
+
+
+@pytest.mark.parametrize("asked, plain", REQUESTS, ids=["preselect", "field", "history", "sets"])
+def test_output_in_the_words_of_abaqus(asked, plain, tmp_path):
+    """The same files, but for their names and times of the machine."""
+    runs = [run(tmp_path/name, moving().replace(PRINT, cards))
+            for name, cards in [("asked", asked), ("plain", plain)]]
+    assert "warning: " not in runs[0].errors
+    found = []
+    for done in runs:
+        found.append({})
+        for suffix in (".vtkhdf", ".h5"):
+            with h5py.File(done.file(suffix), "r") as file:
+                file.visititems(lambda name, item: found[-1].update({name: item[()].tobytes()})
+                                if isinstance(item, h5py.Dataset) and not re.search("SECONDS|cpu|texts|^run", name)
+                                else None)
+    assert found[0] == found[1]
+
+
+def test_output_of_abaqus_that_is_not_written_is_warned_of(tmp_path):
+    done = run(tmp_path, moving().replace(PRINT, "*OUTPUT, FIELD\n*NODE OUTPUT\nU, A\n*ELEMENT OUTPUT\nLE\n"))
+    assert [line.split("variable ")[1][:4] for line in done.errors.splitlines()] == ["'A' ", "'LE'"]
+
+
 @pytest.mark.parametrize("before, cards", [
     ("*CLOAD\n", "*OUTPUT, FREQUENCY=2\n"),
-    ("*CLOAD\n", "*OUTPUT, FIELD\n"),
+    ("*CLOAD\n", "*OUTPUT, FIELD, HISTORY\n"),
+    ("*CLOAD\n", "*NODE OUTPUT\nU\n"),
+    ("*CLOAD\n", "*OUTPUT, FIELD, VARIABLE=SOME\n"),
+    ("*CLOAD\n", "*OUTPUT, FIELD, TIME POINTS=T\n*NODE OUTPUT\nU\n"),
     ("ELSET=BAR, MATERIAL=M\n", "ELSET=BAR, MATERIAL=M, ORIENTATION=O\n"),
     ("*BOUNDARY\n", "*SURFACE INTERACTION, NAME=I\n0.\n"),
     ("*BOUNDARY\n", "*SURFACE INTERACTION, NAME=I\n1., 2.\n"),
     ("*BOUNDARY\n", "*SURFACE INTERACTION, NAME=I\n1.\n2.\n"),
     ("*CLOAD\n", "*NO ANALYSIS\n"),
-], ids=["frequency", "field", "orientation", "thin", "fields", "lines", "no-analysis"])
+], ids=["frequency", "both", "alone", "word", "times", "orientation", "thin", "fields", "lines", "no-analysis"])
 def test_cards_of_exporters_that_would_change_something_are_refused(before, cards, tmp_path):
     text = moving().replace(before, cards if cards.startswith("ELSET") else cards + before, 1)
     deck = tmp_path/"deck.inp"
