@@ -26,6 +26,7 @@ module emcon_deck
    use emcon_deck_keywords, only : find_keyword, keywords
    use emcon_deck_materials, only : read_materials, read_sections
    use emcon_deck_mesh, only : read_elements, read_nodes
+   use emcon_deck_parts, only : parts_are_used, parts_flatten
    use emcon_deck_reader, only : reader_t
    use emcon_deck_rigid, only : read_rigid_bodies
    use emcon_deck_sets, only : read_sets
@@ -59,16 +60,23 @@ contains
       type(scene_t), intent(out) :: scene
       type(diagnostics_t), intent(inout) :: diagnostics     !! those of `deck_open` stay
       type(reader_t) :: reader
+      type(deck_source_t), target :: flat
 
       reader%line => source%line
       reader%file => source%file
       reader%number => source%number
       reader%log = diagnostics
+      if (parts_are_used(source)) then
+         call parts_flatten(source, flat, scene%deck%labels, reader%log)
+         reader%line => flat%line
+         reader%file => flat%file
+         reader%number => flat%number
+      end if
       reader%log%file_name = source%file_name
       reader%is_lenient = is_lenient
-      reader%doubt%nodes = .not. source%is_whole
-      reader%doubt%elements = .not. source%is_whole
-      reader%doubt%names = .not. source%is_whole
+      reader%doubt%names = .not. source%is_whole .or. reader%log%n_errors > diagnostics%n_errors
+      reader%doubt%nodes = reader%doubt%names
+      reader%doubt%elements = reader%doubt%names
       scene%deck%file = source%file_name
       call read_cards(reader, overrides)
       scene%n_dim = find_dimension(reader)

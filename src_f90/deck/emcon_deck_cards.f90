@@ -13,7 +13,7 @@ module emcon_deck_cards
    use emcon_text, only : squeezed, string_t, stripped, to_text
    implicit none
    private
-   public :: read_cards
+   public :: read_cards, split_options
 
    character(len=*), parameter :: blanks = " " // achar(9) // achar(11) // achar(12)
    character(len=1), parameter :: end_of_text = achar(26)      !! how old systems end a text
@@ -247,8 +247,7 @@ contains
          call card_error(reader, card, "known but not supported: " // trim(refusal%reason))
       end if
       select case (card%name)
-      case ("NGEN", "NCOPY", "NFILL", "ELGEN", "ELCOPY", "PART", "ASSEMBLY", "INSTANCE", &
-         "SYSTEM")
+      case ("NGEN", "NCOPY", "NFILL", "ELGEN", "ELCOPY", "SYSTEM")
          reader%doubt%nodes = .true.
          reader%doubt%elements = .true.
          reader%doubt%names = .true.

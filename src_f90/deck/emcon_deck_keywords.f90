@@ -31,7 +31,7 @@ module emcon_deck_keywords
 
    !> Keywords of other programs that are known, and why they do nothing here.
    type :: refusal_t
-      character(len=64) :: reason = ""
+      character(len=80) :: reason = ""
       character(len=180) :: names = ""       !! with commas between them
       logical :: is_output = .false.         !! --lenient reads on
       logical :: is_idle = .false.           !! taken: they would change nothing
@@ -50,9 +50,9 @@ module emcon_deck_keywords
       keyword_t("ELEMENT", in_model, "TYPE=,ELSET=,!INPUT,!OFFSET:0"), &
       keyword_t("USER ELEMENT", in_model, "TYPE=,NODES=,FACES=,COORDINATES=,!PROPERTIES:0," &
          // "!IPROPERTIES:0,!VARIABLES:1,~UNSYMM,!LINEAR,!TENSOR,!INTEGRATION,!FILE"), &
-      keyword_t("NSET", in_both, "NSET=,GENERATE,ELSET=,~INTERNAL,~UNSORTED,!INSTANCE"), &
-      keyword_t("ELSET", in_both, "ELSET=,GENERATE,~INTERNAL,~UNSORTED,!INSTANCE"), &
-      keyword_t("SURFACE", in_model, "NAME=,TYPE=,~INTERNAL,!COMBINE,!CROP,!TRIM," &
+      keyword_t("NSET", in_both, "NSET=,GENERATE,ELSET=,INTERNAL,~UNSORTED,!INSTANCE"), &
+      keyword_t("ELSET", in_both, "ELSET=,GENERATE,INTERNAL,~UNSORTED,!INSTANCE"), &
+      keyword_t("SURFACE", in_model, "NAME=,TYPE=,INTERNAL,!COMBINE,!CROP,!TRIM," &
          // "!FILLETRADIUS:0"), &
       keyword_t("GIVEN FORCES", in_model, "NSET=", has_data=.false.), &
       keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,KINEMATICS=,MASSLESS," &
@@ -92,7 +92,7 @@ module emcon_deck_keywords
          // "!STIFFNESSSCALEFACTOR,!TANGENTFRACTION:1", has_data=.false.), &
       keyword_t("BOUNDARY", in_both, "OP=,AMPLITUDE=,FIXED,TYPE=,TIMEDELAY=,!LOADCASE:1," &
          // "!USER,!SUBMODEL"), &
-      keyword_t("STEP", in_both, "NLGEOM?,INC=,AMPLITUDE=,~NAME,~UNSYMM:NO," &
+      keyword_t("STEP", in_both, "NLGEOM?,INC=,AMPLITUDE=,NAME=,~UNSYMM:NO," &
          // "~EXTRAPOLATION,~CONVERTSDI,!PERTURBATION"), &
       keyword_t("STATIC", in_step, "DIRECT,SOLVER=,STABILIZE?,!FACTOR,!ALLSDTOL," &
          // "!CONTINUE:NO,!RIKS,!EXPLICIT"), &
@@ -141,8 +141,6 @@ module emcon_deck_keywords
       refusal_t("coordinates are those of the global axes", "SYSTEM"), &
       refusal_t("nodes are given one by one by *NODE", "NGEN,NCOPY,NFILL"), &
       refusal_t("elements are given one by one by *ELEMENT", "ELGEN,ELCOPY"), &
-      refusal_t("write a flat deck (no parts and instances)", &
-         "PART,END PART,ASSEMBLY,END ASSEMBLY,INSTANCE,END INSTANCE"), &
       refusal_t("materials are elastic", "PLASTIC,CYCLIC HARDENING,CREEP,VISCOELASTIC"), &
       refusal_t("use *HYPERELASTIC, NEO HOOKE", "HYPERFOAM"), &
       refusal_t("materials have no state variables", "DEPVAR"), &

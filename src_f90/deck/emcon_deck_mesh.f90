@@ -21,13 +21,18 @@ module emcon_deck_mesh
 
    !> Element types of Abaqus and CalculiX that are not read.
    character(len=7), parameter :: foreign_types(*) = [character(len=7) :: &
-      "CPE4R", "CPE4RH", "CPE3H", "CPE6H", "CPE6M", "CPE8H", "CPE8RH", &
-      "CPS4R", "CAX4R", "CAX4I", "CAX4H", "CAX8H", "CAX8RH", &
-      "C3D4H", "C3D6", "C3D8R", "C3D10M", &
+      "CPE4RH", "CPE3H", "CPE6H", "CPE6M", "CPE8H", "CPE8RH", &
+      "CAX4R", "CAX4I", "CAX4H", "CAX8H", "CAX8RH", &
+      "C3D4H", "C3D6", "C3D10M", &
       "C3D15", "C3D20RH", "C3D10T", "F3D8", "S3", "S4", "S3R", "S4R", "S6", "S8", "S8R", &
       "M3D3", "M3D4", "M3D4R", "M3D6", "M3D8", "B21", "B22", "B31", "B31R", "B32", "B32R", &
       "T3D3", "R2D2", "R3D3", "R3D4", "MASS", "SPRINGA", "SPRING1", "SPRING2", &
       "DASHPTA", "GAPUNI", "DCOUP3D"]
+
+   !> Elements of one point, which hold their shape by forces that have no energy, and those that
+   !> are taken in their place.
+   character(len=5), parameter :: reduced_types(*) = ["CPE4R", "CPS4R", "C3D8R"], &
+      taken_types(*) = ["CPE4I", "CPS4I", "C3D8I"]
 
    !> Elements of lines, as mesh generators write them.
    character(len=4), parameter :: line_types(*) = ["T2D2", "T3D2"]
@@ -246,6 +251,14 @@ contains
             if (is_first) call tell_mixed(reader, card, scene, n, type_name)
             reader%doubt%elements = .true.
             reader%doubt%names = .true.
+            return
+         end if
+         i = findloc(reduced_types == type_name, .true., 1)
+         if (i > 0) then
+            kind = find_element_kind(kinds, taken_types(i))
+            if (is_first) call card_warning(reader, card, "elements of type " // type_name &
+               // " are taken as " // taken_types(i) // ", which need no artificial stiffness " &
+               // "and keep the energy (told once)")
             return
          end if
          if (any(line_types == type_name) .and. scene%n_dim /= n_space) then

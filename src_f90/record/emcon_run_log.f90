@@ -66,6 +66,7 @@ contains
 
       associate (scene => stepper%scene, system => stepper%march%system)
          if (len_trim(scene%deck%heading) > 0) call note_add(notes, trim(scene%deck%heading))
+         if (allocated(scene%deck%labels)) call note_add(notes, scene%deck%labels)
          if (allocated(scene%deck%idle)) call note_add(notes, "changes nothing: " &
             // scene%deck%idle)
          call note_add(notes, to_text(size(scene%x, 2)) // " nodes, " // &

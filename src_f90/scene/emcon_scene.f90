@@ -24,6 +24,7 @@ module emcon_scene
       type(string_t), allocatable :: file(:)         !! names of the deck files
       character(len=:), allocatable :: heading
       character(len=:), allocatable :: idle          !! cards that change nothing, and why
+      character(len=:), allocatable :: labels        !! of instances
    end type scene_deck_t
 
    !> What the deck calls its nodes.

@@ -403,7 +403,7 @@ def test_nothing_is_ignored_without_a_word(plain, other, tmp_path):
 
 
 @pytest.mark.parametrize("edits", [
-    [("TYPE=CPE4", "TYPE=CPE4R")],
+    [("TYPE=CPE4", "TYPE=CPE4RH")],
     [("TYPE=CPE4, ELSET=FOUNDATION", "TYPE=B21, ELSET=FOUNDATION"),
      ("TOP, 2, -1.\n", "TOP, 2, -1.\n*DLOAD\n1, P1, 1.\n*EL PRINT, ELSET=FOUNDATION\nS\n")],
     [("TYPE=CPE4, ELSET=BLOCK", "TYPE=C3D8, ELSET=BLOCK"), ("BLOCK, S1", "11, S1\n12, S1")],
@@ -452,3 +452,10 @@ def test_a_restart_file_may_be_asked_for_before_the_first_step(tmp_path):
     assert before.file(".rst.h5").exists() and inside.file(".rst.h5").exists()
     assert before.digits() == inside.digits()
     assert not run(tmp_path/"without", moving()).file(".rst.h5").exists()
+
+
+@pytest.mark.parametrize("name, taken", [("CPE4R", "CPE4I"), ("CPS4R", "CPS4I")])
+def test_elements_of_one_point_are_taken_as_those_that_keep_the_energy(name, taken, tmp_path):
+    reduced, own = (run(tmp_path/kind, moving().replace("TYPE=CPE4,", f"TYPE={kind},")) for kind in (name, taken))
+    assert f"elements of type {name} are taken as {taken}" in reduced.errors
+    assert reduced.digits() == own.digits()

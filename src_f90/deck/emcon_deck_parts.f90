@@ -1,0 +1,608 @@
+!> Parts and instances: a deck of *PART, *ASSEMBLY and *INSTANCE as the flat text of the same model.
+!>
+!> An instance is the text of its part with labels of its own, names that begin with that of the
+!> instance and a point, and nodes moved as its data lines say. Each line keeps the file and the
+!> number that it has in the deck.
+module emcon_deck_parts
+   use emcon_deck_cards, only : split_options
+   use emcon_deck_reader, only : option_t
+   use emcon_deck_source, only : deck_source_t
+   use emcon_diagnostics, only : add_error, diagnostics_t, quoted
+   use emcon_kinds, only : wp
+   use emcon_origin, only : origin_t
+   use emcon_rotation, only : cross_product
+   use emcon_text, only : read_integer, read_real, squeezed, string_t, stripped, to_text
+   implicit none
+   private
+   public :: parts_are_used, parts_flatten
+
+   integer, parameter :: n_axis = 3
+   !> Fields of GENERATE that are labels.
+   integer, parameter :: n_ends = 2
+   character(len=*), parameter :: blanks = " " // achar(9)
+
+   !> Lines of a part, from behind *PART to before *END PART.
+   type :: part_t
+      character(len=:), allocatable :: name        !! upper case, without blanks
+      integer :: first = 1, last = 0
+   end type part_t
+
+   !> What becomes of labels, names and places of an instance; as it is made: nothing.
+   type :: instance_t
+      character(len=:), allocatable :: name        !! upper case, without blanks; empty: none
+      integer :: shift = 0                         !! of its labels
+      logical :: is_moved = .false.
+      real(wp) :: way(n_axis) = 0.0_wp             !! first, [L]
+      real(wp) :: center(n_axis) = 0.0_wp          !! then turned about this point [L]
+      real(wp) :: axis(n_axis) = 0.0_wp            !! and this unit vector
+      real(wp) :: angle = 0.0_wp                   !! by that [rad]
+   end type instance_t
+
+   !> A card of the source.
+   type :: card_text_t
+      integer :: line = 0                          !! where it begins,
+      integer :: last = 0                          !! ends,
+      integer :: data = 0                          !! and where its data lines begin
+      character(len=:), allocatable :: title       !! as typed, with its star
+      character(len=:), allocatable :: name        !! upper case, without blanks and star
+      type(option_t), allocatable :: option(:)
+   end type card_text_t
+
+   !> The flat text as it grows.
+   type :: flat_t
+      type(deck_source_t) :: text
+      type(part_t), allocatable :: part(:)
+      type(instance_t), allocatable :: instance(:)
+      integer :: n = 0                             !! lines so far
+      integer :: unit = 1                          !! labels of all parts are smaller
+      logical :: in_assembly = .false.
+      integer :: n_instance = 0                    !! in all
+   end type flat_t
+
+contains
+
+   !> Does the deck have parts or instances?
+   pure logical function parts_are_used(source)
+      type(deck_source_t), intent(in) :: source
+      integer :: i
+
+      parts_are_used = .false.
+      do i = 1, size(source%line)
+         parts_are_used = any(keyword_of(source%line(i)%text) == [character(len=11) :: "PART", &
+            "INSTANCE", "ASSEMBLY", "ENDPART", "ENDINSTANCE", "ENDASSEMBLY"])
+         if (parts_are_used) return
+      end do
+   end function parts_are_used
+
+   !> The same deck without parts: `flat`. What is wrong with these is added to `log`.
+   subroutine parts_flatten(source, flat, labels, log)
+      type(deck_source_t), intent(in) :: source
+      type(deck_source_t), intent(out) :: flat
+      character(len=:), allocatable, intent(out) :: labels   !! what those of instances begin with
+      type(diagnostics_t), intent(inout) :: log
+      type(flat_t) :: self
+      type(card_text_t) :: card
+      integer :: i
+
+      allocate(self%instance(0))
+      allocate(self%text%line(64), self%text%file(64), self%text%number(64))
+      self%text%file_name = source%file_name
+      call find_parts(source, self, log)
+      i = 1
+      do while (i <= size(source%line))
+         call read_card(source, i, card)
+         i = card%last + 1
+         select case (card%name)
+         case ("PART")
+            i = end_of(source, card, "ENDPART") + 1
+         case ("INSTANCE")
+            i = end_of(source, card, "ENDINSTANCE") + 1
+            call put_instance(source, card, self, log)
+         case ("ASSEMBLY", "ENDASSEMBLY")
+            self%in_assembly = card%name == "ASSEMBLY"
+         case ("ENDPART", "ENDINSTANCE")
+            call add_error(log, origin_of(source, card%line), card%title // " ends nothing")
+         case default
+            call put_own(source, card, self, log)
+         end select
+      end do
+      labels = "labels"
+      do i = 1, size(self%instance)
+         if (i > 1) labels = labels // ","
+         labels = labels // " " // self%instance(i)%name // " + " &
+            // to_text(self%instance(i)%shift)
+      end do
+      flat = self%text
+      flat%line = self%text%line(:self%n)
+      flat%file = self%text%file(:self%n)
+      flat%number = self%text%number(:self%n)
+   end subroutine parts_flatten
+
+   !> The parts, and a unit above all labels in them.
+   subroutine find_parts(source, self, log)
+      type(deck_source_t), intent(in) :: source
+      type(flat_t), intent(inout) :: self
+      type(diagnostics_t), intent(inout) :: log
+      type(card_text_t) :: card
+      type(part_t) :: part
+      integer :: i, k, label
+      logical :: ok
+
+      allocate(self%part(0))
+      i = 1
+      do while (i <= size(source%line))
+         call read_card(source, i, card)
+         i = card%last + 1
+         if (any(card%name == [character(len=7) :: "NODE", "ELEMENT"])) then
+            do k = card%data, card%last
+               call read_integer(field(source%line(k)%text, 1), label, ok)
+               do while (ok .and. self%unit <= label &
+                  .and. 10.0_wp*real(self%unit, wp) < real(huge(1), wp))
+                  self%unit = 10*self%unit
+               end do
+            end do
+         else if (card%name == "INSTANCE") then
+            self%n_instance = self%n_instance + 1
+         else if (card%name == "PART") then
+            part%name = option_of(card, "NAME")
+            part%first = card%data
+            part%last = end_of(source, card, "ENDPART") - 1
+            if (part%name == "") call add_error(log, origin_of(source, card%line), &
+               "*PART needs NAME=")
+            if (part%last == size(source%line)) call add_error(log, origin_of(source, card%line), &
+               "*END PART is missing")
+            if (part_number(self, part%name) > 0) call add_error(log, &
+               origin_of(source, card%line), "part " // quoted(part%name) // " is given twice")
+            self%part = [self%part, part]
+         end if
+      end do
+   end subroutine find_parts
+
+   pure integer function part_number(self, name) result(k)
+      type(flat_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+
+      do k = size(self%part), 1, -1
+         if (self%part(k)%name == name) return
+      end do
+   end function part_number
+
+   pure integer function instance_number(self, name) result(k)
+      type(flat_t), intent(in) :: self
+      character(len=*), intent(in) :: name
+
+      do k = size(self%instance), 1, -1
+         if (self%instance(k)%name == name) return
+      end do
+   end function instance_number
+
+   !> An instance: its part, and what it says itself, up to *END INSTANCE.
+   subroutine put_instance(source, card, self, log)
+      type(deck_source_t), intent(in) :: source
+      type(card_text_t), intent(in) :: card
+      type(flat_t), intent(inout) :: self
+      type(diagnostics_t), intent(inout) :: log
+      type(instance_t) :: instance
+      character(len=:), allocatable :: fault
+      integer :: k, last
+
+      fault = ""
+      instance%name = option_of(card, "NAME")
+      instance%shift = self%unit*size(self%instance)
+      k = part_number(self, option_of(card, "PART"))
+      last = end_of(source, card, "ENDINSTANCE")
+      if (.not. self%in_assembly) fault = "*INSTANCE stands in *ASSEMBLY alone"
+      if (last > size(source%line)) fault = "*END INSTANCE is missing"
+      if (instance%name == "") fault = "*INSTANCE needs NAME="
+      if (instance_number(self, instance%name) > 0) fault = "instance " // quoted(instance%name) &
+         // " is given twice"
+      if (k == 0) fault = "*INSTANCE: there is no part " // quoted(option_of(card, "PART"))
+      if (real(self%unit, wp)*real(self%n_instance + 1, wp) > real(huge(1), wp)) fault = &
+         "labels are too large for so many instances"
+      if (fault /= "") then
+         call add_error(log, origin_of(source, card%line), fault)
+         return
+      end if
+      call read_motion(source, card, instance, log)
+      self%instance = [self%instance, instance]
+      call put_lines(source, self%part(k)%first, self%part(k)%last, instance, self, log)
+      call put_lines(source, card%last + 1, last - 1, instance, self, log)
+   end subroutine put_instance
+
+   !> The data lines of an instance: a way, then two points of an axis and an angle in degrees.
+   subroutine read_motion(source, card, instance, log)
+      type(deck_source_t), intent(in) :: source
+      type(card_text_t), intent(in) :: card
+      type(instance_t), intent(inout) :: instance
+      type(diagnostics_t), intent(inout) :: log
+      real(wp), parameter :: degree = atan(1.0_wp)/45.0_wp
+      real(wp) :: value(2*n_axis + 1), axis(n_axis)
+      integer :: k, i, line
+      logical :: ok, all_ok
+
+      k = 0
+      do line = card%data, card%last
+         if (is_comment(source%line(line)%text)) cycle
+         k = k + 1
+         value = 0.0_wp
+         all_ok = n_fields(source%line(line)%text) <= merge(n_axis, size(value), k == 1)
+         do i = 1, min(size(value), n_fields(source%line(line)%text))
+            if (field(source%line(line)%text, i) == "") cycle
+            call read_real(field(source%line(line)%text, i), value(i), ok)
+            all_ok = all_ok .and. ok
+         end do
+         axis = value(n_axis + 1:2*n_axis) - value(:n_axis)
+         if (k == 2) all_ok = all_ok .and. any(abs(axis) > 0.0_wp)
+         if (k > 2 .or. .not. all_ok) then
+            call add_error(log, origin_of(source, line), "*INSTANCE: expected a line of the way " &
+               // "x, y, z and one of two points of an axis and an angle in degrees")
+            return
+         end if
+         instance%is_moved = instance%is_moved .or. any(abs(value) > 0.0_wp)
+         if (k == 1) then
+            instance%way = value(:n_axis)
+         else
+            instance%center = value(:n_axis)
+            instance%axis = axis/norm2(axis)
+            instance%angle = degree*value(size(value))
+         end if
+      end do
+   end subroutine read_motion
+
+   !> Where a node of an instance comes to lie.
+   pure function moved(instance, x) result(place)
+      type(instance_t), intent(in) :: instance
+      real(wp), intent(in) :: x(n_axis)          !! in the part [L]
+      real(wp) :: place(n_axis), across(n_axis)
+
+      place = x + instance%way
+      across = cross_product(instance%axis, place - instance%center)
+      place = place + (sin(instance%angle)*across &
+         + 2.0_wp*sin(0.5_wp*instance%angle)**2*cross_product(instance%axis, across))
+   end function moved
+
+   !> The cards of some lines, as an instance has them.
+   subroutine put_lines(source, first, last, instance, self, log)
+      type(deck_source_t), intent(in) :: source
+      integer, intent(in) :: first, last
+      type(instance_t), intent(in) :: instance
+      type(flat_t), intent(inout) :: self
+      type(diagnostics_t), intent(inout) :: log
+      type(card_text_t) :: card
+      integer :: i
+
+      i = first
+      do while (i <= last)
+         call read_card(source, i, card)
+         card%last = min(card%last, last)
+         i = card%last + 1
+         call put_card(source, card, instance, self, log)
+      end do
+   end subroutine put_lines
+
+   !> A card of the assembly, where INSTANCE= says of which instance it speaks, or of the deck.
+   subroutine put_own(source, card, self, log)
+      type(deck_source_t), intent(in) :: source
+      type(card_text_t), intent(in) :: card
+      type(flat_t), intent(inout) :: self
+      type(diagnostics_t), intent(inout) :: log
+      type(instance_t) :: instance
+      character(len=:), allocatable :: name
+      integer :: k
+
+      instance%name = ""
+      ! Labels of the assembly itself lie behind those of all instances.
+      if (self%in_assembly) instance%shift = self%unit*self%n_instance
+      name = option_of(card, "INSTANCE")
+      if (name /= "") then
+         k = instance_number(self, name)
+         if (k == 0) then
+            call add_error(log, origin_of(source, card%line), card%title // ": there is no " &
+               // "instance " // quoted(name))
+            return
+         end if
+         instance%shift = self%instance(k)%shift
+         instance%name = name
+      end if
+      call put_card(source, card, instance, self, log, is_own=.true.)
+   end subroutine put_own
+
+   !> A card with labels, names and places of `instance`; what the assembly calls by names of its
+   !> own keeps these.
+   subroutine put_card(source, card, instance, self, log, is_own)
+      type(deck_source_t), intent(in) :: source
+      type(card_text_t), intent(in) :: card
+      type(instance_t), intent(in) :: instance
+      type(flat_t), intent(inout) :: self
+      type(diagnostics_t), intent(inout) :: log
+      logical, intent(in), optional :: is_own
+      integer :: i
+      logical :: keeps_names
+
+      keeps_names = .false.
+      if (present(is_own)) keeps_names = is_own
+      if (card%name /= "") call put_line(self, keyword_line(card, instance, keeps_names), source, &
+         card%line)
+      do i = card%data, card%last
+         if (is_comment(source%line(i)%text)) cycle
+         if (card%name == "NODE" .and. instance%is_moved) then
+            call put_node(source, i, instance, self, log)
+         else
+            call put_line(self, data_line(self, card, source%line(i)%text, instance), source, i)
+         end if
+      end do
+   end subroutine put_card
+
+   !> The keyword line with the names of an instance, without INSTANCE=.
+   function keyword_line(card, instance, keeps_names) result(line)
+      type(card_text_t), intent(in) :: card
+      type(instance_t), intent(in) :: instance
+      logical, intent(in) :: keeps_names
+      character(len=:), allocatable :: line
+      integer :: i
+
+      line = card%title
+      do i = 1, size(card%option)
+         associate (option => card%option(i))
+            if (option%name == "INSTANCE" .and. keeps_names) cycle
+            line = line // ", " // option%typed
+            if (.not. option%has_value) cycle
+            if (.not. keeps_names .and. (option%name == "NSET" .or. option%name == "ELSET" &
+               .or. (option%name == "NAME" .and. card%name == "SURFACE"))) then
+               line = line // "=" // instance%name // "." // unquoted(option%value)
+            else
+               line = line // "=" // option%value
+            end if
+         end associate
+      end do
+   end function keyword_line
+
+   !> A data line with the labels and names of an instance.
+   function data_line(self, card, text, instance) result(line)
+      type(flat_t), intent(in) :: self
+      type(card_text_t), intent(in) :: card
+      character(len=*), intent(in) :: text
+      type(instance_t), intent(in) :: instance
+      character(len=:), allocatable :: line
+      integer :: i, most
+
+      select case (card%name)
+      case ("NODE")
+         most = 1
+      case ("ELEMENT")
+         most = huge(1)
+      case ("NSET", "ELSET")
+         most = merge(n_ends, huge(1), any([(card%option(i)%name == "GENERATE", i = 1, &
+            size(card%option))]))
+      case ("SURFACE")
+         most = merge(0, 1, option_of(card, "TYPE") == "SEGMENTS")
+      case default
+         most = 0
+      end select
+      line = ""
+      do i = 1, n_fields(text)
+         if (i > 1) line = line // ","
+         line = line // field_of(self, field(text, i), instance, i <= most)
+      end do
+   end function data_line
+
+   !> A field: labels and names of an instance, and labels such as INSTANCE.7 anywhere.
+   function field_of(self, text, instance, is_label) result(word)
+      type(flat_t), intent(in) :: self
+      character(len=*), intent(in) :: text
+      type(instance_t), intent(in) :: instance
+      logical, intent(in) :: is_label
+      character(len=:), allocatable :: word
+      integer :: label, i, k
+      logical :: ok
+
+      word = text
+      if (text == "") return
+      call read_integer(text, label, ok)
+      if (ok) then
+         if (is_label) word = to_text(label + instance%shift)
+         return
+      end if
+      i = index(text, ".", back=.true.)
+      k = 0
+      if (i > 1) k = instance_number(self, squeezed(unquoted(text(:i - 1))))
+      if (k > 0) call read_integer(text(i + 1:), label, ok)
+      if (ok) then
+         word = to_text(label + self%instance(k)%shift)
+      else if (is_label .and. instance%name /= "" .and. k == 0) then
+         word = instance%name // "." // unquoted(text)
+      end if
+   end function field_of
+
+   !> A node of an instance that is moved.
+   subroutine put_node(source, line, instance, self, log)
+      type(deck_source_t), intent(in) :: source
+      integer, intent(in) :: line
+      type(instance_t), intent(in) :: instance
+      type(flat_t), intent(inout) :: self
+      type(diagnostics_t), intent(inout) :: log
+      character(len=:), allocatable :: text
+      character(len=26) :: number
+      real(wp) :: x(n_axis)
+      integer :: i
+      logical :: ok
+
+      x = 0.0_wp
+      do i = 1, n_axis
+         if (field(source%line(line)%text, i + 1) == "") cycle
+         call read_real(field(source%line(line)%text, i + 1), x(i), ok)
+         if (ok) cycle
+         call add_error(log, origin_of(source, line), "coordinate " &
+            // quoted(field(source%line(line)%text, i + 1)) // " of a part that is moved is " &
+            // "not a number")
+         return
+      end do
+      x = moved(instance, x)
+      text = field_of(self, field(source%line(line)%text, 1), instance, .true.)
+      do i = 1, merge(n_axis, n_axis - 1, n_fields(source%line(line)%text) > n_axis &
+         .or. abs(x(n_axis)) > 0.0_wp)
+         write(number, "(es26.17e3)") x(i)
+         text = text // ", " // trim(adjustl(number))
+      end do
+      call put_line(self, text, source, line)
+   end subroutine put_node
+
+   !> One more line, which stands where that of the source does.
+   subroutine put_line(self, text, source, line)
+      type(flat_t), intent(inout) :: self
+      character(len=*), intent(in) :: text
+      type(deck_source_t), intent(in) :: source
+      integer, intent(in) :: line
+      type(deck_source_t) :: grown
+
+      if (self%n == size(self%text%file)) then
+         allocate(grown%line(2*self%n), grown%file(2*self%n), grown%number(2*self%n))
+         grown%line(:self%n) = self%text%line
+         grown%file(:self%n) = self%text%file
+         grown%number(:self%n) = self%text%number
+         call move_alloc(grown%line, self%text%line)
+         call move_alloc(grown%file, self%text%file)
+         call move_alloc(grown%number, self%text%number)
+      end if
+      self%n = self%n + 1
+      self%text%line(self%n)%text = text
+      self%text%file(self%n) = source%file(line)
+      self%text%number(self%n) = source%number(line)
+   end subroutine put_line
+
+   !> The card that begins in a line, up to the line before the next keyword. A keyword line ends
+   !> with a comma where it goes on in the next one; data in front of a keyword are a card, too.
+   subroutine read_card(source, line, card)
+      type(deck_source_t), intent(in) :: source
+      integer, intent(in) :: line
+      type(card_text_t), intent(out) :: card
+      character(len=:), allocatable :: text
+      integer :: i_comma
+
+      card%line = line
+      card%name = keyword_of(source%line(line)%text)
+      card%data = line
+      card%title = ""
+      allocate(card%option(0))
+      if (card%name /= "") then
+         card%data = line + 1
+         text = stripped(source%line(line)%text, blanks)
+         do while (text(len(text):) == "," .and. card%data <= size(source%line))
+            if (.not. continues(source%line(card%data)%text)) exit
+            text = text // stripped(source%line(card%data)%text, blanks)
+            card%data = card%data + 1
+         end do
+         i_comma = index(text // ",", ",")
+         card%title = text(:i_comma - 1)
+         call split_options(text(i_comma:), card%option)
+      end if
+      card%last = card%data
+      do while (card%last <= size(source%line))
+         if (keyword_of(source%line(card%last)%text) /= "") exit
+         card%last = card%last + 1
+      end do
+      card%last = card%last - 1
+   end subroutine read_card
+
+   !> Does a line go on with the parameters of a keyword?
+   pure logical function continues(text)
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable :: core
+
+      core = stripped(text, blanks)
+      continues = scan(core(:min(1, len(core))), "*+-.0123456789,") == 0 .and. len(core) > 0
+   end function continues
+
+   !> The line that ends what `card` begins; behind the last one if none does.
+   integer function end_of(source, card, name) result(line)
+      type(deck_source_t), intent(in) :: source
+      type(card_text_t), intent(in) :: card
+      character(len=*), intent(in) :: name
+
+      do line = card%line + 1, size(source%line)
+         if (keyword_of(source%line(line)%text) == name) return
+      end do
+   end function end_of
+
+   !> The keyword of a line, upper case, without blanks and star; empty: it has none.
+   pure function keyword_of(text) result(name)
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable :: name
+      integer :: first
+
+      name = ""
+      first = verify(text, blanks)
+      if (first == 0) return
+      if (text(first:first) /= "*" .or. is_comment(text)) return
+      name = squeezed(text(first + 1:))
+      name = name(:index(name // ",", ",") - 1)
+   end function keyword_of
+
+   pure logical function is_comment(text)
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable :: core
+
+      core = stripped(text, blanks)
+      is_comment = len(core) == 0
+      if (.not. is_comment) is_comment = index(core, "**") == 1
+   end function is_comment
+
+   !> Value of a parameter as a name: upper case, without blanks and quotes; empty if absent.
+   pure function option_of(card, name) result(value)
+      type(card_text_t), intent(in) :: card
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable :: value
+      integer :: i
+
+      value = ""
+      do i = 1, size(card%option)
+         if (card%option(i)%name == name) value = squeezed(unquoted(card%option(i)%value))
+      end do
+   end function option_of
+
+   pure function unquoted(text) result(word)
+      character(len=*), intent(in) :: text
+      character(len=:), allocatable :: word
+
+      word = text
+      if (len(text) < 2) return
+      if (scan(text(1:1), "'""") == 1 .and. text(len(text):) == text(1:1)) word &
+         = text(2:len(text) - 1)
+   end function unquoted
+
+   !> Fields of a data line, as many as commas and one; a comma at the end is one too many.
+   pure integer function n_fields(text)
+      character(len=*), intent(in) :: text
+      integer :: i
+
+      n_fields = 1 + count([(text(i:i) == ",", i = 1, len(text))])
+   end function n_fields
+
+   !> Field `k` of a data line, without blanks around it.
+   pure function field(text, k) result(word)
+      character(len=*), intent(in) :: text
+      integer, intent(in) :: k
+      character(len=:), allocatable :: word
+      integer :: i, first, last
+
+      first = 1
+      do i = 2, k
+         last = index(text(first:), ",")
+         if (last == 0) then
+            word = ""
+            return
+         end if
+         first = first + last
+      end do
+      last = index(text(first:) // ",", ",")
+      word = stripped(text(first:first + last - 2), blanks)
+   end function field
+
+   pure type(origin_t) function origin_of(source, line)
+      type(deck_source_t), intent(in) :: source
+      integer, intent(in) :: line
+
+      origin_of = origin_t(source%file(line), source%number(line))
+   end function origin_of
+
+end module emcon_deck_parts
