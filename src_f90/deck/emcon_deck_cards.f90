@@ -209,6 +209,7 @@ contains
       if (i == 0) refusal = refusal_of(card%name)
       if (refusal%is_idle) then
          call note_idle(reader, card%title, trim(refusal%reason))
+         card%is_idle = .true.
          card%name = ""
       else if (refusal%reason /= "") then
          call refuse_unsupported(reader, card, refusal)

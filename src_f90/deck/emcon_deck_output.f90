@@ -82,7 +82,9 @@ contains
       character(len=:), allocatable :: name
 
       name = card%name
+      i_row = 0
       if (is_below(card)) then
+         if (self%heading%step /= card%step) return
          name = name(:index(name, "OUTPUT") - 1)
          if (name == "ELEMENT") name = "EL"
          if (has_option(self%heading, "FIELD") .and. name /= "ENERGY") then
@@ -90,7 +92,6 @@ contains
          else
             name = name // "PRINT"
          end if
-         if (self%heading%step /= card%step) name = ""
       end if
       i_row = findloc(output_rows%keyword == name, .true., 1)
    end function row_of
@@ -155,12 +156,14 @@ contains
       type(output_t), allocatable :: grown(:)
       integer, allocatable :: kept(:)
       character(len=:), allocatable :: word
+      logical :: is_empty
       integer :: i, n
 
       new%kind = row%kind
       new%origin = card%origin
       call read_variables(reader, card, row, new)
-      call read_set(reader, card, scene, new)
+      call read_set(reader, card, scene, new, is_empty)
+      if (is_empty) return
       if (is_below(card)) then
          call read_times(reader, self%heading, new)
       else
@@ -295,12 +298,15 @@ contains
       end do
    end subroutine list_variables
 
-   subroutine read_set(reader, card, scene, new)
+   !> The set that a request names; nothing is written of one without members.
+   subroutine read_set(reader, card, scene, new, is_empty)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(scene_t), intent(in) :: scene
       type(output_t), intent(inout) :: new
+      logical, intent(out) :: is_empty
 
+      is_empty = .false.
       select case (new%kind)
       case (output_node_file, output_node_print)
          call look_up("NSET", "node set", scene%set%node, reader%names%node_sets)
@@ -319,6 +325,12 @@ contains
          name = option_name(card, option)
          if (name == "") return
          new%set = name_index_find(index_of, name)
+         is_empty = .false.
+         if (new%set > 0 .and. any(new%kind == [output_node_print, output_element_print])) &
+            is_empty = size(set(new%set)%item) == 0
+         if (is_empty .and. .not. (reader%doubt%nodes .or. reader%doubt%elements)) call &
+            card_warning(reader, card, "the set " // quoted(name) // " is empty: nothing will be " &
+            // "written")
          if (new%set == 0 .and. .not. reader%doubt%names) then
             call hint_at_set(reader, what, name, set_names(set), hint)
             call card_error(reader, card, "unknown set " // option // "=" // quoted(name) // hint)

@@ -38,6 +38,7 @@ module emcon_deck_reader
       integer :: step = 0                          !! number of the step it stands in, 0: none
       integer :: first_item = 1, last_item = 0     !! nodes or elements that it defined
       logical :: is_unresolved = .false.           !! it has an unknown parameter, told already
+      logical :: is_idle = .false.                 !! it changes nothing; it has no name
       logical :: is_parametric = .false.           !! it names parameters: may serve several scenes
    end type card_t
 

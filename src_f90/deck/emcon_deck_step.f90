@@ -189,7 +189,8 @@ contains
       has_refused = .false.
       do i = i_first + 1, size(reader%card)
          if (reader%card(i)%name == "STEP") return
-         has_refused = has_refused .or. reader%card(i)%name == ""
+         has_refused = has_refused .or. (reader%card(i)%name == "" &
+            .and. .not. reader%card(i)%is_idle)
       end do
    end function has_refused
 

@@ -357,6 +357,21 @@ def test_output_in_the_words_of_abaqus(asked, plain, tmp_path):
     assert found[0] == found[1]
 
 
+def test_a_step_of_cards_that_change_nothing_has_no_procedure(tmp_path):
+    deck = tmp_path/"deck.inp"
+    deck.write_text(moving().replace("*DYNAMIC, DIRECT\n0.5, 1.\n", "*CONTROLS\n"))
+    assert "the step has no procedure" in emcon("check", deck).stderr
+
+
+def test_output_of_a_set_without_members_is_warned_of(tmp_path):
+    empty = "*NSET, NSET=NONE\n*ELSET, ELSET=NONE\n*MATERIAL, NAME=M\n"
+    asked = "*NODE PRINT, NSET=NONE\nU\n*EL PRINT, ELSET=NONE, TOTALS=YES\nS\n"
+    done = run(tmp_path, moving().replace("*MATERIAL, NAME=M\n", empty).replace(PRINT, PRINT + asked))
+    assert done.errors.count("the set 'NONE' is empty: nothing will be written") == 2
+    with h5py.File(done.file(".h5"), "r") as file:
+        assert "ALL" in file["sets"] and "NONE" not in file["sets"]
+
+
 def test_output_of_abaqus_that_is_not_written_is_warned_of(tmp_path):
     done = run(tmp_path, moving().replace(PRINT, "*OUTPUT, FIELD\n*NODE OUTPUT\nU, A\n*ELEMENT OUTPUT\nLE\n"))
     assert [line.split("variable ")[1][:4] for line in done.errors.splitlines()] == ["'A' ", "'LE'"]
