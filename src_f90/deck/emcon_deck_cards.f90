@@ -244,6 +244,7 @@ contains
 
       if (reader%is_lenient .and. refusal%is_output) then
          call card_warning(reader, card, "not supported, left out: " // trim(refusal%reason))
+         card%is_idle = .true.
       else
          call card_error(reader, card, "known but not supported: " // trim(refusal%reason))
       end if
