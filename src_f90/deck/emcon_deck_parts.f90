@@ -19,6 +19,10 @@ module emcon_deck_parts
    integer, parameter :: n_axis = 3
    !> Fields of GENERATE that are labels.
    integer, parameter :: n_ends = 2
+   !> A quoted word has so many quotes.
+   integer, parameter :: n_quotes = 2
+   !> Longer keywords are none.
+   integer, parameter :: longest_keyword = 40
    character(len=*), parameter :: blanks = " " // achar(9)
 
    !> Lines of a part, from behind *PART to before *END PART.
@@ -316,29 +320,33 @@ contains
       type(flat_t), intent(inout) :: self
       type(diagnostics_t), intent(inout) :: log
       logical, intent(in), optional :: is_own
+      character(len=:), allocatable :: line
       integer :: i
       logical :: keeps_names
 
       keeps_names = .false.
       if (present(is_own)) keeps_names = is_own
-      if (card%name /= "") call put_line(self, keyword_line(card, instance, keeps_names), source, &
-         card%line)
+      if (card%name /= "") then
+         call make_keyword_line(card, instance, keeps_names, line)
+         call put_line(self, line, source, card%line)
+      end if
       do i = card%data, card%last
          if (is_comment(source%line(i)%text)) cycle
          if (card%name == "NODE" .and. instance%is_moved) then
             call put_node(source, i, instance, self, log)
          else
-            call put_line(self, data_line(self, card, source%line(i)%text, instance), source, i)
+            call make_data_line(self, card, source%line(i)%text, instance, line)
+            call put_line(self, line, source, i)
          end if
       end do
    end subroutine put_card
 
    !> The keyword line with the names of an instance, without INSTANCE=.
-   function keyword_line(card, instance, keeps_names) result(line)
+   pure subroutine make_keyword_line(card, instance, keeps_names, line)
       type(card_text_t), intent(in) :: card
       type(instance_t), intent(in) :: instance
       logical, intent(in) :: keeps_names
-      character(len=:), allocatable :: line
+      character(len=:), allocatable, intent(out) :: line
       integer :: i
 
       line = card%title
@@ -355,15 +363,16 @@ contains
             end if
          end associate
       end do
-   end function keyword_line
+   end subroutine make_keyword_line
 
    !> A data line with the labels and names of an instance.
-   function data_line(self, card, text, instance) result(line)
+   pure subroutine make_data_line(self, card, text, instance, line)
       type(flat_t), intent(in) :: self
       type(card_text_t), intent(in) :: card
       character(len=*), intent(in) :: text
       type(instance_t), intent(in) :: instance
-      character(len=:), allocatable :: line
+      character(len=:), allocatable, intent(out) :: line
+      character(len=:), allocatable :: word
       integer :: i, most
 
       select case (card%name)
@@ -382,17 +391,18 @@ contains
       line = ""
       do i = 1, n_fields(text)
          if (i > 1) line = line // ","
-         line = line // field_of(self, field(text, i), instance, i <= most)
+         call make_field(self, field(text, i), instance, i <= most, word)
+         line = line // word
       end do
-   end function data_line
+   end subroutine make_data_line
 
    !> A field: labels and names of an instance, and labels such as INSTANCE.7 anywhere.
-   function field_of(self, text, instance, is_label) result(word)
+   pure subroutine make_field(self, text, instance, is_label, word)
       type(flat_t), intent(in) :: self
       character(len=*), intent(in) :: text
       type(instance_t), intent(in) :: instance
       logical, intent(in) :: is_label
-      character(len=:), allocatable :: word
+      character(len=:), allocatable, intent(out) :: word
       integer :: label, i, k
       logical :: ok
 
@@ -412,7 +422,7 @@ contains
       else if (is_label .and. instance%name /= "" .and. k == 0) then
          word = instance%name // "." // unquoted(text)
       end if
-   end function field_of
+   end subroutine make_field
 
    !> A node of an instance that is moved.
    subroutine put_node(source, line, instance, self, log)
@@ -438,7 +448,7 @@ contains
          return
       end do
       x = moved(instance, x)
-      text = field_of(self, field(source%line(line)%text, 1), instance, .true.)
+      call make_field(self, field(source%line(line)%text, 1), instance, .true., text)
       do i = 1, merge(n_axis, n_axis - 1, n_fields(source%line(line)%text) > n_axis &
          .or. abs(x(n_axis)) > 0.0_wp)
          write(number, "(es26.17e3)") x(i)
@@ -480,7 +490,7 @@ contains
       integer :: i_comma
 
       card%line = line
-      card%name = keyword_of(source%line(line)%text)
+      card%name = trim(keyword_of(source%line(line)%text))
       card%data = line
       card%title = ""
       allocate(card%option(0))
@@ -527,15 +537,15 @@ contains
    !> The keyword of a line, upper case, without blanks and star; empty: it has none.
    pure function keyword_of(text) result(name)
       character(len=*), intent(in) :: text
-      character(len=:), allocatable :: name
-      integer :: first
+      character(len=longest_keyword) :: name
+      integer :: first, last
 
       name = ""
       first = verify(text, blanks)
       if (first == 0) return
       if (text(first:first) /= "*" .or. is_comment(text)) return
-      name = squeezed(text(first + 1:))
-      name = name(:index(name // ",", ",") - 1)
+      last = index(text // ",", ",") - 1
+      name = squeezed(text(first + 1:last))
    end function keyword_of
 
    pure logical function is_comment(text)
@@ -551,24 +561,49 @@ contains
    pure function option_of(card, name) result(value)
       type(card_text_t), intent(in) :: card
       character(len=*), intent(in) :: name
-      character(len=:), allocatable :: value
+      character(len=option_length(card, name)) :: value
       integer :: i
 
-      value = ""
-      do i = 1, size(card%option)
-         if (card%option(i)%name == name) value = squeezed(unquoted(card%option(i)%value))
-      end do
+      i = option_place(card, name)
+      if (i > 0) value = squeezed(unquoted(card%option(i)%value))
    end function option_of
+
+   pure integer function option_length(card, name) result(length)
+      type(card_text_t), intent(in) :: card
+      character(len=*), intent(in) :: name
+      integer :: i
+
+      length = 0
+      i = option_place(card, name)
+      if (i > 0) length = len(squeezed(unquoted(card%option(i)%value)))
+   end function option_length
+
+   pure integer function option_place(card, name) result(i)
+      type(card_text_t), intent(in) :: card
+      character(len=*), intent(in) :: name
+
+      do i = size(card%option), 1, -1
+         if (card%option(i)%name == name) return
+      end do
+   end function option_place
 
    pure function unquoted(text) result(word)
       character(len=*), intent(in) :: text
-      character(len=:), allocatable :: word
+      character(len=len(text) - merge(n_quotes, 0, is_quoted(text))) :: word
 
-      word = text
-      if (len(text) < 2) return
-      if (scan(text(1:1), "'""") == 1 .and. text(len(text):) == text(1:1)) word &
-         = text(2:len(text) - 1)
+      if (is_quoted(text)) then
+         word = text(2:len(text) - 1)
+      else
+         word = text
+      end if
    end function unquoted
+
+   pure logical function is_quoted(text)
+      character(len=*), intent(in) :: text
+
+      is_quoted = len(text) >= n_quotes
+      if (is_quoted) is_quoted = scan(text(1:1), "'""") == 1 .and. text(len(text):) == text(1:1)
+   end function is_quoted
 
    !> Fields of a data line, as many as commas and one; a comma at the end is one too many.
    pure integer function n_fields(text)
@@ -582,21 +617,46 @@ contains
    pure function field(text, k) result(word)
       character(len=*), intent(in) :: text
       integer, intent(in) :: k
-      character(len=:), allocatable :: word
-      integer :: i, first, last
+      character(len=field_length(text, k)) :: word
+      integer :: first, last
+
+      call find_field(text, k, first, last)
+      word = text(first:last)
+   end function field
+
+   pure integer function field_length(text, k)
+      character(len=*), intent(in) :: text
+      integer, intent(in) :: k
+      integer :: first, last
+
+      call find_field(text, k, first, last)
+      field_length = max(0, last - first + 1)
+   end function field_length
+
+   !> Where field `k` of a data line begins and ends, without blanks around it.
+   pure subroutine find_field(text, k, first, last)
+      character(len=*), intent(in) :: text
+      integer, intent(in) :: k
+      integer, intent(out) :: first, last        !! `last` < `first`: it is empty
+      integer :: i, comma
 
       first = 1
+      last = 0
       do i = 2, k
-         last = index(text(first:), ",")
-         if (last == 0) then
-            word = ""
-            return
-         end if
-         first = first + last
+         comma = index(text(first:), ",")
+         if (comma == 0) return
+         first = first + comma
       end do
-      last = index(text(first:) // ",", ",")
-      word = stripped(text(first:first + last - 2), blanks)
-   end function field
+      last = first + index(text(first:) // ",", ",") - 2
+      do while (first <= last)
+         if (scan(text(first:first), blanks) == 0) exit
+         first = first + 1
+      end do
+      do while (last >= first)
+         if (scan(text(last:last), blanks) == 0) exit
+         last = last - 1
+      end do
+   end subroutine find_field
 
    pure type(origin_t) function origin_of(source, line)
       type(deck_source_t), intent(in) :: source

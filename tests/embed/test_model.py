@@ -313,6 +313,11 @@ def test_all_keywords_of_the_reader_have_a_method() -> None:
     del known["PREPRINT"]                        # does nothing; Model.cards takes it
     del known["USERELEMENT"]                     # its shape comes from Fortran; Model.cards too
     known["SURFACEBEHAVIOR"].remove("DIRECT")    # says of hard contact what holds without it
+    for name in ("OUTPUT", "NODEOUTPUT", "ELEMENTOUTPUT", "CONTACTOUTPUT", "ENERGYOUTPUT"):
+        del known[name]                          # the requests of `output` in other words
+    for name, word in (("NSET", "INTERNAL"), ("ELSET", "INTERNAL"), ("SURFACE", "INTERNAL"),
+                       ("STEP", "NAME")):
+        known[name].remove(word)                 # labels that another program shows
     missing = {name: options - written.get(name, set()) for name, options in known.items()
                if name not in written or not options <= written[name]}
     assert not missing
@@ -328,7 +333,7 @@ def test_keywords_of_every_deck_have_a_method(path: Path) -> None:
     names = {line.strip()[1:].split(",")[0].replace(" ", "").replace("\t", "").upper()
              for line in path.read_text().splitlines() if re.match(r"\s*\*[^*]", line)}
     unknown = names - set(known)
-    assert not unknown or path.stem == "good_lenient"
+    assert not unknown or path.stem in ("good_lenient", "good_exporters", "good_parts")
 
 
 def test_restitution_of_friction_goes_with_friction() -> None:
