@@ -17,8 +17,9 @@ module emcon_deck_parts
    public :: parts_are_used, parts_flatten
 
    integer, parameter :: n_axis = 3
-   !> Fields of GENERATE that are labels.
-   integer, parameter :: n_ends = 2
+   !> Fields of GENERATE that are labels, and of a point of a profile; those of a term of *EQUATION.
+   integer, parameter :: n_ends = 2, n_term = 3
+   character(len=*), parameter :: digits = "0123456789"
    !> A quoted word has so many quotes.
    integer, parameter :: n_quotes = 2
    !> Longer keywords are none.
@@ -327,26 +328,34 @@ contains
       keeps_names = .false.
       if (present(is_own)) keeps_names = is_own
       if (card%name /= "") then
-         call make_keyword_line(card, instance, keeps_names, line)
+         call make_keyword_line(self, card, instance, keeps_names, line)
          call put_line(self, line, source, card%line)
       end if
       do i = card%data, card%last
          if (is_comment(source%line(i)%text)) cycle
          if (card%name == "NODE" .and. instance%is_moved) then
             call put_node(source, i, instance, self, log)
+            cycle
+         end if
+         if (has_stray_label(self, card, source%line(i)%text, instance)) call add_error(log, &
+            origin_of(source, i), card%title // ": a label here is none of the part")
+         if (is_profile(card) .and. instance%is_moved) then
+            call make_profile_line(source%line(i)%text, instance, line)
          else
             call make_data_line(self, card, source%line(i)%text, instance, line)
-            call put_line(self, line, source, i)
          end if
+         call put_line(self, line, source, i)
       end do
    end subroutine put_card
 
    !> The keyword line with the names of an instance, without INSTANCE=.
-   pure subroutine make_keyword_line(card, instance, keeps_names, line)
+   pure subroutine make_keyword_line(self, card, instance, keeps_names, line)
+      type(flat_t), intent(in) :: self
       type(card_text_t), intent(in) :: card
       type(instance_t), intent(in) :: instance
       logical, intent(in) :: keeps_names
       character(len=:), allocatable, intent(out) :: line
+      character(len=:), allocatable :: word
       integer :: i
 
       line = card%title
@@ -358,6 +367,10 @@ contains
             if (.not. keeps_names .and. (option%name == "NSET" .or. option%name == "ELSET" &
                .or. (option%name == "NAME" .and. card%name == "SURFACE"))) then
                line = line // "=" // instance%name // "." // unquoted(option%value)
+            else if (option%name == "REFNODE") then
+               call make_field(self, option%value, instance, is_label=.not. keeps_names &
+                  .or. verify(option%value, digits) == 0, word=word)
+               line = line // "=" // word
             else
                line = line // "=" // option%value
             end if
@@ -373,28 +386,86 @@ contains
       type(instance_t), intent(in) :: instance
       character(len=:), allocatable, intent(out) :: line
       character(len=:), allocatable :: word
-      integer :: i, most
+      integer :: i
 
-      select case (card%name)
-      case ("NODE")
-         most = 1
-      case ("ELEMENT")
-         most = huge(1)
-      case ("NSET", "ELSET")
-         most = merge(n_ends, huge(1), any([(card%option(i)%name == "GENERATE", i = 1, &
-            size(card%option))]))
-      case ("SURFACE")
-         most = merge(0, 1, option_of(card, "TYPE") == "SEGMENTS")
-      case default
-         most = 0
-      end select
       line = ""
       do i = 1, n_fields(text)
          if (i > 1) line = line // ","
-         call make_field(self, field(text, i), instance, i <= most, word)
+         call make_field(self, field(text, i), instance, is_label(card, i, n_fields(text)), word)
          line = line // word
       end do
    end subroutine make_data_line
+
+   !> Is field `i` of the `n` of a data line a label, or the name of a set?
+   pure logical function is_label(card, i, n)
+      type(card_text_t), intent(in) :: card
+      integer, intent(in) :: i, n
+
+      select case (card%name)
+      case ("NODE", "BOUNDARY", "INITIALCONDITIONS")
+         is_label = i == 1
+      case ("ELEMENT")
+         is_label = .true.
+      case ("NSET", "ELSET")
+         is_label = i <= n_ends .or. option_place(card, "GENERATE") == 0
+      case ("SURFACE")
+         is_label = i == 1 .and. .not. is_profile(card)
+      case ("EQUATION")                          ! node, degree of freedom, coefficient
+         is_label = n > 1 .and. mod(i - 1, n_term) == 0
+      case default
+         is_label = .false.
+      end select
+   end function is_label
+
+   pure logical function is_profile(card)
+      type(card_text_t), intent(in) :: card
+
+      is_profile = card%name == "SURFACE" .and. option_of(card, "TYPE") == "SEGMENTS"
+   end function is_profile
+
+   !> Does a line name a label that no part can have? It would be one of another instance.
+   pure logical function has_stray_label(self, card, text, instance)
+      type(flat_t), intent(in) :: self
+      type(card_text_t), intent(in) :: card
+      character(len=*), intent(in) :: text
+      type(instance_t), intent(in) :: instance
+      integer :: i, label
+      logical :: ok
+
+      has_stray_label = .false.
+      if (instance%name == "" .and. .not. self%in_assembly) return
+      do i = 1, n_fields(text)
+         if (.not. is_label(card, i, n_fields(text))) cycle
+         call read_integer(field(text, i), label, ok)
+         has_stray_label = has_stray_label .or. (ok .and. (label < 1 .or. label >= self%unit))
+      end do
+   end function has_stray_label
+
+   !> A segment of a profile that is moved: a word, then points.
+   pure subroutine make_profile_line(text, instance, line)
+      character(len=*), intent(in) :: text
+      type(instance_t), intent(in) :: instance
+      character(len=:), allocatable, intent(out) :: line
+      character(len=26) :: number
+      real(wp) :: x(n_axis)
+      logical :: ok(n_ends)
+      integer :: i, k
+
+      line = field(text, 1)
+      do i = n_ends, n_fields(text) - 1, n_ends
+         x = 0.0_wp
+         do k = 1, n_ends
+            call read_real(field(text, i + k - 1), x(k), ok(k))
+         end do
+         if (.not. all(ok)) exit
+         x = moved(instance, x)
+         do k = 1, n_ends
+            write(number, "(es26.17e3)") x(k)
+            line = line // ", " // trim(adjustl(number))
+         end do
+      end do
+      if (i < n_fields(text)) line = text        ! the reader tells what is no number
+   end subroutine make_profile_line
 
    !> A field: labels and names of an instance, and labels such as INSTANCE.7 anywhere.
    pure subroutine make_field(self, text, instance, is_label, word)
@@ -410,7 +481,7 @@ contains
       if (text == "") return
       call read_integer(text, label, ok)
       if (ok) then
-         if (is_label) word = to_text(label + instance%shift)
+         if (is_label .and. abs(label) < self%unit) word = to_text(label + instance%shift)
          return
       end if
       i = index(text, ".", back=.true.)

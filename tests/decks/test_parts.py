@@ -106,7 +106,25 @@ def test_nodes_of_the_assembly_have_labels_of_their_own(tmp_path):
     assert np.allclose(u[9:], u[9], rtol=0, atol=16*EPSILON) and u[9, 1] == pytest.approx(-0.05)
 
 
+def test_a_profile_goes_with_its_instance(tmp_path):
+    """An analytical surface of a part that is moved and turned, its reference node by its label."""
+    wall = ("*Part, name=Wall\n*Node\n7, 0., 0., 0.\n*Surface, type=SEGMENTS, name=Face\n"
+            "START, 0., -3.\nLINE, 0., -1.\nCIRCL, 0., 1., -5., 0.\n*End Part\n")
+    instance = "*Instance, name=Wall-1, part=Wall\n0.25, 0., 0.\n0., 0., 0., 0., 0., 1., -90.\n*End Instance\n"
+    body = ("*Node\n      1, 0., 0.3, 0.\n*Rigid Body, analytical surface=Wall-1.Face, ref node=1\n"
+            "*Nset, nset=Ref\n1,\n*End Assembly\n")
+    text = PARTS.replace("*Assembly", wall + "*Assembly").replace("*Nset, nset=Top", instance + "*Nset, nset=Top")
+    text = text.replace("*End Assembly\n", body).replace("Foot, 1, 2\n", "Foot, 1, 2\nRef, 1, 2\nRef, 6\n")
+    deck = Deck(text, "deck")
+    run = run_deck(deck, tmp_path)
+    # The profile lies behind the nodes of three instances and that of the assembly; a point (0, y) of
+    # the part is at (y, -0.25).
+    assert np.abs(run.fields().x[20:22, :2] - [(-3.0, -0.25), (-1.0, -0.25)]).max() <= 32*EPSILON*3
+
+
 @pytest.mark.parametrize("old, new, told", [
+    ("*Nset, nset=BELOW\n 1, 2, 3", "*Nset, nset=BELOW\n 1, 12, 3", "*Nset: a label here is none of the part"),
+    ("1, S1\n2, S1", "1, S1\n14, S1", "*Surface: a label here is none of the part"),
     ("part=Square\n*End Instance\n*Instance", "part=Circle\n*End Instance\n*Instance", "no part 'CIRCLE'"),
     ("name=Punch-1", "name=Base-1", "instance 'BASE-1' is given twice"),
     ("name=Punch-1, ", "", "*INSTANCE needs NAME="),
