@@ -10,7 +10,8 @@ module emcon_common_normal_plane
    use emcon_kinds, only : wp
    use emcon_nts_gap_first, only : nts_gap
    use emcon_nts_gap_value, only : last, slave
-   use emcon_nts_stencil, only : polygon_stencil_t, stencil_gather
+   use emcon_nts_stencil, only : stencil_gather
+   use emcon_polygon_stencil_plane, only : polygon_stencil_t
    use emcon_turn_plane, only : turned_by
    implicit none
    private
@@ -126,7 +127,7 @@ contains
 
       still = 0.0_wp
       gap = nts_gap(local(:, :stencil%n), still, stencil%before, stencil%after, stencil%rounding, &
-         stencil%goes_around)
+         stencil%round)
       ! The slave node is the first: its gradient is what the others leave.
       associate (m => 2*(stencil%n - 1))
          tangent = [sum(gap%c(2:m:2)), -sum(gap%c(1:m:2))]

@@ -7,7 +7,7 @@
 module emcon_corner_tops_plane
    use emcon_chain_plane, only : chain_shorter, chain_t
    use emcon_kinds, only : wp
-   use emcon_nts_stencil, only : polygon_stencil_t
+   use emcon_polygon_stencil_plane, only : polygon_stencil_t
    implicit none
    private
    public :: corner_tops, top_width

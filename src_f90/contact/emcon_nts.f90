@@ -18,11 +18,12 @@ module emcon_nts
       choice_pushes_aside, choice_settle, choice_take_nearer, nts_choice_t
    use emcon_nts_constraint, only : polygon_constraint, smooth_constraint
    use emcon_nts_gap_value, only : nts_gap_value
-   use emcon_nts_stencil, only : most_nodes, polygon_slip, stencil_gather, stencil_length
+   use emcon_nts_stencil, only : most_nodes, stencil_gather, stencil_length
+   use emcon_polygon_slip_plane, only : polygon_slip_over
+   use emcon_polygon_stencil_plane, only : polygon_slip
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
-   use emcon_roll_plane, only : roll_over
    use emcon_scene, only : scene_t
-   use emcon_slip_point, only : slip_list_t, slip_over
+   use emcon_slip_point, only : slip_list_t
    implicit none
    private
    public :: nts_t, nts_init, nts_nearest
@@ -152,6 +153,7 @@ contains
 
       sagitta = 0.0_wp
       if (self%edge(i) == 0) return
+      if (any(abs(self%polygon(1, i)%round%bend) > 0.0_wp)) return
       associate (length => self%master%size(self%edge(i)))
          call stencil_gather(x, u0, u0, 3, self%polygon(1, i)%node, local, dlocal)
          call nts_gap_value(local, 0, 0, self%polygon(1, i)%rounding, gap, xi)
@@ -207,7 +209,7 @@ contains
       state = self%start(i)%state
       state%gap1 = state%gap0
       state%is_over = is_over(state, self%start(i)%xi, self%start(i)%xi, &
-         [self%polygon(1, i)%before > 0, self%polygon(1, i)%after > 0])
+         self%polygon(1, i)%goes_on)
    end function state_at_rest
 
    !> What a gap over a polygon is as a step begins.
@@ -222,7 +224,7 @@ contains
       associate (stencil => self%polygon(1, i), state => start%state)
          call stencil_gather(x, u0, u0, stencil%n, stencil%node, local, dlocal)
          call nts_gap_value(local(:, :stencil%n), stencil%before, stencil%after, &
-            stencil%rounding, state%gap0, start%xi, stencil%goes_around)
+            stencil%rounding, state%gap0, start%xi, stencil%round)
          state%gap0 = state%gap0 - self%offset - self%sagitta(i)
          state%size = stencil_length(x, stencil%node)
          state%other_size = self%own_size(i)
@@ -264,9 +266,7 @@ contains
 
       state = start%state
       call polygon_end(self, i, x, u0, du, state%gap1, xi1)
-      associate (stencil => self%polygon(1, i))
-         state%is_over = is_over(state, start%xi, xi1, [stencil%before > 0, stencil%after > 0])
-      end associate
+      state%is_over = is_over(state, start%xi, xi1, self%polygon(1, i)%goes_on)
       if (state%gap1 > end_tol*state%size) return
       state%is_leaving = choice_pushes_aside(self, i, x, u0, du)
       state%is_over = state%is_over .and. .not. state%is_leaving
@@ -287,7 +287,7 @@ contains
             local(:, k) = local(:, k) + (dlocal(:, k) - dlocal(:, 2))
          end do
          call nts_gap_value(local(:, :n), stencil%before, stencil%after, stencil%rounding, gap, &
-            xi, stencil%goes_around)
+            xi, stencil%round)
          gap = gap - self%offset - self%sagitta(i)
       end associate
    end subroutine polygon_end
@@ -408,8 +408,7 @@ contains
       n = 1
       if (self%other(i) > 0) n = size(self%polygon, 1)
       do k = 1, n
-         slip = slip + slip_over(polygon_slip(self%polygon(k, i), 1.0_wp/n), x, u0, du)
-         if (self%arm(i) > 0) slip = slip + roll_over(self%polygon(k, i), 1.0_wp/n, x, u0, du)
+         slip = slip + polygon_slip_over(self%polygon(k, i), 1.0_wp/n, x, u0, du)
       end do
    end function nts_slip
 

@@ -5,6 +5,7 @@
 module emcon_nts_choice
    use emcon_chain_plane, only : chain_init, chain_share, chain_shortest, chain_t, &
       chain_thickness, next, previous
+   use emcon_circles_plane, only : circles_find, circles_t
    use emcon_common_normal_plane, only : is_pushed_aside
    use emcon_contact, only : contact_t
    use emcon_corner_tops_plane, only : corner_tops
@@ -13,9 +14,10 @@ module emcon_nts_choice
    use emcon_interactions, only : contact_pair_t, smoothing_hermite, smoothing_none
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
-   use emcon_nts_stencil, only : edge_distance, edge_of_sector, is_outside, polygon_stencil, &
-      polygon_stencil_t, smooth_stencil, smooth_stencil_t
-   use emcon_rigid_bodies, only : rigid_far_node
+   use emcon_nts_stencil, only : smooth_stencil, smooth_stencil_t
+   use emcon_polygon_stencil_plane, only : corner_widths, edge_distance, edge_of_circle, &
+      edge_of_sector, is_outside, polygon_stencil, polygon_stencil_t, stays_on_circle
+   use emcon_rigid_bodies, only : rigid_far_node, rigid_numbers
    use emcon_scene, only : scene_t
    use emcon_seams_plane, only : chain_join
    use emcon_self_contact_plane, only : self_contact_is_apart
@@ -52,6 +54,7 @@ module emcon_nts_choice
       type(polygon_stencil_t), allocatable :: polygon(:, :)   !! (2, n_constraint) over these
       integer, allocatable :: arm(:)                  !! (n_constraint) another node of the rigid
                                                       !! body of a node with a pad; 0: none
+      type(circles_t), allocatable :: circles         !! of the master; none: it is no rigid one
       logical, allocatable :: is_corner(:)            !! (n_edge) the smoothed master has one at its
                                                       !! first node
       type(smooth_stencil_t), allocatable :: smooth(:)   !! (n_constraint) only if smoothed
@@ -79,6 +82,11 @@ contains
       if (allocated(error)) return
       call chain_join(self%slave, scene)
       call chain_join(self%master, scene)
+      if (size(scene%rigid) > 0 .and. .not. pair%slack > 0.0_wp) then
+         allocate(self%circles)
+         call circles_find(self%circles, self%master, scene%x, rigid_numbers(scene%rigid, &
+            size(scene%x, 2)))
+      end if
       self%is_self = pair%slave == pair%master
       if (self%is_self) call touch_rule_init(self%rule, self%slave, scene, pair%both_sides)
       associate (n => size(self%slave%node))
@@ -244,6 +252,9 @@ contains
 
       edge = self%edge(i)
       call edge_of_sector(self%master, self%node(i), x, u0, edge, other)
+      if (allocated(self%circles)) then
+         if (maxval(self%circles%of([edge, max(1, other)])) > 0) other = 0
+      end if
       new = max(other, merge(edge, 0, edge /= self%edge(i)))
       if (new == 0) return
       if (.not. touch_rule_sees(self%rule, self%class(i), new)) return
@@ -257,23 +268,26 @@ contains
 
    !> Nodes over the polygon: slave node, edge, and what is there before and after that may keep the
    !> node out.
-   pure subroutine stencil_of(self, i, middle, x, u0, stencil)
+   pure subroutine stencil_of(self, i, edge, x, u0, stencil)
       class(nts_choice_t), intent(in) :: self
-      integer, intent(in) :: i, middle           !! constraint, edge of the master
+      integer, intent(in) :: i, edge             !! constraint, edge of the master
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
       type(polygon_stencil_t), intent(out) :: stencil
       real(wp) :: top
+      integer :: middle
 
       ! At rest a node may stand on a top for long.
       top = merge(2.0_wp, 1.0_wp, self%meets_statics)
       if (self%step%is_sharp) top = 0.0_wp
-      call polygon_stencil(stencil, self%master, self%node(i), middle, &
-         self%rounding*[1.0_wp, top], x, u0)
+      middle = edge
+      if (allocated(self%circles)) middle = edge_of_circle(self%master, self%circles, edge)
+      call polygon_stencil(stencil, self%master, self%node(i), middle, x, u0, self%circles)
+      stencil%rounding = corner_widths(self%master, middle, self%rounding*[1.0_wp, top])
       ! Guards watch the mesh.
       if (.not. (self%step%is_sharp .or. self%meets_statics .or. self%slack > 0.0_wp)) then
          call corner_tops(self%slave, self%chain_node(i), self%master, middle, x, u0, stencil)
       end if
-      stencil%goes_around = self%offset > 0.0_wp
+      stencil%round%goes_around = self%offset > 0.0_wp
       stencil%arm = self%arm(i)
       stencil%radius = self%offset
       associate (n => stencil%n, before => stencil%before, after => stencil%after)
@@ -283,13 +297,20 @@ contains
                after = 0
             end if
          end if
-         if (before == 0) return
-         if (bears(self, i, self%master%neighbour(previous, middle), x, u0)) return
-         n = n - 1
-         before = 0
-         if (after == 0) return
-         stencil%node(4) = stencil%node(5)
-         after = 4
+         if (before > 0) then
+            if (.not. bears(self, i, self%master%neighbour(previous, middle), x, u0)) then
+               n = n - 1
+               before = 0
+               if (after > 0) then
+                  stencil%node(4) = stencil%node(5)
+                  after = 4
+               end if
+            end if
+         end if
+         stencil%goes_on = [before, after] > 0 .or. abs(stencil%round%bend([-1, 1])) > 0.0_wp
+         if (abs(stencil%round%bend(0)) > 0.0_wp) then
+            stencil%goes_on = self%master%neighbour(:, middle) > 0
+         end if
       end associate
    end subroutine stencil_of
 
@@ -336,7 +357,7 @@ contains
    end function choice_could_hold
 
    !> Is edge `middle` or one of its neighbours the nearest after the motion `du`, rather than the
-   !> edges after next?
+   !> edges after next? A circle is one edge.
    pure logical function choice_covers(self, i, middle, x, u0, du)
       class(nts_choice_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
@@ -346,6 +367,10 @@ contains
       real(wp) :: inside, outside
       integer :: e, k, side
 
+      if (allocated(self%circles)) then
+         choice_covers = stays_on_circle(self%master, self%circles, self%node(i), middle, x, u0, du)
+         if (choice_covers) return
+      end if
       inside = distance_of(middle)
       outside = huge(outside)
       do side = 1, 2
@@ -366,20 +391,10 @@ contains
 
    contains
 
-      !> Distance of the slave node from edge `e`.
       pure real(wp) function distance_of(e)
-         integer, intent(in) :: e
-         real(wp) :: u(2, 3), local(2, 3)
+         integer, intent(in) :: e                !! edge of the master
 
-         if (.not. present(du)) then
-            distance_of = edge_distance(x, u0, self%node(i), self%master%facet(:, e))
-            return
-         end if
-         associate (node => [self%node(i), self%master%facet(:, e)])
-            local = x(:, node)
-            u = u0(:, node) + du(:, node)
-         end associate
-         distance_of = edge_distance(local, u, 1, [2, 3])
+         distance_of = edge_distance(x, u0, self%node(i), self%master%facet(:, e), du)
       end function distance_of
 
    end function choice_covers

@@ -18,10 +18,9 @@ module emcon_nts_constraint
    use emcon_nts_gap, only : nts_gap
    use emcon_nts_gap_first, only : nts_gap_first => nts_gap
    use emcon_nts_gap_value, only : slave
-   use emcon_nts_stencil, only : most_nodes, polygon_slip, polygon_stencil_t, smooth_stencil_t, &
-      stencil_gather, stencil_length
-   use emcon_roll_plane, only : roll_add
-   use emcon_slip_point, only : slip_add
+   use emcon_nts_stencil, only : most_nodes, smooth_stencil_t, stencil_gather, stencil_length
+   use emcon_polygon_slip_plane, only : polygon_slip_add
+   use emcon_polygon_stencil_plane, only : polygon_stencil_t
    implicit none
    private
    public :: polygon_constraint, smooth_constraint
@@ -57,9 +56,8 @@ contains
       if (item%has_friction) call condition_resize_slip(item)
       do i = 1, size(stencil)
          call add_polygon(stencil(i), 1.0_wp/size(stencil), x, u0, du, item)
-         if (.not. item%has_friction) cycle
-         call slip_add(polygon_slip(stencil(i), 1.0_wp/size(stencil)), x, u0, du, item)
-         if (stencil(i)%arm > 0) call roll_add(stencil(i), 1.0_wp/size(stencil), x, u0, du, item)
+         if (item%has_friction) call polygon_slip_add(stencil(i), 1.0_wp/size(stencil), x, u0, du, &
+            item)
       end do
    end subroutine polygon_constraint
 
@@ -78,12 +76,12 @@ contains
          call stencil_gather(x, u0, du, n, stencil%node, local, dlocal)
          if (item%leaves_second) then
             first = nts_gap_first(local(:, :n), dlocal(:, :n), before, after, rounding, &
-               stencil%goes_around)
+               stencil%round)
             call add_gap(stencil, share, change_t(first%f0, first%f1, first%df), first%g, first%c, &
                first%h, item)
          else
             gap = nts_gap(local(:, :n), dlocal(:, :n), before, after, rounding, &
-               stencil%goes_around)
+               stencil%round)
             call add_gap(stencil, share, change_t(gap%f0, gap%f1, gap%df), gap%g, gap%c, gap%h, &
                item)
          end if

@@ -13,7 +13,7 @@ module emcon_nts_gap_value
    implicit none
    private
    public :: nts_gap_value
-   public :: slave, first, last, flat, right_angle
+   public :: edge_round_t, slave, first, last, flat, right_angle
 
    !> Local numbers of the nodes; the neighbours' further nodes follow as they are present.
    integer, parameter :: slave = 1, first = 2, last = 3
@@ -25,27 +25,34 @@ module emcon_nts_gap_value
    !> round-off.
    real(wp), parameter :: right_angle = -1.0e-6_wp
 
+   !> What of an edge and its ends is round.
+   type :: edge_round_t
+      logical :: goes_around = .false.           !! convex corners are as far as they are
+      !> Length of the edge times the curvature of the arc in which it goes on before its first
+      !> node, of its own, and of that behind its last node; 0: none
+      real(wp) :: bend(-1:1) = 0.0_wp
+   end type edge_round_t
+
    include "../dgrad/emcon_dgrad0_plane.inc"
 
    !> The gap for one configuration, and the projection `xi` on the edge (0..1 inside).
-   pure subroutine nts_gap_value(x, before, after, rounding, gap, xi, goes_around)
+   pure subroutine nts_gap_value(x, before, after, rounding, gap, xi, round)
       real(wp), intent(in) :: x(:, :)            !! (2, 3 to 5)
       integer, intent(in) :: before, after       !! as in `nts_gap`
       real(wp), intent(in) :: rounding(2, 2)     !! as in `nts_gap`
       real(wp), intent(out) :: gap               !! [L]
       real(wp), intent(out) :: xi                !! on the line of the edge, 0 to 1 within it
-      logical, intent(in), optional :: goes_around   !! as in `nts_gap`
+      type(edge_round_t), intent(in), optional :: round   !! none: nothing is
       type(difference_t) :: edge(-1:1), node(0:1)
       type(dg_t) :: value
-      logical :: is_round
+      type(edge_round_t) :: curves
 
-      is_round = .false.
-      if (present(goes_around)) is_round = goes_around
+      if (present(round)) curves = round
       if (before > 0) edge(-1) = difference(first, before, x)
       edge(0) = difference(last, first, x)
       if (after > 0) edge(1) = difference(after, last, x)
       node = [difference(slave, first, x), difference(slave, last, x)]
-      value = bent_gap(edge, node, [before, after] > 0, rounding, is_round)
+      value = bent_gap(edge, node, [before, after] > 0, rounding, curves)
       gap = value%f
       value = dg_dot(node(0), edge(0))/dg_dot(edge(0), edge(0))
       xi = value%f

@@ -5,7 +5,7 @@ module emcon_interactions
    implicit none
    private
    public :: contact_pair_t, contact_options_t, contact_damping_t, interaction_t, adjustment_t
-   public :: pair_has_order, pair_holds_nodes, pair_may_exchange
+   public :: pair_has_order, pair_holds_nodes, pair_may_exchange, pair_is_reverse_of, pair_of_one
    public :: formulation_nts, formulation_segment, formulation_mortar, formulation_user
    public :: integration_segments, integration_elements
    public :: multiplier_standard, multiplier_dual
@@ -90,6 +90,24 @@ contains
 
       has_order = .not. (pair%both_sides .or. pair%slave == pair%master)
    end function pair_has_order
+
+   !> Have two pairs the same surfaces, in turn?
+   elemental logical function pair_is_reverse_of(other, pair) result(is_reverse_of)
+      type(contact_pair_t), intent(in) :: other, pair
+
+      is_reverse_of = other%slave == pair%master .and. other%master == pair%slave
+   end function pair_is_reverse_of
+
+   !> The pair that holds the nodes of its slave alone, without the other half.
+   pure type(contact_pair_t) function pair_of_one(pair)
+      type(contact_pair_t), intent(in) :: pair
+
+      pair_of_one = pair
+      pair_of_one%both_sides = .false.
+      pair_of_one%is_reverse = .false.
+      pair_of_one%may_choose = .false.
+      pair_of_one%is_guarded = .false.
+   end function pair_of_one
 
    !> Does the deck leave it open which one that is? What is adjusted is the slave.
    elemental logical function pair_may_exchange(pair) result(may_exchange)

@@ -7,7 +7,8 @@ module emcon_rigid_bodies
    use emcon_origin, only : origin_t
    implicit none
    private
-   public :: rigid_body_t, rigid_far_node, rigid_frame_choose, rigid_weights
+   public :: rigid_body_t, rigid_far_node, rigid_frame_choose, rigid_numbers, &
+      rigid_weights
 
    type :: rigid_body_t
       type(origin_t) :: origin
@@ -87,6 +88,18 @@ contains
          return
       end do
    end function rigid_far_node
+
+   !> Which of the rigid bodies each node belongs to; 0: none.
+   pure function rigid_numbers(rigid, n_node) result(number)
+      type(rigid_body_t), intent(in) :: rigid(:)
+      integer, intent(in) :: n_node                  !! of the scene
+      integer :: number(n_node), b
+
+      number = 0
+      do b = 1, size(rigid)
+         number(rigid(b)%node) = b
+      end do
+   end function rigid_numbers
 
    !> The affine combination of the nodes of a frame that a place is; the weights sum up to 1.
    pure subroutine rigid_weights(frame, place, weight)

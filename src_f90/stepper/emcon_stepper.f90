@@ -8,6 +8,7 @@ module emcon_stepper
    use emcon_deck_user_scheme, only : take_user_schemes
    use emcon_deck_source, only : deck_open, deck_open_text, deck_source_t, passage_t
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
+   use emcon_discs_plane, only : discs_prepare
    use emcon_errors, only : err_input, err_interrupt, error_t, raise
    use emcon_host, only : host_t
    use emcon_host_check, only : host_check_scene
@@ -144,6 +145,7 @@ contains
       if (.not. (allocated(error) &
          .or. self%scene%host%is_whole)) call host_check_scene(self%host, self%scene, error)
       if (allocated(error)) return
+      call discs_prepare(self%scene, self%notes)
       call ties_prepare(self%scene, self%notes, error)
       if (.not. (allocated(error) .or. self%scene%host%is_whole)) call prepare_contact(self, error)
       if (allocated(error)) return

@@ -16,6 +16,7 @@ program main
    use test_bodies, only : collect_bodies
    use test_chain, only : collect_chain
    use test_check, only : collect_check
+   use test_circles, only : collect_circles
 #ifndef EMCON_PERMISSIVE
    use test_diagonal_blocks, only : collect_diagonal_blocks
    use test_kept_factor, only : collect_kept_factor
@@ -308,6 +309,7 @@ program main
    call run("overlap_plane", collect_overlap_plane)
    call run("bodies", collect_bodies)
    call run("arcs", collect_arcs)
+   call run("circles", collect_circles)
    call run("linear_rows", collect_linear_rows)
    call run("loads", collect_loads)
    call run("press_face", collect_press_face)

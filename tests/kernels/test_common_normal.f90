@@ -5,7 +5,7 @@ module test_common_normal
    use emcon_common_normal_plane, only : is_pushed_aside
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_nts_stencil, only : polygon_stencil_t
+   use emcon_polygon_stencil_plane, only : polygon_stencil_t
    implicit none
    private
    public :: collect_common_normal

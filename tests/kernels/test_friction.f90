@@ -13,8 +13,8 @@ module test_friction
    use emcon_kinds, only : wp
    use emcon_lemke, only : lemke_solve
    use emcon_nts_constraint, only : polygon_constraint
-   use emcon_nts_stencil, only : polygon_stencil_t
-   use emcon_roll_plane, only : roll_over
+   use emcon_polygon_stencil_plane, only : polygon_stencil_t
+   use emcon_polygon_slip_plane, only : polygon_slip_over
    use emcon_slip_point, only : slip_add, slip_over, slip_point, slip_point_t
    use emcon_text, only : to_text
    use random_draws, only : draw_random
@@ -388,10 +388,10 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp), parameter :: small = epsilon(1.0_wp)**(1.0_wp/3.0_wp), turn = 0.75_wp
       type(polygon_stencil_t) :: stencil(1)
-      type(condition_t) :: item, other
+      type(condition_t) :: item, other(2)
       real(wp), dimension(2, 4) :: x, du, moved, mid, still
       real(wp) :: worst
-      integer :: i, j
+      integer :: i, j, n
 
       stencil(1)%n = 3
       stencil(1)%node(:3) = [1, 2, 3]
@@ -403,13 +403,13 @@ contains
       do i = 1, 20
          call shake(x, 0.1_wp)
          x = x + reshape([0.4_wp, 0.5_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.1_wp, 0.8_wp], [2, 4])
-         call shake(du, 0.3_wp)
+         call shake(du, 0.15_wp)
          call polygon_constraint(stencil, x, still, du, 0.0_wp, item)
          mid = x + 0.5_wp*du
          associate (t => item%t(:, :4, 1), at => item%node(:4))
             call check_equal(error, [item%n_slave, at], [2, 1, 4, 2, 3], "its nodes first")
-            call check_near(error, [sum(t*du(:, at)), slip_over(slip_point([1, 1, 2, 3], 0.0_wp, &
-               1.0_wp), x, still, du) + roll_over(stencil(1), 1.0_wp, x, still, du)], &
+            call check_near(error, [sum(t*du(:, at)), polygon_slip_over(stencil(1), 1.0_wp, x, &
+               still, du)], &
                item%slip([1, 1]), 4.0_wp*tol, 1.0_wp, "T.D, and its value")
             call check_near(error, [sum(t(1, :)), sum(t(2, :)), &
                sum(t(2, :)*mid(1, at) - t(1, :)*mid(2, at))], [0.0_wp, 0.0_wp, 0.0_wp], &
@@ -418,15 +418,17 @@ contains
          worst = 0.0_wp
          do j = 1, 8
             associate (a => 1 + mod(j - 1, 2), k => 1 + (j - 1)/2)
-               moved = du
-               moved(a, item%node(k)) = du(a, item%node(k)) + small
-               call polygon_constraint(stencil, x, still, moved, 0.0_wp, other)
-               worst = max(worst, abs((other%slip(1) - item%slip(1))/small - item%t1(a, k, 1)), &
-                  maxval(abs(reshape((other%t(:, :4, 1) - item%t(:, :4, 1))/small, [8]) &
-                  - item%ht(:8, j, 1))))
+               do n = 1, 2
+                  moved = du
+                  moved(a, item%node(k)) = du(a, item%node(k)) + (real(n, wp) - 1.5_wp)*small
+                  call polygon_constraint(stencil, x, still, moved, 0.0_wp, other(n))
+               end do
+               worst = max(worst, abs((other(2)%slip(1) - other(1)%slip(1))/small &
+                  - item%t1(a, k, 1)), maxval(abs(reshape((other(2)%t(:, :4, 1) &
+                  - other(1)%t(:, :4, 1))/small, [8]) - item%ht(:8, j, 1))))
             end associate
          end do
-         call check_true(error, worst < 100.0_wp*small, "differences: " // to_text(worst))
+         call check_true(error, worst < small, "differences: " // to_text(worst))
          if (allocated(error)) return
       end do
       x = reshape([0.5_wp, 0.5_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.5_wp, 2.5_wp], [2, 4])

@@ -8,7 +8,7 @@ module test_nts_choice
    use emcon_kinds, only : wp
    use emcon_nts, only : nts_init, nts_nearest, nts_t
    use emcon_nts_choice, only : choice_covers
-   use emcon_nts_stencil, only : edge_distance
+   use emcon_polygon_stencil_plane, only : edge_distance
    use emcon_scene, only : scene_t
    use emcon_text, only : to_text
    use small_scenes, only : add_block, add_surface, block_t, bottom, left, make_block, &

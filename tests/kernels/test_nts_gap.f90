@@ -5,7 +5,7 @@ module test_nts_gap
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_nts_gap, only : nts_gap_of => nts_gap
-   use emcon_nts_gap_value, only : nearly_flat => flat, nts_gap_value
+   use emcon_nts_gap_value, only : edge_round_t, nearly_flat => flat, nts_gap_value
    use emcon_text, only : to_text
    use nodal_numbers, only : by_nodes, nodal_t
    use random_draws, only : draw_random
@@ -48,13 +48,13 @@ contains
    end subroutine collect_nts_gap
 
    !> The gap over a step with its derivatives by all five nodes.
-   pure type(nodal_t) function nts_gap(x0, dx, before, after, rounding, goes_around)
+   pure type(nodal_t) function nts_gap(x0, dx, before, after, rounding, round)
       real(wp), intent(in) :: x0(:, :), dx(:, :), rounding(2, 2)
       integer, intent(in) :: before, after
-      logical, intent(in), optional :: goes_around
+      type(edge_round_t), intent(in), optional :: round
       type(dg_t) :: a
 
-      a = nts_gap_of(x0, dx, before, after, rounding, goes_around)
+      a = nts_gap_of(x0, dx, before, after, rounding, round)
       nts_gap = by_nodes(5, [a%f0, a%f1, a%df], a%g, a%c, a%h)
    end function nts_gap
 
@@ -432,10 +432,10 @@ contains
          x0(2, 4:5) = x0(2, 4:5) - [0.9_wp, 0.7_wp]
          call draw_random(x0(:, 1))
          x0(:, 1) = [-0.5_wp, 0.4_wp] + [2.0_wp, 0.3_wp]*x0(:, 1)
-         a = nts_gap(x0, dx, 4, 5, round, goes_around=.true.)
-         call nts_gap_value(x0, 4, 5, round, gap(1), xi, goes_around=.true.)
+         a = nts_gap(x0, dx, 4, 5, round, edge_round_t(.true.))
+         call nts_gap_value(x0, 4, 5, round, gap(1), xi, edge_round_t(.true.))
          if (abs(xi - 0.5_wp) > 0.6_wp) n_beyond = n_beyond + 1
-         call nts_gap_value(x0 + dx, 4, 5, round, gap(2), xi, goes_around=.true.)
+         call nts_gap_value(x0 + dx, 4, 5, round, gap(2), xi, edge_round_t(.true.))
          call check_near(error, [a%f0, a%f1], gap, tol, 2.0_wp, "values")
          call check_near(error, gap, [distance(x0), distance(x0 + dx)], tol, 4.0_wp, "distances")
          g = reshape(a%g, [2, 5])
@@ -450,8 +450,8 @@ contains
             k = (j + 1)/2
             way = 0.0_wp
             way(j - 2*k + 2, k) = step
-            up = nts_gap(x0, dx + way, 4, 5, round, goes_around=.true.)
-            down = nts_gap(x0, dx - way, 4, 5, round, goes_around=.true.)
+            up = nts_gap(x0, dx + way, 4, 5, round, edge_round_t(.true.))
+            down = nts_gap(x0, dx - way, 4, 5, round, edge_round_t(.true.))
             ! The curvature jumps where the corner begins to count.
             call check_near(error, a%c(j), (up%f1 - down%f1)/(2.0_wp*step), 16.0_wp*step, 1.0_wp, &
                "gradient")

@@ -4,8 +4,9 @@ module test_nts_stencil
    use emcon_chain_plane, only : chain_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_nts_stencil, only : edge_distance, edge_of_sector, is_outside, polygon_stencil, &
-      polygon_stencil_t, stencil_length
+   use emcon_nts_stencil, only : stencil_length
+   use emcon_polygon_stencil_plane, only : corner_widths, edge_distance, edge_of_sector, &
+      is_outside, polygon_stencil, polygon_stencil_t
    use emcon_text, only : to_text
    use random_draws, only : draw_random
    use small_scenes, only : shake
@@ -102,7 +103,8 @@ contains
             place(:, 5) = place(:, 2) + scales(k)
             call place_nodes(place, x, u)
             chain%size = scales(k)*[1.5_wp, 0.5_wp, 0.25_wp]
-            call polygon_stencil(stencil, chain, 5, 2, [0.5_wp, 2.0_wp], x, u)
+            call polygon_stencil(stencil, chain, 5, 2, x, u)
+            stencil%rounding = corner_widths(chain, 2, [0.5_wp, 2.0_wp])
             call check_equal(error, stencil%node(:stencil%n), [5, 2, 3, pack([1, 4], is_there)], &
                "nodes of case " // to_text(i))
             call check_equal(error, [stencil%before, stencil%after], [merge(4, 0, is_there(1)), &

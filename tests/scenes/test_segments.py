@@ -44,18 +44,33 @@ def test_a_block_rebounds_from_a_line(formulation, initiation, tmp_path):
     assert np.abs(px - px[0]).max() < 1e-12
 
 
-def test_a_disc_in_a_bowl_of_arcs(tmp_path):
-    """Two arcs of a quarter each, smoothed: the nodes stay within the circle to 1e-6 of it."""
+@pytest.mark.parametrize(("smoothing", "off"), [("HERMITE", 1e-6), (None, 1e-12)])
+def test_a_disc_in_a_bowl_of_arcs(smoothing, off, tmp_path):
+    """Two arcs of a quarter each: the nodes stay within the circle, smoothed to 1e-6 of it."""
     scene = Scene(0.02, 1.0, gravity=10.0)
     scene.disc("BODY", (0.35, -0.606), 0.3, (6, 2), stiffness=3000.0)
     deck = with_profile(scene, "START, -1., 0.\nCIRCL, 0., -1., 0., 0.\nCIRCL, 1., 0., 0., 0.")
-    run = run_deck(deck, tmp_path, formulation="NODE TO SURFACE", initiation="MASSLESS",
-                   smoothing="HERMITE")
+    more = {"smoothing": smoothing} if smoothing else {}
+    run = run_deck(deck, tmp_path, formulation="NODE TO SURFACE", initiation="MASSLESS", **more)
     assert (run.history["active"] > 0).mean() > 0.5
     assert balances(run.history) < 1e-12
     n = len(scene.part["BODY"].node)
     r = np.linalg.norm(places(run)[:, :n], axis=2).max()
-    assert 1 - 1e-3 < r < 1 + 1e-6
+    assert 1 - 1e-3 < r < 1 + off
+
+
+def test_a_block_on_a_roller_of_arcs(tmp_path):
+    """It falls on the top of a half circle: nodes that touch are on it, none is in it."""
+    scene = Scene(0.01, 1.0, gravity=10.0)
+    scene.block("BODY", (-0.53, 0.02), (1.0, 0.5), (9, 3), stiffness=1000.0)
+    deck = with_profile(scene, "START, -2., -2.\nCIRCL, 0., 0., 0., -2.\nCIRCL, 2., -2., 0., -2.")
+    run = run_deck(deck, tmp_path, formulation="NODE TO SURFACE", initiation="MASSLESS")
+    assert balances(run.history) < 1e-12
+    assert (run.history["active"] > 1).any()
+    n = len(scene.part["BODY"].node)
+    away = np.linalg.norm(places(run)[:, :n] - [0.0, -2.0], axis=2) - 2.0
+    assert away.min() > -1e-12
+    assert ((away < 1e-12).sum(axis=1) == run.history["active"]).all()
 
 
 def test_a_die_of_three_lines_is_pressed_in(tmp_path):

@@ -1,6 +1,7 @@
 """Rigid polygons that are thrown along a floor or down a slope: they slide, then roll.
 
-The floor lies along x; on a slope gravity leans. What a run is judged by is read from its field file.
+Of many corners they stay polygons, as SIDES=BOTH is asked. The floor lies along x; on a slope gravity
+leans. What a run is judged by is read from its field file.
 """
 
 import dataclasses
@@ -43,7 +44,7 @@ P
 *SURFACE INTERACTION, NAME=I
 *FRICTION
 {mu!r}
-*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE
+*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE, SIDES=BOTH
 SP, SF
 *BOUNDARY
 1001, 1, 2
