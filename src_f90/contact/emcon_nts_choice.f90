@@ -11,7 +11,8 @@ module emcon_nts_choice
    use emcon_corner_tops_plane, only : corner_tops
    use emcon_errors, only : error_t
    use emcon_facing_plane, only : facing_allows
-   use emcon_interactions, only : contact_pair_t, smoothing_hermite, smoothing_none
+   use emcon_interactions, only : contact_pair_t, formulation_mortar, smoothing_hermite, &
+      smoothing_none
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
    use emcon_nts_stencil, only : smooth_stencil, smooth_stencil_t
@@ -82,7 +83,8 @@ contains
       if (allocated(error)) return
       call chain_join(self%slave, scene)
       call chain_join(self%master, scene)
-      if (size(scene%rigid) > 0 .and. .not. pair%slack > 0.0_wp) then
+      if (size(scene%rigid) > 0 .and. pair%formulation /= formulation_mortar &
+         .and. .not. pair%slack > 0.0_wp) then
          allocate(self%circles)
          call circles_find(self%circles, self%master, scene%x, rigid_numbers(scene%rigid, &
             size(scene%x, 2)))

@@ -23,6 +23,8 @@ module emcon_start_gaps
       integer, allocatable :: place(:)           !! (n) index into the nodes of the slave
       integer, allocatable :: facet(:)           !! (n) nearest of the master; 0: none near
       type(gap_state_t), allocatable :: state(:) !! (n) as last measured
+      !> (n) what the facet is off the circle that takes its place: nodes may be behind by it [L]
+      real(wp), allocatable :: doubt(:)
    contains
       procedure :: is_connected
       procedure(nearest_interface), deferred :: nearest

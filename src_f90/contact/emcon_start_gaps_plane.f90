@@ -1,6 +1,7 @@
 !> Gaps of nodes over edges before the first step, as contact node to segment measures them.
 module emcon_start_gaps_plane
    use emcon_chain_plane, only : chain_corners, chain_crossing, next
+   use emcon_circles_plane, only : off_circles
    use emcon_constraint, only : condition_t
    use emcon_errors, only : error_t
    use emcon_interactions, only : contact_options_t, contact_pair_t
@@ -53,6 +54,7 @@ contains
       self%place = self%nts%chain_node
       self%facet = self%nts%edge
       self%state = self%nts%state
+      allocate(self%doubt(self%n), source=0.0_wp)
       call midside_init(midside, scene, [pair%slave, pair%master])
       self%u = scene%u0
       if (midside%n > 0) self%u = midside_points(midside, scene%u0)
@@ -78,6 +80,8 @@ contains
       call self%nts%measure_points(scene%x, self%u, self%still)
       self%facet = self%nts%edge
       self%state = self%nts%state
+      if (allocated(self%nts%circles)) self%doubt = off_circles(self%nts%circles, &
+         self%nts%master, self%facet)
    end subroutine measure
 
    pure subroutine offset_off(self, i, scene, offset, is_last)

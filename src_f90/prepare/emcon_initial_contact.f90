@@ -338,7 +338,7 @@ contains
       character(len=:), allocatable :: found
 
       call contact%measure(scene)
-      limit = merge(noise, huge(noise), contact%facet > 0)
+      limit = merge(noise + contact%doubt, huge(noise), contact%facet > 0)
       if (contact%is_self) then
          do i = 1, contact%n
             if (contact%facet(i) == 0) cycle

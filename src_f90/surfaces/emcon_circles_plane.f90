@@ -8,7 +8,7 @@ module emcon_circles_plane
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: circles_t, circles_find, circle_whole
+   public :: circles_t, circles_find, circle_whole, off_circles
 
    !> Turns from edge to edge up to this are those of a circle, sharper ones corners: a polygon of
    !> 60 edges is a circle (sine; with room for the rounding of coordinates).
@@ -152,7 +152,7 @@ contains
          a = chord(chain, x, run(k))
          if (.not. all(abs([norm2(x(:, chain%facet(1, run(k))) - centre), &
             norm2(x(:, chain%facet(2, run(k))) - centre)] - radius) &
-            <= off*dot_product(a, a)/(8.0_wp*radius))) return
+            <= off*off_circle(1.0_wp/radius, norm2(a)))) return
       end do
       is_on = .true.
    end function is_on
@@ -192,6 +192,25 @@ contains
 
       chord = x(:, chain%facet(2, e)) - x(:, chain%facet(1, e))
    end function chord
+
+   !> How far edges are off their circles in the middle; 0 where there is none [L].
+   elemental real(wp) function off_circle(curvature, length)
+      real(wp), intent(in) :: curvature          !! [1/L]
+      real(wp), intent(in) :: length             !! of the edge [L]
+
+      off_circle = 0.125_wp*abs(curvature)*length**2
+   end function off_circle
+
+   !> The same of the edges `edge`, 0: none.
+   pure function off_circles(self, chain, edge) result(way)
+      type(circles_t), intent(in) :: self
+      type(chain_t), intent(in) :: chain
+      integer, intent(in) :: edge(:)
+      real(wp) :: way(size(edge))                !! [L]
+
+      way = 0.0_wp
+      where (edge > 0) way = off_circle(self%curvature(max(1, edge)), chain%size(max(1, edge)))
+   end function off_circles
 
    !> Is a whole surface one circle that bulges out? Its centre and radius.
    pure subroutine circle_whole(self, chain, x, is_whole, centre, radius)

@@ -190,3 +190,25 @@ def test_what_stays_a_polygon(n, more, tmp_path):
     bodies = disc(1, (0.0, 1.0), 1.0, "A", n) + profile("START, -3., 0.\nLINE, 9., 0.")
     run = run_deck(deck(bodies, "SA, GROUND", [9001], 0.01, 0.02, more=more), tmp_path)
     assert "rigid circle" not in run.log
+
+
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT"])
+def test_coordinates_of_six_digits_lie_on_an_arc(formulation, tmp_path):
+    """A pad that fits a drum: its nodes are in the drum by roundings, and not refused; what is in by more
+    than an edge of the profile is off its arc is."""
+    def pad(inner):
+        angle = math.radians(60) + math.radians(60)*np.arange(13)/12
+        place = [(r*math.cos(a), r*math.sin(a)) for r in (inner, 2.2) for a in angle[::-1]]
+        node = "".join(f"{k}, {x:.6g}, {y:.6g}\n" for k, (x, y) in enumerate(place, 1))
+        element = "".join(f"{k}, {k}, {k + 1}, {k + 14}, {k + 13}\n" for k in range(1, 13))
+        return (f"*NODE\n{node}*ELEMENT, TYPE=CPE4I, ELSET=A\n{element}*SOLID SECTION, ELSET=A, MATERIAL=M\n"
+                "*SURFACE, NAME=SA\nA, S1\n")
+    drum = profile("START, -2., 0.\nCIRCL, 0., 2., 0., 0.\nCIRCL, 2., 0., 0., 0.")
+    scene = deck(pad(2.0) + drum, "SA, GROUND", [9001], 0.01, 0.1, more=", SIDES=ONE")
+    text = scene.text().replace("TYPE=NODE TO SURFACE", f"TYPE={formulation}")
+    run = run_deck(Deck(text, "pad"), tmp_path/"fits")
+    assert run.verdict["verdict"] == "good" and run.history["active"][-1] > 3
+    low = deck(pad(1.999) + drum, "SA, GROUND", [9001], 0.01, 0.1, more=", SIDES=ONE").text()
+    run = run_deck(Deck(low.replace("TYPE=NODE TO SURFACE", f"TYPE={formulation}"), "pad"),
+                   tmp_path/"does not", code=2)
+    assert "penetrate surface GROUND" in run.errors
