@@ -201,11 +201,11 @@ contains
       off_circle = 0.125_wp*abs(curvature)*length**2
    end function off_circle
 
-   !> The same of the edges `edge`, 0: none.
+   !> The same of some edges.
    pure function off_circles(self, chain, edge) result(way)
       type(circles_t), intent(in) :: self
       type(chain_t), intent(in) :: chain
-      integer, intent(in) :: edge(:)
+      integer, intent(in) :: edge(:)             !! of the chain; 0: none
       real(wp) :: way(size(edge))                !! [L]
 
       way = 0.0_wp
