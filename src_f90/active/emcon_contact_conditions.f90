@@ -83,7 +83,7 @@ contains
             return
          else if (gap%is_arriving .and. self%rules%has_impacts .and. self%rules%may_cut) then
             status = step_too_far
-         else if (self%start%was_active(id) .or. .not. gap%gap0 - allowed(0) &
+         else if (self%start%was_active(id) .or. .not. gap%gap0 - min(allowed(0), 0.0_wp) &
             < -contact%max_penetration_at_start*gap%size) then
             closes = .not. gap%gap1 - allowed(1) >= -merge(0.0_wp, gap_noise, &
                contact%step%is_penalty)*gap%size

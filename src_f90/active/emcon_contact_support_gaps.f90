@@ -71,7 +71,7 @@ contains
             is_meant(first:last) = contact%state%is_near .and. contact%state%is_over &
                .and. .not. contact%state%is_leaving
             is_meant(first:last) = is_meant(first:last) .and. contact%state%gap1 &
-               > contact%state%closed + overclosure(first:last) &
+               > min(contact%state%closed, 0.0_wp) + overclosure(first:last) &
                - contact%max_penetration_at_start*contact%state%size
          end associate
       end do

@@ -2,10 +2,13 @@
 !> the surfaces. Source: docs/theory.md, eqs. (20a) to (20e).
 module emcon_penalty
    use emcon_constraints, only : constraint_index, constraint_set_t
-   use emcon_contact_law, only : contact_law_t, contact_place_t
-   use emcon_contact_law_registry, only : contact_law_of_method
+   use emcon_contact_law, only : contact_law_box_t, contact_law_t, contact_place_t
+   use emcon_contact_law_registry, only : contact_law_in_place, contact_law_of_method
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_interactions, only : pressure_hard, pressure_reach
+   use emcon_gaps, only : pair_measure, pair_search
    use emcon_kinds, only : wp
+   use emcon_motion, only : motion_t
    use emcon_scene, only : scene_t, where_text
    use emcon_steps, only : method_augmented_lagrange, method_penalty, step_is_dynamic, step_t
    use emcon_system, only : system_t
@@ -14,7 +17,7 @@ module emcon_penalty
    implicit none
    private
    public :: penalty_state_t, penalty_begin_step, penalty_forget, penalty_select, penalty_augment, &
-      penalty_stored, penalty_depth, penalty_keep, penalty_owes
+      penalty_start, penalty_stored, penalty_depth, penalty_keep, penalty_owes
 
    !> Solves with multipliers that are given, at most.
    integer, parameter, public :: most_augmentations = 50
@@ -33,7 +36,9 @@ module emcon_penalty
       integer :: n_augmentation = 0              !! in the last increment
       real(wp) :: left = huge(1.0_wp)            !! of the gaps before the last one, by the edge
       real(wp) :: raised = 1.0_wp                !! `stiffness` is to be so much larger in the step
-      class(contact_law_t), allocatable :: law   !! of all contacts, where it gives way
+      class(contact_law_t), allocatable :: law   !! of contacts, where these give way
+      type(contact_law_box_t), allocatable :: own(:)   !! (n_contact) of those that have their own
+      logical :: is_meant = .false.              !! all have, as the deck gives them
       real(wp), allocatable :: stiffness(:)      !! (n_constraint) of contacts [M/T^2]
       real(wp), allocatable :: area(:)           !! (n_constraint) of contacts [L^2]
       real(wp), allocatable :: edge(:)           !! (n_constraint) of the slave surface [L]
@@ -59,6 +64,7 @@ contains
       do k = 1, size(system%contact)
          system%contact(k)%contact%step%has_compliance = self%is_on
          system%contact(k)%contact%step%is_penalty = .false.
+         system%contact(k)%contact%step%engages = 0.0_wp
       end do
       if (.not. self%is_on) return
       self%tolerance = step%contact%penalty%tolerance
@@ -67,6 +73,8 @@ contains
       else
          call contact_law_of_method(step%contact%method, self%law)
       end if
+      allocate(self%own(size(system%contact)))
+      self%is_meant = .not. self%augments
       allocate(self%closure(system%n_constraint), source=1.0_wp)
       allocate(self%stiffness(system%n_constraint), self%area(system%n_constraint), &
          self%edge(system%n_constraint), source=0.0_wp)
@@ -85,7 +93,7 @@ contains
 
    !> The stiffness of contact `k`: one pressure by penetration for all of its nodes, that of the
    !> deck, or the mean of `inner` at its slave nodes by their area, or else at the master's. Where
-   !> nodes of both sides push each side has half of it.
+   !> nodes of both sides push each side has half of it. Pressures of its surfaces take its place.
    subroutine set_contact(self, system, scene, step, k, inner, error)
       type(penalty_state_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -108,6 +116,16 @@ contains
                "by; name its elements and faces, or use TYPE=NULL SPACE")
             return
          end if
+         self%area(before + 1:before + size(area)) = area*contact%area_factor
+         ! Nodes at the ends of a surface have half of an edge.
+         self%edge(before + 1:before + size(area)) = maxval(area/contact%thickness)
+         contact%step%is_penalty = .not. self%augments .and. step_is_dynamic(step)
+         call take_own_law(self, system, scene, k)
+         if (allocated(self%own(k)%law)) then
+            if (k <= system%n_pair) call note_add(system%notes, "contact of pair " // to_text(k) &
+               // " gives way by the PRESSURE-OVERCLOSURE of its surfaces")
+            return
+         end if
          by_area = given
          if (.not. given > 0.0_wp) by_area = factor*sum(inner(contact%node))/sum(area)
          if (.not. by_area > 0.0_wp) by_area = factor &
@@ -119,15 +137,67 @@ contains
                // "pair: give its STIFFNESS, pressure by penetration")
             return
          end if
-         contact%step%is_penalty = .not. self%augments .and. step_is_dynamic(step)
-         self%area(before + 1:before + size(area)) = area*contact%area_factor
          self%stiffness(before + 1:before + size(area)) = area*contact%area_factor*by_area
-         ! Nodes at the ends of a surface have half of an edge.
-         self%edge(before + 1:before + size(area)) = maxval(area/contact%thickness)
          if (k <= system%n_pair) call note_add(system%notes, "contact of pair " // to_text(k) // &
             " gives way by a stiffness of " // to_text(by_area, 9) // ", pressure by penetration")
       end associate
    end subroutine set_contact
+
+   !> The law of the surfaces of contact `k`, if they have one. Guards push at the same pressures,
+   !> from where they act on.
+   subroutine take_own_law(self, system, scene, k)
+      type(penalty_state_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: k
+
+      associate (surface => scene%pair(abs(system%contact(k)%of_pair))%interaction)
+         if (self%augments .or. surface%pressure%kind == pressure_hard) then
+            self%is_meant = .false.
+            return
+         end if
+         call contact_law_in_place(surface, method_penalty, self%own(k)%law)
+         if (k <= system%n_pair) system%contact(k)%contact%step%engages = &
+            pressure_reach(surface%pressure)
+      end associate
+   end subroutine take_own_law
+
+   !> What is closed as the analysis begins, and what it stores there.
+   subroutine penalty_start(self, system, motion, closure, energy)
+      type(penalty_state_t), intent(in) :: self
+      type(system_t), intent(inout) :: system
+      type(motion_t), intent(in) :: motion       !! none, at the start
+      real(wp), intent(inout) :: closure(:)      !! (n_constraint) those of others stand [L]
+      real(wp), intent(out) :: energy            !! [M L^2/T^2]
+      class(contact_law_t), allocatable :: law
+      type(contact_place_t) :: place
+      integer :: i, id, k
+
+      energy = 0.0_wp
+      if (.not. allocated(self%own)) return
+      do k = 1, system%n_pair
+         if (.not. allocated(self%own(k)%law)) cycle
+         call pair_search(system, k, motion)
+         call pair_measure(system, k, motion%x, motion%u0, motion%du)
+         associate (contact => system%contact(k)%contact)
+            do i = 1, contact%n_constraint
+               id = system%first_constraint(k) + i
+               associate (gap => contact%state(i))
+                  if (.not. (gap%is_near .and. gap%is_over)) cycle
+                  if (gap%gap0 < -contact%max_penetration_at_start*gap%size) cycle
+                  closure(id) = min(gap%gap0 - gap%closed, 0.0_wp)*contact%share(i)
+               end associate
+               if (.not. closure(id) < 0.0_wp) cycle
+               place = contact_place_t(self%area(id), self%stiffness(id), contact%share(i), &
+                  closure(id))
+               if (allocated(law)) deallocate(law)
+               allocate(law, source=self%own(k)%law)
+               call law%begin(place)
+               energy = energy + law%stored()
+            end do
+         end associate
+      end do
+   end subroutine penalty_start
 
    !> The stiffness at the nodes of the other side of contact `k`, if these are some contact's: of
    !> its pair, or of that the other way round.
@@ -169,11 +239,26 @@ contains
             *self%stiffness(set%id(k)), system%contact(pair)%contact%share(i))
          if (set%penalty%is_stored .and. .not. self%is_at_ends) place%closure = &
             self%closure(set%id(k))
-         allocate(set%law(k)%row, source=self%law)
+         call give_law(self, pair, set%law(k)%row)
          call set%law(k)%row%begin(place)
          call set%law(k)%row%push_on(set%lam(k))
       end do
    end subroutine penalty_select
+
+   !> A copy of the law of contact `k`.
+   subroutine give_law(self, k, law)
+      type(penalty_state_t), intent(in) :: self
+      integer, intent(in) :: k
+      class(contact_law_t), allocatable, intent(out) :: law
+
+      if (allocated(self%own)) then
+         if (allocated(self%own(k)%law)) then
+            allocate(law, source=self%own(k)%law)
+            return
+         end if
+      end if
+      allocate(law, source=self%law)
+   end subroutine give_law
 
    !> A step begins: nothing was pushed back in it yet.
    pure subroutine penalty_forget(self)
@@ -257,7 +342,7 @@ contains
          edge = set%item(k)%size
          if (self%edge(set%id(k)) > 0.0_wp .and. .not. self%augments) edge = min(edge, &
             self%edge(set%id(k)))
-         depth = max(depth, -set%penalty%left(k)/edge)
+         depth = max(depth, (-set%penalty%left(k) - set%law(k)%row%reach)/edge)
       end do
    end function penalty_depth
 

@@ -48,6 +48,7 @@ module emcon_contact
       logical :: is_static = .false.                  !! it seeks a state of rest
       logical :: has_compliance = .false.             !! by a penalty, or augmented
       logical :: is_penalty = .false.                 !! it stores what it takes: a penalty
+      real(wp) :: engages = 0.0_wp                    !! the gap at which that begins, if > 0 [L]
    end type contact_step_t
 
    type, abstract, extends(constraint_t) :: contact_t
@@ -264,6 +265,7 @@ contains
          call self%measure_points(x, midside_points(self%midside, u0), &
             midside_points(self%midside, du))
       end if
+      if (self%step%engages > 0.0_wp) self%state%closed = self%step%engages
    end subroutine measure
 
    !> The constraints `wanted` with their derivatives, as `constraint_t` has it; `target` are the

@@ -14,7 +14,7 @@ module emcon_mortar
    use emcon_integrated_gap, only : integrated_gap_init, integrated_gap_sagittas, &
       integrated_gap_slips, integrated_gap_t
    use emcon_interactions, only : contact_options_t, contact_pair_t, integration_elements, &
-      multiplier_dual, normal_nodal, smoothing_hermite
+      interaction_reach, multiplier_dual, normal_nodal, smoothing_hermite
    use emcon_kinds, only : wp
    use emcon_mortar_choice, only : pair_append, pair_comes_near, pair_cut_corners, pair_is_meant, &
       pairs_drop_far, pairs_seen
@@ -73,7 +73,7 @@ contains
       call integrated_gap_init(self, scene, pair, error)
       if (allocated(error)) return
       call near_list_init(self%near, self%slave%facet, self%master%facet, scene%x, scene%u0, &
-         maxval(self%slave%size) + (self%offset + pair%interaction%damping%clearance))
+         maxval(self%slave%size) + (self%offset + interaction_reach(pair%interaction)))
       self%max_gap_on_entry = maxval(self%slave%size)
       allocate(self%start(self%slave%n_facet + 1), source=1)
       allocate(self%pair(0))

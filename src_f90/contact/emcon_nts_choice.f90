@@ -11,8 +11,8 @@ module emcon_nts_choice
    use emcon_corner_tops_plane, only : corner_tops
    use emcon_errors, only : error_t
    use emcon_facing_plane, only : facing_allows
-   use emcon_interactions, only : contact_pair_t, formulation_mortar, smoothing_hermite, &
-      smoothing_none
+   use emcon_interactions, only : contact_pair_t, formulation_mortar, interaction_reach, &
+      smoothing_hermite, smoothing_none
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
    use emcon_nts_stencil, only : smooth_stencil, smooth_stencil_t
@@ -116,7 +116,7 @@ contains
       associate (n => self%n_constraint/self%rule%n_class)
          self%near_item = [(1 + mod(i, n), i = 0, self%n_constraint - 1)]
          call near_list_init(self%near, reshape(self%node(:n), [1, n]), self%master%facet, &
-            scene%x, scene%u0, self%offset + pair%interaction%damping%clearance)
+            scene%x, scene%u0, self%offset + interaction_reach(pair%interaction))
       end associate
    end subroutine choice_init
 

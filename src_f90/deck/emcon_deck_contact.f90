@@ -3,16 +3,18 @@ module emcon_deck_contact
    use emcon_deck_contact_damping, only : read_contact_damping
    use emcon_deck_contact_settings, only : read_pair_initiation
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, &
-      next_line, refuse_lines
+      next_line
    use emcon_deck_friction, only : read_friction
    use emcon_deck_named, only : set_names
    use emcon_deck_options, only : check_option
+   use emcon_deck_pressure, only : read_behavior
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, n_lines, need_name, &
       note_idle, option_name, option_number, option_word, reader_t, refuse_option
    use emcon_deck_surfaces, only : get_surfaces, need_facets
    use emcon_diagnostics, only : add_error, quoted, suggestion
    use emcon_interactions, only : adjustment_t, contact_damping_t, contact_pair_t, &
-      formulation_user, formulation_mortar, formulation_nts, formulation_segment
+      formulation_user, formulation_mortar, formulation_nts, formulation_segment, pressure_hard, &
+      pressure_t, pressure_tied
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_options, only : option_code, option_default, option_words
@@ -25,8 +27,7 @@ module emcon_deck_contact
 
 contains
 
-   !> The surface interactions: names, pads, restitution, friction and damping. All mean hard
-   !> contact.
+   !> The surface interactions: names, pads, restitution, friction, damping and pressures.
    subroutine read_interactions(reader)
       type(reader_t), intent(inout) :: reader
       character(len=:), allocatable :: name
@@ -65,7 +66,8 @@ contains
                      // "left of the velocity along the surface of what sticks", 0.0_wp, 1.0_wp, &
                      reader%interaction(max(1, n))%rebound)
                else
-                  call check_behavior(reader, card)
+                  call read_behavior(reader, card, reader%interaction(max(1, n))%pressure)
+                  if (n == 0) reader%interaction(1)%pressure = pressure_t()
                end if
             end select
          end associate
@@ -92,21 +94,6 @@ contains
          "that of the sections counts")
       if (next_line(reader, data)) call data_error(reader, data, "is the second data line")
    end subroutine read_thickness
-
-   subroutine check_behavior(reader, card)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      character(len=*), parameter :: name = "PRESSURE-OVERCLOSURE"
-      character(len=:), allocatable :: word
-
-      if (option_name(card, name) == "TIED") then
-         call refuse_option(reader, card, name, "HARD", "surfaces are tied by *TIE")
-         return
-      end if
-      call option_word(reader, card, name, "HARD", word, "LINEAR, EXPONENTIAL, TABULAR, " // &
-         "SCALE FACTOR", "contact is enforced exactly, without penalty")
-      if (word == "HARD") call refuse_lines(reader, card)
-   end subroutine check_behavior
 
    !> All *CONTACT PAIR cards.
    subroutine read_pairs(reader, scene)
@@ -320,8 +307,35 @@ contains
          pair(i)%is_guarded = of_card%is_guarded
          pair(i)%interaction = of_card%interaction
          pair(i)%initiation = of_card%initiation
+         if (has_option(card, "TIED")) pair(i)%interaction%pressure%kind = pressure_tied
+         call suit_pressure(pair(i))
+         if (pair(i)%interaction%pressure%kind == pressure_tied) call check_tied(reader, card, &
+            scene, pair(i))
       end do
    end subroutine read_pair_options
+
+   !> A pressure by the overclosure acts on the nodes of the slave that the deck names, whose area
+   !> it is by, unless it asks for both sides.
+   pure subroutine suit_pressure(pair)
+      type(contact_pair_t), intent(inout) :: pair
+
+      if (pair%interaction%pressure%kind == pressure_hard) return
+      pair%is_guarded = .false.
+      if (pair%may_choose) pair%both_sides = .false.
+      pair%may_choose = .false.
+   end subroutine suit_pressure
+
+   !> What is tied has faces on two surfaces.
+   subroutine check_tied(reader, card, scene, pair)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+
+      if (min(pair%slave, pair%master) == 0) return
+      if (scene%surface(pair%slave)%is_nodal .or. pair%slave == pair%master) call card_error( &
+         reader, card, "its surfaces are tied, and ties join the element faces of two surfaces")
+   end subroutine check_tied
 
    !> What contact of a program has, and what it does not know of.
    subroutine suit_user(reader, card, of_card)

@@ -2,7 +2,7 @@
 module emcon_deck_explicit
    use emcon_deck_reader, only : card_error, has_option, option_name, reader_t
    use emcon_diagnostics, only : add_error
-   use emcon_interactions, only : contact_pair_t
+   use emcon_interactions, only : contact_pair_t, pressure_exponential
    use emcon_kinds, only : wp
    use emcon_solver_registry, only : solver_default
    use emcon_steps, only : initiation_admissible, initiation_massless, method_null_space, &
@@ -83,6 +83,10 @@ contains
                to_text(k) // " is explicit: what rebounds there is the bodies alone")
             cycle
          end if
+         i = findloc(pair%interaction%pressure%kind == pressure_exponential, .true., 1)
+         if (i > 0) call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: the pressure of " &
+            // "its surface interaction is EXPONENTIAL, which has no largest stiffness, but step " &
+            // to_text(k) // " is explicit; use LINEAR or TABULAR")
          step(k)%contact%initiation = initiation_admissible
          if (step(k)%contact%method /= method_penalty) step(k)%contact%method = &
             method_null_space

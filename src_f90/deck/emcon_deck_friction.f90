@@ -4,7 +4,7 @@ module emcon_deck_friction
       refuse_lines
    use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
    use emcon_diagnostics, only : add_error, add_warning
-   use emcon_interactions, only : contact_pair_t, smoothing_hermite
+   use emcon_interactions, only : contact_pair_t, pressure_hard, smoothing_hermite
    use emcon_kinds, only : wp
    use emcon_massless_surfaces, only : pair_keeps_mass
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
@@ -145,7 +145,10 @@ contains
          call refuse(reader, pair, "*CONTACT INITIATION, TYPE=VELOCITY UPDATE of step " // &
             to_text(k) // ": jumps of velocities have no friction")
       end if
-      if (.not. any(step%contact%method == [method_null_space, method_saddle_point])) then
+      if (pair%interaction%pressure%kind /= pressure_hard) then
+         call refuse(reader, pair, "a PRESSURE-OVERCLOSURE by which it gives way; leave out " // &
+            "either of them")
+      else if (.not. any(step%contact%method == [method_null_space, method_saddle_point])) then
          call refuse(reader, pair, "contact that gives way, in step " // to_text(k) // "; use " // &
             "*CONSTRAINT METHOD, TYPE=NULL SPACE")
       end if

@@ -12,7 +12,7 @@ module emcon_deck_general_contact
    use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
    use emcon_deck_surfaces, only : need_facets, surface_names
    use emcon_diagnostics, only : quoted, suggestion
-   use emcon_interactions, only : contact_pair_t, formulation_nts
+   use emcon_interactions, only : contact_pair_t, formulation_nts, pressure_hard
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_name_index, only : name_index_find, name_index_put
@@ -267,6 +267,8 @@ contains
                call refuse(given%friction > 0.0_wp, "*FRICTION, which is of pairs only", "is of")
                call refuse(given%damping%coefficient > 0.0_wp, "*CONTACT DAMPING, which is of " // &
                   "pairs only", "is of")
+               call refuse(given%pressure%kind /= pressure_hard, "a PRESSURE-OVERCLOSURE, " // &
+                  "which is by the area of a slave surface", "is of")
                call refuse(given%offset > 0.0_wp, "a PAD THICKNESS, which has no meaning " // &
                   "where surfaces may be in contact with themselves", "keeps apart")
             end associate

@@ -78,7 +78,7 @@ module emcon_deck_keywords
          // "!USER,!DEPVAR:0,!PROPERTIES:0,!DEPENDENCIES:0"), &
       keyword_t("CONTACT DAMPING", in_model, "DEFINITION=,TANGENTFRACTION="), &
       keyword_t("CONTACT PAIR", in_model, "INTERACTION=,TYPE=,SIDES=,GUARD=," &
-         // "ADJUST=,INITIATION=,!SMALLSLIDING,!TIED"), &
+         // "ADJUST=,INITIATION=,~SMALLSLIDING,TIED"), &
       keyword_t("CONTACT", in_model, has_data=.false.), &
       keyword_t("CONTACT INCLUSIONS", in_model, "ALLEXTERIOR"), &
       keyword_t("CONTACT PROPERTY ASSIGNMENT", in_model), &

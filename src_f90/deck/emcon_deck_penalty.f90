@@ -54,6 +54,7 @@ contains
          associate (method => step(k)%contact%method, initiation => step(k)%contact%initiation)
             if (.not. step_is_dynamic(step(k))) cycle
             if (.not. any(method == [method_penalty, method_augmented_lagrange])) cycle
+            if (step(k)%contact%penalty%origin%line == 0) cycle    ! by pressures of surfaces
             if (initiation == initiation_massless) call refuse( &
                "*CONTACT INITIATION, TYPE=MASSLESS: surfaces without mass hold their gaps exactly")
             if (initiation == initiation_velocity_update) call refuse("*CONTACT INITIATION, " // &

@@ -23,6 +23,7 @@ module emcon_deck_step
    use emcon_deck_output, only : is_output, read_output, requests_init, requests_t
    use emcon_deck_rigid, only : read_turns
    use emcon_deck_scheme, only : check_schemes, read_scheme
+   use emcon_deck_pressure, only : soften_steps
    use emcon_deck_penalty, only : check_penalty, read_constraint_method
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
       option_name, option_number, option_real, option_word, reader_t, refuse_option
@@ -90,6 +91,7 @@ contains
       end do
       call read_turns(reader, scene)
       call pairs_ask(reader, scene%pair, scene%step)
+      call soften_steps(reader, scene%pair, scene%step)
       call suit_explicit(reader, scene%pair, scene%step)
       call check_massless(reader, scene%step)
       call check_schemes(reader, scene%pair, scene%step)

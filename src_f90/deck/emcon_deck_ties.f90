@@ -6,7 +6,8 @@ module emcon_deck_ties
    use emcon_deck_reader, only : card_error, card_t, line_origin, n_lines, need_name, &
       option_name, option_real, option_word, reader_t
    use emcon_deck_surfaces, only : get_surfaces, need_facets
-   use emcon_diagnostics, only : quoted
+   use emcon_diagnostics, only : add_warning, quoted
+   use emcon_interactions, only : pair_is_reverse_of, pressure_tied
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_scene, only : scene_t, where_text
    implicit none
@@ -33,7 +34,34 @@ contains
          call read_tie_lines(reader, reader%card(i), scene, common, tie_of, tie, n)
       end do
       scene%tie = tie(:n)
+      call tie_pairs(reader, scene)
    end subroutine read_ties
+
+   !> Contact pairs whose surfaces are tied are ties, without the stiffness that others give them.
+   subroutine tie_pairs(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(inout) :: scene
+      logical :: is_tied(size(scene%pair))
+      type(tie_t) :: tie
+      integer :: i
+
+      is_tied = scene%pair%interaction%pressure%kind == pressure_tied
+      do i = 1, size(is_tied)
+         if (.not. is_tied(i)) cycle
+         associate (pair => scene%pair(i))
+            if (min(pair%slave, pair%master) == 0) cycle       ! unknown, and told
+            if (any(pair_is_reverse_of(scene%pair(:i - 1), pair))) cycle
+            call add_warning(reader%log, pair%origin, "*CONTACT PAIR: its surfaces are tied, as " &
+               // "by *TIE: exactly, without a stiffness of contact")
+            tie%origin = pair%origin
+            tie%name = scene%surface(pair%slave)%name
+            tie%slave = pair%slave
+            tie%master = pair%master
+            scene%tie = [scene%tie, tie]
+         end associate
+      end do
+      scene%pair = pack(scene%pair, .not. is_tied)
+   end subroutine tie_pairs
 
    !> What a card says of all its ties.
    subroutine read_tie_options(reader, card, tie)

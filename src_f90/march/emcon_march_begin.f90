@@ -32,7 +32,7 @@ module emcon_march_begin
    use emcon_quasi_static, only : quasi_static_begin, quasi_static_hold
    use emcon_scene, only : scene_t, where_text
    use emcon_scheme_registry, only : scheme_create, scheme_user
-   use emcon_penalty, only : penalty_begin_step
+   use emcon_penalty, only : penalty_begin_step, penalty_start
    use emcon_solver_registry, only : solver_user
    use emcon_state, only : state_t
    use emcon_step_control, only : control_begin
@@ -194,6 +194,9 @@ contains
          call configure_contact(self, scene)
          call penalty_begin_step(self%active%penalty, self%system, scene, step, error)
          if (allocated(error)) return
+         if (state%clock%i_step == 1 .and. .not. state%clock%time > 0.0_wp) call penalty_start( &
+            self%active%penalty, self%system, motion_of(evaluation_at_end, scene%x, state%u, &
+            at_rest(state%u)), state%contacts%closure, self%ledger%contact_energy)
          call near_laws_begin_step(self%active%near_laws, self%system, scene, step)
          call begin_overclosure(self, scene, step)
          call begin_massless(self, scene, step, error)

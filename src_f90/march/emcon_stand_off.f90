@@ -39,7 +39,7 @@ contains
          if (force <= least_force*largest) cycle
          call constraint_index(system, set%id(k), pair, i)
          associate (state => system%contact(pair)%contact%state(i))
-            gap = gap_ratio(state, max(0.0_wp, state%gap1))
+            gap = gap_ratio(state, max(0.0_wp, state%gap1 - max(0.0_wp, state%closed)))
          end associate
          self%largest = max(self%largest, gap)
          self%impulse = self%impulse + force*h

@@ -68,6 +68,7 @@ module emcon_verdict
       real(wp) :: give = 0.0_wp                  !! how deep contact has given way, per edge
       real(wp) :: time = 0.0_wp                  !! of that [T]
       integer :: most_augmentations = 0          !! of an augmented Lagrangian in an increment
+      logical :: is_meant = .true.               !! by pressures that the deck gives
    end type penalty_found_t
 
    type :: verdict_counts_t
@@ -173,6 +174,7 @@ contains
          self%largest_push = max(self%largest_push, increment%largest_push)
          call scatter_follow(self%scatter, state%sums%sum, &
             evaluation_has_inertia(march%motion%evaluation))
+         self%penalty%is_meant = self%penalty%is_meant .and. march%active%penalty%is_meant
          if (increment%give > self%penalty%give) then
             self%penalty%give = increment%give
             self%penalty%time = state%clock%time
@@ -367,7 +369,8 @@ contains
             call note_add(found, text)
          end if
       end associate
-      if (self%overlap%deepest > overlap_told &
+      if (self%overlap%deepest > overlap_told .and. .not. (self%penalty%is_meant .and. &
+         self%penalty%give > 0.0_wp) &
          .and. self%overlap%deepest <= most_overlap(self)) call note_add( &
          found, "bodies overlap by " // to_text(self%overlap%deepest, 3) &
          // " of an edge at time " // &
@@ -403,7 +406,8 @@ contains
       if (self%overlap%deepest > most_overlap(self)) call note_add(self%reasons, &
          "bodies overlap by " // to_text(self%overlap%deepest, 3) // " of an edge at time " // &
          to_text(self%overlap%time, 9) // ", " // self%overlap%place)
-      if (self%penalty%give > far_behind) call note_add(self%reasons, &
+      if (self%penalty%give > far_behind .and. .not. self%penalty%is_meant) call note_add( &
+         self%reasons, &
          "contact penetrates by up to " // to_text(self%penalty%give, 3) // &
          " of an edge: STIFFNESS or FACTOR of *CONSTRAINT METHOD is too small")
       if (stand_off_mean(self%stand_off) > most_stand_off) then
@@ -438,8 +442,13 @@ contains
       type(verdict_t), intent(in) :: self
       logical, intent(in) :: is_strict           !! whatever is bad is a failure
 
-      verdict_is_failure = max(self%overlap%deepest, self%penalty%give) > far_behind .or. &
-         energy_is_failure(self%energy) .or. (is_strict .and. self%reasons%n > 0)
+      if (self%penalty%is_meant) then
+         verdict_is_failure = self%overlap%deepest > max(far_behind, most_overlap(self))
+      else
+         verdict_is_failure = max(self%overlap%deepest, self%penalty%give) > far_behind
+      end if
+      verdict_is_failure = verdict_is_failure .or. energy_is_failure(self%energy) .or. &
+         (is_strict .and. self%reasons%n > 0)
    end function verdict_is_failure
 
    !> How far the laws of contact and friction were missed, by the largest force of the run.

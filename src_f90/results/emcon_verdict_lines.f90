@@ -61,7 +61,10 @@ contains
             "not judged), "
       end associate
       if (allocated(self%largest_force)) then
-         if (self%penalty%give > 0.0_wp) then
+         if (self%penalty%give > 0.0_wp .and. self%penalty%is_meant) then
+            line = line // "contact gives way by up to " // to_text(self%penalty%give, 3) // &
+               " of an edge, as its PRESSURE-OVERCLOSURE says, nothing else penetrates, "
+         else if (self%penalty%give > 0.0_wp) then
             line = line // "contact penetrates by up to " // to_text(self%penalty%give, 3) // &
                " of an edge, nothing else does, "
          else if (self%overlap%deepest > overlap_told) then

@@ -5,6 +5,8 @@ module emcon_interactions
    implicit none
    private
    public :: contact_pair_t, contact_options_t, contact_damping_t, interaction_t, adjustment_t
+   public :: pressure_t, pressure_reach, interaction_reach
+   public :: pressure_hard, pressure_linear, pressure_exponential, pressure_tabular, pressure_tied
    public :: pair_has_order, pair_holds_nodes, pair_may_exchange, pair_is_reverse_of, pair_of_one
    public :: formulation_nts, formulation_segment, formulation_mortar, formulation_user
    public :: integration_segments, integration_elements
@@ -17,6 +19,11 @@ module emcon_interactions
    integer, parameter :: multiplier_standard = 1, multiplier_dual = 2
    integer, parameter :: normal_edge = 1, normal_nodal = 2
    integer, parameter :: smoothing_none = 1, smoothing_hermite = 2
+
+   integer, parameter :: pressure_hard = 1, pressure_linear = 2, pressure_exponential = 3, &
+      pressure_tabular = 4, pressure_tied = 5
+   !> An exponential pressure is cut off at so many clearances, where it is a millionth.
+   real(wp), parameter :: exponential_reach = 3.0_wp
 
    !> How the contact of a step is computed: *MORTAR and *SURFACE SMOOTHING.
    type :: contact_options_t
@@ -39,6 +46,17 @@ module emcon_interactions
       real(wp) :: tangent = 0.0_wp                   !! part of it along the surface, >= 0
    end type contact_damping_t
 
+   !> *SURFACE BEHAVIOR: pressure as a function of the overclosure.
+   type :: pressure_t
+      integer :: kind = pressure_hard
+      real(wp) :: slope = 0.0_wp                     !! LINEAR: by overclosure [M/(L^2 T^2)]
+      real(wp) :: tension = 0.0_wp                   !! LINEAR: sigma_inf, 0: none [M/(L T^2)]
+      real(wp) :: clearance = 0.0_wp                 !! EXPONENTIAL: c0 [L]
+      real(wp) :: at_touch = 0.0_wp                  !! EXPONENTIAL: p0 [M/(L T^2)]
+      real(wp), allocatable :: pressure(:)           !! (n) TABULAR: from 0 on [M/(L T^2)]
+      real(wp), allocatable :: overclosure(:)        !! (n) of these, ascending [L]
+   end type pressure_t
+
    !> *SURFACE INTERACTION: how surfaces act on each other.
    type :: interaction_t
       real(wp) :: offset = 0.0_wp                    !! of the gap: a layer in between, >= 0 [L]
@@ -46,6 +64,7 @@ module emcon_interactions
       real(wp) :: friction = 0.0_wp                  !! mu of Coulomb's law, >= 0
       real(wp) :: rebound = 0.0_wp                   !! along the surface, of what sticks, 0 to 1
       type(contact_damping_t) :: damping
+      type(pressure_t) :: pressure
    end type interaction_t
 
    !> Nodes of a slave surface that are moved onto the master before the first step.
@@ -75,6 +94,22 @@ module emcon_interactions
    end type contact_pair_t
 
 contains
+
+   !> The gap up to which a pressure acts [L].
+   pure real(wp) function pressure_reach(pressure) result(reach)
+      type(pressure_t), intent(in) :: pressure
+
+      reach = 0.0_wp
+      if (pressure%kind == pressure_exponential) reach = exponential_reach*pressure%clearance
+      if (pressure%kind == pressure_tabular) reach = max(0.0_wp, -pressure%overclosure(1))
+   end function pressure_reach
+
+   !> The gap up to which surfaces act on each other, pads left out [L].
+   pure real(wp) function interaction_reach(surface) result(reach)
+      type(interaction_t), intent(in) :: surface
+
+      reach = max(surface%damping%clearance, pressure_reach(surface%pressure))
+   end function interaction_reach
 
    !> Does a pair hold each node of its slave in front of its master?
    elemental logical function pair_holds_nodes(pair) result(holds_nodes)

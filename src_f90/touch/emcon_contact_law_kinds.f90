@@ -4,12 +4,13 @@ submodule (emcon_contact_law_registry) emcon_contact_law_kinds
    use emcon_dashpot_law, only : dashpot_t
    use emcon_restitution_law, only : restitution_t
    use emcon_penalty_law, only : augmented_t, penalty_t
+   use emcon_pressure_law, only : pressure_law_t
    implicit none
 
 contains
 
    module procedure n_kind
-      n_kind = 5
+      n_kind = 6
    end procedure n_kind
 
    module procedure allocate_law
@@ -17,8 +18,9 @@ contains
       case (1); allocate(coulomb_t :: law)
       case (2); allocate(dashpot_t :: law)
       case (3); allocate(restitution_t :: law)
-      case (4); allocate(penalty_t :: law)
-      case (5); allocate(augmented_t :: law)
+      case (4); allocate(pressure_law_t :: law)
+      case (5); allocate(penalty_t :: law)
+      case (6); allocate(augmented_t :: law)
       end select
    end procedure allocate_law
 

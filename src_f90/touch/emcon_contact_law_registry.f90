@@ -5,7 +5,7 @@ module emcon_contact_law_registry
    use emcon_interactions, only : interaction_t
    implicit none
    private
-   public :: contact_laws_of_surface, contact_law_of_method
+   public :: contact_laws_of_surface, contact_law_of_method, contact_law_in_place
 
    interface
       !> Number of kinds.
@@ -40,15 +40,26 @@ contains
    subroutine contact_law_of_method(method, law)
       integer, intent(in) :: method              !! of `emcon_steps`
       class(contact_law_t), allocatable, intent(out) :: law      !! not allocated: rows hold
+
+      call contact_law_in_place(interaction_t(), method, law)
+   end subroutine contact_law_of_method
+
+   !> The same of surfaces that may have a law of their own.
+   subroutine contact_law_in_place(surface, method, law)
+      type(interaction_t), intent(in) :: surface
+      integer, intent(in) :: method              !! of `emcon_steps`
+      class(contact_law_t), allocatable, intent(out) :: law      !! not allocated: rows hold
+      type(interaction_t) :: alone
       logical :: acts
       integer :: kind
 
+      alone%pressure = surface%pressure          ! others act beside
       do kind = 1, n_kind()
          call allocate_law(kind, law)
-         call law%take(interaction_t(), method, acts)
+         call law%take(alone, method, acts)
          if (acts) return
       end do
       deallocate(law)
-   end subroutine contact_law_of_method
+   end subroutine contact_law_in_place
 
 end module emcon_contact_law_registry

@@ -25,6 +25,8 @@ module emcon_penalty_law
       procedure :: take => penalty_take
       procedure :: begin => penalty_begin
       procedure :: respond => penalty_respond
+      procedure :: push => penalty_push
+      procedure :: push_over => penalty_push_over
       procedure :: stored
       procedure :: stiffest
       procedure :: closure
@@ -87,41 +89,60 @@ contains
       self%base = lam
    end subroutine push_on
 
-   !> k times the mean of min(d, 0) times the part of the way that is closed. What is stored goes on
-   !> from what the step before has left, whatever the gap at its start is found to be now; what
-   !> begins closed stores nothing yet. Source: docs/theory.md, eq. (20f).
+   !> What is stored goes on from what the step before has left, whatever the gap at its start is
+   !> found to be now; what begins closed stores nothing yet. Source: docs/theory.md, eq. (20f).
    pure subroutine penalty_respond(self, at, response)
       class(penalty_t), intent(inout) :: self
       type(contact_values_t), intent(in) :: at
       type(contact_response_t), intent(inout) :: response
-      real(wp) :: start, part
+      real(wp) :: start
 
       start = at%gap0
       self%now = at%gap1
       if (.not. at%is_stored) then
-         response%lam = -self%stiffness*at%left
-         response%stiffness(0, 0) = self%stiffness
+         call self%push(at%left, response%lam, response%stiffness(0, 0))
          return
       end if
       if (self%before < 0.0_wp .or. (at%gap0 < 0.0_wp .and. .not. self%before > 0.0_wp)) then
          start = self%before
          self%now = start + at%dgap
       end if
-      associate (lam => response%lam, slope => response%stiffness(0, 0), now => self%now)
-         if (start <= 0.0_wp .and. now <= 0.0_wp) then
-            lam = -0.5_wp*self%stiffness*(start + now)
-            slope = 0.5_wp*self%stiffness
-         else if (.not. (start >= 0.0_wp .and. now >= 0.0_wp)) then
-            part = min(start, now)/(-abs(now - start))
-            lam = -0.5_wp*self%stiffness*min(start, now)*part
-            if (start < 0.0_wp) then
-               slope = 0.5_wp*self%stiffness*part**2
-            else
-               slope = 0.5_wp*self%stiffness*part*(2.0_wp - part)
-            end if
-         end if
-      end associate
+      call self%push_over(start, self%now, response%lam, response%stiffness(0, 0))
    end subroutine penalty_respond
+
+   !> Push and stiffness where the gap is; where it is open a pull, that what pulls may be let go.
+   pure subroutine penalty_push(self, gap, lam, stiffness)
+      class(penalty_t), intent(in) :: self
+      real(wp), intent(in) :: gap                !! [L]
+      real(wp), intent(out) :: lam, stiffness    !! [M L/T^2], [M/T^2]
+
+      lam = -self%stiffness*gap
+      stiffness = self%stiffness
+   end subroutine penalty_push
+
+   !> k times the mean of min(d, 0) times the part of the way that is closed, and how that falls
+   !> with the end of the way.
+   pure subroutine penalty_push_over(self, from, to, lam, stiffness)
+      class(penalty_t), intent(in) :: self
+      real(wp), intent(in) :: from, to           !! of the gap [L]
+      real(wp), intent(out) :: lam, stiffness    !! [M L/T^2], [M/T^2]
+      real(wp) :: part
+
+      lam = 0.0_wp
+      stiffness = 0.0_wp
+      if (from <= 0.0_wp .and. to <= 0.0_wp) then
+         lam = -0.5_wp*self%stiffness*(from + to)
+         stiffness = 0.5_wp*self%stiffness
+      else if (.not. (from >= 0.0_wp .and. to >= 0.0_wp)) then
+         part = min(from, to)/(-abs(to - from))
+         lam = -0.5_wp*self%stiffness*min(from, to)*part
+         if (from < 0.0_wp) then
+            stiffness = 0.5_wp*self%stiffness*part**2
+         else
+            stiffness = 0.5_wp*self%stiffness*part*(2.0_wp - part)
+         end if
+      end if
+   end subroutine penalty_push_over
 
    !> A push by the `base` and by what is left of the gap, of either sign.
    pure subroutine augmented_respond(self, at, response)

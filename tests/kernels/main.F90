@@ -96,6 +96,7 @@ program main
    use test_linked_elements, only : collect_linked_elements
    use test_links, only : collect_links
    use test_loads, only : collect_loads
+   use test_pressure_law, only : collect_pressure_law
    use test_press_face, only : collect_press_face
    use test_march, only : collect_march
    use test_march_check, only : collect_march_check
@@ -312,6 +313,7 @@ program main
    call run("circles", collect_circles)
    call run("linear_rows", collect_linear_rows)
    call run("loads", collect_loads)
+   call run("pressure_law", collect_pressure_law)
    call run("press_face", collect_press_face)
    call run("rigid_motion", collect_rigid_motion)
    call run("rigidity", collect_rigidity)

@@ -1,0 +1,172 @@
+"""`*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR`, `EXPONENTIAL` and `TABULAR`: contact that gives way.
+
+A block of one element stands on, or falls onto, a fixed floor: judged by places against closed forms.
+"""
+
+import math
+
+import numpy as np
+import pytest
+from scene_tools import Deck, attempt, run_deck
+from test_contact_output import restart
+
+FORMULATIONS = ["NODE TO SURFACE", "SEGMENT", "MORTAR"]
+#: Pressure by overclosure, and the overclosure of a pressure, of each behaviour.
+BEHAVIOURS = {
+    "LINEAR\n100.": lambda p: p/100,
+    "EXPONENTIAL\n.005, .5": lambda p: 0.005/math.log(100)*math.log(p/0.5),
+    "TABULAR\n0., -.01\n2., .01\n10., .02": lambda p: -0.01 + p/100 if p < 2 else 0.01 + (p - 2)/800,
+}
+
+
+def deck(behaviour, formulation, step, *, gap=0.0, more="", young=1e3, start=""):
+    """A unit square above a floor that is held."""
+    return Deck(f"""*NODE
+1, 0., {gap!r}
+2, 1., {gap!r}
+3, 1., {1 + gap!r}
+4, 0., {1 + gap!r}
+5, -.5, -1.
+6, 1.5, -1.
+7, 1.5, 0.
+8, -.5, 0.
+*ELEMENT, TYPE=CPE4, ELSET=A
+1, 1, 2, 3, 4
+*ELEMENT, TYPE=CPE4, ELSET=B
+2, 5, 6, 7, 8
+*MATERIAL, NAME=M
+*ELASTIC
+{young!r}, 0.
+*DENSITY
+1.
+*SOLID SECTION, ELSET=A, MATERIAL=M
+*SOLID SECTION, ELSET=B, MATERIAL=M
+*NSET, NSET=FEET
+1, 2
+*SURFACE, NAME=SA
+1, S1
+*SURFACE, NAME=SB
+2, S3
+*SURFACE INTERACTION, NAME=I
+*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE={behaviour}
+*CONTACT PAIR, INTERACTION=I, TYPE={formulation}{more}
+SA, SB
+*BOUNDARY
+5, 1, 2
+6, 1, 2
+7, 1, 2
+8, 1, 2
+1, 1
+2, 1
+3, 1
+4, 1
+{start}{step}*NODE FILE, FREQUENCY=1
+U, V
+*CONTACT FILE, FREQUENCY=1
+CF
+*END STEP
+""", "pressure")
+
+
+def static(load, nlgeom=""):
+    return f"*STEP{nlgeom}\n*STATIC\n.25, 1.\n*CLOAD\n3, 2, {-load/2!r}\n4, 2, {-load/2!r}\n"
+
+
+def dynamic(h, t_end, kind="DIRECT"):
+    return f"*STEP, NLGEOM\n*DYNAMIC, {kind}\n{h!r}, {t_end!r}\n"
+
+
+FALLS = "*INITIAL CONDITIONS, TYPE=VELOCITY\n1, 2, -1.\n2, 2, -1.\n3, 2, -1.\n4, 2, -1.\n"
+
+
+def feet(run):
+    fields = run.fields()
+    return (fields.x + fields["displacement"])[:, :2, 1]
+
+
+@pytest.mark.parametrize("load", [0.5, 5.0])
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("behaviour", BEHAVIOURS)
+def test_a_load_goes_in_by_the_curve(behaviour, formulation, load, tmp_path):
+    """The floor, loaded by the block alone, stays flat to the accuracy of what it gives way by."""
+    run = run_deck(deck(behaviour, formulation, static(load)), tmp_path)
+    assert run.verdict["verdict"] == "good"
+    assert -feet(run)[-1] == pytest.approx(BEHAVIOURS[behaviour](load), rel=1e-9, abs=1e-12)
+    assert run.fields()["contact_force"][-1][:2, 1].sum() == pytest.approx(load, rel=1e-9)
+
+
+def test_a_tension_bends_the_line(tmp_path):
+    """K o (1/2 + atan(o/eps)/pi), eps = pi sigma/K, as CalculiX has it for nodes; surfaces that are
+    integrated over have the line."""
+    for formulation, expected in (("NODE TO SURFACE", None), ("MORTAR", 0.005)):
+        run = run_deck(deck("LINEAR\n100., .1", formulation, static(0.5)), tmp_path/formulation)
+        over = -feet(run)[-1, 0]
+        if expected is None:
+            eps = math.pi*0.1/100
+            assert 100*over*(0.5 + math.atan(over/eps)/math.pi) == pytest.approx(0.5, rel=1e-9)
+            assert "do not pull at each other" in run.errors
+        else:
+            assert over == pytest.approx(expected, rel=1e-9)
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.02])
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("behaviour", BEHAVIOURS)
+def test_energy_stays(behaviour, formulation, gap, tmp_path):
+    """What the curve stores is in the balance, from the first instant on, also where it acts there
+    already; the block comes back as it went."""
+    run = run_deck(deck(behaviour, formulation, dynamic(0.002, 0.5), gap=gap, start=FALLS), tmp_path)
+    history = run.history
+    assert run.verdict["verdict"] == "good" and run.verdict["cuts"] == 0
+    assert np.abs(history["total"] - history["total"][0]).max() < 1e-12*history["total"][0]
+    assert np.abs(history["contact_work"]).max() < 1e-12
+    assert history["contact_energy"].max() > 0.2 and history["contact_energy"][-1] == 0.0
+    at_start = {"LINEAR": 0.0, "EXPONENTIAL": 0.5*0.005/math.log(100)*(1 - 1e-6), "TABULAR": 0.005}
+    expected = at_start[behaviour.split()[0]] if gap == 0.0 else history["contact_energy"][0]
+    assert history["contact_energy"][0] == pytest.approx(expected, rel=1e-9)
+    assert history["kinetic"][-1] > 0.49 and history["py"][-1] > 0.9
+
+
+def test_half_a_swing(tmp_path):
+    """A stiff block on a linear pressure is a mass on a spring: depth v sqrt(m/K), and its time."""
+    h = 1e-3
+    run = run_deck(deck("LINEAR\n100.", "NODE TO SURFACE", dynamic(h, 0.5), young=1e6, start=FALLS),
+                   tmp_path)
+    way = feet(run)
+    assert -way.min() == pytest.approx(0.1, rel=1e-3)
+    out = np.flatnonzero((way[1:] > 0).all(axis=1))[0] + 1
+    assert run.history["time"][out] == pytest.approx(math.pi/10, abs=2*h)
+
+
+@pytest.mark.parametrize("behaviour", ["LINEAR\n100.", "TABULAR\n0., -.01\n2., .01\n10., .02"])
+def test_in_explicit_steps(behaviour, tmp_path):
+    run = run_deck(deck(behaviour, "NODE TO SURFACE", dynamic(2e-3, 0.5, "EXPLICIT, DIRECT"), gap=0.02,
+                        start=FALLS), tmp_path)
+    history = run.history
+    assert history["contact_energy"].max() > 0.2
+    assert np.abs(history["total"] - history["total"][0]).max() < 1e-2*history["total"][0]
+
+
+def test_a_hard_pair_beside_it_gives_way_by_a_penalty_if_asked(tmp_path):
+    text = deck("LINEAR\n100.", "NODE TO SURFACE", static(0.5)).text()
+    text = text.replace("*BOUNDARY", "*SURFACE INTERACTION, NAME=H\n*CONTACT PAIR, INTERACTION=H, SIDES=ONE\n"
+                        "SB, SA\n*BOUNDARY", 1)
+    refused, _ = attempt(Deck(text, "pressure"), tmp_path/"a", (), {})
+    assert refused.returncode == 2 and "it is hard, beside pairs" in refused.stderr
+    text = text.replace("*CLOAD", "*CONSTRAINT METHOD, TYPE=PENALTY\n*CLOAD")
+    run = run_deck(Deck(text, "pressure"), tmp_path/"b")
+    assert run.verdict["verdict"] == "good"
+
+
+def test_a_run_goes_on_from_its_middle(tmp_path):
+    """What contact has stored is in the restart file: the same bits."""
+    text = deck("EXPONENTIAL\n.005, .5", "NODE TO SURFACE", dynamic(0.002, 0.02), start=FALLS).text()
+    step = text[text.index("*STEP"):]
+    text = text.replace("*NODE FILE", "*RESTART, WRITE, FREQUENCY=10\n*NODE FILE") \
+        + step.replace("*NODE FILE", "*RESTART, WRITE, FREQUENCY=0\n*NODE FILE")
+    run = run_deck(Deck(text, "pressure"), tmp_path/"whole")
+    assert run.history["contact_energy"][10] > 0
+    (tmp_path/"copy").mkdir()
+    copy = restart(run, tmp_path/"copy")
+    assert "resumed after increment 10" in copy.log
+    assert copy.digits() == run.digits()
