@@ -347,8 +347,9 @@ class Model(Source):
                     pad_thickness: Number | None = None,
                     restitution: Number | None = None,
                     damping: Number | Sequence[Number] | None = None,
-                    tangent_fraction: Number | None = None) -> Model:
-        """`*SURFACE INTERACTION` with hard contact.
+                    tangent_fraction: Number | None = None,
+                    pressure: Sequence[Any] | None = None) -> Model:
+        """`*SURFACE INTERACTION`, hard if no pressure is given.
 
         friction        coefficient of Coulomb's law, 0 or more; "ROUGH": nothing slides; default 0
         friction_restitution   0 to 1: the part of the velocity along the surface of what sticks
@@ -361,6 +362,9 @@ class Model(Source):
                         which on there is none [L] and the part of that, 0 to 1, up to which it
                         does not fall; default none
         tangent_fraction   the part of it, 0 or more, against slip; default 0
+        pressure        by the overclosure: ("LINEAR", slope [M/(L^2 T^2)]) with a tension
+                        [M/(L T^2)] behind it or without; ("EXPONENTIAL", clearance [L], pressure
+                        at zero gap); ("TABULAR", (pressure, overclosure), ...) from pressure 0 on
         """
         if damping is None and tangent_fraction is not None:
             raise InputError("tangent_fraction is a part of damping: give damping too")
@@ -368,7 +372,9 @@ class Model(Source):
             raise InputError("friction_restitution is of what sticks: give friction too")
         text = card("SURFACE INTERACTION", {"NAME": name, "PAD THICKNESS": pad_thickness,
                                             "RESTITUTION": restitution})
-        text += card("SURFACE BEHAVIOR", {"PRESSURE-OVERCLOSURE": "HARD"})
+        kind, *values = pressure or ("HARD",)
+        rows = values if str(kind).upper() == "TABULAR" else [tuple(values)]*bool(values)
+        text += card("SURFACE BEHAVIOR", {"PRESSURE-OVERCLOSURE": kind}, rows=rows)
         if friction is not None:
             is_rough = isinstance(friction, str) and friction.upper() == "ROUGH"
             text += card("FRICTION", {"ROUGH": is_rough, "RESTITUTION": friction_restitution},

@@ -333,7 +333,7 @@ contains
    pure real(wp) function penalty_depth(self, set) result(depth)
       type(penalty_state_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
-      real(wp) :: edge
+      real(wp) :: edge, reach
       integer :: k
 
       depth = 0.0_wp
@@ -342,7 +342,9 @@ contains
          edge = set%item(k)%size
          if (self%edge(set%id(k)) > 0.0_wp .and. .not. self%augments) edge = min(edge, &
             self%edge(set%id(k)))
-         depth = max(depth, (-set%penalty%left(k) - set%law(k)%row%reach)/edge)
+         reach = 0.0_wp
+         if (allocated(set%law(k)%row)) reach = set%law(k)%row%reach
+         depth = max(depth, (-set%penalty%left(k) - reach)/edge)
       end do
    end function penalty_depth
 

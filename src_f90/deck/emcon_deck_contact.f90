@@ -325,16 +325,18 @@ contains
       pair%may_choose = .false.
    end subroutine suit_pressure
 
-   !> What is tied has faces on two surfaces.
+   !> What is tied has faces on two surfaces; else it has none from here on.
    subroutine check_tied(reader, card, scene, pair)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(scene_t), intent(in) :: scene
-      type(contact_pair_t), intent(in) :: pair
+      type(contact_pair_t), intent(inout) :: pair
 
       if (min(pair%slave, pair%master) == 0) return
-      if (scene%surface(pair%slave)%is_nodal .or. pair%slave == pair%master) call card_error( &
-         reader, card, "its surfaces are tied, and ties join the element faces of two surfaces")
+      if (.not. (scene%surface(pair%slave)%is_nodal .or. pair%slave == pair%master)) return
+      call card_error(reader, card, "its surfaces are tied, and ties join the element faces of " &
+         // "two surfaces")
+      pair%slave = 0
    end subroutine check_tied
 
    !> What contact of a program has, and what it does not know of.

@@ -68,7 +68,7 @@ module emcon_verdict
       real(wp) :: give = 0.0_wp                  !! how deep contact has given way, per edge
       real(wp) :: time = 0.0_wp                  !! of that [T]
       integer :: most_augmentations = 0          !! of an augmented Lagrangian in an increment
-      logical :: is_meant = .true.               !! by pressures that the deck gives
+      logical :: is_meant = .false.              !! by pressures that the deck gives, all of it
    end type penalty_found_t
 
    type :: verdict_counts_t
@@ -174,6 +174,7 @@ contains
          self%largest_push = max(self%largest_push, increment%largest_push)
          call scatter_follow(self%scatter, state%sums%sum, &
             evaluation_has_inertia(march%motion%evaluation))
+         if (.not. self%penalty%give > 0.0_wp) self%penalty%is_meant = .true.
          self%penalty%is_meant = self%penalty%is_meant .and. march%active%penalty%is_meant
          if (increment%give > self%penalty%give) then
             self%penalty%give = increment%give

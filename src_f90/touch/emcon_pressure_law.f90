@@ -246,7 +246,7 @@ contains
       type(pressure_t), intent(in) :: curve
       real(wp), intent(in) :: from, to
       real(wp), intent(out) :: mean, rate
-      real(wp) :: low, high, pressure, slope
+      real(wp) :: low, high, pressure, slope, begun, done
       integer :: k, first
 
       mean = 0.0_wp
@@ -264,7 +264,9 @@ contains
          if (k < size(curve%pressure) - 1) high = min(high, curve%overclosure(k + 1))
          call pressure_at(curve, 0.5_wp*(low + high), pressure, slope)
          mean = mean + pressure*((high - low)/abs(to - from))
-         rate = rate + 0.5_wp*slope*abs((high - low)*(high + low - from - from))/(to - from)**2
+         begun = (low - from)/(to - from)
+         done = (high - from)/(to - from)
+         rate = rate + 0.5_wp*slope*abs(done**2 - begun**2)
       end do
    end subroutine mean_of_segments
 

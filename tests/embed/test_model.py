@@ -244,6 +244,8 @@ def everything() -> Model:
     model.amplitude("AMP", [0.0, 1.0], [0.0, 1.0], time="TOTAL TIME")
     model.time_points("T1", [0.5, 1.0]).time_points("T2", generate=(0.0, 1.0, "<h>"))
     model.interaction("I2", friction="rough")
+    model.interaction("I3", pressure=("TABULAR", (0, 0), (5, 0.01)))
+    model.interaction("I4", pressure=("LINEAR", 1e3))
     model.interaction("I", friction=0.0, friction_restitution=0.5, pad_thickness=0.0,
                       restitution=0.5, damping=(0.0, 0.1, 0.5), tangent_fraction=0.5)
     model.contact_pair("S1", "S2", interaction="I", adjust=0.1, sides="BOTH", guard="NO",
@@ -313,6 +315,7 @@ def test_all_keywords_of_the_reader_have_a_method() -> None:
     del known["PREPRINT"]                        # does nothing; Model.cards takes it
     del known["USERELEMENT"]                     # its shape comes from Fortran; Model.cards too
     known["SURFACEBEHAVIOR"].remove("DIRECT")    # says of hard contact what holds without it
+    known["CONTACTPAIR"].remove("TIED")          # Model.tie says it
     for name in ("OUTPUT", "NODEOUTPUT", "ELEMENTOUTPUT", "CONTACTOUTPUT", "ENERGYOUTPUT"):
         del known[name]                          # the requests of `output` in other words
     for name, word in (("NSET", "INTERNAL"), ("ELSET", "INTERNAL"), ("SURFACE", "INTERNAL"),

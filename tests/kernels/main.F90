@@ -47,6 +47,7 @@ program main
    use test_dgrad_wide, only : collect_dgrad_wide
    use test_dissipation, only : collect_dissipation
    use test_stabilization, only : collect_stabilization
+   use test_elastic_slip, only : collect_elastic_slip
    use test_element, only : collect_element
    use test_element_kinds, only : collect_element_kinds
    use test_element_axial, only : collect_element_axial
@@ -256,6 +257,7 @@ program main
    call run("law_space", collect_law_space)
    call run("law_thin", collect_law_thin)
    call run("ledger", collect_ledger)
+   call run("elastic_slip", collect_elastic_slip)
    call run("element", collect_element)
    call run("element_kinds", collect_element_kinds)
    call run("element_axial", collect_element_axial)
