@@ -219,6 +219,7 @@ contains
       self%start%was_active = state%contacts%is_active
       self%start%lam0 = state%contacts%lam
       self%penalty%closure = state%contacts%closure
+      self%penalty%stretch = state%contacts%stretch
       if (self%friction%is_on) then
          self%friction%direction0 = state%contacts%slides_along
          self%friction%tau0 = state%contacts%drag
@@ -405,6 +406,7 @@ contains
       self%is_active(:system%first_constraint(1)) = system%acts
       self%lam = contacts%lam
       self%penalty%closure = contacts%closure
+      self%penalty%stretch = contacts%stretch
       self%is_candidate = self%is_active
    end subroutine active_set_take
 

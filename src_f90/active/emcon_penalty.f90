@@ -2,10 +2,10 @@
 !> the surfaces. Source: docs/theory.md, eqs. (20a) to (20e).
 module emcon_penalty
    use emcon_constraints, only : constraint_index, constraint_set_t
-   use emcon_contact_law, only : contact_law_box_t, contact_law_t, contact_place_t
-   use emcon_contact_law_registry, only : contact_law_in_place, contact_law_of_method
+   use emcon_contact, only : contact_t
+   use emcon_contact_law, only : contact_law_t, contact_place_t
+   use emcon_contact_law_registry, only : contact_law_of_method
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_interactions, only : pressure_hard, pressure_reach
    use emcon_gaps, only : pair_measure, pair_search
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
@@ -37,12 +37,12 @@ module emcon_penalty
       real(wp) :: left = huge(1.0_wp)            !! of the gaps before the last one, by the edge
       real(wp) :: raised = 1.0_wp                !! `stiffness` is to be so much larger in the step
       class(contact_law_t), allocatable :: law   !! of contacts, where these give way
-      type(contact_law_box_t), allocatable :: own(:)   !! (n_contact) of those that have their own
-      logical :: is_meant = .false.              !! all have, as the deck gives them
+      logical :: is_meant = .false.              !! all have their own, as the deck gives them
       real(wp), allocatable :: stiffness(:)      !! (n_constraint) of contacts [M/T^2]
       real(wp), allocatable :: area(:)           !! (n_constraint) of contacts [L^2]
       real(wp), allocatable :: edge(:)           !! (n_constraint) of the slave surface [L]
       real(wp), allocatable :: closure(:)        !! (n_constraint) that of `state_t` [L]
+      real(wp), allocatable :: stretch(:, :)     !! (most_slips, n_constraint) the same [L]
    end type penalty_state_t
 
 contains
@@ -73,7 +73,6 @@ contains
       else
          call contact_law_of_method(step%contact%method, self%law)
       end if
-      allocate(self%own(size(system%contact)))
       self%is_meant = .not. self%augments
       allocate(self%closure(system%n_constraint), source=1.0_wp)
       allocate(self%stiffness(system%n_constraint), self%area(system%n_constraint), &
@@ -120,12 +119,14 @@ contains
          ! Nodes at the ends of a surface have half of an edge.
          self%edge(before + 1:before + size(area)) = maxval(area/contact%thickness)
          contact%step%is_penalty = .not. self%augments .and. step_is_dynamic(step)
-         call take_own_law(self, system, scene, k)
-         if (allocated(self%own(k)%law)) then
-            if (k <= system%n_pair) call note_add(system%notes, "contact of pair " // to_text(k) &
+         if (has_own_law(self, contact)) then
+            if (k > system%n_pair) return
+            contact%step%engages = contact%laws%row%reach
+            call note_add(system%notes, "contact of pair " // to_text(k) &
                // " gives way by the PRESSURE-OVERCLOSURE of its surfaces")
             return
          end if
+         self%is_meant = .false.
          by_area = given
          if (.not. given > 0.0_wp) by_area = factor*sum(inner(contact%node))/sum(area)
          if (.not. by_area > 0.0_wp) by_area = factor &
@@ -143,24 +144,13 @@ contains
       end associate
    end subroutine set_contact
 
-   !> The law of the surfaces of contact `k`, if they have one. Guards push at the same pressures,
-   !> from where they act on.
-   subroutine take_own_law(self, system, scene, k)
-      type(penalty_state_t), intent(inout) :: self
-      type(system_t), intent(inout) :: system
-      type(scene_t), intent(in) :: scene
-      integer, intent(in) :: k
+   !> Have the surfaces of a contact a law of their own, by which it gives way?
+   pure logical function has_own_law(self, contact)
+      type(penalty_state_t), intent(in) :: self
+      class(contact_t), intent(in) :: contact
 
-      associate (surface => scene%pair(abs(system%contact(k)%of_pair))%interaction)
-         if (self%augments .or. surface%pressure%kind == pressure_hard) then
-            self%is_meant = .false.
-            return
-         end if
-         call contact_law_in_place(surface, method_penalty, self%own(k)%law)
-         if (k <= system%n_pair) system%contact(k)%contact%step%engages = &
-            pressure_reach(surface%pressure)
-      end associate
-   end subroutine take_own_law
+      has_own_law = allocated(contact%laws%row) .and. .not. self%augments
+   end function has_own_law
 
    !> What is closed as the analysis begins, and what it stores there.
    subroutine penalty_start(self, system, motion, closure, energy)
@@ -174,9 +164,9 @@ contains
       integer :: i, id, k
 
       energy = 0.0_wp
-      if (.not. allocated(self%own)) return
+      if (.not. self%is_on) return
       do k = 1, system%n_pair
-         if (.not. allocated(self%own(k)%law)) cycle
+         if (.not. has_own_law(self, system%contact(k)%contact)) cycle
          call pair_search(system, k, motion)
          call pair_measure(system, k, motion%x, motion%u0, motion%du)
          associate (contact => system%contact(k)%contact)
@@ -191,7 +181,7 @@ contains
                place = contact_place_t(self%area(id), self%stiffness(id), contact%share(i), &
                   closure(id))
                if (allocated(law)) deallocate(law)
-               allocate(law, source=self%own(k)%law)
+               allocate(law, source=contact%laws%row)
                call law%begin(place)
                energy = energy + law%stored()
             end do
@@ -239,25 +229,25 @@ contains
             *self%stiffness(set%id(k)), system%contact(pair)%contact%share(i))
          if (set%penalty%is_stored .and. .not. self%is_at_ends) place%closure = &
             self%closure(set%id(k))
-         call give_law(self, pair, set%law(k)%row)
+         if (allocated(self%stretch)) place%stretch = self%stretch(:, set%id(k))
+         call give_law(self, system%contact(pair)%contact, set%law(k)%row)
          call set%law(k)%row%begin(place)
          call set%law(k)%row%push_on(set%lam(k))
+         set%item(k)%has_friction = set%item(k)%has_friction .or. set%law(k)%row%has_friction
       end do
    end subroutine penalty_select
 
-   !> A copy of the law of contact `k`.
-   subroutine give_law(self, k, law)
+   !> A copy of the law of a contact: of its surfaces, or of all.
+   subroutine give_law(self, contact, law)
       type(penalty_state_t), intent(in) :: self
-      integer, intent(in) :: k
+      class(contact_t), intent(in) :: contact
       class(contact_law_t), allocatable, intent(out) :: law
 
-      if (allocated(self%own)) then
-         if (allocated(self%own(k)%law)) then
-            allocate(law, source=self%own(k)%law)
-            return
-         end if
+      if (has_own_law(self, contact)) then
+         allocate(law, source=contact%laws%row)
+      else
+         allocate(law, source=self%law)
       end if
-      allocate(law, source=self%law)
    end subroutine give_law
 
    !> A step begins: nothing was pushed back in it yet.
@@ -306,15 +296,17 @@ contains
    end function penalty_stored
 
    !> What the contacts of `set` leave to the next step.
-   pure subroutine penalty_keep(self, set, closure)
+   pure subroutine penalty_keep(self, set, closure, stretch)
       type(penalty_state_t), intent(in) :: self
       type(constraint_set_t), intent(in) :: set
       real(wp), intent(inout) :: closure(:)      !! (n_constraint) those of others stand [L]
+      real(wp), intent(inout) :: stretch(:, :)   !! (most_slips, n_constraint) the same [L]
       integer :: k
 
       if (self%augments .or. .not. set%penalty%is_on) return
       do k = set%n_permanent + 1, set%n
          closure(set%id(k)) = set%law(k)%row%closure()
+         stretch(:, set%id(k)) = set%law(k)%row%stretch()
       end do
    end subroutine penalty_keep
 

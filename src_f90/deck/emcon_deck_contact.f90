@@ -61,7 +61,8 @@ contains
                   if (n > 0 .and. n == last_friction) call card_error(reader, card, &
                      "the surface interaction has *FRICTION already")
                   last_friction = n
-                  call read_friction(reader, card, reader%interaction(max(1, n))%friction)
+                  call read_friction(reader, card, reader%interaction(max(1, n))%friction, &
+                     reader%interaction(max(1, n))%stick)
                   call option_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
                      // "left of the velocity along the surface of what sticks", 0.0_wp, 1.0_wp, &
                      reader%interaction(max(1, n))%rebound)

@@ -22,16 +22,18 @@ module emcon_deck_friction
 
 contains
 
-   !> The coefficient of Coulomb's law. A second value is a limit of shear stress or a slope of
-   !> stick in other programs: here nothing but the coefficient bounds friction, and stick is exact.
-   !> What is rough does not slide: a coefficient that no force is above.
-   subroutine read_friction(reader, card, coefficient)
+   !> The coefficient of Coulomb's law, and the slope of stick: shear by slip, 0 where stick is
+   !> exact. Nothing but the coefficient bounds friction. What is rough does not slide: a coefficient
+   !> that no force is above.
+   subroutine read_friction(reader, card, coefficient, stick)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       real(wp), intent(inout) :: coefficient
+      real(wp), intent(inout) :: stick           !! [M/(L^2 T^2)]
       type(data_t) :: data
       integer :: n
 
+      stick = 0.0_wp
       if (has_option(card, "ROUGH")) then
          coefficient = rough
          call refuse_lines(reader, card)
@@ -43,6 +45,11 @@ contains
          n = n + 1
          call get_real(reader, data, 1, "friction coefficient", coefficient)
          call drop_zeros(data, 1)
+         if (data%ok .and. data%n > 1) call get_real(reader, data, 1 + 1, "slope of stick", stick)
+         if (data%ok .and. stick < 0.0_wp) then
+            call data_error(reader, data, "the slope of stick " // to_text(stick) // " is negative")
+            stick = 0.0_wp
+         end if
          if (data%ok .and. coefficient < 0.0_wp) then
             call data_error(reader, data, "the friction coefficient " // to_text(coefficient) &
                // " is negative")
@@ -51,10 +58,10 @@ contains
          if (n == 2) then
             call data_error(reader, data, "only one data line is read: the coefficient is one " &
                // "for all rates, pressures and temperatures")
-         else if (n == 1 .and. data%n > 1) then
-            call data_error(reader, data, "only the coefficient is read: what sticks does not " &
-               // "move, so that there is no slope of stick, nothing else bounds friction, and " &
-               // "it depends on no rate, pressure or temperature; leave out what stands behind it")
+         else if (n == 1 .and. data%n > 1 + 1) then
+            call data_error(reader, data, "only the coefficient and a slope of stick are read: " &
+               // "nothing else bounds friction, and it depends on no rate, pressure or " // &
+               "temperature; leave out what stands behind them")
          end if
       end do
       if (n == 0) call card_error(reader, card, "a data line with the coefficient is missing")
@@ -77,6 +84,7 @@ contains
                call check_step(reader, pair(i), step(k), k)
             end do
             call check_pad(reader, scene, pair(i))
+            call check_stick(reader, pair(i))
             if (any(step_initiation(step) == initiation_massless) &
                .and. pair_keeps_mass(pair(i))) then
                call add_warning(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface " &
@@ -86,6 +94,22 @@ contains
          end do
       end associate
    end subroutine check_friction
+
+   !> What holds gaps sticks exactly; what gives way does so along the surface, too.
+   subroutine check_stick(reader, pair)
+      type(reader_t), intent(inout) :: reader
+      type(contact_pair_t), intent(in) :: pair
+
+      associate (surface => pair%interaction)
+         if (surface%pressure%kind == pressure_hard .and. surface%stick > 0.0_wp) then
+            call add_warning(reader%log, pair%origin, "*CONTACT PAIR: the slope of stick of its " &
+               // "*FRICTION has no effect: contact is hard, and what sticks does not move")
+         else if (surface%pressure%kind /= pressure_hard .and. .not. surface%stick > 0.0_wp) then
+            call refuse(reader, pair, "a PRESSURE-OVERCLOSURE by which it gives way, without a " &
+               // "slope of stick, shear by slip, behind the coefficient")
+         end if
+      end associate
+   end subroutine check_stick
 
    !> Nodes with a pad are discs. They roll if a rigid body turns them, over edges.
    subroutine check_pad(reader, scene, pair)
@@ -145,10 +169,8 @@ contains
          call refuse(reader, pair, "*CONTACT INITIATION, TYPE=VELOCITY UPDATE of step " // &
             to_text(k) // ": jumps of velocities have no friction")
       end if
-      if (pair%interaction%pressure%kind /= pressure_hard) then
-         call refuse(reader, pair, "a PRESSURE-OVERCLOSURE by which it gives way; leave out " // &
-            "either of them")
-      else if (.not. any(step%contact%method == [method_null_space, method_saddle_point])) then
+      if (pair%interaction%pressure%kind /= pressure_hard) return
+      if (.not. any(step%contact%method == [method_null_space, method_saddle_point])) then
          call refuse(reader, pair, "contact that gives way, in step " // to_text(k) // "; use " // &
             "*CONSTRAINT METHOD, TYPE=NULL SPACE")
       end if

@@ -28,7 +28,7 @@ module emcon_march
    use emcon_scheme_registry, only : scheme_user
    use emcon_state, only : state_t
    use emcon_step_control, only : control_forget
-   use emcon_system, only : system_init
+   use emcon_system, only : system_init, system_springs
    use emcon_term_registry, only : terms_massless
    use emcon_text, only : to_text
    use emcon_velocity_mass, only : velocity_update_free
@@ -72,8 +72,17 @@ contains
       call pair_sums_init(self%state%sums, self%system, scene%pair)
       call active_set_init(self%active, self%system)
       associate (contacts => self%state%contacts, friction => self%active%friction)
-         allocate(contacts%slip_path(size(friction%law)), source=0.0_wp)
-         allocate(contacts%slides_along, contacts%drag, contacts%slip, source=0.0_wp*friction%tau)
+         if (friction%is_on .or. any(system_springs(self%system))) then
+            associate (n_slip => size(scene%x, 1) - 1, n => self%system%n_constraint)
+               allocate(contacts%slip_path(n), source=0.0_wp)
+               allocate(contacts%slides_along(n_slip, n), contacts%drag(n_slip, n), &
+                  contacts%slip(n_slip, n), source=0.0_wp)
+            end associate
+         else
+            allocate(contacts%slip_path(0))
+            allocate(contacts%slides_along, contacts%drag, contacts%slip, &
+               source=0.0_wp*friction%tau)
+         end if
       end associate
       call ledger_init(self%ledger, scene%n_dim)
       call overlap_check_init(self%overlap_check, scene)

@@ -2,6 +2,7 @@
 module emcon_march_commit
    use emcon_constraint, only : condition_friction, most_slips
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_dissipated, &
+      constraints_row_stored, &
       constraints_force
    use emcon_correction, only : correction_reason
    use emcon_contact_law, only : loss_damping, loss_friction
@@ -242,12 +243,14 @@ contains
       associate (state => self%state, set => self%active%set, layer => self%layer, &
             penalty => self%explicit%penalty(self%explicit%i_start))
          call state%contacts%clear()
-         call penalty_keep(self%active%penalty, set, state%contacts%closure)
+         call penalty_keep(self%active%penalty, set, state%contacts%closure, &
+            state%contacts%stretch)
          if (self%active%penalty%is_at_ends) then
             do k = 1, size(penalty%id)
                call state%contacts%keep(penalty%id(k), penalty%lam(k), .true.)
             end do
-            call penalty_keep(self%active%penalty, penalty, state%contacts%closure)
+            call penalty_keep(self%active%penalty, penalty, state%contacts%closure, &
+               state%contacts%stretch)
          end if
          do k = 1, set%n
             acts = .true.
@@ -268,12 +271,23 @@ contains
       type(march_t), intent(inout) :: self       !! some contact rubs
       integer, intent(in) :: k                   !! place in the set, up to n
       real(wp) :: drag(most_slips)
+      logical :: is_spring
 
+      is_spring = allocated(self%active%set%law(k)%row)
+      if (is_spring) is_spring = self%active%set%law(k)%row%has_friction
+      if (.not. (is_spring .or. self%active%friction%is_on)) return
       associate (contacts => self%state%contacts, item => self%active%set%item(k), &
-            id => self%active%set%id(k), n => self%active%friction%n_slip)
-         if (.not. self%active%friction%law(id)%mu > 0.0_wp) return
-         contacts%slides_along(:, id) = self%active%friction%law(id)%status%direction(:n)
-         drag = condition_friction(item, self%active%set%lam(k))
+            id => self%active%set%id(k), n => size(self%state%u, 1) - 1)
+         if (is_spring) then
+            drag = item%response%tau
+            contacts%slides_along(:, id) = 0.0_wp
+            if (constraints_dissipated(self%active%set, k, loss_friction) > 0.0_wp) &
+               contacts%slides_along(:, id) = drag(:n)/max(norm2(drag), tiny(drag))
+         else
+            if (.not. self%active%friction%law(id)%mu > 0.0_wp) return
+            contacts%slides_along(:, id) = self%active%friction%law(id)%status%direction(:n)
+            drag = condition_friction(item, self%active%set%lam(k))
+         end if
          contacts%drag(:, id) = drag(:n)
          contacts%slip(:, id) = contacts%slip(:, id) + item%slip(:n)
          contacts%slip_path(id) = contacts%slip_path(id) + norm2(item%slip)
@@ -408,6 +422,7 @@ contains
          else if (evaluation_has_inertia(motion%evaluation)) then
             do k = 1, set%n
                contact_work = contact_work + set%lam(k)*set%item(k)%dgap
+               if (k > set%n_permanent) contact_work = contact_work - constraints_row_stored(set, k)
             end do
             self%ledger%external_work = self%ledger%external_work &
                + sum(part(role_external)%force*motion%du) + sum(state%reaction*motion%du) &

@@ -14,6 +14,7 @@ module emcon_quantities
    use emcon_rigid_rotation, only : rigid_rotation_spin
    use emcon_rotation, only : n_turn
    use emcon_solid, only : solid_t
+   use emcon_system, only : system_springs
    use emcon_stepper, only : stepper_t
    use emcon_steps, only : step_square
    use emcon_stress, only : element_energies, element_means, nodal_stress, von_mises
@@ -293,12 +294,16 @@ contains
       character(len=*), intent(in) :: variable
       real(dp), allocatable :: values(:, :)
       real(wp) :: drag(stepper%scene%n_dim - 1)
+      logical, allocatable :: rubs(:)
       integer :: n, i
 
       n = quantity_components(variable, at_contacts, stepper%scene%n_dim)
       allocate(values(n, stepper%march%system%n_constraint), source=0.0_dp)
-      if (.not. stepper%march%active%friction%is_on) return
-      associate (state => stepper%march%state, law => stepper%march%active%friction%law)
+      if (size(stepper%march%state%contacts%drag) == 0) return
+      rubs = system_springs(stepper%march%system)
+      if (stepper%march%active%friction%is_on) rubs = rubs .or. &
+         stepper%march%active%friction%law%mu > 0.0_wp
+      associate (state => stepper%march%state)
          if (variable == "CSLIP") then
             values(:n - 1, :) = real(state%contacts%slip, dp)
             values(n, :) = real(state%contacts%slip_path, dp)
@@ -309,7 +314,7 @@ contains
             if (allocated(state%pairs%jump_drag)) drag = drag + state%pairs%jump_drag(:, i)
             if (state%pairs%shear_area(i) > 0.0_wp) values(:n - 1, i) &
                = real(drag/state%pairs%shear_area(i), dp)
-            if (law(i)%mu > 0.0_wp) values(n, i) = real(state%contacts%status(i), dp)
+            if (rubs(i)) values(n, i) = real(state%contacts%status(i), dp)
          end do
       end associate
    end function rubbing

@@ -62,6 +62,7 @@ module emcon_interactions
       real(wp) :: offset = 0.0_wp                    !! of the gap: a layer in between, >= 0 [L]
       real(wp) :: restitution = 1.0_wp               !! of impacts, 0 to 1
       real(wp) :: friction = 0.0_wp                  !! mu of Coulomb's law, >= 0
+      real(wp) :: stick = 0.0_wp                     !! slope of stick, 0: exact [M/(L^2 T^2)]
       real(wp) :: rebound = 0.0_wp                   !! along the surface, of what sticks, 0 to 1
       type(contact_damping_t) :: damping
       type(pressure_t) :: pressure

@@ -1,5 +1,6 @@
 !> Where an analysis stands: all that the next increment depends on.
 module emcon_state
+   use emcon_constraint, only : most_slips
    use emcon_factor_base, only : factor_base_t
    use emcon_kinds, only : wp
    use emcon_pair_record, only : pair_record_t
@@ -32,6 +33,7 @@ module emcon_state
       real(wp), allocatable :: lam(:)            !! (n_constraint) contact forces, 0 where inactive
       !> (n_constraint) how far contact by penalty is closed as it stores, <= 0; > 0: as its gap [L]
       real(wp), allocatable :: closure(:)
+      real(wp), allocatable :: stretch(:, :)     !! (most_slips, n_constraint) of their springs [L]
       ! Vectors along the surface, of n_dim - 1 components; with friction, else of no constraint:
       !> (n_slip, n_constraint) direction of slip where it slides, of length 1; 0: it sticks
       real(wp), allocatable :: slides_along(:, :)
@@ -92,7 +94,7 @@ contains
       integer, intent(in) :: n                   !! constraints
 
       allocate(self%is_active(n), source=.false.)
-      allocate(self%lam(n), self%closure(n), source=0.0_wp)
+      allocate(self%lam(n), self%closure(n), self%stretch(most_slips, n), source=0.0_wp)
    end subroutine contacts_begin
 
    !> Nothing acts, stores or rubs any more.
@@ -102,6 +104,7 @@ contains
       self%is_active = .false.
       self%lam = 0.0_wp
       self%closure = 0.0_wp
+      self%stretch = 0.0_wp
       self%slides_along = 0.0_wp
       self%drag = 0.0_wp
    end subroutine contacts_clear

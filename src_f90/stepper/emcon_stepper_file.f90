@@ -199,6 +199,11 @@ contains
          else
             state%contacts%closure = 0.0_wp
          end if
+         if (restart_offers(restart, "stretch", any(abs(state%contacts%stretch) > 0.0_wp))) then
+            call restart_exchange(restart, "stretch", state%contacts%stretch)
+         else
+            state%contacts%stretch = 0.0_wp
+         end if
          if (restart_offers(restart, "drag", size(state%contacts%drag) > 0)) then
             call exchange_directions(state, restart)
             call restart_exchange(restart, "drag", state%contacts%drag)

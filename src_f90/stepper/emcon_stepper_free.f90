@@ -125,6 +125,7 @@ contains
       if (present(u)) call measure_rest(self, next, error)
       if (allocated(error)) return
       if (present(u)) next%contacts%closure = 1.0_wp
+      if (present(u)) next%contacts%stretch = 0.0_wp
       next%base%is_set = .false.
       call control_forget(next%control)
       call march_go_back(self%march, next, self%march%ledger)

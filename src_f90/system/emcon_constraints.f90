@@ -20,7 +20,7 @@ module emcon_constraints
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_force
    public :: constraints_stick, constraints_take_hold, constraints_gives_back
    public :: constraints_add_law_forces, constraints_add_row_forces, constraints_lam, &
-      constraints_dissipated
+      constraints_dissipated, constraints_row_stored
    public :: constraint_index, constraints_rounding, constraints_add_rounding
 
    !> Of the rows of gaps that do not hold: laws give their multipliers.
@@ -234,7 +234,25 @@ contains
       dissipated = 0.0_wp
       if (allocated(self%law(k)%beside)) dissipated = contact_laws_dissipated(self%law(k), &
          values_of(self, k), kind)
+      if (.not. allocated(self%law(k)%row)) return
+      associate (row => self%law(k)%row)
+         if (row%loss == kind) dissipated = dissipated + row%dissipated(values_of(self, k), &
+            self%item(k)%response)
+      end associate
    end function constraints_dissipated
+
+   !> What friction of the law in place of row `k` has taken and not lost: springs store it.
+   pure real(wp) function constraints_row_stored(self, k) result(work)
+      type(constraint_set_t), intent(in) :: self
+      integer, intent(in) :: k                   !! n_permanent + 1..n
+
+      work = 0.0_wp
+      if (.not. allocated(self%law(k)%row)) return
+      associate (row => self%law(k)%row, item => self%item(k))
+         if (row%has_friction) work = dot_product(item%response%tau, item%slip) &
+            - row%dissipated(values_of(self, k), item%response)
+      end associate
+   end function constraints_row_stored
 
    !> What the laws of condition `k` give. One in place of the row of its gap gives the multiplier,
    !> or what one under way lacks of it, and leaves no defect.
@@ -250,11 +268,24 @@ contains
          call law%row%respond(values_of(self, k), response)
          penalty%left(k) = self%defect(k)
          penalty%slope(k) = response%stiffness(0, 0)
+         if (law%row%has_friction) call take_friction(self%item(k)%response, response, &
+            allocated(law%beside))
          penalty%lack(k) = merge(response%lam - self%lam(k), 0.0_wp, penalty%is_under_way)
          self%lam(k) = response%lam - penalty%lack(k)
          self%defect(k) = 0.0_wp
       end associate
    end subroutine respond
+
+   !> Friction of a law in place of a row.
+   pure subroutine take_friction(self, response, adds)
+      type(contact_response_t), intent(inout) :: self
+      type(contact_response_t), intent(in) :: response   !! of the law
+      logical, intent(in) :: adds                !! to what laws beside it have given
+
+      if (.not. adds) self = contact_response_t()
+      self%tau = self%tau + response%tau
+      self%stiffness(1:, :) = self%stiffness(1:, :) + response%stiffness(1:, :)
+   end subroutine take_friction
 
    !> Forces on all nodes of the conditions from the `first` one on, and of laws; with `magnitude`
    !> the sum of their sizes.

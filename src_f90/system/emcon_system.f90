@@ -32,7 +32,7 @@ module emcon_system
    private
    public :: system_t, system_init, system_begin_step, system_renew, system_respond, &
       system_find_energy, system_check_response, system_stiffen, system_tangent_times, &
-      system_loads, system_may_hold, mass_times
+      system_loads, system_may_hold, system_springs, mass_times
 
    type :: system_t
       type(term_box_t), allocatable :: term(:)
@@ -403,6 +403,22 @@ contains
          call self%term(k)%term%tangent_times(motion, direction, product)
       end do
    end subroutine system_tangent_times
+
+   !> Which contacts slip against springs, where they give way?
+   pure function system_springs(self) result(springs)
+      type(system_t), intent(in) :: self
+      logical :: springs(self%n_constraint)
+      integer :: k
+
+      springs = .false.
+      do k = 1, size(self%contact)
+         associate (laws => self%contact(k)%contact%laws)
+            if (.not. allocated(laws%row)) cycle
+            springs(self%first_constraint(k) + 1:self%first_constraint(k + 1)) &
+               = laws%row%has_friction
+         end associate
+      end do
+   end function system_springs
 
    !> M field, in all directions.
    pure subroutine mass_times(self, field, product)

@@ -40,6 +40,7 @@ module emcon_contact_law
       real(wp) :: share = 1.0_wp
       !> `closure` of the step before, <= 0: 0 where the law did not push; > 0: nothing is known
       real(wp) :: closure = 1.0_wp
+      real(wp) :: stretch(most_slips) = 0.0_wp   !! that of the step before [L]
       real(wp) :: gap = 0.0_wp                   !! mean gap as the step begins [L]
       logical :: is_closed = .false.             !! it touches, whatever the gap says
    end type contact_place_t
@@ -58,6 +59,7 @@ module emcon_contact_law
       procedure :: dissipated
       procedure :: stiffest
       procedure :: closure
+      procedure :: stretch
       procedure :: gives_back
       procedure :: rate_change
    end type contact_law_t
@@ -152,6 +154,14 @@ contains
 
       closure = 0.0_wp
    end function closure
+
+   !> The same of springs that slip stretches, 0 unless overridden [L].
+   pure function stretch(self)
+      class(contact_law_t), intent(in) :: self   !! it has responded
+      real(wp) :: stretch(most_slips)
+
+      stretch = 0.0_wp
+   end function stretch
 
    !> Has the law stored in steps before what it gives back in this one? Not unless overridden.
    pure logical function gives_back(self)
@@ -258,6 +268,7 @@ contains
       integer :: i
 
       rub = .false.
+      if (allocated(self%row)) rub = self%row%has_friction
       if (.not. allocated(self%beside)) return
       do i = 1, size(self%beside)
          rub = rub .or. self%beside(i)%law%has_friction

@@ -2,7 +2,8 @@
 !> `emcon_contact_law_kinds` alone.
 module emcon_contact_law_registry
    use emcon_contact_law, only : contact_law_t, contact_laws_add, contact_laws_t
-   use emcon_interactions, only : interaction_t
+   use emcon_interactions, only : interaction_t, pressure_hard
+   use emcon_steps, only : method_penalty
    implicit none
    private
    public :: contact_laws_of_surface, contact_law_of_method, contact_law_in_place
@@ -21,7 +22,8 @@ module emcon_contact_law_registry
 
 contains
 
-   !> The laws that act beside the rows of a pair whose surfaces are `surface`.
+   !> The laws that act beside the rows of a pair whose surfaces are `surface`, and that in place of
+   !> them where its contact gives way.
    subroutine contact_laws_of_surface(surface, laws)
       type(interaction_t), intent(in) :: surface
       type(contact_laws_t), intent(out) :: laws
@@ -34,6 +36,8 @@ contains
          call law%take(surface, 0, acts)
          if (acts) call contact_laws_add(laws, law)
       end do
+      if (surface%pressure%kind /= pressure_hard) call contact_law_in_place(surface, &
+         method_penalty, laws%row)
    end subroutine contact_laws_of_surface
 
    !> The law that acts in place of the rows of gaps in steps of a method.
@@ -54,6 +58,10 @@ contains
       integer :: kind
 
       alone%pressure = surface%pressure          ! others act beside
+      if (surface%pressure%kind /= pressure_hard) then
+         alone%friction = surface%friction
+         alone%stick = surface%stick
+      end if
       do kind = 1, n_kind()
          call allocate_law(kind, law)
          call law%take(alone, method, acts)

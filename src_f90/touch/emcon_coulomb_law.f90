@@ -9,7 +9,7 @@
 module emcon_coulomb_law
    use emcon_constraint, only : contact_response_t, most_slips
    use emcon_contact_law, only : contact_law_t, contact_values_t, loss_friction
-   use emcon_interactions, only : interaction_t
+   use emcon_interactions, only : interaction_t, pressure_hard
    use emcon_kinds, only : wp
    implicit none
    private
@@ -78,7 +78,7 @@ contains
       self%restitution = surface%rebound
       self%has_friction = .true.
       self%loss = loss_friction
-      acts = self%mu > 0.0_wp
+      acts = self%mu > 0.0_wp .and. surface%pressure%kind == pressure_hard
    end subroutine coulomb_take
 
    !> It is asked with the row of its condition.

@@ -27,6 +27,7 @@ module emcon_penalty_law
       procedure :: respond => penalty_respond
       procedure :: push => penalty_push
       procedure :: push_over => penalty_push_over
+      procedure :: rub => penalty_rub
       procedure :: stored
       procedure :: stiffest
       procedure :: closure
@@ -101,6 +102,7 @@ contains
       self%now = at%gap1
       if (.not. at%is_stored) then
          call self%push(at%left, response%lam, response%stiffness(0, 0))
+         call self%rub(at, response)
          return
       end if
       if (self%before < 0.0_wp .or. (at%gap0 < 0.0_wp .and. .not. self%before > 0.0_wp)) then
@@ -108,7 +110,15 @@ contains
          self%now = start + at%dgap
       end if
       call self%push_over(start, self%now, response%lam, response%stiffness(0, 0))
+      call self%rub(at, response)
    end subroutine penalty_respond
+
+   !> Friction under the push that `response` has; none unless overridden.
+   pure subroutine penalty_rub(self, at, response)
+      class(penalty_t), intent(inout) :: self
+      type(contact_values_t), intent(in) :: at
+      type(contact_response_t), intent(inout) :: response
+   end subroutine penalty_rub
 
    !> Push and stiffness where the gap is; where it is open a pull, that what pulls may be let go.
    pure subroutine penalty_push(self, gap, lam, stiffness)

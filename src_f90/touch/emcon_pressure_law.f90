@@ -2,10 +2,14 @@
 !>
 !> A curve p(o) of *SURFACE BEHAVIOR stores W, the integral of p, per area; o = -g of the gap g.
 !> From the gap on at which it begins to push it is a penalty with that potential: over a step its
-!> force is the mean of p over the way. Source: docs/theory.md, eqs. (20f), (20k) and (20l).
+!> force is the mean of p over the way. With *FRICTION slip stretches a spring, up to the
+!> coefficient times the push. Source: docs/theory.md, eqs. (20f) and (20k) to (20n).
 module emcon_pressure_law
-   use emcon_contact_law, only : contact_place_t
+   use emcon_constraint, only : contact_response_t, most_slips
+   use emcon_contact_law, only : contact_place_t, contact_values_t, loss_friction
    use emcon_dgrad_series, only : sinh_ratio
+   use emcon_elastic_slip, only : elastic_slip_at_end, elastic_slip_open, elastic_slip_over, &
+      elastic_slip_t
    use emcon_interactions, only : interaction_t, pressure_exponential, pressure_hard, &
       pressure_linear, pressure_reach, pressure_t, pressure_tabular
    use emcon_kinds, only : wp
@@ -32,12 +36,18 @@ module emcon_pressure_law
    type, extends(penalty_t) :: pressure_law_t
       type(pressure_t) :: curve
       real(wp) :: area = 0.0_wp                  !! of the condition [L^2]
+      real(wp) :: mu = 0.0_wp                    !! of friction, 0: none
+      real(wp) :: stick = 0.0_wp                 !! slope of that, shear by slip [M/(L^2 T^2)]
+      type(elastic_slip_t) :: before_slip, spring   !! as a step begins, and after it
    contains
       procedure :: take => pressure_take
       procedure :: begin => pressure_begin
       procedure :: push => pressure_push
       procedure :: push_over => pressure_push_over
+      procedure :: rub => pressure_rub
       procedure :: stored => pressure_law_stored
+      procedure :: dissipated => pressure_dissipated
+      procedure :: stretch => pressure_stretch
       procedure :: stiffest => pressure_stiffest
    end type pressure_law_t
 
@@ -52,6 +62,10 @@ contains
 
       self%curve = surface%pressure
       self%reach = pressure_reach(surface%pressure)
+      self%mu = surface%friction
+      self%stick = surface%stick
+      self%has_friction = min(self%mu, self%stick) > 0.0_wp
+      self%loss = loss_friction
       acts = method /= 0 .and. self%curve%kind /= pressure_hard
    end subroutine pressure_take
 
@@ -62,6 +76,8 @@ contains
       call self%penalty_t%begin(place)
       self%area = place%area
       self%now = min(self%before, 0.0_wp)
+      self%before_slip%stretch = place%stretch/place%share
+      self%spring = self%before_slip
    end subroutine pressure_begin
 
    !> Push and stiffness where the gap is; beyond the end of its reach a pull, that what pulls may
@@ -96,8 +112,56 @@ contains
    pure real(wp) function pressure_law_stored(self) result(stored)
       class(pressure_law_t), intent(in) :: self
 
-      stored = self%area*pressure_stored(self%curve, -self%share*self%now - self%reach)
+      stored = self%area*pressure_stored(self%curve, -self%share*self%now - self%reach) &
+         + 0.5_wp*spring_stiffness(self)*sum(self%spring%stretch**2)
    end function pressure_law_stored
+
+   !> Drag of the spring, up to the coefficient times the push, and what of it is lost.
+   pure subroutine pressure_rub(self, at, response)
+      class(pressure_law_t), intent(inout) :: self
+      type(contact_values_t), intent(in) :: at
+      type(contact_response_t), intent(inout) :: response
+      real(wp) :: limit
+
+      if (.not. self%has_friction) return
+      self%spring = self%before_slip
+      associate (spring => self%spring, stiffness => spring_stiffness(self))
+         limit = self%mu*max(0.0_wp, response%lam)/stiffness
+         if (at%is_stored) then
+            call elastic_slip_over(spring, limit, at%slip)
+            if (.not. self%now < 0.0_wp) call elastic_slip_open(spring)
+         else
+            call elastic_slip_at_end(spring, limit, at%slip)
+         end if
+         response%tau = stiffness*spring%drag
+         response%stiffness(1:, 1:) = stiffness*spring%by_slip
+         if (limit > 0.0_wp) response%stiffness(1:, 0) = &
+            -self%mu*spring%by_limit*response%stiffness(0, 0)
+      end associate
+   end subroutine pressure_rub
+
+   !> Of the spring: what it stores is a function of the slip over the whole area, as of gaps
+   !> [M/T^2].
+   pure real(wp) function spring_stiffness(self)
+      class(pressure_law_t), intent(in) :: self
+
+      spring_stiffness = self%stick*self%area*self%share**2
+   end function spring_stiffness
+
+   pure real(wp) function pressure_dissipated(self, at, response) result(dissipated)
+      class(pressure_law_t), intent(in) :: self
+      type(contact_values_t), intent(in) :: at
+      type(contact_response_t), intent(in) :: response
+
+      dissipated = spring_stiffness(self)*self%spring%loss
+   end function pressure_dissipated
+
+   pure function pressure_stretch(self) result(stretch)
+      class(pressure_law_t), intent(in) :: self
+      real(wp) :: stretch(most_slips)
+
+      stretch = self%share*self%spring%stretch
+   end function pressure_stretch
 
    pure real(wp) function pressure_stiffest(self) result(stiffest)
       class(pressure_law_t), intent(in) :: self

@@ -562,6 +562,7 @@ contains
          0, coulomb_t(mu=0.5_wp))
       contacts%lam = [1.0_wp, 2.0_wp]
       contacts%closure = [-0.1_wp, -0.2_wp]
+      allocate(contacts%stretch(2, 2), source=0.0_wp)
       do k = 0, 3
          acts = btest(k, [0, 1])
          active%is_active = acts
@@ -644,6 +645,8 @@ contains
          state%contacts%is_active = [.true., .true., .false., .true.]
          state%contacts%lam = [1.0_wp, 2.0_wp, 0.0_wp, 3.0_wp]
          state%contacts%closure = [0.1_wp, -0.1_wp, -0.1_wp, 0.0_wp]
+         if (.not. allocated(state%contacts%stretch)) allocate(state%contacts%stretch(2, 4), &
+            source=0.0_wp)
          motion%evaluation = evaluation_moving(1.0_wp, 0.5_wp, 2.0_wp)
          motion%evaluation%pushes_at_end = k == 3
          if (k == 2) motion%evaluation = evaluation_at_end

@@ -197,6 +197,7 @@ contains
             = self%was_active
          allocate(contacts%lam(n), source=0.0_wp)
          allocate(contacts%closure(n), source=1.0_wp)
+         allocate(contacts%stretch(2, n), source=0.0_wp)
          allocate(contacts%slides_along(1, n), source=self%slides_along)
          allocate(contacts%drag(1, n), source=0.0_wp)
          if (allocated(self%start)) contacts%lam = self%lam

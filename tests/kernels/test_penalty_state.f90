@@ -214,7 +214,7 @@ contains
       type(system_t) :: system
       type(penalty_state_t) :: state
       type(active_set_t) :: active
-      real(wp) :: closure(3), energy
+      real(wp) :: closure(3), energy, stretch(2, 3)
       logical :: owes(2)
       integer :: k
 
@@ -224,7 +224,8 @@ contains
          call set_now(active, -0.2_wp, 0.1_wp)
          active%set%penalty%is_on = k /= 3
          closure = 7.0_wp
-         call penalty_keep(state, active%set, closure)
+         stretch = 0.0_wp
+         call penalty_keep(state, active%set, closure, stretch)
          energy = penalty_stored(state, active%set)
          if (k == 1) then
             call check_near(error, [energy, closure], [0.2_wp, -0.2_wp, 7.0_wp, 0.0_wp], tol, &

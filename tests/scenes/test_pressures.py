@@ -170,3 +170,78 @@ def test_a_run_goes_on_from_its_middle(tmp_path):
     copy = restart(run, tmp_path/"copy")
     assert "resumed after increment 10" in copy.log
     assert copy.digits() == run.digits()
+
+
+# ---- friction with a slope of stick -------------------------------------------------------------
+
+MU, STICK = 0.3, 50.0
+
+
+def rubs(deck_, free=True):
+    text = deck_.text().replace("*CONTACT PAIR", f"*FRICTION\n{MU}, {STICK}\n*CONTACT PAIR")
+    return text.replace("1, 1\n2, 1\n3, 1\n4, 1\n", "") if free else text
+
+
+def requests(text):
+    return text[text.index("*NODE FILE"):]
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_a_block_is_moved_to_and_fro(formulation, tmp_path):
+    """Pressed by 1, all nodes led along: the spring, up to the coefficient times the push."""
+    text = rubs(deck("LINEAR\n100.", formulation, ""))
+    ask = requests(text).replace("CF\n", "CF, CSHEAR, CSLIP\n")
+    text = text[:text.index("*NODE FILE")]
+    led = "".join(f"{k}, 1, 1, .02\n" for k in range(1, 5))
+    text += ("*AMPLITUDE, NAME=A, TIME=TOTAL TIME\n0., 0., 1., 0., 1.5, 1., 2.5, -1., 3.5, 1.\n*STEP\n*STATIC\n.25, 1.\n"
+             "*BOUNDARY\n1, 1\n2, 1\n3, 1\n4, 1\n*CLOAD\n3, 2, -.5\n4, 2, -.5\n" + ask
+             + "*STEP\n*STATIC\n.05, 2.5\n*BOUNDARY, OP=NEW\n5, 1, 2\n6, 1, 2\n7, 1, 2\n8, 1, 2\n"
+             "*BOUNDARY, AMPLITUDE=A\n" + led + ask)
+    run = run_deck(Deck(text, "pressure"), tmp_path)
+    assert run.verdict["verdict"] == "good"
+    fields = run.fields()
+    way, force = fields["displacement"][:, 0, 0], fields["contact_force"][:, :2, 0].sum(axis=1)
+    shear = fields["contact_shear"]
+    stretch, last = 0.0, 0.0
+    for k in range(5, len(way)):
+        stretch = np.clip(stretch + way[k] - last, -MU/STICK, MU/STICK)
+        last = way[k]
+        assert force[k] == pytest.approx(-STICK*stretch, abs=1e-9)
+        # Slip counts along the floor's edge, which goes to the left.
+        assert shear[k][:2].mean() == pytest.approx(-STICK*stretch, abs=1e-8)
+    assert np.abs(force).max() == pytest.approx(MU, rel=1e-9) and force.min() < 0 < force.max()
+    # Each way from side to side: to the limit on the other side, and on at it.
+    loss = MU*(0.02 - MU/STICK) + 2*MU*(0.04 - 2*MU/STICK)
+    assert run.history["friction_loss"][-1] == pytest.approx(loss, rel=1e-6)
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("behaviour", BEHAVIOURS)
+def test_it_slides_to_rest(behaviour, formulation, tmp_path):
+    """Energy with what friction took is that of the start; friction never gives; it goes about as far as
+    a mass point that mu g stops."""
+    start = "*INITIAL CONDITIONS, TYPE=VELOCITY\n1, 1, .3\n2, 1, .3\n3, 1, .3\n4, 1, .3\n"
+    step = dynamic(0.005, 1.5) + "*DLOAD\nA, GRAV, 1., 0., -1.\n"
+    run = run_deck(Deck(rubs(deck(behaviour, formulation, step, start=start)), "pressure"), tmp_path)
+    history = run.history
+    assert run.verdict["verdict"] == "good" and run.verdict["cuts"] == 0
+    balance = history["total"] + history["friction_loss"]
+    assert np.abs(balance - balance[0]).max() < 1e-12
+    assert np.diff(history["friction_loss"]).min() >= 0.0
+    assert history["friction_loss"][-1] == pytest.approx(0.045, rel=0.1)
+    # It bounces once and a half on the way, as it begins without a pressure.
+    way = run.fields()["displacement"][-1, :4, 0].mean()
+    assert way == pytest.approx(0.5*0.3**2/MU, rel=0.25)
+
+
+def test_friction_goes_on_from_the_middle(tmp_path):
+    text = rubs(deck("LINEAR\n100.", "MORTAR", dynamic(0.005, 0.2) + "*DLOAD\nA, GRAV, 1., 0., -1.\n",
+                     start="*INITIAL CONDITIONS, TYPE=VELOCITY\n1, 1, .3\n2, 1, .3\n3, 1, .3\n4, 1, .3\n"))
+    step = text[text.index("*STEP"):]
+    text = text.replace("*NODE FILE", "*RESTART, WRITE, FREQUENCY=40\n*NODE FILE") \
+        + step.replace("*NODE FILE", "*RESTART, WRITE, FREQUENCY=0\n*NODE FILE")
+    run = run_deck(Deck(text, "pressure"), tmp_path/"whole")
+    (tmp_path/"copy").mkdir()
+    copy = restart(run, tmp_path/"copy")
+    assert "resumed after increment 40" in copy.log
+    assert copy.digits() == run.digits()
