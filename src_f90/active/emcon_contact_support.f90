@@ -21,7 +21,7 @@ module emcon_contact_support
    use emcon_mechanism_text, only : describe_motion
    use emcon_mechanism_rows, only : mechanism_rows_append, mechanism_rows_find, mechanism_rows_t
    use emcon_scene, only : scene_t
-   use emcon_system, only : system_loads, system_stiffen, system_t
+   use emcon_system, only : system_loads, system_springs, system_stiffen, system_t
    implicit none
    private
    public :: contact_support_t, contact_support_begin, contact_support_forget, &
@@ -84,7 +84,7 @@ contains
          call mechanism_rows_find(system, step%prescribed, self%supports)
       end associate
       allocate(self%is_loose(system%space%n_body), self%hangs(system%space%n_body), source=.false.)
-      allocate(self%grips(system%n_constraint), source=.false.)
+      allocate(self%grips, source=system_springs(system))
       allocate(self%brought(system%n_constraint), self%overclosure(system%n_constraint), &
          source=0.0_wp)
       if (size(system%contact) == 0) return

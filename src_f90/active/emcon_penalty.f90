@@ -109,10 +109,8 @@ contains
             given => step%contact%penalty%stiffness)
          call contact%own_area(scene%x, area)
          if (.not. sum(area) > 0.0_wp) then
-            call raise(error, err_input, where_text(scene, step%contact%penalty%origin) &
-               // ": error: " &
-               // "*CONSTRAINT METHOD: a slave surface made of nodes has no area to give way " // &
-               "by; name its elements and faces, or use TYPE=NULL SPACE")
+            call refuse("a slave surface made of nodes has no area to give way by; name its " // &
+               "elements and faces, or let contact be hard")
             return
          end if
          self%area(before + 1:before + size(area)) = area*contact%area_factor
@@ -132,16 +130,30 @@ contains
          if (.not. by_area > 0.0_wp) by_area = factor &
             *of_opposite(system, scene, k, inner)/sum(area)
          if (.not. by_area > 0.0_wp) then
-            call raise(error, err_input, where_text(scene, step%contact%penalty%origin) &
-               // ": error: " &
-               // "*CONSTRAINT METHOD: no elastic element stands on either surface of a contact " &
-               // "pair: give its STIFFNESS, pressure by penetration")
+            call refuse("no elastic element stands on either surface of a contact pair: give " // &
+               "its STIFFNESS, pressure by penetration")
             return
          end if
          self%stiffness(before + 1:before + size(area)) = area*contact%area_factor*by_area
          if (k <= system%n_pair) call note_add(system%notes, "contact of pair " // to_text(k) // &
             " gives way by a stiffness of " // to_text(by_area, 9) // ", pressure by penetration")
       end associate
+
+   contains
+
+      !> At the card of the method, or at the pair, which gives way by a pressure.
+      subroutine refuse(what)
+         character(len=*), intent(in) :: what
+
+         if (step%contact%penalty%origin%line > 0) then
+            call raise(error, err_input, where_text(scene, step%contact%penalty%origin) // &
+               ": error: *CONSTRAINT METHOD: " // what)
+         else
+            call raise(error, err_input, where_text(scene, scene%pair(abs(system%contact( &
+               k)%of_pair))%origin) // ": error: *CONTACT PAIR: " // what)
+         end if
+      end subroutine refuse
+
    end subroutine set_contact
 
    !> Have the surfaces of a contact a law of their own, by which it gives way?

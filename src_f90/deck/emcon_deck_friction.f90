@@ -23,8 +23,8 @@ module emcon_deck_friction
 contains
 
    !> The coefficient of Coulomb's law, and the slope of stick: shear by slip, 0 where stick is
-   !> exact. Nothing but the coefficient bounds friction. What is rough does not slide: a coefficient
-   !> that no force is above.
+   !> exact. Nothing but the coefficient bounds friction. What is rough does not slide: a
+   !> coefficient that no force is above.
    subroutine read_friction(reader, card, coefficient, stick)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card

@@ -245,3 +245,18 @@ def test_friction_goes_on_from_the_middle(tmp_path):
     copy = restart(run, tmp_path/"copy")
     assert "resumed after increment 40" in copy.log
     assert copy.digits() == run.digits()
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("behaviour", BEHAVIOURS)
+def test_friction_alone_holds_a_block(behaviour, formulation, tmp_path):
+    """Nothing else does sideways: it slips by the shear over the slope; no static state above mu N."""
+    def pushed(push):
+        step = "*STEP\n*STATIC\n.5, 1.\n*CLOAD\n3, 2, -.5\n4, 2, -.5\n" \
+            f"1, 1, {push/2!r}\n2, 1, {push/2!r}\n"
+        return Deck(rubs(deck(behaviour, formulation, step, young=1e7)), "pressure")
+    run = run_deck(pushed(0.2), tmp_path/"below")
+    assert run.verdict["verdict"] == "good"
+    assert run.fields()["displacement"][-1, :2, 0].mean() == pytest.approx(0.2/STICK, rel=1e-4)
+    done, _ = attempt(pushed(0.4), tmp_path/"above", (), {})
+    assert done.returncode == 3, done.stderr
