@@ -101,16 +101,14 @@ contains
       integer, intent(in) :: k
       real(wp), intent(in) :: inner(:)           !! (n_node) stiffness of what stands there [M/T^2]
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: area(system%contact(k)%contact%n_constraint), by_area, factor
+      real(wp) :: area(system%contact(k)%contact%n_constraint), by_area
 
-      factor = step%contact%penalty%factor
-      if (self%augments) factor = augmented_factor*factor
-      associate (contact => system%contact(k)%contact, before => system%first_constraint(k), &
-            given => step%contact%penalty%stiffness)
+      associate (contact => system%contact(k)%contact, before => system%first_constraint(k))
          call contact%own_area(scene%x, area)
          if (.not. sum(area) > 0.0_wp) then
-            call refuse("a slave surface made of nodes has no area to give way by; name its " // &
-               "elements and faces, or let contact be hard")
+            call refuse(scene, step, system%contact(k)%of_pair, "a slave surface " // &
+               "made of nodes has no area to give way by; name its elements and faces, or let " // &
+               "contact be hard", error)
             return
          end if
          self%area(before + 1:before + size(area)) = area*contact%area_factor
@@ -120,41 +118,53 @@ contains
          if (has_own_law(self, contact)) then
             if (k > system%n_pair) return
             contact%step%engages = contact%laws%row%reach
-            call note_add(system%notes, "contact of pair " // to_text(k) &
-               // " gives way by the PRESSURE-OVERCLOSURE of its surfaces")
+            call tell("the PRESSURE-OVERCLOSURE of its surfaces")
             return
          end if
          self%is_meant = .false.
-         by_area = given
-         if (.not. given > 0.0_wp) by_area = factor*sum(inner(contact%node))/sum(area)
-         if (.not. by_area > 0.0_wp) by_area = factor &
-            *of_opposite(system, scene, k, inner)/sum(area)
+         by_area = step%contact%penalty%stiffness
+         if (.not. by_area > 0.0_wp) by_area = step%contact%penalty%factor*merge( &
+            augmented_factor, 1.0_wp, self%augments)*of_either(system, scene, k, inner)/sum(area)
          if (.not. by_area > 0.0_wp) then
-            call refuse("no elastic element stands on either surface of a contact pair: give " // &
-               "its STIFFNESS, pressure by penetration")
+            call refuse(scene, step, system%contact(k)%of_pair, "no elastic " // &
+               "element stands on either surface of a contact pair: give its STIFFNESS, " // &
+               "pressure by penetration", error)
             return
          end if
          self%stiffness(before + 1:before + size(area)) = area*contact%area_factor*by_area
-         if (k <= system%n_pair) call note_add(system%notes, "contact of pair " // to_text(k) // &
-            " gives way by a stiffness of " // to_text(by_area, 9) // ", pressure by penetration")
+         if (k <= system%n_pair) call tell("a stiffness of " // to_text(by_area, 9) // &
+            ", pressure by penetration")
       end associate
 
    contains
 
-      !> At the card of the method, or at the pair, which gives way by a pressure.
-      subroutine refuse(what)
-         character(len=*), intent(in) :: what
+      subroutine tell(by_what)
+         character(len=*), intent(in) :: by_what
 
-         if (step%contact%penalty%origin%line > 0) then
-            call raise(error, err_input, where_text(scene, step%contact%penalty%origin) // &
-               ": error: *CONSTRAINT METHOD: " // what)
-         else
-            call raise(error, err_input, where_text(scene, scene%pair(abs(system%contact( &
-               k)%of_pair))%origin) // ": error: *CONTACT PAIR: " // what)
-         end if
-      end subroutine refuse
+         call note_add(system%notes, "contact of pair " // to_text(k) // " gives way by " // &
+            by_what)
+      end subroutine tell
 
    end subroutine set_contact
+
+   !> An error at the card of the method, or at a pair that gives way by a pressure.
+   subroutine refuse(scene, step, of_pair, what, error)
+      type(scene_t), intent(in) :: scene
+      type(step_t), intent(in) :: step
+      integer, intent(in) :: of_pair             !! of the scene; < 0: its sides exchanged
+      character(len=*), intent(in) :: what
+      type(error_t), allocatable, intent(out) :: error
+
+      associate (card => step%contact%penalty%origin, pair => scene%pair(abs(of_pair))%origin)
+         if (card%line > 0) then
+            call raise(error, err_input, where_text(scene, card) // ": error: *CONSTRAINT " // &
+               "METHOD: " // what)
+         else
+            call raise(error, err_input, where_text(scene, pair) // ": error: *CONTACT PAIR: " // &
+               what)
+         end if
+      end associate
+   end subroutine refuse
 
    !> Have the surfaces of a contact a law of their own, by which it gives way?
    pure logical function has_own_law(self, contact)
@@ -200,6 +210,17 @@ contains
          end associate
       end do
    end subroutine penalty_start
+
+   !> The stiffness at the nodes of contact `k`, or else of the other side.
+   pure real(wp) function of_either(system, scene, k, inner) result(total)
+      type(system_t), intent(in) :: system
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: k
+      real(wp), intent(in) :: inner(:)           !! (n_node)
+
+      total = sum(inner(system%contact(k)%contact%node))
+      if (.not. total > 0.0_wp) total = of_opposite(system, scene, k, inner)
+   end function of_either
 
    !> The stiffness at the nodes of the other side of contact `k`, if these are some contact's: of
    !> its pair, or of that the other way round.
