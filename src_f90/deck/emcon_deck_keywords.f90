@@ -38,7 +38,7 @@ module emcon_deck_keywords
    end type refusal_t
 
    character(len=*), parameter :: printed = "FREQUENCY=,TIMEPOINTS=,TOTALS=,~GLOBAL:YES"
-   character(len=*), parameter :: filed = "FREQUENCY=,TIMEPOINTS=,~OUTPUT:2D,!POSITION,!USER"
+   character(len=*), parameter :: filed = "FREQUENCY=,TIMEPOINTS=,~OUTPUT:2D,~POSITION,!USER"
 
    type(keyword_t), parameter :: keywords(*) = [ &
       keyword_t("HEADING", in_both), &

@@ -79,7 +79,7 @@ contains
       type(card_t), intent(in) :: card
       type(scene_t), intent(inout) :: scene
       integer, intent(inout) :: n                  !! nodes so far
-      logical, intent(inout) :: is_solid_told      !! a third coordinate was told
+      logical, intent(inout) :: is_solid_told      !! a third coordinate too many, or none, was told
       character(len=12), parameter :: axis(3) = ["coordinate x", "coordinate y", "coordinate z"]
       type(data_t) :: data
       real(wp) :: position(3)
@@ -97,9 +97,11 @@ contains
          do k = 1, size(axis)
             call get_real(reader, data, k + 1, axis(k), position(k))
          end do
-         if (data%ok .and. scene%n_dim == size(axis) .and. is_blank(data, 1 + scene%n_dim)) then
-            call data_error(reader, data, "node " // to_text(label) // " has no z: the elements " &
-               // "have three dimensions")
+         if (data%ok .and. scene%n_dim == size(axis) .and. is_blank(data, 1 + scene%n_dim) &
+            .and. .not. is_solid_told) then
+            call data_warning(reader, data, "node " // to_text(label) // " has no z: 0 is taken, " &
+               // "as for all nodes without one (told once)")
+            is_solid_told = .true.
          end if
          reader%doubt%positions = reader%doubt%positions .or. .not. data%ok
          ! A node with a bad coordinate stays, so that what names it is not an error too.

@@ -119,8 +119,8 @@ def plane_elements_too(case: Case) -> str:
     return "of the plane or of space, not of both"
 
 
-def no_third_coordinate(case: Case) -> str:
-    return "has no z"
+def no_third_coordinate(case: Case) -> None:
+    """0 is taken: refused or not, by what becomes of the element."""
 
 
 def any_place(case: Case) -> str | None:
