@@ -321,7 +321,6 @@ contains
       type(contact_pair_t), intent(inout) :: pair
 
       if (pair%interaction%pressure%kind == pressure_hard) return
-      pair%is_guarded = .false.
       if (pair%may_choose) pair%both_sides = .false.
       pair%may_choose = .false.
    end subroutine suit_pressure

@@ -2,10 +2,9 @@
 module emcon_march_commit
    use emcon_constraint, only : condition_friction, most_slips
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_dissipated, &
-      constraints_row_stored, &
       constraints_force
    use emcon_correction, only : correction_reason
-   use emcon_contact_law, only : loss_damping, loss_friction
+   use emcon_contact_law, only : contact_laws_drag, loss_damping, loss_friction
    use emcon_errors, only : error_t
    use emcon_explicit, only : explicit_commit
    use emcon_friction, only : friction_missed
@@ -279,7 +278,7 @@ contains
       associate (contacts => self%state%contacts, item => self%active%set%item(k), &
             id => self%active%set%id(k), n => size(self%state%u, 1) - 1)
          if (is_spring) then
-            drag = item%response%tau
+            drag = item%response%tau - contact_laws_drag(self%active%set%law(k))
             contacts%slides_along(:, id) = 0.0_wp
             if (constraints_dissipated(self%active%set, k, loss_friction) > 0.0_wp) &
                contacts%slides_along(:, id) = drag(:n)/max(norm2(drag), tiny(drag))
@@ -422,7 +421,7 @@ contains
          else if (evaluation_has_inertia(motion%evaluation)) then
             do k = 1, set%n
                contact_work = contact_work + set%lam(k)*set%item(k)%dgap
-               if (k > set%n_permanent) contact_work = contact_work - constraints_row_stored(set, k)
+               if (allocated(set%law(k)%row)) contact_work = contact_work - set%law(k)%row%gained()
             end do
             self%ledger%external_work = self%ledger%external_work &
                + sum(part(role_external)%force*motion%du) + sum(state%reaction*motion%du) &

@@ -20,7 +20,7 @@ module emcon_constraints
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_force
    public :: constraints_stick, constraints_take_hold, constraints_gives_back
    public :: constraints_add_law_forces, constraints_add_row_forces, constraints_lam, &
-      constraints_dissipated, constraints_row_stored
+      constraints_dissipated
    public :: constraint_index, constraints_rounding, constraints_add_rounding
 
    !> Of the rows of gaps that do not hold: laws give their multipliers.
@@ -240,19 +240,6 @@ contains
             self%item(k)%response)
       end associate
    end function constraints_dissipated
-
-   !> What friction of the law in place of row `k` has taken and not lost: springs store it.
-   pure real(wp) function constraints_row_stored(self, k) result(work)
-      type(constraint_set_t), intent(in) :: self
-      integer, intent(in) :: k                   !! n_permanent + 1..n
-
-      work = 0.0_wp
-      if (.not. allocated(self%law(k)%row)) return
-      associate (row => self%law(k)%row, item => self%item(k))
-         if (row%has_friction) work = dot_product(item%response%tau, item%slip) &
-            - row%dissipated(values_of(self, k), item%response)
-      end associate
-   end function constraints_row_stored
 
    !> What the laws of condition `k` give. One in place of the row of its gap gives the multiplier,
    !> or what one under way lacks of it, and leaves no defect.

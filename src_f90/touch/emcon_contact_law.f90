@@ -12,7 +12,7 @@ module emcon_contact_law
    private
    public :: contact_law_t, contact_law_box_t, contact_laws_t, contact_values_t, contact_place_t
    public :: contact_laws_add, contact_laws_begin, contact_laws_respond, contact_laws_dissipated, &
-      contact_laws_reach, contact_laws_rub, contact_laws_rate_change
+      contact_laws_reach, contact_laws_rub, contact_laws_rate_change, contact_laws_drag
    public :: loss_damping, loss_friction
 
    !> What a law takes is told as a loss of one of these kinds.
@@ -60,6 +60,7 @@ module emcon_contact_law
       procedure :: stiffest
       procedure :: closure
       procedure :: stretch
+      procedure :: gained
       procedure :: gives_back
       procedure :: rate_change
    end type contact_law_t
@@ -163,6 +164,13 @@ contains
       stretch = 0.0_wp
    end function stretch
 
+   !> What slip has added to what the law stores in a step, 0 unless overridden [M L^2/T^2].
+   pure real(wp) function gained(self)
+      class(contact_law_t), intent(in) :: self   !! it has responded
+
+      gained = 0.0_wp
+   end function gained
+
    !> Has the law stored in steps before what it gives back in this one? Not unless overridden.
    pure logical function gives_back(self)
       class(contact_law_t), intent(in) :: self
@@ -230,6 +238,19 @@ contains
          end associate
       end do
    end subroutine contact_laws_respond
+
+   !> Their forces along the surface, as a sum [M L/T^2].
+   pure function contact_laws_drag(self) result(tau)
+      type(contact_laws_t), intent(in) :: self   !! they have responded
+      real(wp) :: tau(most_slips)
+      integer :: i
+
+      tau = 0.0_wp
+      if (.not. allocated(self%beside)) return
+      do i = 1, size(self%beside)
+         tau = tau + self%beside(i)%response%tau
+      end do
+   end function contact_laws_drag
 
    !> What those laws have taken whose loss is of the kind `kind` [M L^2/T^2].
    pure real(wp) function contact_laws_dissipated(self, at, kind) result(dissipated)

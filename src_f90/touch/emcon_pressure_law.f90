@@ -48,6 +48,7 @@ module emcon_pressure_law
       procedure :: stored => pressure_law_stored
       procedure :: dissipated => pressure_dissipated
       procedure :: stretch => pressure_stretch
+      procedure :: gained => pressure_gained
       procedure :: stiffest => pressure_stiffest
    end type pressure_law_t
 
@@ -155,6 +156,13 @@ contains
 
       dissipated = spring_stiffness(self)*self%spring%loss
    end function pressure_dissipated
+
+   pure real(wp) function pressure_gained(self) result(gained)
+      class(pressure_law_t), intent(in) :: self
+
+      gained = 0.5_wp*spring_stiffness(self)*(sum(self%spring%stretch**2) &
+         - sum(self%before_slip%stretch**2))
+   end function pressure_gained
 
    pure function pressure_stretch(self) result(stretch)
       class(pressure_law_t), intent(in) :: self

@@ -234,6 +234,22 @@ def test_it_slides_to_rest(behaviour, formulation, tmp_path):
     assert way == pytest.approx(0.5*0.3**2/MU, rel=0.25)
 
 
+def test_damping_beside_friction(tmp_path):
+    """Of each what it takes: the balance closes with both, and shears are those of friction alone."""
+    step = dynamic(0.005, 0.5) + "*DLOAD\nA, GRAV, 1., .2, -1.\n"
+    text = rubs(deck("LINEAR\n100.", "NODE TO SURFACE", step)).replace(
+        "*CONTACT PAIR", "*CONTACT DAMPING, TANGENT FRACTION=.5\n2., .1, .5\n*CONTACT PAIR", 1)
+    run = run_deck(Deck(text.replace("CF\n", "CF, CSHEAR, CSTR\n"), "pressure"), tmp_path)
+    history = run.history
+    assert run.verdict["verdict"] == "good"
+    balance = history["total"] + history["friction_loss"] + history["contact_damping_loss"]
+    assert np.abs(balance - balance[0]).max() < 1e-12
+    assert history["contact_damping_loss"][-1] > 1e-3 and history["contact_energy"].max() > 1e-3
+    fields = run.fields()
+    shear, pressure = fields["contact_shear"][:, :2], fields["contact_pressure"][:, :2]
+    assert (np.abs(shear) <= MU*pressure + 1e-12).all() and np.abs(shear).max() > 0.05
+
+
 def test_friction_goes_on_from_the_middle(tmp_path):
     text = rubs(deck("LINEAR\n100.", "MORTAR", dynamic(0.005, 0.2) + "*DLOAD\nA, GRAV, 1., 0., -1.\n",
                      start="*INITIAL CONDITIONS, TYPE=VELOCITY\n1, 1, .3\n2, 1, .3\n3, 1, .3\n4, 1, .3\n"))
