@@ -299,6 +299,11 @@ contains
 
       if (size(pair) == 0) call card_error(reader, card, "no pair of surfaces is given")
       call read_interaction(reader, card, pair, of_card)
+      do i = 1, size(pair)
+         pair(i)%interaction = of_card%interaction
+         if (has_option(card, "TIED")) pair(i)%interaction%pressure%kind = pressure_tied
+         call suit_pressure(pair(i))
+      end do
       if (has_option(card, "ADJUST")) call read_adjust(reader, card, scene, of_card)
       call read_guard(reader, card, any(pair%both_sides), of_card)
       call read_pair_initiation(reader, card, of_card%initiation)
@@ -306,10 +311,7 @@ contains
       do i = 1, size(pair)
          pair(i)%adjust = of_card%adjust
          pair(i)%is_guarded = of_card%is_guarded
-         pair(i)%interaction = of_card%interaction
          pair(i)%initiation = of_card%initiation
-         if (has_option(card, "TIED")) pair(i)%interaction%pressure%kind = pressure_tied
-         call suit_pressure(pair(i))
          if (pair(i)%interaction%pressure%kind == pressure_tied) call check_tied(reader, card, &
             scene, pair(i))
       end do

@@ -4,6 +4,8 @@ A block of one element stands on, or falls onto, a fixed floor: judged by places
 """
 
 import math
+import shutil
+import subprocess
 
 import numpy as np
 import pytest
@@ -193,8 +195,8 @@ def test_a_block_is_moved_to_and_fro(formulation, tmp_path):
     ask = requests(text).replace("CF\n", "CF, CSHEAR, CSLIP\n")
     text = text[:text.index("*NODE FILE")]
     led = "".join(f"{k}, 1, 1, .02\n" for k in range(1, 5))
-    text += ("*AMPLITUDE, NAME=A, TIME=TOTAL TIME\n0., 0., 1., 0., 1.5, 1., 2.5, -1., 3.5, 1.\n*STEP\n*STATIC\n.25, 1.\n"
-             "*BOUNDARY\n1, 1\n2, 1\n3, 1\n4, 1\n*CLOAD\n3, 2, -.5\n4, 2, -.5\n" + ask
+    text += ("*AMPLITUDE, NAME=A, TIME=TOTAL TIME\n0., 0., 1., 0., 1.5, 1., 2.5, -1., 3.5, 1.\n"
+             "*STEP\n*STATIC\n.25, 1.\n*BOUNDARY\n1, 1\n2, 1\n3, 1\n4, 1\n*CLOAD\n3, 2, -.5\n4, 2, -.5\n" + ask
              + "*STEP\n*STATIC\n.05, 2.5\n*BOUNDARY, OP=NEW\n5, 1, 2\n6, 1, 2\n7, 1, 2\n8, 1, 2\n"
              "*BOUNDARY, AMPLITUDE=A\n" + led + ask)
     run = run_deck(Deck(text, "pressure"), tmp_path)
@@ -276,3 +278,79 @@ def test_friction_alone_holds_a_block(behaviour, formulation, tmp_path):
     assert run.fields()["displacement"][-1, :2, 0].mean() == pytest.approx(0.2/STICK, rel=1e-4)
     done, _ = attempt(pushed(0.4), tmp_path/"above", (), {})
     assert done.returncode == 3, done.stderr
+
+
+# ---- beside CalculiX ----------------------------------------------------------------------------
+
+
+def patch(first, x0, y0, width, height, n):
+    """Nodes from `first` on and elements, two high and `n` wide."""
+    node = "".join(f"{first + j*(n + 1) + i}, {x0 + width*i/n!r}, {y0 + height*j/2!r}, 0.\n"
+                   for j in range(3) for i in range(n + 1))
+    corner = [(first + j*n + i, first + j*(n + 1) + i) for j in range(2) for i in range(n)]
+    return node, "".join(f"{k}, {a}, {a + 1}, {a + n + 2}, {a + n + 1}\n" for k, a in corner)
+
+
+LED = "1, 1, 1\n6, 1, 1\n11, 1, 1\n"
+
+
+def two_patches(behaviour, friction, load):
+    """A block on a floor, pressed by `load`; with friction also pushed, else led on its left side."""
+    (upper, block), (lower, floor) = patch(1, 0.0, 0.0, 1.0, 0.5, 4), patch(101, -0.5, -0.5, 2.0, 0.5, 8)
+    rows = {"FOOT": range(1, 5), "TOP": range(109, 117)}
+    faces = {name: "".join(f"{k}, S{1 if name == 'FOOT' else 3}\n" for k in row)
+             for name, row in rows.items()}
+    rubs_ = "*FRICTION\n0.3, 5000.\n" if friction else ""
+    held = "".join(f"{k}, 1, 2\n" for k in range(101, 110))
+    push = f"*CLOAD\n11, 1, {0.04*load!r}\n12, 1, {0.04*load!r}\n"
+    return f"""*NODE, NSET=ALL
+{upper}{lower}*ELEMENT, TYPE=CPE4, ELSET=A
+{block}*ELEMENT, TYPE=CPE4, ELSET=B
+{floor}*MATERIAL, NAME=M
+*ELASTIC
+1000., .3
+*SOLID SECTION, ELSET=A, MATERIAL=M
+1.
+*SOLID SECTION, ELSET=B, MATERIAL=M
+1.
+*SURFACE, NAME=FOOT
+{faces["FOOT"]}*SURFACE, NAME=TOP
+{faces["TOP"]}*SURFACE INTERACTION, NAME=I
+*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE={behaviour}
+{rubs_}*CONTACT PAIR, INTERACTION=I, TYPE=NODE TO SURFACE, GUARD=NO
+FOOT, TOP
+*BOUNDARY
+{held}{"" if friction else LED}*STEP
+*STATIC
+.25, 1.
+*DLOAD
+{"".join(f"{k}, P3, {load!r}" + chr(10) for k in range(5, 9))}{push if friction else ""}*NODE PRINT, NSET=ALL
+U
+*NODE FILE
+U
+*END STEP
+"""
+
+
+@pytest.mark.skipif(not shutil.which("ccx"), reason="CalculiX is not installed")
+@pytest.mark.parametrize("friction", [False, True])
+@pytest.mark.parametrize("behaviour", ["LINEAR\n1e4, 1e-6", "LINEAR\n1e4, 1.",
+                                       "TABULAR\n0., 0.\n10., .001\n1000., .01"])
+def test_calculix_says_the_same(behaviour, friction, tmp_path):
+    """The same text through both, nodes on surfaces: displacements differ by what they turn by, which
+    only one of the codes follows without NLGEOM, and fall with the load."""
+    missed = []
+    for load in (5.0, 0.05):
+        folder = tmp_path/str(load)
+        folder.mkdir()
+        text = two_patches(behaviour, friction, load)
+        (folder/"peer.inp").write_text(text)
+        subprocess.run(["ccx", "-i", "peer"], cwd=folder, capture_output=True, timeout=100, check=False)
+        rows = (folder/"peer.dat").read_text().rpartition("displacements")[2].splitlines()
+        theirs = {int(row.split()[0]): [float(u) for u in row.split()[1:3]] for row in rows if len(row.split()) == 4}
+        fields = run_deck(Deck(text, "ours"), folder).fields()
+        ours = dict(zip([*range(1, 16), *range(101, 128)], fields["displacement"][-1]))
+        assert len(theirs) == len(ours) == 42
+        scale = np.abs(list(theirs.values())).max()
+        missed.append(max(np.abs(ours[k][:2] - theirs[k]).max() for k in ours)/scale)
+    assert missed[0] < 1e-3 and missed[1] < 1e-4 and missed[1] < 0.2*missed[0], missed
