@@ -310,7 +310,9 @@ contains
       if (any(pair%formulation == formulation_user)) call suit_user(reader, card, of_card)
       do i = 1, size(pair)
          pair(i)%adjust = of_card%adjust
-         pair(i)%is_guarded = of_card%is_guarded
+         ! Guards would push beside a pressure where that lets bodies in by more than their slack.
+         pair(i)%is_guarded = of_card%is_guarded .and. (has_option(card, "GUARD") .or. &
+            pair(i)%interaction%pressure%kind == pressure_hard)
          pair(i)%initiation = of_card%initiation
          if (pair(i)%interaction%pressure%kind == pressure_tied) call check_tied(reader, card, &
             scene, pair(i))

@@ -97,6 +97,18 @@ def test_a_load_goes_in_by_the_curve(behaviour, formulation, load, tmp_path):
     assert run.fields()["contact_force"][-1][:2, 1].sum() == pytest.approx(load, rel=1e-9)
 
 
+@pytest.mark.parametrize("formulation", FORMULATIONS)
+def test_blocks_that_fit_each_other(formulation, tmp_path):
+    """Corner on corner, in by a tenth and a fifth of an edge: by the curve, and nothing else."""
+    for load in (1.0, 10.0, 20.0):
+        text = deck("LINEAR\n100.", formulation, static(load)).text()
+        for old, new in (("5, -.5,", "5, 0.,"), ("6, 1.5,", "6, 1.,"), ("7, 1.5,", "7, 1.,"), ("8, -.5,", "8, 0.,")):
+            text = text.replace(old, new)
+        run = run_deck(Deck(text, "pressure"), tmp_path/str(load))
+        assert run.verdict["verdict"] == "good"
+        assert -feet(run)[-1] == pytest.approx(load/100, rel=1e-9)
+
+
 def test_a_tension_bends_the_line(tmp_path):
     """K o (1/2 + atan(o/eps)/pi), eps = pi sigma/K, as CalculiX has it for nodes; surfaces that are
     integrated over have the line."""
