@@ -1,18 +1,21 @@
 !> The curves that edges of outlines stand for: what polygons may overlap by where curves do not.
 !>
-!> Those of smoothed masters of contact pairs are what gaps are measured to; other edges are chords
-!> of arcs.
+!> Those of smoothed masters of contact pairs and the circles of rigid ones are what gaps are
+!> measured to; other edges are chords of arcs.
 !> Source: docs/theory.md, sections 4.3 and 4.11.
 module emcon_outline_curves_plane
    use emcon_arcs_plane, only : arc_curvature, arc_rise
    use emcon_chain_plane, only : chain_corners, chain_init, chain_t, next, previous
+   use emcon_circles_plane, only : circles_find, circles_t
    use emcon_errors, only : error_t
    use emcon_hermite, only : hermite_curve, hermite_point, hermite_point_t, hermite_stencil_t, &
       joined_pieces
-   use emcon_interactions, only : contact_options_t, formulation_segment, smoothing_hermite
+   use emcon_interactions, only : contact_options_t, formulation_segment, &
+      smoothing_hermite, smoothing_none
    use emcon_kinds, only : wp
    use emcon_outline, only : outline_t
    use emcon_outline_plane, only : outline_links_t
+   use emcon_rigid_bodies, only : rigid_numbers
    use emcon_scene, only : scene_t
    use emcon_seams_plane, only : chain_join
    implicit none
@@ -28,6 +31,7 @@ module emcon_outline_curves_plane
    type :: outline_curves_t
       integer, allocatable :: number(:)          !! (n_edge) of its smoothed piece; 0: an arc
       type(piece_t), allocatable :: piece(:)
+      real(wp), allocatable :: circle(:)         !! (n_edge) curvature of its circle; 0: none [1/L]
       !> (-1:4, n_edge) nodes along the outline, those of the edge at 1 and 2; 0 beyond a corner
       integer, allocatable :: row(:, :)
    end type outline_curves_t
@@ -47,13 +51,14 @@ contains
 
       allocate(self%number(size(outline%facet, 2)), source=0)
       allocate(self%piece(0))
+      allocate(self%circle(size(outline%facet, 2)), source=0.0_wp)
       do i = 1, merge(size(scene%pair), 0, outline%n_piece > 0)
          associate (pair => scene%pair(i))
             chosen = options
             if (pair%has_options) chosen = pair%options
-            if (pair%formulation == formulation_segment .or. pair%slack > 0.0_wp) cycle
-            if (chosen%smoothing == smoothing_hermite) call add_surface(self, outline, scene, &
-               pair%master, chosen%smoothing_angle)
+            if (pair%slack > 0.0_wp) cycle
+            if (pair%formulation == formulation_segment) chosen%smoothing = smoothing_none
+            call add_surface(self, outline, scene, pair%master, chosen)
          end associate
       end do
       call find_rows(self, outline, links, scene, options%smoothing_angle)
@@ -105,13 +110,14 @@ contains
    end subroutine find_rows
 
    !> Add the edges of surface `number` that have no curve yet.
-   subroutine add_surface(self, outline, scene, number, angle)
+   subroutine add_surface(self, outline, scene, number, options)
       type(outline_curves_t), intent(inout) :: self
       type(outline_t), intent(in) :: outline
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: number              !! of the surface
-      real(wp), intent(in) :: angle              !! sharper turns are corners [degrees]
+      type(contact_options_t), intent(in) :: options   !! of a pair that has it as its master
       type(chain_t) :: chain
+      type(circles_t) :: circles
       type(error_t), allocatable :: error
       logical, allocatable :: is_corner(:)
       integer :: begins(size(scene%x, 2)), e, k
@@ -119,14 +125,17 @@ contains
       call chain_init(chain, scene, scene%surface(number), error)
       if (allocated(error)) return
       call chain_join(chain, scene)
+      call circles_find(circles, chain, scene%x, rigid_numbers(scene%rigid, size(scene%x, 2)))
       allocate(is_corner(chain%n_facet))
-      call chain_corners(chain, scene%x, angle, is_corner)
+      call chain_corners(chain, scene%x, options%smoothing_angle, is_corner)
       begins = 0
       begins(chain%facet(1, :)) = [(k, k = 1, chain%n_facet)]
       do e = 1, size(outline%facet, 2)
          k = begins(outline%facet(1, e))
          if (k == 0 .or. self%number(e) > 0) cycle
          if (chain%facet(2, k) /= outline%facet(2, e)) cycle
+         self%circle(e) = circles%curvature(k)
+         if (options%smoothing /= smoothing_hermite) cycle
          self%piece = [self%piece, piece_of(chain, is_corner, k)]
          self%number(e) = size(self%piece)
       end do
@@ -179,8 +188,13 @@ contains
       integer, intent(in) :: e                   !! edge of the outline
       real(wp), intent(in) :: share              !! place along it, 0 to 1
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (2, n_node) [L]
+      real(wp) :: chord(2)
 
-      if (self%number(e) > 0) then
+      if (abs(self%circle(e)) > 0.0_wp) then
+         chord = (x(:, self%row(2, e)) - x(:, self%row(1, e))) &
+            + (u(:, self%row(2, e)) - u(:, self%row(1, e)))
+         rise = arc_rise(self%circle(e), sqrt(dot_product(chord, chord)), share, 0.0_wp)
+      else if (self%number(e) > 0) then
          rise = piece_rise(self%piece(self%number(e)), share, x, u)
       else
          rise = row_rise(self%row(:, e), share, x, u)

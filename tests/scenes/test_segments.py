@@ -59,6 +59,24 @@ def test_a_disc_in_a_bowl_of_arcs(smoothing, off, tmp_path):
     assert 1 - 1e-3 < r < 1 + off
 
 
+@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT"])
+def test_short_edges_on_a_short_hollow_arc(formulation, tmp_path):
+    """Corners that touch it next to its ends are behind a chord, by .002 of it: no overlap."""
+    scene = Scene(0.01, 1.0, gravity=10.0)
+    scene.block("BODY", (-0.35, 0.1), (0.7, 0.2), (4, 2), stiffness=1000.0)
+    radius, turn = 10.0, np.radians(2.5)
+    x, y = radius*np.sin(turn), radius*(1 - np.cos(turn))
+    slope = np.tan(turn)
+    deck = with_profile(scene, f"START, -3., {float(y + slope*(3 - x))!r}\n"
+                        f"LINE, {float(-x)!r}, {float(y)!r}\n"
+                        f"CIRCL, {float(x)!r}, {float(y)!r}, 0., {radius}\n"
+                        f"LINE, 3., {float(y + slope*(3 - x))!r}")
+    run = run_deck(deck, tmp_path, formulation=formulation, initiation="MASSLESS", sides="ONE")
+    assert (run.history["active"] > 0).any()
+    assert balances(run.history) < 1e-12
+    assert run.verdict["penetration"] < 1e-9
+
+
 def test_a_block_on_a_roller_of_arcs(tmp_path):
     """It falls on the top of a half circle: nodes that touch are on it, none is in it."""
     scene = Scene(0.01, 1.0, gravity=10.0)
