@@ -7,6 +7,7 @@ module emcon_friction
    use emcon_constraints, only : constraint_set_t, constraints_stick
    use emcon_contact, only : contact_t
    use emcon_contact_law, only : contact_laws_add
+   use emcon_convergence, only : round_off
    use emcon_coulomb_law, only : contact_open, contact_slides, contact_sticks, contact_trial_t, &
       coulomb_status, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
    use emcon_csr, only : csr_find
@@ -320,6 +321,8 @@ contains
             missed = max(missed, coulomb_violation(at, law%mu, friction_stiffness(system, item)))
          end associate
       end do
+      ! Where nothing is loaded all forces are round-off.
+      if (missed <= round_off*maxval(system%response%rounding)) missed = 0.0_wp
    end subroutine friction_missed
 
    !> The largest normal force of contacts.

@@ -5,6 +5,7 @@ module test_friction_ways
    use emcon_contact, only : gap_state_t
    use emcon_coulomb_law, only : contact_free, contact_slides, contact_sticks, coulomb_t, &
       slip_rounding, slip_status_t
+   use emcon_convergence, only : round_off
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_at_end, evaluation_moving
    use emcon_friction, only : friction_begin, friction_close, friction_holds, friction_keep, &
@@ -287,6 +288,12 @@ contains
          set%item(1)%t(:, 1, 1) = [0.5_wp, 0.0_wp]
          call friction_missed(friction, system, set, missed, largest)
          call check_near(error, [missed, largest], [0.5_wp, 6.0_wp], tol, 1.0_wp, "a mean gap")
+         system%response%rounding = 0.49_wp/round_off
+         call friction_missed(friction, system, set, missed, largest)
+         call check_near(error, missed, 0.5_wp, tol, 1.0_wp, "more than round-off")
+         system%response%rounding(2, 1) = 0.51_wp/round_off
+         call friction_missed(friction, system, set, missed, largest)
+         call check_near(error, missed, 0.0_wp, 0.0_wp, 1.0_wp, "round-off of forces that cancel")
          set%lam = 0.0_wp
          call friction_missed(friction, system, set, missed, largest)
          call check_near(error, [missed, largest], [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "no push")
