@@ -103,11 +103,13 @@ class Step(Cards):
         return self._card("CONSTRAINT METHOD", {"TYPE": type, "STIFFNESS": stiffness,
                                                 "FACTOR": factor, "TOLERANCE": tolerance})
 
-    def contact_initiation(self, type: str = "PERSISTENT", *,
+    def contact_initiation(self, type: str = "AUTO", *,
                            gap_tolerance: Number | None = None) -> Step:
-        """`*CONTACT INITIATION`: PERSISTENT (default), ADMISSIBLE, VELOCITY UPDATE or MASSLESS.
+        """`*CONTACT INITIATION`: AUTO (default), PERSISTENT, ADMISSIBLE, VELOCITY UPDATE, MASSLESS.
 
-        gap_tolerance   largest new stand-off as a fraction of an edge, for PERSISTENT
+        AUTO is MASSLESS on bodies that are many elements across, PERSISTENT elsewhere.
+
+        gap_tolerance   largest new stand-off as a fraction of an edge, for nodes with mass
         """
         return self._card("CONTACT INITIATION", {"TYPE": type, "GAP TOLERANCE": gap_tolerance})
 

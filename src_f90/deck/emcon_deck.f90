@@ -74,6 +74,7 @@ contains
       end if
       reader%log%file_name = source%file_name
       reader%is_lenient = is_lenient
+      reader%n_own_file = source%n_own_file
       reader%doubt%names = .not. source%is_whole .or. reader%log%n_errors > diagnostics%n_errors
       reader%doubt%nodes = reader%doubt%names
       reader%doubt%elements = reader%doubt%names

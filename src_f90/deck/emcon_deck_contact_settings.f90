@@ -10,8 +10,8 @@ module emcon_deck_contact_settings
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find
    use emcon_options, only : option_default
-   use emcon_steps, only : initiation_admissible, initiation_massless, initiation_none, &
-      initiation_persistent, step_initiation, step_is_dynamic, step_t
+   use emcon_steps, only : initiation_admissible, initiation_auto, initiation_massless, &
+      initiation_none, initiation_persistent, step_initiation, step_is_dynamic, step_t
    use emcon_text, only : to_text
    implicit none
    private
@@ -30,8 +30,8 @@ contains
       call choose_option(reader, card, "TYPE", "initiation", step%contact%initiation)
       call option_real(reader, card, "GAP TOLERANCE", step%contact%gap_tolerance)
       if (has_option(card, "GAPTOLERANCE") &
-         .and. step%contact%initiation /= initiation_persistent) then
-        call card_warning(reader, card, "GAP TOLERANCE has an effect with TYPE=PERSISTENT only")
+         .and. all(step%contact%initiation /= [initiation_auto, initiation_persistent])) then
+        call card_warning(reader, card, "GAP TOLERANCE has an effect with TYPE=AUTO and PERSISTENT only")
       end if
    end subroutine read_initiation
 

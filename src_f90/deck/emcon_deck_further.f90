@@ -42,6 +42,7 @@ contains
       source%file = [source%file, more%file + n_file]
       source%number = [source%number, more%number]
       source%file_name = [source%file_name, more%file_name]
+      source%n_own_file = n_file
    end subroutine further_append
 
    !> Between steps there is no card: the model is that of the run.

@@ -8,7 +8,7 @@ module emcon_deck_jacobian
    use emcon_shape, only : shape_t, shape_table_t, shape_tabulate
    implicit none
    private
-   public :: is_integrable, refuse_shapes, warn_of_shapes, warn_of_corners
+   public :: determinant, is_integrable, refuse_shapes, warn_of_shapes, warn_of_corners
 
    integer, parameter :: n_space = 3
    !> Jacobian at a point, over the largest one, below which it is round-off of the coordinates.

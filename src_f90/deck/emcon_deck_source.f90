@@ -20,6 +20,7 @@ module emcon_deck_source
       integer, allocatable :: file(:)              !! (n_line) index into `file_name`
       integer, allocatable :: number(:)            !! (n_line) line number in that file
       type(string_t), allocatable :: file_name(:)  !! as typed; included ones as resolved
+      integer :: n_own_file = huge(1)              !! those behind hold further steps of a run
       logical :: is_whole = .true.                 !! false: some included file could not be read
    end type deck_source_t
 

@@ -16,6 +16,7 @@ module emcon_deck_step
    use emcon_deck_friction, only : check_friction
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, is_blank, &
       next_line
+   use emcon_deck_initiation, only : choose_initiation
    use emcon_deck_increments, only : check_increments, read_events, read_tolerance
    use emcon_deck_loads, only : read_boundary, read_cload
    use emcon_deck_mortar, only : read_mortar, read_smoothing
@@ -69,6 +70,7 @@ contains
          end if
       end do
       allocate(scene%step(n_step))
+      last%contact%initiation = option_default("initiation")
       time = 0.0_wp
       do i = 1, size(reader%card)
          if (reader%card(i)%step == 0 .and. reader%card(i)%name == "RESTART") call read_restart( &
@@ -90,6 +92,7 @@ contains
          last = scene%step(k)
       end do
       call read_turns(reader, scene)
+      call choose_initiation(reader, scene)
       call pairs_ask(reader, scene%pair, scene%step)
       call soften_steps(reader, scene%pair, scene%step)
       call suit_explicit(reader, scene%pair, scene%step)

@@ -159,8 +159,7 @@ contains
          call choose("contact", size(system%contact) > 0, "no *CONTACT PAIR, no *CONTACT")
          call choose("guards", size(system%contact) > system%n_pair, &
             "no pairs, both sides of all pairs are held, or GUARD=NO")
-         call choose("massless contact nodes", layer%is_on, "no *CONTACT " // &
-            "INITIATION, TYPE=MASSLESS, or all slave nodes need their mass")
+         call choose("massless contact nodes", layer%is_on, why_mass(scene))
          call choose("velocity update", any(step_initiation(scene%step) &
             == initiation_velocity_update), "no *CONTACT INITIATION, TYPE=VELOCITY UPDATE")
          call choose("ties and equations", system%space%linear%n > 0, &
@@ -191,6 +190,16 @@ contains
       end subroutine choose
 
    end subroutine add_choices
+
+   !> Why nodes of contact keep their mass.
+   pure function why_mass(scene) result(text)
+      type(scene_t), intent(in) :: scene
+      character(len=:), allocatable :: text
+
+      text = "no *CONTACT INITIATION, TYPE=MASSLESS, or all slave nodes need their mass"
+      if (.not. allocated(scene%deck%keeps_mass)) return
+      if (len(scene%deck%keeps_mass) > 0) text = scene%deck%keeps_mass
+   end function why_mass
 
    pure logical function has_loads(scene)
       type(scene_t), intent(in) :: scene

@@ -10,7 +10,11 @@ module emcon_massless_surfaces
    use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
-   public :: pair_keeps_mass, pair_sheds_mass, surface_keeps_mass, nodes_that_keep_mass
+   public :: most_moved, pair_keeps_mass, pair_sheds_mass, surface_keeps_mass, nodes_that_keep_mass
+
+   !> Where the program chooses, surfaces lose their mass if no body has more of its own at them:
+   !> rebounds would be off by percents. Source: docs/trade.md, section "First contact".
+   real(wp), parameter :: most_moved = 0.2_wp
 
 contains
 

@@ -18,7 +18,7 @@ module emcon_options
       scheme_static
    use emcon_solver_registry, only : n_solver_row, solver_row, solver_row_t
    use emcon_steps, only : events_nodes, events_pairs, initiation_admissible, &
-      initiation_massless, initiation_persistent, initiation_velocity_update, &
+      initiation_auto, initiation_massless, initiation_persistent, initiation_velocity_update, &
       method_augmented_lagrange, method_null_space, method_penalty, method_saddle_point, &
       newton_full, newton_kept, step_t
    use emcon_text, only : squeezed
@@ -68,6 +68,7 @@ module emcon_options
       option_row_t("smoothing", smoothing_none, "NONE", "EMCON_UNSMOOTHED", "", ""), &
       option_row_t("smoothing", smoothing_hermite, "HERMITE", "EMCON_HERMITE", &
          "smoothed master surface", "", n_plane, instead="NONE"), &
+      option_row_t("initiation", initiation_auto, "AUTO", "", "", ""), &
       option_row_t("initiation", initiation_persistent, "PERSISTENT", "EMCON_PERSISTENT", "", ""), &
       option_row_t("initiation", initiation_admissible, "ADMISSIBLE", "EMCON_ADMISSIBLE", "", ""), &
       option_row_t("initiation", initiation_velocity_update, "VELOCITY UPDATE", "", "", ""), &
@@ -207,7 +208,7 @@ contains
       case ("surface")
          code = surface_of_faces
       case ("initiation")
-         code = step%contact%initiation
+         code = initiation_auto
       case ("events")
          code = step%time%events
       case ("kinematics")

@@ -25,6 +25,8 @@ module emcon_scene
       character(len=:), allocatable :: heading
       character(len=:), allocatable :: idle          !! cards that change nothing, and why
       character(len=:), allocatable :: labels        !! of instances
+      !> Why surfaces of contact keep their mass, "": they lose it; not allocated: the steps say so.
+      character(len=:), allocatable :: keeps_mass
    end type scene_deck_t
 
    !> What the deck calls its nodes.

@@ -13,7 +13,7 @@ module emcon_steps
    public :: load_point, load_pressure, load_gravity, load_moment, load_centrifugal
    public :: by_node, by_element, by_surface
    public :: initiation_none, initiation_persistent, initiation_admissible, &
-      initiation_velocity_update, initiation_massless
+      initiation_velocity_update, initiation_massless, initiation_auto
    public :: method_null_space, method_saddle_point, method_penalty, method_augmented_lagrange
    public :: newton_kept, newton_full
    public :: events_pairs, events_nodes
@@ -24,7 +24,8 @@ module emcon_steps
       load_centrifugal = 5
    integer, parameter :: by_node = 1, by_element = 2, by_surface = 3
    integer, parameter :: initiation_none = 0, initiation_persistent = 1, &
-      initiation_admissible = 2, initiation_velocity_update = 3, initiation_massless = 4
+      initiation_admissible = 2, initiation_velocity_update = 3, initiation_massless = 4, &
+      initiation_auto = 5
    integer, parameter :: method_null_space = 1, method_saddle_point = 2, method_penalty = 3, &
       method_augmented_lagrange = 4
    integer, parameter :: newton_kept = 1, newton_full = 2
