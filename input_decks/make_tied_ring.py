@@ -83,7 +83,7 @@ are those of the whole bodies: they run across the interfaces.
 Units: any consistent set (length L, mass M, time T; stress M/(L T^2), thickness 1 L).
 
 What to look at: the ring flattens, slides and rebounds like the one of one piece.
-With CONTACT INITIATION=PERSISTENT the total energy is held through contact and release.
+The total energy is held through contact and release.
 
 Expected: total energy {energy:.6g} throughout; ring mass {mass:.6g};
           ring momentum ({px:.6g}, {py:.6g}) before contact;

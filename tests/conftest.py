@@ -24,6 +24,7 @@ if signal.getsignal(signal.SIGINT) is signal.SIG_IGN:
 
 # Whole runs of the ring scene that tests of several files look at, dearest first.
 RING_RUNS = [
+    ("AUTO", 0.01),
     ("PERSISTENT", 0.01),
     ("ADMISSIBLE", 0.01),
     ("VELOCITY UPDATE", 0.01),

@@ -74,11 +74,11 @@ contains
       end if
       reader%log%file_name = source%file_name
       reader%is_lenient = is_lenient
-      reader%n_own_file = source%n_own_file
       reader%doubt%names = .not. source%is_whole .or. reader%log%n_errors > diagnostics%n_errors
       reader%doubt%nodes = reader%doubt%names
       reader%doubt%elements = reader%doubt%names
       scene%deck%file = source%file_name
+      scene%deck%n_own_file = source%n_own_file
       call read_cards(reader, overrides)
       scene%n_dim = find_dimension(reader)
       scene%is_axial = scene%n_dim == n_plane .and. is_axial_deck(reader)

@@ -9,9 +9,16 @@ module emcon_deck_check_massless
       step_is_dynamic
    implicit none
    private
-   public :: check_massless_sections, mark_inertia
+   public :: check_massless_sections, has_massless_sections, mark_inertia
 
 contains
+
+   !> Is there a section without inertia?
+   pure logical function has_massless_sections(scene) result(has_some)
+      type(scene_t), intent(in) :: scene
+
+      has_some = any(scene%section%is_massless)
+   end function has_massless_sections
 
    !> Materials whose density makes inertia: that of a section which is not MASSLESS.
    pure subroutine mark_inertia(scene, has_inertia)

@@ -31,7 +31,8 @@ contains
       call option_real(reader, card, "GAP TOLERANCE", step%contact%gap_tolerance)
       if (has_option(card, "GAPTOLERANCE") &
          .and. all(step%contact%initiation /= [initiation_auto, initiation_persistent])) then
-        call card_warning(reader, card, "GAP TOLERANCE has an effect with TYPE=AUTO and PERSISTENT only")
+        call card_warning(reader, card, &
+            "GAP TOLERANCE has an effect with TYPE=AUTO and PERSISTENT only")
       end if
    end subroutine read_initiation
 

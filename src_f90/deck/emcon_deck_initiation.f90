@@ -3,6 +3,7 @@
 !> Source: docs/theory.md, section 6.4.
 module emcon_deck_initiation
    use emcon_bodies, only : bodies_find
+   use emcon_deck_check_massless, only : has_massless_sections
    use emcon_deck_jacobian, only : determinant
    use emcon_deck_reader, only : reader_t
    use emcon_interactions, only : contact_pair_t, formulation_user, pair_has_order, pressure_hard
@@ -31,7 +32,7 @@ contains
       logical, dimension(size(scene%step)) :: is_done
       integer :: first
 
-      is_done = scene%step%origin%file <= reader%n_own_file
+      is_done = scene%step%origin%file <= scene%deck%n_own_file
       first = findloc(is_done .and. step_is_dynamic(scene%step), .true., 1)
       if (first > 0) then
          further = pack(scene%step, .not. is_done)
@@ -85,7 +86,7 @@ contains
       k = findloc(takes_massless(scene%step), .false., 1)
       if (k > 0) then
          reason = "scheme or constraint method of step " // to_text(k) // " needs it"
-      else if (any(scene%section%is_massless)) then
+      else if (has_massless_sections(scene)) then
          reason = "there are MASSLESS sections"
       else if (any(scene%material%alpha > 0.0_wp .or. scene%material%beta > 0.0_wp)) then
          reason = "there is *DAMPING of materials"
@@ -98,8 +99,8 @@ contains
       if (.not. share(k) > 0.0_wp) then
          reason = "no node of the surfaces can lose it"
       else if (share(k) > most_moved) then
-         reason = "body " // to_text(k) // " has " // to_text(100.0_wp*share(k), 2) // " % of its " &
-            // "mass at nodes of contact, more than " // to_text(100.0_wp*most_moved, 2) // " %"
+         reason = "body " // to_text(k) // " has " // to_text(100.0_wp*share(k), 2) // " % of " // &
+            "its mass at nodes of contact, more than " // to_text(100.0_wp*most_moved, 2) // " %"
       end if
    end subroutine find_reason
 
@@ -108,7 +109,7 @@ contains
       type(step_t), intent(in) :: step
 
       takes_massless = .not. step_is_dynamic(step) .or. (step%scheme%takes_massless .and. &
-         step%scheme%code /= scheme_user .and. .not. step%scheme%is_explicit .and. &
+         step%scheme%code /= scheme_user .and. .not. step%scheme%lumps_mass .and. &
          any(step%contact%method == [method_null_space, method_saddle_point]))
    end function takes_massless
 

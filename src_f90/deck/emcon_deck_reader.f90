@@ -69,7 +69,6 @@ module emcon_deck_reader
       type(card_t), allocatable :: card(:)
       type(diagnostics_t) :: log
       logical :: is_lenient = .false.
-      integer :: n_own_file = huge(1)                    !! then those of further steps
       integer :: n_dim = 0                               !! of the model
       logical :: is_flat = .true.                        !! and not one of solids of revolution
       type(doubts_t) :: doubt

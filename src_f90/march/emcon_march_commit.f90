@@ -14,30 +14,23 @@ module emcon_march_commit
    use emcon_interlock_plane, only : interlock_tell
    use emcon_kinds, only : wp
    use emcon_march_guess, only : end_velocities, follow_links
+   use emcon_march_jumps, only : march_jump
    use emcon_march_past, only : march_past_keep
    use emcon_march_types, only : increment_t, march_t
    use emcon_nodal_pull, only : nodal_pull_add
    use emcon_numbering, only : gather_dependent
    use emcon_pair_record, only : pair_record_jump, pair_record_measure
    use emcon_pair_sums, only : pair_sums_add, pair_sums_begin, pair_sums_jump
-   use emcon_phases, only : phase_enter, phase_leave, phase_restitution
    use emcon_evaluation, only : evaluation_contact_place, evaluation_has_inertia
    use emcon_active_set, only : active_set_brought
-   use emcon_layer, only : layer_take_velocities
-   use emcon_quasi_static, only : quasi_static_move
-   use emcon_restitution, only : restitution_take
    use emcon_scene, only : scene_t
    use emcon_penalty, only : penalty_depth, penalty_keep, penalty_stored
    use emcon_stand_off, only : stand_off_add
-   use emcon_steps, only : initiation_velocity_update, step_initiation
    use emcon_system, only : system_t
    use emcon_term, only : role_external, role_inertia, role_internal
    use emcon_term_registry, only : terms_dissipation, terms_stabilization
    use emcon_text, only : note_add, notes_t, to_text
    use emcon_rigid_rotation, only : rigid_rotation_measure
-   use emcon_velocity_jumps, only : jumps_add, jumps_begin, jumps_join, jumps_scale
-   use emcon_velocity_update, only : push_t, push_weights, velocity_update_apply, &
-      velocity_update_push
    implicit none
    private
    public :: march_commit
@@ -72,7 +65,7 @@ contains
             call book_work(self)
          end if
          call march_past_keep(self, h)
-         call restitute(self, scene, h, increment%notes, error)
+         call march_jump(self, scene, h, increment%notes, error)
          if (allocated(error)) return
          state%u = state%u + self%end_state%du
          if (size(scene%rigid) > 0) then
@@ -208,30 +201,6 @@ contains
       end associate
    end function work_scale
 
-   !> The velocities that impacts and what has no mass call for.
-   subroutine restitute(self, scene, h, notes, error)
-      type(march_t), intent(inout) :: self
-      type(scene_t), intent(in) :: scene
-      real(wp), intent(in) :: h                  !! > 0 [T]
-      type(notes_t), intent(inout) :: notes      !! for the log
-      type(error_t), allocatable, intent(out) :: error
-      logical :: has_inertia
-      integer :: left
-
-      call phase_enter(self%system%phases, phase_restitution, left)
-      call jumps_begin(self%end_state%jump)
-      has_inertia = evaluation_has_inertia(self%motion%evaluation)
-      if (step_initiation(scene%step(self%state%clock%i_step)) == initiation_velocity_update) then
-         call restore_energy(self, notes, error)
-      end if
-      if (has_inertia .and. .not. allocated(error)) call restitution_take(self, h, &
-         notes, error)
-      if (has_inertia) call quasi_static_move(self, h)
-      if (has_inertia .and. self%layer%is_on .and. .not. allocated(error)) call end_massless(self, &
-         h, notes, error)
-      call phase_leave(self%system%phases, left)
-   end subroutine restitute
-
    !> What acts at the end of the step, with which multipliers: those of the step, or of the balance
    !> of what has no mass.
    subroutine keep_constraints(self)
@@ -292,61 +261,6 @@ contains
          contacts%slip_path(id) = contacts%slip_path(id) + norm2(item%slip)
       end associate
    end subroutine keep_slip
-
-   !> What has no mass moves as its displacement says. Where it was balanced anew, what that and
-   !> closing contacts have taken is given back by a jump of the velocities.
-   subroutine end_massless(self, h, notes, error)
-      type(march_t), intent(inout) :: self
-      real(wp), intent(in) :: h                  !! > 0 [T]
-      type(notes_t), intent(inout) :: notes      !! for the log
-      type(error_t), allocatable, intent(out) :: error
-      real(wp) :: lost
-      logical :: has_root
-      integer :: k
-
-      associate (layer => self%layer, set => self%active%set)
-         call layer_take_velocities(layer, h, self%end_state%du, self%end_state%v)
-         if (.not. layer%is_settled) return
-         lost = 0.0_wp
-         do k = set%n_permanent + 1, set%n
-            lost = lost - set%lam(k)*set%item(k)%dgap
-         end do
-         self%ledger%external_work = self%ledger%external_work + layer%work
-         self%ledger%friction = self%ledger%friction + layer%rubbed
-         call velocity_update_push(self%velocity_update, self%system, set, &
-            push_t(layer%push, lost + layer%released), self%end_state%v, has_root, error)
-         if (allocated(error)) return
-         if (has_root) then
-            self%ledger%contact_work = self%ledger%contact_work + lost
-            call jumps_scale(layer%jump, self%velocity_update%part)
-            call jumps_join(self%end_state%jump, layer%jump)
-         else
-            call note_add(notes, "the energy " // to_text(lost + layer%released) // &
-               " that contacts took as they opened or closed is not restored: there is no root")
-         end if
-      end associate
-   end subroutine end_massless
-
-   !> Give back by a jump of the velocities what closing contacts have taken.
-   subroutine restore_energy(self, notes, error)
-      type(march_t), intent(inout) :: self
-      type(notes_t), intent(inout) :: notes      !! for the log
-      type(error_t), allocatable, intent(out) :: error
-      real(wp) :: restored
-      logical :: has_root
-
-      call velocity_update_apply(self%velocity_update, self%system, self%active%set, &
-         self%end_state%v, restored, has_root, error)
-      if (allocated(error)) return
-      self%ledger%contact_work = self%ledger%contact_work + restored
-      if (restored > 0.0_wp) then
-         call note_add(notes, "velocity update restores an energy of " // to_text(restored))
-         call jumps_add(self%end_state%jump, self%active%set, &
-            self%velocity_update%part*push_weights(self%active%set))
-      end if
-      if (.not. has_root) call note_add(notes, &
-         "velocity update: no root, the energy lost in this step is not restored")
-   end subroutine restore_energy
 
    !> Tell of what moves with nothing to hold it, and of what was brought into contact without load.
    !> The stiffness of STABILIZE is in the tangent of loose bodies alone: it bears what the balance

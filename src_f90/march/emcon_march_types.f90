@@ -79,6 +79,7 @@ module emcon_march_types
    type :: end_state_t
       real(wp), allocatable :: du(:, :)          !! (n_dim, n_node) displacement over the step [L]
       real(wp), allocatable :: v(:, :)           !! (n_dim, n_node) velocity [L/T]
+      real(wp), allocatable :: v_before(:, :)    !! (n_dim, n_node) before it jumps [L/T]
       type(velocity_jump_t), allocatable :: jump(:)  !! by which velocities have jumped there
       real(wp), allocatable :: force(:, :)       !! (n_dim, n_node) internal forces [M L/T^2]
       real(wp), allocatable :: energy(:)         !! (n_element) [M L^2/T^2]

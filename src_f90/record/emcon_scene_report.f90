@@ -151,6 +151,7 @@ contains
    subroutine add_choices(stepper, rows)
       type(stepper_t), intent(in) :: stepper
       type(report_rows_t), intent(inout) :: rows
+      character(len=:), allocatable :: why
       logical :: is_dynamic
 
       associate (scene => stepper%scene, system => stepper%march%system, &
@@ -159,7 +160,8 @@ contains
          call choose("contact", size(system%contact) > 0, "no *CONTACT PAIR, no *CONTACT")
          call choose("guards", size(system%contact) > system%n_pair, &
             "no pairs, both sides of all pairs are held, or GUARD=NO")
-         call choose("massless contact nodes", layer%is_on, why_mass(scene))
+         call find_why_mass(scene, why)
+         call choose("massless contact nodes", layer%is_on, why)
          call choose("velocity update", any(step_initiation(scene%step) &
             == initiation_velocity_update), "no *CONTACT INITIATION, TYPE=VELOCITY UPDATE")
          call choose("ties and equations", system%space%linear%n > 0, &
@@ -192,14 +194,14 @@ contains
    end subroutine add_choices
 
    !> Why nodes of contact keep their mass.
-   pure function why_mass(scene) result(text)
+   pure subroutine find_why_mass(scene, text)
       type(scene_t), intent(in) :: scene
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
       text = "no *CONTACT INITIATION, TYPE=MASSLESS, or all slave nodes need their mass"
       if (.not. allocated(scene%deck%keeps_mass)) return
       if (len(scene%deck%keeps_mass) > 0) text = scene%deck%keeps_mass
-   end function why_mass
+   end subroutine find_why_mass
 
    pure logical function has_loads(scene)
       type(scene_t), intent(in) :: scene

@@ -22,6 +22,7 @@ module emcon_scene
    !> The text that the scene was read from.
    type :: scene_deck_t
       type(string_t), allocatable :: file(:)         !! names of the deck files
+      integer :: n_own_file = huge(1)                !! those behind hold further steps of a run
       character(len=:), allocatable :: heading
       character(len=:), allocatable :: idle          !! cards that change nothing, and why
       character(len=:), allocatable :: labels        !! of instances

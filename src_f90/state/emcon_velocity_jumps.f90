@@ -8,7 +8,8 @@ module emcon_velocity_jumps
    use emcon_rotation, only : add_moments, n_turn
    implicit none
    private
-   public :: velocity_jump_t, jumps_begin, jumps_add, jumps_rub, jumps_join, jumps_scale
+   public :: velocity_jump_t, jumps_begin, jumps_add, jumps_rub, jumps_join, &
+      jumps_scale, jumps_sum
 
    !> The impulse of one contact constraint.
    type :: velocity_jump_t
@@ -124,6 +125,22 @@ contains
          end if
       end do
    end subroutine turn
+
+   !> What all together give each node.
+   pure subroutine jumps_sum(jump, impulse)
+      type(velocity_jump_t), intent(in) :: jump(:)       !! (any)
+      real(wp), intent(out) :: impulse(:, :)     !! (n_dim, n_node) [M L/T]
+      integer :: i, k
+
+      impulse = 0.0_wp
+      do k = 1, size(jump)
+         do i = 1, size(jump(k)%node)
+            associate (own => impulse(:, jump(k)%node(i)))
+               own = own + jump(k)%impulse(:, i)
+            end associate
+         end do
+      end do
+   end subroutine jumps_sum
 
    !> Take a part of all.
    elemental subroutine jumps_scale(jump, part)

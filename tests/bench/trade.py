@@ -57,8 +57,16 @@ def simplified(deck, body, kind):
     return deck
 
 
-def ring(kind, path=DECKS / "ring.inp"):
+def massive(path):
+    """A deck of input_decks/ whose nodes have mass where nothing else is said."""
     deck = Deck.read(path)
+    if "initiation = AUTO" in deck.text():
+        deck.replace("initiation = AUTO", "initiation = PERSISTENT")
+    return deck
+
+
+def ring(kind, path=DECKS / "ring.inp"):
+    deck = massive(path)
     if kind not in ("rigid", PROFILE):
         return simplified(deck, "BLOCK", kind)
     body = rigid("BLOCK", (0, -5), True)
@@ -76,7 +84,7 @@ def ring(kind, path=DECKS / "ring.inp"):
 
 
 def bar(kind):
-    deck = Deck.read(DECKS / "bouncing_bar.inp")
+    deck = massive(DECKS / "bouncing_bar.inp")
     return simplified(deck, "BAR", kind)
 
 

@@ -12,7 +12,8 @@ import pathlib
 import re
 
 import numpy as np
-from trade import NTS, PAGE, PROGRAM, ball, bowl, drift, drawn, force_of, impulse_of, percent
+from trade import (NTS, PAGE, PROGRAM, ball, bowl, drift, drawn, force_of, impulse_of, massive,
+                   percent)
 
 from book.common import size, table  # isort: skip, `trade` says where
 from book.forces import switches
@@ -43,7 +44,7 @@ def knobbed(deck):
 
 
 def from_file(name):
-    return lambda: knobbed(Deck.read(DECKS / f"{name}.inp"))
+    return lambda: knobbed(massive(DECKS / f"{name}.inp"))
 
 
 def plain(scene, body):

@@ -19,7 +19,7 @@ import subprocess
 import sys
 
 import numpy as np
-from trade import NTS, PAGE, PROFILE, PROGRAM, ROOT, ball, bar, drawn, ring
+from trade import NTS, PAGE, PROFILE, PROGRAM, ROOT, ball, bar, drawn, massive, ring
 from trade_knobs import SINGLE, knobbed
 
 from book.common import COLOURS, axes, common_legend, save, table  # isort: skip, `trade` says where
@@ -63,7 +63,7 @@ def generated(generator, *options):
     path.parent.mkdir(parents=True, exist_ok=True)
     subprocess.run([sys.executable, DECKS / f"make_{generator}.py", *options, "--output", path],
                    check=True)
-    return path
+    return massive(path).write(path)
 
 
 def adaptive(deck, tolerance, events):

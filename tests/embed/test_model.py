@@ -76,7 +76,8 @@ def final(model: Model) -> np.ndarray:
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "MORTAR"])
 def test_ring_by_calls_gives_the_bits_of_the_deck(formulation: str) -> None:
     model = ring_by_calls(0.05, formulation)
-    with Stepper(RING, h=0.05, formulation=formulation) as deck, model.stepper() as calls:
+    with (Stepper(RING, h=0.05, formulation=formulation, initiation="PERSISTENT") as deck,
+          model.stepper() as calls):
         assert np.array_equal(deck.positions, calls.positions)
         for _ in range(8):
             assert deck.step() == calls.step()

@@ -32,7 +32,7 @@ class Contact:
     """The ring at the start of a step in contact; where the step leads to."""
 
     def __init__(self, formulation: str) -> None:
-        self.stepper = Stepper(RING, h=H, formulation=formulation)
+        self.stepper = Stepper(RING, h=H, formulation=formulation, initiation="PERSISTENT")
         self.stepper.run(until=0.75, callback=lambda ring, _: bool(ring.active.sum() >= 2))
         self.before = self.stepper.save()
         self.u0 = self.stepper.u

@@ -193,7 +193,7 @@ def test_energy_table(ring, treatment, h, text):
 def test_printed_run(ring):
     """The screen text of the README against the closing balance of the same run: counts and
     energies; figures of round-off by their size. Digits vary a little from machine to machine."""
-    run = ring("PERSISTENT", 0.01)
+    run = ring("AUTO", 0.01)
     shown = README.read_text()
 
     def both(pattern):
@@ -215,7 +215,7 @@ def test_printed_run(ring):
 
 
 def test_rebound_velocity(ring):
-    with h5py.File(ring("PERSISTENT", 0.01).file(".h5"), "r") as file:
+    with h5py.File(ring("AUTO", 0.01).file(".h5"), "r") as file:
         bodies = file["sets/BODIES"]
         velocity = bodies["MOMENTUM"][-1, 0, :2]/bodies["MASS"][0, 0]
     shown = re.search(r"leaves it with \((\S+), (\S+)\)", README.read_text())
@@ -224,7 +224,7 @@ def test_rebound_velocity(ring):
 
 def test_printed_files(ring):
     """The files that the README says a run leaves are there, and no other."""
-    run = ring("PERSISTENT", 0.01)
+    run = ring("AUTO", 0.01)
     shown = set(re.findall(r"`(ring\.[\w.]+)`(?=.*\|)", README.read_text()))
     left = {p.name for p in run.base.parent.iterdir()}
     assert {name for name in shown if name != "ring.inp"} == left

@@ -175,6 +175,7 @@ def test_needs_no_contact_code_while_far_apart(tmp_path):
     without.remove("*CONTACT FILE")
     without.remove("*CONTACT PRINT")
     runs = [
-        run_deck(deck, tmp_path / deck.name, h=0.05, t_end=0.5) for deck in (with_pair, without)
+        run_deck(deck, tmp_path / deck.name, h=0.05, t_end=0.5, initiation="PERSISTENT")
+        for deck in (with_pair, without)
     ]
     assert runs[0].digits(pairs=False) == runs[1].digits(pairs=False)

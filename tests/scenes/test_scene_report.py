@@ -72,8 +72,10 @@ def test_a_rigid_body_changes_the_rebound_by_less_than_is_told(ring, tmp_path):
 
 
 def test_what_locks_and_what_makes_a_comb_is_told(tmp_path):
+    comb = ["--set", "initiation=PERSISTENT"]
+    assert "advice" not in report(DECKS/"bouncing_bar.inp")
+    assert "TYPE=MASSLESS" in report(DECKS/"bouncing_bar.inp", *comb)["advice"][0]["text"]
     deck = Deck.read(DECKS/"bouncing_bar.inp").text()
-    assert "TYPE=MASSLESS" in report(DECKS/"bouncing_bar.inp")["advice"][0]["text"]
     before, _, after = deck.partition("*ELASTIC\n")
     first, _, rest = after.partition("\n")
     (tmp_path/"locks.inp").write_text(before + "*ELASTIC\n" + first.split(",")[0] + ", 0.4999\n"

@@ -10,7 +10,8 @@ from scene_tools import DECKS, Deck, emcon, run_deck
 
 @pytest.fixture(scope="module")
 def ring(tmp_path_factory):
-    return run_deck(DECKS / "ring.inp", tmp_path_factory.mktemp("ring"), h=0.05)
+    return run_deck(DECKS / "ring.inp", tmp_path_factory.mktemp("ring"), h=0.05,
+                    initiation="PERSISTENT")
 
 
 def test_figures_are_those_of_the_history(ring):
@@ -27,7 +28,8 @@ def test_figures_are_those_of_the_history(ring):
 
 def test_stand_off_is_the_gap_held(ring):
     """Persistent contact holds the gap that it begins with, which shrinks with the increment."""
-    fine = run_deck(DECKS / "ring.inp", ring.base.parent / "fine", h=0.01, t_end=1.5)
+    fine = run_deck(DECKS / "ring.inp", ring.base.parent / "fine", h=0.01, t_end=1.5,
+                    initiation="PERSISTENT")
     assert 0 < fine.verdict["stand_off"] < 0.5*ring.verdict["stand_off"]
     shut = run_deck(
         DECKS / "ring.inp", ring.base.parent / "shut", h=0.05, t_end=1.5, initiation="ADMISSIBLE")

@@ -27,7 +27,7 @@ from plain_scenes import (  # noqa: E402
     below,
 )
 
-__all__ = ["SCENES", "UNGUARDED", "Outcome", "draw", "fuzz_scenes", "judge"]
+__all__ = ["SCENES", "UNGUARDED", "Outcome", "draw", "draw_fine", "fuzz_scenes", "judge"]
 
 #: Rounding of positions, by an edge: lengths are 30 edges at most, some tens of operations.
 ROUNDING = 1e-13
@@ -103,6 +103,50 @@ def draw(chance):
             return scene
 
 
+def add_fine_body(scene, name, chance, plain):
+    """One body of ten elements and more across, a ring of five between its circles."""
+    place = place_of(chance, plain)
+    density = chance.choice([0.1, 1.0, 1.0, 10.0])
+    more = {"stiffness": density*chance.choice([100.0, 300.0, 1000.0]), "density": density,
+            "velocity": velocity_of(chance, place, plain),
+            "spin": 0.0 if plain else chance.choice([0.0, 2.0, -5.0])}
+    kind = chance.choice(["block", "disc", "ring"])
+    if kind == "block":
+        size = chance.choice([0.6, 1.0]), chance.choice([0.6, 1.0])
+        cells = chance.choice([11, 12, 14]), chance.choice([11, 12, 14])
+        turn = chance.choice([0.0, 0.0, math.pi/4]) if plain else chance.uniform(0, math.pi)
+        scene.block(name, place, size, cells, turn, **more)
+    elif kind == "disc":
+        scene.disc(name, place, chance.choice([0.3, 0.4]), (chance.choice([6, 8]), chance.choice([3, 5])),
+                   0.0 if plain else chance.uniform(0, 1), **more)
+    else:
+        outer = chance.choice([0.4, 0.5])
+        more["stiffness"] *= 10.0      # no wall is to meet the other one
+        scene.ring(name, lambda angle, share: (
+            place[0] + outer*(1 - 0.4*share)*math.cos(angle),
+            place[1] + outer*(1 - 0.4*share)*math.sin(angle)), (chance.choice([32, 48]), 5), **more)
+
+
+def draw_fine(chance):
+    """One to three bodies of many elements, with or without a floor, as `draw` draws coarse ones."""
+    while True:
+        plain = chance.random() < 0.4
+        scene = Scene(chance.choice([0.005, 0.01, 0.02]), 0.0, gravity=chance.choice([0.0, 0.0, 10.0]))
+        scene.t_end = 60*scene.h
+        for k in range(chance.randint(1, 3)):
+            add_fine_body(scene, f"B{k}", chance, plain)
+        floors = ["rigid", "fine"] + ["none"]*(len(scene.part) > 1)
+        floor = chance.choice(floors)
+        if floor == "rigid":
+            scene.block("FLOOR", (-2.0, -0.5), (4.0, 0.5), (chance.choice([8, 13, 30]), 1))
+            scene.hold("FLOOR", lambda x, y: True)
+        elif floor == "fine":
+            scene.block("FLOOR", (-2.0, -0.5), (4.0, 0.5), (chance.choice([20, 33]), 7),
+                        stiffness=chance.choice([100.0, 1000.0])).hold("FLOOR", below(-0.5))
+        if is_apart(scene):
+            return scene
+
+
 def judge(scene, done, meets_itself):
     """What is wrong with a run that is told to be good; empty: nothing.
 
@@ -134,6 +178,7 @@ def judge(scene, done, meets_itself):
 WAYS = [(ALL, {"formulation": "NODE TO SURFACE"}),
         (ALL, {"formulation": "NODE TO SURFACE", "initiation": "ADMISSIBLE"}),
         (ALL, {"formulation": "NODE TO SURFACE", "initiation": "MASSLESS"}),
+        (AUTO, {"formulation": "NODE TO SURFACE", "initiation": "AUTO"}),
         (ALL, {"formulation": "NODE TO SURFACE", "method": "AUGMENTED LAGRANGE"}),
         (BOTH, {"formulation": "NODE TO SURFACE", "method": "SADDLE POINT"}),
         (AUTO, {"formulation": "SEGMENT"}), (AUTO, {"formulation": "MORTAR"}),
@@ -142,7 +187,7 @@ WAYS = [(ALL, {"formulation": "NODE TO SURFACE"}),
 
 def fuzz_scenes(chance, folder):
     """A scene drawn by chance ends as it is told, or stops and says why."""
-    scene = draw(chance)
+    scene = draw_fine(chance) if chance.random() < 0.1 else draw(chance)
     sides, parameters = chance.choice(WAYS)
     done = Outcome(scene, folder, sides, **parameters)
     assert done.has_ended or done.run.verdict["message"]
