@@ -395,6 +395,7 @@ trade: .venv/test.stamp  ## write the tables and the figure of docs/trade.md ane
 	$(PY) tests/bench/trade_first.py --update
 	$(PY) tests/bench/trade_coarse.py --update
 	$(PY) tests/bench/trade_fine.py --update
+	$(PY) tests/bench/trade_discs.py --update
 	$(PY) tests/bench/trade_studies.py --update
 
 extremes: .venv/test.stamp  ## drive everything to its extremes; write the table of docs/stability.md anew

@@ -82,6 +82,15 @@ def run(deck, parameters):
     return found | {name: measures[name].rows.tolist() for name in names if name in measures}
 
 
+def chosen(deck, parameters):
+    """The treatment that `AUTO`, the default, takes."""
+    with tempfile.TemporaryDirectory() as folder:
+        path = deck.write(pathlib.Path(folder) / "deck.inp")
+        told = usage([PROGRAM, "check", path, *(f"--set={name}={value}" for name, value in {
+            **parameters, "initiation": "AUTO"}.items())]).text
+    return "`MASSLESS`" if "massless contact nodes: on" in told else "`PERSISTENT`"
+
+
 def away(found, exact, name):
     """How far a run is from its limit, by the largest row; nan where it is not measured."""
     a, b = (np.array(r.get(name, [[math.nan]])) for r in (found, exact))
@@ -97,8 +106,8 @@ def share(value):
     return "" if math.isnan(value) else f"{100*value:.2g} %" if value >= 1e-4 else "< 0.01 %"
 
 
-def line_of(name, runs):
-    """A row of the table; `runs` by treatment and part."""
+def line_of(name, runs, default):
+    """A row of the table; `runs` by treatment and part, `default` what `AUTO` takes."""
     of = {t: [runs[t, part] for part in PARTS] for t in TREATMENTS}
     massive, massless = of["PERSISTENT"], of["MASSLESS"]
     both = [(share(away(runs_of[0], runs_of[-1], "position")),
@@ -110,23 +119,24 @@ def line_of(name, runs):
             " / ".join(map(str, bad.values())),
             *(f"{size(largest(massive, key))} / {size(largest(massless, key))}"
               for key in ("energy", "stand_off")),
-            *(" / ".join(pair) if any(pair) else "" for pair in zip(*both, strict=True)))
+            *(" / ".join(pair) if any(pair) else "" for pair in zip(*both, strict=True)), default)
 
 
-HEAD = ["scene", "CPU", "CPU, h/8", "cuts", "bad", "energy", "stand-off", "position", "impulse"]
+HEAD = ["scene", "CPU", "CPU, h/8", "cuts", "bad", "energy", "stand-off", "position", "impulse",
+        "`AUTO`"]
 
 
 def lines_of(only, jobs=1):
-    chosen = [scene for scene in scenes()
+    wanted = [scene for scene in scenes()
               if not only or any(word in scene[0] for word in only)]
-    asked = [(scene, t, part) for scene in chosen for t in TREATMENTS for part in PARTS]
+    asked = [(scene, t, part) for scene in wanted for t in TREATMENTS for part in PARTS]
     with concurrent.futures.ThreadPoolExecutor(jobs) as pool:
         found = list(pool.map(lambda one: record(*one[0], *one[1:]), asked))
     by_key = {(scene[0], t, part): r for (scene, t, part), r in zip(asked, found, strict=True)}
     rows = []
-    for name, *_ in chosen:
+    for name, deck, parameters in wanted:
         runs = {(t, part): by_key[name, t, part] for t in TREATMENTS for part in PARTS}
-        rows.append(line_of(name, runs))
+        rows.append(line_of(name, runs, chosen(deck, parameters)))
     return table(HEAD, rows), by_key
 
 

@@ -13,6 +13,8 @@ sys.path.insert(0, str(BENCH))
 import bench_targets  # noqa: E402
 import kept_runs  # noqa: E402
 import trade_coarse  # noqa: E402
+import trade_discs  # noqa: E402
+import trade_fine  # noqa: E402
 import trade_first  # noqa: E402
 import trade_knobs  # noqa: E402
 import trade_studies  # noqa: E402
@@ -126,10 +128,25 @@ def test_table_of_first_contact(tmp_path, monkeypatch):
     """A row of docs/trade.md: both treatments, three increments; what is there is not run again."""
     monkeypatch.setattr(trade_first, "KEPT", tmp_path)
     lines, runs = trade_first.lines_of(["punch"])
-    assert len(lines) == 3 and lines[2].count("|") == 10 and len(runs) == 6
+    assert len(lines) == 3 and lines[2].count("|") == 11 and len(runs) == 6
+    assert "`PERSISTENT`" in lines[2]
     assert all(r["energy"][0][0] < 1e-12 and r["verdict"] == "good" for r in runs.values())
     monkeypatch.setattr(trade_first, "run", None)
     assert trade_first.lines_of(["punch"])[0] == lines
+
+
+def test_table_of_drawn_fine_scenes():
+    """Of the first three scenes all shed their mass, and none ends worse for it."""
+    lines = trade_fine.lines_of(range(3))
+    assert lines[0].startswith("`AUTO` is `MASSLESS` in 3 of 3 drawn scenes; of these 0 end worse")
+    assert [line.count("|") for line in lines[2:]] == 4*[6]
+
+
+def test_table_of_discs():
+    """Without mass at the rim the force is smoother with half of h; with it it is rough."""
+    lines = trade_discs.lines_of(edges=(24,), steps=(0.01, 0.005))
+    rough = [float(line.split("|")[4]) for line in lines[2:]]
+    assert len(rough) == 4 and rough[3] < 0.5*rough[2] < 0.1*min(rough[:2])
 
 
 def test_force_of_the_bar_in_closed_form():
