@@ -37,6 +37,7 @@ module emcon_deck
    use emcon_deck_surfaces, only : read_surfaces
    use emcon_deck_tables, only : read_amplitudes, read_time_points
    use emcon_deck_ties, only : read_ties
+   use emcon_deck_transform, only : read_transforms
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
    use emcon_guards, only : guards_find
    use emcon_scene, only : scene_t
@@ -100,6 +101,7 @@ contains
       call read_element_kinds(reader, scene)
       call read_elements(reader, scene)
       call read_sets(reader, scene)
+      call read_transforms(reader, scene)
       call read_given(reader, scene)
       call read_surfaces(reader, scene)
       call read_materials(reader, scene)

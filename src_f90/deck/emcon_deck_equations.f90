@@ -6,12 +6,14 @@ module emcon_deck_equations
       is_blank, is_label, next_line
    use emcon_deck_named, only : get_nodes
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, option_name, reader_t
+   use emcon_deck_turned, only : turn_equation
    use emcon_diagnostics, only : add_error, quoted
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
    use emcon_sort, only : sort_order
    use emcon_text, only : to_text
+   use emcon_turned_axes, only : turned_marks
    implicit none
    private
    public :: read_equations
@@ -48,6 +50,7 @@ contains
       type(scene_t), intent(inout) :: scene
       type(list_t) :: list
       integer :: i, n_before
+      integer, allocatable :: mark(:)
 
       n_before = reader%log%n_errors
       allocate(list%item(16))
@@ -63,6 +66,10 @@ contains
          end associate
       end do
       scene%equation = list%item(:list%n)
+      allocate(mark, source=turned_marks(scene%node%turned, size(scene%node%label)))
+      do i = 1, merge(list%n, 0, size(scene%node%turned) > 0)
+         call turn_equation(scene%node%turned, mark, scene%n_dim, scene%equation(i))
+      end do
       reader%doubt%equations = reader%doubt%equations .or. reader%log%n_errors > n_before
    end subroutine read_equations
 

@@ -37,8 +37,9 @@ module emcon_deck_keywords
       logical :: is_idle = .false.           !! taken: they would change nothing
    end type refusal_t
 
-   character(len=*), parameter :: printed = "FREQUENCY=,TIMEPOINTS=,TOTALS=,~GLOBAL:YES"
-   character(len=*), parameter :: filed = "FREQUENCY=,TIMEPOINTS=,~OUTPUT:2D,~POSITION,!USER"
+   character(len=*), parameter :: printed = "FREQUENCY=,TIMEPOINTS=,TOTALS="
+   character(len=*), parameter :: filed = "FREQUENCY=,TIMEPOINTS=,~GLOBAL:YES,~OUTPUT:2D," &
+      // "~POSITION,!USER"
 
    type(keyword_t), parameter :: keywords(*) = [ &
       keyword_t("HEADING", in_both), &
@@ -85,6 +86,7 @@ module emcon_deck_keywords
       keyword_t("TIE", in_model, "NAME=,POSITIONTOLERANCE=,MULTIPLIER=,ADJUST=,TYPE=," &
          // "~NOROTATION,~NOTHICKNESS,!CYCLICSYMMETRY,!MULTISTAGE,!TIEDNSET,!CONSTRAINTRATIO"), &
       keyword_t("EQUATION", in_both, "!REMOVE,!REMOVEALL,!INPUT"), &
+      keyword_t("TRANSFORM", in_model, "NSET=,TYPE="), &
       keyword_t("CONTACT INTERFERENCE", in_step, "SHRINK,AMPLITUDE=,!OP,!TYPE", &
          has_data=.false.), &
       keyword_t("CONTACT CONTROLS", in_step, "STABILIZE?,RESET,!AUTOMATICTOLERANCES," &
@@ -116,9 +118,9 @@ module emcon_deck_keywords
       keyword_t("NODE FILE", in_step, "NSET=," // filed), &
       keyword_t("EL FILE", in_step, "ELSET=," // filed), &
       keyword_t("CONTACT FILE", in_step, filed), &
-      keyword_t("NODE PRINT", in_step, "NSET=," // printed), &
-      keyword_t("EL PRINT", in_step, "ELSET=," // printed), &
-      keyword_t("CONTACT PRINT", in_step, "~NSET,~SET," // printed), &
+      keyword_t("NODE PRINT", in_step, "NSET=,GLOBAL=," // printed), &
+      keyword_t("EL PRINT", in_step, "ELSET=,~GLOBAL:YES," // printed), &
+      keyword_t("CONTACT PRINT", in_step, "~NSET,~SET,~GLOBAL:YES," // printed), &
       keyword_t("ENERGY PRINT", in_step, "~ELSET,~FREQUENCY:1,~TIMEPOINTS"), &
       keyword_t("OUTPUT", in_step, "FIELD,HISTORY,VARIABLE=,FREQUENCY=,TIMEPOINTS=,~NAME," &
          // "~FREQUENCYF:1,~TIMEINTERVAL,~NUMBERINTERVAL,~TIMEMARKS,~OP:NEW,~FILTER", &
@@ -137,7 +139,6 @@ module emcon_deck_keywords
       refusal_t("linear couplings go by *EQUATION", &
          "MPC,COUPLING,KINEMATIC,DISTRIBUTING,EMBEDDED ELEMENT"), &
       refusal_t("use *RIGID BODY and TYPE=SEGMENTS", "RIGID SURFACE"), &
-      refusal_t("degrees of freedom are those of the global axes", "TRANSFORM"), &
       refusal_t("coordinates are those of the global axes", "SYSTEM"), &
       refusal_t("nodes are given one by one by *NODE", "NGEN,NCOPY,NFILL"), &
       refusal_t("elements are given one by one by *ELEMENT", "ELGEN,ELCOPY"), &

@@ -175,6 +175,7 @@ contains
          new%only_totals = word == "ONLY"
       end if
       call check_contact(reader, card, scene, new)
+      call read_axes(reader, card, scene, self, new)
       kept = pack([(i, i = 1, size(self%step))], &
          self%output%kind /= new%kind .or. self%step == card%step)
       n = size(kept)
@@ -186,6 +187,28 @@ contains
       self%step = [self%step(kept), card%step]
       call move_alloc(grown, self%output)
    end subroutine read_request
+
+   !> GLOBAL: vectors of nodes are printed in the axes of these, or in those of the model.
+   subroutine read_axes(reader, card, scene, self, new)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(requests_t), intent(in) :: self
+      type(output_t), intent(inout) :: new
+      character(len=:), allocatable :: word
+      integer :: i
+
+      if (new%kind /= output_node_print .or. card%name /= "NODEPRINT") return
+      call option_word(reader, card, "GLOBAL", "NO, YES", word)
+      new%is_local = word == "NO" .and. size(scene%node%turned) > 0
+      do i = 1, size(self%output)
+         if (self%output(i)%kind /= new%kind .or. self%output(i)%set /= new%set) cycle
+         if (self%output(i)%is_local .eqv. new%is_local) cycle
+         call card_error(reader, card, "the same nodes are printed with another GLOBAL before; " &
+            // "give both the same, or one of them a set of its own")
+         return
+      end do
+   end subroutine read_axes
 
    !> Contact output needs contact, and totals of pairs are totals of forces.
    subroutine check_contact(reader, card, scene, new)

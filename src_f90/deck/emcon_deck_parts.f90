@@ -331,6 +331,8 @@ contains
          call make_keyword_line(self, card, instance, keeps_names, line)
          call put_line(self, line, source, card%line)
       end if
+      if (card%name == "TRANSFORM" .and. instance%is_moved) call add_error(log, origin_of(source, &
+         card%line), card%title // ": axes do not move with an instance; put it into the assembly")
       do i = card%data, card%last
          if (is_comment(source%line(i)%text)) cycle
          if (card%name == "NODE" .and. instance%is_moved) then

@@ -28,6 +28,7 @@ module emcon_deck_step
    use emcon_deck_penalty, only : check_penalty, read_constraint_method
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
       option_name, option_number, option_real, option_word, reader_t, refuse_option
+   use emcon_deck_turned, only : turn_conditions
    use emcon_diagnostics, only : add_error
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
@@ -92,6 +93,7 @@ contains
          last = scene%step(k)
       end do
       call read_turns(reader, scene)
+      call turn_conditions(reader, scene)
       call choose_initiation(reader, scene)
       call pairs_ask(reader, scene%pair, scene%step)
       call soften_steps(reader, scene%pair, scene%step)

@@ -100,7 +100,13 @@ contains
                scene%rigid(-t)%name // " in " // direction(scene, linear%own(row)) &
                // " at node " // to_text(scene%node%label(k))
          else if (t == 0) then
-            text = where_text(scene, scene%equation(k)%origin) // ": *EQUATION " // to_text(k)
+            text = where_text(scene, scene%equation(k)%origin)
+            if (scene%equation(k)%turned == 0) then
+               text = text // ": *EQUATION " // to_text(k)
+            else
+               text = text // ": *TRANSFORM at node " // to_text(scene%node%label( &
+                  scene%equation(k)%node(1)))
+            end if
          else
             text = where_text(scene, scene%tie(t)%origin) // ": *TIE " // scene%tie(t)%name // &
                " in " // direction(scene, linear%own(row)) // " at slave node " // &
@@ -120,13 +126,16 @@ contains
       direction = axes(a:a)
    end function direction
 
-   !> The nodes of degrees of freedom.
+   !> The nodes of degrees of freedom; those of stand-ins are their nodes.
    pure function nodes_of(scene, dof) result(node)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: dof(:)
-      integer :: node(size(dof))
+      integer :: node(size(dof)), i
 
       node = (dof - 1)/scene%n_dim + 1
+      do i = 1, size(scene%node%turned)
+         where (node == scene%node%turned(i)%stand_in) node = scene%node%turned(i)%node
+      end do
    end function nodes_of
 
    subroutine nodes_text(scene, node, text)

@@ -12,6 +12,7 @@ module emcon_print_series
       output_t
    use emcon_stepper, only : stepper_t
    use emcon_text, only : string_t
+   use emcon_turned_axes, only : turn_values
    implicit none
    private
    public :: series_t, print_series_define, print_series_write, is_due
@@ -24,8 +25,12 @@ module emcon_print_series
       character(len=16) :: variable = ""
       logical :: is_total = .false.              !! the sum over the members
       integer :: i_set = 0                       !! as the history counts
+      logical :: is_local = .false.              !! in the axes of the nodes
       integer, allocatable :: item(:)            !! the members
    end type series_t
+
+   !> What of nodes is a vector, and may be told in their own axes.
+   character(len=*), parameter :: turning(*) = [character(len=2) :: "U", "V", "RF"]
 
 contains
 
@@ -65,6 +70,7 @@ contains
 
       associate (output => stepper%scene%step(new%step)%output(new%request))
          has_totals = output%totals .or. output%only_totals
+         new%is_local = output%is_local
          do k = 1, size(output%variable)
             new%variable = output%variable(k)%text
             if (new%variable == "CNUM") cycle          ! counts are of pairs
@@ -123,6 +129,7 @@ contains
       do i = 1, size(self)
          if (.not. is_same(self(i), new)) cycle
          new%i_set = self(i)%i_set
+         new%is_local = self(i)%is_local
          self = [self, new]
          return
       end do
@@ -152,7 +159,8 @@ contains
       associate (scene => stepper%scene, system => stepper%march%system)
          select case (place)
          case (at_nodes)
-            call find_members("ALL_NODES", scene%set%node, scene%node%label)
+            call find_members("ALL_NODES", scene%set%node, scene%node%label( &
+               :size(scene%node%label) - count(scene%node%turned%stand_in > 0)))
          case (at_elements)
             call find_members("ALL_ELEMENTS", scene%set%element, scene%element%label)
          case (at_contacts)
@@ -258,6 +266,8 @@ contains
             if (any(is_written .and. self%i_set == series%i_set)) cycle
             is_written(i) = .true.
             values = quantity_values(stepper, trim(series%variable), series%place)
+            if (series%is_local .and. any(series%variable == turning)) call turn_values( &
+               stepper%scene%node%turned, values)
             values = values(:, series%item)
             if (series%is_total) values = reshape(sum(values, dim=2), [size(values, 1), 1])
             call history_set_append(history, series%i_set, real(stepper%march%state%clock%time, &

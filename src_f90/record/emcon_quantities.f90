@@ -21,6 +21,7 @@ module emcon_quantities
    use emcon_term_registry, only : terms_solid
    use emcon_text, only : string_t
    use emcon_vtkhdf, only : field_t
+   use emcon_turned_axes, only : stand_in_forces, stand_in_shows
    implicit none
    private
    public :: quantity_values, quantity_components, quantity_fields, quantity_of_field
@@ -147,11 +148,14 @@ contains
          select case (variable)
          case ("U")
             values = real(state%u, dp)
+            call stand_in_shows(stepper%scene%node%turned, values)
          case ("V")
             values = real(state%v, dp)
+            call stand_in_shows(stepper%scene%node%turned, values)
          case ("RF")
             values = real(state%reaction, dp)
             call gather_frames(stepper%scene%rigid, values)
+            call stand_in_forces(stepper%scene%node%turned, values)
          case ("UR", "VR", "RM")
             allocate(values(n_turn(size(state%u, 1)), size(state%u, 2)), source=0.0_dp)
             do i = 1, size(stepper%scene%rigid)

@@ -30,9 +30,11 @@ contains
       call find_crosspoints(scene, node, place, n_place)
       call elimination_text(system, text)
       if (size(scene%rigid) > 0) text = to_text(size(scene%rigid)) // " rigid; " // text
+      if (size(scene%node%turned) > 0) text = to_text(count(scene%node%turned%stand_in > 0)) // &
+         " nodes held along axes of *TRANSFORM; " // text
       call note_add(notes, to_text(system%space%n_body) // " subdomains, " // &
          to_text(size(scene%tie)) // " ties, " // to_text(n_place) // " crosspoints, " // &
-         to_text(size(scene%equation)) // " equations; " // text)
+         to_text(count(scene%equation%turned == 0)) // " equations; " // text)
       if (size(scene%tie) > 0) call add_subdomains(scene, system, notes)
       do k = 1, size(scene%tie)
          call tie_text(scene, scene%tie(k), text)

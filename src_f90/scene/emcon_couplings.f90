@@ -40,6 +40,7 @@ module emcon_couplings
       integer, allocatable :: node(:)                !! (n) the first is the one to eliminate
       integer, allocatable :: dof(:)                 !! (n) 1..n_dim
       real(wp), allocatable :: coefficient(:)        !! (n) the first is not 0
+      integer :: turned = 0                          !! of a node with axes of its own: its index
    end type equation_t
 
 end module emcon_couplings

@@ -23,6 +23,7 @@ module emcon_requests
       real(wp), allocatable :: time(:)               !! TIME POINTS, ascending; none: by frequency
       logical :: totals = .false.                    !! TOTALS=YES or ONLY
       logical :: only_totals = .false.
+      logical :: is_local = .false.                  !! vectors in the axes of their nodes
    end type output_t
 
 end module emcon_requests

@@ -14,6 +14,7 @@ module emcon_scene
    use emcon_rigid_bodies, only : rigid_body_t
    use emcon_steps, only : step_t
    use emcon_text, only : string_t, to_text
+   use emcon_turned_axes, only : turned_axes_t
    implicit none
    private
    public :: scene_t, scene_nodes_t, scene_elements_t, scene_sets_t, scene_host_t, scene_deck_t
@@ -34,6 +35,7 @@ module emcon_scene
    type :: scene_nodes_t
       integer, allocatable :: label(:)               !! (n_node)
       type(origin_t), allocatable :: origin(:)       !! (n_node)
+      type(turned_axes_t), allocatable :: turned(:)  !! those with axes of their own
    end type scene_nodes_t
 
    type :: scene_elements_t
@@ -98,7 +100,7 @@ contains
       allocate(scene%element%node(size(x, 1), 0), scene%element%kinds(0))     ! room for a facet
       allocate(scene%set%node(0), scene%set%element(0), scene%surface(0), scene%amplitude(0))
       allocate(scene%material(0), scene%section(0), scene%pair(0), scene%tie(0))
-      allocate(scene%equation(0), scene%rigid(0), scene%step(1))
+      allocate(scene%equation(0), scene%rigid(0), scene%step(1), scene%node%turned(0))
       allocate(scene%step(1)%prescribed(0), scene%step(1)%turn(0), scene%step(1)%load(0), &
          scene%step(1)%output(0))
    end subroutine scene_of_nodes
