@@ -128,12 +128,12 @@ contains
       is_bare([profile]) = .false.
       is_bare(pack(scene%surface%inner_node, scene%surface%inner_node > 0)) = .false.
       if (.not. any(is_bare) .or. all(is_bare)) return
-      call mark_coupled(scene, is_coupled)
+      call mark_coupled(scene, 0, is_coupled)
       is_idle = is_bare .and. .not. any(is_coupled, 1)
       if (any(is_idle)) call add_warning(reader%log, scene%node%origin(findloc(is_idle, .true., &
          1)), "node " // label_list(pack(scene%node%label, is_idle)) &
          // " belongs to no element; it is left out")
-      call mark_loaded(scene, is_coupled, is_loaded)
+      call mark_loaded(scene, is_loaded)
       call tell_bare(is_loaded .and. is_idle, "but *CLOAD acts on it")
       call tell_bare(is_loaded .and. is_bare .and. .not. is_idle, &
          "but *CLOAD acts on it in a direction that is in no *EQUATION")
@@ -158,15 +158,17 @@ contains
 
    end subroutine check_nodes
 
-   !> The nodes on which a force acts in a direction that is not coupled.
-   pure subroutine mark_loaded(scene, is_coupled, is_loaded)
+   !> The nodes on which a force acts in a direction that is not coupled in its step.
+   pure subroutine mark_loaded(scene, is_loaded)
       type(scene_t), intent(in) :: scene
-      logical, intent(in) :: is_coupled(:, :)                    !! (n_dim, n_node)
       logical, allocatable, intent(out) :: is_loaded(:)          !! (n_node)
+      logical, allocatable :: is_coupled(:, :)
       integer :: i, k
 
       allocate(is_loaded(size(scene%node%label)), source=.false.)
       do i = 1, size(scene%step)
+         if (.not. any(scene%step(i)%load%kind == load_point)) cycle
+         call mark_coupled(scene, i, is_coupled)
          associate (load => scene%step(i)%load)
             do k = 1, size(load)
                if (load(k)%kind /= load_point .or. .not. abs(load(k)%value) > 0.0_wp) cycle
@@ -178,15 +180,17 @@ contains
       end do
    end subroutine mark_loaded
 
-   !> The degrees of freedom that stand in equations, or move a rigid body.
-   pure subroutine mark_coupled(scene, is_coupled)
+   !> The degrees of freedom that stand in equations of a step, or move a rigid body.
+   pure subroutine mark_coupled(scene, i_step, is_coupled)
       type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step                              !! 0: equations of all steps
       logical, allocatable, intent(out) :: is_coupled(:, :)      !! (n_dim, n_node)
       integer :: i, k
 
       allocate(is_coupled(scene%n_dim, size(scene%node%label)), source=.false.)
       do i = 1, size(scene%equation)
          associate (equation => scene%equation(i))
+            if (equation%last_step < i_step) cycle
             do k = 1, size(equation%node)
                is_coupled(equation%dof(k), equation%node(k)) = .true.
             end do

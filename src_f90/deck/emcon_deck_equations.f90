@@ -1,9 +1,9 @@
-!> *EQUATION: sums of coefficient times displacement that are zero in all steps.
+!> *EQUATION: sums of coefficient times displacement that are zero, until a step removes them.
 module emcon_deck_equations
    use emcon_couplings, only : equation_t
    use emcon_deck_dimension, only : freedoms_text, n_plane
-   use emcon_deck_fields, only : data_error, data_open, data_t, get_integer, get_name, get_real, &
-      is_blank, is_label, next_line
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_integer, &
+      get_name, get_real, is_blank, is_label, next_line
    use emcon_deck_named, only : get_nodes
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, option_name, reader_t
    use emcon_deck_turned, only : turn_equation
@@ -59,9 +59,11 @@ contains
             if (card%name /= "EQUATION") cycle
             if (card%step == 0) then
                call read_card(reader, card, scene, list)
-            else if (.not. (has_option(card, "REMOVE") .or. has_option(card, "REMOVEALL"))) then
+            else if (has_option(card, "REMOVE") .or. has_option(card, "REMOVEALL")) then
+               call remove_equations(reader, card, scene, list)
+            else
                call card_error(reader, card, "known but not supported inside a step: equations " &
-                  // "hold in all steps; put it before the first *STEP")
+                  // "hold from the first step on; put it before the first *STEP")
             end if
          end associate
       end do
@@ -72,6 +74,50 @@ contains
       end do
       reader%doubt%equations = reader%doubt%equations .or. reader%log%n_errors > n_before
    end subroutine read_equations
+
+   !> REMOVE, REMOVE ALL: equations that no longer hold from the step of the card on, all or those
+   !> whose first term is named.
+   subroutine remove_equations(reader, card, scene, list)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(list_t), intent(inout) :: list
+      type(data_t) :: data
+      integer, allocatable :: item(:)
+      logical :: is_named(size(scene%node%label)), is_wanted(list%n), is_empty
+      integer :: first, last, k
+
+      is_empty = .true.
+      is_wanted = has_option(card, "REMOVEALL")
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         is_empty = .false.
+         if (has_option(card, "REMOVEALL")) then
+            call data_error(reader, data, "REMOVE ALL has no data lines")
+            return
+         end if
+         call check_count(reader, data, 2, 3, "node or node set, first dof, last dof")
+         if (data%ok) call get_nodes(reader, data, 1, scene, item)
+         if (data%ok) call get_integer(reader, data, 2, "degree of freedom", first)
+         last = first
+         if (data%ok .and. .not. is_blank(data, 3)) call get_integer(reader, data, 3, &
+            "last degree of freedom", last)
+         if (.not. data%ok) cycle
+         is_named = .false.
+         is_named(item) = .true.
+         associate (found => [(is_named(list%item(k)%node(1)) .and. list%item(k)%first_dof &
+               >= first .and. list%item(k)%first_dof <= last .and. list%item(k)%last_step &
+               >= card%step, k = 1, list%n)])
+            is_wanted = is_wanted .or. found
+            if (.not. (any(found) .or. reader%doubt%equations)) call data_error(reader, data, &
+               "no equation that still holds has its first term there")
+         end associate
+      end do
+      if (is_empty .and. .not. has_option(card, "REMOVEALL")) call card_error(reader, card, &
+         "which equations is not said: the node and degree of freedom of their first terms")
+      where (is_wanted) list%item(:list%n)%last_step = min(list%item(:list%n)%last_step, &
+         card%step - 1)
+   end subroutine remove_equations
 
    !> The equations of one card: each a line with the number of terms, then lines of terms.
    subroutine read_card(reader, card, scene, list)
@@ -313,6 +359,7 @@ contains
          equation%origin = new%origin
          equation%node = pack(new%node, is_kept)
          equation%dof = pack(new%dof, is_kept)
+         equation%first_dof = equation%dof(1)
          equation%coefficient = pack(new%coefficient, is_kept)
       end associate
    end subroutine append

@@ -85,7 +85,7 @@ module emcon_deck_keywords
       keyword_t("CONTACT PROPERTY ASSIGNMENT", in_model), &
       keyword_t("TIE", in_model, "NAME=,POSITIONTOLERANCE=,MULTIPLIER=,ADJUST=,TYPE=," &
          // "~NOROTATION,~NOTHICKNESS,!CYCLICSYMMETRY,!MULTISTAGE,!TIEDNSET,!CONSTRAINTRATIO"), &
-      keyword_t("EQUATION", in_both, "!REMOVE,!REMOVEALL,!INPUT"), &
+      keyword_t("EQUATION", in_both, "REMOVE,REMOVEALL,!INPUT"), &
       keyword_t("TRANSFORM", in_model, "NSET=,TYPE="), &
       keyword_t("CONTACT INTERFERENCE", in_step, "SHRINK,AMPLITUDE=,!OP,!TYPE", &
          has_data=.false.), &
@@ -274,8 +274,6 @@ contains
          reason = " (friction has one coefficient, for stick and slip, both ways and at any speed)"
       case ("TIEDNSET")
          reason = " (whole surfaces are tied)"
-      case ("REMOVE", "REMOVEALL")
-         reason = " (equations hold in all steps)"
       case ("POLYNOMIAL", "REDUCEDPOLYNOMIAL", "ARRUDA-BOYCE", "VANDERWAALS", "MARLOW")
          call law_titles("HYPERELASTIC", reason)
          reason = " (laws are " // reason // ")"

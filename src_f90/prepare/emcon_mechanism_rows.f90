@@ -55,6 +55,7 @@ contains
             rows%start(m + k + 1) = m + to
             rows%dof(m + from:m + to) = linear%dof(from:to)
             rows%weight(m + from:m + to) = linear%weight(from:to)/total
+            if (linear%is_gone(k)) rows%weight(m + from:m + to) = 0.0_wp
          end associate
       end do
    end subroutine mechanism_rows_find

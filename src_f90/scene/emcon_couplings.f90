@@ -40,6 +40,8 @@ module emcon_couplings
       integer, allocatable :: node(:)                !! (n) the first is the one to eliminate
       integer, allocatable :: dof(:)                 !! (n) 1..n_dim
       real(wp), allocatable :: coefficient(:)        !! (n) the first is not 0
+      integer :: first_dof = 0                       !! of the first term, in the deck
+      integer :: last_step = huge(1)                 !! that it holds in
       integer :: turned = 0                          !! of a node with axes of its own: its index
    end type equation_t
 

@@ -8,14 +8,14 @@ module emcon_linear_rows
    use emcon_rigid_bodies, only : rigid_body_t, rigid_weights
    use emcon_scene, only : scene_t
    use emcon_sort, only : sort_order
-   use emcon_steps, only : step_t
    implicit none
    private
    public :: linear_rows_t, linear_rows_init, linear_rows_choose
 
    type :: linear_rows_t
       integer :: n = 0
-      logical, allocatable :: is_used(:)         !! (n) else it follows from others in this step
+      logical, allocatable :: is_used(:)         !! (n) else it follows from others in this step,
+      logical, allocatable :: is_gone(:)         !! (n) or no longer holds
       integer, allocatable :: tie(:)             !! (n) that it is of; 0: an equation; -b: a body
       integer, allocatable :: place(:)           !! (n) row of tie, number of equation, rigid node
       integer, allocatable :: own(:)             !! (n) the freedom to eliminate, if possible
@@ -74,6 +74,7 @@ contains
          end associate
       end do
       allocate(self%is_used(self%n), source=.true.)
+      allocate(self%is_gone(self%n), source=.false.)
    end subroutine linear_rows_init
 
    !> Append the rows of tie `t` behind row `n`.
@@ -161,11 +162,11 @@ contains
    end subroutine add_sums
 
    !> Choose what is eliminated in `step`: arms follow the frame of their body, but where they are
-   !> prescribed the frame follows them. All rows are in use then.
-   pure subroutine linear_rows_choose(self, scene, step)
+   !> prescribed the frame follows them. All rows that hold are in use then.
+   pure subroutine linear_rows_choose(self, scene, i_step)
       type(linear_rows_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      type(step_t), intent(in) :: step
+      integer, intent(in) :: i_step              !! from 1
       integer :: n, k, node
 
       do n = 1, self%n
@@ -175,15 +176,20 @@ contains
             if (allocated(body%arm)) k = findloc(body%arm, self%place(n), 1)
             if (k == 0) cycle
             node = body%arm(k)
-            if (allocated(step%turn)) then
-               if (any(step%turn%rigid == -self%tie(n) .and. .not. step%turn%is_about)) then
-                  node = body%frame(k + 1)
+            associate (step => scene%step(i_step))
+               if (allocated(step%turn)) then
+                  if (any(step%turn%rigid == -self%tie(n) .and. .not. step%turn%is_about)) then
+                     node = body%frame(k + 1)
+                  end if
                end if
-            end if
+            end associate
             self%own(n) = n_dim*(node - 1) + 1 + mod(self%own(n) - 1, n_dim)
          end associate
       end do
-      self%is_used = .true.
+      do n = 1, self%n
+         if (self%tie(n) == 0) self%is_gone(n) = i_step > scene%equation(self%place(n))%last_step
+      end do
+      self%is_used = .not. self%is_gone
    end subroutine linear_rows_choose
 
    !> Append row `n`: degrees of freedom ascending, equal ones as one.

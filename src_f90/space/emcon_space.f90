@@ -145,7 +145,8 @@ contains
       logical :: is_too_full
 
       associate (step => scene%step(i_step))
-         call linear_rows_choose(self%linear, scene, step)
+         call linear_rows_choose(self%linear, scene, i_step)
+         if (any(self%linear%is_gone)) call retire(self, scene, i_step, lists)
          if (self%linear%n > 0) then
             call numbering_init(self%linked, self%is_alive, step%prescribed, self%linear, &
                self%unresolved)
@@ -162,6 +163,40 @@ contains
       call numbering_init(self%numbering, self%is_alive, scene%step(i_step)%prescribed)
       call lay_out(self, lists, matrix, slot, is_too_full, error)
    end subroutine space_begin_step
+
+   !> What was part of the model by equations alone is none of it once these no longer hold.
+   pure subroutine retire(self, scene, i_step, lists)
+      type(space_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i_step
+      type(lists_t), intent(in) :: lists         !! of all terms
+      logical :: is_bare(size(self%is_alive))
+      integer :: i
+
+      is_bare = .false.
+      do i = 1, size(scene%equation)
+         if (i_step > scene%equation(i)%last_step) is_bare(freedoms(i)) = .true.
+      end do
+      do i = 1, size(scene%equation)
+         if (i_step <= scene%equation(i)%last_step) is_bare(freedoms(i)) = .false.
+      end do
+      is_bare(lists%freedom) = .false.
+      self%is_alive = self%is_alive .and. .not. reshape(is_bare, shape(self%is_alive))
+      do i = 1, size(scene%rigid)
+         self%is_alive(:, scene%rigid(i)%node) = .true.
+      end do
+      if (allocated(scene%host%node)) self%is_alive(:, scene%host%node) = .true.
+
+   contains
+
+      pure function freedoms(k) result(dof)
+         integer, intent(in) :: k
+         integer :: dof(size(scene%equation(k)%node))
+
+         dof = lists%n_dim*(scene%equation(k)%node - 1) + scene%equation(k)%dof
+      end function freedoms
+
+   end subroutine retire
 
    !> The matrix of `numbering`: each freedom meets those of its lists, and itself.
    subroutine lay_out(self, lists, matrix, slot, is_too_full, error)

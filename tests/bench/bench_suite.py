@@ -52,7 +52,7 @@ def undamped(h, end):
     return edit
 
 
-def fully(edit):
+def fully(edit=lambda text: text):
     """The same with all points."""
     return lambda text: edit(text).replace("C3D20R", "C3D20")
 
@@ -60,6 +60,7 @@ def fully(edit):
 NEWTON = "CalculiX ends Newton's method at 0.5 % of the forces; to round-off"
 DAMPED = ("numerical damping of CalculiX, ALPHA=-0.05, none here; without it, to round-off, and with "
           "short increments")
+POINTS = "CalculiX takes the forces of turning by the 2 x 2 x 2 points of C3D20R; with C3D20"
 #: Why a deck differs by more than CalculiX prints, and by what change of the deck for CalculiX and
 #: for EMCON one sees it; the difference is then told, too.
 WHY = {
@@ -75,6 +76,11 @@ WHY = {
     "beamdynamic": (DAMPED + "; and CalculiX takes the mass, too, by the 2 x 2 x 2 points of C3D20R; "
                     "all three mended, with C3D20",
                     *(fully(edit("1e-7", "1e-5")) for edit in (undamped, by_increments))),
+    "equrem1": (DAMPED, undamped("2e-9", "2e-7"), by_increments("2e-9", "2e-7")),
+    "equrem2": (DAMPED, undamped("2e-9", "2e-7"), by_increments("2e-9", "2e-7")),
+    "equrem3": (DAMPED, undamped("2e-9", "2e-7"), by_increments("2e-9", "2e-7")),
+    "segment1": (POINTS, *2*(fully(),)),
+    "segment2": (POINTS, *2*(fully(),)),
     "beamnldye": ("explicit, five increments from rest: what stands at a node as mass decides; "
                   "to twenty times that end", by_increments("1e-8", "1e-6"),
                   by_increments("1e-8", "1e-6")),
