@@ -320,7 +320,9 @@ contains
             else if (mark == mark_flag .and. option%has_value) then
                fault = "parameter " // option%name // " takes no value"
             else if (mark == mark_without_effect) then
-               call card_warning(reader, card, "parameter " // option%name // " has no effect")
+               call parameter_reason(option%name, reason)
+               call card_warning(reader, card, "parameter " // option%name // " has no effect" &
+                  // reason)
             else if (is_repeated(card%option(:i))) then
                fault = "parameter " // option%name // " is given twice"
             end if

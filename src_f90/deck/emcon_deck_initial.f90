@@ -5,7 +5,8 @@ module emcon_deck_initial
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_integer, &
       get_real, next_line
    use emcon_deck_named, only : get_nodes
-   use emcon_deck_reader, only : card_error, card_t, option_name, reader_t, refuse_option
+   use emcon_deck_reader, only : card_error, card_t, note_idle, option_name, reader_t, &
+      refuse_option
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t
@@ -54,9 +55,11 @@ contains
                call read_values(reader, card, scene, .false., u)
             case ("")
                call card_error(reader, card, "TYPE=VELOCITY or TYPE=DISPLACEMENT is missing")
-            case ("TEMPERATURE", "STRESS", "PLASTICSTRAIN", "SOLUTION", "HARDENING", "CONTACT")
-               call refuse_option(reader, card, "TYPE", known, &
-                  "a run starts without stress at one temperature")
+            case ("TEMPERATURE")
+               call note_idle(reader, card%title // ", TYPE=TEMPERATURE", &
+                  "no step changes a temperature")
+            case ("STRESS", "PLASTICSTRAIN", "SOLUTION", "HARDENING", "CONTACT")
+               call refuse_option(reader, card, "TYPE", known, "a run starts without stress")
             case default
                call refuse_option(reader, card, "TYPE", known, "")
             end select

@@ -57,7 +57,7 @@ module emcon_deck_keywords
          // "!FILLETRADIUS:0"), &
       keyword_t("GIVEN FORCES", in_model, "NSET=", has_data=.false.), &
       keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,KINEMATICS=,MASSLESS," &
-         // "!ORIENTATION,!OFFSET:0,!CONTROLS"), &
+         // "~ORIENTATION,!OFFSET:0,!CONTROLS"), &
       keyword_t("RIGID BODY", in_model, "ELSET=,ANALYTICALSURFACE=,REFNODE=,!NSET,!ROTNODE," &
          // "!PINNSET,!TIENSET,!POSITION:INPUT,!ISOTHERMAL:NO", has_data=.false.), &
       keyword_t("MATERIAL", in_model, "NAME=", has_data=.false.), &
@@ -100,6 +100,7 @@ module emcon_deck_keywords
          // "!CONTINUE:NO,!RIKS,!EXPLICIT"), &
       keyword_t("DYNAMIC", in_step, "DIRECT,EXPLICIT,SOLVER=,!ALPHA:0,!APPLICATION,!INITIAL," &
          // "~NOHAF,~HAFTOL,~HALFINCSCALEFACTOR"), &
+      keyword_t("NO ANALYSIS", in_step, has_data=.false.), &
       keyword_t("CLOAD", in_step, "OP=,AMPLITUDE=,TIMEDELAY=,!LOADCASE:1,!USER,!FOLLOWER," &
          // "!SECTOR"), &
       keyword_t("DLOAD", in_step, "OP=,AMPLITUDE=,TIMEDELAY=,!LOADCASE:1,!USER"), &
@@ -148,7 +149,7 @@ module emcon_deck_keywords
       refusal_t("there is no temperature", "TEMPERATURE,DFLUX,FILM,RADIATE,HEAT TRANSFER"), &
       refusal_t("there is no temperature", &
          "EXPANSION,CONDUCTIVITY,SPECIFIC HEAT,PHYSICAL CONSTANTS", is_idle=.true.), &
-      refusal_t("no section asks for it", "ORIENTATION", is_idle=.true.), &
+      refusal_t("materials are isotropic", "ORIENTATION", is_idle=.true.), &
       refusal_t("use *SOLID SECTION", "UEL PROPERTY"), &
       refusal_t("bodies are solids; forces, potentials and masses of others a program may give", &
          "SHELL SECTION,BEAM SECTION,MEMBRANE SECTION,SPRING,DASHPOT,MASS"), &
@@ -168,8 +169,7 @@ module emcon_deck_keywords
       refusal_t("it names no results", "FILE FORMAT,MONITOR,INCREMENTATION OUTPUT,FILTER,PRINT", &
          is_idle=.true.), &
       refusal_t("use *EL FILE", "ELEMENT FILE", .true.), &
-      refusal_t("the log has diagnostics", "DIAGNOSTICS", is_idle=.true.), &
-      refusal_t("emcon check reads a deck without running it", "NO ANALYSIS")]
+      refusal_t("the log has diagnostics", "DIAGNOSTICS", is_idle=.true.)]
 
 contains
 
@@ -264,6 +264,8 @@ contains
          reason = " (contact follows the deformed surfaces)"
       case ("TIED")
          reason = " (use *TIE)"
+      case ("ORIENTATION")
+         reason = " (materials are isotropic, and directions are those of the axes of the model)"
       case ("CYCLICSYMMETRY", "MULTISTAGE")
          reason = " (sectors of a model are not repeated; couple their edges by *EQUATION)"
       case ("TAUMAX")

@@ -26,8 +26,8 @@ module emcon_deck_step
    use emcon_deck_scheme, only : check_schemes, read_scheme
    use emcon_deck_pressure, only : soften_steps
    use emcon_deck_penalty, only : check_penalty, read_constraint_method
-   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_count, &
-      option_name, option_number, option_real, option_word, reader_t, refuse_option
+   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, n_cards, &
+      option_count, option_name, option_number, option_real, option_word, reader_t, refuse_option
    use emcon_deck_turned, only : turn_conditions
    use emcon_diagnostics, only : add_error
    use emcon_interactions, only : contact_pair_t
@@ -46,6 +46,7 @@ module emcon_deck_step
 
    !> Increments of a step are counted in default integers, those that are cut too.
    real(wp), parameter :: most_increments = 0.5_wp*huge(1)
+   character(len=*), parameter :: procedure_twice = "the step has a procedure already"
    !> STABILIZE of *STATIC without a value, and at most.
    real(wp), parameter :: default_stabilization = 2.0e-4_wp, most_stabilization = 0.1_wp
 
@@ -72,6 +73,7 @@ contains
       end do
       allocate(scene%step(n_step))
       last%contact%initiation = option_default("initiation")
+      scene%deck%only_checks = n_cards(reader, "NOANALYSIS") > 0
       time = 0.0_wp
       do i = 1, size(reader%card)
          if (reader%card(i)%step == 0 .and. reader%card(i)%name == "RESTART") call read_restart( &
@@ -153,6 +155,9 @@ contains
             select case (card%name)
             case ("STATIC", "DYNAMIC")
                call read_procedure(reader, card, step)
+            case ("NOANALYSIS")
+               if (step%scheme%code /= 0) call card_error(reader, card, procedure_twice)
+               step%scheme = scheme_row("STATIC", "")
             case ("CONSTRAINTMETHOD")
                call read_constraint_method(reader, card, step)
             case ("CONTACTINITIATION")
@@ -240,7 +245,7 @@ contains
          "least increment", "largest increment"]
 
       if (step%scheme%code /= 0) then
-         call card_error(reader, card, "the step has a procedure already")
+         call card_error(reader, card, procedure_twice)
          return
       end if
       step%scheme = scheme_row(card%name, "")

@@ -92,15 +92,23 @@ contains
       type(run_report_t), intent(out) :: report
       type(error_t), allocatable, intent(out) :: error
       type(run_t), allocatable :: run
+
+      allocate(run)
+      call stepper_open(run%stepper, path, options%override, options%is_lenient, error)
+      call move_diagnostics(run, report)
+      if (.not. (allocated(error) .or. options%is_quiet)) call report_model(run, options, report)
+   end subroutine run_check
+
+   !> What `emcon check` prints of a model.
+   subroutine report_model(run, options, report)
+      type(run_t), intent(inout) :: run
+      type(run_options_t), intent(in) :: options
+      type(run_report_t), intent(inout) :: report
       type(report_rows_t) :: rows
       type(notes_t) :: lines
       character(len=:), allocatable :: json
       integer :: k
 
-      allocate(run)
-      call stepper_open(run%stepper, path, options%override, options%is_lenient, error)
-      call move_diagnostics(run, report)
-      if (allocated(error) .or. options%is_quiet) return
       associate (line => model_lines(run%stepper))
          lines = notes_t(size(line), line)
       end associate
@@ -116,7 +124,7 @@ contains
          end do
       end if
       report%closing = lines%item(:lines%n)
-   end subroutine run_check
+   end subroutine report_model
 
    !> Run the deck at `path`. What was written stays, whatever the error.
    subroutine run_deck(path, options, is_interrupted, report, error)
@@ -132,6 +140,12 @@ contains
       call stepper_open(run%stepper, path, options%override, options%is_lenient, error)
       call move_diagnostics(run, report)
       if (allocated(error)) return
+      if (run%stepper%scene%deck%only_checks) then
+         call report_model(run, options, report)
+         report%closing = [report%closing, string_t("*NO ANALYSIS: the deck was read and " &
+            // "checked; nothing was computed")]
+         return
+      end if
       call run_parts_mark(run%parts, part_read)
       call result_base(path, options, run%base)
       report%base = run%base

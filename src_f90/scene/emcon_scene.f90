@@ -29,6 +29,7 @@ module emcon_scene
       character(len=:), allocatable :: labels        !! of instances
       !> Why surfaces of contact keep their mass, "": they lose it; not allocated: the steps say so.
       character(len=:), allocatable :: keeps_mass
+      logical :: only_checks = .false.               !! *NO ANALYSIS
    end type scene_deck_t
 
    !> What the deck calls its nodes.

@@ -307,15 +307,28 @@ EXPORTED = [
     ("*DENSITY\n", "*EXPANSION, ZERO=0.\n1.2e-5\n*CONDUCTIVITY\n50., 0.\n*SPECIFIC HEAT\n500.\n",
      "*SPECIFIC HEAT (there is no temperature)"),
     ("*MATERIAL, NAME=M\n", "*ORIENTATION, NAME=O, SYSTEM=CYLINDRICAL\n0., 0., 0., 0., 0., 1.\n",
-     "*ORIENTATION (no section asks for it)"),
+     "*ORIENTATION (materials are isotropic)"),
     ("*CLOAD\n", "*CONTROLS, PARAMETERS=TIME INCREMENTATION\n8, 10, , , , , , 5\n0.25, 0.5\n",
      "*CONTROLS ("),
     ("*CLOAD\n", "*OUTPUT, FREQUENCY=1\n", "*OUTPUT (the requests that follow say what is written)"),
+    ("*MATERIAL, NAME=M\n", "*INITIAL CONDITIONS, TYPE=TEMPERATURE\nEND, 293.\n",
+     "*INITIAL CONDITIONS, TYPE=TEMPERATURE (no step changes a temperature)"),
     ("*CLOAD\n", "*PRINT, CONTACT=YES\n*MONITOR, NODE=1, DOF=2\n*FILE FORMAT, ASCII\n",
      "*MONITOR (it names no results)"),
     ("*BOUNDARY\n", "*SURFACE INTERACTION, NAME=I\n1.,\n*FRICTION\n0.3\n*BOUNDARY\n*FILTER, NAME=F\n",
      "thickness of *SURFACE INTERACTION (that of the sections counts)"),
 ]
+
+
+def test_no_analysis(tmp_path):
+    """The deck is read and checked, and no files are written."""
+    deck = tmp_path/"deck.inp"
+    deck.write_text(moving().replace("*DYNAMIC, DIRECT\n0.5, 1.\n", "*NO ANALYSIS\n"))
+    done = emcon(deck)
+    assert done.returncode == 0 and list(tmp_path.iterdir()) == [deck]
+    assert done.stdout.splitlines()[-1] == "*NO ANALYSIS: the deck was read and checked; nothing was computed"
+    deck.write_text(moving().replace("*DYNAMIC, DIRECT\n0.5, 1.\n", "*NO ANALYSIS\n").replace("*ELASTIC\n", ""))
+    assert emcon(deck).returncode == 2
 
 
 @pytest.mark.parametrize("before, cards, told", EXPORTED, ids=lambda text: text.split("\n")[0])
@@ -378,18 +391,22 @@ def test_output_of_abaqus_that_is_not_written_is_warned_of(tmp_path):
     assert [line.split("variable ")[1][:4] for line in done.errors.splitlines()] == ["'A' ", "'LE'"]
 
 
+def test_orientation_of_a_section_is_told(tmp_path):
+    done = run(tmp_path, moving().replace("ELSET=BAR, MATERIAL=M\n", "ELSET=BAR, MATERIAL=M, ORIENTATION=O\n"))
+    assert "parameter ORIENTATION has no effect (materials are isotropic" in done.errors
+
+
 @pytest.mark.parametrize("before, cards", [
     ("*CLOAD\n", "*OUTPUT, FREQUENCY=2\n"),
     ("*CLOAD\n", "*OUTPUT, FIELD, HISTORY\n"),
     ("*CLOAD\n", "*NODE OUTPUT\nU\n"),
     ("*CLOAD\n", "*OUTPUT, FIELD, VARIABLE=SOME\n"),
     ("*CLOAD\n", "*OUTPUT, FIELD, TIME POINTS=T\n*NODE OUTPUT\nU\n"),
-    ("ELSET=BAR, MATERIAL=M\n", "ELSET=BAR, MATERIAL=M, ORIENTATION=O\n"),
     ("*BOUNDARY\n", "*SURFACE INTERACTION, NAME=I\n0.\n"),
     ("*BOUNDARY\n", "*SURFACE INTERACTION, NAME=I\n1., 2.\n"),
     ("*BOUNDARY\n", "*SURFACE INTERACTION, NAME=I\n1.\n2.\n"),
     ("*CLOAD\n", "*NO ANALYSIS\n"),
-], ids=["frequency", "both", "alone", "word", "times", "orientation", "thin", "fields", "lines", "no-analysis"])
+], ids=["frequency", "both", "alone", "word", "times", "thin", "fields", "lines", "no-analysis"])
 def test_cards_of_exporters_that_would_change_something_are_refused(before, cards, tmp_path):
     text = moving().replace(before, cards if cards.startswith("ELSET") else cards + before, 1)
     deck = tmp_path/"deck.inp"
