@@ -6,7 +6,9 @@
 default where the Debian package calculix-ccx-test puts them; where one of them is missing, that is
 all that is told. A deck that EMCON refuses is a line with the first reason. Differences are
 relative to the largest displacement of the deck; those above what CalculiX prints have a remark.
-`--update` writes the tables into docs/verification.md, DECK are names without .inp.
+Then how many decks `emcon check --lenient` accepts, which words refuse the others, and how many each
+word would open alone. `--words` makes this table only. `--update` writes the tables into
+docs/verification.md, DECK are names without .inp.
 """
 
 import argparse
@@ -178,6 +180,79 @@ def compare(name, text, program):
             f"{part:.1e}", f"{digit:.0e}", note)
 
 
+#: What a message complains of: a pattern, and the word for it.
+COMPLAINTS = [
+    (r"element type '?(B\d|PIPE)", "beams"), (r"element type '?S\d", "shells"),
+    (r"element type '?M3D", "membranes"), (r"element type '?(SPRING|DASHPOT|GAP|MASS)",
+                                           "springs, dashpots, gap elements"),
+    (r"element type '?(T\dD)|holds lines", "trusses"),
+    (r"element type '?([\w]+)", "TYPE=\\1"),
+    (r"(?i)^(\*[a-z -]+[a-z]): (?:unknown )?parameter '?(\w+)", "\\1, \\2"),
+    (r"(?i)^(\*[a-z -]+[a-z]): (\w+)='(.*?)' is known", "\\1, \\2=\\3"),
+    (r"unknown keyword '(.*?)'", "\\1"),
+    (r"(?i)^(\*[a-z -]+[a-z]): known but not supported", "\\1"),
+    (r"(contact|ties|\*DAMPING|rigid bodies) (in three dimensions|with elements CAX)", "\\1 \\2"),
+    (r"(?:load type|unknown load type) '?(\w+)", "*DLOAD, \\1"),
+    (r"beside solids of revolution", "elements CPS beside CAX"),
+    (r"is a \*USER MATERIAL", "*USER MATERIAL"),
+    (r"do not depend on temperature", "constants by temperature"),
+]
+#: Messages that follow from others.
+FOLLOWS = re.compile(r"has no law|the deck has no|expected E, nu|ELSET= is missing|unknown (?:\w+ )?set")
+
+
+def word(message):
+    """What an error complains of, in a word."""
+    for pattern, name in COMPLAINTS:
+        found = re.search(pattern, message)
+        if found:
+            return found.expand(name).upper() if pattern.startswith("(?i)") else found.expand(name)
+    return re.sub(r"\d+", "#", message.split(";")[0])
+
+
+def words_of(deck):
+    """What `emcon check --lenient` complains of in a deck, in its order; none: it is accepted."""
+    done = emcon("check", "--lenient", "--quiet", deck.name, cwd=deck.parent,
+                 timeout=calculix_suite.MOST)
+    told = re.findall(r"error: (.*)", done.stderr)
+    own = [message for message in told if not FOLLOWS.search(message)] or told
+    return list(dict.fromkeys(word(message) for message in own)) if done.returncode else []
+
+
+def refusals(options):
+    """{deck: the words that refuse it}, for all decks, those of heat and the like too."""
+    told = {}
+    with tempfile.TemporaryDirectory() as folder:
+        for name, path in calculix_suite.decks(options.suite).items():
+            (pathlib.Path(folder)/f"{name}.inp").write_bytes(
+                calculix_suite.text_of(path).encode("latin-1"))
+        for name in calculix_suite.decks(options.suite):
+            if not options.only or name in options.only:
+                told[name] = words_of(pathlib.Path(folder)/f"{name}.inp")
+    return told
+
+
+def refusal_lines(told):
+    """A row for each word: decks that it refuses first, that have it, that it would open alone."""
+    first, has, alone = {}, {}, {}
+    for name, words in told.items():
+        for k, each in enumerate(words):
+            has.setdefault(each, []).append(name)
+            if k == 0:
+                first.setdefault(each, []).append(name)
+            if len(words) == 1:
+                alone.setdefault(each, []).append(name)
+    rows = sorted(has, key=lambda each: (-len(alone.get(each, [])), -len(has[each]), each))
+    shown = [each for each in rows if each in alone or len(first.get(each, [])) > 3]
+    accepted = sum(not words for words in told.values())
+    return [f"`emcon check --lenient` accepts {accepted} of all {len(told)} decks. What refuses the others, "
+            "but for words that open none alone and come first in three decks and fewer:", "",
+            *table(["word", "decks that have it", "refused by it first", "opened by it alone"],
+                   [(f"`{each}`" if each.startswith(("*", "TYPE")) else each, len(has[each]),
+                     len(first.get(each, [])),
+                     ", ".join(f"`{deck}`" for deck in alone.get(each, []))) for each in shown])]
+
+
 def tables(options, program):
     rows, out = [], []
     others = 0
@@ -224,6 +299,7 @@ def arguments():
     parser.add_argument("--ccx", metavar="PROGRAM", help="CalculiX (ccx)")
     parser.add_argument("--suite", type=pathlib.Path, default=calculix_suite.FOLDER,
                         metavar="FOLDER", help="its decks")
+    parser.add_argument("--words", action="store_true", help="only which words refuse decks")
     parser.add_argument("--update", action="store_true", help="write into docs/")
     parser.add_argument("only", nargs="*", metavar="DECK", help="these decks alone")
     return parser
@@ -238,12 +314,16 @@ def main():
     if not options.suite.is_dir():
         print(f"CalculiX is passed over: no decks in {options.suite} (--suite)")
         return
+    words = refusal_lines(refusals(options))
+    if options.words:
+        print(*words, sep="\n")
+        return
     rows, out, others = tables(options, program)
-    print("\nThe decks of CalculiX by both codes", *lines_of(rows, out, others), sep="\n")
+    print("\nThe decks of CalculiX by both codes", *lines_of(rows, out, others), "", *words, sep="\n")
     if options.update:
         lines = lines_of(rows, grouped(out), others)
         lines[0] = f"CalculiX {release(program)}, {lines[0]}"
-        PAGE.write_text(update(PAGE.read_text(), "suite", lines))
+        PAGE.write_text(update(PAGE.read_text(), "suite", [*lines, "", *words]))
 
 
 if __name__ == "__main__":

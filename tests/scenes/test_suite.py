@@ -60,6 +60,33 @@ def test_reasons_are_grouped():
         "0 decks compared, 0 of them within what CalculiX prints; 3 mechanical ones not compared; 7")
 
 
+def test_words_that_refuse_decks(tmp_path):
+    """A deck that is accepted, one that a word alone refuses, one with two."""
+    good = (ROOT/"tests/decks/good_plain.inp").read_text()
+    for name, old, new in [("good", "", ""), ("plastic", "*DENSITY", "*PLASTIC\n1.\n*DENSITY"),
+                           ("both", "*DENSITY", "*PLASTIC\n1.\n*CREEP\n1.\n*DENSITY")]:
+        (tmp_path/f"{name}.inp").write_text(good.replace(old, new, 1) if old else good)
+    told = bench_suite.refusals(bench_suite.arguments().parse_args(["--suite", str(tmp_path)]))
+    assert told == {"both": ["*PLASTIC", "*CREEP"], "good": [], "plastic": ["*PLASTIC"]}
+    lines = bench_suite.refusal_lines(told)
+    assert lines[0].startswith("`emcon check --lenient` accepts 1 of all 3 decks")
+    assert lines[-1] == "| `*PLASTIC` | 2 | 2 | `plastic` |"
+
+
+@pytest.mark.parametrize("message, word", [
+    ("*ELEMENT: element type B31 is known but not supported by this version", "beams"),
+    ("*ELEMENT: unknown element type 'D'; supported: CPE3", "TYPE=D"),
+    ("*Rigid Body: parameter NSET is known but not supported (made of)", "*RIGID BODY, NSET"),
+    ("*ELASTIC: TYPE='ORTHO' is known but not supported (materials)", "*ELASTIC, TYPE=ORTHO"),
+    ("unknown keyword '*SUBMODEL'", "*SUBMODEL"),
+    ("*MPC: known but not supported: linear couplings go by *EQUATION", "*MPC"),
+    ("*CONTACT PAIR: contact in three dimensions is not in this version",
+     "contact in three dimensions"),
+    ("*NODE: node 12 is defined twice; first at", "*NODE: node # is defined twice")])
+def test_words_of_messages(message, word):
+    assert bench_suite.word(message) == word
+
+
 def test_mechanical_decks():
     assert calculix_suite.is_mechanical("*STATIC\n*ELEMENT, TYPE=C3D8\n")
     assert not calculix_suite.is_mechanical("*Heat transfer\n")
