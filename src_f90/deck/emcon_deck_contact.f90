@@ -9,12 +9,13 @@ module emcon_deck_contact
    use emcon_deck_options, only : check_option
    use emcon_deck_pressure, only : read_behavior
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, n_lines, need_name, &
-      note_idle, option_name, option_number, option_word, reader_t, refuse_option
+      note_idle, option_name, option_number, option_word, reader_t, refuse_option, &
+      card_warning
    use emcon_deck_surfaces, only : get_surfaces, need_facets
    use emcon_diagnostics, only : add_error, quoted, suggestion
    use emcon_interactions, only : adjustment_t, contact_damping_t, contact_pair_t, &
       formulation_user, formulation_mortar, formulation_nts, formulation_segment, pressure_hard, &
-      pressure_t, pressure_tied
+      pressure_slope, pressure_t, pressure_tied
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_options, only : option_code, option_default, option_words
@@ -31,11 +32,11 @@ contains
    subroutine read_interactions(reader)
       type(reader_t), intent(inout) :: reader
       character(len=:), allocatable :: name
-      integer :: i, n, last_friction
+      integer :: i, n, friction(size(reader%card))         ! the *FRICTION of each interaction
 
       allocate(reader%interaction(size(reader%card)), reader%interaction_name(size(reader%card)))
       n = 0
-      last_friction = 0                                   ! the last interaction with *FRICTION
+      friction = 0
       do i = 1, size(reader%card)
          associate (card => reader%card(i))
             select case (card%name)
@@ -58,9 +59,9 @@ contains
                   call read_contact_damping(reader, card, reader%interaction(max(1, n))%damping)
                   if (n == 0) reader%interaction(1)%damping = contact_damping_t()
                else if (card%name == "FRICTION") then
-                  if (n > 0 .and. n == last_friction) call card_error(reader, card, &
+                  if (friction(max(1, n)) > 0) call card_error(reader, card, &
                      "the surface interaction has *FRICTION already")
-                  last_friction = n
+                  if (n > 0) friction(n) = i
                   call read_friction(reader, card, reader%interaction(max(1, n))%friction, &
                      reader%interaction(max(1, n))%stick)
                   call option_number(reader, card, "RESTITUTION", "a number from 0 to 1: what is " &
@@ -75,7 +76,26 @@ contains
       end do
       reader%interaction = reader%interaction(:n)
       reader%interaction_name = reader%interaction_name(:n)
+      call suit_sticks(reader, friction(:n))
    end subroutine read_interactions
+
+   !> Friction without a slope of stick on a pressure gets half of its slope, as CalculiX has it.
+   subroutine suit_sticks(reader, friction)
+      type(reader_t), intent(inout) :: reader
+      integer, intent(in) :: friction(:)           !! the card of each interaction; 0: none
+      integer :: i
+
+      do i = 1, size(friction)
+         if (friction(i) == 0) cycle
+         associate (surface => reader%interaction(i), card => reader%card(friction(i)))
+            if (any(surface%pressure%kind == [pressure_hard, pressure_tied]) .or. &
+               surface%stick > 0.0_wp .or. .not. surface%friction > 0.0_wp) cycle
+            surface%stick = 0.5_wp*pressure_slope(surface%pressure)
+            call card_warning(reader, card, "no slope of stick is given: half of the slope of " &
+               // "the pressure is taken, " // to_text(surface%stick))
+         end associate
+      end do
+   end subroutine suit_sticks
 
    !> The thickness of an interaction of the plane, which sections have here.
    subroutine read_thickness(reader, card)

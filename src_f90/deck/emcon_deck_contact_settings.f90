@@ -1,9 +1,10 @@
 !> Settings of contact in a step: how it begins, what overlaps at the start, what nothing holds.
 module emcon_deck_contact_settings
    use emcon_amplitudes, only : amplitude_t, find_amplitude_value
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, next_line
    use emcon_deck_options, only : choose_option
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, option_name, &
-      option_real, reader_t, refuse_option
+      option_real, option_word, reader_t, refuse_option
    use emcon_deck_tables, only : table_names
    use emcon_diagnostics, only : add_error, quoted, suggestion
    use emcon_interactions, only : contact_pair_t
@@ -17,6 +18,9 @@ module emcon_deck_contact_settings
    private
    public :: read_initiation, read_pair_initiation, read_interference, read_controls, &
       check_statics, check_massless, check_restitution, pairs_ask
+
+   !> Surfaces of a pair.
+   integer, parameter :: n_surface = 2
 
 contains
 
@@ -94,6 +98,7 @@ contains
       if (size(pair) == 0 .and. .not. reader%doubt%names) call card_error(reader, card, &
          "there is no *CONTACT PAIR")
       step%contact%resolves_overclosure = .true.
+      call check_interference_pairs(reader, card, pair)
       name = option_name(card, "AMPLITUDE")
       if (name == "") return
       step%contact%overclosure_amplitude = name_index_find(reader%names%amplitudes, name)
@@ -102,6 +107,49 @@ contains
          card, "unknown amplitude " // quoted(name) // suggestion(name, table_names(amplitude)))
    end subroutine read_interference
 
+   !> Lines of *CONTACT INTERFERENCE: it holds for all pairs, and so they name none of them or all.
+   subroutine check_interference_pairs(reader, card, pair)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(contact_pair_t), intent(in) :: pair(:)
+      type(data_t) :: data
+      character(len=:), allocatable :: name
+      integer :: slave, master, n, n_errors
+      logical :: is_named(size(pair))
+
+      call option_word(reader, card, "TYPE", "CONTACT PAIR", name, "ELEMENT", &
+         "contact is that of *CONTACT PAIR")
+      is_named = .false.
+      n_errors = reader%log%n_errors
+      n = 0
+      call data_open(data, card)
+      do while (next_line(reader, data))
+         call check_count(reader, data, n_surface, n_surface, "slave surface, master surface")
+         n = n + 1
+         if (data%ok) call get_name(reader, data, 1, "surface", name)
+         if (data%ok) slave = name_index_find(reader%names%surfaces, name)
+         if (data%ok) call get_name(reader, data, n_surface, "surface", name)
+         if (data%ok) master = name_index_find(reader%names%surfaces, name)
+         if (.not. data%ok .or. reader%doubt%names) cycle
+         if (.not. any(names())) call data_error(reader, data, "there is no *CONTACT PAIR of " &
+            // "these two surfaces")
+         is_named = is_named .or. names()
+      end do
+      if (n > 0 .and. reader%log%n_errors == n_errors .and. .not. (all(is_named) .or. &
+         reader%doubt%names)) call card_error(reader, &
+         card, "it holds for all pairs: name every *CONTACT PAIR, or none")
+
+   contains
+
+      pure function names()
+         logical :: names(size(pair))
+
+         names = (pair%slave == slave .and. pair%master == master) .or. &
+            (pair%slave == master .and. pair%master == slave)
+      end function names
+
+   end subroutine check_interference_pairs
+
    !> *CONTACT CONTROLS, STABILIZE or RESET: bodies that nothing holds and no load moves.
    subroutine read_controls(reader, card, pair, step)
       type(reader_t), intent(inout) :: reader
@@ -109,8 +157,8 @@ contains
       type(contact_pair_t), intent(in) :: pair(:)
       type(step_t), intent(inout) :: step
 
-      if (option_name(card, "STABILIZE") /= "") call refuse_option(reader, card, "STABILIZE", &
-         "no value", "the motion is the smallest one, whatever the stiffness")
+      if (option_name(card, "STABILIZE") /= "") call card_warning(reader, card, "the value of " &
+         // "STABILIZE has no effect: the motion is the smallest one, whatever the stiffness")
       if (has_option(card, "STABILIZE") .eqv. has_option(card, "RESET")) call card_error(reader, &
          card, "either STABILIZE or RESET is to be given")
       if (size(pair) == 0 .and. .not. reader%doubt%names) call card_error(reader, card, &

@@ -3,7 +3,7 @@ module emcon_deck_element_loads
    use emcon_deck_conditions, only : conditions_t, drop_loads, put_load
    use emcon_deck_element_kinds, only : face_names, face_number
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, get_real, &
-      is_label, next_line
+      is_blank, is_label, next_line
    use emcon_deck_loads, only : card_amplitude, is_new
    use emcon_deck_named, only : get_elements
    use emcon_deck_reader, only : card_t, reader_t
@@ -48,13 +48,29 @@ contains
             call get_faces(reader, data, scene, item, face)
          else if (data%ok) then
             call refuse_surface(reader, data)
-            if (data%ok) call get_elements(reader, data, 1, scene, item)
+            if (data%ok) call get_loaded(reader, data, scene, new, item)
             if (data%ok) call check_faces(reader, data, scene, item, new%place)
             if (data%ok) face = spread(new%place, 1, size(item))
          end if
          if (data%ok) call put_loads(self, new, item, face)
       end do
    end subroutine read_dload
+
+   !> The elements that field 1 names; without a name what acts on volumes acts on all elements.
+   subroutine get_loaded(reader, data, scene, new, item)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(scene_t), intent(in) :: scene
+      type(load_t), intent(in) :: new
+      integer, allocatable, intent(out) :: item(:)
+      integer :: i
+
+      if (is_blank(data, 1) .and. new%kind /= load_pressure) then
+         item = [(i, i = 1, size(scene%element%label))]
+      else
+         call get_elements(reader, data, 1, scene, item)
+      end if
+   end subroutine get_loaded
 
    !> *DSLOAD: surface, P, pressure.
    subroutine read_dsload(reader, card, scene, self)
@@ -157,7 +173,7 @@ contains
       type(data_t), intent(inout) :: data
       character(len=:), allocatable :: name
 
-      if (is_label(data, 1)) return
+      if (is_blank(data, 1) .or. is_label(data, 1)) return
       call get_name(reader, data, 1, "element label or set", name)
       if (.not. data%ok) return
       if (name_index_find(reader%names%element_sets, name) > 0) return

@@ -95,19 +95,15 @@ contains
       end associate
    end subroutine check_friction
 
-   !> What holds gaps sticks exactly; what gives way does so along the surface, too.
+   !> What holds gaps sticks exactly.
    subroutine check_stick(reader, pair)
       type(reader_t), intent(inout) :: reader
       type(contact_pair_t), intent(in) :: pair
 
       associate (surface => pair%interaction)
-         if (surface%pressure%kind == pressure_hard .and. surface%stick > 0.0_wp) then
+         if (surface%pressure%kind == pressure_hard .and. surface%stick > 0.0_wp) &
             call add_warning(reader%log, pair%origin, "*CONTACT PAIR: the slope of stick of its " &
-               // "*FRICTION has no effect: contact is hard, and what sticks does not move")
-         else if (surface%pressure%kind /= pressure_hard .and. .not. surface%stick > 0.0_wp) then
-            call refuse(reader, pair, "a PRESSURE-OVERCLOSURE by which it gives way, without a " &
-               // "slope of stick, shear by slip, behind the coefficient")
-         end if
+            // "*FRICTION has no effect: contact is hard, and what sticks does not move")
       end associate
    end subroutine check_stick
 

@@ -5,8 +5,7 @@ module emcon_deck_initial
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_integer, &
       get_real, next_line
    use emcon_deck_named, only : get_nodes
-   use emcon_deck_reader, only : card_error, card_t, note_idle, option_name, reader_t, &
-      refuse_option
+   use emcon_deck_reader, only : card_error, card_t, note_idle, option_name, reader_t, refuse_option
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t

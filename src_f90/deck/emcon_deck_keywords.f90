@@ -25,14 +25,14 @@ module emcon_deck_keywords
    type :: keyword_t
       character(len=27) :: name = ""
       integer :: place = in_both
-      character(len=192) :: parameters = ""
+      character(len=256) :: parameters = ""
       logical :: has_data = .true.           !! data lines may follow
    end type keyword_t
 
    !> Keywords of other programs that are known, and why they do nothing here.
    type :: refusal_t
       character(len=80) :: reason = ""
-      character(len=180) :: names = ""       !! with commas between them
+      character(len=240) :: names = ""       !! with commas between them
       logical :: is_output = .false.         !! --lenient reads on
       logical :: is_idle = .false.           !! taken: they would change nothing
    end type refusal_t
@@ -57,7 +57,7 @@ module emcon_deck_keywords
          // "!FILLETRADIUS:0"), &
       keyword_t("GIVEN FORCES", in_model, "NSET=", has_data=.false.), &
       keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,KINEMATICS=,MASSLESS," &
-         // "~ORIENTATION,!OFFSET:0,!CONTROLS"), &
+         // "~ORIENTATION,!OFFSET:0,~CONTROLS"), &
       keyword_t("RIGID BODY", in_model, "ELSET=,ANALYTICALSURFACE=,REFNODE=,!NSET,!ROTNODE," &
          // "!PINNSET,!TIENSET,!POSITION:INPUT,!ISOTHERMAL:NO", has_data=.false.), &
       keyword_t("MATERIAL", in_model, "NAME=", has_data=.false.), &
@@ -73,13 +73,15 @@ module emcon_deck_keywords
       keyword_t("TIME POINTS", in_both, "NAME=,GENERATE"), &
       keyword_t("SURFACE INTERACTION", in_model, "NAME=,PADTHICKNESS=,RESTITUTION="), &
       keyword_t("SURFACE BEHAVIOR", in_model, "PRESSURE-OVERCLOSURE=,DIRECT,!NOSEPARATION," &
-         // "!PENALTY,!AUGMENTEDLAGRANGE"), &
+         // "~PENALTY,~AUGMENTEDLAGRANGE"), &
       keyword_t("FRICTION", in_model, "RESTITUTION=,ROUGH,~SLIPTOLERANCE,~ELASTICSLIP," &
          // "~LAGRANGE,!TAUMAX,!SHEARTRACTIONSLOPE,!EXPONENTIALDECAY,!TESTDATA,!ANISOTROPIC," &
          // "!USER,!DEPVAR:0,!PROPERTIES:0,!DEPENDENCIES:0"), &
       keyword_t("CONTACT DAMPING", in_model, "DEFINITION=,TANGENTFRACTION="), &
       keyword_t("CONTACT PAIR", in_model, "INTERACTION=,TYPE=,SIDES=,GUARD=," &
-         // "ADJUST=,INITIATION=,~SMALLSLIDING,TIED"), &
+         // "ADJUST=,INITIATION=,TIED,~SMALLSLIDING,~NOTHICKNESS,~SMOOTH," &
+         // "~MECHANICALCONSTRAINT:KINEMATIC,~CPSET,~WEIGHT,~TRACKING,~GEOMETRICCORRECTION," &
+         // "~SUPPLEMENTARYCONSTRAINTS,~HCRIT,~EXTENSIONZONE,~OP:NEW"), &
       keyword_t("CONTACT", in_model, has_data=.false.), &
       keyword_t("CONTACT INCLUSIONS", in_model, "ALLEXTERIOR"), &
       keyword_t("CONTACT PROPERTY ASSIGNMENT", in_model), &
@@ -87,19 +89,19 @@ module emcon_deck_keywords
          // "~NOROTATION,~NOTHICKNESS,!CYCLICSYMMETRY,!MULTISTAGE,!TIEDNSET,!CONSTRAINTRATIO"), &
       keyword_t("EQUATION", in_both, "REMOVE,REMOVEALL,!INPUT"), &
       keyword_t("TRANSFORM", in_model, "NSET=,TYPE="), &
-      keyword_t("CONTACT INTERFERENCE", in_step, "SHRINK,AMPLITUDE=,!OP,!TYPE", &
-         has_data=.false.), &
-      keyword_t("CONTACT CONTROLS", in_step, "STABILIZE?,RESET,!AUTOMATICTOLERANCES," &
-         // "!FRICTIONONSET,!LAGRANGEMULTIPLIER,!MASTER,!SLAVE,!MAXCHP,!PERRMX,!UERRMX," &
+      keyword_t("CONTACT INTERFERENCE", in_step, "SHRINK,AMPLITUDE=,TYPE=,~OP:NEW"), &
+      keyword_t("CONTACT CONTROLS", in_step, "STABILIZE?,RESET,~MASTER,~SLAVE," &
+         // "!AUTOMATICTOLERANCES,!FRICTIONONSET,!LAGRANGEMULTIPLIER,!MAXCHP,!PERRMX,!UERRMX," &
          // "!STIFFNESSSCALEFACTOR,!TANGENTFRACTION:1", has_data=.false.), &
       keyword_t("BOUNDARY", in_both, "OP=,AMPLITUDE=,FIXED,TYPE=,TIMEDELAY=,!LOADCASE:1," &
          // "!USER,!SUBMODEL"), &
       keyword_t("STEP", in_both, "NLGEOM?,INC=,AMPLITUDE=,NAME=,~UNSYMM:NO," &
          // "~EXTRAPOLATION,~CONVERTSDI,!PERTURBATION"), &
-      keyword_t("STATIC", in_step, "DIRECT,SOLVER=,STABILIZE?,!FACTOR,!ALLSDTOL," &
+      keyword_t("STATIC", in_step, "DIRECT,SOLVER=,STABILIZE?,!FACTOR,~ALLSDTOL," &
          // "!CONTINUE:NO,!RIKS,!EXPLICIT"), &
-      keyword_t("DYNAMIC", in_step, "DIRECT,EXPLICIT,SOLVER=,!ALPHA:0,!APPLICATION,!INITIAL," &
-         // "~NOHAF,~HAFTOL,~HALFINCSCALEFACTOR"), &
+      keyword_t("DYNAMIC", in_step, "DIRECT,EXPLICIT?,SOLVER=,APPLICATION=,!ALPHA:0," &
+         // "!INITIAL:NO,!RELATIVETOABSOLUTE,~DIRECTUSERCONTROL,~NOHAF,~HAFTOL," &
+         // "~HALFINCSCALEFACTOR"), &
       keyword_t("NO ANALYSIS", in_step, has_data=.false.), &
       keyword_t("CLOAD", in_step, "OP=,AMPLITUDE=,TIMEDELAY=,!LOADCASE:1,!USER,!FOLLOWER," &
          // "!SECTOR"), &
@@ -121,7 +123,7 @@ module emcon_deck_keywords
       keyword_t("CONTACT FILE", in_step, filed), &
       keyword_t("NODE PRINT", in_step, "NSET=,GLOBAL=," // printed), &
       keyword_t("EL PRINT", in_step, "ELSET=,~GLOBAL:YES," // printed), &
-      keyword_t("CONTACT PRINT", in_step, "~NSET,~SET,~GLOBAL:YES," // printed), &
+      keyword_t("CONTACT PRINT", in_step, "MASTER=,SLAVE=,~NSET,~SET,~GLOBAL:YES," // printed), &
       keyword_t("ENERGY PRINT", in_step, "~ELSET,~FREQUENCY:1,~TIMEPOINTS"), &
       keyword_t("OUTPUT", in_step, "FIELD,HISTORY,VARIABLE=,FREQUENCY=,TIMEPOINTS=,~NAME," &
          // "~FREQUENCYF:1,~TIMEINTERVAL,~NUMBERINTERVAL,~TIMEMARKS,~OP:NEW,~FILTER", &
@@ -132,7 +134,8 @@ module emcon_deck_keywords
       keyword_t("CONTACT OUTPUT", in_step, "VARIABLE=,~NSET,~MASTER,~SLAVE,~SURFACE," &
          // "~GENERALCONTACT"), &
       keyword_t("ENERGY OUTPUT", in_step, "VARIABLE=,~ELSET"), &
-      keyword_t("RESTART", in_both, "WRITE,FREQUENCY=,~OVERLAY,!READ", has_data=.false.), &
+      keyword_t("RESTART", in_both, "WRITE,FREQUENCY=,~OVERLAY,~NUMBERINTERVAL," &
+         // "~TIMEMARKS,!READ", has_data=.false.), &
       keyword_t("END STEP", in_step, has_data=.false.)]
 
    !> Keywords of other programs that are known but not supported, and those that change nothing.
@@ -143,27 +146,47 @@ module emcon_deck_keywords
       refusal_t("coordinates are those of the global axes", "SYSTEM"), &
       refusal_t("nodes are given one by one by *NODE", "NGEN,NCOPY,NFILL"), &
       refusal_t("elements are given one by one by *ELEMENT", "ELGEN,ELCOPY"), &
-      refusal_t("materials are elastic", "PLASTIC,CYCLIC HARDENING,CREEP,VISCOELASTIC"), &
+      refusal_t("materials are elastic", "PLASTIC,CYCLIC HARDENING,CREEP,VISCOELASTIC,DAMAGE " &
+         // "INITIATION,DAMAGE EVOLUTION,DEFORMATION PLASTICITY,MOHR COULOMB,DRUCKER PRAGER," &
+         // "CHANGE PLASTIC"), &
       refusal_t("use *HYPERELASTIC, NEO HOOKE", "HYPERFOAM"), &
       refusal_t("materials have no state variables", "DEPVAR"), &
-      refusal_t("there is no temperature", "TEMPERATURE,DFLUX,FILM,RADIATE,HEAT TRANSFER"), &
+      refusal_t("there is no temperature", "TEMPERATURE,DFLUX,CFLUX,FILM,RADIATE,HEAT TRANSFER," &
+         // "COUPLED TEMPERATURE-DISPLACEMENT,UNCOUPLED TEMPERATURE-DISPLACEMENT"), &
       refusal_t("there is no temperature", &
-         "EXPANSION,CONDUCTIVITY,SPECIFIC HEAT,PHYSICAL CONSTANTS", is_idle=.true.), &
+         "EXPANSION,CONDUCTIVITY,SPECIFIC HEAT,PHYSICAL CONSTANTS,GAP CONDUCTANCE," &
+         // "GAP HEAT GENERATION", is_idle=.true.), &
       refusal_t("materials are isotropic", "ORIENTATION", is_idle=.true.), &
+      refusal_t("elements have no artificial stiffness", "SECTION CONTROLS,HOURGLASS STIFFNESS", &
+         is_idle=.true.), &
       refusal_t("use *SOLID SECTION", "UEL PROPERTY"), &
       refusal_t("bodies are solids; forces, potentials and masses of others a program may give", &
-         "SHELL SECTION,BEAM SECTION,MEMBRANE SECTION,SPRING,DASHPOT,MASS"), &
+         "SHELL SECTION,SHELL GENERAL SECTION,BEAM SECTION,BEAM GENERAL SECTION,MEMBRANE " &
+         // "SECTION,COHESIVE SECTION,CONNECTOR SECTION,SURFACE SECTION,NODAL THICKNESS,NORMAL," &
+         // "SPRING,DASHPOT,MASS,ROTARY INERTIA"), &
       refusal_t("use *CONTACT PAIR", "GAP"), &
       refusal_t("list what touches by *CONTACT INCLUSIONS", "CONTACT EXCLUSIONS"), &
       refusal_t("all with all holds the nodes of both sides", "CONTACT FORMULATION"), &
-      refusal_t("use ADJUST of *CONTACT PAIR", "CLEARANCE"), &
+      refusal_t("use ADJUST of *CONTACT PAIR", "CLEARANCE,CONTACT INITIALIZATION DATA," &
+         // "CONTACT INITIALIZATION ASSIGNMENT"), &
+      refusal_t("use *CONTACT CONTROLS, STABILIZE", "CONTACT STABILIZATION,CONTACT CONTROLS " &
+         // "ASSIGNMENT"), &
+      refusal_t("faces of solids have no thickness", "SURFACE PROPERTY ASSIGNMENT", &
+         is_idle=.true.), &
+      refusal_t("nothing damps but *DAMPING", "BULK VISCOSITY", is_idle=.true.), &
       refusal_t("coefficients hold for the whole run", "CHANGE FRICTION"), &
-      refusal_t("pairs and elements stay for the whole run", "MODEL CHANGE"), &
+      refusal_t("pairs and elements stay as they are for the whole run", "MODEL CHANGE,CHANGE " &
+         // "CONTACT TYPE,CHANGE SURFACE BEHAVIOR,CHANGE MATERIAL"), &
+      refusal_t("prescribe displacements by *BOUNDARY", "PRE-TENSION SECTION"), &
+      refusal_t("sectors of a model are not repeated; couple their edges by *EQUATION", &
+         "CYCLIC SYMMETRY MODEL,SELECT CYCLIC SYMMETRY MODES"), &
+      refusal_t("move the nodes in *NODE", "IMPERFECTION"), &
       refusal_t("use *BOUNDARY with an amplitude", "BASE MOTION"), &
       refusal_t("*NEWTON and the procedure say how steps are solved", "CONTROLS", &
          is_idle=.true.), &
       refusal_t("the procedures are *STATIC and *DYNAMIC", &
-         "FREQUENCY,BUCKLE,MODAL DYNAMIC,STEADY STATE DYNAMICS,VISCO"), &
+         "FREQUENCY,COMPLEX FREQUENCY,BUCKLE,MODAL DYNAMIC,STEADY STATE DYNAMICS,VISCO,GREEN," &
+         // "SENSITIVITY,SUBSTRUCTURE GENERATE,ELECTROMAGNETICS,CFD"), &
       refusal_t("results go by *NODE FILE, *EL FILE and *... PRINT", &
          "SECTION PRINT,SECTION FILE,INTEGRATED OUTPUT,INTEGRATED OUTPUT SECTION", .true.), &
       refusal_t("it names no results", "FILE FORMAT,MONITOR,INCREMENTATION OUTPUT,FILTER,PRINT", &
@@ -259,13 +282,16 @@ contains
 
       select case (name)
       case ("ALPHA")
-         reason = " (the energy-momentum scheme has no numerical damping)"
+         reason = " (the energy-momentum scheme has no numerical damping: *TIME INTEGRATION, " &
+            // "SCHEME=GENERALIZED ALPHA has)"
       case ("SMALLSLIDING")
          reason = " (contact follows the deformed surfaces)"
-      case ("TIED")
-         reason = " (use *TIE)"
       case ("ORIENTATION")
          reason = " (materials are isotropic, and directions are those of the axes of the model)"
+      case ("NOSEPARATION")
+         reason = " (surfaces part; *TIE holds them together)"
+      case ("RELATIVETOABSOLUTE")
+         reason = " (motions are those in space)"
       case ("CYCLICSYMMETRY", "MULTISTAGE")
          reason = " (sectors of a model are not repeated; couple their edges by *EQUATION)"
       case ("TAUMAX")

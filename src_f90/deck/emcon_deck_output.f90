@@ -24,7 +24,11 @@ module emcon_deck_output
    type :: requests_t
       type(output_t), allocatable :: output(:)
       integer, allocatable :: step(:)              !! the step that gave each
-      type(card_t) :: heading                      !! the last *OUTPUT
+      logical, allocatable :: has_times(:)         !! does it say when?
+      type(card_t) :: heading                      !! the last *OUTPUT,
+      type(output_t) :: of_heading                 !! and when it asks for what stands below it
+      integer :: frequency = 1                     !! *OUTPUT, FREQUENCY= without FIELD or HISTORY,
+      integer :: frequency_step = 0                !! and its step
    end type requests_t
 
    !> One keyword, and the quantities that it can write; place 0: the energies of the model.
@@ -45,9 +49,11 @@ module emcon_deck_output
       output_row_t("CONTACTPRINT", output_contact_print, at_contacts, .false., "CDIS CSTR"), &
       output_row_t("ENERGYPRINT", output_energy_print)]
 
-   !> Variables that exporters name and that are not written here: a warning says so.
-   character(len=*), parameter :: unwritten(*) = [character(len=4) :: "PE", "PEEQ", "ME", "NOE", &
-      "ERR", "ZZS"]
+   !> Variables of other programs that are not written here: a warning says so.
+   character(len=*), parameter :: unwritten(*) = [character(len=5) :: "PE", "PEEQ", "PEMAG", &
+      "CEEQ", "LE", "EE", "IE", "NE", "THE", "ME", "NOE", "ERR", "HER", "ZZS", "PHS", "MAXS", &
+      "MAXE", "MAXU", "SMID", "SNEG", "SPOS", "SF", "SVF", "SDV", "NT", "RFL", "HFL", "HFLF", &
+      "A", "COORD", "CENT", "EMAS", "CELS", "CFN", "CFS", "PCON"]
 
    character(len=*), parameter :: energies(4) = [character(len=6) :: "ALLKE", "ALLSE", "ALLWK", &
       "ETOTAL"]
@@ -57,7 +63,7 @@ contains
    subroutine requests_init(self)
       type(requests_t), intent(out) :: self
 
-      allocate(self%output(0), self%step(0))
+      allocate(self%output(0), self%step(0), self%has_times(0))
    end subroutine requests_init
 
    pure logical function is_output(card)
@@ -129,12 +135,16 @@ contains
       n_errors = reader%log%n_errors
       is_field = has_option(card, "FIELD")
       is_history = has_option(card, "HISTORY")
-      if (.not. (is_field .or. is_history) .and. any(option_name(card, "FREQUENCY") &
-         == [character(len=1) :: "", "1"])) then
-         call note_idle(reader, card%title, "the requests that follow say what is written")
+      if (.not. (is_field .or. is_history)) then
+         call read_frequency(reader, card, self)
+         return
       else if (is_field .eqv. is_history) then
          call card_error(reader, card, "either FIELD or HISTORY is to be given")
-      else if (has_option(card, "VARIABLE")) then
+         return
+      end if
+      self%of_heading = output_t()
+      call read_times(reader, card, self%of_heading)
+      if (has_option(card, "VARIABLE") .and. reader%log%n_errors == n_errors) then
          do i = 1, size(output_rows)
             if (output_rows(i)%to_field_file .neqv. is_field) cycle
             if (is_history .and. output_rows(i)%place > 0) cycle
@@ -144,6 +154,26 @@ contains
          end do
       end if
    end subroutine read_heading
+
+   !> *OUTPUT of CalculiX, which has neither FIELD nor HISTORY: its FREQUENCY is that of all
+   !> requests of the step, before it and behind, that have none of their own.
+   subroutine read_frequency(reader, card, self)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(requests_t), intent(inout) :: self
+
+      if (has_option(card, "VARIABLE")) then
+         call card_error(reader, card, "either FIELD or HISTORY is to be given")
+         return
+      end if
+      self%frequency = 1
+      self%frequency_step = card%step
+      call option_count(reader, card, "FREQUENCY", 0, self%frequency)
+      if (self%frequency == 1) call note_idle(reader, card%title, "every increment is written " &
+         // "unless a request says otherwise")
+      where (self%step == card%step .and. .not. self%has_times) self%output%frequency &
+         = self%frequency
+   end subroutine read_frequency
 
    !> Take in a request for variables of `row`.
    subroutine read_request(reader, card, row, scene, self)
@@ -156,7 +186,7 @@ contains
       type(output_t), allocatable :: grown(:)
       integer, allocatable :: kept(:)
       character(len=:), allocatable :: word
-      logical :: is_empty
+      logical :: is_empty, has_times
       integer :: i, n
 
       new%kind = row%kind
@@ -164,8 +194,12 @@ contains
       call read_variables(reader, card, row, new)
       call read_set(reader, card, scene, new, is_empty)
       if (is_empty) return
-      if (is_below(card)) then
-         call read_times(reader, self%heading, new)
+      if (self%frequency_step == card%step) new%frequency = self%frequency
+      has_times = says_when(card)
+      if (is_below(card) .or. card%name == "OUTPUT") then
+         has_times = says_when(self%heading)
+         if (has_times) new%frequency = self%of_heading%frequency
+         if (allocated(self%of_heading%time)) new%time = self%of_heading%time
       else
          call read_times(reader, card, new)
       end if
@@ -174,6 +208,7 @@ contains
          new%totals = word == "YES" .or. word == "ONLY"
          new%only_totals = word == "ONLY"
       end if
+      call read_pair(reader, card, scene, new)
       call check_contact(reader, card, scene, new)
       call read_axes(reader, card, scene, self, new)
       kept = pack([(i, i = 1, size(self%step))], &
@@ -185,6 +220,7 @@ contains
       end do
       grown(n + 1) = new
       self%step = [self%step(kept), card%step]
+      self%has_times = [self%has_times(kept), has_times]
       call move_alloc(grown, self%output)
    end subroutine read_request
 
@@ -209,6 +245,25 @@ contains
          return
       end do
    end subroutine read_axes
+   !> MASTER= and SLAVE= of *CONTACT PRINT: totals of that pair, beside those of the others.
+   subroutine read_pair(reader, card, scene, new)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(output_t), intent(inout) :: new
+      integer :: slave, master
+
+      if (.not. (has_option(card, "MASTER") .or. has_option(card, "SLAVE"))) return
+      new%totals = .true.
+      new%only_totals = .true.
+      slave = name_index_find(reader%names%surfaces, option_name(card, "SLAVE"))
+      master = name_index_find(reader%names%surfaces, option_name(card, "MASTER"))
+      if (any(scene%pair%slave == slave .and. scene%pair%master == master)) return
+      if (any(scene%tie%slave == slave .and. scene%tie%master == master)) return
+      if (.not. reader%doubt%names) call card_error(reader, card, "SLAVE=" &
+         // quoted(option_name(card, "SLAVE")) // " and MASTER=" &
+         // quoted(option_name(card, "MASTER")) // " are no *CONTACT PAIR")
+   end subroutine read_pair
 
    !> Contact output needs contact, and totals of pairs are totals of forces.
    subroutine check_contact(reader, card, scene, new)
@@ -220,7 +275,8 @@ contains
 
       if (all(new%kind /= [output_contact_file, output_contact_print])) return
       if (size(scene%pair) == 0 .and. .not. reader%doubt%names) then
-         call card_warning(reader, card, "there is no *CONTACT PAIR: nothing will be written")
+         call card_warning(reader, card, "there is no *CONTACT PAIR that is not tied: nothing " &
+            // "will be written")
       else if (new%totals .and. all([(new%variable(i)%text /= "CF", &
          i = 1, size(new%variable))])) then
          call card_warning(reader, card, "TOTALS has no effect without CF")
@@ -259,7 +315,7 @@ contains
                is_wanted(i) = .true.
             else if (reader%is_lenient .or. is_below(card) .or. any(unwritten == name)) then
                call data_warning(reader, data, "output variable " // quoted(name) &
-                  // " is not supported, left out; supported: " // known)
+                  // " is not supported, left out; " // instead_of(name) // "supported: " // known)
             else
                call data_error(reader, data, "output variable " // quoted(name) &
                   // " is not supported; supported: " // known)
@@ -287,6 +343,19 @@ contains
 
       whole = name
    end function whole_of
+
+   !> What says the same as a variable that is not written: "...; ", or nothing.
+   pure function instead_of(name) result(text)
+      character(len=*), intent(in) :: name
+      character(len=:), allocatable :: text
+
+      select case (name)
+      case ("CELS"); text = "the history has it in the column contact_energy; "
+      case ("CFN", "CFS"); text = "CF is the whole force; "
+      case ("LE", "EE", "ME"); text = "E is the strain; "
+      case default; text = ""
+      end select
+   end function instead_of
 
    !> What PRESELECT asks for, of the variables of a row.
    pure function preselected(row, list)
@@ -365,6 +434,12 @@ contains
       end subroutine look_up
 
    end subroutine read_set
+
+   pure logical function says_when(card)
+      type(card_t), intent(in) :: card
+
+      says_when = has_option(card, "FREQUENCY") .or. has_option(card, "TIMEPOINTS")
+   end function says_when
 
    !> When: by FREQUENCY or at the times of a table.
    subroutine read_times(reader, card, new)

@@ -249,8 +249,9 @@ contains
          return
       end if
       step%scheme = scheme_row(card%name, "")
-      if (has_option(card, "EXPLICIT")) step%scheme = scheme_row(card%name, "CENTRALDIFFERENCE")
+      if (is_explicit(reader, card)) step%scheme = scheme_row(card%name, "CENTRALDIFFERENCE")
       step%time%is_direct = has_option(card, "DIRECT")
+      call read_application(reader, card)
       call read_solver(reader, card, step)
       call read_stabilize(reader, card, step)
       value = [1.0_wp, 1.0_wp, 0.0_wp, 0.0_wp]
@@ -270,6 +271,32 @@ contains
       end if
       if (next_line(reader, data)) call data_error(reader, data, "only one data line is read")
    end subroutine read_procedure
+
+   !> EXPLICIT, alone or as CalculiX numbers it: 0 nothing, 1 a fluid, 2 the structure, 3 both.
+   logical function is_explicit(reader, card)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      integer, parameter :: most = 3             !! numbers of CalculiX: 2 and 3 are the structure
+      integer :: kind
+
+      is_explicit = has_option(card, "EXPLICIT")
+      if (.not. is_explicit .or. option_name(card, "EXPLICIT") == "") return
+      kind = 0
+      call option_count(reader, card, "EXPLICIT", 0, kind, most)
+      is_explicit = kind >= most - 1
+   end function is_explicit
+
+   !> APPLICATION= of Abaqus: how much a step damps by itself, which here it does not.
+   subroutine read_application(reader, card)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      character(len=:), allocatable :: word
+
+      call option_word(reader, card, "APPLICATION", "TRANSIENT FIDELITY, MODERATE DISSIPATION", &
+         word, "QUASI-STATIC", "use *STATIC, with STABILIZE where it snaps")
+      if (word == "MODERATEDISSIPATION") call card_warning(reader, card, "APPLICATION=MODERATE " &
+         // "DISSIPATION has no effect: energy is kept; *DAMPING takes it")
+   end subroutine read_application
 
    !> SOLVER=: one that is here, or one that a program has to give; a name from another program asks
    !> for nothing else.

@@ -5,7 +5,7 @@ module emcon_interactions
    implicit none
    private
    public :: contact_pair_t, contact_options_t, contact_damping_t, interaction_t, adjustment_t
-   public :: pressure_t, pressure_reach, interaction_reach
+   public :: pressure_t, pressure_reach, pressure_slope, interaction_reach
    public :: pressure_hard, pressure_linear, pressure_exponential, pressure_tabular, pressure_tied
    public :: pair_has_order, pair_holds_nodes, pair_may_exchange, pair_is_reverse_of, pair_of_one
    public :: formulation_nts, formulation_segment, formulation_mortar, formulation_user
@@ -104,6 +104,20 @@ contains
       if (pressure%kind == pressure_exponential) reach = exponential_reach*pressure%clearance
       if (pressure%kind == pressure_tabular) reach = max(0.0_wp, -pressure%overclosure(1))
    end function pressure_reach
+
+   !> How fast a pressure rises [M/(L^2 T^2)]: where gaps are closed, or at the end of its table.
+   pure real(wp) function pressure_slope(pressure) result(slope)
+      type(pressure_t), intent(in) :: pressure
+      real(wp), parameter :: log_100 = log(100.0_wp)
+
+      slope = pressure%slope
+      if (pressure%kind == pressure_exponential) slope = &
+         log_100*pressure%at_touch/pressure%clearance
+      if (pressure%kind /= pressure_tabular) return
+      associate (p => pressure%pressure, o => pressure%overclosure, n => size(pressure%pressure))
+         slope = (p(n) - p(1))/(o(n) - o(1))
+      end associate
+   end function pressure_slope
 
    !> The gap up to which surfaces act on each other, pads left out [L].
    pure real(wp) function interaction_reach(surface) result(reach)
