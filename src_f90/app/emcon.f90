@@ -7,7 +7,8 @@ program emcon
    use emcon_interrupt, only : interrupt_watch, is_interrupted
    use emcon_posix, only : c_errno, c_write
    use emcon_printable, only : printable
-   use emcon_run, only : run_check, run_deck, run_prepare, run_report_t, run_restart
+   use emcon_run, only : keyword_lines, run_check, run_deck, run_prepare, run_report_t, run_restart
+   use emcon_text, only : string_t
    use emcon_version, only : precision_names, this_precision, version
    implicit none
 
@@ -52,7 +53,8 @@ contains
          return
       end if
       has_room = .true.
-      if (all(command%verb /= ["help   ", "version"])) has_room = emcon_has_room() == 1
+      if (all(command%verb /= ["help    ", "version ", "keywords"])) has_room = &
+         emcon_has_room() == 1
       if (.not. has_room) then
          write(error_unit, "(a)", iostat=ignored) "emcon: the limit of address space (ulimit -v) " &
             // "leaves less than 130 MB, which OpenBLAS takes when it is called: raise it"
@@ -72,6 +74,9 @@ contains
          call print_line("emcon " // version // ", " // trim(precision_names(this_precision)) &
             // " precision")
          return
+      case ("keywords")
+         call print_keywords(command%path, code)
+         return
       case ("check")
          call run_check(command%path, command%options, report, error)
       case ("restart")
@@ -83,6 +88,23 @@ contains
       end select
       call tell(report, error, command%options%is_quiet, code)
    end subroutine execute
+
+   !> Print what the names of keywords begin with `beginning`, which may have its asterisk.
+   subroutine print_keywords(beginning, code)
+      character(len=*), intent(in) :: beginning
+      integer, intent(inout) :: code             !! that of the program
+      type(string_t), allocatable :: line(:)
+      integer :: i
+
+      call keyword_lines(beginning(verify(beginning // " ", "*"):), line)
+      do i = 1, size(line)
+         call print_line(line(i)%text)
+      end do
+      if (size(line) > 0) return
+      code = err_input
+      write(error_unit, "(a)", iostat=ignored) "emcon: no keyword begins with " // &
+         printable(beginning)
+   end subroutine print_keywords
 
    !> Print a line on standard output. What cannot be printed, as on a full disk, is an error; a
    !> reader that has gone, as `head` does, is none.

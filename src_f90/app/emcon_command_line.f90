@@ -14,8 +14,8 @@ module emcon_command_line
       "compare", "summary", "mesh", "study"]
 
    type :: command_t
-      character(len=:), allocatable :: verb      !! run, check, restart, version or help
-      character(len=:), allocatable :: path
+      character(len=:), allocatable :: verb      !! run, check, restart, keywords, version or help
+      character(len=:), allocatable :: path      !! of keywords: what their names begin with
       type(run_options_t) :: options
       character(len=:), allocatable :: fault     !! what is wrong with the command line, or empty
    end type command_t
@@ -47,7 +47,7 @@ contains
          end if
       end do
       if (len(self%fault) > 0 .or. self%verb == "help" .or. self%verb == "version") return
-      if (len(self%path) == 0) self%fault = "no file is named"
+      if (len(self%path) == 0 .and. self%verb /= "keywords") self%fault = "no file is named"
       if (self%options%is_json .and. self%verb /= "check") self%fault = &
          "--json is for emcon check; a run writes NAME.json"
       call check_restart(self)
@@ -77,12 +77,13 @@ contains
       type(command_t), intent(inout) :: self
       character(len=*), intent(in) :: word
       integer, intent(inout) :: n_plain
-      type(string_t) :: verb(3)
+      type(string_t) :: verb(4)
       character(len=:), allocatable :: near
 
-      verb = [string_t("run"), string_t("check"), string_t("restart")]
+      verb = [string_t("run"), string_t("check"), string_t("restart"), string_t("keywords")]
       call nearest_word(self%path, verb, near)
-      if (n_plain == 1 .and. (word == "run" .or. word == "check" .or. word == "restart")) then
+      if (n_plain == 1 .and. any(word == [character(len=8) :: "run", "check", "restart", &
+         "keywords"])) then
          self%verb = word
       else if (n_plain == 1 .and. any(word == of_package)) then
          self%fault = "'" // word // "' is a command of the Python package: python -m emcon " &
@@ -230,12 +231,13 @@ contains
 
    !> The help text.
    function usage() result(line)
-      character(len=72) :: line(24)
+      character(len=72) :: line(25)
 
       line = [character(len=72) :: &
          "usage: emcon [run] DECK [options]     run a deck", &
          "       emcon check DECK [options]     read it, report on it, no run", &
          "       emcon restart NAME.rst.h5      go on from a restart file", &
+         "       emcon keywords [NAME]          what decks may say", &
          "", &
          "options:", &
          "  --output DIR       write the results into DIR, not beside the deck", &

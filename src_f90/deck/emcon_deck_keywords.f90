@@ -6,7 +6,7 @@ module emcon_deck_keywords
    use emcon_text, only : read_real, squeezed, string_t
    implicit none
    private
-   public :: keyword_t, keywords, find_keyword, keyword_names, refusal_of, refusal_t
+   public :: keyword_t, keywords, find_keyword, keyword_names, refusal_of, refusal_t, refusals
    public :: parameter_mark, parameter_names, parameter_reason, is_neutral
    public :: in_model, in_step, in_both
    public :: mark_none, mark_flag, mark_value, mark_either, mark_unsupported, mark_without_effect
@@ -47,6 +47,12 @@ module emcon_deck_keywords
          has_data=.false.), &
       keyword_t("PARAMETER", in_both), &
       keyword_t("INCLUDE", in_both, "INPUT="), &
+      keyword_t("PART", in_model, "NAME=", has_data=.false.), &
+      keyword_t("END PART", in_model, has_data=.false.), &
+      keyword_t("ASSEMBLY", in_model, "NAME=", has_data=.false.), &
+      keyword_t("END ASSEMBLY", in_model, has_data=.false.), &
+      keyword_t("INSTANCE", in_model, "NAME=,PART=,!LIBRARY"), &
+      keyword_t("END INSTANCE", in_model, has_data=.false.), &
       keyword_t("NODE", in_model, "NSET=,!SYSTEM:R,!INPUT"), &
       keyword_t("ELEMENT", in_model, "TYPE=,ELSET=,!INPUT,!OFFSET:0"), &
       keyword_t("USER ELEMENT", in_model, "TYPE=,NODES=,FACES=,COORDINATES=,!PROPERTIES:0," &
@@ -311,6 +317,8 @@ contains
          reason = " (degree of freedom 6 of the reference node is the rotation)"
       case ("READ")
          reason = " (use: emcon restart NAME.rst.h5)"
+      case ("INSTANCE")
+         reason = " (there is no *ASSEMBLY)"
       case ("INPUT")
          reason = " (use *INCLUDE)"
       case default

@@ -4,6 +4,7 @@ module emcon_run
    use emcon_blas, only : blas_single_thread
    use emcon_build, only : build_differences, build_list
    use emcon_deck_further, only : further_t
+   use emcon_deck_keyword_list, only : keyword_lines
    use emcon_errors, only : err_analysis, err_file, err_input, err_interrupt, error_t, raise
    use emcon_files, only : file_exists, file_remove, make_directory, survive_file_size_limit
    use emcon_heap, only : heap_keep
@@ -38,6 +39,7 @@ module emcon_run
    private
    public :: run_options_t, run_report_t, interrupt_interface
    public :: run_prepare, run_deck, run_restart, run_check
+   public :: keyword_lines                       ! what decks may say
 
    !> What the command line can say of a run.
    type :: run_options_t
