@@ -222,7 +222,7 @@ contains
       type(diagnostics_t), intent(inout) :: log
       real(wp), parameter :: degree = atan(1.0_wp)/45.0_wp
       real(wp) :: value(2*n_axis + 1), axis(n_axis)
-      integer :: k, i, line
+      integer :: k, i, n, line
       logical :: ok, all_ok
 
       k = 0
@@ -230,8 +230,9 @@ contains
          if (is_comment(source%line(line)%text)) cycle
          k = k + 1
          value = 0.0_wp
-         all_ok = n_fields(source%line(line)%text) <= merge(n_axis, size(value), k == 1)
-         do i = 1, min(size(value), n_fields(source%line(line)%text))
+         n = n_filled(source%line(line)%text)
+         all_ok = n <= merge(n_axis, size(value), k == 1)
+         do i = 1, min(size(value), n)
             if (field(source%line(line)%text, i) == "") cycle
             call read_real(field(source%line(line)%text, i), value(i), ok)
             all_ok = all_ok .and. ok
@@ -685,6 +686,14 @@ contains
 
       n_fields = 1 + count([(text(i:i) == ",", i = 1, len(text))])
    end function n_fields
+
+   !> The same without empty ones at the end.
+   pure integer function n_filled(text)
+      character(len=*), intent(in) :: text
+
+      n_filled = n_fields(text(:verify(text, blanks // ",", back=.true.)))
+      if (verify(text, blanks // ",") == 0) n_filled = 0
+   end function n_filled
 
    !> Field `k` of a data line, without blanks around it.
    pure function field(text, k) result(word)

@@ -38,7 +38,7 @@ ASSEMBLY = """*Assembly, name=Assembly
 *Instance, name=Base-1, part=Square
 *End Instance
 *Instance, name=Punch-1, part=Square
-          0.25,           1.,           0.
+          0.25,           1.,           0.,
 *End Instance
 *Nset, nset=Top, internal, instance=Punch-1, generate
  7,  9,  1
