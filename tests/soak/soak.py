@@ -1,6 +1,7 @@
 """Seeded fuzzers: bad decks, damaged files, calls in any order, killed runs, scenes by chance.
 
-    .venv/bin/python tests/soak/soak.py [--seconds 600] [--seed 1] [decks crossed restart calls kill scenes space]
+    .venv/bin/python tests/soak/soak.py [--seconds 600] [--seed 1] [decks crossed restart calls kill scenes
+        space words damaged]
 
 Every case has a seed of its own, which is printed where the case fails: `--seed N --cases 1` and
 the name of the fuzzer repeat it. `make soak` runs all; a few cases of each are in the tests.
@@ -20,6 +21,7 @@ import time
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 
+from random_decks import fuzz_damaged, fuzz_words
 from random_scenes import fuzz_scenes
 from random_space import fuzz_space
 from scene_tools import DECKS, PROGRAM, ROOT, Deck, Run, assert_no_crash, emcon, run_deck, start
@@ -324,7 +326,8 @@ def fuzz_kill(chance, folder):
 # ---- driver -------------------------------------------------------------------------------------
 
 FUZZERS = {"decks": fuzz_decks, "crossed": fuzz_crossed, "restart": fuzz_restart, "calls": fuzz_calls,
-           "kill": fuzz_kill, "scenes": fuzz_scenes, "space": fuzz_space}
+           "kill": fuzz_kill, "scenes": fuzz_scenes, "space": fuzz_space, "words": fuzz_words,
+           "damaged": lambda chance, folder: fuzz_damaged(chance, folder, mutated)}
 
 
 def soak(name, seed, folder, cases=None, seconds=None):

@@ -13,7 +13,7 @@ from scene_tools import DECKS, PROGRAM, Run
 from scene_table import judge_seed, table
 from soak import FUZZERS, soak
 
-CASES = {"decks": 25, "crossed": 3, "restart": 12, "calls": 4, "kill": 1, "scenes": 12, "space": 10}
+CASES = {"decks": 25, "crossed": 3, "restart": 12, "calls": 4, "kill": 1, "scenes": 12, "space": 10, "words": 20, "damaged": 20}
 
 
 @pytest.mark.parametrize("name", FUZZERS)
