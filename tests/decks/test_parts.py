@@ -38,7 +38,7 @@ ASSEMBLY = """*Assembly, name=Assembly
 *Instance, name=Base-1, part=Square
 *End Instance
 *Instance, name=Punch-1, part=Square
-          0.25,           1.,           0.,
+          0.25,           1.,           0.
 *End Instance
 *Nset, nset=Top, internal, instance=Punch-1, generate
  7,  9,  1
@@ -83,7 +83,7 @@ def test_instances_are_the_flat_deck(tmp_path):
     ("0., 0., 0., 0., 0., 1., 30.", lambda x, y: (np.sqrt(0.75)*x - y/2, x/2 + np.sqrt(0.75)*y)),
 ])
 def test_an_instance_is_moved_and_then_turned(axis, place, tmp_path):
-    text = PARTS.replace("          0.25,           1.,           0.\n", f"-2., 3., 0.\n{axis}\n")
+    text = PARTS.replace("          0.25,           1.,           0.\n", f"-2., 3., 0.,\n{axis},,\n")
     deck = tmp_path/"deck.inp"
     deck.write_text(text.replace("*STATIC\n0.5, 1.\n", "*STATIC\n0.5, 1.\n*CONTROLS\n").replace(
         "*CONTACT PAIR, INTERACTION=I, TYPE=SURFACE TO SURFACE\nPunch-1.LOWER, Under\n", ""))
