@@ -65,6 +65,7 @@ contains
 
    !> Works and energies of a step that has them. Contact without friction takes none: where what
    !> acted at the start lets go, or others take over, it does as far as the increment is too long.
+   !> Contact that gives way stores some, which comes back.
    subroutine judge(self, part, status)
       type(march_t), intent(inout) :: self
       type(part_t), intent(in) :: part
@@ -80,8 +81,9 @@ contains
          after = sum(ending%energy)
          missed = abs(0.5_wp*sum((state%internal + ending%force)*ending%du) &
             - (after - before))
-         if (any(abs(state%contact) > 0.0_wp) .and. .not. self%active%friction%is_on) missed &
-            = max(missed, -0.5_wp*sum((state%contact + self%newton%contact)*ending%du))
+         if (any(abs(state%contact) > 0.0_wp) .and. .not. (self%active%friction%is_on &
+            .or. self%active%set%penalty%is_on)) missed = max(missed, &
+            -0.5_wp*sum((state%contact + self%newton%contact)*ending%du))
          if (.not. missed > most_missed*max(before, after) + epsilon(missed) &
             *sum(self%system%response%rounding*abs(ending%du))) return
          self%step_check%ratio = missed/max(before, after)

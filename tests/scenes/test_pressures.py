@@ -98,6 +98,17 @@ def test_a_load_goes_in_by_the_curve(behaviour, formulation, load, tmp_path):
 
 
 @pytest.mark.parametrize("formulation", FORMULATIONS)
+@pytest.mark.parametrize("behaviour", BEHAVIOURS)
+def test_what_it_stores_does_not_snap(behaviour, formulation, tmp_path):
+    """STABILIZE cuts increments in which energy is set free; what contact stores stays there."""
+    step = static(5.0, ", NLGEOM").replace("*STATIC", "*STATIC, STABILIZE")
+    run = run_deck(deck(behaviour, formulation, step), tmp_path)
+    assert run.verdict["verdict"] == "good"
+    assert run.verdict["cuts"] == 0
+    assert run.verdict["contact_energy"] > 0.1*run.verdict["strain"]
+
+
+@pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_blocks_that_fit_each_other(formulation, tmp_path):
     """Corner on corner, in by a tenth and a fifth of an edge: by the curve, and nothing else."""
     for load in (1.0, 10.0, 20.0):
