@@ -8,7 +8,7 @@ module emcon_deck_keywords
    private
    public :: keyword_t, keywords, find_keyword, keyword_names, refusal_of, refusal_t, refusals
    public :: parameter_mark, parameter_names, parameter_reason, is_neutral
-   public :: in_model, in_step, in_both
+   public :: in_model, in_step, in_both, gap_instead
    public :: mark_none, mark_flag, mark_value, mark_either, mark_unsupported, mark_without_effect
 
    !> Where a keyword may stand: before the first *STEP, inside a step, or anywhere.
@@ -31,11 +31,15 @@ module emcon_deck_keywords
 
    !> Keywords of other programs that are known, and why they do nothing here.
    type :: refusal_t
-      character(len=80) :: reason = ""
+      character(len=100) :: reason = ""
       character(len=240) :: names = ""       !! with commas between them
       logical :: is_output = .false.         !! --lenient reads on
       logical :: is_idle = .false.           !! taken: they would change nothing
    end type refusal_t
+
+   !> What to do without elements that hold the distance of two nodes.
+   character(len=*), parameter :: gap_instead = "use *CONTACT PAIR with a *SURFACE, TYPE=NODE " &
+      // "as slave, as far from its master as the gap is wide"
 
    character(len=*), parameter :: printed = "FREQUENCY=,TIMEPOINTS=,TOTALS="
    character(len=*), parameter :: filed = "FREQUENCY=,TIMEPOINTS=,~GLOBAL:YES,~OUTPUT:2D," &
@@ -170,7 +174,7 @@ module emcon_deck_keywords
          "SHELL SECTION,SHELL GENERAL SECTION,BEAM SECTION,BEAM GENERAL SECTION,MEMBRANE " &
          // "SECTION,COHESIVE SECTION,CONNECTOR SECTION,SURFACE SECTION,NODAL THICKNESS,NORMAL," &
          // "SPRING,DASHPOT,MASS,ROTARY INERTIA"), &
-      refusal_t("use *CONTACT PAIR", "GAP"), &
+      refusal_t(gap_instead, "GAP"), &
       refusal_t("list what touches by *CONTACT INCLUSIONS", "CONTACT EXCLUSIONS"), &
       refusal_t("all with all holds the nodes of both sides", "CONTACT FORMULATION"), &
       refusal_t("use ADJUST of *CONTACT PAIR", "CLEARANCE,CONTACT INITIALIZATION DATA," &

@@ -4,6 +4,7 @@ module emcon_deck_mesh
    use emcon_deck_element_kinds, only : has_user_card, is_user_type
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       drop_zeros, get_integer, get_real, is_blank, next_line
+   use emcon_deck_keywords, only : gap_instead
    use emcon_deck_labels, only : find_label, label_map_init
    use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, n_cards, &
       n_lines, need_name, option_name, reader_t
@@ -324,12 +325,30 @@ contains
             // "ELEMENT")
       else if (any(foreign_types == type_name)) then
          call card_error(reader, card, "element type " // type_name &
-            // " is known but not supported by this version; supported:" // list)
+            // " is known but not supported by this version" // instead(type_name) &
+            // "; supported:" // list)
       else
          call card_error(reader, card, "unknown element type " // quoted(type_name) &
             // "; supported:" // list)
       end if
    end subroutine refuse_type
+
+   !> What to do without an element type that is not read; empty: take another one.
+   pure function instead(type_name) result(text)
+      character(len=*), intent(in) :: type_name  !! one of `foreign_types`
+      character(len=:), allocatable :: text
+
+      select case (type_name)
+      case ("GAPUNI")
+         text = " (" // gap_instead // ")"
+      case ("MASS", "SPRINGA", "SPRING1", "SPRING2", "DASHPTA")
+         text = " (a program that calls the library may give masses, forces and potentials)"
+      case ("R2D2", "R3D3", "R3D4")
+         text = " (use *RIGID BODY with elements of the body, or with a *SURFACE, TYPE=SEGMENTS)"
+      case default
+         text = ""
+      end select
+   end function instead
 
    !> The nodes of one element, 0 throughout if any is wrong. The list goes on in the next line
    !> after a comma at the end of a line.

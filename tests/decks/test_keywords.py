@@ -33,7 +33,8 @@ def test_a_name_narrows_the_list():
     assert "   says nothing: MECHANICALCONSTRAINT=KINEMATIC, OP=NEW\n" in told
     assert "   refused: NOSEPARATION\n" in emcon("keywords", "SURFACE BEHAVIOR").stdout
     assert emcon("keywords", "gap").stdout == ("changes nothing: *GAP CONDUCTANCE, *GAP HEAT GENERATION: there is no "
-                                               "temperature\nnot supported: *GAP: use *CONTACT PAIR\n")
+                                               "temperature\nnot supported: *GAP: use *CONTACT PAIR with a *SURFACE, "
+                                               "TYPE=NODE as slave, as far from its master as the gap is wide\n")
     assert "left out with --lenient: *ELEMENT FILE: use *EL FILE" in emcon("keywords", "ELEMENT F").stdout
 
 

@@ -493,3 +493,24 @@ def test_elements_of_one_point_are_taken_as_those_that_keep_the_energy(name, tak
     reduced, own = (run(tmp_path/kind, moving().replace("TYPE=CPE4,", f"TYPE={kind},")) for kind in (name, taken))
     assert f"elements of type {name} are taken as {taken}" in reduced.errors
     assert reduced.digits() == own.digits()
+
+
+def test_in_place_of_a_gap_element(tmp_path):
+    """A bar of an end that may go up by a twentieth: as GAPUNI from its nodes to the ground would hold it."""
+    wall = """*NODE
+9, 0., 9.
+*SURFACE, NAME=TIP, TYPE=NODE
+END
+*SURFACE, NAME=WALL, TYPE=SEGMENTS
+START, 2., 2.05
+LINE, -1., 2.05
+*RIGID BODY, ANALYTICAL SURFACE=WALL, REF NODE=9
+*BOUNDARY
+9, 1, 6
+*SURFACE INTERACTION, NAME=I
+*CONTACT PAIR, INTERACTION=I
+TIP, WALL
+"""
+    cards = "*CLOAD\nEND, 2, {}\n"
+    done = run(tmp_path, BAR + wall + static(cards.format(1.0), cards.format(2.0)))
+    assert np.allclose(ends(done), [[COMPLIANCE*LENGTH*2.0]*2, [0.05]*2], rtol=1e-9, atol=0.0)
