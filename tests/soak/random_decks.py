@@ -24,8 +24,18 @@ ABOVE = 1000
 ENERGY, BALANCE = 1e-8, 1e-6
 #: So far, by the edge, bodies are in each other where nothing is told.
 UNTOLD = 1e-3
+#: Solutions an increment, in the mean, with which a static step looks for a balance and may find another one.
+WANDERED = 12
+#: Of strain energies of decks that say the same to round-off, by the largest energy.
+ROUNDED = 1e-6
 #: What a run may take [s].
 PATIENCE = 60
+#: Node sets of plain decks.
+SETS = ["FEET", "HEAD", "BODY", "SOLE"]
+#: Degrees of freedom of the head that lie along x and along y: axes of the model, and of a *TRANSFORM.
+GLOBAL, TURNED = (1, 2), (2, 1)
+#: How the last step frees a lid that is kept flat; None: by the names of its nodes.
+FREED = {"freed": None, "freed at once": ("*EQUATION, REMOVE ALL", [])}
 
 
 def number(chance, value):
@@ -88,8 +98,12 @@ class Model:
         self.is_guided = chance.random() < 0.7
         self._draw_contact(chance)
         self.steps = [self._step(chance, k) for k in range(pick([1, 1, 2]))]
+        #: Do the other words say the same to round-off alone?
+        self.is_rounded = False
+        self.lid = pick([None, None, None, "flat", "freed", "freed at once"])
+        self.is_read_alone = chance.random() < 0.02
         if chance.random() < 0.9:
-            self._reconcile(chance)
+            self._reconcile()
         self.speed = pick([0.0, 0.02, 0.1])*np.sqrt(self.young/self.density)
 
     def _draw_contact(self, chance):
@@ -105,15 +119,16 @@ class Model:
             (p0, o0), (p1, o1) = self.curve
             self.slope = (p1 - p0)/(o1 - o0)
         self.friction = pick([None, None, 0.1, 0.5])
-        self.stick = pick([None, k]) if self.friction else None
+        self.is_rough = self.friction is not None and chance.random() < 0.1
+        self.stick = pick([None, k]) if self.friction and not self.is_rough else None
         self.formulation = pick(["NODE TO SURFACE", "SEGMENT", "MORTAR"])
-        self.pair = [*pick([[], [], [], ["SIDES=ONE"], ["SIDES=BOTH"], ["GUARD=NO"]]), *pick([[], [], ["ADJUST=0."], ["ADJUST=0.05"]])]
+        self.pair = [*pick([[], [], [], ["SIDES=ONE"], ["SIDES=BOTH"], ["GUARD=NO"]]), *pick([[], [], ["ADJUST=0."], ["ADJUST=0.05"], ["ADJUST=SOLE"]])]
         self.interaction = pick([[], [], [], [], ["RESTITUTION=0.5"], ["PAD THICKNESS=0.015625"]])
         self.damping = pick([None, None, None, [np.sqrt(self.young*self.density), 0.25, 0.5]])
         self.method = pick([[]]*6 + [["*CONSTRAINT METHOD, TYPE=PENALTY"], ["*CONTACT INITIATION, TYPE=ADMISSIBLE"],
                                      ["*CONTACT INITIATION, TYPE=MASSLESS"], ["*CONSTRAINT METHOD, TYPE=SADDLE POINT"]])
 
-    def _reconcile(self, chance):
+    def _reconcile(self):
         """Take out what is refused beside something else that is said."""
         is_hard, first = self.behaviour == "HARD", self.steps[0]
         if not is_hard:
@@ -127,6 +142,8 @@ class Model:
             self.pair.append("SIDES=ONE")
         if self.behaviour == "TIED" or self.damping and not any(step["is_dynamic"] for step in self.steps):
             self.damping = None
+        if any(step["load"] == "way" for step in self.steps):
+            self.lid = None
         for step in self.steps[1:] if self.behaviour != "TIED" else self.steps:
             step["more"] = step.get("more", "").replace("interference", "").replace("loose", "")
         if self.gap < 0 and is_hard and not any("ADJUST" in word for word in self.pair):
@@ -165,15 +182,16 @@ class Model:
                   [[e + ABOVE, *up(n)] for e, n in self.up.element.items()]),
                  ("*ELSET, ELSET=ALL", [["LOW"], ["UP"]]), ("*NSET, NSET=FEET", [[n] for n in self.low.feet]),
                  ("*NSET, NSET=HEAD", [[n] for n in up(self.up.head)]),
-                 ("*NSET, NSET=BODY", [[n] for n in up(self.up.node)]),
+                 ("*NSET, NSET=BODY", [[n] for n in up(self.up.node)]), ("*NSET, NSET=SOLE", [[n] for n in up(self.up.feet)]),
                  ("*SURFACE, NAME=UNDER", [[e, f"S{f}"] for e, f in self.low.top]),
                  ("*SURFACE, NAME=OVER", [[e + ABOVE, f"S{f}"] for e, f in self.up.bottom]),
                  ("*SURFACE, NAME=LID", [[e + ABOVE, f"S{f}"] for e, f in self.up.top])]
-        return written(cards + self._rest("OVER", "UNDER", "LID", "ALL", ["FEET", "HEAD", "BODY"]))
+        return written(cards + self._rest("OVER", "UNDER", "LID", "ALL", SETS, up(self.up.head)))
 
-    def _rest(self, over, under, lid, everything, sets):
-        """All but the mesh, plainly; `sets`: the feet, the head and the whole of the upper block."""
-        feet, head, body = sets
+    def _rest(self, over, under, lid, everything, sets, top, axes=GLOBAL):
+        """All but the mesh, plainly; `sets`: the feet, the head, the whole and the lower side of the upper block;
+        `top`: the nodes of the head, and along which `axes` their degrees of freedom are."""
+        feet, head, body, sole = sets
         law = [("*" + self.law, [[self.young, self.nu]])]
         cards = [("*MATERIAL, NAME=M", []), *law, ("*DENSITY", [[self.density]]),
                  (f"*SOLID SECTION, ELSET={everything}, MATERIAL=M", [[self.thickness]]),
@@ -182,18 +200,26 @@ class Model:
             cards += [(f"*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE={self.behaviour}", self.curve)]
         if self.friction:
             stick = self.stick or (0.5*self.slope if self.slope else None)
-            cards += [("*FRICTION", [[self.friction] + ([stick] if stick else [])])]
+            rough = ("*FRICTION, ROUGH", [])
+            cards += [rough if self.is_rough else ("*FRICTION", [[self.friction] + ([stick] if stick else [])])]
         if self.damping:
             cards += [("*CONTACT DAMPING", [self.damping])]
-        cards += [(", ".join(["*CONTACT PAIR, INTERACTION=I", f"TYPE={self.formulation}", *self.pair]), [[over, under]]),
-                  ("*BOUNDARY", [[feet, 1, 2]] + ([[head, 1]] if self.is_guided else []))]
+        pair = ", ".join(["*CONTACT PAIR, INTERACTION=I", f"TYPE={self.formulation}", *self.pair])
+        cards += [(pair.replace("SOLE", sole), [[over, under]]),
+                  ("*BOUNDARY", [[feet, 1, 2]] + ([[head, axes[0]]] if self.is_guided else []))]
+        if self.lid:
+            cards += [("*EQUATION", [row for n in top[1:] for row in ([2], [n, axes[1], 1.0, top[0], axes[1], -1.0])])]
         if any(step["is_dynamic"] for step in self.steps):
             cards += [("*INITIAL CONDITIONS, TYPE=VELOCITY", [[body, 2, -self.speed]])]
-        for step in self.steps:
-            cards += self._step_cards(step, lid, everything, head)
+        for k, step in enumerate(self.steps):
+            cards += self._step_cards(step, lid, everything, head, axes)
+            if k == len(self.steps) - 1 and self.lid in FREED:
+                cards[-1:-1] = [FREED[self.lid] or ("*EQUATION, REMOVE", [[n, axes[1]] for n in top[1:]])]
+            if k == len(self.steps) - 1 and self.is_read_alone:
+                cards = [("*NO ANALYSIS", []) if card[1] == [step["times"]] else card for card in cards]
         return cards
 
-    def _step_cards(self, step, lid, everything, head):
+    def _step_cards(self, step, lid, everything, head, axes):
         kind = ("*DYNAMIC" if step["is_dynamic"] else "*STATIC") + (", DIRECT" if step["direct"] else "")
         more = step.get("more")
         kind += ", STABILIZE" if more == "stabilize" else ""
@@ -209,9 +235,9 @@ class Model:
         if step["load"] == "pressure":
             cards += [("*DSLOAD" + new, [[lid, "P", size]])]
         elif step["load"] == "force":
-            cards += [("*CLOAD" + new, [[head, 2, -size]])]
+            cards += [("*CLOAD" + new, [[head, axes[1], -size]])]
         elif step["load"] == "way":
-            cards += [("*BOUNDARY", [[head, 2, 2, -size]])]
+            cards += [("*BOUNDARY", [[head, axes[1], axes[1], -size]])]
         elif step["load"] == "weight":
             cards += [("*DLOAD" + new, [[everything, "GRAV", size, 0.0, -1.0]])]
         return [*cards, ("*NODE FILE, FREQUENCY=1", [["U", "RF"]]), ("*CONTACT FILE, FREQUENCY=1", [["CF"]]),
@@ -223,15 +249,23 @@ class Model:
         """The same deck as other programs would write it."""
         if chance.random() < 0.5:
             cards = self._parts(chance)
-            names = ["Up-1.Over", "Under", "Up-1.Lid", "Everything", ["Feet", "Up-1.Head", "Up-1.Body"]]
+            names = ["Up-1.Over", "Under", "Up-1.Lid", "Everything", ["Feet", "Up-1.Head", "Up-1.Body", "Up-1.Sole"]]
+            top = [f"Up-1.{n}" for n in self.up.head]
         else:
-            cards, names = self._flat(chance), ["OVER", "UNDER", "LID", "ALL", ["FEET", "HEAD", "BODY"]]
-        rest = self._rest(*names)
+            shift = chance.choice([500, 7000, 10**6])
+            cards, names = self._flat(chance, shift), ["OVER", "UNDER", "LID", "ALL", SETS]
+            top = [n + shift for n in self.up.head]
+        axes = chance.choice([GLOBAL, GLOBAL, TURNED])
+        rest = self._rest(*names, top, axes)
+        turns = [(f"*TRANSFORM, NSET={names[4][1]}", [[0.0, 3.0, 0.0, -2.0, 0.0, 0.0]])] if axes == TURNED else []
+        if chance.random() < 0.2:
+            self.is_rounded = True
+            turns += [(f"*TRANSFORM, TYPE=C, NSET={names[4][0]}", [[0.0, 9.0, 0.0, 0.0, 9.0, 1.0]])]
+        rest[0:0] = turns
         return written(self._reworded(cards, rest, chance, names), chance)
 
-    def _flat(self, chance):
+    def _flat(self, chance, shift):
         """The mesh with labels of its own and sets by GENERATE, sides by element sets."""
-        shift = chance.choice([500, 7000, 10**6])
         up = lambda labels: [label + shift for label in labels]
         cards = [("*NODE, NSET=Nall", [[n, *x] + [0.0] for n, x in self.low.node.items()]
                   + [[n + shift, *x] for n, x in self.up.node.items()]),
@@ -239,7 +273,7 @@ class Model:
                   + [[e + shift, *up(n)] for e, n in self.up.element.items()]),
                  ("*ELSET, ELSET=ALL", [["Efaces"]]),
                  *self._set("NSET", "FEET", self.low.feet, chance), *self._set("NSET", "HEAD", up(self.up.head), chance),
-                 *self._set("NSET", "BODY", up(self.up.node), chance)]
+                 *self._set("NSET", "BODY", up(self.up.node), chance), *self._set("NSET", "SOLE", up(self.up.feet), chance)]
         for name, sides, base in (("UNDER", self.low.top, 0), ("OVER", self.up.bottom, shift), ("LID", self.up.top, shift)):
             face = sides[0][1]
             cards += [*self._set("ELSET", f"_{name}_S{face}", [e + base for e, _ in sides], chance),
@@ -258,17 +292,22 @@ class Model:
     def _parts(self, chance):
         """Two parts; the upper one lies somewhere else in its part, by eighths."""
         way = [chance.randint(-16, 16)/8 for _ in range(2)]
+        turn = chance.choice([(1.0, 0.0, ""), (1.0, 0.0, ""), (0.0, 1.0, "90."), (-1.0, 0.0, "-180.0")])
+        self.is_rounded = self.is_rounded or bool(turn[2])
+        back = lambda x, y: (turn[0]*x + turn[1]*y, turn[0]*y - turn[1]*x)
         lower = [(f"*Part, name=Low{k}", rows) for k, rows in [("", [])]]
         lower += [("*Node", [[n, *x] for n, x in self.low.node.items()]),
                   (f"*Element, type={self.low.kind}", [[e, *n] for e, n in self.low.element.items()]), ("*End Part", [])]
-        upper = [("*Part, name=Up", []), ("*Node", [[n, x - way[0], y - way[1]] for n, (x, y) in self.up.node.items()]),
+        upper = [("*Part, name=Up", []), ("*Node", [[n, *back(x - way[0], y - way[1])] for n, (x, y) in self.up.node.items()]),
                  (f"*Element, type={self.up.kind}, elset=Whole", [[e, *n] for e, n in self.up.element.items()]),
                  *self._set("NSET", "Head", self.up.head, chance), *self._set("NSET", "Body", self.up.node, chance),
+                 *self._set("NSET", "Sole", self.up.feet, chance),
                  ("*Surface, type=ELEMENT, name=Over", [[e, f"S{f}"] for e, f in self.up.bottom]),
                  ("*Surface, type=ELEMENT, name=Lid", [[e, f"S{f}"] for e, f in self.up.top]), ("*End Part", [])]
         face = self.low.top[0][1]
         assembly = [("*Assembly, name=Assembly", []), ("*Instance, name=Low-1, part=Low", []), ("*End Instance", []),
-                    ("*Instance, name=Up-1, part=Up", [[*way, 0.0]] if any(way) or chance.random() < 0.5 else []),
+                    ("*Instance, name=Up-1, part=Up", ([[*way, 0.0]] if any(way) or turn[2] or chance.random() < 0.5 else [])
+                     + ([[*way, 0.0, *way, 1.0, turn[2]]] if turn[2] else [])),
                     ("*End Instance", []), *self._set("Nset", "Feet", self.low.feet, chance, ", instance=Low-1"),
                     *self._set("Elset", "_Under", [e for e, _ in self.low.top], chance, ", internal, instance=Low-1"),
                     ("*Surface, type=ELEMENT, name=Under", [["_Under", f"S{face}"]]),
@@ -396,6 +435,13 @@ def energies(run):
     return np.abs(change).max()/largest if largest else 0.0
 
 
+def energies_differ(model, run, same):
+    """By what the strain energies at the end differ, by the largest, or that of a strain of 1e-6."""
+    one, other = run.digits(pairs=False), same.digits(pairs=False)
+    largest = max(np.abs(np.array(one[name], dtype=float)).max() for name in ("kinetic", "strain", "external_work"))
+    return abs(float(one["strain"][-1]) - float(other["strain"][-1]))/max(largest, 1e-12*model.young)
+
+
 def wrong(model, run):
     """What is wrong with a run that calls itself good; empty: nothing."""
     table = run.digits()
@@ -412,7 +458,8 @@ def wrong(model, run):
     seen = deepest(fields, begin)
     # What only the chords of bent surfaces are in is told where it is more than that which is in.
     chords = re.search(r"edges of curved surfaces overlap by up to (\S+) of their length", run.log)
-    told = max(run.verdict["penetration"], float(chords[1])*(1 + 5e-3) if chords else 0.0)
+    soft = re.search(r"largest penetration of contact (\S+) of an edge", run.log)
+    told = max(run.verdict["penetration"], *(float(line[1])*(1 + 5e-3) for line in (chords, soft) if line), 0.0)
     told += max(run.verdict["penetration"], UNTOLD)
     if model.behaviour != "TIED" and seen.by_edge > told*(1 + 1e-5) + 1e-12:
         return f"told {told:.3g} deep, but {seen}"
@@ -426,18 +473,17 @@ def wrong(model, run):
 
 def deepest(fields, begin):
     """The deepest overlap at the ends of increments, from time `begin` on. Contact sees a side with a midside node as two edges
-    that meet in a point farther out, by a third of what the side bends by."""
+    that meet in this node at the start, and farther out as the side bends, by a third of that."""
     cells = [cell.reshape(2, -1).T.ravel() if len(cell) == 8 else cell for cell in fields.cells]
     bodies, found = overlap.Bodies(cells), overlap.Overlap()
     for time, u in zip(fields.time, fields["displacement"]):
         if time < begin:
             continue
-        x = fields.x + u[:, :2]
-        place = x.copy()
+        way = u[:, :2].copy()
         for cell in cells:
             if len(cell) == 8:
-                place[cell[1::2]] = (8*x[cell[1::2]] - x[cell[::2]] - x[np.roll(cell[::2], -1)])/6
-        found = max(found, bodies.overlap(place, time))
+                way[cell[1::2]] = (8*u[cell[1::2]] - u[cell[::2]] - u[np.roll(cell[::2], -1)])[:, :2]/6
+        found = max(found, bodies.overlap(fields.x + way, time))
     return found
 
 
@@ -445,7 +491,11 @@ def area(x, cells):
     """Of all elements."""
     total = 0.0
     for cell in cells:
-        ring = x[cell.reshape(2, -1).T.ravel() if len(cell) == 8 else cell]
+        ring = x[cell]
+        if len(cell) == 8:
+            ring = ring.reshape(2, 4, -1).swapaxes(0, 1).reshape(8, -1)
+            # As much lies below a parabola as in a triangle whose tip is a third farther out.
+            ring[1::2] = (8*ring[1::2] - ring[::2] - np.roll(ring[::2], -1, axis=0))/6
         total += 0.5*overlap.cross(ring, np.roll(ring, -1, axis=0)).sum()
     return total
 
@@ -482,10 +532,17 @@ def fuzz_words(chance, folder):
     """A deck in other words ends as in plain ones, and what calls itself good is so."""
     model = Model(chance)
     (plain, run), (dressed, same) = ended(model.plain(), folder, "plain"), ended(model.dressed(chance), folder, "dressed")
-    assert plain.returncode == dressed.returncode, f"{plain.returncode}, {dressed.returncode}\n{plain.stderr}\n{dressed.stderr}"
-    if plain.returncode == 2:
+    if model.is_rounded and 3 in (plain.returncode, dressed.returncode):
+        # What hardly holds, or is hardly near, round-off may decide.
+        assert 2 not in (plain.returncode, dressed.returncode)
         return
-    assert run.digits() == same.digits(), "other words, other digits"
+    assert plain.returncode == dressed.returncode, f"{plain.returncode}, {dressed.returncode}\n{plain.stderr}\n{dressed.stderr}"
+    if plain.returncode == 2 or model.is_read_alone:
+        return
+    if model.is_rounded and not any(run.verdict["newton"] > WANDERED*run.verdict["increments"] for run in (run, same)):
+        assert energies_differ(model, run, same) <= ROUNDED, "other words, other energies"
+    elif not model.is_rounded:
+        assert run.digits() == same.digits(), "other words, other digits"
     fault = wrong(model, run)
     assert not fault, fault
 
