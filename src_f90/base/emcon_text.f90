@@ -307,12 +307,21 @@ contains
       best = max(1, len(word)/3) + 1
       do i = 1, size(list)
          distance = edit_distance(word, list(i)%text)
+         if (is_last_part(word, list(i)%text)) distance = 0
          if (distance < best) then
             best = distance
             nearest = list(i)%text
          end if
       end do
    end subroutine nearest_word
+
+   !> Is `word` what follows a point in `name`, as in INSTANCE.NAME?
+   pure logical function is_last_part(word, name)
+      character(len=*), intent(in) :: word, name
+
+      is_last_part = len(name) > len(word)
+      if (is_last_part) is_last_part = name(len(name) - len(word):) == "." // word
+   end function is_last_part
 
    !> Levenshtein distance of `a` and `b`.
    pure integer function edit_distance(a, b)

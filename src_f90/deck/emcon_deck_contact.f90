@@ -32,11 +32,13 @@ contains
    subroutine read_interactions(reader)
       type(reader_t), intent(inout) :: reader
       character(len=:), allocatable :: name
-      integer :: i, n, friction(size(reader%card))         ! the *FRICTION of each interaction
+      integer :: i, n
+      integer :: friction(size(reader%card)), behavior(size(reader%card))   ! of each interaction
 
       allocate(reader%interaction(size(reader%card)), reader%interaction_name(size(reader%card)))
       n = 0
       friction = 0
+      behavior = 0
       do i = 1, size(reader%card)
          associate (card => reader%card(i))
             select case (card%name)
@@ -68,6 +70,9 @@ contains
                      // "left of the velocity along the surface of what sticks", 0.0_wp, 1.0_wp, &
                      reader%interaction(max(1, n))%rebound)
                else
+                  if (behavior(max(1, n)) > 0) call card_error(reader, card, &
+                     "the surface interaction has *SURFACE BEHAVIOR already")
+                  if (n > 0) behavior(n) = i
                   call read_behavior(reader, card, reader%interaction(max(1, n))%pressure)
                   if (n == 0) reader%interaction(1)%pressure = pressure_t()
                end if
@@ -91,8 +96,8 @@ contains
             if (any(surface%pressure%kind == [pressure_hard, pressure_tied]) .or. &
                surface%stick > 0.0_wp .or. .not. surface%friction > 0.0_wp) cycle
             surface%stick = 0.5_wp*pressure_slope(surface%pressure)
-            call card_warning(reader, card, "no slope of stick is given: half of the slope of " &
-               // "the pressure is taken, " // to_text(surface%stick))
+            call card_warning(reader, card, "no slope of stick above 0 is given: half of the " &
+               // "slope of the pressure is taken, " // to_text(surface%stick))
          end associate
       end do
    end subroutine suit_sticks

@@ -61,6 +61,8 @@ module emcon_deck_parts
       integer :: n = 0                             !! lines so far
       integer :: unit = 1                          !! labels of all parts are smaller
       logical :: in_assembly = .false.
+      logical :: has_own = .false.                 !! nodes or elements outside of all parts
+      logical :: is_sound = .true.                 !! nothing is wrong with parts and instances
       integer :: n_instance = 0                    !! in all
    end type flat_t
 
@@ -87,13 +89,16 @@ contains
       type(diagnostics_t), intent(inout) :: log
       type(flat_t) :: self
       type(card_text_t) :: card
-      integer :: i
+      integer :: i, n_before
 
       allocate(self%instance(0))
       allocate(self%text%line(64), self%text%file(64), self%text%number(64))
       self%text%file_name = source%file_name
+      n_before = log%n_errors
       call find_parts(source, self, log)
-      i = 1
+      self%is_sound = log%n_errors == n_before
+      ! What stands in the wrong place would be read as something else: all that follows is wrong.
+      i = merge(1, size(source%line) + 1, self%is_sound)
       do while (i <= size(source%line))
          call read_card(source, i, card)
          i = card%last + 1
@@ -103,10 +108,12 @@ contains
          case ("INSTANCE")
             i = end_of(source, card, "ENDINSTANCE") + 1
             call put_instance(source, card, self, log)
-         case ("ASSEMBLY", "ENDASSEMBLY")
-            self%in_assembly = card%name == "ASSEMBLY"
-         case ("ENDPART", "ENDINSTANCE")
-            call add_error(log, origin_of(source, card%line), card%title // " ends nothing")
+         case ("ASSEMBLY")
+            self%in_assembly = .true.
+         case ("ENDPART", "ENDINSTANCE", "ENDASSEMBLY")
+            if (self%is_sound .and. .not. (self%in_assembly .and. card%name == "ENDASSEMBLY")) &
+               call add_error(log, origin_of(source, card%line), card%title // " ends nothing")
+            self%in_assembly = self%in_assembly .and. card%name /= "ENDASSEMBLY"
          case default
             call put_own(source, card, self, log)
          end select
@@ -130,22 +137,24 @@ contains
       type(diagnostics_t), intent(inout) :: log
       type(card_text_t) :: card
       type(part_t) :: part
-      integer :: i, k, label
-      logical :: ok
+      character(len=:), allocatable :: inside, outside
+      integer :: i
 
       allocate(self%part(0))
+      inside = ""
+      outside = ""
       i = 1
       do while (i <= size(source%line))
          call read_card(source, i, card)
          i = card%last + 1
+         if (has_no_end(source, card)) then
+            call add_error(log, origin_of(source, card%line), "*END " // card%name // " is missing")
+            return
+         end if
+         call follow(source, card, inside, outside, log)
          if (any(card%name == [character(len=7) :: "NODE", "ELEMENT"])) then
-            do k = card%data, card%last
-               call read_integer(field(source%line(k)%text, 1), label, ok)
-               do while (ok .and. self%unit <= label &
-                  .and. 10.0_wp*real(self%unit, wp) < real(huge(1), wp))
-                  self%unit = 10*self%unit
-               end do
-            end do
+            self%has_own = self%has_own .or. inside // outside == ""
+            call raise_unit(source, card, self)
          else if (card%name == "INSTANCE") then
             self%n_instance = self%n_instance + 1
          else if (card%name == "PART") then
@@ -154,14 +163,66 @@ contains
             part%last = end_of(source, card, "ENDPART") - 1
             if (part%name == "") call add_error(log, origin_of(source, card%line), &
                "*PART needs NAME=")
-            if (part%last == size(source%line)) call add_error(log, origin_of(source, card%line), &
-               "*END PART is missing")
             if (part_number(self, part%name) > 0) call add_error(log, &
                origin_of(source, card%line), "part " // quoted(part%name) // " is given twice")
             self%part = [self%part, part]
          end if
       end do
    end subroutine find_parts
+
+   !> Does a card begin what nothing ends?
+   pure logical function has_no_end(source, card)
+      type(deck_source_t), intent(in) :: source
+      type(card_text_t), intent(in) :: card
+
+      has_no_end = any(card%name == [character(len=8) :: "PART", "INSTANCE", "ASSEMBLY"])
+      if (has_no_end) has_no_end = end_of(source, card, "END" // card%name) > size(source%line)
+   end function has_no_end
+
+   !> What a card stands in. Parts and instances hold neither parts nor instances, an assembly no
+   !> assembly; what belongs to the whole model stands in none of them.
+   subroutine follow(source, card, inside, outside, log)
+      type(deck_source_t), intent(in) :: source
+      type(card_text_t), intent(in) :: card
+      character(len=:), allocatable, intent(inout) :: inside   !! PART, INSTANCE or nothing,
+      character(len=:), allocatable, intent(inout) :: outside  !! and ASSEMBLY or nothing, around it
+      type(diagnostics_t), intent(inout) :: log
+      character(len=:), allocatable :: around
+
+      around = inside
+      select case (card%name)
+      case ("PART", "INSTANCE")
+         if (inside == "") inside = card%name
+      case ("ASSEMBLY")
+         if (inside == "") around = outside
+         outside = card%name
+      case ("MATERIAL", "STEP")
+         if (inside == "") around = outside
+      case default
+         around = ""
+         if (card%name == "END" // inside) inside = ""
+         if (card%name == "ENDASSEMBLY") outside = ""
+      end select
+      if (around /= "") call add_error(log, origin_of(source, card%line), card%title &
+         // " may not stand between *" // around // " and *END " // around)
+   end subroutine follow
+
+   !> Labels of a card lie below the unit.
+   subroutine raise_unit(source, card, self)
+      type(deck_source_t), intent(in) :: source
+      type(card_text_t), intent(in) :: card
+      type(flat_t), intent(inout) :: self
+      integer :: i, label
+      logical :: ok
+
+      do i = card%data, card%last
+         call read_integer(field(source%line(i)%text, 1), label, ok)
+         do while (ok .and. self%unit <= label &
+            .and. 10.0_wp*real(self%unit, wp) < real(huge(1), wp))
+            self%unit = 10*self%unit
+         end do
+      end do
+   end subroutine raise_unit
 
    pure integer function part_number(self, name) result(k)
       type(flat_t), intent(in) :: self
@@ -197,7 +258,6 @@ contains
       k = part_number(self, option_of(card, "PART"))
       last = end_of(source, card, "ENDINSTANCE")
       if (.not. self%in_assembly) fault = "*INSTANCE stands in *ASSEMBLY alone"
-      if (last > size(source%line)) fault = "*END INSTANCE is missing"
       if (instance%name == "") fault = "*INSTANCE needs NAME="
       if (instance_number(self, instance%name) > 0) fault = "instance " // quoted(instance%name) &
          // " is given twice"
@@ -205,7 +265,9 @@ contains
       if (real(self%unit, wp)*real(self%n_instance + 1, wp) > real(huge(1), wp)) fault = &
          "labels are too large for so many instances"
       if (fault /= "") then
-         call add_error(log, origin_of(source, card%line), fault)
+         ! Others have the same fault, or follow from it.
+         if (self%is_sound) call add_error(log, origin_of(source, card%line), fault)
+         self%is_sound = .false.
          return
       end if
       call read_motion(source, card, instance, log)
@@ -303,8 +365,8 @@ contains
       if (name /= "") then
          k = instance_number(self, name)
          if (k == 0) then
-            call add_error(log, origin_of(source, card%line), card%title // ": there is no " &
-               // "instance " // quoted(name))
+            if (self%is_sound) call add_error(log, origin_of(source, card%line), card%title &
+               // ": there is no instance " // quoted(name))
             return
          end if
          instance%shift = self%instance(k)%shift
@@ -340,8 +402,14 @@ contains
             call put_node(source, i, instance, self, log)
             cycle
          end if
-         if (has_stray_label(self, card, source%line(i)%text, instance)) call add_error(log, &
-            origin_of(source, i), card%title // ": a label here is none of the part")
+         if (has_stray_label(self, card, source%line(i)%text, instance)) then
+            call add_error(log, origin_of(source, i), card%title // ": a label here is none of " &
+               // "the part")
+         else if (has_bare_label(self, card, source%line(i)%text, instance)) then
+            call add_error(log, origin_of(source, i), card%title // ": " &
+               // field(source%line(i)%text, 1) // " may be a label of any instance; write " &
+               // "INSTANCE." // field(source%line(i)%text, 1) // ", with the name of one")
+         end if
          if (is_profile(card) .and. instance%is_moved) then
             call make_profile_line(source%line(i)%text, instance, line)
          else
@@ -443,6 +511,22 @@ contains
          has_stray_label = has_stray_label .or. (ok .and. (label < 1 .or. label >= self%unit))
       end do
    end function has_stray_label
+
+   !> Does a line that stands in no part and no assembly begin with a label, where all nodes and
+   !> elements are those of parts?
+   pure logical function has_bare_label(self, card, text, instance)
+      type(flat_t), intent(in) :: self
+      type(card_text_t), intent(in) :: card
+      character(len=*), intent(in) :: text
+      type(instance_t), intent(in) :: instance
+      integer :: label
+
+      has_bare_label = .false.
+      if (instance%name /= "" .or. self%in_assembly .or. self%has_own) return
+      if (all(card%name /= [character(len=17) :: "BOUNDARY", "CLOAD", "DLOAD", "NSET", "ELSET", &
+         "SURFACE", "INITIALCONDITIONS"]) .or. is_profile(card)) return
+      call read_integer(field(text, 1), label, has_bare_label)
+   end function has_bare_label
 
    !> A segment of a profile that is moved: a word, then points.
    pure subroutine make_profile_line(text, instance, line)
@@ -598,7 +682,7 @@ contains
    end function continues
 
    !> The line that ends what `card` begins; behind the last one if none does.
-   integer function end_of(source, card, name) result(line)
+   pure integer function end_of(source, card, name) result(line)
       type(deck_source_t), intent(in) :: source
       type(card_text_t), intent(in) :: card
       character(len=*), intent(in) :: name

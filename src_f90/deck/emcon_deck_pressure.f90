@@ -4,13 +4,13 @@ module emcon_deck_pressure
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, next_line, &
       refuse_lines
    use emcon_deck_reader, only : card_error, card_t, option_word, reader_t
-   use emcon_diagnostics, only : add_error, add_warning
+   use emcon_diagnostics, only : add_error, add_warning, entries
    use emcon_interactions, only : contact_pair_t, formulation_nts, pressure_exponential, &
       pressure_hard, pressure_linear, pressure_t, pressure_tabular, pressure_tied
    use emcon_kinds, only : wp
    use emcon_steps, only : initiation_massless, initiation_velocity_update, method_null_space, &
       method_penalty, step_initiation, step_is_dynamic, step_t
-   use emcon_text, only : to_text
+   use emcon_text, only : string_t, to_text
    implicit none
    private
    public :: read_behavior, soften_steps
@@ -87,19 +87,26 @@ contains
       real(wp), intent(out) :: first, second
       real(wp), intent(out), optional :: third
       type(data_t) :: data
+      type(string_t) :: words(most_numbers)
       real(wp) :: value(most_numbers)
       integer :: k, n
 
+      words(:size(entries(what))) = entries(what)
       n = merge(size(value), size(value) - 1, present(third))
       value = 0.0_wp
       call data_open(data, card)
       if (next_line(reader, data)) then
          call check_count(reader, data, least, n, what)
          do k = 1, min(data%n, n)
-            if (data%ok) call get_real(reader, data, k, what, value(k))
-            if (data%ok .and. (value(k) < 0.0_wp .or. (k <= least .and. .not. value(k) &
-               > 0.0_wp))) call data_error(reader, data, "number " // to_text(k) // " of " // &
-               what // " is " // to_text(value(k)) // ", not positive")
+            if (data%ok) call get_real(reader, data, k, words(k)%text, value(k))
+            if (.not. data%ok) cycle
+            if (k <= least .and. .not. value(k) > 0.0_wp) then
+               call data_error(reader, data, "the " // words(k)%text // " " // to_text(value(k)) &
+                  // " is not positive")
+            else if (value(k) < 0.0_wp) then
+               call data_error(reader, data, "the " // words(k)%text // " " // to_text(value(k)) &
+                  // " is negative")
+            end if
          end do
          if (next_line(reader, data)) call data_error(reader, data, "only one data line is read")
       else if (least > 0) then
@@ -132,7 +139,9 @@ contains
                   to_text(push) // ": a table begins with pressure 0")
             else if (n > 0) then
                if (.not. (push >= p(n) .and. over > o(n))) call data_error(reader, data, &
-                  "pressures and overclosures have to ascend from line to line")
+                  "pressure " // to_text(push) // " at overclosure " // to_text(over) // &
+                  " follows " // to_text(p(n)) // " at " // to_text(o(n)) // ": from line to " // &
+                  "line overclosures have to rise, and pressures may not fall")
             end if
             if (n == 0 .and. over > 0.0_wp) then
                p = [0.0_wp]

@@ -71,6 +71,13 @@ contains
       self%item(n + 1)%text = trim(text)
    end subroutine add
 
+   pure logical function is_same(a, b)
+      type(diagnostic_t), intent(in) :: a, b
+
+      is_same = a%origin%file == b%origin%file .and. a%origin%line == b%origin%line &
+         .and. (a%is_error .eqv. b%is_error) .and. a%text == b%text
+   end function is_same
+
    !> All messages, one line each, in the order of files and lines: `file:line: error: ...`.
    function diagnostics_texts(self) result(text)
       type(diagnostics_t), intent(in) :: self
@@ -89,6 +96,9 @@ contains
       told = 0
       n_text = 0
       do i = 1, n
+         if (i > 1) then                         ! a line that is read for each instance of a part
+            if (is_same(self%item(order(i - 1)), self%item(order(i)))) cycle
+         end if
          k = merge(1, 2, self%item(order(i))%is_error)
          told(k) = told(k) + 1
          if (told(k) > max_told) cycle
