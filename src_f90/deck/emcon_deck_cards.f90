@@ -6,17 +6,15 @@ module emcon_deck_cards
    use emcon_deck_parameters, only : parameter_define, parameters_init, parameters_t, &
       substitute_parameters, unused_override
    use emcon_deck_reader, only : card_error, card_t, card_warning, line_origin, note_idle, &
-      option_t, reader_t
+      reader_t
+   use emcon_deck_text, only : gather_keyword, is_card, is_comment, option_t, split_keyword
    use emcon_diagnostics, only : add_error, quoted, suggestion
    use emcon_law_registry, only : law_variants
    use emcon_origin, only : origin_t
-   use emcon_text, only : squeezed, string_t, stripped, to_text
+   use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: read_cards, split_options
-
-   character(len=*), parameter :: blanks = " " // achar(9) // achar(11) // achar(12)
-   character(len=1), parameter :: end_of_text = achar(26)      !! how old systems end a text
+   public :: read_cards
 
    !> Where the reading of cards stands.
    type :: place_t
@@ -67,25 +65,6 @@ contains
       end do
    end function count_cards
 
-   pure logical function is_card(line)
-      character(len=*), intent(in) :: line
-      integer :: first
-
-      first = verify(line, blanks)
-      is_card = first > 0
-      if (is_card) is_card = line(first:first) == "*"
-      if (is_card .and. first < len(line)) is_card = line(first + 1:first + 1) /= "*"
-   end function is_card
-
-   pure logical function is_comment(line)
-      character(len=*), intent(in) :: line
-      integer :: first
-
-      first = verify(line, blanks // end_of_text)
-      is_comment = first == 0
-      if (first > 0 .and. first < len(line)) is_comment = line(first:first + 1) == "**"
-   end function is_comment
-
    !> Take in the line `i`, for a card also the lines it goes on in: `i` becomes the last of them.
    subroutine read_line(reader, parameters, place, i)
       type(reader_t), intent(inout) :: reader
@@ -98,7 +77,7 @@ contains
 
       if (is_card(reader%line(i)%text)) then
          i_first = i
-         call gather_card(reader, i, text)
+         call gather_keyword(reader%line, i, text)
          is_parametric = index(text, "<") > 0
          call put_parameters(reader, parameters, i_first, text, is_resolved)
          place%n_card = place%n_card + 1
@@ -164,29 +143,6 @@ contains
       call move_alloc(patched, text)
    end subroutine put_parameters
 
-   !> The keyword line `i` with the lines it goes on in after a comma at its end. A comma before
-   !> another keyword or before a number is only a comma too many.
-   subroutine gather_card(reader, i, text)
-      type(reader_t), intent(in) :: reader
-      integer, intent(inout) :: i
-      character(len=:), allocatable, intent(out) :: text
-      integer :: next, first
-
-      text = stripped(reader%line(i)%text, blanks)
-      do while (text(len(text):) == ",")
-         next = i + 1
-         do while (next <= size(reader%line))
-            if (.not. is_comment(reader%line(next)%text)) exit
-            next = next + 1
-         end do
-         if (next > size(reader%line)) exit
-         first = verify(reader%line(next)%text, blanks)
-         if (scan(reader%line(next)%text(first:first), "*+-.0123456789,") == 1) exit
-         text = text // stripped(reader%line(next)%text, blanks)
-         i = next
-      end do
-   end subroutine gather_card
-
    !> Make a card of `text`. It gets no name if nothing may be read from it.
    subroutine read_card(reader, place, text, i_line, card)
       type(reader_t), intent(inout) :: reader
@@ -196,15 +152,12 @@ contains
       type(card_t), intent(out) :: card
       character(len=:), allocatable :: variants
       type(refusal_t) :: refusal
-      integer :: i_comma, i
+      integer :: i
 
       card%origin = line_origin(reader, i_line)
-      i_comma = index(text, ",")
-      if (i_comma == 0) i_comma = len(text) + 1
-      card%title = quoted(text(:i_comma - 1))
+      call split_keyword(text, card%title, card%name, card%option)
+      card%title = quoted(card%title)
       card%title = card%title(2:len(card%title) - 1)
-      card%name = squeezed(text(2:i_comma - 1))
-      call split_options(text(i_comma:), card%option)
       i = find_keyword(card%name)
       if (i == 0) refusal = refusal_of(card%name)
       if (refusal%is_idle) then
@@ -256,43 +209,6 @@ contains
       end select
       card%name = ""
    end subroutine refuse_unsupported
-
-   !> Take `,NAME=VALUE,NAME` apart.
-   subroutine split_options(text, option)
-      character(len=*), intent(in) :: text
-      type(option_t), allocatable, intent(out) :: option(:)
-      integer :: i, n, first, i_equal
-      character(len=1) :: quote
-      character(len=:), allocatable :: part
-
-      allocate(option(count([(text(i:i) == ",", i = 1, len(text))])))
-      n = 0
-      first = 2
-      quote = " "
-      do i = 2, len(text) + 1
-         if (i <= len(text)) then
-            if (quote /= " ") then
-               if (text(i:i) == quote) quote = " "
-               cycle
-            else if (scan(text(i:i), "'""") == 1 .and. index(text(i + 1:), text(i:i)) > 0) then
-               quote = text(i:i)
-               cycle
-            end if
-            if (text(i:i) /= ",") cycle
-         end if
-         part = stripped(text(first:i - 1), blanks)
-         first = i + 1
-         if (part == "") cycle
-         n = n + 1
-         i_equal = index(part, "=")
-         option(n)%has_value = i_equal > 0
-         if (i_equal == 0) i_equal = len(part) + 1
-         option(n)%typed = stripped(part(:i_equal - 1), blanks)
-         option(n)%name = squeezed(option(n)%typed)
-         option(n)%value = stripped(part(i_equal + 1:), blanks)
-      end do
-      option = option(:n)
-   end subroutine split_options
 
    !> Hold the parameters of a card against the list of the registry.
    subroutine check_options(reader, card, parameters)

@@ -1,6 +1,7 @@
 !> Data lines taken apart: fields between commas, read as labels, reals or names.
 module emcon_deck_fields
-   use emcon_deck_reader, only : bare_name, card_t, line_origin, max_name, reader_t, source_line
+   use emcon_deck_reader, only : card_t, line_origin, max_name, reader_t, source_line
+   use emcon_deck_text, only : bare_name, fields_t, is_blank, split_fields
    use emcon_diagnostics, only : add_error, add_warning, quoted
    use emcon_kinds, only : wp
    use emcon_text, only : read_integer, read_real, to_text, to_upper
@@ -11,14 +12,10 @@ module emcon_deck_fields
    public :: check_count, is_blank, is_label, get_integer, get_real, get_name
 
    !> A data line taken apart, and the way to the next. `ok` is false once a field was refused.
-   type :: data_t
+   type, extends(fields_t) :: data_t
       type(card_t) :: card
       integer :: i_line = 0
-      integer :: n = 0                             !! fields; empty ones at the end do not count
-      logical :: ends_in_comma = .false.
       logical :: ok = .true.
-      character(len=:), allocatable :: text
-      integer, allocatable :: from(:), to(:)       !! (n) extent of each field, without blanks
    end type data_t
 
 contains
@@ -52,7 +49,6 @@ contains
 
       data%card = card
       data%i_line = card%first - 1
-      allocate(data%from(16), data%to(16))
    end subroutine data_open
 
    !> Take the next data line apart, comments and blank lines left out; false: there is none.
@@ -74,59 +70,6 @@ contains
       end do
       next_line = .false.
    end function next_line
-
-   !> Extents of the fields of `data%text` between commas.
-   subroutine split_fields(data)
-      type(data_t), intent(inout) :: data
-      integer :: first, last, comma
-
-      data%n = 0
-      first = 1
-      data%ends_in_comma = .false.
-      do while (first <= len(data%text))
-         do comma = first, len(data%text)
-            if (data%text(comma:comma) == ",") exit
-         end do
-         last = comma - 1
-         data%ends_in_comma = comma <= len(data%text)
-         do while (first <= last)
-            if (.not. is_space(data%text(first:first))) exit
-            first = first + 1
-         end do
-         do while (last >= first)
-            if (.not. is_space(data%text(last:last))) exit
-            last = last - 1
-         end do
-         ! What follows the last comma may be blanks only.
-         if (comma > len(data%text) .and. last < first) data%ends_in_comma = data%n > 0
-         data%n = data%n + 1
-         if (data%n > size(data%from)) then
-            data%from = [data%from, data%from]
-            data%to = [data%to, data%to]
-         end if
-         data%from(data%n) = first
-         data%to(data%n) = last
-         first = comma + 1
-      end do
-      do while (data%n > 0)
-         if (data%to(data%n) >= data%from(data%n)) exit
-         data%n = data%n - 1
-      end do
-   end subroutine split_fields
-
-   pure logical function is_space(character_)
-      character(len=1), intent(in) :: character_
-
-      is_space = character_ == " " .or. (iachar(character_) >= 9 .and. iachar(character_) <= 13)
-   end function is_space
-
-   pure logical function is_blank(data, k)
-      type(data_t), intent(in) :: data
-      integer, intent(in) :: k
-
-      is_blank = k > data%n
-      if (.not. is_blank) is_blank = data%to(k) < data%from(k)
-   end function is_blank
 
    !> Whether field `k` is a whole number, hence no name.
    pure logical function is_label(data, k)

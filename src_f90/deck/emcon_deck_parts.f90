@@ -4,14 +4,14 @@
 !> instance and a point, and nodes moved as its data lines say. Each line keeps the file and the
 !> number that it has in the deck.
 module emcon_deck_parts
-   use emcon_deck_cards, only : split_options
-   use emcon_deck_reader, only : option_t
    use emcon_deck_source, only : deck_source_t
+   use emcon_deck_text, only : bare_name, field, fields_t, gather_keyword, is_comment, keyword_of, &
+      option_place, option_t, option_value, split_fields, split_keyword
    use emcon_diagnostics, only : add_error, diagnostics_t, quoted
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t
    use emcon_rotation, only : cross_product
-   use emcon_text, only : read_integer, read_real, squeezed, string_t, stripped, to_text
+   use emcon_text, only : read_integer, read_real, to_text
    implicit none
    private
    public :: parts_are_used, parts_flatten
@@ -20,11 +20,6 @@ module emcon_deck_parts
    !> Fields of GENERATE that are labels, and of a point of a profile; those of a term of *EQUATION.
    integer, parameter :: n_ends = 2, n_term = 3
    character(len=*), parameter :: digits = "0123456789"
-   !> A quoted word has so many quotes.
-   integer, parameter :: n_quotes = 2
-   !> Longer keywords are none.
-   integer, parameter :: longest_keyword = 40
-   character(len=*), parameter :: blanks = " " // achar(9)
 
    !> Lines of a part, from behind *PART to before *END PART.
    type :: part_t
@@ -158,7 +153,7 @@ contains
          else if (card%name == "INSTANCE") then
             self%n_instance = self%n_instance + 1
          else if (card%name == "PART") then
-            part%name = option_of(card, "NAME")
+            part%name = option_value(card%option, "NAME")
             part%first = card%data
             part%last = end_of(source, card, "ENDPART") - 1
             if (part%name == "") call add_error(log, origin_of(source, card%line), &
@@ -212,11 +207,13 @@ contains
       type(deck_source_t), intent(in) :: source
       type(card_text_t), intent(in) :: card
       type(flat_t), intent(inout) :: self
+      type(fields_t) :: data
       integer :: i, label
       logical :: ok
 
       do i = card%data, card%last
-         call read_integer(field(source%line(i)%text, 1), label, ok)
+         call split_fields(data, source%line(i)%text)
+         call read_integer(field(data, 1), label, ok)
          do while (ok .and. self%unit <= label &
             .and. 10.0_wp*real(self%unit, wp) < real(huge(1), wp))
             self%unit = 10*self%unit
@@ -253,15 +250,16 @@ contains
       integer :: k, last
 
       fault = ""
-      instance%name = option_of(card, "NAME")
+      instance%name = option_value(card%option, "NAME")
       instance%shift = self%unit*size(self%instance)
-      k = part_number(self, option_of(card, "PART"))
+      k = part_number(self, option_value(card%option, "PART"))
       last = end_of(source, card, "ENDINSTANCE")
       if (.not. self%in_assembly) fault = "*INSTANCE stands in *ASSEMBLY alone"
       if (instance%name == "") fault = "*INSTANCE needs NAME="
       if (instance_number(self, instance%name) > 0) fault = "instance " // quoted(instance%name) &
          // " is given twice"
-      if (k == 0) fault = "*INSTANCE: there is no part " // quoted(option_of(card, "PART"))
+      if (k == 0) fault = "*INSTANCE: there is no part " &
+         // quoted(option_value(card%option, "PART"))
       if (real(self%unit, wp)*real(self%n_instance + 1, wp) > real(huge(1), wp)) fault = &
          "labels are too large for so many instances"
       if (fault /= "") then
@@ -284,7 +282,8 @@ contains
       type(diagnostics_t), intent(inout) :: log
       real(wp), parameter :: degree = atan(1.0_wp)/45.0_wp
       real(wp) :: value(2*n_axis + 1), axis(n_axis)
-      integer :: k, i, n, line
+      type(fields_t) :: data
+      integer :: k, i, line
       logical :: ok, all_ok
 
       k = 0
@@ -292,11 +291,11 @@ contains
          if (is_comment(source%line(line)%text)) cycle
          k = k + 1
          value = 0.0_wp
-         n = n_filled(source%line(line)%text)
-         all_ok = n <= merge(n_axis, size(value), k == 1)
-         do i = 1, min(size(value), n)
-            if (field(source%line(line)%text, i) == "") cycle
-            call read_real(field(source%line(line)%text, i), value(i), ok)
+         call split_fields(data, source%line(line)%text)
+         all_ok = data%n <= merge(n_axis, size(value), k == 1)
+         do i = 1, min(size(value), data%n)
+            if (field(data, i) == "") cycle
+            call read_real(field(data, i), value(i), ok)
             all_ok = all_ok .and. ok
          end do
          axis = value(n_axis + 1:2*n_axis) - value(:n_axis)
@@ -361,7 +360,7 @@ contains
       instance%name = ""
       ! Labels of the assembly itself lie behind those of all instances.
       if (self%in_assembly) instance%shift = self%unit*self%n_instance
-      name = option_of(card, "INSTANCE")
+      name = option_value(card%option, "INSTANCE")
       if (name /= "") then
          k = instance_number(self, name)
          if (k == 0) then
@@ -385,6 +384,7 @@ contains
       type(diagnostics_t), intent(inout) :: log
       logical, intent(in), optional :: is_own
       character(len=:), allocatable :: line
+      type(fields_t) :: data
       integer :: i
       logical :: keeps_names
 
@@ -398,22 +398,23 @@ contains
          card%line), card%title // ": axes do not move with an instance; put it into the assembly")
       do i = card%data, card%last
          if (is_comment(source%line(i)%text)) cycle
+         call split_fields(data, source%line(i)%text)
          if (card%name == "NODE" .and. instance%is_moved) then
-            call put_node(source, i, instance, self, log)
+            call put_node(source, i, data, instance, self, log)
             cycle
          end if
-         if (has_stray_label(self, card, source%line(i)%text, instance)) then
+         if (has_stray_label(self, card, data, instance)) then
             call add_error(log, origin_of(source, i), card%title // ": a label here is none of " &
                // "the part")
-         else if (has_bare_label(self, card, source%line(i)%text, instance)) then
-            call add_error(log, origin_of(source, i), card%title // ": " &
-               // field(source%line(i)%text, 1) // " may be a label of any instance; write " &
-               // "INSTANCE." // field(source%line(i)%text, 1) // ", with the name of one")
+         else if (has_bare_label(self, card, data, instance)) then
+            call add_error(log, origin_of(source, i), card%title // ": " // field(data, 1) &
+               // " may be a label of any instance; write INSTANCE." // field(data, 1) &
+               // ", with the name of one")
          end if
          if (is_profile(card) .and. instance%is_moved) then
-            call make_profile_line(source%line(i)%text, instance, line)
+            call make_profile_line(data, instance, line)
          else
-            call make_data_line(self, card, source%line(i)%text, instance, line)
+            call make_data_line(self, card, data, instance, line)
          end if
          call put_line(self, line, source, i)
       end do
@@ -437,7 +438,7 @@ contains
             if (.not. option%has_value) cycle
             if (.not. keeps_names .and. (option%name == "NSET" .or. option%name == "ELSET" &
                .or. (option%name == "NAME" .and. card%name == "SURFACE"))) then
-               line = line // "=" // instance%name // "." // unquoted(option%value)
+               line = line // "=" // instance%name // "." // bare_name(option%value)
             else if (option%name == "REFNODE") then
                call make_field(self, option%value, instance, is_label=.not. keeps_names &
                   .or. verify(option%value, digits) == 0, word=word)
@@ -450,21 +451,22 @@ contains
    end subroutine make_keyword_line
 
    !> A data line with the labels and names of an instance.
-   pure subroutine make_data_line(self, card, text, instance, line)
+   pure subroutine make_data_line(self, card, data, instance, line)
       type(flat_t), intent(in) :: self
       type(card_text_t), intent(in) :: card
-      character(len=*), intent(in) :: text
+      type(fields_t), intent(in) :: data
       type(instance_t), intent(in) :: instance
       character(len=:), allocatable, intent(out) :: line
       character(len=:), allocatable :: word
       integer :: i
 
       line = ""
-      do i = 1, n_fields(text)
+      do i = 1, data%n
          if (i > 1) line = line // ","
-         call make_field(self, field(text, i), instance, is_label(card, i, n_fields(text)), word)
+         call make_field(self, field(data, i), instance, is_label(card, i, data%n), word)
          line = line // word
       end do
+      if (data%ends_in_comma) line = line // ","
    end subroutine make_data_line
 
    !> Is field `i` of the `n` of a data line a label, or the name of a set?
@@ -478,7 +480,7 @@ contains
       case ("ELEMENT")
          is_label = .true.
       case ("NSET", "ELSET")
-         is_label = i <= n_ends .or. option_place(card, "GENERATE") == 0
+         is_label = i <= n_ends .or. option_place(card%option, "GENERATE") == 0
       case ("SURFACE")
          is_label = i == 1 .and. .not. is_profile(card)
       case ("EQUATION")                          ! node, degree of freedom, coefficient
@@ -491,33 +493,33 @@ contains
    pure logical function is_profile(card)
       type(card_text_t), intent(in) :: card
 
-      is_profile = card%name == "SURFACE" .and. option_of(card, "TYPE") == "SEGMENTS"
+      is_profile = card%name == "SURFACE" .and. option_value(card%option, "TYPE") == "SEGMENTS"
    end function is_profile
 
    !> Does a line name a label that no part can have? It would be one of another instance.
-   pure logical function has_stray_label(self, card, text, instance)
+   pure logical function has_stray_label(self, card, data, instance)
       type(flat_t), intent(in) :: self
       type(card_text_t), intent(in) :: card
-      character(len=*), intent(in) :: text
+      type(fields_t), intent(in) :: data
       type(instance_t), intent(in) :: instance
       integer :: i, label
       logical :: ok
 
       has_stray_label = .false.
       if (instance%name == "" .and. .not. self%in_assembly) return
-      do i = 1, n_fields(text)
-         if (.not. is_label(card, i, n_fields(text))) cycle
-         call read_integer(field(text, i), label, ok)
+      do i = 1, data%n
+         if (.not. is_label(card, i, data%n)) cycle
+         call read_integer(field(data, i), label, ok)
          has_stray_label = has_stray_label .or. (ok .and. (label < 1 .or. label >= self%unit))
       end do
    end function has_stray_label
 
    !> Does a line that stands in no part and no assembly begin with a label, where all nodes and
    !> elements are those of parts?
-   pure logical function has_bare_label(self, card, text, instance)
+   pure logical function has_bare_label(self, card, data, instance)
       type(flat_t), intent(in) :: self
       type(card_text_t), intent(in) :: card
-      character(len=*), intent(in) :: text
+      type(fields_t), intent(in) :: data
       type(instance_t), intent(in) :: instance
       integer :: label
 
@@ -525,12 +527,12 @@ contains
       if (instance%name /= "" .or. self%in_assembly .or. self%has_own) return
       if (all(card%name /= [character(len=17) :: "BOUNDARY", "CLOAD", "DLOAD", "NSET", "ELSET", &
          "SURFACE", "INITIALCONDITIONS"]) .or. is_profile(card)) return
-      call read_integer(field(text, 1), label, has_bare_label)
+      call read_integer(field(data, 1), label, has_bare_label)
    end function has_bare_label
 
    !> A segment of a profile that is moved: a word, then points.
-   pure subroutine make_profile_line(text, instance, line)
-      character(len=*), intent(in) :: text
+   pure subroutine make_profile_line(data, instance, line)
+      type(fields_t), intent(in) :: data
       type(instance_t), intent(in) :: instance
       character(len=:), allocatable, intent(out) :: line
       character(len=26) :: number
@@ -538,11 +540,11 @@ contains
       logical :: ok(n_ends)
       integer :: i, k
 
-      line = field(text, 1)
-      do i = n_ends, n_fields(text) - 1, n_ends
+      line = field(data, 1)
+      do i = n_ends, data%n - 1, n_ends
          x = 0.0_wp
          do k = 1, n_ends
-            call read_real(field(text, i + k - 1), x(k), ok(k))
+            call read_real(field(data, i + k - 1), x(k), ok(k))
          end do
          if (.not. all(ok)) exit
          x = moved(instance, x)
@@ -551,7 +553,7 @@ contains
             line = line // ", " // trim(adjustl(number))
          end do
       end do
-      if (i < n_fields(text)) line = text        ! the reader tells what is no number
+      if (i < data%n) line = data%text           ! the reader tells what is no number
    end subroutine make_profile_line
 
    !> A field: labels and names of an instance, and labels such as INSTANCE.7 anywhere.
@@ -573,19 +575,20 @@ contains
       end if
       i = index(text, ".", back=.true.)
       k = 0
-      if (i > 1) k = instance_number(self, squeezed(unquoted(text(:i - 1))))
+      if (i > 1) k = instance_number(self, bare_name(text(:i - 1)))
       if (k > 0) call read_integer(text(i + 1:), label, ok)
       if (ok) then
          word = to_text(label + self%instance(k)%shift)
       else if (is_label .and. instance%name /= "" .and. k == 0) then
-         word = instance%name // "." // unquoted(text)
+         word = instance%name // "." // bare_name(text)
       end if
    end subroutine make_field
 
    !> A node of an instance that is moved.
-   subroutine put_node(source, line, instance, self, log)
+   subroutine put_node(source, line, data, instance, self, log)
       type(deck_source_t), intent(in) :: source
       integer, intent(in) :: line
+      type(fields_t), intent(in) :: data         !! of that line
       type(instance_t), intent(in) :: instance
       type(flat_t), intent(inout) :: self
       type(diagnostics_t), intent(inout) :: log
@@ -597,18 +600,16 @@ contains
 
       x = 0.0_wp
       do i = 1, n_axis
-         if (field(source%line(line)%text, i + 1) == "") cycle
-         call read_real(field(source%line(line)%text, i + 1), x(i), ok)
+         if (field(data, i + 1) == "") cycle
+         call read_real(field(data, i + 1), x(i), ok)
          if (ok) cycle
-         call add_error(log, origin_of(source, line), "coordinate " &
-            // quoted(field(source%line(line)%text, i + 1)) // " of a part that is moved is " &
-            // "not a number")
+         call add_error(log, origin_of(source, line), "coordinate " // quoted(field(data, i + 1)) &
+            // " of a part that is moved is not a number")
          return
       end do
       x = moved(instance, x)
-      call make_field(self, field(source%line(line)%text, 1), instance, .true., text)
-      do i = 1, merge(n_axis, n_axis - 1, n_fields(source%line(line)%text) > n_axis &
-         .or. abs(x(n_axis)) > 0.0_wp)
+      call make_field(self, field(data, 1), instance, .true., text)
+      do i = 1, merge(n_axis, n_axis - 1, data%n > n_axis .or. abs(x(n_axis)) > 0.0_wp)
          write(number, "(es26.17e3)") x(i)
          text = text // ", " // trim(adjustl(number))
       end do
@@ -638,31 +639,23 @@ contains
       self%text%number(self%n) = source%number(line)
    end subroutine put_line
 
-   !> The card that begins in a line, up to the line before the next keyword. A keyword line ends
-   !> with a comma where it goes on in the next one; data in front of a keyword are a card, too.
+   !> The card that begins in a line, up to the line before the next keyword; data in front of a
+   !> keyword are a card, too.
    subroutine read_card(source, line, card)
       type(deck_source_t), intent(in) :: source
       integer, intent(in) :: line
       type(card_text_t), intent(out) :: card
       character(len=:), allocatable :: text
-      integer :: i_comma
 
       card%line = line
-      card%name = trim(keyword_of(source%line(line)%text))
       card%data = line
+      card%name = ""
       card%title = ""
       allocate(card%option(0))
-      if (card%name /= "") then
-         card%data = line + 1
-         text = stripped(source%line(line)%text, blanks)
-         do while (text(len(text):) == "," .and. card%data <= size(source%line))
-            if (.not. continues(source%line(card%data)%text)) exit
-            text = text // stripped(source%line(card%data)%text, blanks)
-            card%data = card%data + 1
-         end do
-         i_comma = index(text // ",", ",")
-         card%title = text(:i_comma - 1)
-         call split_options(text(i_comma:), card%option)
+      if (keyword_of(source%line(line)%text) /= "") then
+         call gather_keyword(source%line, card%data, text)
+         call split_keyword(text, card%title, card%name, card%option)
+         card%data = card%data + 1
       end if
       card%last = card%data
       do while (card%last <= size(source%line))
@@ -671,15 +664,6 @@ contains
       end do
       card%last = card%last - 1
    end subroutine read_card
-
-   !> Does a line go on with the parameters of a keyword?
-   pure logical function continues(text)
-      character(len=*), intent(in) :: text
-      character(len=:), allocatable :: core
-
-      core = stripped(text, blanks)
-      continues = scan(core(:min(1, len(core))), "*+-.0123456789,") == 0 .and. len(core) > 0
-   end function continues
 
    !> The line that ends what `card` begins; behind the last one if none does.
    pure integer function end_of(source, card, name) result(line)
@@ -691,138 +675,6 @@ contains
          if (keyword_of(source%line(line)%text) == name) return
       end do
    end function end_of
-
-   !> The keyword of a line, upper case, without blanks and star; empty: it has none.
-   pure function keyword_of(text) result(name)
-      character(len=*), intent(in) :: text
-      character(len=longest_keyword) :: name
-      integer :: first, last
-
-      name = ""
-      first = verify(text, blanks)
-      if (first == 0) return
-      if (text(first:first) /= "*" .or. is_comment(text)) return
-      last = index(text // ",", ",") - 1
-      name = squeezed(text(first + 1:last))
-   end function keyword_of
-
-   pure logical function is_comment(text)
-      character(len=*), intent(in) :: text
-      character(len=:), allocatable :: core
-
-      core = stripped(text, blanks)
-      is_comment = len(core) == 0
-      if (.not. is_comment) is_comment = index(core, "**") == 1
-   end function is_comment
-
-   !> Value of a parameter as a name: upper case, without blanks and quotes; empty if absent.
-   pure function option_of(card, name) result(value)
-      type(card_text_t), intent(in) :: card
-      character(len=*), intent(in) :: name
-      character(len=option_length(card, name)) :: value
-      integer :: i
-
-      i = option_place(card, name)
-      if (i > 0) value = squeezed(unquoted(card%option(i)%value))
-   end function option_of
-
-   pure integer function option_length(card, name) result(length)
-      type(card_text_t), intent(in) :: card
-      character(len=*), intent(in) :: name
-      integer :: i
-
-      length = 0
-      i = option_place(card, name)
-      if (i > 0) length = len(squeezed(unquoted(card%option(i)%value)))
-   end function option_length
-
-   pure integer function option_place(card, name) result(i)
-      type(card_text_t), intent(in) :: card
-      character(len=*), intent(in) :: name
-
-      do i = size(card%option), 1, -1
-         if (card%option(i)%name == name) return
-      end do
-   end function option_place
-
-   pure function unquoted(text) result(word)
-      character(len=*), intent(in) :: text
-      character(len=len(text) - merge(n_quotes, 0, is_quoted(text))) :: word
-
-      if (is_quoted(text)) then
-         word = text(2:len(text) - 1)
-      else
-         word = text
-      end if
-   end function unquoted
-
-   pure logical function is_quoted(text)
-      character(len=*), intent(in) :: text
-
-      is_quoted = len(text) >= n_quotes
-      if (is_quoted) is_quoted = scan(text(1:1), "'""") == 1 .and. text(len(text):) == text(1:1)
-   end function is_quoted
-
-   !> Fields of a data line, as many as commas and one; a comma at the end is one too many.
-   pure integer function n_fields(text)
-      character(len=*), intent(in) :: text
-      integer :: i
-
-      n_fields = 1 + count([(text(i:i) == ",", i = 1, len(text))])
-   end function n_fields
-
-   !> The same without empty ones at the end.
-   pure integer function n_filled(text)
-      character(len=*), intent(in) :: text
-
-      n_filled = n_fields(text(:verify(text, blanks // ",", back=.true.)))
-      if (verify(text, blanks // ",") == 0) n_filled = 0
-   end function n_filled
-
-   !> Field `k` of a data line, without blanks around it.
-   pure function field(text, k) result(word)
-      character(len=*), intent(in) :: text
-      integer, intent(in) :: k
-      character(len=field_length(text, k)) :: word
-      integer :: first, last
-
-      call find_field(text, k, first, last)
-      word = text(first:last)
-   end function field
-
-   pure integer function field_length(text, k)
-      character(len=*), intent(in) :: text
-      integer, intent(in) :: k
-      integer :: first, last
-
-      call find_field(text, k, first, last)
-      field_length = max(0, last - first + 1)
-   end function field_length
-
-   !> Where field `k` of a data line begins and ends, without blanks around it.
-   pure subroutine find_field(text, k, first, last)
-      character(len=*), intent(in) :: text
-      integer, intent(in) :: k
-      integer, intent(out) :: first, last        !! `last` < `first`: it is empty
-      integer :: i, comma
-
-      first = 1
-      last = 0
-      do i = 2, k
-         comma = index(text(first:), ",")
-         if (comma == 0) return
-         first = first + comma
-      end do
-      last = first + index(text(first:) // ",", ",") - 2
-      do while (first <= last)
-         if (scan(text(first:first), blanks) == 0) exit
-         first = first + 1
-      end do
-      do while (last >= first)
-         if (scan(text(last:last), blanks) == 0) exit
-         last = last - 1
-      end do
-   end subroutine find_field
 
    pure type(origin_t) function origin_of(source, line)
       type(deck_source_t), intent(in) :: source

@@ -2,6 +2,7 @@
 module emcon_deck_reader
    use emcon_amplitudes, only : amplitude_t
    use emcon_deck_labels, only : label_map_t
+   use emcon_deck_text, only : bare_name, option_length, option_place, option_t, option_value
    use emcon_diagnostics, only : add_error, add_warning, diagnostics_t, entries, quoted, suggestion
    use emcon_interactions, only : interaction_t
    use emcon_kinds, only : wp
@@ -11,22 +12,14 @@ module emcon_deck_reader
    use emcon_text, only : read_integer, read_real, squeezed, string_t, to_text
    implicit none
    private
-   public :: reader_t, doubts_t, names_t, card_t, option_t, max_name
-   public :: line_origin, source_line, card_error, card_warning, note_idle, bare_name
+   public :: reader_t, doubts_t, names_t, card_t, max_name
+   public :: line_origin, source_line, card_error, card_warning, note_idle
    public :: n_cards, n_lines
    public :: has_option, option_name, option_count, option_number, option_real, option_angle
    public :: need_name, option_word, refuse_option
 
    integer, parameter :: max_name = 80             !! characters of a name
    real(wp), parameter :: above_zero = nearest(0.0_wp, 1.0_wp)
-
-   !> One parameter of a card.
-   type :: option_t
-      character(len=:), allocatable :: name        !! upper case, without blanks
-      character(len=:), allocatable :: typed       !! the name as it stands in the deck
-      character(len=:), allocatable :: value       !! as typed
-      logical :: has_value = .false.
-   end type option_t
 
    !> One keyword with its parameters and the place of its data lines.
    type :: card_t
@@ -161,44 +154,21 @@ contains
       call add_warning(reader%log, card%origin, card%title // ": " // text)
    end subroutine card_warning
 
-   pure integer function find_option(card, name)
-      type(card_t), intent(in) :: card
-      character(len=*), intent(in) :: name
-      integer :: i
-
-      find_option = 0
-      do i = 1, size(card%option)
-         if (card%option(i)%name == name) find_option = i
-      end do
-   end function find_option
-
    pure logical function has_option(card, name)
       type(card_t), intent(in) :: card
       character(len=*), intent(in) :: name
 
-      has_option = find_option(card, name) > 0
+      has_option = option_place(card%option, name) > 0
    end function has_option
 
    !> Value of a parameter as a name (upper case, no blanks, no quotes); empty if it is absent.
    pure function option_name(card, name) result(value)
       type(card_t), intent(in) :: card
       character(len=*), intent(in) :: name
-      character(len=option_length(card, name)) :: value
-      integer :: i
+      character(len=option_length(card%option, name)) :: value
 
-      i = find_option(card, name)
-      if (i > 0) value = bare_name(card%option(i)%value)
+      value = option_value(card%option, name)
    end function option_name
-
-   pure integer function option_length(card, name)
-      type(card_t), intent(in) :: card
-      character(len=*), intent(in) :: name
-      integer :: i
-
-      option_length = 0
-      i = find_option(card, name)
-      if (i > 0) option_length = bare_length(card%option(i)%value)
-   end function option_length
 
    !> The name that a card must give by `option`. Empty, with an error, if it does not.
    subroutine need_name(reader, card, option, name)
@@ -231,7 +201,7 @@ contains
       integer :: i, number
       logical :: ok
 
-      i = find_option(card, name)
+      i = option_place(card%option, name)
       if (i == 0) return
       range_text = "of at least " // to_text(least)
       call read_integer(card%option(i)%value, number, ok)
@@ -261,7 +231,7 @@ contains
       integer :: i
       logical :: ok
 
-      i = find_option(card, squeezed(name))
+      i = option_place(card%option, squeezed(name))
       if (i == 0) return
       call read_real(card%option(i)%value, number, ok)
       if (ok) ok = number >= least .and. number <= most
@@ -332,7 +302,7 @@ contains
       character(len=*), intent(in) :: reason       !! empty: the value is not known at all
       integer :: i
 
-      i = find_option(card, name)
+      i = option_place(card%option, name)
       if (reason == "") then
          call card_error(reader, card, "unknown " // name // "=" // quoted(card%option(i)%value) &
             // "; known: " // known &
@@ -342,28 +312,5 @@ contains
             // " is known but not supported (" // reason // "); supported: " // known)
       end if
    end subroutine refuse_option
-
-   !> A name as it is compared: upper case, no blanks, no quotes around it.
-   pure function bare_name(text) result(name)
-      character(len=*), intent(in) :: text
-      character(len=bare_length(text)) :: name
-      character(len=len(text)) :: word
-
-      word = squeezed(text)
-      name = word
-      if (len(name) < len_trim(word)) name = word(2:)
-   end function bare_name
-
-   !> Quotes around a name do not count.
-   pure integer function bare_length(text) result(n)
-      character(len=*), intent(in) :: text
-      character(len=len(text)) :: word
-
-      word = squeezed(text)
-      n = len_trim(word)
-      if (n > 1) then
-         if (scan(word(1:1), "'""") == 1 .and. word(1:1) == word(n:n)) n = n - 2
-      end if
-   end function bare_length
 
 end module emcon_deck_reader
