@@ -2,8 +2,8 @@
 this project and in those of other programs.
 
 `Model(chance)` is what is said; `plain()` and `dressed(chance)` say it, the second in parts and instances,
-`*OUTPUT`, parameters that mean the same, cards that change nothing, any capitals and blanks. The two have to
-end alike, to the last digit. `fuzz_words` runs them and judges what calls itself good: numbers are finite,
+turned axes, `*OUTPUT`, parameters that mean the same, cards that change nothing, any capitals and blanks. The
+two have to end alike, to the last digit where words do not round. `fuzz_words` runs them and judges what calls itself good: numbers are finite,
 bodies are no deeper in each other than told, supports bear what is put on, and energies add up.
 """
 
