@@ -4,10 +4,8 @@ module emcon_deck_dimension
    use emcon_deck_fields, only : data_open, data_t, next_line
    use emcon_deck_reader, only : card_error, card_t, option_name, reader_t
    use emcon_diagnostics, only : add_error
-   use emcon_kinds, only : wp
    use emcon_requests, only : output_t
    use emcon_scene, only : scene_t
-   use emcon_scheme_registry, only : scheme_user
    implicit none
    private
    public :: n_plane, n_space, type_dimension, other_dimension, find_dimension, is_axial_deck
@@ -161,30 +159,20 @@ contains
       is_user_pair = card%name == "CONTACTPAIR" .and. option_name(card, "TYPE") == "USER"
    end function is_user_pair
 
-   !> Refuse what materials, schemes of a program and output ask for and is of the plane. Values
-   !> of options are refused where they are read, by their rows.
+   !> Refuse output that is of the plane. Values of options are refused where they are read, by
+   !> their rows.
    subroutine check_dimension(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      character(len=:), allocatable :: missing
       integer :: i, k
 
-      missing = " " // trim(merge(in_space, on_rings // "  ", scene%n_dim == n_space)) &
-         // " is not in this version"
-      do i = 1, size(scene%material)
-         associate (material => scene%material(i))
-            if (material%alpha > 0.0_wp .or. material%beta > 0.0_wp) call add_error(reader%log, &
-               material%damping_origin, "material " // material%name // ": *DAMPING" // missing)
-         end associate
-      end do
+      if (size(scene%rigid) == 0) return
       do i = 1, size(scene%step)
          associate (step => scene%step(i))
-            if (step%scheme%dissipates .and. step%scheme%code == scheme_user) call add_error( &
-               reader%log, step%choice%origin, "*TIME INTEGRATION: SCHEME=" // &
-               trim(step%scheme%word) // missing)
             do k = 1, size(step%output)
-               if (size(scene%rigid) > 0 .and. asks_for_turns(step%output(k))) call add_error( &
-                  reader%log, step%origin, "UR, VR, RM: the rotation of rigid bodies" // missing)
+               if (asks_for_turns(step%output(k))) call add_error(reader%log, step%origin, &
+                  "UR, VR, RM: the rotation of rigid bodies " // in_space &
+                  // " is not in this version")
             end do
          end associate
       end do

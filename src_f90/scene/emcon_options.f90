@@ -122,9 +122,7 @@ contains
          row = option_row_t("solver", solver%code, solver%word, "", solver%text, "")
       else if (k <= n_solver_row() + n_choice()) then
          scheme = scheme_row(k - n_solver_row() + 1)
-         row = option_row_t("scheme", scheme%code, scheme%word, "", scheme%text, "", &
-            merge(n_plane, 0, scheme%dissipates), .not. scheme%dissipates, &
-            merge("ENERGY MOMENTUM", repeat(" ", 15), scheme%dissipates))
+         row = option_row_t("scheme", scheme%code, scheme%word, "", scheme%text, "")
       else
          k = k - n_solver_row() - n_choice()
          element = element_row(k)

@@ -11,25 +11,17 @@ module emcon_stabilization
    use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_incompatible_modes, only : modes_relax
    use emcon_kinds, only : dp, wp
-   use emcon_law, only : law_response_plane, law_response_t, law_t
    use emcon_motion, only : motion_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_space, only : lists_append, lists_t, space_t
    use emcon_steps, only : step_square
+   use emcon_strain_rows, only : moduli_find, moduli_t, n_shear, shear_one, shear_other, &
+      strain_count, strain_rows, strain_rows_relax, strain_change, stress_of
    use emcon_term, only : response_t, role_internal, term_t
    implicit none
    private
    public :: stabilization_term_t, stabilization_term_init, stabilization_force
-
-   !> The two directions of each shear strain: 12, then 23 and 13.
-   integer, parameter :: one_of(*) = [1, 2, 1], other_of(*) = 1 + [1, 2, 2]
-
-   !> Lame's moduli of an isotropic law.
-   type :: moduli_t
-      real(wp) :: lambda = 0.0_wp                !! [M/(L T^2)]
-      real(wp) :: mu = 0.0_wp                    !! [M/(L T^2)]
-   end type moduli_t
 
    type, extends(term_t) :: stabilization_term_t
       type(solid_t), private :: solid
@@ -69,9 +61,9 @@ contains
          if (solid%trait%is_rigid(e)) cycle
          associate (k => solid%law_of(e))
             if (solid%trait%has_mean(e) .and. allocated(solid%rest(k)%law)) then
-               call find_moduli(solid%rest(k)%law, self%lame(e))
+               call moduli_find(solid%rest(k)%law, self%lame(e))
             else if (allocated(solid%law(k)%law)) then
-               call find_moduli(solid%law(k)%law, self%lame(e))
+               call moduli_find(solid%law(k)%law, self%lame(e))
             else
                self%lame(e)%lambda = given_modulus(solid, e)/3.0_wp
                self%lame(e)%mu = self%lame(e)%lambda
@@ -80,18 +72,6 @@ contains
       end do
       self%acts = self%lame%mu > 0.0_wp
    end subroutine stabilization_term_init
-
-   !> Lame's moduli of an isotropic law at rest.
-   pure subroutine find_moduli(law, lame)
-      class(law_t), intent(in) :: law
-      type(moduli_t), intent(out) :: lame
-      real(wp), parameter :: rest(3) = 0.0_wp
-      type(law_response_t) :: state
-
-      call law_response_plane(law, rest, rest, state)
-      lame%mu = 2.0_wp*state%tangent(3, 3)       ! by the end of no step
-      lame%lambda = 2.0_wp*state%tangent(1, 1) - 2.0_wp*lame%mu
-   end subroutine find_moduli
 
    !> The modulus of a law that a program gives: that of the stiffness of its element. It stands for
    !> lambda + 2 mu.
@@ -242,7 +222,7 @@ contains
    pure real(wp) function drag_of(self, u) result(drag)
       type(stabilization_term_t), intent(in) :: self
       real(wp), intent(in), contiguous :: u(:, :)          !! (n_dim, n_node) [L]
-      real(wp), allocatable :: strain(:, :)
+      real(wp), allocatable :: strain(:, :), stress(:)
       real(wp) :: stored, moved                  ! 2 W, and the square of u over the volume
       integer :: e, g
 
@@ -254,8 +234,9 @@ contains
                node => self%solid%node(:self%solid%geometry(e)%n_node, e))
             call find_strain(self, e, 0.0_wp*u(:, node), u(:, node), strain)
             do g = 1, geometry%n_gp
-               stored = stored + geometry%weight(g)*dot_product(strain(:, g), &
-                  stress_of(self%lame(e), size(u, 1), strain(:, g)))
+               stress = strain(:, g)
+               call stress_of(self%lame(e), size(u, 1), 1.0_wp, strain(:, g), stress)
+               stored = stored + geometry%weight(g)*dot_product(strain(:, g), stress)
             end do
             moved = moved + sum(geometry%weight)/size(node)*sum(u(:, node)**2)
          end associate
@@ -288,28 +269,18 @@ contains
    pure subroutine find_strain(self, e, from, by, strain)
       type(stabilization_term_t), intent(in) :: self
       integer, intent(in) :: e
-      real(wp), intent(in) :: from(:, :), by(:, :)         !! (n_dim, n_node of the element) [L]
-      real(wp), allocatable, intent(out) :: strain(:, :)   !! (n_strain, n_gp) as of `rows`
-      integer :: g
+      real(wp), intent(in), contiguous :: from(:, :)       !! (n_dim, n_node of the element) [L]
+      real(wp), intent(in), contiguous :: by(:, :)         !! as `from` [L]
+      real(wp), allocatable, intent(out) :: strain(:, :)   !! (n_strain, n_gp) as of `strain_rows`
 
-      associate (geometry => self%solid%geometry(e), n => size(by, 1) &
-            + n_shear(size(by, 1)) + count([allocated(self%solid%geometry(e)%circle)]), &
+      associate (geometry => self%solid%geometry(e), &
+            n => strain_count(self%solid%geometry(e), size(by, 1)), &
             square => self%solid%trait%square_of(e, self%square))
          allocate(strain(n, geometry%n_gp))
-         do g = 1, geometry%n_gp
-            strain(:, g) = matmul(rows(geometry, g, from + 0.5_wp*by, square, n), &
-               reshape(by, [size(by)]))
-         end do
+         call strain_change(geometry, from + 0.5_wp*by, by, square, strain)
          if (allocated(geometry%mode)) call modes_relax(geometry, strain)
       end associate
    end subroutine find_strain
-
-   !> Shear strains; normal ones are as many as dimensions, and one of the circle.
-   pure integer function n_shear(n_dim)
-      integer, intent(in) :: n_dim
-
-      n_shear = merge(size(one_of), 1, n_dim == size(one_of))
-   end function n_shear
 
    !> Force and tangent of element `e`: derivatives by the end of 1/2 (lapse/h) int dE.C dE.
    pure subroutine find_part(self, e, motion, with_tangent, part)
@@ -326,25 +297,23 @@ contains
             *self%solid%geometry(e)%n_node, node => self%solid%node( &
             :self%solid%geometry(e)%n_node, e), &
             square => self%solid%trait%square_of(e, self%square))
-         from = motion%u0(:, node)
-         by = motion%du(:, node)
+         allocate(from, source=motion%u0(:, node))
+         allocate(by, source=motion%du(:, node))
          call find_strain(self, e, from, by, strain)
-         allocate(last(size(strain, 1), n, geometry%n_gp))
-         do g = 1, geometry%n_gp
-            last(:, :, g) = rows(geometry, g, from + by, square, size(strain, 1))
-         end do
+         allocate(last(size(strain, 1), n, geometry%n_gp), stress(size(strain, 1)))
+         call strain_rows(geometry, from + by, square, last)
          part%force = spread(0.0_wp, 1, n)
          part%work = 0.0_wp
          if (with_tangent) part%tangent = spread(part%force, 2, n)
          do g = 1, geometry%n_gp
             factor = (self%lapse/motion%evaluation%lapse)*geometry%weight(g)
-            stress = factor*stress_of(self%lame(e), size(by, 1), strain(:, g))
+            call stress_of(self%lame(e), size(by, 1), factor, strain(:, g), stress)
             part%work = part%work + dot_product(stress, strain(:, g))
             part%force = part%force + matmul(stress, last(:, :, g))
             if (with_tangent) call add_geometric(geometry, g, square*stress, part%tangent)
          end do
          if (.not. with_tangent) return
-         if (allocated(geometry%mode)) call relax_rows(geometry, last)
+         if (allocated(geometry%mode)) call strain_rows_relax(geometry, last)
          do g = 1, geometry%n_gp
             factor = (self%lapse/motion%evaluation%lapse)*geometry%weight(g)
             call add_material(self%lame(e), size(by, 1), factor, last(:, :, g), part%tangent)
@@ -352,83 +321,19 @@ contains
       end associate
    end subroutine find_part
 
-   !> The strains at point `g` by the components of displacements, node by node, about the
-   !> displacements `u`: 11, 22, (33,) shears, doubled; of solids of revolution 11, 22, 12 and the
-   !> circle.
-   pure function rows(geometry, g, u, square, n_strain) result(row)
-      type(element_geometry_t), intent(in) :: geometry
-      integer, intent(in) :: g
-      real(wp), intent(in) :: u(:, :)            !! (n_dim, n_node) [L]
-      real(wp), intent(in) :: square             !! part of squares in strains
-      integer, intent(in) :: n_strain
-      real(wp) :: row(n_strain, size(u))
-      real(wp) :: f(size(u, 1), size(u, 1)), grown
-      integer :: a, b, i, k, n_dim
-
-      n_dim = size(u, 1)
-      f = square*matmul(u, transpose(geometry%gradient(:, :, g)))
-      do a = 1, n_dim
-         f(a, a) = f(a, a) + 1.0_wp
-      end do
-      do i = 1, size(u, 2)
-         associate (slope => geometry%gradient(:, i, g))
-            do b = 1, n_dim
-               associate (to => row(:, n_dim*(i - 1) + b))
-                  to = 0.0_wp
-                  to(:n_dim) = f(b, :)*slope
-                  do k = 1, n_shear(n_dim)
-                     to(n_dim + k) = f(b, one_of(k))*slope(other_of(k)) &
-                        + f(b, other_of(k))*slope(one_of(k))
-                  end do
-               end associate
-            end do
-         end associate
-      end do
-      if (.not. allocated(geometry%circle)) return
-      grown = 1.0_wp + square*dot_product(geometry%circle(:, g), u(1, :))
-      row(n_strain, 1::n_dim) = grown*geometry%circle(:, g)
-   end function rows
-
-   !> What incompatible modes leave of the strains at the points by each component.
-   pure subroutine relax_rows(geometry, row)
-      type(element_geometry_t), intent(in) :: geometry
-      real(wp), intent(inout) :: row(:, :, :)    !! (n_strain, n_dim*n, n_gp)
-      real(wp) :: by(size(row, 1), size(row, 3))
-      integer :: j
-
-      do j = 1, size(row, 2)
-         by = row(:, j, :)
-         call modes_relax(geometry, by)
-         row(:, j, :) = by
-      end do
-   end subroutine relax_rows
-
-   !> The stress of a strain, both in the order of `rows`.
-   pure function stress_of(lame, n_dim, strain) result(stress)
-      type(moduli_t), intent(in) :: lame
-      integer, intent(in) :: n_dim
-      real(wp), intent(in) :: strain(:)
-      real(wp) :: stress(size(strain)), volume
-      logical :: is_normal(size(strain))
-      integer :: k
-
-      is_normal = [(k <= n_dim .or. k > n_dim + n_shear(n_dim), k = 1, size(strain))]
-      volume = sum(strain, is_normal)
-      stress = lame%mu*strain
-      where (is_normal) stress = lame%lambda*volume + 2.0_wp*stress
-   end function stress_of
-
    !> Add the part of the tangent that the change of stress makes.
    pure subroutine add_material(lame, n_dim, factor, row, tangent)
       type(moduli_t), intent(in) :: lame
       integer, intent(in) :: n_dim
       real(wp), intent(in) :: factor             !! [L^3]
-      real(wp), intent(in) :: row(:, :)          !! (n_strain, n_dim*n)
+      real(wp), intent(in), contiguous :: row(:, :)          !! (n_strain, n_dim*n)
       real(wp), intent(inout) :: tangent(:, :)
+      real(wp) :: stress(size(row, 1))
       integer :: j
 
       do j = 1, size(row, 2)
-         tangent(:, j) = tangent(:, j) + factor*matmul(stress_of(lame, n_dim, row(:, j)), row)
+         call stress_of(lame, n_dim, factor, row(:, j), stress)
+         tangent(:, j) = tangent(:, j) + matmul(stress, row)
       end do
    end subroutine add_material
 
@@ -447,8 +352,8 @@ contains
          s(a, a) = stress(a)
       end do
       do k = 1, n_shear(n_dim)
-         s(one_of(k), other_of(k)) = stress(n_dim + k)
-         s(other_of(k), one_of(k)) = stress(n_dim + k)
+         s(shear_one(k), shear_other(k)) = stress(n_dim + k)
+         s(shear_other(k), shear_one(k)) = stress(n_dim + k)
       end do
       do j = 1, geometry%n_node
          do i = 1, geometry%n_node

@@ -1,7 +1,7 @@
 !> The kinds of terms, and those of them that are asked for by name.
 submodule (emcon_term_registry) emcon_term_kinds
    use emcon_corotated_term, only : corotated_term_init, corotated_term_t
-   use emcon_dissipation_plane, only : dissipation_term_init, dissipation_term_t
+   use emcon_dissipation, only : dissipation_term_init, dissipation_term_t
    use emcon_host_check, only : host_check_mass
    use emcon_host_term, only : host_term_init, host_term_t
    use emcon_inertia, only : inertia_add, inertia_init, inertia_t, inertia_times

@@ -3,7 +3,7 @@
 module test_dissipation
    use check, only : check_near, check_true, test_case_t
    use emcon_csr, only : csr_t
-   use emcon_dissipation_plane, only : dissipation_term_init, dissipation_term_t
+   use emcon_dissipation, only : dissipation_term_init, dissipation_term_t
    use emcon_errors, only : error_t
    use emcon_evaluation, only : evaluation_t
    use emcon_kinds, only : wp

@@ -40,7 +40,7 @@ contains
 
       tests = [ &
          test_case_t("of the plane, in every kinematics, damped", test_plane), &
-         test_case_t("of revolution and in space", test_other)]
+         test_case_t("of revolution and in space, damped", test_other)]
    end subroutine collect_linked_elements
 
    subroutine test_plane(error)
@@ -63,8 +63,10 @@ contains
 
       do k = 1, size(other)
          if (.not. allocated(error)) call check_one(error, other(k), "NONLINEAR", .false.)
+         if (.not. allocated(error)) call check_one(error, other(k), "NONLINEAR", .true.)
          if (allocated(error) .or. other(k)(:3) == "CAX") cycle
          call check_one(error, other(k), "LINEAR", .false.)
+         if (.not. allocated(error)) call check_one(error, other(k), "LINEAR", .true.)
       end do
    end subroutine test_other
 

@@ -119,8 +119,9 @@ def test_hollow_ball(kind, tmp_path):
     assert fine < (1e-4 if kind in QUADRATIC else 1e-2)
 
 
+@pytest.mark.parametrize("damping", ["", "*DAMPING, BETA=0.1\n"])
 @pytest.mark.parametrize("kind", KINDS)
-def test_free_flight(kind, tmp_path):
+def test_free_flight(kind, damping, tmp_path):
     """A ring that flies along its axis and vibrates, 1000 increments."""
     mesh = Mesh(kind, 2, 2, [(1, 0), (3, 0), (3, 1), (1, 1)])
     speed = "".join(f"{k}, 1, {0.3*(x - 1) - 0.4*(y - 0.5)!r}\n"
@@ -128,13 +129,17 @@ def test_free_flight(kind, tmp_path):
                     for k, (x, y) in enumerate(mesh.x.tolist(), 1))
     after = (f"*INITIAL CONDITIONS, TYPE=VELOCITY\n{speed}*STEP, NLGEOM, INC=2000\n"
              "*DYNAMIC, DIRECT\n0.02, 20.\n*NODE FILE, FREQUENCY=1000\nU\n*END STEP\n")
-    history = run(mesh.deck(RUBBER, after), tmp_path).history
+    history = run(mesh.deck(RUBBER + damping, after), tmp_path).history
     assert len(history) == 1001
-    for name in ("py", "total"):
-        drift = np.abs(history[name] - history[name][0]).max()
-        assert drift <= 1e-12*abs(history[name][0]), name
+    loss = history["damping_loss"]
+    for values in (history["py"], history["total"] + loss):
+        assert np.abs(values - values[0]).max() <= 1e-12*abs(values[0])
     assert not history["px"].any() and not history["lz"].any()
     assert history["strain"].max() > 1e-3*history["total"][0]
+    assert (loss[-1] > 1e-3*history["total"][0]) == bool(damping) and (np.diff(loss) >= 0).all()
+    if damping:                        # what is left is the flight along the axis
+        flight = 0.5*history["py"][0]**2/(0.5*np.pi*(3**2 - 1))
+        assert abs(history["kinetic"][-1] - flight) < 1e-4*flight
 
 
 def rotor(n, kind, folder):

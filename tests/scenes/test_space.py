@@ -68,9 +68,9 @@ def test_patch_of_macneal_and_harder(kind, tmp_path):
     assert "element 4 is folded at a corner" in result.log
 
 
-def flies(kind, law, tmp_path):
-    """A block that spins about no axis of its own, flies and vibrates, 250 increments: energy and
-    six momenta."""
+def flies(kind, law, tmp_path, scheme="ENERGY MOMENTUM"):
+    """A block that spins about no axis of its own, flies and vibrates, 250 increments: energy, with
+    what was taken of it, and six momenta. Its history."""
     mesh = Block(kind, (2, 1, 1), (2, 1, 1))
     centre = np.array([1, 0.5, 0.5])
     rate = np.array([[0.4, -1.5, 0.6], [1.5, -0.3, -0.9], [-0.6, 0.9, 0.2]])
@@ -78,19 +78,53 @@ def flies(kind, law, tmp_path):
     speed = "".join(f"{k}, {a + 1}, {float(v[k - 1, a])!r}\n"
                     for k in range(1, len(v) + 1) for a in range(3))
     after = (f"*INITIAL CONDITIONS, TYPE=VELOCITY\n{speed}*STEP, NLGEOM, INC=2000\n"
-             "*DYNAMIC, DIRECT\n0.02, 5.\n*NODE FILE, FREQUENCY=250\nU\n*END STEP\n")
+             f"*DYNAMIC, DIRECT\n0.02, 5.\n*TIME INTEGRATION, SCHEME={scheme}\n"
+             "*NODE FILE, FREQUENCY=250\nU\n*END STEP\n")
     history = run(mesh.deck(law, after), tmp_path).history
     assert len(history) == 251
-    for names in (["total"], ["px", "py", "pz"], ["lx", "ly", "lz"]):
+    taken = history["damping_loss"] + history["scheme_loss"]
+    kept = history["total"] + taken
+    assert np.abs(kept - kept[0]).max() <= 1e-12*kept[0]
+    assert (np.diff(history["damping_loss"]) >= 0).all() and (history["scheme_loss"] >= 0).all()
+    for names in (["px", "py", "pz"], ["lx", "ly", "lz"]):
         size = np.sqrt(sum(history[name][0]**2 for name in names))
         for name in names:
             assert np.abs(history[name] - history[name][0]).max() <= 1e-12*size, name
     assert history["strain"].max() > 1e-3*history["total"][0]
+    return history
 
 
 @pytest.mark.parametrize("kind", KINDS)
 def test_free_flight(kind, tmp_path):
-    flies(kind, RUBBER, tmp_path)
+    assert not flies(kind, RUBBER, tmp_path)["damping_loss"].any()
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_damped_free_flight(kind, tmp_path):
+    """Damping by moduli keeps all momenta and takes energy until the body turns as a rigid one."""
+    loss = flies(kind, RUBBER + "*DAMPING, BETA=0.05\n", tmp_path)["damping_loss"]
+    assert loss[-1] > 0.01
+    assert loss[-1] - loss[125] < 0.1*loss[-1]
+
+
+@pytest.mark.parametrize("kind", ["C3D8", "C3D8I", "C3D10"])
+def test_a_scheme_that_takes_energy(kind, tmp_path):
+    history = flies(kind, RUBBER, tmp_path, "ENERGY DECAYING, DISSIPATION=0.5")
+    assert history["scheme_loss"][-1] > 1e-4*history["total"][0]
+
+
+def test_drag_by_mass(tmp_path):
+    """M (v1 - v0)/h = -alpha M (v0 + v1)/2: all momenta shrink by one factor in each step."""
+    mesh = Block("C3D10", (1, 1, 1))
+    speed = "".join(f"{k}, 1, 1.\n{k}, 2, -2.\n{k}, 3, 0.5\n" for k in range(1, len(mesh.x) + 1))
+    after = (f"*INITIAL CONDITIONS, TYPE=VELOCITY\n{speed}*STEP, NLGEOM, INC=2000\n"
+             "*DYNAMIC, DIRECT\n0.05, 1.\n*END STEP\n")
+    history = run(mesh.deck(RUBBER + "*DAMPING, ALPHA=3.\n", after), tmp_path).history
+    factor = ((1 - 0.075)/(1 + 0.075))**np.arange(len(history))
+    for name in ("px", "py", "pz"):
+        assert np.abs(history[name] - history[name][0]*factor).max() <= 1e-12*abs(history[name][0])
+    kept = history["total"] + history["damping_loss"]
+    assert np.abs(kept - kept[0]).max() <= 1e-12*kept[0]
 
 
 @pytest.mark.parametrize(("kind", "is_bent"), [(kind, False) for kind in KINDS]

@@ -3,26 +3,23 @@
 !> strain, beta C dE/h, and against velocity, alpha M du/h. C are the moduli at rest.
 !>
 !> Source: docs/theory.md, eqs. (4e) to (4g), (11a) and (11b).
-module emcon_dissipation_plane
+module emcon_dissipation
    use emcon_csr, only : csr_t
    use emcon_element, only : element_geometry_t
    use emcon_element_lists, only : element_lists
-   use emcon_element_plane, only : element_motion_t, element_point, point_motion_t
    use emcon_incompatible_modes, only : modes_relax
    use emcon_kinds, only : dp, wp
-   use emcon_law, only : law_response_plane, law_response_t
    use emcon_motion, only : motion_t
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_space, only : lists_append, lists_t, space_t
    use emcon_steps, only : step_square
+   use emcon_strain_rows, only : moduli_find, moduli_t, strain_count, strain_rows, &
+      strain_rows_relax, strain_change, stress_of
    use emcon_term, only : response_t, role_internal, term_t
    implicit none
    private
    public :: dissipation_term_t, dissipation_term_init
-
-   !> Components of strain and stress.
-   integer, parameter :: n_strain = 3
 
    type, extends(term_t) :: dissipation_term_t
       type(solid_t), private :: solid
@@ -30,9 +27,7 @@ module emcon_dissipation_plane
       logical, allocatable, private :: deforms(:)        !! (n_element) and has moduli
       real(wp), allocatable, private :: alpha(:)         !! (n_element) of its material [1/T]
       real(wp), allocatable, private :: beta(:)          !! (n_element) of its material [T]
-      !> (3, 3, 2 n_law) of laws at rest, then of what `rest` leaves of them [M/(L T^2)]
-      real(wp), allocatable, private :: moduli(:, :, :)
-      integer, allocatable, private :: moduli_of(:)      !! (n_element) which of these
+      type(moduli_t), allocatable, private :: lame(:)    !! (n_element) at rest
       real(wp), private :: square = 1.0_wp               !! part of squares in strains
       integer, allocatable, private :: slot(:)           !! element matrices by columns
       ! Of the last motion's forces [M L^2/T^2]:
@@ -52,24 +47,22 @@ contains
       type(dissipation_term_t), intent(out) :: self
       type(solid_t), intent(in) :: solid
       type(scene_t), intent(in) :: scene
-      real(wp), parameter :: rest(n_strain) = 0.0_wp
-      type(law_response_t) :: state
-      integer :: k
+      integer :: e
 
       self%role = role_internal
       self%solid = solid
-      allocate(self%moduli(n_strain, n_strain, 2*size(solid%law)), source=0.0_wp)
+      allocate(self%lame(solid%n_element))
       allocate(self%deforms(solid%n_element), source=.false.)
-      self%moduli_of = solid%law_of + merge(size(solid%law), 0, solid%trait%has_mean)
-      do k = 1, size(solid%law)
-         if (.not. allocated(solid%law(k)%law)) cycle
-         call law_response_plane(solid%law(k)%law, rest, rest, state)
-         ! By the end of a step of no size.
-         self%moduli(:, :, k) = 2.0_wp*state%tangent
-         self%deforms = self%deforms .or. (solid%law_of == k .and. .not. solid%trait%is_rigid)
-         if (.not. allocated(solid%rest(k)%law)) cycle
-         call law_response_plane(solid%rest(k)%law, rest, rest, state)
-         self%moduli(:, :, size(solid%law) + k) = 2.0_wp*state%tangent
+      do e = 1, solid%n_element
+         associate (k => solid%law_of(e))
+            if (solid%trait%is_rigid(e) .or. .not. allocated(solid%law(k)%law)) cycle
+            self%deforms(e) = .true.
+            if (solid%trait%has_mean(e) .and. allocated(solid%rest(k)%law)) then
+               call moduli_find(solid%rest(k)%law, self%lame(e))
+            else
+               call moduli_find(solid%law(k)%law, self%lame(e))
+            end if
+         end associate
       end do
       associate (material => scene%section(scene%element%section)%material)
          self%alpha = scene%material(material)%alpha
@@ -122,87 +115,117 @@ contains
       end do
    end subroutine respond
 
-   !> The motions of an element over the step, and over the one before.
-   pure subroutine gather(self, e, motion, now, before)
+   !> Displacements of the nodes of an element, less that of the first one along the directions in
+   !> which the whole may move without strain.
+   pure function gather(self, e, field) result(local)
       type(dissipation_term_t), intent(in) :: self
       integer, intent(in) :: e
-      type(motion_t), intent(in) :: motion
-      type(element_motion_t), intent(out) :: now, before
-      integer :: i
+      real(wp), intent(in) :: field(:, :)        !! (n_dim, n_node of the scene) [L]
+      real(wp) :: local(size(field, 1), self%solid%geometry(e)%n_node)
+      integer :: first, i
 
-      now%square = self%solid%trait%square_of(e, self%square)
-      before%square = now%square
-      do i = 1, self%solid%geometry(e)%n_node
-         associate (node => self%solid%node(i, e), u0 => motion%u0)
-            now%from(:, i) = u0(:, node) - u0(:, self%solid%node(1, e))
-            now%by(:, i) = motion%du(:, node) - motion%du(:, self%solid%node(1, e))
-            if (.not. allocated(motion%du_before)) cycle
-            before%by(:, i) = motion%du_before(:, node) &
-               - motion%du_before(:, self%solid%node(1, e))
-            before%from(:, i) = now%from(:, i) - before%by(:, i)
-         end associate
+      first = 1 + count([allocated(self%solid%geometry(e)%circle)])  ! a ring is no ring elsewhere
+      do i = 1, size(local, 2)
+         local(:, i) = field(:, self%solid%node(i, e))
+         local(first:, i) = local(first:, i) - field(first:, self%solid%node(1, e))
       end do
-   end subroutine gather
+   end function gather
 
    !> Add the forces of element `e`, and their derivatives to the places from `first` on.
-   subroutine add_element(self, e, first, motion, response, value, side)
+   pure subroutine add_element(self, e, first, motion, response, value, side)
       type(dissipation_term_t), intent(inout) :: self
       integer, intent(in) :: e, first
       type(motion_t), intent(in) :: motion
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)
-      type(element_motion_t) :: now, before
-      type(point_motion_t) :: point
-      real(wp), dimension(n_strain, n_strain) :: c, viscous
-      real(wp), dimension(n_strain, self%solid%geometry(e)%n_gp) :: strain, last
-      real(wp) :: s(n_strain), rate(n_strain), f(size(motion%du, 1))
-      integer :: g, i
+      real(wp), dimension(size(motion%du, 1), self%solid%geometry(e)%n_node) :: from, by, before
+      real(wp) :: force(size(by))
+      real(wp), dimension(strain_count(self%solid%geometry(e), size(motion%du, 1)), &
+         self%solid%geometry(e)%n_gp) :: strain, last, stress
+      real(wp), dimension(size(strain, 1), size(by), size(strain, 2)) :: middle
+      real(wp) :: square
+      integer :: i
 
       if (.not. (motion%evaluation%dissipation > 0.0_wp .or. self%beta(e) > 0.0_wp)) return
-      call gather(self, e, motion, now, before)
-      call find_increments(self%solid%geometry(e), now, strain)
-      call find_increments(self%solid%geometry(e), before, last)
-      associate (geometry => self%solid%geometry(e), total => response%part(self%role))
-         do g = 1, geometry%n_gp
-            call element_point(geometry, g, now, point)
-            c = 0.5_wp*motion%evaluation%dissipation*geometry%weight(g) &
-               *self%moduli(:, :, self%moduli_of(e))
-            viscous = (self%beta(e)*motion%evaluation%mass_scale)*geometry%weight(g) &
-               *self%moduli(:, :, self%moduli_of(e))
-            s = matmul(c, strain(:, g) - motion%evaluation%recalled*last(:, g))
-            rate = matmul(viscous, strain(:, g))
-            self%work = self%work + dot_product(s, strain(:, g))
-            self%damping = self%damping + dot_product(rate, strain(:, g))
-            s = s + rate
-            do i = 1, geometry%n_node
-               f = matmul(point%f_mid, traction(s, geometry%gradient(:, i, g)))
-               associate (node => self%solid%node(i, e))
-                  total%force(:, node) = total%force(:, node) + f
-                  if (response%with_sizes) total%magnitude(:, node) = total%magnitude(:, node) &
-                     + abs(f)
-               end associate
-            end do
-            if (present(value)) call add_tangent(self%slot(first + 1:), geometry, g, c + viscous, &
-               now, value, side)
+      square = self%solid%trait%square_of(e, self%square)
+      from = gather(self, e, motion%u0)
+      by = gather(self, e, motion%du)
+      last = 0.0_wp
+      if (allocated(motion%du_before) .and. motion%evaluation%dissipation > 0.0_wp) then
+         before = gather(self, e, motion%du_before)
+         call find_increment(self%solid%geometry(e), from - before, before, square, last)
+      end if
+      call find_increment(self%solid%geometry(e), from, by, square, strain)
+      call strain_rows(self%solid%geometry(e), from + 0.5_wp*by, square, middle)
+      call find_stress(self, e, motion, strain, last, stress)
+      call sum_up(stress, middle, force)
+      associate (total => response%part(self%role))
+         do i = 1, size(by, 2)
+            associate (node => self%solid%node(i, e), &
+                  own => force((i - 1)*size(by, 1) + 1:i*size(by, 1)))
+               total%force(:, node) = total%force(:, node) + own
+               if (response%with_sizes) total%magnitude(:, node) = total%magnitude(:, node) &
+                  + abs(own)
+            end associate
          end do
       end associate
+      if (present(value)) call add_tangent(self, e, motion, middle, &
+         self%slot(first + 1:), value, side)
    end subroutine add_element
+
+   !> Stresses by the scheme and by the material, with the weights of the points, and what they take
+   !> over the strain increments.
+   pure subroutine find_stress(self, e, motion, strain, last, stress)
+      type(dissipation_term_t), intent(inout) :: self
+      integer, intent(in) :: e
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: strain(:, :), last(:, :)       !! (n_strain, n_gp)
+      real(wp), intent(out) :: stress(:, :)                  !! (n_strain, n_gp) [M L^2/T^2]
+      real(wp), dimension(size(strain, 1)) :: numerical, viscous
+      integer :: g, n_dim
+
+      n_dim = size(motion%du, 1)
+      associate (evaluation => motion%evaluation, weight => self%solid%geometry(e)%weight)
+         do g = 1, size(strain, 2)
+            call stress_of(self%lame(e), n_dim, 0.5_wp*evaluation%dissipation*weight(g), &
+               strain(:, g) - evaluation%recalled*last(:, g), numerical)
+            call stress_of(self%lame(e), n_dim, self%beta(e)*evaluation%mass_scale*weight(g), &
+               strain(:, g), viscous)
+            self%work = self%work + dot_product(numerical, strain(:, g))
+            self%damping = self%damping + dot_product(viscous, strain(:, g))
+            stress(:, g) = numerical + viscous
+         end do
+      end associate
+   end subroutine find_stress
+
+   !> Forces of stresses at the points.
+   pure subroutine sum_up(stress, row, force)
+      real(wp), intent(in), contiguous :: stress(:, :)       !! (n_strain, n_gp)
+      real(wp), intent(in), contiguous :: row(:, :, :)       !! (n_strain, n_dim*n, n_gp)
+      real(wp), intent(out), contiguous :: force(:)          !! (n_dim*n)
+      integer :: g, j, k
+
+      force = 0.0_wp
+      do g = 1, size(stress, 2)
+         do j = 1, size(force)
+            do k = 1, size(stress, 1)
+               force(j) = force(j) + stress(k, g)*row(k, j, g)
+            end do
+         end do
+      end do
+   end subroutine sum_up
 
    !> Increments of the strains at the points. Incompatible modes are taken out, by the same moduli
    !> that make stress of them here: such a stress has no part to be returned.
-   pure subroutine find_increments(geometry, motion, strain)
+   pure subroutine find_increment(geometry, from, by, square, strain)
       type(element_geometry_t), intent(in) :: geometry
-      type(element_motion_t), intent(in) :: motion
-      real(wp), intent(out) :: strain(:, :)      !! (n_strain, n_gp)
-      type(point_motion_t) :: point
-      integer :: g
+      real(wp), intent(in), contiguous :: from(:, :), by(:, :)         !! (n_dim, n_node) [L]
+      real(wp), intent(in) :: square             !! part of squares in strains
+      real(wp), intent(out), contiguous :: strain(:, :)      !! (n_strain, n_gp)
 
-      do g = 1, geometry%n_gp
-         call element_point(geometry, g, motion, point)
-         strain(:, g) = point%dstrain
-      end do
+      call strain_change(geometry, from + 0.5_wp*by, by, square, strain)
       if (allocated(geometry%mode)) call modes_relax(geometry, strain)
-   end subroutine find_increments
+   end subroutine find_increment
 
    !> Add the drag of the mass of element `e`, and its derivatives to the places from `first` on.
    pure subroutine add_drag(self, e, first, motion, response, value, side)
@@ -236,59 +259,41 @@ contains
       end associate
    end subroutine add_drag
 
-   !> Stress times a gradient.
-   pure function traction(s, gradient) result(t)
-      real(wp), intent(in) :: s(n_strain)        !! S11, S22, S12
-      real(wp), intent(in) :: gradient(:)        !! (n_dim)
-      real(wp) :: t(size(gradient))
-
-      t = [s(1)*gradient(1) + s(n_strain)*gradient(2), s(n_strain)*gradient(1) + s(2)*gradient(2)]
-   end function traction
-
-   !> Add the derivatives of the forces of a point by the end of the step, but for that of the place
-   !> where the stress acts: a factor can then be made again without the step before.
-   subroutine add_tangent(slot, geometry, at, c, motion, value, side)
+   !> Add the derivatives of the forces of an element by the end of the step, but for that of the
+   !> place where the stress acts: a factor can then be made again without the step before.
+   pure subroutine add_tangent(self, e, motion, middle, slot, value, side)
+      type(dissipation_term_t), intent(in) :: self
+      integer, intent(in) :: e
+      type(motion_t), intent(in) :: motion
+      real(wp), intent(in), contiguous :: middle(:, :, :)    !! (n_strain, n_dim*n, n_gp)
       integer, intent(in) :: slot(:)             !! of the element, by columns
-      type(element_geometry_t), intent(in) :: geometry
-      integer, intent(in) :: at                  !! the point: 1 to n_gp
-      real(wp), intent(in) :: c(n_strain, n_strain)          !! with the weight of the point
-      type(element_motion_t), intent(in) :: motion
       real(dp), intent(inout), contiguous :: value(:), side(:)
-      type(point_motion_t) :: point(geometry%n_gp)
-      real(wp) :: k(size(geometry%gradient, 1)), by(n_strain, geometry%n_gp), change(n_strain)
-      integer :: i, j, a, b, g, n
+      real(wp) :: at_end(size(motion%du, 1), self%solid%geometry(e)%n_node), &
+         last(size(middle, 1), size(middle, 2), size(middle, 3)), column(size(middle, 2)), &
+         change(size(middle, 1), size(middle, 3)), part
+      integer :: g, i, j, n
 
-      do g = 1, geometry%n_gp
-         call element_point(geometry, g, motion, point(g))
-      end do
-      n = 0
-      do j = 1, geometry%n_node
-         do b = 1, size(k)
+      at_end = gather(self, e, motion%u0) + gather(self, e, motion%du)
+      associate (geometry => self%solid%geometry(e), evaluation => motion%evaluation, &
+            square => self%solid%trait%square_of(e, self%square))
+         part = 0.5_wp*evaluation%dissipation + self%beta(e)*evaluation%mass_scale
+         call strain_rows(geometry, at_end, square, last)
+         if (allocated(geometry%mode)) call strain_rows_relax(geometry, last)
+         n = 0
+         do j = 1, size(last, 2)
             do g = 1, geometry%n_gp
-               by(:, g) = strain_by(point(g)%f_end(b, :), geometry%gradient(:, j, g))
+               call stress_of(self%lame(e), size(at_end, 1), part*geometry%weight(g), &
+                  last(:, j, g), change(:, g))
             end do
-            if (allocated(geometry%mode)) call modes_relax(geometry, by)
-            change = matmul(c, by(:, at))
-            do i = 1, geometry%n_node
-               k = matmul(point(at)%f_mid, traction(change, geometry%gradient(:, i, at)))
-               do a = 1, size(k)
-                  n = n + 1
-                  if (slot(n) > 0) value(slot(n)) = value(slot(n)) + real(k(a), dp)
-                  if (slot(n) < 0) side(-slot(n)) = side(-slot(n)) + real(k(a), dp)
-               end do
+            call sum_up(change, middle, column)
+            do i = 1, size(column)
+               n = n + 1
+               if (slot(n) > 0) value(slot(n)) = value(slot(n)) + real(column(i), dp)
+               if (slot(n) < 0) side(-slot(n)) = side(-slot(n)) + real(column(i), dp)
             end do
          end do
-      end do
+      end associate
    end subroutine add_tangent
-
-   !> Derivative of the strain by a component of a node's displacement.
-   pure function strain_by(f, gradient) result(by)
-      real(wp), intent(in) :: f(:)               !! (n_dim) that component of dx/dX
-      real(wp), intent(in) :: gradient(:)        !! (n_dim) of the node's function by X [1/L]
-      real(wp) :: by(n_strain)
-
-      by = [f(1)*gradient(1), f(2)*gradient(2), f(1)*gradient(2) + f(2)*gradient(1)]
-   end function strain_by
 
    !> The strain increment has its derivative by the end, its forces act at the middle.
    pure logical function is_symmetric(self, motion)
@@ -299,4 +304,4 @@ contains
          any(self%solid%trait%is_corotated)))
    end function is_symmetric
 
-end module emcon_dissipation_plane
+end module emcon_dissipation
