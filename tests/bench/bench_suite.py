@@ -75,9 +75,10 @@ WHY = {
                 lambda text: re.sub("(?i),SOLVER=ITERATIVE CHOLESKY", "", text), None),
     "beamnldy": (DAMPED, undamped("1e-7", "5e-6"), by_increments("1e-7", "5e-6")),
     "beamnldynodirect": (DAMPED, undamped("1e-7", "5e-6"), by_increments("1e-7", "5e-6")),
-    "beamdynamic": (DAMPED + "; and CalculiX takes the mass, too, by the 2 x 2 x 2 points of C3D20R; "
-                    "all three mended, with C3D20",
-                    *(fully(edit("1e-7", "1e-5")) for edit in (undamped, by_increments))),
+    **dict.fromkeys(("beamdynamic", "beamimpdy1", "beamimpdy1nodirect"), (
+        DAMPED + "; and CalculiX takes the mass, too, by the 2 x 2 x 2 points of C3D20R; all three "
+        "mended, with C3D20", *(fully(edit("1e-7", "1e-5")) for edit in (undamped, by_increments)))),
+    "beamimpdy2": (DAMPED, undamped("1e-6", "1e-4"), by_increments("1e-6", "1e-4")),
     "equrem1": (DAMPED, undamped("2e-9", "2e-7"), by_increments("2e-9", "2e-7")),
     "equrem2": (DAMPED, undamped("2e-9", "2e-7"), by_increments("2e-9", "2e-7")),
     "equrem3": (DAMPED, undamped("2e-9", "2e-7"), by_increments("2e-9", "2e-7")),
