@@ -451,6 +451,15 @@ class Model(Source):
             rows.append((*self._names(term[0], self._nodes, "*EQUATION"), *term[1:]))
         return self._card("EQUATION", rows=rows)
 
+    def transform(self, nodes: str, a: Sequence[Number], b: Sequence[Number],
+                  type: Literal["R", "C"] = "R") -> Model:
+        """`*TRANSFORM`: degrees of freedom of a node set along axes of their own.
+
+        a, b    R: a point on the first axis, and one on the second side of it, from the origin;
+                C: two points of the axis of a cylinder; x, y, z each
+        """
+        return self._card("TRANSFORM", {"NSET": nodes, "TYPE": type}, [(*a, *b)])
+
     # --- what a deck cannot say --------------------------------------------------------------
 
     def give_law(self, material: str, law: PointFunction) -> Model:

@@ -14,7 +14,8 @@ from .options import words
 Op: TypeAlias = Literal["MOD", "NEW"]
 #: Requests, and the parameter that names their set.
 _REQUESTS = {"NODE FILE": "NSET", "EL FILE": "ELSET", "CONTACT FILE": None, "NODE PRINT": "NSET",
-             "EL PRINT": "ELSET", "CONTACT PRINT": None, "ENERGY PRINT": None}
+             "EL PRINT": "ELSET", "CONTACT PRINT": None, "SECTION PRINT": "SURFACE",
+             "ENERGY PRINT": None}
 
 
 class Step(Cards):
@@ -192,20 +193,31 @@ class Step(Cards):
         """
         return self._card("EVENTS", {"TYPE": type, "FRACTION": fraction, "OFF": off or None})
 
+    def remove_equations(self, *dofs: tuple[str | int, int]) -> Step:
+        """`*EQUATION, REMOVE`: those whose first term is a node (or set) and 1 to 3; all if none."""
+        if not dofs:
+            return self._card("EQUATION", {"REMOVE ALL": True})
+        rows = [(*self._names(where, self._nodes, "*EQUATION"), dof) for where, dof in dofs]
+        return self._card("EQUATION", {"REMOVE": True}, rows)
+
     # --- output ----------------------------------------------------------------------------
 
     def output(self, request: str, variables: str | Sequence[str] = (), *,
                set: str | None = None, frequency: int | str | None = None,
-               time_points: str | None = None, totals: str | None = None) -> Step:
+               time_points: str | None = None, totals: str | None = None,
+               name: str | None = None, global_axes: bool | None = None) -> Step:
         """Ask for output of the batch program, `emcon run`.
 
-        request       NODE, EL or CONTACT with FILE (fields) or PRINT (history); ENERGY PRINT
+        request       NODE, EL or CONTACT with FILE (fields) or PRINT (history); SECTION PRINT;
+                      ENERGY PRINT
         variables     U, V, RF, UR, VR, RM; S, E, ENER, ELSE, ELKE, EVOL; CDIS, CSTR, CF, CSHEAR,
-                      CSLIP, CNUM
-        set           of nodes or elements, for NODE and EL
+                      CSLIP, CNUM; SOF, SOM, SOMC, SOCENTER, SOAREA
+        set           of nodes or elements, for NODE and EL; the surface of SECTION PRINT
         frequency     every so many increments; 0: never
         time_points   name of times, instead
         totals        YES or ONLY: the sums over the set, for PRINT
+        name          of a section in the history; default: that of its surface
+        global_axes   NODE PRINT: along the axes of the model, not those of `Model.transform`
         """
         if request not in _REQUESTS:
             raise InputError(f"output requests are {', '.join(_REQUESTS)}, not {request!r}")
@@ -214,7 +226,9 @@ class Step(Cards):
             raise InputError(f"{request} is for the whole model, not for a set")
         chosen = [variables] if isinstance(variables, str) else list(variables)
         return self._card(request, {**({key: set} if key else {}), "FREQUENCY": frequency,
-                                    "TIME POINTS": time_points, "TOTALS": totals},
+                                    "TIME POINTS": time_points, "TOTALS": totals, "NAME": name,
+                                    "GLOBAL": None if global_axes is None
+                                    else "YES" if global_axes else "NO"},
                           [chosen] if chosen else [])
 
     def restart(self, frequency: int | str | None = None) -> Step:

@@ -134,6 +134,8 @@ module emcon_deck_keywords
       keyword_t("NODE PRINT", in_step, "NSET=,GLOBAL=," // printed), &
       keyword_t("EL PRINT", in_step, "ELSET=,~GLOBAL:YES," // printed), &
       keyword_t("CONTACT PRINT", in_step, "MASTER=,SLAVE=,~NSET,~SET,~GLOBAL:YES," // printed), &
+      keyword_t("SECTION PRINT", in_step, "SURFACE=,NAME=,FREQUENCY=,TIMEPOINTS=," &
+         // "~AXES:GLOBAL,~UPDATE:YES,~FREQUENCYF:1"), &
       keyword_t("ENERGY PRINT", in_step, "~ELSET,~FREQUENCY:1,~TIMEPOINTS"), &
       keyword_t("OUTPUT", in_step, "FIELD,HISTORY,VARIABLE=,FREQUENCY=,TIMEPOINTS=,~NAME," &
          // "~FREQUENCYF:1,~TIMEINTERVAL,~NUMBERINTERVAL,~TIMEMARKS,~OP:NEW,~FILTER", &
@@ -198,7 +200,7 @@ module emcon_deck_keywords
          "FREQUENCY,COMPLEX FREQUENCY,BUCKLE,MODAL DYNAMIC,STEADY STATE DYNAMICS,VISCO,GREEN," &
          // "SENSITIVITY,SUBSTRUCTURE GENERATE,ELECTROMAGNETICS,CFD"), &
       refusal_t("results go by *NODE FILE, *EL FILE and *... PRINT", &
-         "SECTION PRINT,SECTION FILE,INTEGRATED OUTPUT,INTEGRATED OUTPUT SECTION", .true.), &
+         "SECTION FILE,INTEGRATED OUTPUT,INTEGRATED OUTPUT SECTION", .true.), &
       refusal_t("it names no results", "FILE FORMAT,MONITOR,INCREMENTATION OUTPUT,FILTER,PRINT", &
          is_idle=.true.), &
       refusal_t("use *EL FILE", "ELEMENT FILE", .true.), &

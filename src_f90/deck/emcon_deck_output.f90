@@ -7,13 +7,16 @@ module emcon_deck_output
    use emcon_deck_named, only : hint_at_set, set_names
    use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, note_idle, &
       option_count, option_name, option_word, reader_t
+   use emcon_deck_surfaces, only : surface_names
    use emcon_deck_tables, only : table_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_mesh, only : named_set_t
    use emcon_name_index, only : name_index_find, name_index_t
-   use emcon_quantity_registry, only : at_contacts, at_elements, at_nodes, quantities_of_card
+   use emcon_quantity_registry, only : at_contacts, at_elements, at_nodes, at_sections, &
+      quantities_of_card
    use emcon_requests, only : output_contact_file, output_contact_print, output_element_file, &
-      output_element_print, output_energy_print, output_node_file, output_node_print, output_t
+      output_element_print, output_energy_print, output_node_file, output_node_print, &
+      output_section_print, output_t
    use emcon_scene, only : scene_t
    use emcon_text, only : string_t
    implicit none
@@ -47,6 +50,7 @@ module emcon_deck_output
       output_row_t("ELPRINT", output_element_print, at_elements, .false., "S E"), &
       output_row_t("CONTACTFILE", output_contact_file, at_contacts, .true., "CDIS CSTR"), &
       output_row_t("CONTACTPRINT", output_contact_print, at_contacts, .false., "CDIS CSTR"), &
+      output_row_t("SECTIONPRINT", output_section_print, at_sections), &
       output_row_t("ENERGYPRINT", output_energy_print)]
 
    !> Variables of other programs that are not written here: a warning says so.
@@ -149,6 +153,7 @@ contains
             if (output_rows(i)%to_field_file .neqv. is_field) cycle
             if (is_history .and. output_rows(i)%place > 0) cycle
             if (output_rows(i)%place == at_contacts .and. size(scene%pair) == 0) cycle
+            if (output_rows(i)%place == at_sections) cycle
             call read_request(reader, card, output_rows(i), scene, self)
             if (reader%log%n_errors > n_errors) exit
          end do
@@ -404,6 +409,9 @@ contains
          call look_up("NSET", "node set", scene%set%node, reader%names%node_sets)
       case (output_element_file, output_element_print)
          call look_up("ELSET", "element set", scene%set%element, reader%names%element_sets)
+      case (output_section_print)
+         call read_section(reader, card, scene, new)
+         is_empty = new%set == 0
       end select
 
    contains
@@ -440,6 +448,34 @@ contains
 
       says_when = has_option(card, "FREQUENCY") .or. has_option(card, "TIMEPOINTS")
    end function says_when
+
+   !> The surface of a section, and its name in the history; without surface 0.
+   subroutine read_section(reader, card, scene, new)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(output_t), intent(inout) :: new
+      character(len=:), allocatable :: name
+      integer :: i
+
+      name = option_name(card, "SURFACE")
+      new%name = option_name(card, "NAME")
+      if (new%name == "") new%name = name
+      i = name_index_find(reader%names%surfaces, name)
+      if (name == "") then
+         call card_error(reader, card, "SURFACE= is missing: the faces whose force is to be told")
+      else if (i == 0) then
+         if (.not. reader%doubt%names) call card_error(reader, card, "unknown surface " &
+            // quoted(name) // suggestion(name, surface_names(scene%surface)))
+      else if (.not. allocated(scene%surface(i)%element)) then
+         i = 0
+      else if (size(scene%surface(i)%element) == 0) then
+         call card_error(reader, card, "surface " // quoted(name) // " has no faces of elements; " &
+            // "the force on nodes is told by *NODE PRINT with RF and TOTALS=YES")
+      else
+         new%set = i
+      end if
+   end subroutine read_section
 
    !> When: by FREQUENCY or at the times of a table.
    subroutine read_times(reader, card, new)

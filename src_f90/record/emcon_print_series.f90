@@ -7,9 +7,9 @@ module emcon_print_series
    use emcon_mesh, only : named_set_t
    use emcon_quantities, only : quantity_components, quantity_values
    use emcon_quantity_registry, only : at_contacts, at_elements, at_nodes, at_pairs, &
-      n_quantity_row, quantity_row, quantity_row_t
+      at_sections, n_quantity_row, quantity_row, quantity_row_t
    use emcon_requests, only : output_contact_print, output_element_print, output_node_print, &
-      output_t
+      output_section_print, output_t
    use emcon_stepper, only : stepper_t
    use emcon_text, only : string_t
    use emcon_turned_axes, only : turn_values
@@ -21,7 +21,7 @@ module emcon_print_series
    type :: series_t
       integer :: step = 0                        !! of the deck
       integer :: request = 0                     !! of that step
-      integer :: place = 0                       !! of the members, one of the `at_` codes
+      integer :: place = 0                       !! of the members, one of the `at_` codes, or 0
       character(len=16) :: variable = ""
       logical :: is_total = .false.              !! the sum over the members
       integer :: i_set = 0                       !! as the history counts
@@ -46,8 +46,8 @@ contains
       allocate(self(0))
       do i = 1, size(stepper%scene%step)
          do j = 1, size(stepper%scene%step(i)%output)
-            new%place = findloc([output_node_print, output_element_print, output_contact_print], &
-               stepper%scene%step(i)%output(j)%kind, 1)      ! `at_nodes`, ... or none
+            new%place = findloc([output_node_print, output_element_print, output_contact_print, &
+               output_section_print], stepper%scene%step(i)%output(j)%kind, 1)
             if (new%place == 0) cycle
             if (new%place == at_contacts .and. size(stepper%scene%pair) == 0) cycle
             new%step = i
@@ -171,6 +171,10 @@ contains
             do i = 1, system%n_pair
                label = [label, scene%node%label(system%contact(i)%contact%node)]
             end do
+         case (at_sections)
+            set = output%name
+            item = [output%set]
+            label = [0]
          case default
             set = "PAIRS"
             item = [(i, i = 1, size(scene%pair))]

@@ -8,16 +8,19 @@ module emcon_quantities
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : at_rest, motion_of
    use emcon_quantity_registry, only : at_contacts, at_elements, at_nodes, at_pairs, &
-      n_quantity_row, of_rotation, of_strain, of_vector, of_wrench, quantity_row, &
+      at_sections, n_quantity_row, of_rotation, of_strain, of_vector, of_wrench, quantity_row, &
       quantity_row_of, quantity_row_t
    use emcon_rigid_bodies, only : rigid_body_t
    use emcon_rigid_rotation, only : rigid_rotation_spin
-   use emcon_rotation, only : n_turn
+   use emcon_requests, only : output_section_print
+   use emcon_rotation, only : add_moments, n_turn
+   use emcon_section_force, only : section_force
    use emcon_solid, only : solid_t
    use emcon_system, only : system_springs
    use emcon_stepper, only : stepper_t
    use emcon_steps, only : step_square
    use emcon_stress, only : element_energies, element_means, nodal_stress, von_mises
+   use emcon_surface_area, only : surface_area
    use emcon_term_registry, only : terms_solid
    use emcon_text, only : string_t
    use emcon_vtkhdf, only : field_t
@@ -26,7 +29,8 @@ module emcon_quantities
    private
    public :: quantity_values, quantity_components, quantity_fields, quantity_of_field
    public :: quantity_variables
-   public :: node_quantity, element_quantity, contact_quantity, contact_field, pair_quantity
+   public :: node_quantity, element_quantity, contact_quantity, contact_field, pair_quantity, &
+      section_quantity
 
 contains
 
@@ -44,6 +48,8 @@ contains
          values = element_quantity(stepper, variable)
       case (at_contacts)
          values = contact_quantity(stepper, variable)
+      case (at_sections)
+         values = section_quantity(stepper, variable)
       case (at_pairs)
          values = pair_quantity(stepper, variable)
       case default
@@ -377,6 +383,44 @@ contains
          value = min(value, more)
       end if
    end subroutine take_over
+
+   !> Of each surface (second index) that a request of the step names: SOF force on its elements,
+   !> SOM moment about the origin, SOMC about its centre, SOCENTER that, SOAREA area; else 0.
+   function section_quantity(stepper, variable) result(values)
+      type(stepper_t), intent(in), target :: stepper
+      character(len=*), intent(in) :: variable
+      real(dp), allocatable :: values(:, :)
+      real(wp) :: wrench(stepper%scene%n_dim + n_turn(stepper%scene%n_dim)), area, &
+         centre(stepper%scene%n_dim), shifted(n_turn(stepper%scene%n_dim))
+      type(solid_t), pointer :: solid
+      integer :: i
+
+      solid => terms_solid(stepper%march%system%term)
+      associate (scene => stepper%scene, u => stepper%march%state%u, n => stepper%scene%n_dim, &
+            output => stepper%scene%step(stepper%march%state%clock%i_step)%output)
+         allocate(values(quantity_components(variable, at_sections, n), size(scene%surface)), &
+            source=0.0_dp)
+         do i = 1, size(values, 2)
+            if (.not. any(output%kind == output_section_print .and. output%set == i)) cycle
+            call surface_area(scene, scene%surface(i), scene%x + square(stepper)*u, area, centre)
+            call section_force(solid, scene, scene%surface(i), u, square(stepper), wrench)
+            select case (variable)
+            case ("SOF")
+               values(:, i) = real(wrench(:n), dp)
+            case ("SOM")
+               values(:, i) = real(wrench(n + 1:), dp)
+            case ("SOMC")
+               shifted = wrench(n + 1:)
+               call add_moments(-centre, wrench(:n), shifted)
+               values(:, i) = real(shifted, dp)
+            case ("SOCENTER")
+               values(:, i) = real(centre, dp)
+            case ("SOAREA")
+               values(:, i) = real(area, dp)
+            end select
+         end do
+      end associate
+   end function section_quantity
 
    !> Of each contact pair (second index): CF, CF_MASTER force and moment about the origin on the
    !> slave and on the master side (3 or 6); CONTACT_LENGTH; CNUM active constraints (1).

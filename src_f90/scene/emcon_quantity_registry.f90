@@ -5,11 +5,12 @@ module emcon_quantity_registry
    implicit none
    private
    public :: quantity_row_t, quantity_row, n_quantity_row, quantity_row_of, quantities_of_card
-   public :: at_nodes, at_elements, at_contacts, at_pairs, of_vector, of_rotation, of_strain, &
-      of_wrench
+   public :: at_nodes, at_elements, at_contacts, at_sections, at_pairs, &
+      of_vector, of_rotation, of_strain, of_wrench
 
    !> Where the values of a quantity are.
-   integer, parameter :: at_nodes = 1, at_elements = 2, at_contacts = 3, at_pairs = 4
+   integer, parameter :: at_nodes = 1, at_elements = 2, at_contacts = 3, &
+      at_sections = 4, at_pairs = 5
 
    !> Components of a vector, in a row: one for each direction; of a rotation: for each plane.
    !> Of a strain: of its tensor, shears twice; of a force and its moment.

@@ -32,6 +32,12 @@ submodule (emcon_quantity_registry) emcon_quantity_rows
          at_contacts), &
       quantity_row_t("CSLIP", at_contacts, of_vector, "contact_slip", "slip_path", .true., &
          at_contacts), &
+      ! of surfaces: force on them, moment about the origin, about their centre; centre, area
+      quantity_row_t("SOF", at_sections, of_vector, card=at_sections), &
+      quantity_row_t("SOM", at_sections, of_rotation, card=at_sections), &
+      quantity_row_t("SOMC", at_sections, of_rotation, card=at_sections), &
+      quantity_row_t("SOCENTER", at_sections, of_vector, card=at_sections), &
+      quantity_row_t("SOAREA", at_sections, card=at_sections), &
       ! force on the slave side with its moment, on the master side; length in contact; how many
       quantity_row_t("CF", at_pairs, of_wrench), &
       quantity_row_t("CF_MASTER", at_pairs, of_wrench), &

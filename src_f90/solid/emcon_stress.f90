@@ -8,22 +8,31 @@ module emcon_stress
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use emcon_corotated_plane, only : corotated_init, corotated_strip, corotated_t, &
       corotated_turn_stress
+   use emcon_element, only : element_geometry_t
    use emcon_element_axial_plane, only : axial_element_hold
    use emcon_element_plane, only : element_motion_t, element_point, point_motion_t
    use emcon_element_space, only : space_element_hold, space_motion_t
    use emcon_user_space, only : user_space_hold
    use emcon_host_law, only : host_response_t, host_state
-   use emcon_incompatible_modes, only : modes_relax
+   use emcon_incompatible_modes, only : modes_relax, modes_return
    use emcon_kinds, only : wp
    use emcon_law, only : law_points_t, law_response_t, n_lane
    use emcon_mean_volume_plane, only : mean_volume_hold
    use emcon_mean_volume_space, only : mean_volume_space_hold
    use emcon_push_forward_plane, only : push_forward
+   use emcon_rotation, only : cross_product
    use emcon_solid, only : solid_t
    use emcon_solid_respond, only : solid_evaluate_user
    implicit none
    private
-   public :: nodal_stress, element_means, element_energies, von_mises
+   public :: nodal_stress, stress_forces, element_means, element_energies, von_mises
+
+   integer, parameter :: n_space = 3
+   !> Place of the strain across the plane, or around, behind those of the plane.
+   integer, parameter :: across = n_space + 1
+   !> Place of each component of the stress tensor.
+   integer, parameter :: place_of(n_space, n_space) = reshape([1, 4, 6, 4, 2, 5, 6, 5, 3], &
+      [n_space, n_space])
 
 contains
 
@@ -169,14 +178,15 @@ contains
       end associate
    end subroutine place_in_frame
 
-   !> Stress and strain (E11, E22, 2 E12) at the quadrature points of element `e`.
+   !> Stress and strain (E11, E22, 2 E12; E33 where it is thin, else 0) at the quadrature points of
+   !> element `e`.
    pure subroutine element_state(solid, e, motion, user, points, stress, strain)
       type(solid_t), intent(in) :: solid
       integer, intent(in) :: e
       type(element_motion_t), intent(in) :: motion       !! of no size
       type(host_response_t), intent(in) :: user
       type(law_points_t), intent(inout) :: points        !! workspace, as it was made
-      real(wp), intent(inout) :: stress(:, :), strain(:, :)   !! (6 and 3, n_gp), and room
+      real(wp), intent(inout) :: stress(:, :), strain(:, :)   !! (6 and 4, n_gp), and room
       type(point_motion_t) :: point
       real(wp) :: f(size(motion%from, 1), size(motion%from, 1), n_lane)
       integer :: before, l, n
@@ -201,8 +211,10 @@ contains
          do l = 1, n
             call push_forward(f(:, :, l), points%stress(l, :), points%stress_33(l), &
                stress(:, before + l))
-            if (motion%square > 0.0_wp .and. solid%trait%is_thin(e)) stress(:, before + l) &
-               = stress(:, before + l)/points%stretch_33(l)
+            strain(across, before + l) = 0.0_wp
+            if (.not. (motion%square > 0.0_wp .and. solid%trait%is_thin(e))) cycle
+            stress(:, before + l) = stress(:, before + l)/points%stretch_33(l)
+            strain(across, before + l) = 0.5_wp*(points%stretch_33(l)**2 - 1.0_wp)
          end do
       end do
    end subroutine element_state
@@ -251,6 +263,115 @@ contains
          end do
       end do
    end subroutine element_means
+
+   !> Internal forces of elements on their nodes, by the stress at the points: int F S grad N. Of
+   !> corotated elements to first order in their strains.
+   subroutine stress_forces(solid, u, square, is_used, force)
+      type(solid_t), intent(in) :: solid
+      real(wp), intent(in), contiguous :: u(:, :)            !! (n_dim, n_node) [L]
+      real(wp), intent(in) :: square             !! part of squares in strains; 0: small
+      logical, intent(in) :: is_used(:)          !! (n_element) those that are asked for
+      real(wp), intent(out) :: force(:, :, :)    !! (n_dim, n_most, n_element) [M L/T^2]
+      type(host_response_t) :: user
+      real(wp), dimension(6, maxval(solid%geometry%n_gp)) :: stress, strain
+      real(wp) :: f(n_space, n_space, size(stress, 2)), s(n_space, n_space)
+      integer :: e, k, n
+
+      call respond_at(solid, u, square, user)
+      force = 0.0_wp
+      n = size(u, 1)
+      do e = 1, solid%n_element
+         if (solid%trait%is_rigid(e) .or. .not. is_used(e)) cycle
+         call state_of(solid, e, u, square, user, stress, strain)
+         associate (geometry => solid%geometry(e))
+            do k = 1, geometry%n_gp
+               call find_deformation(solid, e, k, u, square, f(:, :, k))
+               if (n < n_space .and. square > 0.0_wp) f(n_space, n_space, k) &
+                  = sqrt(1.0_wp + 2.0_wp*strain(across, k))
+               call pull_back(f(:, :, k), stress(:, k))
+            end do
+            if (allocated(geometry%mode)) call return_modes(geometry, n, stress)
+            do k = 1, geometry%n_gp
+               s = reshape(stress([place_of], k), shape(s))
+               force(:, :geometry%n_node, e) = force(:, :geometry%n_node, e) + geometry%weight(k) &
+                  *matmul(matmul(f(:n, :n, k), s(:n, :n)), geometry%gradient(:, :, k))
+            end do
+         end associate
+      end do
+   end subroutine stress_forces
+
+   !> What incompatible modes return of the stresses at the points.
+   pure subroutine return_modes(geometry, n_dim, stress)
+      type(element_geometry_t), intent(in) :: geometry       !! with modes
+      integer, intent(in) :: n_dim
+      real(wp), intent(inout) :: stress(:, :)    !! (6, n_gp), and room [M/(L T^2)]
+      integer :: k, row(size(geometry%mode, 1))
+
+      row = [(k, k = 1, size(row))]
+      if (n_dim < n_space) row(size(row)) = place_of(1, n_dim)
+      associate (n => geometry%n_gp)
+         stress(row, :n) = returned(stress(row, :n))
+      end associate
+
+   contains
+
+      pure function returned(values) result(part)
+         real(wp), intent(in) :: values(:, :)
+         real(wp) :: part(size(values, 1), size(values, 2))
+
+         part = values
+         call modes_return(geometry, part)
+      end function returned
+
+   end subroutine return_modes
+
+   !> By what the material at a point of an element is turned and stretched; 1 across the plane.
+   pure subroutine find_deformation(solid, e, point, u, square, f)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e, point
+      real(wp), intent(in), contiguous :: u(:, :)            !! (n_dim, n_node) [L]
+      real(wp), intent(in) :: square             !! part of squares in strains; 0: small
+      real(wp), intent(out) :: f(n_space, n_space)
+      type(element_motion_t) :: motion
+      real(wp) :: turn(size(u, 1), size(u, 1))
+      integer :: a, n
+
+      n = size(u, 1)
+      f = 0.0_wp
+      do a = 1, n_space
+         f(a, a) = 1.0_wp
+      end do
+      if (solid%trait%is_corotated(e)) then
+         call place(solid, e, u, motion, turn)
+         f(:n, :n) = turn
+      else if (.not. solid%trait%is_small(e)) then
+         associate (node => solid%node(:solid%geometry(e)%n_node, e))
+            f(:n, :n) = f(:n, :n) + square*matmul(u(:, node) &
+               - spread(u(:, node(1)), 2, size(node)), &
+               transpose(solid%geometry(e)%gradient(:, :, point)))
+         end associate
+      end if
+   end subroutine find_deformation
+
+   !> The stress of the reference, det F F^-1 sigma F^-T, in place of Cauchy's.
+   pure subroutine pull_back(f, stress)
+      real(wp), intent(in) :: f(n_space, n_space)            !! det F > 0
+      real(wp), intent(inout) :: stress(6)       !! xx, yy, zz, xy, yz, xz [M/(L T^2)]
+      real(wp) :: s(n_space, n_space), cofactor(n_space, n_space)
+      integer :: a, b
+
+      do a = 1, n_space
+         cofactor(:, a) = cross_product(f(:, 1 + modulo(a, n_space)), &
+            f(:, 1 + modulo(a + 1, n_space)))
+      end do
+      s = reshape(stress([place_of]), shape(s))
+      s = matmul(transpose(cofactor), matmul(s, cofactor))/dot_product(f(:, 1), cofactor(:, 1))
+      do b = 1, n_space
+         do a = 1, b
+            stress(place_of(a, b)) = s(a, b)
+         end do
+      end do
+   end subroutine pull_back
 
    !> Kinetic energy of each element.
    pure subroutine element_energies(solid, v, energy)

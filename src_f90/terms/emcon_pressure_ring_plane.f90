@@ -8,7 +8,7 @@ module emcon_pressure_ring_plane
    use emcon_turn_plane, only : turned_left
    implicit none
    private
-   public :: press_ring, press_ring_stiffness
+   public :: press_ring, press_ring_stiffness, ring_area
 
    !> Points along an edge and their weights, exact to degree 5: an edge of three nodes has that.
    real(wp), parameter :: point(3) = [-sqrt(0.6_wp), 0.0_wp, sqrt(0.6_wp)]
@@ -74,6 +74,29 @@ contains
          end do
       end do
    end subroutine press_ring_stiffness
+
+   !> The length of an edge, or the area that it sweeps around the axis, and its integrals of the
+   !> place: of a circle its centre.
+   pure subroutine ring_area(place, is_ring, size_of)
+      real(wp), intent(in) :: place(:, :)                  !! (2, 2 or 3) of a, b, m [L]
+      logical, intent(in) :: is_ring                       !! it goes around the axis
+      real(wp), intent(out) :: size_of(:)                  !! (1 + 2) [L], [L^2]; of a ring times L
+      real(wp), dimension(size(place, 2)) :: value, slope
+      real(wp) :: at(2), length
+      integer :: k
+
+      size_of = 0.0_wp
+      do k = 1, size(point)
+         call edge_functions(point(k), value, slope)
+         at = matmul(place, value)
+         length = weight(k)*norm2(matmul(place, slope))
+         if (is_ring) then
+            length = length*two_pi*at(1)
+            at(1) = 0.0_wp
+         end if
+         size_of = size_of + length*[1.0_wp, at]
+      end do
+   end subroutine ring_area
 
    pure subroutine take_places(edge, x, u, follows, place)
       integer, intent(in) :: edge(:)

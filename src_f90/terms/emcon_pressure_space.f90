@@ -8,7 +8,7 @@ module emcon_pressure_space
    use emcon_shape, only : shape_table_t
    implicit none
    private
-   public :: press_face, press_face_stiffness
+   public :: press_face, press_face_stiffness, face_area
 
    integer, parameter :: n_dim = 3
    !> Natural coordinates of a face.
@@ -35,6 +35,22 @@ contains
          end do
       end do
    end subroutine press_face
+
+   !> The area of a face, and its integrals of the place.
+   pure subroutine face_area(table, place, size_of)
+      type(shape_table_t), intent(in) :: table   !! of a face of so many
+      real(wp), intent(in) :: place(:, :)        !! (3, n) of its nodes [L]
+      real(wp), intent(out) :: size_of(:)        !! (1 + 3) [L^2], [L^3]
+      real(wp) :: tangent(n_dim, along:across), area
+      integer :: k
+
+      size_of = 0.0_wp
+      do k = 1, table%n_gp
+         tangent = tangents_at(table, k, place)
+         area = table%weight(k)*norm2(cross_product(tangent(:, along), tangent(:, across)))
+         size_of = size_of + area*[1.0_wp, matmul(place, table%value(:, k))]
+      end do
+   end subroutine face_area
 
    !> Its derivative by the places of the nodes, with the sign of a force on the other side.
    pure subroutine press_face_stiffness(table, p, place, slot, value, side)

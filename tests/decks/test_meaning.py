@@ -374,7 +374,7 @@ def test_output_in_the_words_of_abaqus(asked, plain, tmp_path):
 
 def test_a_step_of_cards_that_change_nothing_has_no_procedure(tmp_path):
     deck = tmp_path/"deck.inp"
-    for cards in ("*CONTROLS\n", "*SECTION PRINT, NAME=P, SURFACE=UPPER\nSOF\n"):
+    for cards in ("*CONTROLS\n", "*SECTION FILE, NAME=P, SURFACE=UPPER\nSOF\n"):
         deck.write_text(moving().replace("*DYNAMIC, DIRECT\n0.5, 1.\n", cards))
         assert "the step has no procedure" in emcon("check", "--lenient", deck).stderr
 
