@@ -55,9 +55,9 @@ module emcon_deck_output
 
    !> Variables of other programs that are not written here: a warning says so.
    character(len=*), parameter :: unwritten(*) = [character(len=5) :: "PE", "PEEQ", "PEMAG", &
-      "CEEQ", "LE", "EE", "IE", "NE", "THE", "ME", "NOE", "ERR", "HER", "ZZS", "PHS", "MAXS", &
+      "CEEQ", "LE", "EE", "IE", "NE", "THE", "NOE", "ERR", "HER", "ZZS", "PHS", "MAXS", &
       "MAXE", "MAXU", "SMID", "SNEG", "SPOS", "SF", "SVF", "SDV", "NT", "RFL", "HFL", "HFLF", &
-      "A", "COORD", "CENT", "EMAS", "CELS", "CFN", "CFS", "PCON"]
+      "A", "CENT", "EMAS", "CELS", "CFN", "CFS", "PCON"]
 
    character(len=*), parameter :: energies(4) = [character(len=6) :: "ALLKE", "ALLSE", "ALLWK", &
       "ETOTAL"]
@@ -357,7 +357,8 @@ contains
       select case (name)
       case ("CELS"); text = "the history has it in the column contact_energy; "
       case ("CFN", "CFS"); text = "CF is the whole force; "
-      case ("LE", "EE", "ME"); text = "E is the strain; "
+      case ("LE", "EE"); text = "E is the strain; "
+      case ("PE", "PEEQ", "PEMAG", "CEEQ"); text = "it is 0, materials are elastic; "
       case default; text = ""
       end select
    end function instead_of

@@ -139,8 +139,8 @@ contains
       row = quantity_row_t()
    end function field_row
 
-   !> U, V, RF: (n_dim, n_node); UR, VR, RM (1, n_node); S: Cauchy stress and von Mises stress (7,
-   !> n_node).
+   !> U, V, COORD, RF: (n_dim, n_node); UR, VR, RM (1, n_node); S: Cauchy stress and von Mises
+   !> stress (7, n_node).
    function node_quantity(stepper, variable) result(values)
       type(stepper_t), intent(in), target :: stepper
       character(len=*), intent(in) :: variable
@@ -157,6 +157,9 @@ contains
             call stand_in_shows(stepper%scene%node%turned, values)
          case ("V")
             values = real(state%v, dp)
+            call stand_in_shows(stepper%scene%node%turned, values)
+         case ("COORD")
+            values = real(stepper%scene%x + state%u, dp)
             call stand_in_shows(stepper%scene%node%turned, values)
          case ("RF")
             values = real(state%reaction, dp)

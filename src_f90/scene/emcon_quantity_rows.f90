@@ -12,10 +12,12 @@ submodule (emcon_quantity_registry) emcon_quantity_rows
       quantity_row_t("UR", at_nodes, of_rotation, "rotation", "", .true., at_nodes, "UR3"), &
       quantity_row_t("VR", at_nodes, of_rotation, "spin", "", .true., at_nodes, "VR3"), &
       quantity_row_t("RM", at_nodes, of_rotation, "reaction_moment", "", .true., at_nodes, "RM3"), &
+      ! place where the node is [L]
+      quantity_row_t("COORD", at_nodes, of_vector, "position", card=at_nodes), &
       ! Cauchy stress, and that of von Mises [M/(L T^2)]; of elements, as the strain, means
       quantity_row_t("S", at_nodes, 7, "cauchy_stress", "von_mises", card=at_elements), &
       quantity_row_t("S", at_elements, 6, card=at_elements), &
-      quantity_row_t("E", at_elements, of_strain, "strain", card=at_elements), &
+      quantity_row_t("E", at_elements, of_strain, "strain", "", .false., at_elements, "ME"), &
       ! energies [M L^2/T^2], reference volume [L^3]
       quantity_row_t("ENER", at_elements, 1, "strain_energy", card=at_elements), &
       quantity_row_t("ELSE", at_elements, 1, "strain_energy", card=at_elements), &

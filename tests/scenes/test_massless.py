@@ -14,6 +14,7 @@ from emcon import Stepper
 
 sys.path.insert(0, str(ROOT / "tests" / "bench"))
 from book import forces  # noqa: E402
+from trade_discs import roughness  # noqa: E402
 
 MASSLESS = {"initiation": "MASSLESS"}
 BACK = "contact nodes take their mass back"
@@ -76,14 +77,6 @@ def disc_on_floor(angle, shift, h, edges=24):
     width = 4.0/(edges//2)
     scene.block("FLOOR", (-1.0 + shift*width, -0.3), (4.0, 0.3), (edges//2, 1))
     return scene.hold("FLOOR", lambda x, y: True)
-
-
-def roughness(run):
-    """Rms of the second differences of the force over its mean, while it acts."""
-    force = np.diff(run.history["py"])/np.diff(run.history["time"])
-    acts = np.flatnonzero(force > 1e-9*force.max())
-    force = force[acts[0]:acts[-1] + 1]
-    return np.sqrt(np.mean(np.diff(force, 2)**2))/force.mean()
 
 
 @pytest.mark.parametrize("order", ["DISC", "FLOOR"])
