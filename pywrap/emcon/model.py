@@ -296,16 +296,25 @@ class Model(Source):
         return self
 
     def section(self, material: str, elements: str = "ALL", *, thickness: Number = 1.0,
-                kinematics: str | None = None, massless: bool = False) -> Model:
+                kinematics: str | None = None, massless: bool = False,
+                orientation: str | None = None) -> Model:
         """`*SOLID SECTION`: an element set is of a material, of `thickness` [L].
 
         kinematics    NONLINEAR (default), as the steps say; LINEAR: small strains in all steps;
                       COROTATED: the same in frames that turn with the elements
         massless      no inertia in dynamic steps: a quasi-static part
+        orientation   axes of a material with directions
         """
         return self._card("SOLID SECTION", {"ELSET": elements, "MATERIAL": material,
-                                            "KINEMATICS": kinematics, "MASSLESS": massless},
-                          [(thickness,)])
+                                            "KINEMATICS": kinematics, "MASSLESS": massless,
+                                            "ORIENTATION": orientation}, [(thickness,)])
+
+    def orientation(self, name: str, a: Sequence[Number], b: Sequence[Number]) -> Model:
+        """`*ORIENTATION`: axes of a material, for `section`.
+
+        a, b    points on the first axis, and on the second side of it, from the origin; x, y, z
+        """
+        return self._card("ORIENTATION", {"NAME": name, "SYSTEM": "RECTANGULAR"}, [(*a, *b)])
 
     def rigid_body(self, elements: str | None, reference: int | str, *,
                    profile: str | None = None) -> Model:

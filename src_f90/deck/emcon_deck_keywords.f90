@@ -67,7 +67,8 @@ module emcon_deck_keywords
          // "!FILLETRADIUS:0"), &
       keyword_t("GIVEN FORCES", in_model, "NSET=", has_data=.false.), &
       keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,KINEMATICS=,MASSLESS," &
-         // "~ORIENTATION,!OFFSET:0,~CONTROLS"), &
+         // "ORIENTATION=,!OFFSET:0,~CONTROLS"), &
+      keyword_t("ORIENTATION", in_model, "NAME=,SYSTEM=,~DEFINITION:COORDINATES"), &
       keyword_t("RIGID BODY", in_model, "ELSET=,ANALYTICALSURFACE=,REFNODE=,!NSET,!ROTNODE," &
          // "!PINNSET,!TIENSET,!POSITION:INPUT,!ISOTHERMAL:NO", has_data=.false.), &
       keyword_t("MATERIAL", in_model, "NAME=", has_data=.false.), &
@@ -168,7 +169,6 @@ module emcon_deck_keywords
       refusal_t("there is no temperature", &
          "EXPANSION,CONDUCTIVITY,SPECIFIC HEAT,PHYSICAL CONSTANTS,GAP CONDUCTANCE," &
          // "GAP HEAT GENERATION", is_idle=.true.), &
-      refusal_t("materials are isotropic", "ORIENTATION", is_idle=.true.), &
       refusal_t("elements have no artificial stiffness", "SECTION CONTROLS,HOURGLASS STIFFNESS", &
          is_idle=.true.), &
       refusal_t("use *SOLID SECTION", "UEL PROPERTY"), &
@@ -298,8 +298,6 @@ contains
             // "SCHEME=GENERALIZED ALPHA has)"
       case ("SMALLSLIDING")
          reason = " (contact follows the deformed surfaces)"
-      case ("ORIENTATION")
-         reason = " (materials are isotropic, and directions are those of the axes of the model)"
       case ("NOSEPARATION")
          reason = " (surfaces part; *TIE holds them together)"
       case ("RELATIVETOABSOLUTE")

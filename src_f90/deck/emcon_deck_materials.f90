@@ -1,5 +1,7 @@
 !> *MATERIAL with its cards, and *SOLID SECTION.
 module emcon_deck_materials
+   use emcon_deck_anisotropic, only : anisotropic_constants, anisotropic_names, is_anisotropic, &
+      note_orientations, read_orientation, turn_constants
    use emcon_deck_damping, only : read_damping
    use emcon_deck_dimension, only : n_plane
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
@@ -12,7 +14,7 @@ module emcon_deck_materials
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_t
-   use emcon_law_registry, only : find_law_row, law_create, law_user, law_row, &
+   use emcon_law_registry, only : find_law_row, law_anisotropic, law_create, law_user, law_row, &
       law_row_t, n_constant, n_law_row
    use emcon_materials, only : kinematics_nonlinear, material_t, section_t
    use emcon_name_index, only : name_index_find, name_index_put
@@ -23,6 +25,7 @@ module emcon_deck_materials
    private
    public :: read_materials, read_sections
 
+   integer, parameter :: n_axis = 3
    integer, parameter :: per_line = 8             !! constants in a data line
 
 contains
@@ -112,9 +115,13 @@ contains
       logical :: ok
 
       call choose_law(reader, card, material%law, i_row)
-      if (card%name == "ELASTIC" .and. option_name(card, "TYPE") /= "ISOTROPIC") call &
-         option_word(reader, card, "TYPE", "ISO", word, "ORTHO, ANISO, ENGINEERING CONSTANTS, " // &
-         "ORTHOTROPIC, ANISOTROPIC, LAMINA", "materials are isotropic")
+      if (is_anisotropic(card)) then
+         call read_anisotropic(reader, card, material)
+         return
+      end if
+      if (card%name == "ELASTIC") call option_word(reader, card, "TYPE", "ISO, ORTHO, ANISO, " // &
+         "ENGINEERING CONSTANTS, ISOTROPIC, ORTHOTROPIC, ANISOTROPIC", word, "LAMINA", &
+         "sheets of layers; use ENGINEERING CONSTANTS with solids")
       if (i_row == 0) return
       row = law_row(i_row)
       allocate(value(n_constant(row)))
@@ -128,6 +135,53 @@ contains
       end if
       material%constant = value
    end subroutine read_law
+
+   !> Linear elasticity along axes of the material.
+   subroutine read_anisotropic(reader, card, material)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(material_t), intent(inout) :: material
+      real(wp) :: value(size(anisotropic_names(card)))
+      type(error_t), allocatable :: error
+      class(law_t), allocatable :: law
+      logical :: ok
+
+      material%law = law_anisotropic
+      call read_constants(reader, card, anisotropic_names(card), value, ok)
+      if (.not. ok) return
+      if (any(anisotropic_names(card) == "E1") .and. any(value(:n_axis) <= 0.0_wp)) then
+         call card_error(reader, card, "E1, E2, E3 must be positive")
+         return
+      end if
+      material%constant = anisotropic_constants(anisotropic_names(card), value)
+      call law_create(material%law, material%constant, law, error)
+      if (allocated(error)) call card_error(reader, card, error%message)
+   end subroutine read_anisotropic
+
+   !> The material of a section with an ORIENTATION: a copy whose constants are along the axes of
+   !> the model.
+   subroutine turn_material(reader, card, scene, section)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(inout) :: scene
+      type(section_t), intent(inout) :: section
+      type(material_t) :: turned
+      real(wp) :: axes(n_axis, n_axis)
+      logical :: ok
+
+      if (section%material == 0 .or. option_name(card, "ORIENTATION") == "") return
+      if (scene%material(section%material)%law /= law_anisotropic) then
+         call card_warning(reader, card, "parameter ORIENTATION has no effect (materials are " &
+            // "isotropic, and directions are those of the axes of the model)")
+         return
+      end if
+      call read_orientation(reader, card, axes, ok)
+      turned = scene%material(section%material)
+      if (.not. ok .or. size(turned%constant) == 0) return
+      turned%constant = turn_constants(turned%constant, axes)
+      scene%material = [scene%material, turned]
+      section%material = size(scene%material)
+   end subroutine turn_material
 
    !> Code and row of the law; row 0: refused. A law is there, even if it is wrong: that none is
    !> given need not be told as well.
@@ -282,15 +336,21 @@ contains
    subroutine read_sections(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(inout) :: scene
+      logical :: uses_axes
       integer :: i, n
 
+      uses_axes = .false.
       allocate(scene%section(n_cards(reader, "SOLIDSECTION")))
       n = 0
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= "SOLIDSECTION") cycle
          n = n + 1
          call read_section(reader, reader%card(i), scene, n)
+         if (scene%section(n)%material == 0) cycle
+         uses_axes = uses_axes .or. (has_option(reader%card(i), "ORIENTATION") .and. &
+            scene%material(scene%section(n)%material)%law == law_anisotropic)
       end do
+      call note_orientations(reader, uses_axes)
    end subroutine read_sections
 
    subroutine read_section(reader, card, scene, i_section)
@@ -317,6 +377,8 @@ contains
             call card_error(reader, card, "unknown material " // quoted(name) &
                // suggestion(name, known))
          end if
+         call check_directions(reader, card, scene, section)
+         call turn_material(reader, card, scene, section)
          call read_kinematics(reader, card, scene, section)
          section%is_massless = has_option(card, "MASSLESS")
          call data_open(data, card)
@@ -347,6 +409,21 @@ contains
          "element set " // quoted(set_name) // " holds lines too, which have no stiffness; give " &
          // "the section a set without them")
    end subroutine read_section
+
+   !> Materials with directions are of three dimensions.
+   subroutine check_directions(reader, card, scene, section)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(section_t), intent(in) :: section
+
+      if (section%material == 0 .or. scene%n_dim /= n_plane) return
+      associate (material => scene%material(section%material))
+         if (material%law == law_anisotropic) call card_error(reader, card, "material " &
+            // material%name // " has other constants along other directions (*ELASTIC, TYPE=), " &
+            // "which is for elements C3D alone; use *ELASTIC with E and nu")
+      end associate
+   end subroutine check_directions
 
    !> How the elements deform. Small strains take the stiffness of a law at rest, which a law
    !> that a program gives does not tell before the deck is read.

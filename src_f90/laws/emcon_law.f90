@@ -33,6 +33,9 @@ module emcon_law
       !> E33 = E13 = E23 = 0 alone, and W in space is the sum of `part`.
       integer :: n_part = 0
       real(wp) :: exponent(max_part) = 1.0_wp    !! (:n_part) of the stretches
+      !> (6, 6) of components 11, 22, 33, 12, 23, 13: W in space is 1/2 E.C E, and `energy` that of
+      !> an isotropic law near it; not allocated: W is of invariants [M/(L T^2)]
+      real(wp), allocatable :: moduli(:, :)
    contains
       procedure(take_interface), deferred :: take
       procedure(energy_interface), deferred :: energy

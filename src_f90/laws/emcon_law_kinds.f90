@@ -2,6 +2,7 @@
 !> `allocate_law`.
 submodule (emcon_law_registry) emcon_law_kinds
    use emcon_law, only : law_response_plane, law_response_t
+   use emcon_law_anisotropic, only : law_anisotropic_t
    use emcon_law_coupled_neo_hooke, only : law_coupled_neo_hooke_t
    use emcon_law_linear, only : law_linear_t
    use emcon_law_mooney_rivlin, only : law_mooney_rivlin_t
@@ -11,7 +12,7 @@ submodule (emcon_law_registry) emcon_law_kinds
    use emcon_law_yeoh, only : law_yeoh_t
    implicit none
 
-   !> Codes besides those of the registry, of which `law_user` has no row.
+   !> Codes besides those of the registry.
    integer, parameter :: law_neo_hooke = 2, law_coupled_neo_hooke = 3, law_mooney_rivlin = 5, &
       law_yeoh = 6, law_ogden = 7
 
@@ -57,6 +58,8 @@ contains
          allocate(law_yeoh_t :: law)
       case (law_ogden)
          allocate(law_ogden_t :: law)
+      case (law_anisotropic)
+         allocate(law_anisotropic_t :: law)
       end select
    end procedure allocate_law
 
@@ -68,6 +71,9 @@ contains
       select type (law)
       type is (law_linear_t)
          plain = law
+      type is (law_anisotropic_t)
+         allocate(linear, source=law)
+         return
       class default
          call law_response_plane(law, rest, rest, response)
          plain%mu = law%shear                    ! the tangent is by the end of a step of no size
@@ -88,6 +94,8 @@ contains
          call plain%make_thin()
          allocate(thin, source=plain)
       type is (law_ogden_t)                      ! its stretches are those of E33 = 0
+         return
+      type is (law_anisotropic_t)                ! of three dimensions
          return
       class default
          call thin_law(law, thin)

@@ -8,11 +8,11 @@ module emcon_law_registry
    implicit none
    private
    public :: law_row_t, law_row, n_law_row, law_titles, law_variants, find_law_row, n_constant
-   public :: law_create, law_linearise, law_make_thin, law_linear, law_user
+   public :: law_create, law_linearise, law_make_thin, law_linear, law_user, law_anisotropic
 
    !> Codes of laws that others ask for: linear elasticity, under NLGEOM St. Venant-Kirchhoff; those
-   !> given by a program.
-   integer, parameter :: law_linear = 1, law_user = 4
+   !> given by a program; linear ones of any symmetry, in space. The last two have no row.
+   integer, parameter :: law_linear = 1, law_user = 4, law_anisotropic = 8
 
    integer, parameter :: max_constant = 9
 
@@ -127,7 +127,7 @@ contains
          row = law_row(i)
          if (row%code == code .and. n_constant(row) == size(constant)) exit
       end do
-      if (i > n_law_row()) then
+      if (i > n_law_row() .and. code /= law_anisotropic) then
          call raise(error, err_input, "a law got too many or too few constants")
          return
       end if

@@ -3,7 +3,7 @@ module emcon_report_bodies
    use emcon_csr, only : csr_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_response_plane, law_response_t
-   use emcon_law_registry, only : law_user, law_row, law_row_t, n_law_row
+   use emcon_law_registry, only : law_anisotropic, law_user, law_row, law_row_t, n_law_row
    use emcon_locking, only : locking_ratio
    use emcon_report_row, only : report_row_t, report_rows_t, row_begin, row_put, rows_add
    use emcon_rotation, only : n_turn
@@ -273,6 +273,7 @@ contains
          if (row%code == body%law) name = trim(row%name)
       end do
       if (body%law == law_user) name = "given law"
+      if (body%law == law_anisotropic) name = "anisotropic"
    end subroutine name_law
 
    subroutine name_kinematics(body, name)

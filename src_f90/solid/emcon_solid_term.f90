@@ -10,7 +10,7 @@ module emcon_solid_term
    use emcon_host_law, only : host_law_t, host_response_t
    use emcon_kinds, only : dp, wp
    use emcon_law, only : n_lane
-   use emcon_law_registry, only : law_linear
+   use emcon_law_registry, only : law_anisotropic, law_linear
    use emcon_motion, only : motion_t
    use emcon_pack_shares, only : border_keep, pack_shares_t, shares_has, shares_lay_out
    use emcon_point_function, only : point_failed
@@ -64,6 +64,7 @@ contains
             .not. self%solid%trait%is_small)) = .true.
       end if
       self%has_linear_laws = all(scene%material%law == 0 .or. scene%material%law == law_linear &
+         .or. scene%material%law == law_anisotropic &
          .or. .not. is_here)
       self%is_empty = all(self%solid%trait%is_small) .and. self%solid%n_element > 0
    end subroutine solid_term_init
