@@ -153,29 +153,48 @@ module emcon_deck_keywords
 
    !> Keywords of other programs that are known but not supported, and those that change nothing.
    type(refusal_t), parameter :: refusals(*) = [ &
-      refusal_t("linear couplings go by *EQUATION", &
-         "MPC,COUPLING,KINEMATIC,DISTRIBUTING,EMBEDDED ELEMENT"), &
+      refusal_t("write what it couples as *EQUATION; what moves as a whole is a *RIGID BODY", &
+         "MPC"), &
+      refusal_t("make the coupled part a *RIGID BODY, or couple its nodes by *EQUATION", &
+         "COUPLING,KINEMATIC"), &
+      refusal_t("spread the force over the nodes by *CLOAD, over faces by *DSLOAD", &
+         "DISTRIBUTING"), &
+      refusal_t("give the parts common nodes, or join their surfaces by *TIE", &
+         "EMBEDDED ELEMENT"), &
       refusal_t("use *RIGID BODY and TYPE=SEGMENTS", "RIGID SURFACE"), &
       refusal_t("coordinates are those of the global axes", "SYSTEM"), &
       refusal_t("nodes are given one by one by *NODE", "NGEN,NCOPY,NFILL"), &
       refusal_t("elements are given one by one by *ELEMENT", "ELGEN,ELCOPY"), &
-      refusal_t("materials are elastic", "PLASTIC,CYCLIC HARDENING,CREEP,VISCOELASTIC,DAMAGE " &
-         // "INITIATION,DAMAGE EVOLUTION,DEFORMATION PLASTICITY,MOHR COULOMB,DRUCKER PRAGER," &
+      refusal_t("materials are elastic; leave it out where stresses stay below the yield stress", &
+         "PLASTIC,CYCLIC HARDENING,DEFORMATION PLASTICITY,MOHR COULOMB,DRUCKER PRAGER," &
          // "CHANGE PLASTIC"), &
+      refusal_t("materials are elastic, and stay whole", "DAMAGE INITIATION,DAMAGE EVOLUTION"), &
+      refusal_t("materials are elastic; take the moduli of the time that is of interest", &
+         "CREEP,VISCOELASTIC"), &
       refusal_t("use *HYPERELASTIC, NEO HOOKE", "HYPERFOAM"), &
       refusal_t("materials have no state variables", "DEPVAR"), &
-      refusal_t("there is no temperature", "TEMPERATURE,DFLUX,CFLUX,FILM,RADIATE,HEAT TRANSFER," &
-         // "COUPLED TEMPERATURE-DISPLACEMENT,UNCOUPLED TEMPERATURE-DISPLACEMENT"), &
+      refusal_t("there is no temperature; move surfaces by *CONTACT INTERFERENCE or *BOUNDARY", &
+         "TEMPERATURE"), &
+      refusal_t("there is no temperature; the procedures are *STATIC and *DYNAMIC", &
+         "DFLUX,CFLUX,FILM,RADIATE,HEAT TRANSFER,COUPLED TEMPERATURE-DISPLACEMENT," &
+         // "UNCOUPLED TEMPERATURE-DISPLACEMENT"), &
       refusal_t("there is no temperature", &
          "EXPANSION,CONDUCTIVITY,SPECIFIC HEAT,PHYSICAL CONSTANTS,GAP CONDUCTANCE," &
          // "GAP HEAT GENERATION", is_idle=.true.), &
       refusal_t("elements have no artificial stiffness", "SECTION CONTROLS,HOURGLASS STIFFNESS", &
          is_idle=.true.), &
       refusal_t("use *SOLID SECTION", "UEL PROPERTY"), &
-      refusal_t("bodies are solids; forces, potentials and masses of others a program may give", &
-         "SHELL SECTION,SHELL GENERAL SECTION,BEAM SECTION,BEAM GENERAL SECTION,MEMBRANE " &
-         // "SECTION,COHESIVE SECTION,CONNECTOR SECTION,SURFACE SECTION,NODAL THICKNESS,NORMAL," &
-         // "SPRING,DASHPOT,MASS,ROTARY INERTIA"), &
+      refusal_t("mesh the thickness with solid elements, such as C3D8I or C3D20R", &
+         "SHELL SECTION,SHELL GENERAL SECTION,MEMBRANE SECTION,SURFACE SECTION,NODAL " &
+         // "THICKNESS,NORMAL"), &
+      refusal_t("mesh the cross section with solid elements, such as C3D8I or C3D20R", &
+         "BEAM SECTION,BEAM GENERAL SECTION"), &
+      refusal_t("use *CONTACT PAIR or *TIE", "COHESIVE SECTION"), &
+      refusal_t("use *EQUATION or *RIGID BODY", "CONNECTOR SECTION"), &
+      refusal_t("use a strip of soft solid elements, or a program that gives a potential", &
+         "SPRING"), &
+      refusal_t("damp the material by *DAMPING, or contact by *CONTACT DAMPING", "DASHPOT"), &
+      refusal_t("give this mass to solid elements by their *DENSITY", "MASS,ROTARY INERTIA"), &
       refusal_t(gap_instead, "GAP"), &
       refusal_t("list what touches by *CONTACT INCLUSIONS", "CONTACT EXCLUSIONS"), &
       refusal_t("all with all holds the nodes of both sides", "CONTACT FORMULATION"), &
@@ -196,9 +215,12 @@ module emcon_deck_keywords
       refusal_t("use *BOUNDARY with an amplitude", "BASE MOTION"), &
       refusal_t("*NEWTON and the procedure say how steps are solved", "CONTROLS", &
          is_idle=.true.), &
+      refusal_t("let the body swing in a *DYNAMIC step, and read frequencies off its history", &
+         "FREQUENCY,COMPLEX FREQUENCY,MODAL DYNAMIC,STEADY STATE DYNAMICS"), &
+      refusal_t("load beyond the limit in a step with NLGEOM, *DYNAMIC or *STATIC, STABILIZE", &
+         "BUCKLE"), &
       refusal_t("the procedures are *STATIC and *DYNAMIC", &
-         "FREQUENCY,COMPLEX FREQUENCY,BUCKLE,MODAL DYNAMIC,STEADY STATE DYNAMICS,VISCO,GREEN," &
-         // "SENSITIVITY,SUBSTRUCTURE GENERATE,ELECTROMAGNETICS,CFD"), &
+         "VISCO,GREEN,SENSITIVITY,SUBSTRUCTURE GENERATE,ELECTROMAGNETICS,CFD"), &
       refusal_t("results go by *NODE FILE, *EL FILE and *... PRINT", &
          "SECTION FILE,INTEGRATED OUTPUT,INTEGRATED OUTPUT SECTION", .true.), &
       refusal_t("it names no results", "FILE FORMAT,MONITOR,INCREMENTATION OUTPUT,FILTER,PRINT", &

@@ -21,14 +21,14 @@ module emcon_deck_mesh
    public :: read_nodes, read_elements
 
    !> Element types of Abaqus and CalculiX that are not read.
-   character(len=7), parameter :: foreign_types(*) = [character(len=7) :: &
+   character(len=8), parameter :: foreign_types(*) = [character(len=8) :: &
       "CPE4RH", "CPE3H", "CPE6H", "CPE6M", "CPE8H", "CPE8RH", &
       "CAX4R", "CAX4I", "CAX4H", "CAX8H", "CAX8RH", &
       "C3D4H", "C3D6", "C3D10M", &
       "C3D15", "C3D20RH", "C3D10T", "F3D8", "S3", "S4", "S3R", "S4R", "S6", "S8", "S8R", &
       "M3D3", "M3D4", "M3D4R", "M3D6", "M3D8", "B21", "B22", "B31", "B31R", "B32", "B32R", &
       "T3D3", "R2D2", "R3D3", "R3D4", "MASS", "SPRINGA", "SPRING1", "SPRING2", &
-      "DASHPTA", "GAPUNI", "DCOUP3D"]
+      "SPRING", "DASHPTA", "DASHPOT", "DASHPOTA", "GAPUNI", "DCOUP3D", "CONN3D2"]
 
    !> Elements of one point, which hold their shape by forces that have no energy, and those that
    !> are taken in their place.
@@ -325,7 +325,7 @@ contains
             // "ELEMENT")
       else if (any(foreign_types == type_name)) then
          call card_error(reader, card, "element type " // type_name &
-            // " is known but not supported by this version" // instead(type_name) &
+            // " is known but not supported by this version" // instead_of(type_name) &
             // "; supported:" // list)
       else
          call card_error(reader, card, "unknown element type " // quoted(type_name) &
@@ -333,22 +333,23 @@ contains
       end if
    end subroutine refuse_type
 
-   !> What to do without an element type that is not read; empty: take another one.
-   pure function instead(type_name) result(text)
-      character(len=*), intent(in) :: type_name  !! one of `foreign_types`
+   !> What to do without elements that are no solids.
+   pure function instead_of(type_name) result(text)
+      character(len=*), intent(in) :: type_name
       character(len=:), allocatable :: text
 
-      select case (type_name)
-      case ("GAPUNI")
-         text = " (" // gap_instead // ")"
-      case ("MASS", "SPRINGA", "SPRING1", "SPRING2", "DASHPTA")
-         text = " (a program that calls the library may give masses, forces and potentials)"
-      case ("R2D2", "R3D3", "R3D4")
-         text = " (use *RIGID BODY with elements of the body, or with a *SURFACE, TYPE=SEGMENTS)"
-      case default
-         text = ""
-      end select
-   end function instead
+      text = ""
+      if (scan(type_name(1:1), "SM") == 1) text = "; mesh the thickness with solid elements"
+      if (type_name(1:1) == "B") text = "; mesh the cross section with solid elements"
+      if (index(type_name, "SPRING") == 1) text = "; use a strip of soft solid elements"
+      if (index(type_name, "DASHP") == 1) text = "; damp the material by *DAMPING"
+      if (index(type_name, "GAP") == 1) text = "; " // gap_instead
+      if (index(type_name, "MASS") == 1) text = "; give this mass to solid elements by *DENSITY"
+      if (any(type_name == ["DCOUP3D", "CONN3D2"])) text = "; couple nodes by *EQUATION or " &
+         // "*RIGID BODY"
+      if (index(type_name, "R2D") + index(type_name, "R3D") > 0) text = "; use *RIGID BODY with " &
+         // "solid elements"
+   end function instead_of
 
    !> The nodes of one element, 0 throughout if any is wrong. The list goes on in the next line
    !> after a comma at the end of a line.

@@ -514,3 +514,33 @@ TIP, WALL
     cards = "*CLOAD\nEND, 2, {}\n"
     done = run(tmp_path, BAR + wall + static(cards.format(1.0), cards.format(2.0)))
     assert np.allclose(ends(done), [[COMPLIANCE*LENGTH*2.0]*2, [0.05]*2], rtol=1e-9, atol=0.0)
+
+
+@pytest.mark.parametrize(("card", "told"), [
+    ("*MPC\nBEAM, 1, 2\n", "write what it couples as *EQUATION; what moves as a whole is a *RIGID BODY"),
+    ("*COUPLING, CONSTRAINT NAME=C, REF NODE=1, SURFACE=S\n", "make the coupled part a *RIGID BODY"),
+    ("*DISTRIBUTING\n1, 3\n", "spread the force over the nodes by *CLOAD"),
+    ("*EMBEDDED ELEMENT\nE\n", "join their surfaces by *TIE"),
+    ("*SPRING, ELSET=E\n", "use a strip of soft solid elements"),
+    ("*DASHPOT, ELSET=E\n", "damp the material by *DAMPING"),
+    ("*MASS, ELSET=E\n1.\n", "give this mass to solid elements by their *DENSITY"),
+    ("*SHELL SECTION, ELSET=E, MATERIAL=M\n0.1\n", "mesh the thickness with solid elements"),
+    ("*BEAM SECTION, ELSET=E, MATERIAL=M, SECTION=RECT\n", "mesh the cross section with solid elements"),
+    ("*PLASTIC\n1., 0.\n", "leave it out where stresses stay below the yield stress"),
+    ("*CREEP\n1., 1., 1.\n", "take the moduli of the time that is of interest"),
+    ("*TEMPERATURE\n1, 20.\n", "move surfaces by *CONTACT INTERFERENCE or *BOUNDARY"),
+    ("*HEAT TRANSFER\n", "there is no temperature; the procedures are *STATIC and *DYNAMIC"),
+    ("*FREQUENCY\n3\n", "let the body swing in a *DYNAMIC step"),
+    ("*BUCKLE\n3\n", "load beyond the limit in a step with NLGEOM"),
+    ("*ELEMENT, TYPE=S4, ELSET=E\n", "mesh the thickness with solid elements"),
+    ("*ELEMENT, TYPE=B31, ELSET=E\n", "mesh the cross section with solid elements"),
+    ("*ELEMENT, TYPE=SPRINGA, ELSET=E\n", "use a strip of soft solid elements"),
+    ("*ELEMENT, TYPE=GAPUNI, ELSET=E\n", "use *CONTACT PAIR"),
+    ("*ELEMENT, TYPE=MASS, ELSET=E\n", "give this mass to solid elements by *DENSITY"),
+    ("*ELEMENT, TYPE=CONN3D2, ELSET=E\n", "couple nodes by *EQUATION or *RIGID BODY"),
+    ("*ELEMENT, TYPE=R3D4, ELSET=E\n", "use *RIGID BODY with solid elements")])
+def test_what_is_not_here_says_what_to_do_instead(card, told, tmp_path):
+    deck = tmp_path/"deck.inp"
+    deck.write_text(card + moving())
+    done = emcon("check", deck)
+    assert done.returncode == 2 and "known but not supported" in done.stderr and told in done.stderr
