@@ -82,6 +82,7 @@ contains
    subroutine begin_rows(linear)
       type(linear_rows_t), intent(out) :: linear
 
+      allocate(linear%is_gone(0))
       allocate(linear%is_used(0), linear%tie(0), linear%place(0), linear%own(0), linear%size(0))
       allocate(linear%dof(0), linear%weight(0))
       linear%start = [0]
@@ -95,6 +96,7 @@ contains
 
       linear%n = linear%n + 1
       linear%is_used = [linear%is_used, .true.]
+      linear%is_gone = [linear%is_gone, .false.]
       linear%tie = [linear%tie, 0]
       linear%place = [linear%place, linear%n]
       linear%own = [linear%own, own]

@@ -37,6 +37,7 @@ contains
 
       scene%deck%heading = ""
       allocate(scene%deck%file(0), scene%node%label(0), scene%node%origin(0), scene%x(2, 0))
+      allocate(scene%node%turned(0))
       allocate(scene%element%label(0), scene%element%origin(0), scene%element%kind(0))
       call element_kinds_create(2, scene%element%kinds)
       allocate(scene%element%node(4, 0), scene%element%section(0))

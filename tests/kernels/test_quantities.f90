@@ -6,7 +6,7 @@ module test_quantities
    use emcon_march, only : increment_t, march_free, march_increment
    use emcon_quantities, only : quantity_components, quantity_fields, quantity_of_field, &
       quantity_values, quantity_variables
-   use emcon_quantity_registry, only : at_contacts, at_elements, at_nodes, at_pairs, &
+   use emcon_quantity_registry, only : at_contacts, at_elements, at_nodes, at_pairs, at_sections, &
       n_quantity_row, quantities_of_card, quantity_row, quantity_row_t
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_t
@@ -58,6 +58,8 @@ contains
          n = size(stepper%scene%element%kind)
       case (at_contacts)
          n = stepper%march%system%n_constraint
+      case (at_sections)
+         n = size(stepper%scene%surface)
       case (at_pairs)
          n = size(stepper%scene%pair)
       end select

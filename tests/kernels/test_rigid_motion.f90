@@ -158,9 +158,11 @@ contains
 
       if (.not. allocated(linear%start)) then
          allocate(linear%start(1), source=0)
+         allocate(linear%is_gone(0))
          allocate(linear%dof(0), linear%weight(0))
       end if
       linear%n = linear%n + 1
+      linear%is_gone = [linear%is_gone, .false.]
       linear%dof = [linear%dof, 2*(node - 1) + dof]
       linear%weight = [linear%weight, weight]
       linear%start = [linear%start, size(linear%dof)]
