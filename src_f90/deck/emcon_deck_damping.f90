@@ -3,7 +3,7 @@ module emcon_deck_damping
    use emcon_deck_reader, only : card_error, card_t, has_option, option_name, reader_t
    use emcon_diagnostics, only : add_error
    use emcon_kinds, only : wp
-   use emcon_law_registry, only : law_anisotropic, law_user
+   use emcon_law_registry, only : law_user
    use emcon_materials, only : material_t
    use emcon_scene, only : scene_t
    use emcon_steps, only : initiation_massless, step_initiation
@@ -62,9 +62,6 @@ contains
             if (material%beta > 0.0_wp .and. material%law == law_user) call refuse( &
                "BETA of material " // material%name // ": the moduli at rest of *USER MATERIAL " &
                // "are not known; use ALPHA")
-            if (material%beta > 0.0_wp .and. material%law == law_anisotropic) call refuse( &
-               "BETA of material " // material%name // ": damping by moduli is of isotropic " &
-               // "materials; use ALPHA")
             k = findloc(scene%step%scheme%takes_damping, .false., 1)
             if (k > 0) call refuse("step " // to_text(k) // " has SCHEME=" // &
                trim(scene%step(k)%scheme%word) // ", which does not go with damped materials; " // &

@@ -15,15 +15,17 @@ module emcon_strain_rows
    integer, parameter :: shear_one(*) = [1, 2, 1], shear_other(*) = 1 + [1, 2, 2]
    integer, parameter :: n_most = size(shear_one)          ! dimensions, at most
 
-   !> Lame's moduli of an isotropic law.
+   !> Lame's moduli of an isotropic law, or all of another.
    type :: moduli_t
       real(wp) :: lambda = 0.0_wp                !! [M/(L T^2)]
       real(wp) :: mu = 0.0_wp                    !! [M/(L T^2)]
+      !> (n_strain, n_strain) in place of these [M/(L T^2)]
+      real(wp), allocatable :: whole(:, :)
    end type moduli_t
 
 contains
 
-   !> Lame's moduli of an isotropic law at rest.
+   !> Those of a law at rest.
    pure subroutine moduli_find(law, lame)
       class(law_t), intent(in) :: law
       type(moduli_t), intent(out) :: lame
@@ -33,6 +35,7 @@ contains
       call law_response_plane(law, rest, rest, state)
       lame%mu = 2.0_wp*state%tangent(3, 3)       ! by the end of no step
       lame%lambda = 2.0_wp*state%tangent(1, 1) - 2.0_wp*lame%mu
+      if (allocated(law%moduli)) lame%whole = law%moduli
    end subroutine moduli_find
 
    !> Shear strains; normal ones are as many as dimensions, and one of the circle.
@@ -173,6 +176,10 @@ contains
       real(wp) :: pressure, shear
       integer :: k, n
 
+      if (allocated(lame%whole)) then
+         stress = factor*matmul(lame%whole, strain)
+         return
+      end if
       n = n_dim + n_shear(n_dim)
       pressure = factor*lame%lambda*(sum(strain(:n_dim)) + sum(strain(n + 1:)))
       shear = factor*lame%mu
