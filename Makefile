@@ -167,6 +167,9 @@ FFLAGS_OF_lanes := -O3 -g1 -fopenmp-simd -fno-trapping-math \
 # Loops over all unknowns in each correction, several at a time: the bits are the same here too.
 FFLAGS_OF_streams := -O3 -g1 -fopenmp-simd $(VECTOR)
 
+# One element at a time, by arrays of its size: these are on the stack.
+FFLAGS_OF_elements := -O2 -g1 -fstack-arrays
+
 # Numbers with many derivatives, added and multiplied term by term: several terms at a time.
 # -Wno-zerotrip: those without second derivatives have loops over none.
 FFLAGS_OF_derivatives := -O3 -g1 -Wno-zerotrip $(VECTOR)

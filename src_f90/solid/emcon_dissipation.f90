@@ -1,3 +1,4 @@
+! build: elements
 !> Forces of elements that take energy: against strain increments that change from step to step,
 !> chi/2 C (dE - dE_before), where the scheme asks for it; of damped materials against the rate of
 !> strain, beta C dE/h, and against velocity, alpha M du/h. C are the moduli at rest.

@@ -1,3 +1,4 @@
+! build: elements
 !> Strains of elements as linear forms in displacements, and the stress of an isotropic law at rest:
 !> of the plane, of space and of solids of revolution alike.
 module emcon_strain_rows
