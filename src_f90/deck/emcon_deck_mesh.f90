@@ -308,7 +308,7 @@ contains
       type(card_t), intent(in) :: card
       type(element_kind_t), intent(in) :: kinds(:)
       character(len=*), intent(in) :: type_name
-      character(len=:), allocatable :: list
+      character(len=:), allocatable :: list, instead
       type(element_row_t) :: row
       integer :: i
 
@@ -324,8 +324,9 @@ contains
          call card_error(reader, card, "element type " // type_name // " is defined by no *USER " &
             // "ELEMENT")
       else if (any(foreign_types == type_name)) then
+         call say_instead(type_name, instead)
          call card_error(reader, card, "element type " // type_name &
-            // " is known but not supported by this version" // instead_of(type_name) &
+            // " is known but not supported by this version" // instead &
             // "; supported:" // list)
       else
          call card_error(reader, card, "unknown element type " // quoted(type_name) &
@@ -334,9 +335,9 @@ contains
    end subroutine refuse_type
 
    !> What to do without elements that are no solids.
-   pure function instead_of(type_name) result(text)
+   pure subroutine say_instead(type_name, text)
       character(len=*), intent(in) :: type_name
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text   !! behind the message; empty: nothing
 
       text = ""
       if (scan(type_name(1:1), "SM") == 1) text = "; mesh the thickness with solid elements"
@@ -349,7 +350,7 @@ contains
          // "*RIGID BODY"
       if (index(type_name, "R2D") + index(type_name, "R3D") > 0) text = "; use *RIGID BODY with " &
          // "solid elements"
-   end function instead_of
+   end subroutine say_instead
 
    !> The nodes of one element, 0 throughout if any is wrong. The list goes on in the next line
    !> after a comma at the end of a line.

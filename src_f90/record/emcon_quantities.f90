@@ -29,8 +29,7 @@ module emcon_quantities
    private
    public :: quantity_values, quantity_components, quantity_fields, quantity_of_field
    public :: quantity_variables
-   public :: node_quantity, element_quantity, contact_quantity, contact_field, pair_quantity, &
-      section_quantity
+   public :: node_quantity, element_quantity, contact_quantity, contact_field, pair_quantity
 
 contains
 
