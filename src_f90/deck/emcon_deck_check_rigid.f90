@@ -4,6 +4,7 @@ module emcon_deck_check_rigid
    use emcon_deck_reader, only : reader_t
    use emcon_deck_rigid, only : mark_rigid
    use emcon_diagnostics, only : add_error, label_list
+   use emcon_requests, only : output_section_print
    use emcon_scene, only : scene_t
    use emcon_steps, only : prescribed_find
    use emcon_text, only : to_text
@@ -49,7 +50,42 @@ contains
             end do
          end associate
       end do
+      call check_sections(reader, scene)
    end subroutine check_rigid
+
+   !> Rigid elements have no stress that a section could tell.
+   subroutine check_sections(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      integer :: i, k, b
+
+      do i = 1, size(scene%step)
+         do k = 1, size(scene%step(i)%output)
+            associate (output => scene%step(i)%output(k))
+               if (output%kind /= output_section_print) cycle
+               if (i > 1) then                   ! carried over: it is told already
+                  if (any(scene%step(i - 1)%output%origin%line == output%origin%line)) cycle
+               end if
+               associate (surface => scene%surface(output%set))
+                  do b = 1, size(scene%rigid)
+                     if (.not. any_in(surface%element, scene%rigid(b)%element)) cycle
+                     call add_error(reader%log, output%origin, "*SECTION PRINT: surface " &
+                        // surface%name // " has elements of rigid body " // scene%rigid(b)%name &
+                        // ", which have no stress; ask for RF of its reference node by *NODE " &
+                        // "PRINT, or for CF by *CONTACT PRINT")
+                  end do
+               end associate
+            end associate
+         end do
+      end do
+   end subroutine check_sections
+
+   pure logical function any_in(element, list)
+      integer, intent(in) :: element(:), list(:)
+      integer :: i
+
+      any_in = any([(any(list == element(i)), i = 1, size(element))])
+   end function any_in
 
    !> Profiles belong to rigid bodies, which are prescribed in every step if they have nothing else:
    !> there is no mass.

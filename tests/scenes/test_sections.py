@@ -4,7 +4,7 @@ import h5py
 import numpy as np
 import pytest
 from element_meshes import Mesh
-from scene_tools import run_deck
+from scene_tools import emcon, run_deck
 from space_mesh import CUBE_FACES, KINDS, TETRAHEDRA, TETRAHEDRON_FACES, Block
 
 RUBBER = "*HYPERELASTIC, NEO HOOKE\n20., 0.01\n"
@@ -129,3 +129,13 @@ def test_a_held_side_tells_its_reaction(tmp_path):
     found = section(done, "FOOT")
     assert np.abs(found["SOF"] - [0, 6]).max() <= 1e-10
     assert np.abs(found["SOM"] - 9).max() <= 1e-10 and np.abs(found["SOMC"]).max() <= 1e-10
+
+
+def test_sections_of_rigid_bodies_are_refused(tmp_path):
+    body = Mesh("CPE4", 1, 1, [(0, 0), (1, 0), (1, 1), (0, 1)])
+    again = "*STEP\n*DYNAMIC, DIRECT\n0.1, 0.1\n*END STEP\n"
+    deck = tmp_path/"deck.inp"
+    deck.write_text(body.deck(ELASTIC, "*SURFACE, NAME=FOOT\n1, S1\n*RIGID BODY, ELSET=ALL, REF NODE=1\n"
+                              + again.replace("*END", f"*SECTION PRINT, SURFACE=FOOT\n{WORDS}*END") + again))
+    told = emcon("check", deck).stderr
+    assert told.count("surface FOOT has elements of rigid body ALL, which have no stress") == 1, told
