@@ -296,7 +296,7 @@ contains
       type(output_t), intent(inout) :: new
       type(data_t) :: data
       type(string_t), allocatable :: list(:), longer(:)
-      character(len=:), allocatable :: name, known
+      character(len=:), allocatable :: name, known, instead
       logical, allocatable :: is_wanted(:)
       integer :: i, k, n_before
 
@@ -319,8 +319,9 @@ contains
             if (i <= size(list)) then
                is_wanted(i) = .true.
             else if (reader%is_lenient .or. is_below(card) .or. any(unwritten == name)) then
+               call say_instead(name, instead)
                call data_warning(reader, data, "output variable " // quoted(name) &
-                  // " is not supported, left out; " // instead_of(name) // "supported: " // known)
+                  // " is not supported, left out; " // instead // "supported: " // known)
             else
                call data_error(reader, data, "output variable " // quoted(name) &
                   // " is not supported; supported: " // known)
@@ -350,18 +351,23 @@ contains
    end function whole_of
 
    !> What says the same as a variable that is not written: "...; ", or nothing.
-   pure function instead_of(name) result(text)
+   pure subroutine say_instead(name, text)
       character(len=*), intent(in) :: name
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
       select case (name)
-      case ("CELS"); text = "the history has it in the column contact_energy; "
-      case ("CFN", "CFS"); text = "CF is the whole force; "
-      case ("LE", "EE"); text = "E is the strain; "
-      case ("PE", "PEEQ", "PEMAG", "CEEQ"); text = "it is 0, materials are elastic; "
-      case default; text = ""
+      case ("CELS")
+         text = "the history has it in the column contact_energy; "
+      case ("CFN", "CFS")
+         text = "CF is the whole force; "
+      case ("LE", "EE")
+         text = "E is the strain; "
+      case ("PE", "PEEQ", "PEMAG", "CEEQ")
+         text = "it is 0, materials are elastic; "
+      case default
+         text = ""
       end select
-   end function instead_of
+   end subroutine say_instead
 
    !> What PRESELECT asks for, of the variables of a row.
    pure function preselected(row, list)
