@@ -29,6 +29,8 @@ contains
          fault = "no file is named"
       else if (.not. exists) then
          fault = "no such file"
+         inquire(file=path // ".inp", exist=exists)
+         if (exists) fault = fault // "; did you mean " // path // ".inp?"
       else if (n_byte > int(huge(1), int64)) then
          fault = "the file is larger than 2 GB; split it by *INCLUDE"
       else if (n_byte <= 0) then

@@ -59,7 +59,8 @@ contains
       end do
       if (any(is_inside)) call add_error(reader%log, surface%origin, title &
          // " has faces inside the body, of element " &
-         // label_list(pack(scene%element%label(surface%element), is_inside)))
+         // label_list(pack(scene%element%label(surface%element), is_inside)) // "; name the " // &
+         "outer ones alone, or no face: *SURFACE then takes the free faces of the elements")
    end subroutine check_free
 
    !> At each node one face may end and one may begin.

@@ -85,14 +85,15 @@ contains
       reason = ""
       k = findloc(takes_massless(scene%step), .false., 1)
       if (k > 0) then
-         reason = "scheme or constraint method of step " // to_text(k) // " needs it"
+         reason = "the scheme or the constraint method of step " // to_text(k) // " needs them"
       else if (has_massless_sections(scene)) then
          reason = "there are MASSLESS sections"
       else if (any(scene%material%alpha > 0.0_wp .or. scene%material%beta > 0.0_wp)) then
          reason = "there is *DAMPING of materials"
-      else if (any(asks_for_mass(scene%pair))) then
-         reason = "soft contact, a restitution, damping or INITIATION= of a pair needs it"
       end if
+      do k = 1, size(scene%pair)
+         if (len(reason) == 0) call find_reason_of(scene%pair(k), reason)
+      end do
       if (len(reason) > 0 .or. size(scene%pair) == 0) return
       call find_shares(scene, share)
       k = maxloc(share, 1)
@@ -113,14 +114,23 @@ contains
          any(step%contact%method == [method_null_space, method_saddle_point]))
    end function takes_massless
 
-   !> Does a pair say what nodes without mass do not have, or how it begins?
-   elemental logical function asks_for_mass(pair)
+   !> What nodes without mass do not have, of a pair; "" if it says nothing of that kind.
+   pure subroutine find_reason_of(pair, reason)
       type(contact_pair_t), intent(in) :: pair
+      character(len=:), allocatable, intent(inout) :: reason     !! stays "" so
 
-      asks_for_mass = pair_keeps_mass(pair) .or. pair%interaction%restitution < 1.0_wp .or. &
-         pair%interaction%pressure%kind /= pressure_hard .or. pair%formulation == formulation_user &
-         .or. pair%initiation /= 0 .or. pair%slave == 0 .or. pair%master == 0
-   end function asks_for_mass
+      if (pair%initiation /= 0) then
+         reason = "a *CONTACT PAIR has INITIATION="
+      else if (pair%interaction%pressure%kind /= pressure_hard) then
+         reason = "a contact has a pressure by its overclosure"
+      else if (pair%interaction%restitution < 1.0_wp) then
+         reason = "a contact has a RESTITUTION"
+      else if (pair_keeps_mass(pair)) then
+         reason = "a contact has *CONTACT DAMPING, or friction and a restitution"
+      else if (pair%formulation == formulation_user .or. any([pair%slave, pair%master] == 0)) then
+         reason = "a program gives a contact"
+      end if
+   end subroutine find_reason_of
 
    !> The part of the mass of each body that its nodes of contact would lose.
    pure subroutine find_shares(scene, share)

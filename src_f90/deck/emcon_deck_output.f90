@@ -218,6 +218,7 @@ contains
       call read_axes(reader, card, scene, self, new)
       kept = pack([(i, i = 1, size(self%step))], &
          self%output%kind /= new%kind .or. self%step == card%step)
+      call check_name(reader, card, self%output(kept), new)
       n = size(kept)
       allocate(grown(n + 1))
       do i = 1, n
@@ -455,6 +456,22 @@ contains
 
       says_when = has_option(card, "FREQUENCY") .or. has_option(card, "TIMEPOINTS")
    end function says_when
+
+   !> Two sections of a step have two names.
+   subroutine check_name(reader, card, output, new)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(output_t), intent(in) :: output(:)    !! of the step so far, and what stays of others
+      type(output_t), intent(in) :: new
+      integer :: i
+
+      if (new%kind /= output_section_print) return
+      do i = 1, size(output)
+         if (output(i)%kind /= new%kind .or. output(i)%set == new%set) cycle
+         if (output(i)%name == new%name) call card_error(reader, card, "another section of the " &
+            // "step has the name " // quoted(new%name) // "; NAME= tells them apart")
+      end do
+   end subroutine check_name
 
    !> The surface of a section, and its name in the history; without surface 0.
    subroutine read_section(reader, card, scene, new)

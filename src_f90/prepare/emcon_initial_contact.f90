@@ -354,7 +354,8 @@ contains
       call raise(error, err_input, where_text(scene, pair%origin) // ": error: " // to_text(n) // &
          " slave nodes of surface " // scene%surface(pair%slave)%name // " penetrate surface " // &
          scene%surface(pair%master)%name // found // &
-         "; move them, or let *CONTACT PAIR, ADJUST= do it")
+         "; move them, or let *CONTACT PAIR, ADJUST= do it; where the overlap is meant, as of " // &
+         "a press fit, begin with a *STATIC step with *CONTACT INTERFERENCE, SHRINK")
    end subroutine check_penetration
 
    !> Slave nodes behind the master surface, as the contact that a program gives for pair `i` sees

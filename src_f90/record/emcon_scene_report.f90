@@ -7,6 +7,7 @@ module emcon_scene_report
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_locking, only : locking_advice
+   use emcon_massless_surfaces, only : most_moved
    use emcon_motion, only : at_rest, motion_of
    use emcon_options, only : option_text
    use emcon_evaluation, only : evaluation_at_end
@@ -14,11 +15,12 @@ module emcon_scene_report
    use emcon_report_row, only : report_row_t, report_rows_t, row_begin, row_put, rows_add
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
-   use emcon_steps, only : initiation_massless, initiation_persistent, initiation_velocity_update, &
-      step_initiation, step_is_dynamic
+   use emcon_steps, only : initiation_massless, initiation_persistent, step_initiation, &
+      step_is_dynamic
    use emcon_stepper, only : stepper_t
    use emcon_surface_facets, only : surface_facets
    use emcon_term_registry, only : terms_solid
+   use emcon_text, only : to_text
    implicit none
    private
    public :: scene_report
@@ -151,19 +153,14 @@ contains
    subroutine add_choices(stepper, rows)
       type(stepper_t), intent(in) :: stepper
       type(report_rows_t), intent(inout) :: rows
-      character(len=:), allocatable :: why
       logical :: is_dynamic
 
-      associate (scene => stepper%scene, system => stepper%march%system, &
-            layer => stepper%march%layer)
+      associate (scene => stepper%scene, system => stepper%march%system)
          is_dynamic = any(step_is_dynamic(scene%step))
          call choose("contact", size(system%contact) > 0, "no *CONTACT PAIR, no *CONTACT")
          call choose("guards", size(system%contact) > system%n_pair, &
             "no pairs, both sides of all pairs are held, or GUARD=NO")
-         call find_why_mass(scene, why)
-         call choose("massless contact nodes", layer%is_on, why)
-         call choose("velocity update", any(step_initiation(scene%step) &
-            == initiation_velocity_update), "no *CONTACT INITIATION, TYPE=VELOCITY UPDATE")
+         call add_first_contact(stepper, rows)
          call choose("ties and equations", system%space%linear%n > 0, &
             "no *TIE, no *EQUATION, no *RIGID BODY")
          call choose("inertia", is_dynamic, "all steps are static")
@@ -193,15 +190,32 @@ contains
 
    end subroutine add_choices
 
-   !> Why nodes of contact keep their mass.
-   pure subroutine find_why_mass(scene, text)
-      type(scene_t), intent(in) :: scene
-      character(len=:), allocatable, intent(out) :: text
+   !> How contact begins in dynamic steps, and who says so.
+   subroutine add_first_contact(stepper, rows)
+      type(stepper_t), intent(in) :: stepper
+      type(report_rows_t), intent(inout) :: rows
+      type(report_row_t) :: row
+      character(len=:), allocatable :: because, word
+      integer :: k
 
-      text = "no *CONTACT INITIATION, TYPE=MASSLESS, or all slave nodes need their mass"
-      if (.not. allocated(scene%deck%keeps_mass)) return
-      if (len(scene%deck%keeps_mass) > 0) text = scene%deck%keeps_mass
-   end subroutine find_why_mass
+      associate (scene => stepper%scene)
+         k = findloc(step_is_dynamic(scene%step), .true., 1)
+         if (k == 0 .or. size(stepper%march%system%contact) == 0) return
+         because = "as the deck says"
+         if (allocated(scene%deck%keeps_mass)) then
+            because = "AUTO, no body has more than " // to_text(100.0_wp*most_moved, 2) // &
+               " % of its mass at nodes of contact"
+            if (len(scene%deck%keeps_mass) > 0) because = "AUTO keeps masses, " // &
+               scene%deck%keeps_mass
+         end if
+         call row_begin(row, "parts", "first contact:")
+         call row_put(row, "part", "first contact", "")
+         call option_text("initiation", scene%step(k)%contact%initiation, word)
+         call row_put(row, "is", word, " #")
+         call row_put(row, "because", because, ": #")
+         call rows_add(rows, row)
+      end associate
+   end subroutine add_first_contact
 
    pure logical function has_loads(scene)
       type(scene_t), intent(in) :: scene
@@ -316,6 +330,7 @@ contains
       type(body_t), intent(in) :: body(:)
       type(report_rows_t), intent(inout) :: rows
       type(report_row_t) :: row
+      character(len=:), allocatable :: cure
       real(wp) :: transit
       integer :: k
 
@@ -326,11 +341,13 @@ contains
       transit = shortest_transit(body)
       if (.not. (transit < huge(transit) .and. scene%step(k)%time%h < transit)) return
       call row_begin(row, "advice", "h is")
+      cure = "*CONTACT INITIATION, TYPE=MASSLESS makes them smooth on bodies at least two " // &
+         "elements thick"
+      if (allocated(scene%deck%keeps_mass)) cure = "they are smooth where bodies are ten " // &
+         "elements across, and lose the mass there"
       call row_put(row, "courant_number", scene%step(k)%time%h/transit, &
          " # of the wave transit time " &
-         // "of the smallest element: contact forces of nodes with mass jump up and down; " // &
-         "*CONTACT INITIATION, TYPE=MASSLESS makes them smooth on bodies at least two " // &
-         "elements thick")
+         // "of the smallest element: contact forces of nodes with mass jump up and down; " // cure)
       call rows_add(rows, row)
    end subroutine advise_massless
 

@@ -69,10 +69,13 @@ module emcon_options
       option_row_t("smoothing", smoothing_hermite, "HERMITE", "EMCON_HERMITE", &
          "smoothed master surface", "", n_plane, instead="NONE"), &
       option_row_t("initiation", initiation_auto, "AUTO", "", "", ""), &
-      option_row_t("initiation", initiation_persistent, "PERSISTENT", "EMCON_PERSISTENT", "", ""), &
-      option_row_t("initiation", initiation_admissible, "ADMISSIBLE", "EMCON_ADMISSIBLE", "", ""), &
-      option_row_t("initiation", initiation_velocity_update, "VELOCITY UPDATE", "", "", ""), &
-      option_row_t("initiation", initiation_massless, "MASSLESS", "", "", ""), &
+      option_row_t("initiation", initiation_persistent, "PERSISTENT", "EMCON_PERSISTENT", &
+         "PERSISTENT", ""), &
+      option_row_t("initiation", initiation_admissible, "ADMISSIBLE", "EMCON_ADMISSIBLE", &
+         "ADMISSIBLE", ""), &
+      option_row_t("initiation", initiation_velocity_update, "VELOCITY UPDATE", "", &
+         "VELOCITY UPDATE", ""), &
+      option_row_t("initiation", initiation_massless, "MASSLESS", "", "MASSLESS", ""), &
       option_row_t("method", method_null_space, "NULL SPACE", "", "", ""), &
       option_row_t("method", method_saddle_point, "SADDLE POINT", "", "", ""), &
       option_row_t("method", method_penalty, "PENALTY", "", "by penalty", ""), &

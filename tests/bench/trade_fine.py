@@ -53,7 +53,7 @@ def run(seed, treatment, folder):
     done = usage([PROGRAM, path, "--quiet", "--output", folder, f"--set=formulation={formulation}",
                   f"--set=initiation={treatment}"])
     verdict = read_verdict(ResultPaths(path.with_suffix("")))
-    is_massless = "massless contact nodes: on" in path.with_suffix(".log").read_text()
+    is_massless = "first contact: MASSLESS" in path.with_suffix(".log").read_text()
     return verdict | {"cpu": done.cpu, "is_massless": is_massless}
 
 

@@ -88,7 +88,7 @@ def chosen(deck, parameters):
         path = deck.write(pathlib.Path(folder) / "deck.inp")
         told = usage([PROGRAM, "check", path, *(f"--set={name}={value}" for name, value in {
             **parameters, "initiation": "AUTO"}.items())]).text
-    return "`MASSLESS`" if "massless contact nodes: on" in told else "`PERSISTENT`"
+    return "`MASSLESS`" if "first contact: MASSLESS" in told else "`PERSISTENT`"
 
 
 def away(found, exact, name):

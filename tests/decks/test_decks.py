@@ -67,6 +67,13 @@ def test_missing_file(tmp_path):
     assert (code, messages) == (2, [(0, "error: no such file")])
 
 
+def test_name_without_its_end(tmp_path):
+    """As other programs have it."""
+    (tmp_path/"ball.inp").write_text("*HEADING\n")
+    code, messages, _ = check("ball", cwd=tmp_path)
+    assert (code, messages) == (2, [(0, "error: no such file; did you mean ball.inp?")])
+
+
 def test_directory(tmp_path):
     (tmp_path / "folder").mkdir()
     code, messages, _ = check("folder", cwd=tmp_path)
