@@ -59,6 +59,12 @@ contains
             word = squeezed(line(:scan(line // ",", ",") - 1))
             if (index(word, "**") == 1 .or. word == "") cycle
             if (word == "*STEP") is_in = .true.
+            if (word == "*NOANALYSIS") then
+               call raise(error, err_input, source%file_name(source%file(i))%text // ":" // &
+                  to_text(source%number(i)) // ": error: *NO ANALYSIS is no step that a run " // &
+                  "could go on with; leave it out")
+               return
+            end if
             if (.not. is_in) then
                call raise(error, err_input, source%file_name(source%file(i))%text // ":" // &
                   to_text(source%number(i)) // ": error: '" // trim(line) // "' is in no step: " &

@@ -6,10 +6,12 @@ module emcon_deck_initiation
    use emcon_deck_check_massless, only : has_massless_sections
    use emcon_deck_jacobian, only : determinant
    use emcon_deck_reader, only : reader_t
+   use emcon_diagnostics, only : add_error
    use emcon_interactions, only : contact_pair_t, formulation_user, pair_has_order, pressure_hard
    use emcon_kinds, only : wp
    use emcon_massless_surfaces, only : most_moved, nodes_that_keep_mass, pair_keeps_mass, &
       surface_keeps_mass
+   use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
    use emcon_scheme_registry, only : scheme_user
    use emcon_shape, only : shape_table_t, shape_tabulate
@@ -25,10 +27,11 @@ contains
 
    !> Settle how contact begins in steps that are AUTO, and tell why. Further steps of a run that
    !> goes on follow those that it has done: mass does not come and go.
-   pure subroutine choose_initiation(reader, scene)
-      type(reader_t), intent(in) :: reader       !! after all steps have been read
+   subroutine choose_initiation(reader, scene)
+      type(reader_t), intent(inout) :: reader    !! after all steps have been read
       type(scene_t), intent(inout) :: scene
       type(step_t), allocatable :: further(:)
+      logical :: keeps(size(scene%node%label))
       logical, dimension(size(scene%step)) :: is_done
       integer :: first
 
@@ -38,13 +41,32 @@ contains
          further = pack(scene%step, .not. is_done)
          scene%step = pack(scene%step, is_done)
          call settle(reader, scene)
+         keeps = nodes_that_keep_mass(scene)
          where (further%contact%initiation == initiation_auto) &
             further%contact%initiation = scene%step(first)%contact%initiation
          scene%step = [scene%step, further]
+         if (size(further) > 0 .and. scene%step(first)%contact%initiation == initiation_massless) &
+            call check_held(reader, scene, further(1)%origin, keeps)
       else
          call settle(reader, scene)
       end if
    end subroutine choose_initiation
+
+   !> What has no mass by now cannot be held in further steps: it would get its mass back, and with
+   !> it an energy.
+   subroutine check_held(reader, scene, origin, kept)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(origin_t), intent(in) :: origin       !! of the first further step
+      logical, intent(in) :: kept(:)             !! (n_node) their mass before
+      integer :: i
+
+      i = findloc(contact_nodes(scene) .and. nodes_that_keep_mass(scene) .and. .not. kept, .true., 1)
+      if (i > 0) call add_error(reader%log, origin, "node " // to_text(scene%node%label(i)) // &
+         " of a contact surface, which has no mass in the run so far, is held or driven in a " // &
+         "further step; begin anew with all steps in the deck, or with *CONTACT INITIATION, " // &
+         "TYPE=PERSISTENT")
+   end subroutine check_held
 
    !> MASSLESS where that serves all dynamic steps, PERSISTENT elsewhere.
    pure subroutine settle(reader, scene)
@@ -140,15 +162,9 @@ contains
       integer, allocatable :: body(:), node(:)   !! `body`: (n_node)
       real(wp), allocatable :: total(:)          !! (n_body) [M]
       real(wp) :: mass
-      integer :: e, k, n_body
+      integer :: e, n_body
 
-      meets = .false.
-      do k = 1, size(scene%surface)
-         if (.not. any([scene%pair%slave, scene%pair%master] == k)) cycle
-         call surface_nodes(scene, scene%surface(k), node)
-         meets(node) = .true.
-      end do
-      meets = meets .and. .not. nodes_that_keep_mass(scene)
+      meets = contact_nodes(scene) .and. .not. nodes_that_keep_mass(scene)
       call bodies_find(scene%element%node, size(meets), body, n_body)
       allocate(share(n_body), total(n_body), source=0.0_wp)
       do e = 1, size(scene%element%kind)
@@ -162,6 +178,21 @@ contains
       end do
       where (total > 0.0_wp) share = share/total
    end subroutine find_shares
+
+   !> The nodes of all surfaces of contact.
+   pure function contact_nodes(scene) result(meets)
+      type(scene_t), intent(in) :: scene
+      logical :: meets(size(scene%node%label))   !! (n_node)
+      integer, allocatable :: node(:)
+      integer :: k
+
+      meets = .false.
+      do k = 1, size(scene%surface)
+         if (.not. any([scene%pair%slave, scene%pair%master] == k)) cycle
+         call surface_nodes(scene, scene%surface(k), node)
+         meets(node) = .true.
+      end do
+   end function contact_nodes
 
    !> Mass of element `e`, in the plane by its thickness; 0 of one whose shape a program gives.
    pure real(wp) function element_mass(scene, e) result(mass)

@@ -62,6 +62,10 @@ module emcon_deck_output
    character(len=*), parameter :: energies(4) = [character(len=6) :: "ALLKE", "ALLSE", "ALLWK", &
       "ETOTAL"]
 
+   !> Groups of the history that have their names for themselves.
+   character(len=*), parameter :: own_groups(*) = [character(len=7) :: "BODIES", "CONTACT", &
+      "PAIRS", "RUN"]
+
 contains
 
    subroutine requests_init(self)
@@ -466,6 +470,8 @@ contains
       integer :: i
 
       if (new%kind /= output_section_print) return
+      if (any(own_groups == new%name)) call card_error(reader, card, quoted(new%name) // " is a " &
+         // "group of the history of its own; another NAME= is needed")
       do i = 1, size(output)
          if (output(i)%kind /= new%kind .or. output(i)%set == new%set) cycle
          if (output(i)%name == new%name) call card_error(reader, card, "another section of the " &

@@ -361,6 +361,7 @@ contains
       logical :: sheds(self%system%n_pair)
       integer :: i
 
+      if (allocated(scene%deck%keeps_mass)) return       ! nobody has asked for it
       do i = 1, self%system%n_pair
          sheds(i) = any(self%massless%may_be(self%system%contact(i)%contact%node))
       end do

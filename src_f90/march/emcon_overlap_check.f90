@@ -6,6 +6,7 @@
 !> done. Source: docs/theory.md, section 4.11.
 module emcon_overlap_check
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
+   use emcon_guards, only : touching_bar
    use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
@@ -123,7 +124,8 @@ contains
             if (outline_meets(self%query%outline, p, self%other(i))) cycle
             overlap = overlap_t()
             call overlap_check_pieces(self, p, self%other(i), x, u, rest, overlap)
-            if (overlap%depth > 0.0_wp) meant = [meant, meeting_t(p, self%other(i))]
+            ! Bodies that touch are in each other by round-off, and are not meant to go on.
+            if (overlap%depth > touching_bar) meant = [meant, meeting_t(p, self%other(i))]
             if (overlap%depth > deepest%depth) deepest = overlap
          end do
       end do

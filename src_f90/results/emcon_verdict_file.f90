@@ -170,6 +170,7 @@ contains
          .or. self%penalty%most_augmentations > 0)) then
          call restart_exchange(restart, "give", self%penalty%give)
          call restart_exchange(restart, "give", self%penalty%time)
+         call restart_exchange(restart, "give_is_meant", self%penalty%is_meant)
          call restart_exchange(restart, "augmentations", self%penalty%most_augmentations)
       end if
       if (restart_offers(restart, "law_missed", self%largest_push > 0.0_wp)) then

@@ -101,11 +101,25 @@ def test_what_cannot_be_is_told(half, options, words, tmp_path):
     ("*STEP\n*STATIC\n1., 1.\n", "*END STEP is missing"),
     ("*STEP\n*STATIC\n1., 1.\n*CLOAD\nNONE, 1, 1.\n*END STEP\n", "more.inp:5"),
     ("", "empty"),
+    ("*STEP\n*STATIC\n1., 1.\n*NO ANALYSIS\n*END STEP\n", "more.inp:4: error: *NO ANALYSIS is no step"),
 ])
 def test_a_bad_step_is_told_with_its_line(half, text, words, tmp_path):
     (tmp_path/"more.inp").write_text(text)
     assert words in go_on(half, tmp_path/"on", "--steps", tmp_path/"more.inp", code=2)
     assert not (tmp_path/"on").exists()
+
+
+def test_steps_that_change_the_unknowns_are_refused(tmp_path):
+    """A stand-in is made for what is prescribed along a turned axis."""
+    deck = coarse_ring()
+    deck.replace("*RESTART, WRITE, FREQUENCY=50", "*RESTART, WRITE")
+    deck.insert("*TRANSFORM, NSET=BOTTOM, TYPE=R\n1., 1., 0., -1., 1., 0.", before="*BOUNDARY")
+    deck.replace("*BOUNDARY\nBOTTOM, 1, 2\n", "")
+    run = run_deck(deck, tmp_path/"run", h=0.02, t_end=0.1, frame=0.1, initiation="PERSISTENT")
+    (tmp_path/"more.inp").write_text(
+        "*STEP, NLGEOM\n*DYNAMIC, DIRECT\n.02, .1\n*BOUNDARY, FIXED\nBOTTOM, 1\n*END STEP\n")
+    told = go_on(run, tmp_path/"on", "--steps", tmp_path/"more.inp", code=2)
+    assert "change the unknowns of the model, as do conditions along axes of a *TRANSFORM" in told
 
 
 def test_results_are_not_overwritten(half, tmp_path):

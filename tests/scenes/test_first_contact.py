@@ -104,13 +104,15 @@ def test_a_slave_that_cannot_shed_its_mass_is_held_as_it_is(tmp_path):
 @pytest.mark.parametrize(("procedure", "words"), [
     ("*DYNAMIC, DIRECT", None),
     ("*DYNAMIC, DIRECT\n<h>, 0.1\n*TIME INTEGRATION, SCHEME=TRAPEZOIDAL", "MASSLESS"),
-    ("*DYNAMIC, DIRECT, EXPLICIT", "MASSLESS")], ids=["same", "trapezoidal", "explicit"])
+    ("*DYNAMIC, DIRECT, EXPLICIT", "MASSLESS"),
+    ("*DYNAMIC, DIRECT\n<h>, 0.1\n*BOUNDARY, FIXED\nBODY, 1, 2", "no mass in the run so far, is held or")],
+    ids=["same", "trapezoidal", "explicit", "held"])
 def test_further_steps_of_a_run_follow_it(procedure, words, tmp_path):
     """Their surfaces have no mass left that a scheme could use."""
     (tmp_path/"deck.inp").write_text(
         block_on_floor().replace("*END STEP", "*RESTART, WRITE\n*END STEP"))
     assert emcon(tmp_path/"deck.inp", "--quiet", "--output", tmp_path).returncode == 0
-    data = "" if "SCHEME" in procedure else "<h>, 0.1\n"
+    data = "" if "0.1" in procedure else "<h>, 0.1\n"
     (tmp_path/"more.inp").write_text(f"*STEP, NLGEOM\n{procedure}\n{data}*END STEP\n")
     done = emcon("restart", tmp_path/"deck.rst.h5", "--quiet", "--output", tmp_path/"on", "--steps",
                  tmp_path/"more.inp")

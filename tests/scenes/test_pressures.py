@@ -195,6 +195,7 @@ def test_a_run_goes_on_from_its_middle(tmp_path):
     copy = restart(run, tmp_path/"copy")
     assert "resumed after increment 10" in copy.log
     assert copy.digits() == run.digits()
+    assert run.verdict["give"] > 0 and copy.verdict["verdict"] == run.verdict["verdict"] == "good"
 
 
 # ---- friction with a slope of stick -------------------------------------------------------------

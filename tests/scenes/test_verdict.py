@@ -4,7 +4,8 @@ import re
 
 import numpy as np
 import pytest
-from plain_scenes import BOTH, Scene
+from plain_scenes import BOTH, ONE, Scene, turned
+from plain_scenes import ONE, Scene, turned
 from scene_tools import DECKS, Deck, emcon, run_deck
 
 
@@ -237,3 +238,25 @@ def test_a_body_that_goes_through_itself_is_told(tmp_path):
     found = run_deck(scene.deck(BOTH), tmp_path, code=3, formulation="NODE TO SURFACE").verdict
     assert found["verdict"] == "bad"
     assert any("a body has gone through itself by then" in text for text in found["reasons"])
+
+
+@pytest.mark.parametrize("turn", [0.0, 0.1, 0.7])
+def test_bodies_that_touch_are_not_meant_to_go_on(turn, tmp_path):
+    """Driven into each other without a pair: by round-off they overlap at the start."""
+    scene = Scene(0.05, 0.5)
+    place = turned(turn)
+    scene.block("UPPER", (0.0, 0.0), (1.0, 1.0), (4, 4), shape=place)
+    scene.block("LOWER", (-0.5, -1.0), (2.0, 1.0), (8, 4), shape=place)
+    scene.hold("LOWER", lambda x, y: True)
+    down = place(0.0, -0.2)
+    for axis, way in zip("12", down, strict=True):
+        scene.hold("UPPER", lambda x, y: True, axes=f"{axis}, {axis}", value=way)
+    scene.pairs = [("UPPER", "UPPER")]
+    deck = scene.deck(ONE)
+    deck.remove("*CONTACT PAIR")
+    deck.remove("*CONTACT FILE")
+    deck.remove("*CONTACT PRINT")
+    done = emcon(deck.write(tmp_path/"scene.inp"), "--quiet", "--output", tmp_path)
+    assert done.returncode == 3
+    assert "bodies overlap by 0.8 of an edge" in done.stderr
+    assert "no contact pair brings the two together" in done.stderr
