@@ -61,7 +61,8 @@ contains
       logical, intent(in) :: kept(:)             !! (n_node) their mass before
       integer :: i
 
-      i = findloc(contact_nodes(scene) .and. nodes_that_keep_mass(scene) .and. .not. kept, .true., 1)
+      i = findloc(contact_nodes(scene) .and. nodes_that_keep_mass(scene) .and. .not. kept, &
+         .true., 1)
       if (i > 0) call add_error(reader%log, origin, "node " // to_text(scene%node%label(i)) // &
          " of a contact surface, which has no mass in the run so far, is held or driven in a " // &
          "further step; begin anew with all steps in the deck, or with *CONTACT INITIATION, " // &

@@ -123,10 +123,10 @@ contains
       call exchange_state(self, restart)
       call restart_check(restart, error)
       if (allocated(error) .and. present(further)) then
-         if (allocated(further%path)) call raise(error, err_input, further%path // ": its steps " // &
-            "change the unknowns of the model, as do conditions along axes of a *TRANSFORM, on " // &
-            "rotations of a *RIGID BODY or on ends of a *TIE where the run had none: begin " // &
-            "anew with all steps in the deck")
+         if (allocated(further%path)) call raise(error, err_input, further%path // ": its steps " &
+            // "change the unknowns of the model, as do conditions along axes of a *TRANSFORM, " &
+            // "on rotations of a *RIGID BODY or on ends of a *TIE where the run had none: begin " &
+            // "anew with all steps in the deck")
       end if
       if (present(further) .and. .not. allocated(error)) call check_until(self, further%until, &
          error)

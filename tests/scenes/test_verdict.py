@@ -5,7 +5,6 @@ import re
 import numpy as np
 import pytest
 from plain_scenes import BOTH, ONE, Scene, turned
-from plain_scenes import ONE, Scene, turned
 from scene_tools import DECKS, Deck, emcon, run_deck
 
 
