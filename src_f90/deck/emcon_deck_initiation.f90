@@ -30,26 +30,26 @@ contains
    subroutine choose_initiation(reader, scene)
       type(reader_t), intent(inout) :: reader    !! after all steps have been read
       type(scene_t), intent(inout) :: scene
-      type(step_t), allocatable :: further(:)
+      type(step_t), allocatable :: step(:)
       logical :: keeps(size(scene%node%label))
-      logical, dimension(size(scene%step)) :: is_done
-      integer :: first
+      integer :: first, n
 
-      is_done = scene%step%origin%file <= scene%deck%n_own_file
-      first = findloc(is_done .and. step_is_dynamic(scene%step), .true., 1)
-      if (first > 0) then
-         further = pack(scene%step, .not. is_done)
-         scene%step = pack(scene%step, is_done)
+      n = count(scene%step%origin%file <= scene%deck%n_own_file)
+      first = findloc(step_is_dynamic(scene%step(:n)), .true., 1)
+      if (first == 0 .or. n == size(scene%step)) then
          call settle(reader, scene)
-         keeps = nodes_that_keep_mass(scene)
-         where (further%contact%initiation == initiation_auto) &
-            further%contact%initiation = scene%step(first)%contact%initiation
-         scene%step = [scene%step, further]
-         if (size(further) > 0 .and. scene%step(first)%contact%initiation == initiation_massless) &
-            call check_held(reader, scene, further(1)%origin, keeps)
-      else
-         call settle(reader, scene)
+         return
       end if
+      step = scene%step
+      scene%step = step(:n)
+      call settle(reader, scene)
+      keeps = nodes_that_keep_mass(scene)
+      step(:n)%contact%initiation = scene%step%contact%initiation
+      where (step(n + 1:)%contact%initiation == initiation_auto) &
+         step(n + 1:)%contact%initiation = step(first)%contact%initiation
+      call move_alloc(step, scene%step)
+      if (scene%step(first)%contact%initiation == initiation_massless) &
+         call check_held(reader, scene, scene%step(n + 1)%origin, keeps)
    end subroutine choose_initiation
 
    !> What has no mass by now cannot be held in further steps: it would get its mass back, and with

@@ -222,7 +222,7 @@ contains
       call read_axes(reader, card, scene, self, new)
       kept = pack([(i, i = 1, size(self%step))], &
          self%output%kind /= new%kind .or. self%step == card%step)
-      call check_name(reader, card, self%output(kept), new)
+      call check_name(reader, card, self%output, kept, new)
       n = size(kept)
       allocate(grown(n + 1))
       do i = 1, n
@@ -462,17 +462,19 @@ contains
    end function says_when
 
    !> Two sections of a step have two names.
-   subroutine check_name(reader, card, output, new)
+   subroutine check_name(reader, card, output, kept, new)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
-      type(output_t), intent(in) :: output(:)    !! of the step so far, and what stays of others
+      type(output_t), intent(in) :: output(:)
+      integer, intent(in) :: kept(:)             !! those of the step, and what stays of others
       type(output_t), intent(in) :: new
-      integer :: i
+      integer :: i, k
 
       if (new%kind /= output_section_print) return
       if (any(own_groups == new%name)) call card_error(reader, card, quoted(new%name) // " is a " &
          // "group of the history of its own; another NAME= is needed")
-      do i = 1, size(output)
+      do k = 1, size(kept)
+         i = kept(k)
          if (output(i)%kind /= new%kind .or. output(i)%set == new%set) cycle
          if (output(i)%name == new%name) call card_error(reader, card, "another section of the " &
             // "step has the name " // quoted(new%name) // "; NAME= tells them apart")
