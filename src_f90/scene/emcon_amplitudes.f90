@@ -9,6 +9,8 @@ module emcon_amplitudes
    !> Slopes that differ by no more than this, by the larger one, are one but for the rounding of
    !> the table.
    real(wp), parameter :: slope_noise = sqrt(epsilon(1.0_wp))
+   !> Times that are sums and products of increments are those of the table up to this part.
+   real(wp), parameter :: time_noise = 16.0_wp*epsilon(1.0_wp)
 
    !> Factor over time: linear between the points, constant outside.
    type :: amplitude_t
@@ -21,22 +23,25 @@ module emcon_amplitudes
 
 contains
 
-   !> Value and slope of an amplitude at `time`; at a kink the slope to the left.
+   !> Value and slope of an amplitude at `time`; at a kink the slope to the left, however the time
+   !> is rounded.
    pure subroutine find_amplitude_value(amplitude, time, value, slope)
       type(amplitude_t), intent(in) :: amplitude
       real(wp), intent(in) :: time
       real(wp), intent(out) :: value                 !! factor
       real(wp), intent(out) :: slope                 !! [1/T]
+      real(wp) :: left
       integer :: i, n
 
       n = size(amplitude%time)
       slope = 0.0_wp
-      if (time <= amplitude%time(1)) then
+      left = time - time_noise*abs(time)
+      if (left <= amplitude%time(1)) then
          value = amplitude%value(1)
-      else if (time > amplitude%time(n)) then
+      else if (left > amplitude%time(n)) then
          value = amplitude%value(n)
       else
-         i = count(amplitude%time < time)
+         i = count(amplitude%time < left)
          slope = (amplitude%value(i + 1) - amplitude%value(i)) &
             /(amplitude%time(i + 1) - amplitude%time(i))
          value = amplitude%value(i) + slope*(time - amplitude%time(i))
