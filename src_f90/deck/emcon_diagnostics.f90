@@ -139,12 +139,27 @@ contains
    pure function quoted(word) result(text)
       character(len=*), intent(in) :: word
       character(len=quoted_length(word)) :: text
+      integer :: n
 
       text = adjustl(word)
-      if (len_trim(adjustl(word)) > max_word) text(max_word + 1:) = "..."
+      if (len_trim(adjustl(word)) > max_word) then
+         n = max_word
+         do while (n > 0 .and. is_inside(text(n + 1:n + 1)))
+            n = n - 1
+         end do
+         text(n + 1:) = repeat(".", max_word + 3 - n)
+      end if
       text = printable(text)
       text = "'" // text(:len(text) - 2) // "'"
    end function quoted
+
+   !> Is a byte inside a character of UTF-8, behind its first one?
+   pure logical function is_inside(byte)
+      character, intent(in) :: byte
+      integer, parameter :: first = 128, last = 191
+
+      is_inside = ichar(byte) >= first .and. ichar(byte) <= last
+   end function is_inside
 
    pure integer function quoted_length(word) result(n)
       character(len=*), intent(in) :: word

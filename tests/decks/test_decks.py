@@ -67,6 +67,14 @@ def test_missing_file(tmp_path):
     assert (code, messages) == (2, [(0, "error: no such file")])
 
 
+@pytest.mark.parametrize("n", range(55, 60))
+def test_long_words_are_cut_between_characters(n, tmp_path):
+    """Messages are UTF-8 wherever the word is cut."""
+    (tmp_path/"deck.inp").write_text("*" + "A"*n + "é"*40 + "\n", encoding="utf-8")
+    done = subprocess.run([EMCON, "check", "deck.inp"], cwd=tmp_path, capture_output=True, timeout=60)
+    assert re.search(r"unknown keyword '\*A+é*\.{3,4}'", done.stderr.decode("utf-8"))
+
+
 def test_name_without_its_end(tmp_path):
     """As other programs have it."""
     (tmp_path/"ball.inp").write_text("*HEADING\n")
