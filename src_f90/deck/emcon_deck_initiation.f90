@@ -13,6 +13,7 @@ module emcon_deck_initiation
       surface_keeps_mass
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
+   use emcon_scene_motions, only : scene_is_flat
    use emcon_scheme_registry, only : scheme_user
    use emcon_shape, only : shape_table_t, shape_tabulate
    use emcon_steps, only : initiation_auto, initiation_massless, initiation_persistent, &
@@ -84,7 +85,8 @@ contains
          return
       end if
       where (is_auto) scene%step%contact%initiation = initiation_persistent
-      if (reader%log%n_errors > 0 .or. .not. any(is_auto .and. is_dynamic)) return
+      if (reader%log%n_errors > 0 .or. size(scene%pair) == 0) return
+      if (.not. any(is_auto .and. is_dynamic)) return
       if (.not. all(is_auto .or. .not. is_dynamic)) return
       call find_reason(scene, reason)
       scene%deck%keeps_mass = reason
@@ -117,11 +119,11 @@ contains
       do k = 1, size(scene%pair)
          if (len(reason) == 0) call find_reason_of(scene%pair(k), reason)
       end do
-      if (len(reason) > 0 .or. size(scene%pair) == 0) return
+      if (len(reason) > 0) return
       call find_shares(scene, share)
       k = maxloc(share, 1)
       if (.not. share(k) > 0.0_wp) then
-         reason = "no node of the surfaces can lose it"
+         reason = "no node of the surfaces can lose its own"
       else if (share(k) > most_moved) then
          reason = "body " // to_text(k) // " has " // to_text(100.0_wp*share(k), 2) // " % of " // &
             "its mass at nodes of contact, more than " // to_text(100.0_wp*most_moved, 2) // " %"
@@ -195,11 +197,12 @@ contains
       end do
    end function contact_nodes
 
-   !> Mass of element `e`, in the plane by its thickness; 0 of one whose shape a program gives.
+   !> Mass of element `e`; 0 of one whose shape a program gives.
    pure real(wp) function element_mass(scene, e) result(mass)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: e
       type(shape_table_t) :: table
+      real(wp) :: thickness
       integer :: i
 
       mass = 0.0_wp
@@ -207,11 +210,12 @@ contains
             section => scene%element%section(e))
          if (.not. allocated(kind%shape) .or. section == 0) return
          if (scene%section(section)%material == 0) return
+         thickness = merge(scene%section(section)%thickness, 1.0_wp, scene_is_flat(scene))
          call shape_tabulate(kind%shape, .true., table)
          associate (x => scene%x(:, scene%element%node(:table%n_node, e)), &
                density => scene%material(scene%section(section)%material)%density)
             do i = 1, table%n_gp
-               mass = mass + density*table%weight(i)*determinant(matmul(x, &
+               mass = mass + thickness*density*table%weight(i)*determinant(matmul(x, &
                   transpose(table%slope(:, :, i))))
             end do
          end associate

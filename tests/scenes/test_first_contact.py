@@ -64,6 +64,29 @@ def test_coarse_bodies_keep_their_mass(tmp_path):
     assert OFF not in check(block_on_floor(10), tmp_path)
 
 
+def test_without_contact_nothing_is_chosen(tmp_path):
+    text = block_on_floor()
+    cut, end = text.index("*SURFACE INTERACTION"), text.index("*BOUNDARY")
+    told = check(text[:cut] + text[end:].replace("*CONTACT FILE\nCDIS, CSTR, CF\n", "").replace(
+        "*CONTACT PRINT, TOTALS=ONLY\nCF\n", ""), tmp_path)
+    assert "contact: off" in told
+    assert "first contact" not in told and "without mass" not in told
+
+
+def test_thickness_counts(tmp_path):
+    """Elements inside that are ten times as thick: the outline has a smaller part of the mass."""
+    text = block_on_floor(9)
+    section = "*SOLID SECTION, ELSET=BODY, MATERIAL=BODY\n1.\n"
+    inner = [str(1 + i + 9*j) for j in range(1, 8) for i in range(1, 8)]
+    outer = [str(k) for k in range(1, 82) if str(k) not in inner]
+    assert section in text
+    sets = "".join(f"*ELSET, ELSET={name}\n" + ",\n".join(labels) + "\n"
+                   for name, labels in (("INNER", inner), ("OUTER", outer)))
+    text = text.replace(section, sets + section.replace("=BODY,", "=OUTER,", 1)
+                        + section.replace("=BODY,", "=INNER,", 1).replace("1.\n", "10.\n"))
+    assert "first contact: MASSLESS" in check(text, tmp_path)
+
+
 @pytest.mark.parametrize(("old", "new", "words"), [
     ("*DENSITY", "*DAMPING, BETA=1e-4\n*DENSITY", "DAMPING of materials"),
     (METHOD, "*CONSTRAINT METHOD, TYPE=PENALTY", "constraint method of step 1"),
