@@ -1,0 +1,95 @@
+!> Where a point is in a frame of two vectors: its affine coordinates and its height, over a step.
+!>
+!> Source: docs/theory.md, section 2 and eq. (60).
+module emcon_frame_vertex_space
+   use emcon_dgrad9, only : dg_affine, dg_height, dg_t, difference, difference_t
+   use emcon_dgrad9_first, only : affine_first => dg_affine, dg_first_t => dg_t, &
+      difference_first => difference, difference_first_t => difference_t, height_first => dg_height
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: frame_vertex_t, frame_vertex, frame_place
+
+   !> Local numbers: coordinates along both vectors of the frame, height over their plane.
+   integer, parameter, public :: at_xi = 1, at_eta = 2, at_height = 3
+   !> Variables: both vectors of the frame and where the point is, from the origin of the frame.
+   integer, parameter, public :: n_frame_var = 9
+
+   type :: frame_vertex_t
+      real(wp) :: f(3, 0:1) = 0.0_wp             !! at both ends of the step
+      real(wp) :: df(3) = 0.0_wp                 !! how they change, to relative accuracy
+      real(wp) :: g(n_frame_var, 3) = 0.0_wp     !! discrete gradients
+      real(wp) :: c(n_frame_var, 3) = 0.0_wp     !! gradients at the end
+      !> (i, j, which) derivative of g(i, which) by variable j at the end; 0 if not asked for
+      real(wp) :: h(n_frame_var, n_frame_var, 3) = 0.0_wp
+   end type frame_vertex_t
+
+contains
+
+   !> The place at one configuration: (xi, eta, height). The height is an L, the coordinates are
+   !> shares of `a` and `b`.
+   pure function frame_place(a, b, d) result(place)
+      real(wp), intent(in) :: a(3), b(3)         !! the frame [L]
+      real(wp), intent(in) :: d(3)               !! the point, from its origin [L]
+      real(wp) :: place(3)
+      real(wp) :: aa, ab, bb, da, db, normal(3)
+
+      aa = dot_product(a, a)
+      ab = dot_product(a, b)
+      bb = dot_product(b, b)
+      da = dot_product(d, a)
+      db = dot_product(d, b)
+      normal = cshift(a, 1)*cshift(b, -1) - cshift(a, -1)*cshift(b, 1)
+      place(:2) = [bb*da - ab*db, aa*db - ab*da]/(aa*bb - ab*ab)
+      place(3) = dot_product(d, normal)/sqrt(dot_product(normal, normal))
+   end function frame_place
+
+   !> The place over a step. `x` are the origin, the tips of both vectors and the point.
+   pure subroutine frame_vertex(x, dx, leaves_second, vertex)
+      real(wp), intent(in) :: x(3, 4), dx(3, 4)  !! where they start, how they move [L]
+      logical, intent(in) :: leaves_second       !! no second derivatives
+      type(frame_vertex_t), intent(out) :: vertex
+      type(difference_t) :: a, b, d
+      type(dg_t) :: xi, eta, s(3)
+      integer :: i
+
+      if (leaves_second) then
+         call vertex_first(x, dx, vertex)
+         return
+      end if
+      a = difference(2, 1, x, dx)
+      b = difference(3, 1, x, dx)
+      d = difference(4, 1, x, dx)
+      call dg_affine(d, a, b, xi, eta)
+      s = [xi, eta, dg_height(d, a, b)]
+      do i = at_xi, at_height
+         vertex%f(i, :) = [s(i)%f0, s(i)%f1]
+         vertex%df(i) = s(i)%df
+         vertex%g(:, i) = s(i)%g
+         vertex%c(:, i) = s(i)%c
+         vertex%h(:, :, i) = s(i)%h
+      end do
+   end subroutine frame_vertex
+
+   !> The same without second derivatives.
+   pure subroutine vertex_first(x, dx, vertex)
+      real(wp), intent(in) :: x(3, 4), dx(3, 4)
+      type(frame_vertex_t), intent(inout) :: vertex
+      type(difference_first_t) :: a, b, d
+      type(dg_first_t) :: xi, eta, s(3)
+      integer :: i
+
+      a = difference_first(2, 1, x, dx)
+      b = difference_first(3, 1, x, dx)
+      d = difference_first(4, 1, x, dx)
+      call affine_first(d, a, b, xi, eta)
+      s = [xi, eta, height_first(d, a, b)]
+      do i = at_xi, at_height
+         vertex%f(i, :) = [s(i)%f0, s(i)%f1]
+         vertex%df(i) = s(i)%df
+         vertex%g(:, i) = s(i)%g
+         vertex%c(:, i) = s(i)%c
+      end do
+   end subroutine vertex_first
+
+end module emcon_frame_vertex_space

@@ -1,0 +1,487 @@
+!> The mean height of a surface of triangles over a small one, the patch, that moves with a node.
+!>
+!> The field over the frame of the patch is continuous, so its integral is smooth while the patch
+!> slides over sides and corners of the triangles. Source: docs/theory.md, eqs. (60) to (66).
+module emcon_patch_gap_space
+   use emcon_frame_vertex_space, only : at_eta, at_height, frame_place, frame_vertex, &
+      frame_vertex_t, n_frame_var
+   use emcon_kinds, only : wp
+   use emcon_patch_moments_space, only : barycentric, patch_misses, patch_moment_slopes, &
+      patch_moments
+   implicit none
+   private
+   public :: patch_t, patch_gap_t, patch_gap, patch_means
+
+   !> Remainders below so many epsilons of what they are the difference of are round-off.
+   real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
+   !> A vertex whose triangles cover so much of the patch at both ends together has half its weight.
+   real(wp), parameter :: some = 0.1_wp
+   !> Corners of the patch, in its own coordinates.
+   real(wp), parameter :: patch_corner(2, 3) = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, &
+      1.0_wp], [2, 3])
+   real(wp), parameter :: centre = 1.0_wp/3.0_wp
+
+   !> The triangles that a patch may see in a step.
+   type :: patch_t
+      integer :: n_vertex = 0
+      integer :: n_triangle = 0
+      integer, allocatable :: triangle(:, :)     !! (3, >= n_triangle) counter-clockwise in the frame
+      real(wp), allocatable :: chi(:)            !! (>= n_vertex) 1, or 0 where the surface has ended
+      real(wp) :: length = 0.0_wp                !! of the sides of the patch, in vectors of the frame
+   end type patch_t
+
+   !> The integral of chi (height - target) over the patch by its area, over a step.
+   type :: patch_gap_t
+      real(wp) :: f0 = 0.0_wp, f1 = 0.0_wp       !! at both ends [L]
+      real(wp) :: df = 0.0_wp                    !! how it changes, to relative accuracy [L]
+      integer :: n_vertex = 0                    !! that it depends on
+      integer, allocatable :: vertex(:)          !! (>= n_vertex) their numbers
+      !> By both vectors of the frame, then by the vertices: discrete gradient, that at the end,
+      !> and derivative of the first by variables at the end
+      real(wp), allocatable :: g(:), c(:)        !! (6 + 3 n_vertex)
+      real(wp), allocatable :: h(:, :)           !! the same twice; only if asked for
+   end type patch_gap_t
+
+   !> One triangle over a step.
+   type :: field_t
+      integer :: vertex(3) = 0                   !! among those that count
+      real(wp) :: moment(3, 0:1) = 0.0_wp        !! over the part of the patch that it covers
+      real(wp) :: value(3, 0:1) = 0.0_wp         !! its field at the corners of the patch [L]
+      real(wp) :: slope(2, 0:1) = 0.0_wp         !! of the field [L]
+      real(wp) :: share(3, 3) = 0.0_wp           !! (j, v) of its corner j at v, of the mean triangle
+      real(wp) :: part(3) = 0.0_wp               !! of the integral that each corner takes
+   end type field_t
+
+   !> What is put on the ways of the vertices in the patch, and how it changes.
+   type :: closing_t
+      real(wp), allocatable :: weight(:)         !! (n_vertex) 0 to 1: as its triangles are covered
+      real(wp), allocatable :: weight_slope(:)   !! (n_vertex) by what they cover of the patch
+      real(wp), allocatable :: way(:, :)         !! (2, n_vertex)
+      real(wp) :: factor = 0.0_wp                !! of weight times way [L]
+      real(wp) :: by_rest = 0.0_wp               !! its slope by the rest,
+      real(wp) :: by_square = 0.0_wp             !! and by the sum of weight times way squared
+   end type closing_t
+
+contains
+
+   !> Where vertices are in the frame at one configuration, coordinates those of the patch.
+   pure subroutine place_vertices(patch, x, place)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: x(:, :)            !! (3, 3 + n_vertex) origin, frame, vertices [L]
+      real(wp), intent(out) :: place(:, :)       !! (3, n_vertex)
+      integer :: j
+
+      do j = 1, patch%n_vertex
+         place(:, j) = frame_place(x(:, 2) - x(:, 1), x(:, 3) - x(:, 1), x(:, 3 + j) - x(:, 1))
+         place(:2, j) = place(:2, j)/patch%length + centre
+      end do
+   end subroutine place_vertices
+
+   !> The integral of chi times height over the patch by its area, and what of it is covered.
+   pure subroutine patch_means(patch, x, height, cover)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: x(:, :)            !! (3, 3 + n_vertex) origin, frame, vertices [L]
+      real(wp), intent(out) :: height            !! [L]
+      real(wp), intent(out) :: cover             !! 0 to 1
+      real(wp) :: place(3, patch%n_vertex), moment(3), share(3)
+      integer :: k, v
+
+      call place_vertices(patch, x, place)
+      height = 0.0_wp
+      cover = 0.0_wp
+      do k = 1, patch%n_triangle
+         associate (t => patch%triangle(:, k))
+            if (patch_misses(place(:2, t))) cycle
+            moment = patch_moments(place(:2, t))
+            do v = 1, 3
+               share = moment(v)*barycentric(place(:2, t), patch_corner(:, v))
+               height = height + dot_product(share, patch%chi(t)*place(3, t))
+               cover = cover + dot_product(share, patch%chi(t))
+            end do
+         end associate
+      end do
+   end subroutine patch_means
+
+   !> The gap over a step with its derivatives. None of its vertices counts where nothing is over
+   !> the patch at either end.
+   pure subroutine patch_gap(patch, x, dx, target, leaves_second, gap)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
+      real(wp), intent(in) :: target             !! that heights are counted from [L]
+      logical, intent(in) :: leaves_second       !! no second derivatives
+      type(patch_gap_t), intent(out) :: gap
+      real(wp) :: place(3, patch%n_vertex, 0:1)
+      type(frame_vertex_t), allocatable :: at(:)
+      type(field_t), allocatable :: field(:)
+      integer :: j
+
+      call place_vertices(patch, x, place(:, :, 0))
+      call place_vertices(patch, x + dx, place(:, :, 1))
+      call choose_fields(patch, place, field, gap)
+      allocate(at(gap%n_vertex))
+      do j = 1, gap%n_vertex
+         associate (node => [1, 2, 3, 3 + gap%vertex(j)])
+            call frame_vertex(x(:, node), dx(:, node), leaves_second, at(j))
+         end associate
+         call to_patch(patch%length, at(j))
+      end do
+      call add_up(patch%chi(gap%vertex(:gap%n_vertex)), target, at, field, leaves_second, gap)
+   end subroutine patch_gap
+
+   !> Coordinates in the patch in place of those in the frame.
+   pure subroutine to_patch(length, at)
+      real(wp), intent(in) :: length
+      type(frame_vertex_t), intent(inout) :: at
+
+      at%f(:at_eta, :) = at%f(:at_eta, :)/length + centre
+      at%df(:at_eta) = at%df(:at_eta)/length
+      at%g(:, :at_eta) = at%g(:, :at_eta)/length
+      at%c(:, :at_eta) = at%c(:, :at_eta)/length
+      at%h(:, :, :at_eta) = at%h(:, :, :at_eta)/length
+   end subroutine to_patch
+
+   !> The triangles over the patch at either end, and their vertices.
+   pure subroutine choose_fields(patch, place, field, gap)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: place(:, :, 0:)    !! (3, n_vertex, 0:1)
+      type(field_t), allocatable, intent(out) :: field(:)
+      type(patch_gap_t), intent(inout) :: gap
+      type(field_t) :: found(patch%n_triangle)
+      integer :: number(patch%n_vertex), i, k, n, end
+
+      allocate(gap%vertex(patch%n_vertex))
+      number = 0
+      n = 0
+      do k = 1, patch%n_triangle
+         associate (t => patch%triangle(:, k))
+            do end = 0, 1
+               found(n + 1)%moment(:, end) = patch_moments(place(:2, t, end))
+            end do
+            if (.not. any(abs(found(n + 1)%moment) > 0.0_wp)) cycle
+            n = n + 1
+            do i = 1, 3
+               if (number(t(i)) == 0) then
+                  gap%n_vertex = gap%n_vertex + 1
+                  gap%vertex(gap%n_vertex) = t(i)
+                  number(t(i)) = gap%n_vertex
+               end if
+               found(n)%vertex(i) = number(t(i))
+            end do
+         end associate
+      end do
+      field = found(:n)
+   end subroutine choose_fields
+
+   !> The sum over triangles, docs/theory.md, eqs. (64) and (65).
+   pure subroutine add_up(chi, target, at, field, leaves_second, gap)
+      real(wp), intent(in) :: chi(:), target     !! (n_vertex); [L]
+      type(frame_vertex_t), intent(in) :: at(:)  !! (n_vertex)
+      type(field_t), intent(inout) :: field(:)
+      logical, intent(in) :: leaves_second
+      type(patch_gap_t), intent(inout) :: gap
+      real(wp), dimension(3, size(at)) :: by, end_by
+      real(wp) :: change(3*size(at), 3*size(at))
+      type(closing_t) :: closing
+      integer :: k
+
+      by = 0.0_wp
+      end_by = 0.0_wp
+      do k = 1, size(field)
+         call form_field(chi(field(k)%vertex), target, at(field(k)%vertex), field(k))
+         associate (f => field(k), v => field(k)%vertex)
+            gap%f0 = gap%f0 + dot_product(f%moment(:, 0), f%value(:, 0))
+            gap%f1 = gap%f1 + dot_product(f%moment(:, 1), f%value(:, 1))
+            by(at_height, v) = by(at_height, v) + chi(v)*f%part
+            by(:at_eta, v) = by(:at_eta, v) - outer(sum(f%slope, 2)/2.0_wp, f%part)
+            call add_end(chi(v), at(v), f, end_by)
+         end associate
+      end do
+      call close_sum(at, field, closing)
+      by(:at_eta, :) = by(:at_eta, :) + closing%factor*spread(closing%weight, 1, at_eta)*closing%way
+      call gather_first(at, by, end_by, gap)
+      if (leaves_second) return
+      call change_of_parts(chi, at, field, change)
+      call change_of_closing(chi, at, field, closing, change)
+      call gather_second(at, by, change, gap)
+   end subroutine add_up
+
+   !> What the gradient lacks, put on the ways of the vertices, each by what it has to do with the
+   !> patch: docs/theory.md, eq. (66).
+   pure subroutine close_sum(at, field, closing)
+      type(frame_vertex_t), intent(in) :: at(:)
+      type(field_t), intent(in) :: field(:)
+      type(closing_t), intent(out) :: closing
+      real(wp) :: rest, square, size_of, ratio, area(size(at))
+      integer :: j, k
+
+      rest = 0.0_wp
+      size_of = tiny(size_of)
+      area = 0.0_wp
+      do k = 1, size(field)
+         associate (f => field(k), v => field(k)%vertex)
+            rest = rest + dot_product(f%moment(:, 1) - f%moment(:, 0), sum(f%value, 2)/2.0_wp)
+            size_of = max(size_of, maxval(sum(abs(f%value), 2)))
+            area(v) = area(v) + sum(f%moment)
+         end associate
+      end do
+      closing%weight = area/(area + some)
+      closing%weight_slope = some/(area + some)**2
+      allocate(closing%way(at_eta, size(at)))
+      do j = 1, size(at)
+         closing%way(:, j) = at(j)%df(:at_eta)
+      end do
+      ! By ways of round-off nothing is divided.
+      square = rounding + sum(spread(closing%weight, 1, at_eta)*closing%way**2)
+      ratio = (rest/(rounding*size_of))**2
+      ratio = merge(ratio/(1.0_wp + ratio), 1.0_wp, ratio <= huge(ratio))
+      closing%factor = ratio*rest/square
+      closing%by_rest = ratio*(3.0_wp - 2.0_wp*ratio)/square
+      closing%by_square = -closing%factor/square
+   end subroutine close_sum
+
+   !> The field of a triangle at both ends.
+   pure subroutine form_field(chi, target, at, field)
+      real(wp), intent(in) :: chi(3), target     !! [L]
+      type(frame_vertex_t), intent(in) :: at(3)  !! its corners
+      type(field_t), intent(inout) :: field
+      real(wp) :: corner(2, 3, 0:1), p(3)
+      integer :: j, v, end
+
+      do j = 1, 3
+         corner(:, j, :) = at(j)%f(:at_eta, :)
+      end do
+      do end = 0, 1
+         do j = 1, 3
+            p(j) = chi(j)*(at(j)%f(at_height, end) - target)
+         end do
+         do v = 1, 3
+            field%value(v, end) = dot_product(p, barycentric(corner(:, :, end), patch_corner(:, v)))
+         end do
+         field%slope(:, end) = field%value(2:3, end) - field%value(1, end)
+      end do
+      do v = 1, 3
+         field%share(:, v) = barycentric(sum(corner, 3)/2.0_wp, patch_corner(:, v))
+      end do
+      field%part = matmul(field%share, sum(field%moment, 2)/2.0_wp)
+   end subroutine form_field
+
+   !> Add the gradient at the end by places and heights.
+   pure subroutine add_end(chi, at, field, by)
+      real(wp), intent(in) :: chi(3)
+      type(frame_vertex_t), intent(in) :: at(3)
+      type(field_t), intent(in) :: field
+      real(wp), intent(inout) :: by(:, :)        !! (3, n_vertex)
+      real(wp) :: corner(2, 3), part(3)
+      integer :: j, v
+
+      do j = 1, 3
+         corner(:, j) = at(j)%f(:at_eta, 1)
+      end do
+      part = 0.0_wp
+      do v = 1, 3
+         part = part + field%moment(v, 1)*barycentric(corner, patch_corner(:, v))
+      end do
+      associate (to => field%vertex)
+         by(at_height, to) = by(at_height, to) + chi*part
+         by(:at_eta, to) = by(:at_eta, to) - outer(field%slope(:, 1), part)
+      end associate
+   end subroutine add_end
+
+   !> How what the vertices take changes with places and heights at the end.
+   pure subroutine change_of_parts(chi, at, field, change)
+      real(wp), intent(in) :: chi(:)
+      type(frame_vertex_t), intent(in) :: at(:)
+      type(field_t), intent(in) :: field(:)
+      real(wp), intent(out) :: change(:, :)      !! (3 n_vertex, 3 n_vertex)
+      real(wp) :: part(3, 9), slope(2, 9)
+      integer :: i, j, k
+
+      change = 0.0_wp
+      do k = 1, size(field)
+         associate (f => field(k), v => field(k)%vertex)
+            call change_of_field(chi(v), at(v), f, part, slope)
+            do i = 1, 3
+               do j = 1, 3
+                  associate (row => 3*(v(i) - 1), column => 3*(v(j) - 1), by => 3*(j - 1))
+                     change(row + at_height, column + 1:column + 3) = &
+                        change(row + at_height, column + 1:column + 3) &
+                        + chi(v(i))*part(i, by + 1:by + 3)
+                     change(row + 1:row + at_eta, column + 1:column + 3) = &
+                        change(row + 1:row + at_eta, column + 1:column + 3) &
+                        - outer(sum(f%slope, 2)/2.0_wp, part(i, by + 1:by + 3)) &
+                        - f%part(i)*slope(:, by + 1:by + 3)
+                  end associate
+               end do
+            end do
+         end associate
+      end do
+   end subroutine change_of_parts
+
+   !> How the parts of the corners of a triangle and its mean slope change with their places and
+   !> heights at the end.
+   pure subroutine change_of_field(chi, at, field, part, slope)
+      real(wp), intent(in) :: chi(3)
+      type(frame_vertex_t), intent(in) :: at(3)
+      type(field_t), intent(in) :: field
+      real(wp), intent(out) :: part(3, 9), slope(2, 9)
+      real(wp) :: corner(2, 3, 0:1), swept(3, 2, 3), lean(2, 3), lean1(2, 3), mean(3)
+      integer :: j, l, v
+
+      do j = 1, 3
+         corner(:, j, :) = at(j)%f(:at_eta, :)
+      end do
+      swept = patch_moment_slopes(corner(:, :, 1))
+      lean = gradients(sum(corner, 3)/2.0_wp)
+      lean1 = gradients(corner(:, :, 1))
+      mean = sum(field%moment, 2)/2.0_wp
+      part = 0.0_wp
+      slope = 0.0_wp
+      do l = 1, 3
+         associate (by => 3*(l - 1))
+            part(:, by + 1:by + at_eta) = 0.5_wp*matmul(field%share, swept(:, :, l))
+            do v = 1, 3
+               part(:, by + 1:by + at_eta) = part(:, by + 1:by + at_eta) &
+                  - (0.5_wp*mean(v)*field%share(l, v))*transpose(lean)
+            end do
+            slope(:, by + 1:by + at_eta) = -0.5_wp*outer(lean1(:, l), field%slope(:, 1))
+            slope(:, by + at_height) = 0.5_wp*chi(l)*lean1(:, l)
+         end associate
+      end do
+   end subroutine change_of_field
+
+   !> Gradients of the barycentric coordinates of a triangle.
+   pure function gradients(corner) result(lean)
+      real(wp), intent(in) :: corner(2, 3)
+      real(wp) :: lean(2, 3)
+      real(wp) :: first(3)
+
+      first = barycentric(corner, patch_corner(:, 1))
+      lean(1, :) = barycentric(corner, patch_corner(:, 2)) - first
+      lean(2, :) = barycentric(corner, patch_corner(:, 3)) - first
+   end function gradients
+
+   !> Add how the closing term changes.
+   pure subroutine change_of_closing(chi, at, field, closing, change)
+      real(wp), intent(in) :: chi(:)
+      type(frame_vertex_t), intent(in) :: at(:)
+      type(field_t), intent(in) :: field(:)
+      type(closing_t), intent(in) :: closing
+      real(wp), intent(inout) :: change(:, :)    !! (3 n_vertex, 3 n_vertex)
+      real(wp) :: by_rest(3, size(at)), by_square(3, size(at)), area(3*size(at), size(at))
+      integer :: a, i, j, k
+
+      by_rest = 0.0_wp
+      by_square = 0.0_wp
+      area = 0.0_wp
+      do k = 1, size(field)
+         call add_rest(chi(field(k)%vertex), at(field(k)%vertex), field(k), by_rest, area)
+      end do
+      do j = 1, size(at)
+         associate (slope => closing%weight_slope(j)*area(:, j), way => closing%way(:, j))
+            by_square(:at_eta, j) = by_square(:at_eta, j) + 2.0_wp*closing%weight(j)*way
+            by_square = by_square + sum(way**2)*reshape(slope, shape(by_square))
+            do a = 1, at_eta
+               i = 3*(j - 1) + a
+               change(i, :) = change(i, :) + closing%factor*way(a)*slope
+               change(i, i) = change(i, i) + closing%factor*closing%weight(j)
+            end do
+         end associate
+      end do
+      by_rest = closing%by_rest*by_rest + closing%by_square*by_square
+      do j = 1, size(at)
+         do a = 1, at_eta
+            i = 3*(j - 1) + a
+            change(i, :) = change(i, :) + closing%weight(j)*closing%way(a, j)*reshape(by_rest, &
+               [size(by_rest)])
+         end do
+      end do
+   end subroutine change_of_closing
+
+   !> Add how what a triangle leaves to the rest changes, and what of the patch it covers.
+   pure subroutine add_rest(chi, at, field, by_rest, area)
+      real(wp), intent(in) :: chi(3)
+      type(frame_vertex_t), intent(in) :: at(3)
+      type(field_t), intent(in) :: field
+      real(wp), intent(inout) :: by_rest(:, :)   !! (3, n_vertex)
+      real(wp), intent(inout) :: area(:, :)      !! (3 n_vertex, n_vertex) of those at a vertex
+      real(wp) :: corner(2, 3), swept(3, 2, 3), part(3)
+      integer :: i, j, v
+
+      do j = 1, 3
+         corner(:, j) = at(j)%f(:at_eta, 1)
+      end do
+      swept = patch_moment_slopes(corner)
+      part = 0.0_wp
+      do v = 1, 3
+         part = part + 0.5_wp*(field%moment(v, 1) - field%moment(v, 0)) &
+            *barycentric(corner, patch_corner(:, v))
+      end do
+      do j = 1, 3
+         associate (to => by_rest(:, field%vertex(j)), at_j => 3*(field%vertex(j) - 1))
+            to(:at_eta) = to(:at_eta) + matmul(sum(field%value, 2)/2.0_wp, swept(:, :, j)) &
+               - part(j)*field%slope(:, 1)
+            to(at_height) = to(at_height) + part(j)*chi(j)
+            do i = 1, 3
+               associate (of => area(at_j + 1:at_j + at_eta, field%vertex(i)))
+                  of = of + sum(swept(:, :, j), 1)
+               end associate
+            end do
+         end associate
+      end do
+   end subroutine add_rest
+
+   !> First derivatives by the frame and by the vertices.
+   pure subroutine gather_first(at, by, end_by, gap)
+      type(frame_vertex_t), intent(in) :: at(:)
+      real(wp), intent(in) :: by(:, :), end_by(:, :)   !! (3, n_vertex)
+      type(patch_gap_t), intent(inout) :: gap
+      integer :: j
+
+      allocate(gap%g(6 + 3*size(at)), gap%c(6 + 3*size(at)), source=0.0_wp)
+      do j = 1, size(at)
+         gap%df = gap%df + dot_product(by(:, j), at(j)%df)
+         associate (place => places(j))
+            gap%g(place) = gap%g(place) + matmul(at(j)%g, by(:, j))
+            gap%c(place) = gap%c(place) + matmul(at(j)%c, end_by(:, j))
+         end associate
+      end do
+   end subroutine gather_first
+
+   !> Second derivatives by the frame and by the vertices.
+   pure subroutine gather_second(at, by, change, gap)
+      type(frame_vertex_t), intent(in) :: at(:)
+      real(wp), intent(in) :: by(:, :), change(:, :)
+      type(patch_gap_t), intent(inout) :: gap
+      integer :: j, k, l
+
+      allocate(gap%h(6 + 3*size(at), 6 + 3*size(at)), source=0.0_wp)
+      do j = 1, size(at)
+         associate (row => places(j))
+            do k = 1, 3
+               gap%h(row, row) = gap%h(row, row) + by(k, j)*at(j)%h(:, :, k)
+            end do
+            do l = 1, size(at)
+               gap%h(row, places(l)) = gap%h(row, places(l)) + matmul(at(j)%g, &
+                  matmul(change(3*j - 2:3*j, 3*l - 2:3*l), transpose(at(l)%c)))
+            end do
+         end associate
+      end do
+   end subroutine gather_second
+
+   !> Where the variables of vertex `j` are among all.
+   pure function places(j) result(place)
+      integer, intent(in) :: j
+      integer :: place(n_frame_var)
+      integer :: k
+
+      place = [(k, k = 1, 6), (6 + 3*(j - 1) + k, k = 1, 3)]
+   end function places
+
+   pure function outer(a, b)
+      real(wp), intent(in) :: a(:), b(:)
+      real(wp) :: outer(size(a), size(b))
+
+      outer = spread(a, 2, size(b))*spread(b, 1, size(a))
+   end function outer
+
+end module emcon_patch_gap_space
