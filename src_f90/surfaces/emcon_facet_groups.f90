@@ -6,6 +6,7 @@
 module emcon_facet_groups
    use emcon_facets, only : facets_normal, facets_t
    use emcon_kinds, only : wp
+   use emcon_rotation, only : cross_product
    use emcon_sort, only : find_sorted, unique_sorted
    implicit none
    private
@@ -204,7 +205,7 @@ contains
             associate (beyond => facets%neighbour(k, f))
                if (beyond == 0) cycle
                associate (a => normal(:, f), b => normal(:, beyond), side => side_of(facets, f, k))
-                  sine = cshift(a, 1)*cshift(b, 2) - cshift(a, 2)*cshift(b, 1)
+                  sine = cross_product(a, b)
                   way = x(:, facets%node(side(n_end))) - x(:, facets%node(side(1)))
                   turn(k, f) = sign(atan2(sqrt(dot_product(sine, sine)), dot_product(a, b)), &
                      dot_product(sine, way))/degree
