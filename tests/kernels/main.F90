@@ -62,6 +62,7 @@ program main
    use test_explicit, only : collect_explicit
    use test_explicit_closed, only : collect_explicit_closed
    use test_facets, only : collect_facets
+   use test_facet_groups, only : collect_facet_groups
    use test_first_touch, only : collect_first_touch
    use test_friction, only : collect_friction
    use test_friction_ways, only : collect_friction_ways
@@ -273,6 +274,7 @@ program main
    call run("bending", collect_bending)
    call run("bent_bodies", collect_bent_bodies)
    call run("facets", collect_facets)
+   call run("facet_groups", collect_facet_groups)
    call run("chain", collect_chain)
    call run("search", collect_search)
    call run("segment", collect_segment)
