@@ -9,17 +9,21 @@ module emcon_condition_nodes
 contains
 
    !> Make room for `n` nodes and count them.
-   pure subroutine condition_resize(self, n)
+   pure subroutine condition_resize(self, n, n_dim)
       type(condition_t), intent(inout) :: self
       integer, intent(in) :: n                   !! > 0
+      integer, intent(in), optional :: n_dim     !! none: the plane's
+      integer :: d
 
+      d = 2
+      if (present(n_dim)) d = n_dim
       self%n_node = n
       if (allocated(self%node)) then
          if (size(self%node) >= n) return
          deallocate(self%node, self%g, self%c, self%h)
       end if
       allocate(self%node(n), source=0)
-      allocate(self%g(2, n), self%c(2, n), self%h(2*n, 2*n), source=0.0_wp)
+      allocate(self%g(d, n), self%c(d, n), self%h(d*n, d*n), source=0.0_wp)
    end subroutine condition_resize
 
    !> Let a condition depend on the nodes `node` too, so far by nothing.
@@ -35,7 +39,7 @@ contains
       if (n == self%n_node) return
       old = self
       n_dim = size(self%g, 1)
-      call condition_resize(self, n)
+      call condition_resize(self, n, n_dim)
       self%node(:n) = list(:n)
       self%g = 0.0_wp
       self%c = 0.0_wp

@@ -6,6 +6,7 @@ submodule (emcon_contact_registry) emcon_contact_kinds
    use emcon_midside_plane, only : midside_init
    use emcon_mortar, only : mortar_init, mortar_t
    use emcon_nts, only : nts_init, nts_t
+   use emcon_patch_contact_space, only : patch_contact_init, patch_contact_t
    use emcon_scene, only : where_text
    use emcon_segment, only : segment_init, segment_t
    use emcon_start_gaps_plane, only : start_gaps_plane_init, start_gaps_plane_t
@@ -17,11 +18,20 @@ contains
       type(mortar_t), allocatable :: mortar
       type(nts_t), allocatable :: nts
       type(segment_t), allocatable :: segment
+      type(patch_contact_t), allocatable :: patch
 
       select case (pair%formulation)
       case (formulation_user)
          call new_given(scene, pair, contact, error, user)
          return
+      end select
+      if (size(scene%x, 1) > 2) then
+         allocate(patch)
+         call patch_contact_init(patch, scene, pair, error)
+         call move_alloc(patch, contact)
+         return
+      end if
+      select case (pair%formulation)
       case (formulation_mortar)
          allocate(mortar)
          call mortar_init(mortar, scene, pair, error)

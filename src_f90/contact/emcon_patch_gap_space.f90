@@ -10,7 +10,7 @@ module emcon_patch_gap_space
       patch_moments
    implicit none
    private
-   public :: patch_t, patch_gap_t, patch_gap, patch_means
+   public :: patch_t, patch_gap_t, patch_gap, patch_means, patch_way, patch_ahead
 
    !> Remainders below so many epsilons of what they are the difference of are round-off.
    real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
@@ -101,6 +101,37 @@ contains
          end associate
       end do
    end subroutine patch_means
+
+   !> How far vertices go along the frame at most, relative to the patch.
+   pure real(wp) function patch_way(patch, x, dx) result(farthest)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
+      real(wp), dimension(3, patch%n_vertex) :: from, to
+
+      call place_vertices(patch, x, from)
+      call place_vertices(patch, x + dx, to)
+      farthest = patch%length*sqrt(maxval(sum((to(:2, :) - from(:2, :))**2, 1)))
+   end function patch_way
+
+   !> How high the planes of the triangles that are over the patch at the end are over it at the
+   !> start: the least; huge if there are none [L].
+   pure real(wp) function patch_ahead(patch, x, dx) result(least)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
+      real(wp), dimension(3, patch%n_vertex) :: from, to
+      integer :: k
+
+      call place_vertices(patch, x, from)
+      call place_vertices(patch, x + dx, to)
+      least = huge(least)
+      do k = 1, patch%n_triangle
+         associate (t => patch%triangle(:, k))
+            if (patch_misses(to(:2, t))) cycle
+            if (any(patch%chi(t) <= 0.0_wp)) cycle
+            least = min(least, dot_product(barycentric(from(:2, t), [centre, centre]), from(3, t)))
+         end associate
+      end do
+   end function patch_ahead
 
    !> The gap over a step with its derivatives. None of its vertices counts where nothing is over
    !> the patch at either end.

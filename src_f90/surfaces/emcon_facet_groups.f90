@@ -10,7 +10,8 @@ module emcon_facet_groups
    use emcon_sort, only : find_sorted, unique_sorted
    implicit none
    private
-   public :: facet_groups_t, ridges_t, facet_groups_init, ridges_find, group_angle, ridge_angle
+   public :: facet_groups_t, ridges_t, facet_groups_init, ridges_find, find_turns, group_angle, &
+      ridge_angle
 
    !> Up to this turn facets are smooth, and beyond it a side is a ridge [degrees].
    real(wp), parameter :: group_angle = 60.0_wp, ridge_angle = 20.0_wp

@@ -1,0 +1,319 @@
+!> Contact of nodes in space: one constraint per slave node, the gap of a small patch around it.
+!>
+!> The patch moves with the slave's surface, and its gap is the mean over what it covers of the
+!> master: smooth while the node slides over sides and corners. Source: docs/theory.md, section 15.
+module emcon_patch_contact_space
+   use emcon_condition_nodes, only : condition_resize
+   use emcon_constraint, only : condition_t
+   use emcon_contact, only : contact_t, max_penetration_on_entry
+   use emcon_contact_law_registry, only : contact_laws_of_surface
+   use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_facets, only : facets_init, facets_normal
+   use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach
+   use emcon_kinds, only : wp
+   use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
+   use emcon_patch_gap_space, only : patch_ahead, patch_gap, patch_gap_t, patch_means, patch_way
+   use emcon_patch_sides_space, only : node_frames_init, patch_sides_t, triangles_init
+   use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
+      patch_stencil_t
+   use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
+   use emcon_scene, only : scene_t, where_text
+   implicit none
+   private
+   public :: patch_contact_t, patch_contact_init
+
+   !> A node is let go where less than this part of its patch is covered.
+   real(wp), parameter :: least_cover = 0.02_wp
+   !> So far, per facet, a gap may be closed as a step begins in which it begins to act: corners are
+   !> rounded by less, and bodies are thicker.
+   real(wp), parameter :: deepest_start = 0.1_wp
+
+   type, extends(contact_t) :: patch_contact_t
+      type(patch_sides_t) :: sides
+      logical :: both_sides = .false.                 !! this and another hold all nodes
+      type(near_list_t) :: near
+      type(position_memo_t) :: memo                   !! of the nodes as stencils were chosen:
+      real(wp) :: chosen_reach = 0.0_wp               !! among facets up to there [L]
+      type(patch_stencil_t), allocatable :: stencil(:)   !! (n_constraint)
+      real(wp), allocatable :: scale(:)               !! (n_constraint) covered at the start
+      real(wp), allocatable :: cover(:)               !! (n_constraint) covered at the end
+   contains
+      procedure :: configure => patch_configure
+      procedure :: begin_points => patch_begin_step
+      procedure :: measure_points => patch_measure
+      procedure :: evaluate_points => patch_evaluate
+      procedure :: area_points => patch_area
+      procedure :: share => patch_share
+      procedure :: mean_gap => patch_mean_gap
+      procedure :: could_hold => patch_could_hold
+   end type patch_contact_t
+
+contains
+
+   !> Set up the pair `pair` of `scene`.
+   subroutine patch_contact_init(self, scene, pair, error)
+      type(patch_contact_t), intent(out) :: self
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      type(error_t), allocatable, intent(out) :: error
+      integer :: i
+
+      associate (sides => self%sides)
+         call facets_init(sides%slave, scene, scene%surface(pair%slave), error)
+         if (allocated(error)) return
+         if (sides%slave%n_facet == 0) then
+            call raise(error, err_input, where_text(scene, scene%surface(pair%slave)%origin) &
+               // ": surface " // scene%surface(pair%slave)%name // " has nodes without faces, " &
+               // "which the gap needs; name faces of elements")
+            return
+         end if
+         allocate(sides%master)
+         call facets_init(sides%master, scene, scene%surface(pair%master), error)
+         if (allocated(error)) return
+         call node_frames_init(sides%frames, sides%slave, scene%x)
+         call triangles_init(sides%triangles, sides%master, scene%x)
+         self%node = sides%slave%node
+         self%n_constraint = size(self%node)
+         allocate(self%duplicate(self%n_constraint), source=0)
+         allocate(self%state(self%n_constraint), self%stencil(self%n_constraint))
+         allocate(self%scale(self%n_constraint), source=1.0_wp)
+         allocate(self%cover(self%n_constraint), self%sagitta(self%n_constraint), source=0.0_wp)
+         self%thickness = sqrt(sides%frames%area)
+         call near_list_init(self%near, reshape(self%node, [1, self%n_constraint]), &
+            sides%master%facet, scene%x, scene%u0, pair%interaction%offset &
+            + interaction_reach(pair%interaction))
+         self%state%other_size = [(sides%frames%size(i), i = 1, self%n_constraint)]
+      end associate
+      self%both_sides = pair%both_sides
+      if (self%both_sides) self%area_factor = 0.5_wp
+      self%may_leave = .true.
+      self%slack = pair%slack
+      self%offset = pair%interaction%offset
+      self%max_penetration_at_start = deepest_start
+      call contact_laws_of_surface(pair%interaction, self%laws)
+   end subroutine patch_contact_init
+
+   !> No option of a step changes what a gap is made of.
+   pure subroutine patch_configure(self, x, options)
+      class(patch_contact_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)   !! (3, n_node) reference positions [L]
+      type(contact_options_t), intent(in) :: options
+   end subroutine patch_configure
+
+   !> Choose for each slave node what its patch may see in the step. From the same start and up to
+   !> the same reach the choice is the same.
+   pure subroutine patch_begin_step(self, x, u0, du)
+      class(patch_contact_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      integer, allocatable :: facet(:)
+      integer :: i, k
+
+      call near_list_update(self%near, x, u0, du, self%reach)
+      call self%has_looked(self%near%clearance)
+      if (abs(self%chosen_reach - self%reach) <= 0.0_wp) then
+         if (position_memo_holds(self%memo, self%near%node, x, u0)) return
+      end if
+      call position_memo_take(self%memo, self%near%node, x, u0)
+      self%chosen_reach = self%reach
+      associate (list => self%near%candidates)
+         do i = 1, self%n_constraint
+            associate (of => list%facet(list%start(i):list%start(i + 1) - 1))
+               facet = pack(of, [(near_list_within(self%near, i, of(k), x, u0, self%reach), &
+                  k = 1, size(of))])
+            end associate
+            call patch_stencil_choose(self%stencil(i), self%sides, i, facet, x, u0)
+         end do
+      end associate
+   end subroutine patch_begin_step
+
+   pure subroutine patch_measure(self, x, u0, du)
+      class(patch_contact_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      integer :: i
+
+      do i = 1, self%n_constraint
+         call measure_node(self, i, x, u0, du)
+      end do
+   end subroutine patch_measure
+
+   !> The gap of node `i` at both ends of the step, and what of its patch is covered.
+   pure subroutine measure_node(self, i, x, u0, du)
+      type(patch_contact_t), intent(inout) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), dimension(3, 3 + self%stencil(i)%patch%n_vertex) :: at, way
+      real(wp) :: height(0:1), cover(0:1), least
+
+      associate (state => self%state(i), stencil => self%stencil(i))
+         state%is_near = stencil%triangle > 0
+         state%is_over = .false.
+         if (.not. state%is_near) return
+         call patch_stencil_gather(stencil, x, u0, du, at, way)
+         call patch_means(stencil%patch, at, height(0), cover(0))
+         call patch_means(stencil%patch, at + way, height(1), cover(1))
+         ! What stores energy is followed as long as there is any to give back.
+         least = least_cover
+         self%scale(i) = max(cover(0), least)
+         if (self%step%is_penalty) least = tiny(least)
+         state%size = stencil%size
+         state%other_size = self%sides%frames%size(i)
+         state%is_near = maxval(cover) > 0.0_wp
+         state%is_over = cover(1) >= least .or. (self%step%is_penalty .and. cover(0) >= least)
+         state%is_leaving = .not. state%is_over
+         state%is_arriving = cover(0) < least
+         state%is_covered = patch_way(stencil%patch, at, way) <= self%reach
+         state%gap0 = 0.0_wp
+         state%gap1 = 0.0_wp
+         state%was_open = .true.
+         if (cover(0) > 0.0_wp) state%gap0 = height(0)/cover(0) - self%offset
+         if (state%is_arriving) state%was_open = patch_ahead(stencil%patch, at, way) &
+            - self%offset >= -max_penetration_on_entry*state%size
+         if (cover(1) >= least) state%gap1 = height(1)/cover(1) - self%offset
+         if (self%slack > 0.0_wp) state%closed = -self%slack*min(state%size, state%other_size)
+         self%cover(i) = cover(1)
+      end associate
+   end subroutine measure_node
+
+   pure subroutine patch_evaluate(self, wanted, x, u0, du, target, item)
+      class(patch_contact_t), intent(inout) :: self
+      integer, intent(in) :: wanted(:)           !! (n) numbers of constraints, ascending
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      real(wp), intent(in) :: target(:)          !! (n) [L]
+      type(condition_t), intent(inout) :: item(:)   !! (n)
+      integer :: k
+
+      do k = 1, size(wanted)
+         call evaluate_node(self, wanted(k), x, u0, du, target(k) + self%offset, item(k))
+      end do
+   end subroutine patch_evaluate
+
+   !> The condition of node `i`.
+   pure subroutine evaluate_node(self, i, x, u0, du, target, item)
+      type(patch_contact_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in) :: target             !! height to hold [L]
+      type(condition_t), intent(inout) :: item
+      real(wp), dimension(3, 3 + self%stencil(i)%patch%n_vertex) :: at, way
+      type(patch_gap_t) :: gap
+      logical :: is_used(self%stencil(i)%n_node)
+      integer :: column(2 + self%stencil(i)%patch%n_vertex), k, n
+
+      associate (stencil => self%stencil(i))
+         call patch_stencil_gather(stencil, x, u0, du, at, way)
+         call patch_gap(stencil%patch, at, way, target, item%leaves_second, gap)
+         n = 2 + gap%n_vertex
+         column(:n) = [1, 2, 2 + gap%vertex(:gap%n_vertex)]
+         is_used = [(any(abs(stencil%weight(k, column(:n))) > 0.0_wp), k = 1, stencil%n_node)]
+         is_used(:stencil%n_slave) = .true.
+         call condition_resize(item, count(is_used), size(x, 1))
+         item%node(:item%n_node) = pack(stencil%node(:stencil%n_node), is_used)
+         item%n_slave = stencil%n_slave
+         item%size = stencil%size
+         item%is_mean = .true.
+         item%gap0 = gap%f0/self%scale(i)
+         item%gap1 = gap%f1/self%scale(i)
+         item%dgap = gap%df/self%scale(i)
+         associate (row => pack([(k, k = 2, stencil%n_node)], is_used(2:)))
+            call spread_to_nodes(gap, stencil%weight(row, column(:n)), 1.0_wp/self%scale(i), item)
+         end associate
+      end associate
+   end subroutine evaluate_node
+
+   !> Derivatives by nodes from those by sums of nodes.
+   pure subroutine spread_to_nodes(gap, weight, factor, item)
+      type(patch_gap_t), intent(in) :: gap
+      real(wp), intent(in) :: weight(:, :)       !! (n_node - 1, 2 + n_vertex) of nodes in the sums
+      real(wp), intent(in) :: factor
+      type(condition_t), intent(inout) :: item
+      real(wp), allocatable :: half(:, :), full(:, :)
+      integer :: i, j, k, n
+
+      n = item%n_node
+      associate (in_order => [(k, k = 1, n)], n_dim => size(item%g, 1))
+         item%g(:, :n) = 0.0_wp
+         item%c(:, :n) = 0.0_wp
+         call nodes_add_first(factor, of_nodes(gap%g), in_order, item%g)
+         call nodes_add_first(factor, of_nodes(gap%c), in_order, item%c)
+         if (item%leaves_second) return
+         associate (m => size(gap%g))
+            allocate(half(n_dim*(n - 1), m), full(n_dim*(n - 1), n_dim*(n - 1)))
+            do k = 1, m
+               half(:, k) = of_nodes(gap%h(:, k))
+            end do
+            full = 0.0_wp
+            do j = 1, size(weight, 2)
+               do i = 1, n - 1
+                  if (.not. abs(weight(i, j)) > 0.0_wp) cycle
+                  associate (to => full(:, n_dim*(i - 1) + 1:n_dim*i))
+                     to = to + weight(i, j)*half(:, n_dim*(j - 1) + 1:n_dim*j)
+                  end associate
+               end do
+            end do
+         end associate
+         item%h(:n_dim*n, :n_dim*n) = 0.0_wp
+         call nodes_add_second(factor, n_dim, full, in_order, item%h)
+      end associate
+
+   contains
+
+      !> The components of each node but the first.
+      pure function of_nodes(part) result(nodes)
+         real(wp), intent(in) :: part(:)         !! components of each sum
+         real(wp) :: nodes(size(item%g, 1)*size(weight, 1))
+
+         nodes = reshape(matmul(reshape(part, [size(item%g, 1), size(weight, 2)]), &
+            transpose(weight)), shape(nodes))
+      end function of_nodes
+
+   end subroutine spread_to_nodes
+
+   !> As `contact_t` has it: areas of facets are shared by their nodes alike.
+   pure subroutine patch_area(self, x, u, area, length)
+      class(patch_contact_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
+      real(wp), intent(out) :: length(:)         !! (n_constraint) by their thickness [L]
+      real(wp) :: normal(3)
+      integer :: f, n
+
+      area = 0.0_wp
+      associate (slave => self%sides%slave)
+         do f = 1, slave%n_facet
+            n = count(slave%corner(:, f) > 0)
+            normal = facets_normal(slave, f, x, u)
+            associate (to => slave%corner(:n, f))
+               area(to) = area(to) + sqrt(dot_product(normal, normal))/real(n, wp)
+            end associate
+         end do
+      end associate
+      length = area/self%thickness
+   end subroutine patch_area
+
+   !> Integrals of gaps are functions of the positions alone; their means know what was covered.
+   pure real(wp) function patch_share(self, i) result(share)
+      class(patch_contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+
+      share = self%scale(i)
+   end function patch_share
+
+   pure real(wp) function patch_mean_gap(self, i, gap) result(mean_gap)
+      class(patch_contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in) :: gap                !! integral by what was covered at the start [L]
+
+      mean_gap = 0.0_wp
+      if (self%cover(i) > 0.0_wp) mean_gap = gap*self%scale(i)/self%cover(i)
+   end function patch_mean_gap
+
+   !> Each node of both surfaces may be held.
+   pure logical function patch_could_hold(self, is_loose) result(could_hold)
+      class(patch_contact_t), intent(in) :: self
+      logical, intent(in) :: is_loose(:)         !! (n_constraint) it is not held, and goes in
+
+      could_hold = self%both_sides .and. any(is_loose)
+   end function patch_could_hold
+
+end module emcon_patch_contact_space

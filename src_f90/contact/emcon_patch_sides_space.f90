@@ -1,0 +1,228 @@
+!> Both sides of contact of nodes in space, as they are made once: frames that move with the nodes
+!> of the slave, and triangles of the master with what is beyond their sides.
+!>
+!> Source: docs/theory.md, section 15.
+module emcon_patch_sides_space
+   use emcon_csr, only : csr_list_users
+   use emcon_facet_groups, only : facet_groups_init, facet_groups_t, find_turns, group_angle, &
+      ridge_angle
+   use emcon_facet_split, only : facet_split_centre, facet_split_init, facet_split_t
+   use emcon_facets, only : facets_length, facets_normal, facets_t
+   use emcon_kinds, only : wp
+   use emcon_rotation, only : cross_product
+   use emcon_sort, only : unique_sorted
+   implicit none
+   private
+   public :: node_frames_t, node_frames_init, triangles_t, triangles_init, patch_sides_t
+   public :: sides_point
+
+   !> The second vector of a frame is turned by 60 degrees: the patch is an equilateral triangle.
+   real(wp), parameter :: turn(2) = [0.5_wp, 0.5_wp*sqrt(3.0_wp)]
+   !> A mean normal shorter than this, by the area, is none.
+   real(wp), parameter :: blunt = 1.0e-2_wp
+
+   !> Frames of nodes: vectors a and b that are sums of weight times (x(ring) - x(node)), lengths as
+   !> in the reference.
+   type :: node_frames_t
+      integer, allocatable :: start(:)           !! (n_node + 1) frames of each node
+      integer, allocatable :: ring_start(:)      !! (n_frame + 1)
+      integer, allocatable :: ring(:)            !! nodes of the scene
+      real(wp), allocatable :: weight(:, :)      !! (2, size of `ring`) in a, in b
+      real(wp), allocatable :: size(:)           !! (n_node) mean length of facets there [L]
+      real(wp), allocatable :: area(:)           !! (n_node) in the reference [L^2]
+   end type node_frames_t
+
+   !> The triangles of a surface in space.
+   type :: triangles_t
+      type(facet_split_t) :: split
+      integer, allocatable :: beyond(:, :)       !! (3, n) triangle beyond each side; 0: none
+      logical, allocatable :: is_ridge(:, :)     !! (3, n) the surface is sharp or ends at the side
+      integer, allocatable :: around_start(:)    !! (n_point + 1) triangles at each point:
+      integer, allocatable :: around(:)          !! around_start(i) to around_start(i + 1) - 1
+      real(wp), allocatable :: size(:)           !! (n) length of the facet of each [L]
+   end type triangles_t
+
+   type :: patch_sides_t
+      type(facets_t) :: slave
+      type(facets_t), allocatable :: master      !! gfortran 12 loses a second one of its kind
+      type(node_frames_t) :: frames              !! of the slave
+      type(triangles_t) :: triangles             !! of the master
+   end type patch_sides_t
+
+contains
+
+   !> The nodes of a point of the master and their weights: a node is itself, a centre is made of the
+   !> nodes of its facet.
+   pure subroutine sides_point(self, point, n, node, weight)
+      type(patch_sides_t), intent(in) :: self
+      integer, intent(in) :: point               !! of the split
+      integer, intent(out) :: n
+      integer, intent(out) :: node(:)            !! (>= nodes of a facet) of the scene
+      real(wp), intent(out) :: weight(:)         !! the same; of sum 1
+      integer :: f
+
+      associate (split => self%triangles%split, master => self%master)
+         if (point <= split%n_node) then
+            n = 1
+            node(1) = master%node(point)
+            weight(1) = 1.0_wp
+            return
+         end if
+         f = split%of_centre(point - split%n_node)
+         n = count(master%facet(:, f) > 0)
+         node(:n) = master%facet(:n, f)
+         weight(:n) = facet_split_centre(n)
+      end associate
+   end subroutine sides_point
+
+   !> The frames at all nodes of a surface: of each smooth group of its facets there, and of all of
+   !> them where there are several.
+   pure subroutine node_frames_init(self, facets, x)
+      type(node_frames_t), intent(out) :: self
+      type(facets_t), intent(in) :: facets       !! in space
+      real(wp), intent(in) :: x(:, :)            !! (3, n_node of the scene) reference [L]
+      type(facet_groups_t) :: groups
+      integer, allocatable :: ring(:)
+      real(wp) :: still(3, size(x, 2))
+      integer :: i, g
+
+      call facet_groups_init(groups, facets, x, group_angle)
+      still = 0.0_wp
+      associate (n => size(facets%node), n_frame => groups%n_group + size(facets%node), &
+            n_ring => 2*size(groups%ring))
+         allocate(self%start(n + 1), self%ring_start(n_frame + 1), source=1)
+         allocate(self%size(n), self%area(n), self%weight(2, n_ring), source=0.0_wp)
+         allocate(self%ring(n_ring), source=0)
+      end associate
+      do i = 1, size(facets%node)
+         self%start(i + 1) = self%start(i)
+         associate (first => groups%node_start(i), last => groups%node_start(i + 1) - 1)
+            do g = first, last
+               ring = groups%ring(groups%ring_start(g):groups%ring_start(g + 1) - 1)
+               call add_frame(self, facets, x, still, i, groups%facet(groups%start(g): &
+                  groups%start(g + 1) - 1), ring)
+            end do
+            if (last > first) then
+               ring = unique_sorted(groups%ring(groups%ring_start(first): &
+                  groups%ring_start(last + 1) - 1))
+               call add_frame(self, facets, x, still, i, groups%facet(groups%start(first): &
+                  groups%start(last + 1) - 1), ring)
+            end if
+         end associate
+         associate (first => facets%around_start(i), last => facets%around_start(i + 1) - 1)
+            if (last < first) cycle
+            self%size(i) = sum([(facets_length(facets, facets%around(g)), g = first, last)]) &
+               /real(last - first + 1, wp)
+            self%area(i) = sum([(facets%size(facets%around(g)) &
+               /real(count(facets%corner(:, facets%around(g)) > 0), wp), g = first, last)])
+         end associate
+      end do
+   end subroutine node_frames_init
+
+   !> Add the frame of the facets `facet` at node `i`, if they have a mean normal: docs/theory.md,
+   !> eq. (61).
+   pure subroutine add_frame(self, facets, x, still, i, facet, ring)
+      type(node_frames_t), intent(inout) :: self
+      type(facets_t), intent(in) :: facets
+      real(wp), intent(in) :: x(:, :), still(:, :)
+      integer, intent(in) :: i                   !! index into the nodes
+      integer, intent(in) :: facet(:), ring(:)   !! facets, and their nodes but `i` as such indices
+      real(wp) :: normal(3), area, first(3), second(3), flat(2, size(ring))
+      real(wp) :: square(2, 2), inverse(2, 2), weight(2, size(ring))
+      integer :: k, n
+
+      normal = 0.0_wp
+      area = 0.0_wp
+      do k = 1, size(facet)
+         normal = normal + facets_normal(facets, facet(k), x, still)
+         area = area + facets%size(facet(k))
+      end do
+      if (.not. sqrt(dot_product(normal, normal)) > blunt*area) return
+      normal = normal/sqrt(dot_product(normal, normal))
+      associate (at => facets%node(i), other => facets%node(ring))
+         first = x(:, other(1)) - x(:, at)
+         first = first - dot_product(first, normal)*normal
+         first = first/sqrt(dot_product(first, first))
+         second = cross_product(normal, first)
+         do k = 1, size(ring)
+            flat(:, k) = [dot_product(first, x(:, other(k)) - x(:, at)), &
+               dot_product(second, x(:, other(k)) - x(:, at))]
+         end do
+         square = matmul(flat, transpose(flat))
+         inverse = reshape([square(2, 2), -square(2, 1), -square(1, 2), square(1, 1)], [2, 2]) &
+            /(square(1, 1)*square(2, 2) - square(1, 2)*square(2, 1))
+         weight = matmul(inverse, flat)
+         weight(2, :) = turn(1)*weight(1, :) + turn(2)*weight(2, :)
+         n = self%ring_start(self%start(i + 1))
+         self%ring(n:n + size(ring) - 1) = other
+         self%weight(:, n:n + size(ring) - 1) = weight
+      end associate
+      self%start(i + 1) = self%start(i + 1) + 1
+      self%ring_start(self%start(i + 1)) = n + size(ring)
+   end subroutine add_frame
+
+   !> The triangles of a surface.
+   pure subroutine triangles_init(self, facets, x)
+      type(triangles_t), intent(out) :: self
+      type(facets_t), intent(in) :: facets       !! in space
+      real(wp), intent(in) :: x(:, :)            !! (3, n_node of the scene) reference [L]
+      real(wp), allocatable :: turns(:, :)
+      integer :: f, k, n, t
+
+      call facet_split_init(self%split, facets)
+      call find_turns(facets, x, turns)
+      n = size(self%split%facet)
+      allocate(self%beyond(3, n), source=0)
+      allocate(self%is_ridge(3, n), source=.false.)
+      allocate(self%size(n))
+      do t = 1, n
+         f = self%split%facet(t)
+         self%size(t) = facets_length(facets, f)
+         associate (first => self%split%start(f), m => &
+               self%split%start(f + 1) - self%split%start(f))
+            if (m == 1) then
+               do k = 1, 3
+                  self%beyond(k, t) = across(f, k)
+                  self%is_ridge(k, t) = is_ridge(turns(k, f))
+               end do
+            else
+               k = t - first + 1
+               self%beyond(1, t) = across(f, k)
+               self%is_ridge(1, t) = is_ridge(turns(k, f))
+               self%beyond(2:3, t) = first + [mod(k, m), mod(k - 2 + m, m)]
+            end if
+         end associate
+      end do
+      call csr_list_users(self%split%n_point, [(1 + 3*t, t = 0, n)], &
+         reshape(self%split%corner, [3*n]), self%around_start, self%around)
+      self%around_start = self%around_start + 1
+
+   contains
+
+      !> The triangle beyond side `k` of facet `f`.
+      pure integer function across(f, k)
+         integer, intent(in) :: f, k
+         integer :: g, j, m
+
+         across = 0
+         g = facets%neighbour(k, f)
+         if (g == 0) return
+         m = count(facets%corner(:, g) > 0)
+         do j = 1, m
+            if (facets%corner(j, g) /= facets%corner(1 + mod(k, &
+               count(facets%corner(:, f) > 0)), f)) cycle
+            if (facets%corner(1 + mod(j, m), g) /= facets%corner(k, f)) cycle
+            across = self%split%start(g) + merge(0, j - 1, m == 3)
+         end do
+      end function across
+
+      !> Does a surface end for a patch that goes over a side at which it turns by so much?
+      pure logical function is_ridge(angle)
+         real(wp), intent(in) :: angle           !! [degrees]; huge: nothing is beyond
+
+         is_ridge = abs(angle) > ridge_angle
+      end function is_ridge
+
+   end subroutine triangles_init
+
+end module emcon_patch_sides_space
