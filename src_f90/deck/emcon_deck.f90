@@ -14,6 +14,7 @@ module emcon_deck
    use emcon_deck_check_surfaces, only : check_surfaces
    use emcon_deck_check_ties, only : check_ties
    use emcon_deck_contact, only : read_interactions, read_pairs
+   use emcon_deck_contact_space, only : check_contact_space
    use emcon_deck_dimension, only : check_dimension, find_dimension, is_axial_deck, n_plane, &
       refuse_plane_cards
    use emcon_deck_equations, only : read_equations
@@ -122,7 +123,11 @@ contains
       call check_nodes(reader, scene)
       call check_linear(reader, scene)
       call check_massless_sections(reader, scene)
-      if (scene%n_dim == n_plane) call check_surfaces(reader, scene)
+      if (scene%n_dim == n_plane) then
+         call check_surfaces(reader, scene)
+      else
+         call check_contact_space(reader, scene)
+      end if
       call choose_slaves(reader, scene)
       call check_pairs(reader, scene)
       call check_ties(reader, scene)

@@ -4,6 +4,7 @@
 module emcon_deck_check_contact
    use emcon_deck_check_sides, only : find_advice
    use emcon_deck_check_surfaces, only : mark_nodes
+   use emcon_deck_dimension, only : n_space
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_interactions, only : contact_pair_t, formulation_user, formulation_mortar, &
@@ -174,6 +175,7 @@ contains
       type(contact_pair_t), intent(in) :: pair
       logical, allocatable :: is_slave(:), is_held(:), is_guided(:)
       integer, allocatable :: n_free(:)
+      character(len=:), allocatable :: others
       integer :: i
 
       if (any(pair%formulation == [0, formulation_user]) .or. pair%both_sides) return
@@ -186,10 +188,12 @@ contains
          is_guided = is_guided .or. (is_slave .and. n_free < scene%n_dim)
       end do
       is_guided = is_guided .and. .not. is_held
+      others = "the other one"
+      if (scene%n_dim == n_space) others = "the others"
       if (any(is_guided)) call add_warning(reader%log, pair%origin, "*CONTACT PAIR: slave node " &
          // label_list(pack(scene%node%label, is_guided)) // " of surface " &
          // scene%surface(pair%slave)%name // " is prescribed in one direction: contact moves it " &
-         // "in the other one only, and is singular where the master faces along the first")
+         // "in " // others // " only, and is singular where the master faces along the first")
    end subroutine check_freedom
 
    !> For each slave node: so many degrees of freedom of one node can fulfil its constraint.

@@ -2,6 +2,7 @@
 !>
 !> Source: docs/theory.md, section 4.12; docs/verification.md, a slave surface that is too coarse.
 module emcon_deck_check_sides
+   use emcon_deck_dimension, only : n_plane
    use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
@@ -22,7 +23,8 @@ module emcon_deck_check_sides
 
 contains
 
-   !> Why the slave of `pair` should be the master, to follow on its name; empty if it should not.
+   !> Why the slave of `pair` should be the master, to follow on its name; empty if it should not,
+   !> and in space.
    subroutine find_advice(scene, pair, advice, is_bent)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
@@ -33,6 +35,7 @@ contains
 
       advice = ""
       is_bent = .false.
+      if (scene%n_dim /= n_plane) return
       slave = surface_shape(scene, scene%surface(pair%slave))
       master = surface_shape(scene, scene%surface(pair%master))
       if (master%length <= 0.0_wp .or. slave%length <= 0.0_wp) return

@@ -10,7 +10,7 @@ module emcon_deck_check_surfaces
    use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
-   public :: check_surfaces, mark_nodes, find_common_edges
+   public :: check_surfaces, check_free, mark_nodes, find_common_edges
 
 contains
 

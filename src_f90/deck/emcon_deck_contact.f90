@@ -2,6 +2,7 @@
 module emcon_deck_contact
    use emcon_deck_contact_damping, only : read_contact_damping
    use emcon_deck_contact_settings, only : read_pair_initiation
+   use emcon_deck_dimension, only : n_space
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, &
       next_line
    use emcon_deck_friction, only : read_friction
@@ -11,7 +12,7 @@ module emcon_deck_contact
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, n_lines, need_name, &
       note_idle, option_name, option_number, option_word, reader_t, refuse_option, &
       card_warning
-   use emcon_deck_surfaces, only : get_surfaces, need_facets
+   use emcon_deck_surfaces, only : get_surfaces, need_facets, refuse_self
    use emcon_diagnostics, only : add_error, quoted, suggestion
    use emcon_interactions, only : adjustment_t, contact_damping_t, contact_pair_t, &
       formulation_user, formulation_mortar, formulation_nts, formulation_segment, pressure_hard, &
@@ -165,6 +166,11 @@ contains
 
       formulation = option_default("formulation")
       if (option_name(card, "TYPE") == "") return
+      if (option_name(card, "TYPE") == "SURFACETOSURFACE" .and. reader%n_dim == n_space) then
+         call card_warning(reader, card, "TYPE=SURFACE TO SURFACE is not for three dimensions in " &
+            // "this version: contact is by nodes, as under NODE TO SURFACE")
+         return
+      end if
       formulation = option_code("formulation", option_name(card, "TYPE"))
       if (formulation > 0) then
          call check_option(reader, card, "TYPE", "formulation", formulation)
@@ -273,7 +279,9 @@ contains
 
       if (pair%slave == 0 .or. pair%master == 0) return
       associate (slave => scene%surface(pair%slave), master => scene%surface(pair%master))
-         if (pair%slave == pair%master) then
+         if (pair%slave == pair%master .and. reader%n_dim == n_space) then
+            call refuse_self(reader, data, slave)
+         else if (pair%slave == pair%master) then
             call need_facets(reader, data, slave, "surface", &
                " and cannot be in contact with itself; ")
          else
@@ -362,6 +370,12 @@ contains
       type(contact_pair_t), intent(inout) :: pair
 
       if (min(pair%slave, pair%master) == 0) return
+      if (reader%n_dim == n_space) then
+         call card_error(reader, card, "its surfaces are tied, and ties in three dimensions are " &
+            // "not in this version")
+         pair%slave = 0
+         return
+      end if
       if (.not. (scene%surface(pair%slave)%is_nodal .or. pair%slave == pair%master)) return
       call card_error(reader, card, "its surfaces are tied, and ties join the element faces of " &
          // "two surfaces")

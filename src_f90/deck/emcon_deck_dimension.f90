@@ -28,8 +28,8 @@ module emcon_deck_dimension
    end type plane_card_t
 
    type(plane_card_t), parameter :: plane_cards(*) = [ &
-      plane_card_t("CONTACTPAIR", "contact"), &
-      plane_card_t("CONTACT", "contact"), &
+      plane_card_t("CONTACTPAIR", "contact", is_of_space=.true.), &
+      plane_card_t("CONTACT", "contact", is_of_space=.true.), &
       plane_card_t("TIE", "ties", "are"), &
       plane_card_t("RIGIDBODY", "rigid bodies", "are", .true.), &
       plane_card_t("USERELEMENT", "elements of a program", "are"), &
@@ -130,9 +130,8 @@ contains
       do i = 1, size(is_kept)
          k = findloc(plane_cards%name == reader%card(i)%name .and. .not. &
             (plane_cards%is_of_space .and. n_dim == n_space), .true., 1)
-         if (is_user_pair(reader%card(i)) .and. n_dim == n_space) k = 0
-         is_kept(i) = k == 0 .and. index(reader%card(i)%name, "CONTACTINCLUSIONS") == 0 &
-            .and. index(reader%card(i)%name, "CONTACTPROPERTY") == 0
+         is_kept(i) = k == 0 .and. (n_dim == n_space .or. .not. &
+            is_under_contact(reader%card(i)%name))
          if (k == 0) cycle
          if (.not. is_told(k)) call card_error(reader, reader%card(i), &
             trim(plane_cards(k)%what) // " " // trim(merge(in_space, on_rings // "  ", &
@@ -152,12 +151,13 @@ contains
       reader%doubt%rigid = .true.
    end subroutine refuse_plane_cards
 
-   !> A contact pair whose contact a program gives?
-   pure logical function is_user_pair(card)
-      type(card_t), intent(in) :: card
+   !> Is a card one of those that stand below *CONTACT?
+   pure logical function is_under_contact(name)
+      character(len=*), intent(in) :: name         !! as `card_t` has it
 
-      is_user_pair = card%name == "CONTACTPAIR" .and. option_name(card, "TYPE") == "USER"
-   end function is_user_pair
+      is_under_contact = index(name, "CONTACTINCLUSIONS") > 0 .or. &
+         index(name, "CONTACTPROPERTY") > 0
+   end function is_under_contact
 
    !> Refuse output that is of the plane. Values of options are refused where they are read, by
    !> their rows.

@@ -1,5 +1,6 @@
 !> *FRICTION of surface interactions, and what it does not go with.
 module emcon_deck_friction
+   use emcon_deck_dimension, only : n_space
    use emcon_deck_fields, only : data_error, data_open, data_t, drop_zeros, get_real, next_line, &
       refuse_lines
    use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
@@ -37,6 +38,7 @@ contains
       if (has_option(card, "ROUGH")) then
          coefficient = rough
          call refuse_lines(reader, card)
+         call suit_dimension(reader, card, coefficient, stick)
          return
       end if
       call data_open(data, card)
@@ -65,7 +67,21 @@ contains
          end if
       end do
       if (n == 0) call card_error(reader, card, "a data line with the coefficient is missing")
+      call suit_dimension(reader, card, coefficient, stick)
    end subroutine read_friction
+
+   !> Contact slides freely in space: what rubs there is refused.
+   subroutine suit_dimension(reader, card, coefficient, stick)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      real(wp), intent(inout) :: coefficient, stick
+
+      if (reader%n_dim /= n_space .or. .not. coefficient > 0.0_wp) return
+      call card_error(reader, card, "friction in three dimensions is not in this version; take " &
+         // "it out: contact there slides freely")
+      coefficient = 0.0_wp
+      stick = 0.0_wp
+   end subroutine suit_dimension
 
    !> Friction is in steps whose scheme has its forces along discrete gradients or which are static,
    !> and which hold contact exactly.

@@ -3,14 +3,16 @@
 !> What is included becomes pairs with both sides held: a surface with itself, on one body or on
 !> many, or with another one. All exterior is one surface, of every free face, in contact with every
 !> analytical surface, too; faces that ties cover go out of it when the ties are known
-!> (`emcon_ties`).
+!> (`emcon_ties`). In space it is one surface for each body, in contact with those of the others.
 module emcon_deck_general_contact
+   use emcon_bodies, only : bodies_find
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t, n_neighbours
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, is_blank, &
       next_line
+   use emcon_deck_dimension, only : n_space
    use emcon_deck_named, only : refuse_name
-   use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
-   use emcon_deck_surfaces, only : need_facets, surface_names
+   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, reader_t
+   use emcon_deck_surfaces, only : need_facets, refuse_self, surface_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_interactions, only : contact_pair_t, formulation_nts, pressure_hard
    use emcon_kinds, only : wp
@@ -18,6 +20,7 @@ module emcon_deck_general_contact
    use emcon_name_index, only : name_index_find, name_index_put
    use emcon_scene, only : scene_t, where_text
    use emcon_surface_nodes, only : surface_nodes
+   use emcon_text, only : to_text
    implicit none
    private
    public :: read_general_contact
@@ -132,7 +135,11 @@ contains
             return
          end associate
       end do
-      call append_pairs(scene, data%card, surface)
+      if (surface(1) == surface(size(surface)) .and. scene%n_dim == n_space) then
+         call refuse_self(reader, data, scene%surface(surface(1)))
+      else
+         call append_pairs(scene, data%card, surface)
+      end if
    end subroutine include_pair
 
    !> Two surfaces, the nodes of both of them held, or one, with itself.
@@ -178,11 +185,6 @@ contains
             // "contact already at " // where_text(scene, scene%pair(1)%origin) // "; take it out")
          return
       end if
-      if (name_index_find(reader%names%surfaces, exterior_name) > 0) then
-         call card_error(reader, card, "ALL EXTERIOR defines a surface " // exterior_name &
-            // "; give yours another name")
-         return
-      end if
       call find_exterior(scene, surface)
       surface%name = exterior_name
       surface%origin = card%origin
@@ -190,14 +192,64 @@ contains
          call card_error(reader, card, "there is no free face")
          return
       end if
-      scene%surface = [scene%surface, surface]
+      if (scene%n_dim == n_space) then
+         call include_bodies(reader, card, surface, scene)
+         return
+      end if
+      call add_surface(reader, card, surface, scene)
       all = size(scene%surface)
-      call name_index_put(reader%names%surfaces, exterior_name, all)
       call append_pairs(scene, card, [all])
       do i = 1, all
          if (scene%surface(i)%is_profile) call append_pairs(scene, card, [all, i])
       end do
    end subroutine include_exterior
+
+   !> The surface of each body in contact with that of each other one.
+   subroutine include_bodies(reader, card, exterior, scene)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(surface_t), intent(in) :: exterior    !! of all bodies
+      type(scene_t), intent(inout) :: scene
+      type(surface_t) :: surface
+      integer, allocatable :: body(:)
+      integer :: i, k, n_body, n_before
+
+      call bodies_find(scene%element%node, size(scene%node%label), body, n_body)
+      if (n_body == 1) then
+         call card_error(reader, card, "there is one body, and contact of a body with itself in " &
+            // "three dimensions is not in this version")
+         return
+      end if
+      call card_warning(reader, card, "ALL EXTERIOR: each body is in contact with the others, " &
+         // "none with itself: that is not in this version in three dimensions")
+      n_before = size(scene%surface)
+      do i = 1, n_body
+         surface = exterior
+         surface%name = exterior_name // "_" // to_text(i)
+         surface%is_exterior = .false.
+         associate (is_own => body(scene%element%node(1, exterior%element)) == i)
+            surface%element = pack(exterior%element, is_own)
+            surface%face = pack(exterior%face, is_own)
+         end associate
+         call add_surface(reader, card, surface, scene)
+         do k = n_before + 1, size(scene%surface) - 1
+            call append_pairs(scene, card, [k, size(scene%surface)])
+         end do
+      end do
+   end subroutine include_bodies
+
+   !> Add a surface that no card defines.
+   subroutine add_surface(reader, card, surface, scene)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(surface_t), intent(in) :: surface
+      type(scene_t), intent(inout) :: scene
+
+      if (name_index_find(reader%names%surfaces, surface%name) > 0) call card_error(reader, card, &
+         "ALL EXTERIOR defines a surface " // surface%name // "; give yours another name")
+      scene%surface = [scene%surface, surface]
+      call name_index_put(reader%names%surfaces, surface%name, size(scene%surface))
+   end subroutine add_surface
 
    !> The free faces of all elements but those of rigid bodies with an analytical surface: that is
    !> what others meet.

@@ -4,6 +4,7 @@
 module emcon_deck_initiation
    use emcon_bodies, only : bodies_find
    use emcon_deck_check_massless, only : has_massless_sections
+   use emcon_deck_dimension, only : n_space
    use emcon_deck_jacobian, only : determinant
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error
@@ -108,6 +109,10 @@ contains
       integer :: k
 
       reason = ""
+      if (scene%n_dim == n_space) then
+         reason = "contact in three dimensions needs them"
+         return
+      end if
       k = findloc(takes_massless(scene%step), .false., 1)
       if (k > 0) then
          reason = "the scheme or the constraint method of step " // to_text(k) // " needs them"

@@ -49,7 +49,7 @@ module emcon_options
       option_row_t("formulation", formulation_segment, "SEGMENT", "EMCON_SEGMENT", &
          "gaps of nodes integrated over slave edges", "", n_plane, instead="NODE TO SURFACE"), &
       option_row_t("formulation", formulation_mortar, "MORTAR", "EMCON_MORTAR", "mortar", &
-         ",LINMORTAR,PGLINMORTAR,SURFACETOSURFACE,"), &
+         ",LINMORTAR,PGLINMORTAR,SURFACETOSURFACE,", n_plane, instead="NODE TO SURFACE"), &
       option_row_t("formulation", formulation_user, "USER", "", "contact of the program", ""), &
       option_row_t("integration", integration_segments, "SEGMENTS", "EMCON_SEGMENTS", &
          "segments", ""), &
@@ -75,7 +75,8 @@ module emcon_options
          "ADMISSIBLE", ""), &
       option_row_t("initiation", initiation_velocity_update, "VELOCITY UPDATE", "", &
          "VELOCITY UPDATE", ""), &
-      option_row_t("initiation", initiation_massless, "MASSLESS", "", "MASSLESS", ""), &
+      option_row_t("initiation", initiation_massless, "MASSLESS", "", "MASSLESS", "", n_plane, &
+         instead="PERSISTENT"), &
       option_row_t("method", method_null_space, "NULL SPACE", "", "", ""), &
       option_row_t("method", method_saddle_point, "SADDLE POINT", "", "", ""), &
       option_row_t("method", method_penalty, "PENALTY", "", "by penalty", ""), &

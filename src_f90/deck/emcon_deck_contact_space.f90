@@ -1,0 +1,251 @@
+!> The surfaces of contact pairs in space: outer faces that make up surfaces, none of them flat.
+module emcon_deck_contact_space
+   use emcon_deck_check_surfaces, only : check_free
+   use emcon_deck_adjacency, only : adjacency_init, adjacency_t
+   use emcon_deck_reader, only : reader_t
+   use emcon_deck_rigid, only : mark_rigid
+   use emcon_diagnostics, only : add_error
+   use emcon_kinds, only : dp, wp
+   use emcon_mesh, only : surface_t
+   use emcon_rotation, only : cross_product
+   use emcon_scene, only : scene_t
+   use emcon_sort, only : sort_order
+   use emcon_surface_facets, only : surface_facets
+   use emcon_surface_nodes, only : surface_nodes
+   use emcon_text, only : joined, string_t, to_text
+   implicit none
+   private
+   public :: check_contact_space
+
+   !> Faces named in a message.
+   integer, parameter :: most_named = 10
+   integer, parameter :: n_dim = 3
+   !> An area below this part of the square of the circumference is none.
+   real(wp), parameter :: least_area = 1.0e-8_wp
+
+   !> A side of a face: its nodes, the lower number first, and whether it runs from that to the
+   !> other one.
+   type :: side_t
+      integer :: low = 0
+      integer :: high = 0
+      logical :: is_up = .false.
+      integer :: facet = 0
+   end type side_t
+
+contains
+
+   !> Every surface that is in contact.
+   subroutine check_contact_space(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(adjacency_t) :: adjacency
+      character(len=:), allocatable :: title
+      integer, allocatable :: facet(:, :)
+      integer :: i, n_errors
+
+      if (size(scene%pair) == 0 .or. reader%doubt%shapes) return
+      call adjacency_init(adjacency, scene)
+      do i = 1, size(scene%surface)
+         if (all(scene%pair%slave /= i .and. scene%pair%master /= i)) cycle
+         associate (surface => scene%surface(i))
+            title = "contact surface " // surface%name
+            call check_rigid(reader, scene, surface, title)
+            n_errors = reader%log%n_errors
+            call check_free(reader, scene, adjacency, surface, title)
+            if (reader%log%n_errors > n_errors) cycle
+            call surface_facets(scene, surface, facet)
+            if (size(facet, 2) == 0) cycle
+            if (any(facet(1, :) == 0)) cycle
+            call check_sides(reader, scene, surface, facet, title)
+            call check_shapes(reader, scene, surface, facet, title)
+         end associate
+      end do
+   end subroutine check_contact_space
+
+   !> Rigid bodies are in no contact in space.
+   subroutine check_rigid(reader, scene, surface, title)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      character(len=*), intent(in) :: title
+      integer, allocatable :: node(:)
+      integer :: body(size(scene%node%label))
+
+      if (size(scene%rigid) == 0) return
+      call mark_rigid(scene, body)
+      call surface_nodes(scene, surface, node)
+      if (all(body(node) == 0)) return
+      call add_error(reader%log, surface%origin, title // " is of rigid body " // &
+         scene%rigid(maxval(body(node)))%name // ": rigid bodies in contact in three dimensions " &
+         // "are not in this version; give it a stiff material in place of *RIGID BODY")
+   end subroutine check_rigid
+
+   !> Two faces at most meet in a side, and they run it in unlike ways.
+   subroutine check_sides(reader, scene, surface, facet, title)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      integer, intent(in) :: facet(:, :)
+      character(len=*), intent(in) :: title
+      type(side_t), allocatable :: side(:)
+      integer :: first, last, n_branch, n_back, branch, back
+
+      call list_sides(facet, side)
+      n_branch = 0
+      n_back = 0
+      branch = 0
+      back = 0
+      first = 1
+      do while (first <= size(side))
+         last = first
+         do while (last < size(side))
+            if (side(last + 1)%low /= side(first)%low .or. &
+               side(last + 1)%high /= side(first)%high) exit
+            last = last + 1
+         end do
+         if (last > first + 1) then
+            n_branch = n_branch + 1
+            if (branch == 0) branch = first
+         else if (last == first + 1) then
+            if (side(first)%is_up .eqv. side(last)%is_up) then
+               n_back = n_back + 1
+               if (back == 0) back = first
+            end if
+         end if
+         first = last + 1
+      end do
+      if (n_branch > 0) call add_error(reader%log, surface%origin, title // " branches: more than " &
+         // "two of its faces meet in " // place(branch, n_branch) // "; put them into surfaces " &
+         // "of their own")
+      if (n_back > 0) call add_error(reader%log, surface%origin, title // " has no common " // &
+         "outside: two of its faces meet back to back in " // place(back, n_back) // "; put " // &
+         "them into surfaces of their own")
+
+   contains
+
+      !> Where side `i` is, and what meets in it.
+      function place(i, n) result(text)
+         integer, intent(in) :: i, n
+         character(len=:), allocatable :: text
+         type(string_t), allocatable :: face(:)
+         integer :: k
+
+         associate (is_here => side%low == side(i)%low .and. side%high == side(i)%high)
+            allocate(face(count(is_here)))
+            do k = 1, size(face)
+               face(k)%text = face_text(scene, surface, side(i + k - 1)%facet)
+            end do
+         end associate
+         text = "the side of nodes " // to_text(scene%node%label(side(i)%low)) // " and " // &
+            to_text(scene%node%label(side(i)%high)) // " (" // joined(face, ", ", most_named) // ")"
+         if (n > 1) text = text // " and in " // to_text(n - 1) // " more"
+      end function place
+
+   end subroutine check_sides
+
+   !> All sides of faces, those of the same nodes next to each other.
+   pure subroutine list_sides(facet, side)
+      integer, intent(in) :: facet(:, :)
+      type(side_t), allocatable, intent(out) :: side(:)
+      real(dp), allocatable :: key(:)
+      real(dp) :: stride
+      integer :: f, k, m, n, from, to
+
+      stride = real(maxval(facet) + 1, dp)
+      allocate(side(count(facet > 0)), key(count(facet > 0)))
+      n = 0
+      do f = 1, size(facet, 2)
+         m = count(facet(:, f) > 0)
+         do k = 1, m
+            from = facet(k, f)
+            to = facet(1 + mod(k, m), f)
+            n = n + 1
+            side(n) = side_t(min(from, to), max(from, to), from < to, f)
+            key(n) = real(side(n)%low, dp)*stride + real(side(n)%high, dp)
+         end do
+      end do
+      side = side(sort_order(key))
+   end subroutine list_sides
+
+   !> "S2 of element 7" for facet `f`.
+   function face_text(scene, surface, f) result(text)
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      integer, intent(in) :: f                   !! in space one for each face
+      character(len=:), allocatable :: text
+
+      text = "S" // to_text(surface%face(f)) // " of element " // &
+         to_text(scene%element%label(surface%element(f)))
+   end function face_text
+
+   !> Faces have an area, and about their middle they are not folded.
+   subroutine check_shapes(reader, scene, surface, facet, title)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      integer, intent(in) :: facet(:, :)
+      character(len=*), intent(in) :: title
+      logical, dimension(size(facet, 2)) :: is_flat, is_folded
+      integer :: f
+
+      do f = 1, size(is_flat)
+         associate (m => count(facet(:, f) > 0))
+            call find_fault(scene%x(:, facet(:m, f)), is_flat(f), is_folded(f))
+         end associate
+      end do
+      call tell(is_flat, " has a face without area: ")
+      call tell(is_folded, " has a face that is folded over, seen from its middle: ")
+
+   contains
+
+      subroutine tell(is_wrong, what)
+         logical, intent(in) :: is_wrong(:)
+         character(len=*), intent(in) :: what
+         type(string_t) :: face(count(is_wrong))
+         integer :: k, n
+
+         if (.not. any(is_wrong)) return
+         n = 0
+         do k = 1, size(is_wrong)
+            if (.not. is_wrong(k)) cycle
+            n = n + 1
+            face(n)%text = face_text(scene, surface, k)
+         end do
+         call add_error(reader%log, surface%origin, title // what // joined(face, ", ", most_named))
+      end subroutine tell
+
+   end subroutine check_shapes
+
+   !> Is a face flat, or are parts of it about its middle turned over?
+   pure subroutine find_fault(x, is_flat, is_folded)
+      real(wp), intent(in) :: x(:, :)            !! (3, n_node) in turn [L]
+      logical, intent(out) :: is_flat, is_folded
+      real(wp) :: at(n_dim, size(x, 2)), part(n_dim, size(x, 2)), round
+      integer :: k, m
+
+      m = size(x, 2)
+      is_flat = .true.
+      is_folded = .false.
+      ! Scaled by a power of two: coordinates may be as large or as small as numbers can be.
+      at = scale(x, -exponent(maxval(abs(x))))
+      associate (middle => sum(at, 2)/real(m, wp))
+         do k = 1, m
+            at(:, k) = at(:, k) - middle
+         end do
+      end associate
+      if (.not. any(abs(at) > 0.0_wp)) return
+      at = at/maxval(abs(at))
+      round = 0.0_wp
+      do k = 1, m
+         associate (here => at(:, k), there => at(:, 1 + mod(k, m)))
+            part(:, k) = cross_product(here, there)
+            round = round + norm2(there - here)
+         end associate
+      end do
+      associate (normal => sum(part, 2))
+         is_flat = norm2(normal) <= least_area*round**2
+         is_folded = .not. is_flat .and. any(matmul(normal, part) <= 0.0_wp)
+      end associate
+   end subroutine find_fault
+
+end module emcon_deck_contact_space
