@@ -10,7 +10,9 @@ from scene_tools import EPSILON, ROOT, Deck, emcon, run_deck
 
 sys.path.insert(0, str(ROOT / "pywrap"))
 
-from emcon.results import locate, read_pairs  # noqa: E402
+from emcon.animation import animate  # noqa: E402
+from emcon.results import FieldFile, locate, read_pairs  # noqa: E402
+from emcon.scene import read_scene  # noqa: E402
 
 #: Round-off of a sum of contact forces, in units of epsilon times the sum of their sizes.
 NOISE = 8
@@ -251,3 +253,36 @@ def test_python_reads_the_pairs(impact):
     on_slave = np.concatenate([pairs.force, pairs.moment], axis=2)
     np.testing.assert_array_equal(on_slave, series(run, "PAIRS", "CF"))
     np.testing.assert_array_equal(pairs.length, series(run, "PAIRS", "CONTACT_AREA"))
+
+
+# ---- pictures -----------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("name", ["contact_pressure", "contact_force", "contact_status",
+                                  "contact_gap", "contact_active"])
+def test_pictures_show_faces_of_contact(impact, name):
+    """As the faces' file has them, nothing on all others; a field that it has not by the nodes."""
+    run, pair = impact
+    faces = FieldsOf(run.file(".surfaces.vtkhdf"))
+    frame = int(np.argmax(np.abs(faces.cell["contact_force"]).sum(axis=(1, 2))))
+    with FieldFile(run.file(".vtkhdf")) as file:
+        scene = read_scene(file, [0, frame], name)
+    assert len(scene.values[1]) == len(scene.cells) == 6*(2**2 + 3**2)
+    shown = {tuple(sorted(cell.tolist())): value for cell, value in
+             zip(scene.cells, scene.values[1], strict=True) if np.isfinite(value)}
+    node = faces.point["node"][0].astype(int)
+    on = {tuple(sorted(node[cell].tolist())): k for k, cell in enumerate(faces.cells)}
+    assert shown and (name == "contact_active" or shown.keys() <= on.keys())
+    if name == "contact_pressure":
+        expected = faces.cell[name][frame]
+        assert all(shown[key] == expected[k] for key, k in on.items() if key in shown)
+        assert expected.max() == max(shown.values())
+        assert not np.isfinite(scene.values[0]).any()
+    if name == "contact_status":
+        assert set(shown.values()) == {1.0} and scene.states[1] == "closed"
+
+
+def test_animations_show_faces_of_contact(impact, tmp_path):
+    run, _ = impact
+    path = animate(run.base, tmp_path/"impact.gif", field="contact_pressure")
+    assert path.stat().st_size > 1000
