@@ -1,5 +1,6 @@
 """What contact writes in space: sums of forces, moments and impulses, pressures, the faces' file."""
 
+import json
 import sys
 
 import h5py
@@ -286,3 +287,33 @@ def test_animations_show_faces_of_contact(impact, tmp_path):
     run, _ = impact
     path = animate(run.base, tmp_path/"impact.gif", field="contact_pressure")
     assert path.stat().st_size > 1000
+
+
+# ---- report -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("kind", ["C3D8", "C3D10"])
+def test_the_report_tells_what_surfaces_consist_of(kind, tmp_path):
+    """A whole cube over the top of another one."""
+    pair = Pair((kind, "C3D8"), (2, 3), gap=0.25, size=(1.0, 1.5))
+    deck = Deck(pair.deck(pressed(0.3)), "report")
+    outline = [f"{e}, S{f}" for e, f in pair.mesh[0].outer_faces()]
+    deck.card = [(head, outline if head == "*SURFACE, NAME=UPPER" else data)
+                 for head, data in deck.card]
+    deck.write(tmp_path/"report.inp")
+    done = emcon("check", tmp_path/"report.inp", "--json")
+    assert done.returncode == 0, done.stderr
+    upper, lower = json.loads(done.stdout)["surfaces"]
+    is_quadratic = pair.mesh[0].step == 2
+    assert (upper["name"], lower["name"]) == ("UPPER", "LOWER")
+    assert upper["faces"] == len(outline) == (48 if is_quadratic else 24)
+    assert (upper["nodes"], upper["parts"]) == (98 if is_quadratic else 26, 1)
+    assert upper["area"] == pytest.approx(6) and lower["area"] == pytest.approx(2.25)
+    assert upper["shortest"] == pytest.approx((1/8 if is_quadratic else 1/4)**0.5)
+    assert lower["shortest"] == lower["longest"] == pytest.approx(0.5)
+    # Twelve edges of two cells, in quadratic elements each with a node between.
+    assert upper["features"] == (48 if is_quadratic else 24)
+    assert upper["sharpest_degrees"] == pytest.approx(90)
+    assert upper["feature_angle"] == 20
+    assert (upper["free_sides"], lower["features"], lower["free_sides"]) == (0, 0, 12)
+    assert lower["sharpest_degrees"] == lower["deepest_degrees"] == 0
