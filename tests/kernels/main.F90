@@ -140,6 +140,7 @@ program main
    use test_null_space, only : collect_null_space
    use test_numbering, only : collect_numbering
    use test_outline, only : collect_outline
+   use test_patch_contact, only : collect_patch_contact
    use test_patch_gap, only : collect_patch_gap
    use test_overlap_boxes, only : collect_overlap_boxes
    use test_overlap_plane, only : collect_overlap_plane
@@ -310,6 +311,7 @@ program main
    call run("tie_partner", collect_tie_partner)
    call run("tie_balance", collect_tie_balance)
    call run("numbering", collect_numbering)
+   call run("patch_contact", collect_patch_contact)
    call run("patch_gap", collect_patch_gap)
    call run("outline", collect_outline)
    call run("overlap_boxes", collect_overlap_boxes)
