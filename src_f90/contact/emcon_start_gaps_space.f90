@@ -25,7 +25,6 @@ module emcon_start_gaps_space
    type, extends(start_gaps_t) :: start_gaps_space_t
       type(signed_distance_t), private :: master !! where it is at the start
       type(signed_foot_t), allocatable, private :: foot(:)   !! (n) as last measured
-      logical, private :: is_closed = .false.    !! the master has no rim
       real(wp), private :: pad = 0.0_wp          !! gaps are counted from it on [L]
    contains
       procedure :: nearest
@@ -146,7 +145,7 @@ contains
          end do
       end associate
       normal = facets_normal(self%surface(is_master), self%facet(i), scene%x, scene%u0)
-      faces = dot_product(mean, normal) < &
+      faces = self%is_closed .or. dot_product(mean, normal) < &
          -least_facing*sqrt(dot_product(mean, mean)*dot_product(normal, normal))
    end function faces
 
