@@ -173,6 +173,8 @@ program main
    use test_bent_bodies, only : collect_bent_bodies
    use test_solvers, only : collect_solvers
    use test_start_gaps, only : collect_start_gaps
+   use test_start_gaps_space, only : collect_start_gaps_space
+   use test_signed_distance, only : collect_signed_distance
    use test_stepper_free, only : collect_stepper_free
    use test_stepper_query, only : collect_stepper_query
    use test_system, only : collect_system
@@ -224,6 +226,8 @@ program main
 #endif
    call run("solvers", collect_solvers)
    call run("start_gaps", collect_start_gaps)
+   call run("start_gaps_space", collect_start_gaps_space)
+   call run("signed_distance", collect_signed_distance)
    call run("contact_scales", collect_contact_scales)
    call run("condition_reuse", collect_condition_reuse)
    call run("contact_states", collect_contact_states)
