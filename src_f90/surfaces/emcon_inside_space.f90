@@ -255,7 +255,25 @@ contains
                inside_confirm(self, b, a%at(:, i)))
          end if
       end do
+      call add_whole_edges(self, a)
    end subroutine tell_points
+
+   !> The middles of edges that are inside as a whole.
+   pure subroutine add_whole_edges(self, a)
+      type(inside_t), intent(inout) :: self
+      type(triangles_t), intent(in) :: a
+      integer :: i, k
+
+      do i = 1, size(self%state)
+         if (self%state(i) /= is_in) cycle
+         do k = a%around_start(i) + 1, a%around_start(i + 1)
+            associate (e => a%around(k))
+               if (a%edge(1, e) /= i .or. self%is_cut(e)) cycle
+               call add(self, middle_t(e, 0.5_wp, self%near(i)))
+            end associate
+         end do
+      end do
+   end subroutine add_whole_edges
 
    !> Give `state` to all points that hang on the first `n` of the queue, and put them into it.
    pure subroutine hand_on(self, a, state, n, meets_out)

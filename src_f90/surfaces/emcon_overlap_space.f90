@@ -61,9 +61,10 @@ contains
       integer :: i, n
 
       n = count(inside%state == is_in) + inside%n_middle
-      allocate(spare(n))
+      allocate(spare(n), place(0))
       n = 0
-      do i = 1, merge(size(inside%state), 0, size(spare) > inside%n_middle)
+      if (size(spare) == 0) return
+      do i = 1, size(inside%state)
          if (inside%state(i) /= is_in) cycle
          call judge(node_of(a, i), a%at(:, i), inside%near(i))
       end do

@@ -6,6 +6,7 @@ import re
 from pathlib import Path
 
 import numpy as np
+import overlap
 import pytest
 from scene_tools import EPSILON, Run, run_deck
 from space_mesh import KINDS, TETRAHEDRA, Block
@@ -74,3 +75,23 @@ def test_what_overlaps_from_the_start_is_told(tmp_path: Path) -> None:
 def test_one_body_has_nothing_to_meet(tmp_path: Path) -> None:
     run = together(tmp_path, [Block("C3D8", (2, 2, 2))], [(0., 0., 1.)], 0.1, 2, code=0)
     assert "overlap not checked: no *CONTACT PAIR" in run.log
+
+
+def turned(seed: int, to: tuple[float, ...] = (0., 0., 0.)):
+    q = np.linalg.qr(np.random.default_rng(seed).normal(size=(3, 3)))[0]
+    q *= np.sign(np.linalg.det(q))
+    return lambda x: (x - 0.5) @ q.T + 0.5 + np.array(to)
+
+
+@pytest.mark.parametrize(("seed", "kind"), enumerate(KINDS))
+def test_depths_are_those_that_an_outsider_finds(seed: int, kind: str, tmp_path: Path) -> None:
+    """Two cubes of cells of unlike sizes that fly through each other, both turned."""
+    blocks = [Block(kind, (2, 2, 2), place=turned(seed)),
+              Block(kind, (3, 3, 3), place=turned(seed + 100, (0.2, 0.1, 1.5)))]
+    run = together(tmp_path, blocks, [(0., 0., 0.), (0., 0.1, -1.)], 0.1, 10)
+    fields = run.fields()
+    bodies = overlap.BodiesInSpace(fields.cells, centres=False)
+    frames = [bodies.overlap(x) for x in fields.x + fields["displacement"]]
+    told = run.history["penetration"]
+    assert max(f.by_edge for f in frames) > 0.3
+    assert [f.by_edge for f in frames] == pytest.approx(list(told), rel=1e-6, abs=1e-9)
