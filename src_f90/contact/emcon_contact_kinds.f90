@@ -28,7 +28,7 @@ contains
          call new_given(scene, pair, contact, error, user)
          return
       end select
-      if (size(scene%x, 1) > 2) then
+      if (scene%n_dim == n_space) then
          allocate(patch)
          call patch_contact_init(patch, scene, pair, error)
          call move_alloc(patch, contact)

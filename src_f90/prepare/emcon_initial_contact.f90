@@ -55,7 +55,6 @@ contains
       real(wp) :: noise
       integer :: i
 
-      if (size(scene%x, 1) > 2) return
       is_meant = .false.
       noise = coordinate_noise(scene)
       if (size(scene%step) > 0) then
