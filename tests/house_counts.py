@@ -102,7 +102,7 @@ def silent_arguments(path):
 # ---- literals of the plane ----------------------------------------------------------------------
 
 #: Rooms where what is of three dimensions by nature ends in `_space`: a 2 there is a second of three.
-SOLID = {"dgrad", "elements", "laws", "solid"}
+SOLID = {"dgrad", "elements", "laws", "solid", "surfaces"}
 
 # A 2 here counts or names what it says itself: a dimension of an array, a pass, a power,
 # a constant of a law, a figure of a record.
@@ -140,9 +140,9 @@ def planar_literals(path):
 SURFACED = ("scene deck space solid surfaces touch contact terms system prepare state solve "
             "active march results stepper record border app").split()  # fmt: skip
 WORD = re.compile(r"\b(?:[a-z]\w*_)?(?:chain|corner|edge|arc|outline)s?(?:_\w+)?\b", re.I)
-# Corners of elements are there in space, too; those of an amplitude are instants.
+# Corners of elements and facets are there in space, too; those of an amplitude are instants.
 ELSEWHERE = re.compile(
-    r"\b(?:n_corner|amplitude_corners|\w*grid_corner_t|march_next_corner|step%time%corner)\b", re.I
+    r"\b(?:(?:self|facets)%corner|n_corner|amplitude_corners|\w*grid_corner_t|march_next_corner|step%time%corner)\b", re.I
 )
 
 

@@ -10,6 +10,12 @@ from that body's outline, in the length of the deck and by the length of the edg
 an outline all nodes are looked at, and the middle of each part of an edge between its crossings
 with the other outline: bodies may overlap with no node of either inside the other. A body inside
 itself is found by its outline likewise, away from the own edges of the point.
+
+In three dimensions (`BodiesInSpace`) outlines are triangles: faces split about the points that
+uniform pressure asks for. A point is inside where the solid angles of all triangles make a full
+turn, edges are cut where they cross triangles, and depths count by the root of the area of a face.
+A body inside itself is not looked for there. `overlap_of_triangles` does it for any two closed
+surfaces.
 """
 
 import dataclasses
@@ -35,9 +41,9 @@ class Overlap:
     def __str__(self):
         if not self.bodies:
             return "no overlap"
+        place = ", ".join(f"{x:.4g}" for x in self.place)
         return (f"body {self.bodies[0] + 1} is {self.depth:.3g} ({self.by_edge:.3g} edges) inside "
-                f"body {self.bodies[1] + 1} at ({self.place[0]:.4g}, {self.place[1]:.4g}), "
-                f"time {self.time:.6g}")
+                f"body {self.bodies[1] + 1} at ({place}), time {self.time:.6g}")
 
 
 # ---- figures of the plane -----------------------------------------------------------------------
@@ -240,20 +246,192 @@ def deepest(p, edge, away, bodies):
     return [Overlap(depth/length, depth, 0.0, bodies, tuple(map(float, p[k])))]
 
 
+# ---- three dimensions ---------------------------------------------------------------------------
+
+#: Pairs of a point and a triangle that are looked at in one go.
+AT_ONCE = 400_000
+TETRAHEDRON = ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3))
+HEXAHEDRON = ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))
+BETWEEN = {10: ((0, 1), (1, 2), (2, 0), (0, 3), (1, 3), (2, 3)),
+           20: ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5),
+                (2, 6), (3, 7))}
+#: Weights of corners, and of nodes between them, in the point that a face is split about.
+WEIGHTS = {4: (1/4, 1/4), 6: (-1/3, 2/3), 8: (-1/2, 3/4)}
+
+
+def rims(cell):
+    """The nodes around each face of a cell, outside in front."""
+    n = len(cell)
+    corners = 4 if n in {4, 10} else 8
+    middle = {frozenset(ends): corners + k for k, ends in enumerate(BETWEEN.get(n, ()))}
+    for face in TETRAHEDRON if corners == 4 else HEXAHEDRON:
+        rim = []
+        for i, j in zip(face, (*face[1:], face[0]), strict=True):
+            rim += [i, middle[frozenset((i, j))]] if middle else [i]
+        yield tuple(int(cell[k]) for k in rim)
+
+
+def in_parts(n_point, n_triangle):
+    """Slices of the points, so that no table of both is too large."""
+    size = max(1, AT_ONCE//max(1, n_triangle))
+    return [slice(k, k + size) for k in range(0, n_point, size)]
+
+
+def turns(p, corner):
+    """How many times closed triangles (n, 3, 3), seen from outside counter-clockwise, go around each point."""
+    found = np.zeros(len(p))
+    for part in in_parts(len(p), len(corner)):
+        a, b, c = (corner[:, k] - p[part, None] for k in range(3))
+        la, lb, lc = (np.linalg.norm(v, axis=-1) for v in (a, b, c))
+        volume = (a*np.cross(b, c)).sum(-1)
+        rest = la*lb*lc + (a*b).sum(-1)*lc + (b*c).sum(-1)*la + (c*a).sum(-1)*lb
+        found[part] = np.arctan2(volume, rest).sum(-1)/(2*np.pi)
+    return found
+
+
+def to_triangles(p, corner):
+    """Distance of each point from the triangles, and the index of the nearest."""
+    far, which = np.zeros(len(p)), np.zeros(len(p), int)
+    normal = np.cross(corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0])
+    for part in in_parts(len(p), len(corner)):
+        q = p[part, None]
+        away = np.full((q.shape[0], len(corner)), np.inf)
+        over = np.ones_like(away, dtype=bool)
+        for k in range(3):
+            a, d = corner[:, k], corner[:, (k + 1) % 3] - corner[:, k]
+            share = np.clip(((q - a)*d).sum(-1)/np.maximum((d*d).sum(-1), np.finfo(float).tiny), 0, 1)
+            away = np.minimum(away, np.linalg.norm(q - a - share[..., None]*d, axis=-1))
+            over &= (np.cross(d, q - a)*normal).sum(-1) > 0
+        height = np.abs(((q - corner[:, 0])*normal).sum(-1))/np.maximum(np.linalg.norm(normal, axis=-1),
+                                                                       np.finfo(float).tiny)
+        away = np.where(over, height, away)
+        which[part] = away.argmin(1)
+        far[part] = away.min(1)
+    return far, which
+
+
+def cut(a, b, corner):
+    """Middles of the parts in which edges a-b are cut by triangles."""
+    middles = []
+    one, other = corner[:, 1] - corner[:, 0], corner[:, 2] - corner[:, 0]
+    for part in in_parts(len(a), len(corner)):
+        along = (b - a)[part, None]
+        with np.errstate(divide="ignore", invalid="ignore"):
+            sideways = np.cross(along, other)
+            turn = (one*sideways).sum(-1)
+            start = a[part, None] - corner[:, 0]
+            u = (start*sideways).sum(-1)/turn
+            up = np.cross(start, one)
+            v = (along*up).sum(-1)/turn
+            t = (other*up).sum(-1)/turn
+            hit = (u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t < 1)
+        for k in range(len(along)):
+            cuts = np.unique([0., *t[k, hit[k]], 1.])
+            middles += [a[part][k] + s*along[k, 0] for s in 0.5*(cuts[1:] + cuts[:-1])]
+    return np.reshape(middles, (-1, 3))
+
+
+def deepest_inside(x, triangle, other, other_triangle, more=()):
+    """The deepest point of closed triangles `triangle` (n, 3) of points `x`, or of points `more`, in others: how
+    deep, the triangle that it is behind, and where; or none."""
+    corner = other[other_triangle]
+    low, high = corner.min((0, 1)), corner.max((0, 1))
+    edge = np.unique(np.sort(np.vstack([triangle[:, [k, (k + 1) % 3]] for k in range(3)]), axis=1), axis=0)
+    edge = edge[((x[edge].max(1) >= low) & (x[edge].min(1) <= high)).all(1)]
+    used = x[np.unique(triangle)]
+    own = np.array([used.min(0), used.max(0)])
+    close = corner[((corner.max(1) >= own[0]) & (corner.min(1) <= own[1])).all(1)]
+    p = np.vstack([used, cut(*x[edge.T], close), np.reshape(more, (-1, 3))])
+    p = p[((p >= low) & (p <= high)).all(1)]
+    p = p[turns(p, corner) > 0.5 + 1e-9]
+    if not len(p):
+        return None
+    far, which = to_triangles(p, corner)
+    k = int(far.argmax())
+    return float(far[k]), int(which[k]), tuple(map(float, p[k]))
+
+
+def overlap_of_triangles(x, triangle, other, other_triangle):
+    """How deep two closed surfaces are in each other, looked at both ways: a length, 0 if they are apart."""
+    found = [deepest_inside(x, triangle, other, other_triangle),
+             deepest_inside(other, other_triangle, x, triangle)]
+    return max((depth for depth, *_ in filter(None, found)), default=0.0)
+
+
+class BodiesInSpace(Bodies):
+    """The bodies of a mesh of tetrahedra and hexahedra. Without `centres` what of an outline is inside counts alone,
+    not the centres of cells."""
+
+    def __init__(self, cells, centres=True):
+        self.centres = centres
+        self.cells = [np.asarray(cell) for cell in cells if len(cell) in {4, 8, 10, 20}]
+        known = {}
+        for k, cell in enumerate(self.cells):
+            for rim in rims(cell):
+                known.setdefault(frozenset(rim), []).append((k, rim))
+        free = sorted(one for one, *others in known.values() if not others)
+        body = self._together()
+        self.n = 1 + max(body.values())
+        self.body_of_cell = np.array([body[int(cell[0])] for cell in self.cells])
+        self.edge = np.array([(i, j) for _, rim in free for i, j in zip(rim, rim[1:] + rim[:1], strict=True)])
+        self.rim = [[rim for k, rim in free if self.body_of_cell[k] == b] for b in range(self.n)]
+
+    def triangles(self, x, body):
+        """Points of the mesh and of the middles of its faces, triangles of a body, and the face of each."""
+        points, triangle, face = [*x], [], []
+        for f, rim in enumerate(self.rim[body]):
+            if len(rim) == 3:
+                triangle.append(rim)
+                face.append(f)
+                continue
+            corner, between = WEIGHTS[len(rim)]
+            weight = [between if k % 2 and len(rim) > 4 else corner for k in range(len(rim))]
+            triangle += [(i, j, len(points)) for i, j in zip(rim, rim[1:] + rim[:1], strict=True)]
+            face += [f]*len(rim)
+            points.append(np.array(weight) @ x[list(rim)])
+        return np.array(points), np.array(triangle), np.array(face)
+
+    def overlap(self, x, time=0.0, alone=()):
+        """The deepest overlap of two bodies in the configuration `x` (n_node, 3)."""
+        shape = [self.triangles(x, b) for b in range(self.n)]
+        box = [(p[t].min((0, 1)), p[t].max((0, 1))) for p, t, _ in shape]
+        found = [Overlap()]
+        for i, j in itertools.permutations(range(self.n), 2):
+            if (min(i, j), max(i, j)) in alone or (np.maximum(box[i][0], box[j][0])
+                                                   > np.minimum(box[i][1], box[j][1])).any():
+                continue
+            centres = [x[cell].mean(0) for cell, of in zip(self.cells, self.body_of_cell, strict=True)
+                       if self.centres and of == i]
+            (p, t, _), (q, u, face) = shape[i], shape[j]
+            deep = deepest_inside(p, t, q, u, centres)
+            if deep is not None:
+                a, b, c = (q[u[face == face[deep[1]]]][:, k] for k in range(3))
+                length = float(np.sqrt(np.linalg.norm(np.cross(b - a, c - a).sum(0)/2)))
+                found.append(Overlap(deep[0]/length, deep[0], 0.0, (i, j), deep[2]))
+        return dataclasses.replace(max(found), time=float(time))
+
+
+# ---- runs ---------------------------------------------------------------------------------------
+
+
+def bodies_of(fields):
+    return (Bodies if fields.x.shape[1] == 2 else BodiesInSpace)(fields.cells)
+
+
 def worst(fields, alone=()):
     """The deepest overlap of a run that wrote its displacements in every increment."""
-    bodies = Bodies(fields.cells)
+    bodies = bodies_of(fields)
     return bodies.worst(fields.x + fields["displacement"], fields.time, alone)
 
 
 def looks(fields, alone=()):
     """The deepest overlap of each frame, and of each look on the way between frames."""
-    bodies = Bodies(fields.cells)
+    bodies = bodies_of(fields)
     return bodies.looks(fields.x + fields["displacement"], fields.time, alone)
 
 
 def frames(fields, alone=()):
     """The deepest overlap of each frame, by itself."""
-    bodies = Bodies(fields.cells)
+    bodies = bodies_of(fields)
     return [bodies.overlap(x, t, alone)
             for x, t in zip(fields.x + fields["displacement"], fields.time, strict=True)]

@@ -1,11 +1,17 @@
 """The independent judge of overlaps, on figures whose overlaps are known."""
 
 import math
+import pathlib
+import sys
 
 import numpy as np
 import pytest
-from overlap import Bodies
+from overlap import Bodies, BodiesInSpace, overlap_of_triangles, turns
 from scene_tools import EPSILON
+
+sys.path.insert(0, str(pathlib.Path(__file__).parent/"scenes"))
+
+from space_mesh import KINDS, TETRAHEDRA, Block  # noqa: E402
 
 
 def square(corner=(0.0, 0.0), size=(1.0, 1.0), cells=(2, 2), turn=0.0):
@@ -157,3 +163,85 @@ def test_lines_and_points_have_no_outline():
     x = np.array([[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0], [-1.0, 0.0], [0.5, 0.5]])
     bodies = Bodies([[0, 1, 2, 3], [0, 4], [5]])
     assert bodies.n == 1 and not bodies.overlap(x).depth > 0
+
+
+# ---- three dimensions ---------------------------------------------------------------------------
+
+
+def blocks(kind, *parts):
+    """One mesh of blocks, each (cells, size, where): positions and `BodiesInSpace`."""
+    x, cells, first = [], [], 0
+    for n, size, where in parts:
+        block = Block(kind, n, size)
+        x.append(block.x + where)
+        cells += [np.array(nodes) - 1 + first for nodes in block.element]
+        first += len(block.x)
+    return np.vstack(x), BodiesInSpace(cells)
+
+
+def ball(n, radius=1.0):
+    """Points and triangles of a sphere: a cube of n cells to a side, blown up."""
+    block = Block("C3D8", (n, n, n))
+    x, bodies = blocks("C3D8", ((n, n, n), (2, 2, 2), (-1, -1, -1)))
+    points, triangle, _ = bodies.triangles(x, 0)
+    used = np.unique(triangle)
+    points[used] *= radius/np.linalg.norm(points[used], axis=1)[:, None]
+    assert len(block.x) == len(x)
+    return points, triangle
+
+
+def volume(x, triangle):
+    a, b, c = (x[triangle[:, k]] for k in range(3))
+    return (a*np.cross(b, c)).sum()/6
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_outlines_in_space_enclose_their_volume(kind):
+    x, bodies = blocks(kind, ((2, 1, 3), (2, 1, 1), (0, 0, 0)), ((1, 1, 1), (1, 1, 1), (5, 0, 0)))
+    assert bodies.n == 2
+    for k, size in enumerate((2.0, 1.0)):
+        points, triangle, face = bodies.triangles(x, k)
+        assert np.isclose(volume(points, triangle), size)
+        n_face = (22, 6)[k]*(2 if kind in TETRAHEDRA else 1)
+        assert len(np.unique(face)) == n_face
+    p = np.array([[0.3, 0.4, 0.2], [5.5, 0.5, 0.5], [3.0, 0.5, 0.5]])
+    points, triangle, _ = bodies.triangles(x, 0)
+    assert np.allclose(turns(p, points[triangle]), [1, 0, 0])
+
+
+@pytest.mark.parametrize("kind", KINDS)
+@pytest.mark.parametrize("depth", [0.2, 1e-3, 1e-9])
+def test_depth_of_a_block_in_a_block(kind, depth):
+    """Sides in one plane, turned about two axes."""
+    x, bodies = blocks(kind, ((2, 2, 1), (2, 1, 1), (0, 0, 0)), ((1, 2, 1), (1, 1, 1), (0.5, 0, 1 - depth)))
+    c, s = math.cos(0.4), math.sin(0.4)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]) @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    for place in (np.eye(3), turn):
+        found = bodies.overlap(x @ place.T)
+        assert set(found.bodies) == {0, 1}
+        assert abs(found.depth - depth) <= 64*EPSILON
+
+
+def test_spheres_overlap_by_what_they_should():
+    """From below, and the better the finer they are."""
+    for n, least in ((4, 0.06), (8, 0.09)):
+        x, triangle = ball(n)
+        found = overlap_of_triangles(x, triangle, x + [0, 0, 1.9], triangle)
+        assert least < found <= 0.1 + 64*EPSILON
+        assert overlap_of_triangles(x, triangle, x + [0, 0, 2.1], triangle) == 0
+
+
+def test_bars_that_cross_have_no_node_inside():
+    x, bodies = blocks("C3D8", ((1, 1, 1), (2, 0.2, 1), (-1, -0.1, 0)), ((1, 1, 1), (0.2, 2, 1), (-0.1, -1, -0.95)))
+    assert abs(bodies.overlap(x).depth - 0.05) <= 16*EPSILON
+    x[8:] -= [0, 0, 0.06]
+    assert bodies.overlap(x).depth == 0
+
+
+def test_a_ball_through_a_plate_is_seen_on_the_way():
+    plate, bodies = blocks("C3D8", ((4, 4, 1), (2, 2, 0.1), (-1, -1, 0)), ((1, 1, 1), (0.2, 0.2, 0.2), (0, 0, 0.2)))
+    after = plate.copy()
+    after[50:] -= [0, 0, 0.6]
+    found = bodies.worst(np.array([plate, after]), [0.0, 1.0])
+    assert found.depth > 0.03 and 0 < found.time < 1
+    assert "(0." in str(found) and str(found).count(",") == 3

@@ -10,7 +10,10 @@ submodule (emcon_contact_registry) emcon_contact_kinds
    use emcon_scene, only : where_text
    use emcon_segment, only : segment_init, segment_t
    use emcon_start_gaps_plane, only : start_gaps_plane_init, start_gaps_plane_t
+   use emcon_start_gaps_space, only : start_gaps_space_init, start_gaps_space_t
    implicit none
+
+   integer, parameter :: n_space = 3
 
 contains
 
@@ -25,7 +28,7 @@ contains
          call new_given(scene, pair, contact, error, user)
          return
       end select
-      if (size(scene%x, 1) > 2) then
+      if (scene%n_dim == n_space) then
          allocate(patch)
          call patch_contact_init(patch, scene, pair, error)
          call move_alloc(patch, contact)
@@ -51,7 +54,14 @@ contains
 
    module procedure new_start_gaps
       type(start_gaps_plane_t), allocatable :: plane
+      type(start_gaps_space_t), allocatable :: space
 
+      if (scene%n_dim == n_space) then
+         allocate(space)
+         call start_gaps_space_init(space, scene, pair, error)
+         call move_alloc(space, gaps)
+         return
+      end if
       allocate(plane)
       call start_gaps_plane_init(plane, scene, pair, error, options)
       call move_alloc(plane, gaps)

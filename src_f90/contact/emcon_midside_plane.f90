@@ -109,7 +109,7 @@ contains
       integer :: at(3), i
 
       associate (kind => scene%element%kinds(scene%element%kind(e)))
-         if (kind%n_face_node /= size(at)) return
+         if (any([kind%n_face_node, kind%n_dim + 1] /= size(at))) return
          at = scene%element%node(kind%face(f), e)
       end associate
       i = find_sorted(node, at(3))

@@ -5,7 +5,7 @@
 module emcon_patch_contact_space
    use emcon_condition_nodes, only : condition_resize
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : contact_t, max_penetration_on_entry
+   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_errors, only : err_input, error_t, raise
@@ -26,6 +26,8 @@ module emcon_patch_contact_space
 
    !> A node is let go where less than this part of its patch is covered.
    real(wp), parameter :: least_cover = 0.02_wp
+   !> Less is round-off.
+   real(wp), parameter :: no_cover = 1.0e3_wp*epsilon(1.0_wp)
    !> So far, per facet, a gap may be closed as a step begins in which it begins to act: corners are
    !> rounded by less, and bodies are thicker.
    real(wp), parameter :: deepest_start = 0.1_wp
@@ -149,27 +151,26 @@ contains
       real(wp) :: height(0:1), cover(0:1), least
 
       associate (state => self%state(i), stencil => self%stencil(i))
-         state%is_near = stencil%triangle > 0
-         state%is_over = .false.
-         if (.not. state%is_near) return
+         state = gap_state_t()
+         if (stencil%triangle == 0) return
          call patch_stencil_gather(stencil, x, u0, du, at, way)
          call patch_means(stencil%patch, at, height(0), cover(0))
          call patch_means(stencil%patch, at + way, height(1), cover(1))
          ! What stores energy is followed as long as there is any to give back.
          least = least_cover
          self%scale(i) = max(cover(0), least)
-         if (self%step%is_penalty) least = tiny(least)
+         if (self%step%is_penalty) least = no_cover
          state%size = stencil%size
          state%other_size = self%sides%frames%size(i)
-         state%is_near = maxval(cover) > 0.0_wp
+         state%is_near = maxval(cover) > no_cover
          state%is_over = cover(1) >= least .or. (self%step%is_penalty .and. cover(0) >= least)
          state%is_leaving = .not. state%is_over
          state%is_arriving = cover(0) < least
-         state%is_covered = patch_way(stencil%patch, at, way) <= self%reach
+         state%is_covered = patch_way(stencil%patch, at, way) <= self%chosen_reach
          state%gap0 = 0.0_wp
-         state%gap1 = 0.0_wp
+         state%gap1 = self%step%engages             ! what is not covered asks for nothing
          state%was_open = .true.
-         if (cover(0) > 0.0_wp) state%gap0 = height(0)/cover(0) - self%offset
+         if (cover(0) > no_cover) state%gap0 = height(0)/cover(0) - self%offset
          if (state%is_arriving) state%was_open = patch_ahead(stencil%patch, at, way) &
             - self%offset >= -max_penetration_on_entry*state%size
          if (cover(1) >= least) state%gap1 = height(1)/cover(1) - self%offset
@@ -326,7 +327,7 @@ contains
       real(wp), intent(in) :: gap                !! integral by what was covered at the start [L]
 
       mean_gap = 0.0_wp
-      if (self%cover(i) > 0.0_wp) mean_gap = gap*self%scale(i)/self%cover(i)
+      if (self%cover(i) > no_cover) mean_gap = gap*self%scale(i)/self%cover(i)
    end function patch_mean_gap
 
    !> Each node of both surfaces may be held.

@@ -17,6 +17,7 @@ module emcon_start_gaps
    type, abstract :: start_gaps_t
       integer :: n = 0                           !! slave nodes, each once for bodies it looks at
       logical :: is_self = .false.               !! a surface in contact with itself
+      logical :: is_closed = .false.             !! what is behind the master is in its body
       type(facets_t) :: surface(is_slave:is_master)
       integer, allocatable :: node(:)            !! (n) node of the scene
       integer, allocatable :: duplicate(:)       !! (n) the other one at its place; 0: none

@@ -34,10 +34,9 @@ module emcon_overlap_check
    end type meeting_t
 
    type :: overlap_check_t
-      logical :: is_able = .false.               !! overlap can be looked for: not in space
       integer :: n_piece = 0                     !! 0: nothing can meet
       integer :: n_facet = 0                     !! of them
-      class(overlap_query_t), allocatable :: query     !! if it is able
+      class(overlap_query_t), allocatable :: query
       type(midside_t) :: midside                 !! of outlines, by contact points
       ! Where each piece is in a step:
       real(wp), allocatable :: low(:, :), high(:, :)     !! (n_dim, n_piece) box over the step [L]
@@ -64,15 +63,12 @@ contains
       type(surface_t) :: outline
 
       call new_overlap_query(scene, self%query)
-      self%is_able = allocated(self%query)
-      if (self%is_able) then
-         associate (mesh => self%query%outline)
-            self%n_piece = mesh%n_piece
-            self%n_facet = size(mesh%facet, 2)
-            outline%edge = mesh%facet
-         end associate
-         call midside_init(self%midside, scene, [integer ::], outline)
-      end if
+      associate (mesh => self%query%outline)
+         self%n_piece = mesh%n_piece
+         self%n_facet = size(mesh%facet, 2)
+         outline%edge = mesh%facet
+      end associate
+      call midside_init(self%midside, scene, [integer ::], outline)
       associate (n => self%n_piece)
          allocate(self%low(scene%n_dim, n), self%high(scene%n_dim, n), &
             self%least(scene%n_dim, n), self%most(scene%n_dim, n))
@@ -87,7 +83,7 @@ contains
       type(scene_t), intent(in) :: scene
       type(contact_options_t), intent(in) :: options
 
-      if (self%is_able) call self%query%begin(scene, options)
+      call self%query%begin(scene, options)
    end subroutine overlap_check_smooth
 
    !> What overlaps at `u`, and no pair brings together, is left as it is from then on.

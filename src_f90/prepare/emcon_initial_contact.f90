@@ -26,6 +26,7 @@ module emcon_initial_contact
    integer, parameter :: most_samples = 64
    !> Iterations that put a node onto the surface.
    integer, parameter :: most_moves = 10
+   integer, parameter :: n_space = 3
    !> Nodes named in a message.
    integer, parameter :: most_named = 10
    !> Coordinates in a deck are rounded: so many epsilons of them are no penetration.
@@ -54,7 +55,6 @@ contains
       real(wp) :: noise
       integer :: i
 
-      if (size(scene%x, 1) > 2) return
       is_meant = .false.
       noise = coordinate_noise(scene)
       if (size(scene%step) > 0) then
@@ -243,6 +243,7 @@ contains
       real(wp) :: gap
       logical :: is_over
 
+      if (contact%is_closed) return
       stride = max(1, contact%n/most_samples)
       n_over = 0
       n_behind = 0
@@ -352,12 +353,29 @@ contains
       end if
       call find_behind(scene, contact%node, contact%state, limit, n, found)
       if (n == 0) return
+      if (scene%n_dim == n_space) call add_deepest(scene, contact, limit, found)
       call raise(error, err_input, where_text(scene, pair%origin) // ": error: " // to_text(n) // &
          " slave nodes of surface " // scene%surface(pair%slave)%name // " penetrate surface " // &
          scene%surface(pair%master)%name // found // &
          "; move them, or let *CONTACT PAIR, ADJUST= do it; where the overlap is meant, as of " // &
          "a press fit, begin with a *STATIC step with *CONTACT INTERFERENCE, SHRINK")
    end subroutine check_penetration
+
+   !> Add the face that the deepest node is behind.
+   subroutine add_deepest(scene, contact, limit, text)
+      type(scene_t), intent(in) :: scene
+      class(start_gaps_t), intent(in) :: contact
+      real(wp), intent(in) :: limit(:)           !! as `find_behind` has it
+      character(len=:), allocatable, intent(inout) :: text
+      character(len=:), allocatable :: face
+
+      associate (deepest => minloc(contact%state%gap0, dim=1, mask=contact%state%is_over .and. &
+            contact%state%gap0 < -limit))
+         call facets_text(contact%surface(is_master), scene, contact%facet(deepest), face)
+         text = text // "; the deepest, " // to_text(scene%node%label(contact%node(deepest))) // &
+            ", is behind " // face
+      end associate
+   end subroutine add_deepest
 
    !> Slave nodes behind the master surface, as the contact that a program gives for pair `i` sees
    !> them.

@@ -187,11 +187,6 @@ contains
       type(march_t), intent(in) :: march
       type(notes_t), intent(inout) :: lines
 
-      if (.not. march%overlap_check%is_able) then
-         call note_add(lines, "overlap not looked for: in three dimensions it is not in this " // &
-            "version")
-         return
-      end if
       associate (check => march%overlap_check)
          if (check%n_piece == 0) then
             call note_add(lines, "overlap not checked: no *CONTACT PAIR or *CONTACT names " // &
@@ -199,7 +194,8 @@ contains
             return
          end if
          call note_add(lines, "overlap checked: " // to_text(check%n_piece) // " bodies, " // &
-            to_text(check%n_facet) // " edges; deepest penetration " // &
+            to_text(check%n_facet) // trim(merge(" edges", " faces", size(check%low, 1) < 3)) // &
+            "; deepest penetration " // &
             to_text(self%overlap%deepest, 3) // " of an element")
          if (self%overlap%of_facets > max(touching_bar, self%overlap%deepest)) &
             call note_add(lines, "edges of curved surfaces overlap by up to " // &

@@ -7,25 +7,25 @@ module emcon_bodies
 
 contains
 
-   !> Number the parts that elements, edges or ties, whose rows are frozen, hold together, in the
+   !> Number the parts that elements, facets or ties, whose rows are frozen, hold together, in the
    !> order of their first node.
-   pure subroutine bodies_find_tied(scene, edge, body, n_body)
+   pure subroutine bodies_find_tied(scene, facet, body, n_body)
       type(scene_t), intent(in) :: scene
-      integer, intent(in) :: edge(:, :)                  !! (2, n_edge) of a surface
+      integer, intent(in) :: facet(:, :)                 !! (most nodes, n_facet) of a surface
       integer, allocatable, intent(out) :: body(:)       !! (n_node), 0: nothing hangs on it
       integer, intent(out) :: n_body
       integer, allocatable :: connected(:, :)
       integer :: k, n, s, t
 
-      n = size(scene%element%node, 2) + size(edge, 2)
+      n = size(scene%element%node, 2) + size(facet, 2)
       do t = 1, size(scene%tie)
          if (allocated(scene%tie(t)%rows%slave)) n = n + size(scene%tie(t)%rows%node)
       end do
-      allocate(connected(max(2, size(scene%element%node, 1)), n), source=0)
+      allocate(connected(max(2, size(facet, 1), size(scene%element%node, 1)), n), source=0)
       n = size(scene%element%node, 2)
       connected(:size(scene%element%node, 1), :n) = scene%element%node
-      connected(:2, n + 1:n + size(edge, 2)) = edge
-      n = n + size(edge, 2)
+      connected(:size(facet, 1), n + 1:n + size(facet, 2)) = facet
+      n = n + size(facet, 2)
       do t = 1, size(scene%tie)
          associate (rows => scene%tie(t)%rows)
             if (.not. allocated(rows%slave)) cycle

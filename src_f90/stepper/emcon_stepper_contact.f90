@@ -288,8 +288,6 @@ contains
 
       call query_sync(self, stepper, error)
       call query_place(self, stepper, u0, du, error)
-      call check_that(self%march%overlap_check%is_able, &
-         "overlap in three dimensions is not in this version", error)
       if (.not. allocated(error)) call overlap_check_step(self%march%overlap_check, &
          stepper%scene%x, u0, du, overlap)
    end subroutine query_overlap

@@ -10,7 +10,7 @@ module emcon_box_tree
    use emcon_sort, only : sort_few, sort_order
    implicit none
    private
-   public :: box_tree_t, box_tree_init, box_tree_find
+   public :: box_tree_t, box_tree_init, box_tree_find, box_tree_walk, leaf_size
 
    !> Boxes in a leaf, at most; a leaf of several has more than half of that.
    integer, parameter :: leaf_size = 8
@@ -166,6 +166,36 @@ contains
       end do
       call sort_list(found(n_before + 1:n))
    end subroutine box_tree_find
+
+   !> The boxes of the next leaf that are no farther than `reach` from that of `low`, `high`: what
+   !> makes `reach` shorter from call to call finds the nearest of all.
+   pure subroutine box_tree_walk(self, low, high, reach, k, found, n)
+      type(box_tree_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: low(:), high(:)    !! (n_dim) finite [L]
+      real(wp), intent(in) :: reach              !! >= 0 [L]
+      integer, intent(inout) :: k                !! where the walk is: first 1, in the end 0
+      integer, intent(out) :: found(leaf_size)   !! those boxes
+      integer, intent(out) :: n                  !! number in `found`
+      integer :: i
+
+      n = 0
+      if (self%n_leaf == 0) k = 0
+      do while (k > 0)
+         if (is_near(self%around(:, k), low, high, reach)) then
+            if (k < self%n_leaf) then
+               k = 2*k
+               cycle
+            end if
+            do i = self%start(k - self%n_leaf + 1), self%start(k - self%n_leaf + 2) - 1
+               if (.not. is_near(self%bounds(:, i), low, high, reach)) cycle
+               n = n + 1
+               found(n) = self%box(i)
+            end do
+         end if
+         k = next_node(k)
+         if (n > 0) return
+      end do
+   end subroutine box_tree_walk
 
    !> The node after the branch of node `k`; 0 after the last one.
    pure integer function next_node(k)

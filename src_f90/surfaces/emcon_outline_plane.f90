@@ -5,18 +5,16 @@
 !> the body to the left. What a tie covers is no outline; where it ends, two pieces meet in one
 !> place, as neighbours do. Surfaces of edges without elements stand for themselves.
 module emcon_outline_plane
-   use emcon_bodies, only : bodies_find, bodies_find_tied
    use emcon_chain_plane, only : chain_init, chain_t
    use emcon_errors, only : error_t
    use emcon_seams_plane, only : chain_join
    use emcon_face_facets, only : face_facets, n_face_facet
    use emcon_kinds, only : dp, wp
    use emcon_mesh, only : surface_t
-   use emcon_outline, only : outline_t
+   use emcon_outline, only : outline_t, pieces_of_facets
    use emcon_scene, only : scene_t
-   use emcon_sort, only : find_sorted, sort_order, unique_sorted
+   use emcon_sort, only : sort_order
    use emcon_surface_facets, only : profile_facets
-   use emcon_surface_nodes, only : surface_nodes
    use emcon_tied_edges, only : tied_edges_find, tied_ends_find
    implicit none
    private
@@ -39,28 +37,11 @@ contains
       type(outline_t), intent(out) :: self
       type(outline_links_t), intent(out) :: links
       type(scene_t), intent(in) :: scene
-      integer, allocatable :: connected(:, :), piece(:), number(:), edge(:, :), order(:)
+      integer, allocatable :: edge(:, :)
       real(wp), allocatable :: thickness(:)
-      logical, allocatable :: is_meant(:)
-      integer :: n_body, p
 
-      call connect(scene, connected)
-      call bodies_find(connected, size(scene%x, 2), piece, n_body)
       call find_free_edges(scene, edge, thickness)
-      call find_meetings(self, scene, piece, edge, number)
-      call find_bodies(self, scene, connected(:, size(scene%element%node, 2) + 1:), piece, number)
-      allocate(self%start(self%n_piece + 1), source=1)
-      ! From here on the piece of a node is its place among those that meet; 0: none of them.
-      piece = [(find_sorted(number, piece(p)), p = 1, size(piece))]
-      is_meant = piece(edge(1, :)) > 0
-      edge = edge(:, pack([(p, p = 1, size(edge, 2))], is_meant))
-      thickness = pack(thickness, is_meant)
-      order = sort_order(piece(edge(1, :)))
-      self%facet = edge(:, order)
-      self%thickness = thickness(order)
-      do p = 1, self%n_piece
-         self%start(p + 1) = self%start(p) + count(piece(edge(1, :)) == p)
-      end do
+      call pieces_of_facets(self, scene, edge, thickness)
       call link_edges(links, self%facet, size(scene%x, 2))
       call find_places(links, self%facet, scene)
       call tied_ends_find(scene, self%facet, links%host, links%is_buried)
@@ -80,75 +61,6 @@ contains
       is_of(of_profiles(1, :)) = .true.
       self%is_profile = is_of(edge(1, :))
    end subroutine find_profiles
-
-   !> Elements, and after them surfaces of edges, by their nodes.
-   pure subroutine connect(scene, connected)
-      type(scene_t), intent(in) :: scene
-      integer, allocatable, intent(out) :: connected(:, :)   !! (n, n_element + n_edge), 0: no node
-      integer, allocatable :: edge(:, :), spread(:, :)
-      integer :: s
-
-      connected = scene%element%node
-      do s = 1, size(scene%surface)
-         if (.not. allocated(scene%surface(s)%edge)) cycle
-         edge = scene%surface(s)%edge
-         allocate(spread(size(connected, 1), size(edge, 2)), source=0)
-         spread(:2, :) = edge
-         connected = reshape([connected, spread], &
-            [size(connected, 1), size(connected, 2) + size(edge, 2)])
-         deallocate(spread)
-      end do
-   end subroutine connect
-
-   !> The pieces that have an outline, unless there is a single one and no pair, and which surfaces
-   !> meet.
-   subroutine find_meetings(self, scene, piece, edge, number)
-      type(outline_t), intent(inout) :: self
-      type(scene_t), intent(in) :: scene
-      integer, intent(in) :: piece(:)            !! (n_node)
-      integer, intent(in) :: edge(:, :)          !! (2, n_edge) of the outlines
-      integer, allocatable, intent(out) :: number(:)   !! (n_piece) as in `piece`, ascending
-      integer, allocatable :: node(:)
-      integer :: s, i
-
-      associate (pair => scene%pair)
-         self%pair = reshape([pair%slave, pair%master], [2, size(pair)], order=[2, 1])
-      end associate
-      allocate(self%on(size(scene%surface)))
-      do s = 1, size(scene%surface)
-         allocate(self%on(s)%piece(0))
-         if (.not. any(self%pair == s)) cycle
-         call surface_nodes(scene, scene%surface(s), node)
-         self%on(s)%piece = unique_sorted(piece(node))
-      end do
-      number = unique_sorted(piece(edge(1, :)))
-      if (size(scene%pair) == 0 .and. size(number) < 2) number = [integer ::]
-      self%n_piece = size(number)
-      do s = 1, size(scene%surface)
-         associate (on => self%on(s)%piece)
-            on = [(find_sorted(number, on(i)), i = 1, size(on))]
-         end associate
-      end do
-   end subroutine find_meetings
-
-   !> The bodies of the pieces: what hangs together by ties, too.
-   subroutine find_bodies(self, scene, lone, piece, number)
-      type(outline_t), intent(inout) :: self
-      type(scene_t), intent(in) :: scene
-      integer, intent(in) :: lone(:, :)          !! (n, n_edge) edges of surfaces; 0: no node
-      integer, intent(in) :: piece(:)            !! (n_node)
-      integer, intent(in) :: number(:)           !! (n_piece) as in `piece`, ascending
-      integer, allocatable :: body(:)
-      integer :: n_body, i, p
-
-      allocate(self%body(self%n_piece), source=0)
-      if (self%n_piece == 0) return
-      call bodies_find_tied(scene, lone(:2, :), body, n_body)
-      do i = 1, size(piece)
-         p = find_sorted(number, piece(i))
-         if (p > 0) self%body(p) = body(i)
-      end do
-   end subroutine find_bodies
 
    !> The edges that one element alone has, but those that a tie covers; in space there are none.
    subroutine find_free_edges(scene, edge, thickness)

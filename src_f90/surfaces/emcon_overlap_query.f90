@@ -11,7 +11,12 @@ module emcon_overlap_query
    use emcon_text, only : to_text
    implicit none
    private
-   public :: overlap_t, overlap_names, overlap_query_t, overlap_text
+   public :: overlap_t, overlap_names, overlap_query_t, overlap_text, &
+      passing, passing_thin
+
+   !> On the way, overlap below the smaller of these, by the facet and by the thickness of the
+   !> element behind it, is the straight way past a corner.
+   real(wp), parameter :: passing = 0.1_wp, passing_thin = 0.2_wp
 
    !> The deepest overlap that was found.
    type :: overlap_t
@@ -85,18 +90,27 @@ contains
       type(overlap_t), intent(in) :: self
       integer, intent(in) :: label(:), body(:)   !! (n_node) the user's numbers, bodies from 1
       character(len=:), allocatable, intent(out) :: text   !! one line
+      integer :: k
 
       associate (facet => self%facet)
          text = "a point of an analytical surface"
          if (body(self%node) > 0) text = "node " // to_text(label(self%node)) // " of body " // &
             to_text(body(self%node))
          text = text // " is " // to_text(self%depth*self%length, 3) // " behind "
-         if (body(facet(1)) > 0) then
-            text = text // "the edge from node " // to_text(label(facet(1))) // " to " // &
-               to_text(label(facet(2))) // " of body " // to_text(body(facet(1)))
-         else
+         if (body(facet(1)) == 0) then
             text = text // "an analytical surface"
+            return
          end if
+         if (facet(3) == 0) then
+            text = text // "the edge from node " // to_text(label(facet(1))) // " to " // &
+               to_text(label(facet(count(facet > 0))))
+         else
+            text = text // "the face of nodes " // to_text(label(facet(1)))
+            do k = 2, count(facet > 0)
+               text = text // ", " // to_text(label(facet(k)))
+            end do
+         end if
+         text = text // " of body " // to_text(body(facet(1)))
       end associate
    end subroutine overlap_text
 

@@ -13,16 +13,13 @@ module emcon_overlap_query_plane
    use emcon_outline_plane, only : outline_init, outline_links_t
    use emcon_overlap_plane, only : crossing_find, length_of, nearest_depth, nearest_t, &
       nearest_update
-   use emcon_overlap_query, only : overlap_query_t, overlap_t
+   use emcon_overlap_query, only : overlap_query_t, overlap_t, passing, passing_thin
    use emcon_scene, only : scene_t
    use emcon_vectors_plane, only : between
    implicit none
    private
    public :: overlap_query_plane_t, overlap_query_plane_init
 
-   !> On the way, overlap below the smaller of these, by the edge and by the thickness of the
-   !> element behind it, is the straight way past a corner.
-   real(wp), parameter :: passing = 0.1_wp, passing_thin = 0.2_wp
    !> Less than this behind an edge, by its length, the middle of one that crosses nothing lies
    !> along it.
    real(wp), parameter :: aligned = sqrt(epsilon(1.0_wp))

@@ -8,7 +8,7 @@ module emcon_overlap_query_registry
    public :: new_overlap_query
 
    interface
-      !> What looks for overlap in `scene`, for its contact pairs; none where that is not built.
+      !> What looks for overlap in `scene`, for its contact pairs.
       module subroutine new_overlap_query(scene, query)
          type(scene_t), intent(in) :: scene
          class(overlap_query_t), allocatable, intent(out) :: query

@@ -140,9 +140,11 @@ program main
    use test_null_space, only : collect_null_space
    use test_numbering, only : collect_numbering
    use test_outline, only : collect_outline
+   use test_patch_contact, only : collect_patch_contact
    use test_patch_gap, only : collect_patch_gap
    use test_overlap_boxes, only : collect_overlap_boxes
    use test_overlap_plane, only : collect_overlap_plane
+   use test_overlap_space, only : collect_overlap_space
    use test_deck_parameters, only : collect_deck_parameters
    use test_deck_ties, only : collect_deck_ties
    use test_point_function, only : collect_point_function
@@ -172,6 +174,8 @@ program main
    use test_bent_bodies, only : collect_bent_bodies
    use test_solvers, only : collect_solvers
    use test_start_gaps, only : collect_start_gaps
+   use test_start_gaps_space, only : collect_start_gaps_space
+   use test_signed_distance, only : collect_signed_distance
    use test_stepper_free, only : collect_stepper_free
    use test_stepper_query, only : collect_stepper_query
    use test_system, only : collect_system
@@ -223,6 +227,8 @@ program main
 #endif
    call run("solvers", collect_solvers)
    call run("start_gaps", collect_start_gaps)
+   call run("start_gaps_space", collect_start_gaps_space)
+   call run("signed_distance", collect_signed_distance)
    call run("contact_scales", collect_contact_scales)
    call run("condition_reuse", collect_condition_reuse)
    call run("contact_states", collect_contact_states)
@@ -310,10 +316,12 @@ program main
    call run("tie_partner", collect_tie_partner)
    call run("tie_balance", collect_tie_balance)
    call run("numbering", collect_numbering)
+   call run("patch_contact", collect_patch_contact)
    call run("patch_gap", collect_patch_gap)
    call run("outline", collect_outline)
    call run("overlap_boxes", collect_overlap_boxes)
    call run("overlap_plane", collect_overlap_plane)
+   call run("overlap_space", collect_overlap_space)
    call run("bodies", collect_bodies)
    call run("arcs", collect_arcs)
    call run("circles", collect_circles)

@@ -1,0 +1,157 @@
+!> How deep one outline in space is inside another: the deepest of the points that are inside, and
+!> of the middles of inside parts of edges, by the nearest facet.
+!>
+!> Source: docs/theory.md, section 4.11.
+module emcon_overlap_space
+   use emcon_inside_space, only : inside_confirm, inside_find, inside_nearest, inside_t, is_in
+   use emcon_kinds, only : wp
+   use emcon_nearest_space, only : nearest_height, nearest_t
+   use emcon_overlap_query, only : overlap_t, passing, passing_thin
+   use emcon_triangles_space, only : triangle_at, triangles_t
+   implicit none
+   private
+   public :: overlap_space_find, overlap_space_take
+
+   !> Less than this behind a facet, by its length, is on it.
+   real(wp), parameter :: aligned = sqrt(epsilon(1.0_wp))
+
+   !> A place that is inside.
+   type :: place_t
+      integer :: node = 0                        !! of the scene, it or the nearest on its facet
+      real(wp) :: at(3) = 0.0_wp                 !! [L]
+      type(nearest_t) :: nearest
+      real(wp) :: ratio = 0.0_wp                 !! depth per length of the facet; 0: not deeper
+   end type place_t
+
+contains
+
+   !> What of `a` is inside `b`.
+   subroutine overlap_space_find(a, b, reach, overlap)
+      type(triangles_t), intent(in) :: a, b      !! placed
+      real(wp), intent(in) :: reach              !! length of the longest facet of both [L]
+      type(overlap_t), intent(inout) :: overlap  !! the deepest so far
+      type(inside_t) :: inside
+      type(place_t), allocatable :: place(:)
+      integer :: i, k
+
+      call inside_find(inside, a, b, reach)
+      call find_places(inside, a, b, overlap%depth, place)
+      do i = 1, size(place)
+         k = maxloc(place%ratio, dim=1)
+         if (.not. place(k)%ratio > overlap%depth) return
+         ! Rounding may have led astray along edges: what is deep is asked again.
+         if (b%is_closed .and. place(k)%ratio > aligned) then
+            if (.not. inside_confirm(inside, b, place(k)%at)) then
+               place(k)%ratio = 0.0_wp
+               cycle
+            end if
+         end if
+         call overlap_space_take(b, place(k)%nearest, place(k)%node, .false., overlap)
+         return
+      end do
+   end subroutine overlap_space_find
+
+   !> All places that are inside by more than `least`, per length of the facet.
+   subroutine find_places(inside, a, b, least, place)
+      type(inside_t), intent(inout) :: inside
+      type(triangles_t), intent(in) :: a, b
+      real(wp), intent(in) :: least
+      type(place_t), allocatable, intent(out) :: place(:)
+      type(place_t), allocatable :: spare(:)
+      integer :: i, n
+
+      n = count(inside%state == is_in) + inside%n_middle
+      allocate(spare(n), place(0))
+      n = 0
+      if (size(spare) == 0) return
+      do i = 1, size(inside%state)
+         if (inside%state(i) /= is_in) cycle
+         call judge(node_of(a, i), a%at(:, i), inside%near(i))
+      end do
+      do i = 1, inside%n_middle
+         associate (middle => inside%middle(i))
+            associate (p => a%edge(1, middle%edge), q => a%edge(2, middle%edge))
+               call judge(node_of(a, merge(p, q, middle%share < 0.5_wp)), &
+                  a%at(:, p) + middle%share*(a%at(:, q) - a%at(:, p)), middle%near)
+            end associate
+         end associate
+      end do
+      place = spare(:n)
+
+   contains
+
+      subroutine judge(node, at, near)
+         integer, intent(in) :: node, near
+         real(wp), intent(in) :: at(3)
+         type(place_t) :: new
+
+         new = place_t(node, at)
+         call inside_nearest(inside, b, at, near, new%nearest)
+         new%ratio = depth_of(b, inside%pad, at, new%nearest) &
+            /b%length(b%split%facet(new%nearest%triangle))
+         if (.not. new%ratio > least) return
+         n = n + 1
+         spare(n) = new
+      end subroutine judge
+
+   end subroutine find_places
+
+   !> How deep a point that counts as inside is: it was moved by very little, and may stand in front
+   !> of the nearest facet, or beside it. At the rim of an outline that is not closed there is no
+   !> behind.
+   pure real(wp) function depth_of(b, pad, point, nearest) result(depth)
+      type(triangles_t), intent(in) :: b
+      real(wp), intent(in) :: pad                !! more than it was moved by [L]
+      real(wp), intent(in) :: point(3)           !! [L]
+      type(nearest_t), intent(in) :: nearest
+
+      depth = sqrt(nearest%square)
+      associate (weight => nearest%weight)
+         if (all(weight > 0.0_wp)) then
+            if (nearest_height(point, triangle_at(b, nearest%triangle)) >= 0.0_wp) depth = 0.0_wp
+         else if (depth <= pad) then
+            depth = 0.0_wp
+         else if (.not. b%is_closed) then
+            if (all(b%is_rim(b%split%corner(:, nearest%triangle)) .or. weight <= 0.0_wp)) &
+               depth = 0.0_wp
+         end if
+      end associate
+   end function depth_of
+
+   !> The node that a point is, or the first of the facet whose centre it is.
+   pure integer function node_of(a, point) result(node)
+      type(triangles_t), intent(in) :: a
+      integer, intent(in) :: point
+
+      if (point <= a%split%n_node) then
+         node = a%facets%node(point)
+      else
+         node = a%facets%facet(1, a%split%of_centre(point - a%split%n_node))
+      end if
+   end function node_of
+
+   !> Keep what is behind a facet of `b` if it is the deepest so far; on the way, less than the
+   !> smaller of two bounds is the straight way past a corner.
+   pure subroutine overlap_space_take(b, nearest, node, is_passing, overlap)
+      type(triangles_t), intent(in) :: b         !! placed
+      type(nearest_t), intent(in) :: nearest     !! place of `b`
+      integer, intent(in) :: node                !! that is behind it, or the nearest
+      logical, intent(in) :: is_passing          !! it is on the way, not at the end of a step
+      type(overlap_t), intent(inout) :: overlap
+      real(wp) :: depth
+
+      depth = sqrt(nearest%square)
+      associate (f => b%split%facet(nearest%triangle))
+         if (.not. depth > overlap%depth*b%length(f)) return
+         if (is_passing .and. depth < min(passing*b%length(f), passing_thin*b%thickness(f))) return
+         overlap%depth = depth/b%length(f)
+         overlap%length = b%length(f)
+         overlap%node = node
+         overlap%facet = 0
+         associate (own => b%facets%facet(:, f))
+            overlap%facet(:size(own)) = own
+         end associate
+      end associate
+   end subroutine overlap_space_take
+
+end module emcon_overlap_space

@@ -1,0 +1,227 @@
+!> How deep closed surfaces in space are in each other, beside closed forms.
+module test_overlap_space
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_errors, only : error_t
+   use emcon_inside_space, only : inside_find, inside_t, is_in
+   use emcon_kinds, only : wp
+   use emcon_overlap_query, only : overlap_t
+   use emcon_overlap_space, only : overlap_space_find
+   use emcon_text, only : to_text
+   use emcon_triangles_space, only : triangles_init, triangles_place, triangles_t
+   use space_shapes, only : make_box, make_box_of_triangles, make_sphere, shape_surface_t, &
+      turn_surface
+   implicit none
+   private
+   public :: collect_overlap_space
+
+   !> Some dozen roundings of quantities of size 1.
+   real(wp), parameter :: tol = 64.0_wp*epsilon(1.0_wp)
+
+contains
+
+   subroutine collect_overlap_space(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("spheres, by their closed form", test_spheres), &
+         test_case_t("bars that cross, no node in either", test_bars), &
+         test_case_t("boxes that touch exactly", test_touch), &
+         test_case_t("like boxes, one into the other", test_like), &
+         test_case_t("one body all within another", test_within), &
+         test_case_t("a body in the hole of another", test_hole), &
+         test_case_t("a surface that is not closed", test_open)]
+   end subroutine collect_overlap_space
+
+   subroutine take_up(triangles, surface)
+      type(triangles_t), intent(out) :: triangles
+      type(shape_surface_t), intent(in) :: surface
+      real(wp) :: thickness(size(surface%facet, 2)), rest(3, size(surface%x, 2))
+
+      thickness = 1.0_wp
+      rest = 0.0_wp
+      call triangles_init(triangles, surface%x, surface%facet, thickness)
+      call triangles_place(triangles, surface%x, rest, rest, 0.0_wp)
+   end subroutine take_up
+
+   !> Depths of each in the other.
+   subroutine look(first, second, depth, overlap)
+      type(shape_surface_t), intent(in) :: first, second
+      real(wp), intent(out) :: depth(2)
+      type(overlap_t), intent(out), optional :: overlap
+      type(triangles_t) :: a, b
+      type(overlap_t) :: found(2)
+      real(wp) :: reach
+
+      call take_up(a, first)
+      call take_up(b, second)
+      reach = max(maxval(a%length), maxval(b%length))
+      call overlap_space_find(a, b, reach, found(1))
+      call overlap_space_find(b, a, reach, found(2))
+      depth = found%depth*found%length
+      if (present(overlap)) overlap = found(1)
+   end subroutine look
+
+   !> Two unit spheres in each other by 0.1, the second turned: depths come up to that as meshes get
+   !> finer, from below, and nodes inside are those that the sphere counts, but for its sagitta.
+   subroutine test_spheres(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: deep = 0.1_wp, least(2:4) = [0.08_wp, 0.085_wp, 0.085_wp]
+      integer, parameter :: missed(2:4) = [4, 4, 8]
+      type(shape_surface_t) :: one, other
+      type(triangles_t) :: a, b
+      type(inside_t) :: inside
+      real(wp) :: depth(2)
+      integer :: n, i, by_sphere
+
+      do n = 2, 4
+         call make_sphere(one, n, 1.0_wp)
+         call make_sphere(other, n, 1.0_wp)
+         call check_equal(error, size(one%x, 2), 2 + size(one%facet, 2)/2, "nodes of a sphere")
+         call turn_surface(other, [0.0_wp, 0.0_wp, 2.0_wp - deep])
+         call look(one, other, depth)
+         call check_true(error, all(depth >= least(n) .and. depth <= deep), "depth " &
+            // to_text(n) // ": " // to_text(depth(1), 4) // ", " // to_text(depth(2), 4))
+         call take_up(a, one)
+         call take_up(b, other)
+         call inside_find(inside, a, b, maxval(b%length))
+         by_sphere = count([(norm2(one%x(:, i) - [0.0_wp, 0.0_wp, 2.0_wp - deep]) < 1.0_wp, i = 1, &
+            size(one%x, 2))])
+         call check_true(error, count(inside%state == is_in) <= by_sphere &
+            .and. count(inside%state == is_in) >= by_sphere - missed(n), "nodes inside " &
+            // to_text(count(inside%state == is_in)) // " of " // to_text(by_sphere))
+      end do
+   end subroutine test_spheres
+
+   !> The middles of the parts of edges that are inside tell how deep.
+   subroutine test_bars(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(shape_surface_t) :: one, other
+      real(wp) :: depth(2)
+
+      call make_box_of_triangles(one, [1, 1, 1], [-1.0_wp, -0.1_wp, 0.0_wp], &
+         [1.0_wp, 0.1_wp, 1.0_wp], .false.)
+      call make_box_of_triangles(other, [1, 1, 1], [-0.1_wp, -1.0_wp, -0.95_wp], &
+         [0.1_wp, 1.0_wp, 0.05_wp], .true.)
+      call look(one, other, depth)
+      call check_near(error, depth, [0.05_wp, 0.05_wp], tol, 1.0_wp, "depth")
+      call make_box(one, [2, 1, 1], [-1.0_wp, -0.1_wp, 0.0_wp], [1.0_wp, 0.1_wp, 1.0_wp])
+      call make_box(other, [1, 2, 1], [-0.1_wp, -1.0_wp, -0.95_wp], [0.1_wp, 1.0_wp, 0.05_wp])
+      call look(one, other, depth)
+      call check_near(error, depth, [0.05_wp, 0.05_wp], tol, 1.0_wp, "depth of quadrilaterals")
+   end subroutine test_bars
+
+   !> On top of each other, meshes of all kinds, like and mirrored ones: no depth at all.
+   subroutine test_touch(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: low(3) = [0.0_wp, 0.0_wp, 0.0_wp], high(3) = [1.0_wp, 1.0_wp, 1.0_wp], &
+         up(3) = [0.0_wp, 0.0_wp, 1.0_wp]
+      type(shape_surface_t) :: one, other
+      real(wp) :: depth(2)
+      integer :: n
+
+      do n = 1, 4
+         call make_box(one, [3, 3, 1], low, high)
+         call make_box(other, [n, n, 1], low + up, high + up)
+         call look(one, other, depth)
+         call check_near(error, depth, [0.0_wp, 0.0_wp], tol, 1.0_wp, "quadrilaterals")
+         call make_box(other, [2, n, 1], [-0.2_wp, -0.2_wp, 1.0_wp], [1.3_wp, 1.3_wp, 2.0_wp])
+         call look(one, other, depth)
+         call check_near(error, depth, [0.0_wp, 0.0_wp], tol, 1.0_wp, "a larger one")
+         call make_box_of_triangles(one, [3, 3, 1], low, high, .false.)
+         call make_box_of_triangles(other, [n, n, 1], low + up, high + up, .false.)
+         call look(one, other, depth)
+         call check_near(error, depth, [0.0_wp, 0.0_wp], tol, 1.0_wp, "triangles")
+         call make_box_of_triangles(other, [n, n, 1], low + up, high + up, .true.)
+         call look(one, other, depth)
+         call check_near(error, depth, [0.0_wp, 0.0_wp], tol, 1.0_wp, "mirrored triangles")
+         call turn_surface(one, up)
+         call turn_surface(other, up)
+         call look(one, other, depth)
+         call check_near(error, depth, [0.0_wp, 0.0_wp], tol, 8.0_wp, "turned")
+      end do
+   end subroutine test_touch
+
+   !> Sides in one plane, nodes over nodes and edges in edges.
+   subroutine test_like(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: deep = 0.03_wp
+      type(shape_surface_t) :: one, other
+      real(wp) :: depth(2)
+      integer :: n, k
+
+      do n = 1, 4
+         do k = 0, 2
+            call make_box_of_triangles(one, [n, n, n], [0.0_wp, 0.0_wp, 0.0_wp], &
+               [1.0_wp, 1.0_wp, 1.0_wp], .false.)
+            call make_box_of_triangles(other, [n, n, n], [0.0_wp, 0.0_wp, 1.0_wp - deep], &
+               [1.0_wp, 1.0_wp, 2.0_wp - deep], k == 1)
+            if (k == 2) call make_box(one, [n, n, n], [0.0_wp, 0.0_wp, 0.0_wp], &
+               [1.0_wp, 1.0_wp, 1.0_wp])
+            if (k == 2) call make_box(other, [n, n, n], [0.0_wp, 0.0_wp, 1.0_wp - deep], &
+               [1.0_wp, 1.0_wp, 2.0_wp - deep])
+            call look(one, other, depth)
+            call check_near(error, depth, [deep, deep], tol, 1.0_wp, "depth " // to_text(n))
+            call turn_surface(one, [0.0_wp, 0.0_wp, 1.0_wp])
+            call turn_surface(other, [0.0_wp, 0.0_wp, 1.0_wp])
+            call look(one, other, depth)
+            call check_near(error, depth, [deep, deep], tol, 8.0_wp, "turned " // to_text(n))
+         end do
+      end do
+   end subroutine test_like
+
+   !> Nothing crosses: a ray tells. The deepest node is in the middle.
+   subroutine test_within(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(shape_surface_t) :: one, other
+      real(wp) :: depth(2)
+
+      call make_sphere(one, 1, 0.1_wp)
+      call make_box(other, [3, 2, 2], [-1.0_wp, -1.0_wp, -1.0_wp], [1.0_wp, 1.0_wp, 1.0_wp])
+      call look(one, other, depth)
+      call check_near(error, depth(1), 1.0_wp - 0.1_wp*0.5_wp, 0.06_wp, 1.0_wp, "small in large")
+      call check_near(error, depth(2), 0.0_wp, 0.0_wp, 1.0_wp, "large in small")
+   end subroutine test_within
+
+   !> Boxes of walls around it are apart, whatever the boxes around all of it say.
+   subroutine test_hole(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(shape_surface_t) :: one, other, inner
+      real(wp) :: depth(2)
+      integer :: n
+
+      call make_sphere(one, 1, 0.1_wp)
+      call make_box(other, [3, 2, 2], [-1.0_wp, -1.0_wp, -1.0_wp], [1.0_wp, 1.0_wp, 1.0_wp])
+      call make_box(inner, [1, 1, 1], [-0.5_wp, -0.5_wp, -0.5_wp], [0.5_wp, 0.5_wp, 0.5_wp])
+      n = size(other%x, 2)
+      other%x = reshape([other%x, inner%x], [3, n + size(inner%x, 2)])
+      other%facet = reshape([other%facet, n + inner%facet(4:1:-1, :)], &
+         [4, size(other%facet, 2) + size(inner%facet, 2)])
+      call look(one, other, depth)
+      call check_near(error, depth, [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "in the hole")
+      one%x(1, :) = one%x(1, :) + 0.45_wp
+      call look(one, other, depth)
+      call check_true(error, depth(1) > 0.04_wp .and. depth(1) <= 0.05_wp + tol, "in its wall: " // to_text(depth(1), 17))
+   end subroutine test_hole
+
+   !> One facet alone: what crosses it counts, what passes beside it does not.
+   subroutine test_open(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(shape_surface_t) :: one, sheet
+      type(overlap_t) :: overlap
+      real(wp) :: depth(2)
+
+      call make_box(one, [4, 4, 4], [-0.5_wp, -0.5_wp, -0.05_wp], [0.5_wp, 0.5_wp, 0.95_wp])
+      allocate(sheet%x(3, 4), sheet%facet(4, 1))
+      sheet%x = reshape([-1.0_wp, -1.0_wp, 0.0_wp, 1.0_wp, -1.0_wp, 0.0_wp, 1.0_wp, 1.0_wp, 0.0_wp, &
+         -1.0_wp, 1.0_wp, 0.0_wp], [3, 4])
+      sheet%facet(:, 1) = [1, 2, 3, 4]
+      call look(one, sheet, depth, overlap)
+      call check_near(error, depth(1), 0.05_wp, tol, 1.0_wp, "in the sheet")
+      call check_equal(error, overlap%facet(:4), [1, 2, 3, 4], "its facet")
+      call check_near(error, overlap%length, 2.0_wp, tol, 1.0_wp, "its length")
+      one%x(1, :) = one%x(1, :) + 1.6_wp
+      call look(one, sheet, depth)
+      call check_near(error, depth, [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "beside it")
+   end subroutine test_open
+
+end module test_overlap_space

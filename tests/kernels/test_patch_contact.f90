@@ -1,0 +1,311 @@
+!> Contact of nodes in space over stencils of meshes: gaps, identities, momenta, derivatives, ends.
+module test_patch_contact
+   use check, only : check_near, check_true, test_case_t
+   use emcon_constraint, only : condition_t
+   use emcon_errors, only : error_t
+   use emcon_interactions, only : contact_pair_t
+   use emcon_kinds, only : wp
+   use emcon_mesh, only : surface_t
+   use emcon_patch_contact_space, only : patch_contact_init, patch_contact_t
+   use emcon_scene, only : scene_t
+   use emcon_text, only : to_text
+   use random_draws, only : draw_random
+   use space_scenes, only : add_box, skin, space_begin
+   implicit none
+   private
+   public :: collect_patch_contact
+
+   real(wp), parameter :: eps = epsilon(1.0_wp)
+   !> Some 100 roundings of quantities of size 1, here by the length of a patch, 1/30.
+   real(wp), parameter :: tol = 1.0e4_wp*eps
+   character(len=4), parameter :: kind(2) = ["C3D8", "C3D4"]
+
+contains
+
+   subroutine collect_patch_contact(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("boxes over each other, whole skins", test_flat), &
+         test_case_t("a box that is thin: its other side is not seen", test_thin), &
+         test_case_t("identity and momenta", test_identity), &
+         test_case_t("derivatives against differences", test_derivatives), &
+         test_case_t("a surface fades past its end", test_end), &
+         test_case_t("a corner first: the frame of all its faces", test_corner)]
+   end subroutine collect_patch_contact
+
+   !> Two boxes of cells of 1/3, the upper one `gap` above the other and moved by `shift` from it,
+   !> and the contact of the nodes of the upper one.
+   subroutine make(name, gap, shift, depth, scene, contact, error)
+      character(len=*), intent(in) :: name
+      real(wp), intent(in) :: gap, shift(2), depth
+      type(scene_t), intent(out) :: scene
+      type(patch_contact_t), intent(out) :: contact
+      type(error_t), allocatable, intent(out) :: error
+      type(surface_t) :: surface(2), all_of_it
+      type(contact_pair_t) :: pair
+      integer :: n
+
+      call space_begin(scene)
+      call add_box(scene, name, [shift, gap], [1.0_wp, 1.0_wp, 1.0_wp], [3, 3, 3])
+      n = size(scene%element%kind)
+      call add_box(scene, name, [0.0_wp, 0.0_wp, -depth], [1.0_wp, 1.0_wp, depth], [3, 3, 1])
+      all_of_it = skin(scene)
+      surface = all_of_it
+      surface(1)%element = pack(all_of_it%element, all_of_it%element <= n)
+      surface(1)%face = pack(all_of_it%face, all_of_it%element <= n)
+      surface(2)%element = pack(all_of_it%element, all_of_it%element > n)
+      surface(2)%face = pack(all_of_it%face, all_of_it%element > n)
+      scene%surface = surface
+      allocate(scene%u0, mold=scene%x)
+      scene%u0 = 0.0_wp
+      pair%slave = 1
+      pair%master = 2
+      call patch_contact_init(contact, scene, pair, error)
+      if (.not. allocated(error)) call contact%suit_steps(.false.)
+   end subroutine make
+
+   !> Every node of the lower side sees the top; no other node sees anything within reach.
+   subroutine test_flat(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: gap(3) = [0.0_wp, 0.02_wp, -0.01_wp]
+      type(scene_t) :: scene
+      type(patch_contact_t) :: contact
+      integer :: i, j, k
+
+      do j = 1, 2
+         do k = 1, size(gap)
+            call make(kind(j), gap(k), [0.0_wp, 0.0_wp], 0.7_wp, scene, contact, error)
+            if (allocated(error)) return
+            call look(contact, scene, 0.0_wp*scene%x)
+            do i = 1, contact%n_constraint
+               associate (state => contact%state(i), at => scene%x(:, contact%node(i)))
+                  if (at(3) > gap(k) + 0.1_wp) then
+                     call check_true(error, .not. state%is_over, "above")
+                  else
+                     call check_true(error, state%is_over .and. state%is_covered, "it is over it")
+                     call check_near(error, [state%gap0, state%gap1], [gap(k), gap(k)], tol, &
+                        1.0_wp, kind(j) // " " // to_text(i))
+                  end if
+               end associate
+            end do
+         end do
+      end do
+   end subroutine test_flat
+
+   !> Begin a step and measure.
+   subroutine look(contact, scene, du)
+      type(patch_contact_t), intent(inout) :: contact
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in), contiguous :: du(:, :)
+
+      contact%reach = 0.0_wp
+      call contact%begin_step(scene%x, scene%u0, du)
+      call contact%measure(scene%x, scene%u0, du)
+   end subroutine look
+
+   !> A plate of a tenth of a facet: the lower side, as near, faces away.
+   subroutine test_thin(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(patch_contact_t) :: contact
+      integer :: i
+
+      call make("C3D8", 0.01_wp, [0.1_wp, 0.07_wp], 0.03_wp, scene, contact, error)
+      if (allocated(error)) return
+      call look(contact, scene, 0.0_wp*scene%x)
+      do i = 1, contact%n_constraint
+         associate (state => contact%state(i))
+            if (state%is_over) call check_near(error, state%gap0, 0.01_wp, tol, 1.0_wp, to_text(i))
+         end associate
+      end do
+      call check_true(error, count(contact%state%is_over) >= 9, "nodes are over it")
+   end subroutine test_thin
+
+   !> A rough scene and a step in which it slides, turns and is bent.
+   subroutine draw(name, size_of, scene, du, contact, error)
+      character(len=*), intent(in) :: name
+      real(wp), intent(in) :: size_of
+      type(scene_t), intent(out) :: scene
+      real(wp), allocatable, intent(out) :: du(:, :)
+      type(patch_contact_t), intent(out) :: contact
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: turn(3, 3), way(2)
+
+      call draw_random(way)
+      call make(name, 0.02_wp, 0.4_wp*way, 0.7_wp, scene, contact, error)
+      if (allocated(error)) return
+      allocate(du, mold=scene%x)
+      call draw_random(du)
+      scene%u0 = 0.03_wp*(2.0_wp*du - 1.0_wp)
+      call draw_random(du)
+      turn = 0.0_wp
+      turn(1, 2) = -size_of
+      turn(2, 1) = size_of
+      turn(1, 3) = 0.5_wp*size_of
+      turn(3, 1) = -0.5_wp*size_of
+      du = 0.1_wp*size_of*(2.0_wp*du - 1.0_wp) + matmul(turn, scene%x)
+      associate (last => 64)
+         du(1, :last) = du(1, :last) + size_of
+      end associate
+   end subroutine draw
+
+   !> The conditions of the nodes that are over the master.
+   subroutine evaluate(contact, scene, du, leaves_second, wanted, item)
+      type(patch_contact_t), intent(inout) :: contact
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in), contiguous :: du(:, :)
+      logical, intent(in) :: leaves_second
+      integer, intent(in) :: wanted(:)
+      type(condition_t), allocatable, intent(out) :: item(:)
+      integer :: i
+
+      allocate(item(size(wanted)))
+      item%leaves_second = leaves_second
+      call contact%evaluate(wanted, scene%x, scene%u0, du, [(0.01_wp, i = 1, size(wanted))], item)
+   end subroutine evaluate
+
+   !> Those that are over the master at either end.
+   function seen(contact) result(wanted)
+      type(patch_contact_t), intent(in) :: contact
+      integer, allocatable :: wanted(:)
+      integer :: i
+
+      wanted = pack([(i, i = 1, contact%n_constraint)], contact%state%is_near)
+   end function seen
+
+   subroutine test_identity(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(patch_contact_t) :: contact
+      type(condition_t), allocatable :: item(:)
+      real(wp), allocatable :: du(:, :)
+      real(wp) :: work, total(3), moment(3), magnitude
+      integer :: i, j, k, a
+
+      do k = 1, 24
+         call draw(kind(1 + mod(k, 2)), 0.3_wp*0.3_wp**(k/2), scene, du, contact, error)
+         if (allocated(error)) return
+         call look(contact, scene, du)
+         call evaluate(contact, scene, du, .true., seen(contact), item)
+         call check_true(error, size(item) > 2, "nodes are over it")
+         do i = 1, size(item)
+            work = 0.0_wp
+            total = 0.0_wp
+            moment = 0.0_wp
+            magnitude = 0.0_wp
+            do j = 1, item(i)%n_node
+               a = item(i)%node(j)
+               associate (g => item(i)%g(:, j), at => scene%x(:, a) + scene%u0(:, a) &
+                     + 0.5_wp*du(:, a))
+                  work = work + dot_product(g, du(:, a))
+                  total = total + g
+                  moment = moment + cshift(at, 1)*cshift(g, -1) - cshift(at, -1)*cshift(g, 1)
+                  magnitude = magnitude + sum(abs(g))
+               end associate
+            end do
+            call check_near(error, work, item(i)%dgap, tol, magnitude*maxval(abs(du)), "identity")
+            call check_near(error, item(i)%gap0 + item(i)%dgap, item(i)%gap1, tol, 1.0_wp, "ends")
+            call check_near(error, [total, moment], [(0.0_wp, j = 1, 6)], tol, magnitude, "momenta")
+         end do
+      end do
+   end subroutine test_identity
+
+   !> Central differences err by the square of their way, times derivatives that grow with kinks by
+   !> the length of a patch, beside round-off by the way.
+   subroutine test_derivatives(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(patch_contact_t) :: contact
+      type(condition_t), allocatable :: item(:), up(:), down(:)
+      real(wp), allocatable :: du(:, :), way(:, :)
+      real(wp) :: step, bound
+      integer :: i, k, n
+
+      step = 0.1_wp*eps**(1.0_wp/3.0_wp)
+      bound = 1.0e6_wp*step**2
+      do k = 1, 8
+         call draw(kind(1 + mod(k, 2)), 0.1_wp, scene, du, contact, error)
+         if (allocated(error)) return
+         call look(contact, scene, du)
+         way = 0.0_wp*du
+         call draw_random(way)
+         way = 2.0_wp*way - 1.0_wp
+         call evaluate(contact, scene, du, .false., seen(contact), item)
+         call evaluate(contact, scene, du + step*way, .true., seen(contact), up)
+         call evaluate(contact, scene, du - step*way, .true., seen(contact), down)
+         do i = 1, size(item)
+            n = item(i)%n_node
+            if (n /= up(i)%n_node .or. n /= down(i)%n_node) cycle
+            if (any(item(i)%node(:n) /= up(i)%node(:n))) cycle
+            associate (by => reshape(way(:, item(i)%node(:n)), [3*n]))
+               call check_near(error, dot_product(reshape(item(i)%c(:, :n), [3*n]), by), &
+                  (up(i)%gap1 - down(i)%gap1)/(2.0_wp*step), bound, 1.0_wp, "gradient")
+               call check_near(error, matmul(item(i)%h(:3*n, :3*n), by), reshape((up(i)%g(:, :n) &
+                  - down(i)%g(:, :n))/(2.0_wp*step), [3*n]), bound, 1.0_wp, "second derivative")
+            end associate
+         end do
+      end do
+   end subroutine test_derivatives
+
+   !> The upper box slides off: what is past the end by more than the flange and the patch is let go,
+   !> and gaps stay what they are up to there.
+   subroutine test_end(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(patch_contact_t) :: contact
+      real(wp) :: past
+      integer :: i, k
+
+      do k = 0, 20
+         past = 0.01_wp*real(k - 10, wp)
+         call make("C3D8", 0.02_wp, [past, 0.0_wp], 0.7_wp, scene, contact, error)
+         if (allocated(error)) return
+         call look(contact, scene, 0.0_wp*scene%x)
+         do i = 1, contact%n_constraint
+            associate (state => contact%state(i), at => scene%x(:, contact%node(i)))
+               if (at(3) > 0.1_wp) cycle
+               if (state%is_over) call check_near(error, state%gap0, 0.02_wp, tol, 1.0_wp, "gap")
+               if (at(1) <= 1.0_wp + 16.0_wp*eps .and. at(1) >= -16.0_wp*eps) then
+                  call check_true(error, state%is_over, "over it, by " // to_text(past, 3))
+                  call check_true(error, contact%cover(i) > 0.4_wp, "half of the patch")
+               end if
+               if (at(1) > 1.1_wp .or. at(1) < -0.1_wp) then
+                  call check_true(error, .not. state%is_over, "past it, by " // to_text(past, 3))
+               end if
+            end associate
+         end do
+      end do
+   end subroutine test_end
+
+   !> A box on one of its corners: of the three faces there none faces the floor alone.
+   subroutine test_corner(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(patch_contact_t) :: contact
+      real(wp) :: one(3), two(3), three(3)
+      integer :: i
+
+      call make("C3D8", 0.0_wp, [0.0_wp, 0.0_wp], 0.7_wp, scene, contact, error)
+      if (allocated(error)) return
+      ! The diagonal upright.
+      three = [1.0_wp, 1.0_wp, 1.0_wp]/sqrt(3.0_wp)
+      one = [1.0_wp, -1.0_wp, 0.0_wp]/sqrt(2.0_wp)
+      two = [-1.0_wp, -1.0_wp, 2.0_wp]/sqrt(6.0_wp)
+      two = two*sign(1.0_wp, three(1)*(one(2)*two(3) - one(3)*two(2)))
+      do i = 1, 64
+         associate (at => scene%x(:, i))
+            scene%u0(:, i) = [0.45_wp, 0.55_wp, 0.01_wp] + [dot_product(one, at), &
+               dot_product(two, at), dot_product(three, at)] - at
+         end associate
+      end do
+      call look(contact, scene, 0.0_wp*scene%x)
+      call check_true(error, contact%state(1)%is_over, "it is over it")
+      call check_near(error, contact%state(1)%gap0, 0.01_wp, tol, 1.0_wp, "its gap")
+      do i = 2, contact%n_constraint
+         if (contact%state(i)%is_over) call check_true(error, contact%state(i)%gap0 > 0.1_wp, &
+            "those beside it are higher")
+      end do
+   end subroutine test_corner
+
+end module test_patch_contact
