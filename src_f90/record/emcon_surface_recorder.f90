@@ -1,5 +1,5 @@
-!> The field file NAME.surfaces.vtkhdf of runs with contact in space: the faces of contact surfaces as
-!> cells, with what contact does to them, in the frames of NAME.vtkhdf.
+!> The field file NAME.surfaces.vtkhdf of runs with contact in space: the faces of contact surfaces
+!> as cells, with what contact does to them, in the frames of NAME.vtkhdf.
 !>
 !> A file of its own: as more cells of the mesh, faces would lie on those of elements and be drawn
 !> through each other.
@@ -111,8 +111,8 @@ contains
       if (.not. allocated(error)) call vtkhdf_end_frame(self%fields, error)
    end subroutine surface_recorder_write
 
-   !> What stays as it is, and is not written again: of points the node of the field file, from 0 on;
-   !> of faces surface and body, from 1 on.
+   !> What stays as it is, and is not written again: of points the node of the field file, from 0
+   !> on; of faces surface and body, from 1 on.
    subroutine write_once(self, stepper, error)
       type(surface_recorder_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
