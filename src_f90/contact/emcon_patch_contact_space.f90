@@ -1,4 +1,5 @@
-!> Contact of nodes in space: one constraint per slave node, the gap of a small patch around it.
+!> Contact of nodes in space: one constraint per frame of a slave node, the gap of a small patch
+!> around it. A node of a smooth surface has one frame, one of a corner has several.
 !>
 !> The patch moves with the slave's surface, and its gap is the mean over what it covers of the
 !> master: smooth while the node slides over sides and corners. Source: docs/theory.md, section 15.
@@ -59,7 +60,6 @@ contains
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       type(error_t), allocatable, intent(out) :: error
-      integer :: i
 
       associate (sides => self%sides)
          call facets_init(sides%slave, scene, scene%surface(pair%slave), error)
@@ -75,17 +75,17 @@ contains
          if (allocated(error)) return
          call node_frames_init(sides%frames, sides%slave, scene%x)
          call triangles_init(sides%triangles, sides%master, scene%x)
-         self%node = sides%slave%node
+         self%node = sides%slave%node(sides%frames%node)
          self%n_constraint = size(self%node)
          allocate(self%duplicate(self%n_constraint), source=0)
          allocate(self%state(self%n_constraint), self%stencil(self%n_constraint))
          allocate(self%scale(self%n_constraint), source=1.0_wp)
          allocate(self%cover(self%n_constraint), self%sagitta(self%n_constraint), source=0.0_wp)
-         self%thickness = sqrt(sides%frames%area)
-         call near_list_init(self%near, reshape(self%node, [1, self%n_constraint]), &
+         self%thickness = sqrt(sides%frames%area(sides%frames%node))
+         call near_list_init(self%near, reshape(sides%slave%node, [1, size(sides%slave%node)]), &
             sides%master%facet, scene%x, scene%u0, pair%interaction%offset &
             + interaction_reach(pair%interaction))
-         self%state%other_size = [(sides%frames%size(i), i = 1, self%n_constraint)]
+         self%state%other_size = sides%frames%size(sides%frames%node)
       end associate
       self%both_sides = pair%both_sides
       if (self%both_sides) self%area_factor = 0.5_wp
@@ -103,7 +103,7 @@ contains
       type(contact_options_t), intent(in) :: options
    end subroutine patch_configure
 
-   !> Choose for each slave node what its patch may see in the step. From the same start and up to
+   !> Choose for each frame what its patch may see in the step. From the same start and up to
    !> the same reach the choice is the same.
    pure subroutine patch_begin_step(self, x, u0, du)
       class(patch_contact_t), intent(inout) :: self
@@ -120,9 +120,11 @@ contains
       self%chosen_reach = self%reach
       associate (list => self%near%candidates)
          do i = 1, self%n_constraint
-            associate (of => list%facet(list%start(i):list%start(i + 1) - 1))
-               facet = pack(of, [(near_list_within(self%near, i, of(k), x, u0, self%reach), &
-                  k = 1, size(of))])
+            associate (item => self%sides%frames%node(i))
+               associate (of => list%facet(list%start(item):list%start(item + 1) - 1))
+                  facet = pack(of, [(near_list_within(self%near, item, of(k), x, u0, self%reach), &
+                     k = 1, size(of))])
+               end associate
             end associate
             call patch_stencil_choose(self%stencil(i), self%sides, i, facet, x, u0)
          end do
@@ -135,12 +137,12 @@ contains
       integer :: i
 
       do i = 1, self%n_constraint
-         call measure_node(self, i, x, u0, du)
+         call measure_frame(self, i, x, u0, du)
       end do
    end subroutine patch_measure
 
-   !> The gap of node `i` at both ends of the step, and what of its patch is covered.
-   pure subroutine measure_node(self, i, x, u0, du)
+   !> The gap of frame `i` at both ends of the step, and what of its patch is covered.
+   pure subroutine measure_frame(self, i, x, u0, du)
       type(patch_contact_t), intent(inout) :: self
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
@@ -158,7 +160,7 @@ contains
          self%scale(i) = max(cover(0), least)
          if (self%step%is_penalty) least = no_cover
          state%size = stencil%size
-         state%other_size = self%sides%frames%size(i)
+         state%other_size = self%sides%frames%size(self%sides%frames%node(i))
          state%is_near = maxval(cover) > no_cover
          state%is_over = cover(1) >= least .or. (self%step%is_penalty .and. cover(0) >= least)
          state%is_leaving = .not. state%is_over
@@ -174,7 +176,7 @@ contains
          if (self%slack > 0.0_wp) state%closed = -self%slack*min(state%size, state%other_size)
          self%cover(i) = cover(1)
       end associate
-   end subroutine measure_node
+   end subroutine measure_frame
 
    pure subroutine patch_evaluate(self, wanted, x, u0, du, target, item)
       class(patch_contact_t), intent(inout) :: self
@@ -185,12 +187,12 @@ contains
       integer :: k
 
       do k = 1, size(wanted)
-         call evaluate_node(self, wanted(k), x, u0, du, target(k) + self%offset, item(k))
+         call evaluate_frame(self, wanted(k), x, u0, du, target(k) + self%offset, item(k))
       end do
    end subroutine patch_evaluate
 
-   !> The condition of node `i`.
-   pure subroutine evaluate_node(self, i, x, u0, du, target, item)
+   !> The condition of frame `i`.
+   pure subroutine evaluate_frame(self, i, x, u0, du, target, item)
       type(patch_contact_t), intent(in) :: self
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
@@ -220,7 +222,7 @@ contains
             call spread_to_nodes(gap, stencil%weight(row, column(:n)), 1.0_wp/self%scale(i), item)
          end associate
       end associate
-   end subroutine evaluate_node
+   end subroutine evaluate_frame
 
    !> Derivatives by nodes from those by sums of nodes.
    pure subroutine spread_to_nodes(gap, weight, factor, item)
@@ -276,19 +278,20 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
       real(wp), intent(out) :: length(:)         !! (n_constraint) by their thickness [L]
-      real(wp) :: normal(3)
+      real(wp) :: normal(3), of_node(size(self%sides%slave%node))
       integer :: f, n
 
-      area = 0.0_wp
+      of_node = 0.0_wp
       associate (slave => self%sides%slave)
          do f = 1, slave%n_facet
             n = count(slave%corner(:, f) > 0)
             normal = facets_normal(slave, f, x, u)
             associate (to => slave%corner(:n, f))
-               area(to) = area(to) + sqrt(dot_product(normal, normal))/real(n, wp)
+               of_node(to) = of_node(to) + sqrt(dot_product(normal, normal))/real(n, wp)
             end associate
          end do
       end associate
+      area = of_node(self%sides%frames%node)
       length = area/self%thickness
    end subroutine patch_area
 

@@ -24,8 +24,10 @@ module emcon_patch_sides_space
    !> Frames of nodes: vectors a and b that are sums of weight times (x(ring) - x(node)), lengths as
    !> in the reference.
    type :: node_frames_t
-      integer, allocatable :: start(:)           !! (n_node + 1) frames of each node
-      integer, allocatable :: ring_start(:)      !! (n_frame + 1)
+      integer :: n = 0                           !! frames of all nodes
+      integer, allocatable :: start(:)           !! (n_node + 1) first frame of each node
+      integer, allocatable :: node(:)            !! (n) index of the node of each frame
+      integer, allocatable :: ring_start(:)      !! (n + 1)
       integer, allocatable :: ring(:)            !! nodes of the scene
       real(wp), allocatable :: weight(:, :)      !! (2, size of `ring`) in a, in b
       real(wp), allocatable :: size(:)           !! (n_node) mean length of facets there [L]
@@ -117,6 +119,8 @@ contains
                /real(count(facets%corner(:, facets%around(g)) > 0), wp), g = first, last)])
          end associate
       end do
+      self%n = self%start(size(facets%node) + 1) - 1
+      self%node = [((i, g = self%start(i), self%start(i + 1) - 1), i = 1, size(facets%node))]
    end subroutine node_frames_init
 
    !> Add the frame of the facets `facet` at node `i`, if they have a mean normal: docs/theory.md,

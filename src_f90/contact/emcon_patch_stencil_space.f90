@@ -22,7 +22,7 @@ module emcon_patch_stencil_space
    !> Triangles at distances that differ by less than this, per facet, are as near.
    real(wp), parameter :: as_near = 1.0e-6_wp
 
-   !> The patch of one node for a step, and its vertices as sums of nodes.
+   !> The patch of one frame for a step, and its vertices as sums of nodes.
    type :: patch_stencil_t
       integer :: triangle = 0                    !! nearest of the master; 0: none near
       type(patch_t) :: patch
@@ -47,22 +47,24 @@ module emcon_patch_stencil_space
 
 contains
 
-   !> Choose the stencil of node `i` of the slave at x + u, where the facets `facet` of the master are
-   !> near: the frame that faces the nearest triangle, and what hangs together with that and faces
-   !> the frame too.
-   pure subroutine patch_stencil_choose(self, sides, i, facet, x, u)
+   !> Choose the stencil of frame `frame` of the slave at x + u, where the facets `facet` of the
+   !> master are near its node: the nearest triangle that faces this frame more than any other of
+   !> the node, and what hangs together with that and faces the frame too.
+   pure subroutine patch_stencil_choose(self, sides, frame, facet, x, u)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: i                   !! index into the slave's nodes
+      integer, intent(in) :: frame               !! 1 to the number of all frames
       integer, intent(in) :: facet(:)            !! ascending
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       type(near_t) :: near
       real(wp) :: normal(3)
-      integer :: frame, nearest
+      integer :: i, nearest
 
       self%triangle = 0
+      if (size(facet) == 0) return
+      i = sides%frames%node(frame)
       call look_around(sides, sides%slave%node(i), facet, x, u, near)
-      call choose_frame(sides, i, near, x, u, frame, nearest)
+      nearest = nearest_to(sides, frame, near, x, u)
       if (nearest == 0) return
       normal = frame_normal(sides, i, frame, x, u)
       call list_triangles(sides, near, nearest, normal)
@@ -146,37 +148,39 @@ contains
 
    end function distance_to
 
-   !> The frame and the nearest triangle that face each other; of those as near the ones that face
-   !> each other most.
-   pure subroutine choose_frame(sides, i, near, x, u, frame, nearest)
+   !> The nearest triangle that faces a frame more than any other frame of its node; of those as
+   !> near the one that faces it most. 0: there is none.
+   pure integer function nearest_to(sides, frame, near, x, u) result(nearest)
       type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: i
+      integer, intent(in) :: frame
       type(near_t), intent(in) :: near
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      integer, intent(out) :: frame, nearest     !! 0: none do
-      real(wp) :: normal(3), cosine, best, least
+      real(wp) :: best, least
       integer :: g, t
 
-      frame = 0
       nearest = 0
       best = 0.0_wp
       least = huge(least)
-      do g = sides%frames%start(i), sides%frames%start(i + 1) - 1
-         normal = frame_normal(sides, i, g, x, u)
-         do t = 1, near%n
-            cosine = dot_product(normal, near%normal(:, t))
-            if (cosine >= facing) cycle
-            associate (room => as_near*sides%triangles%size(near%triangle(t)))
-               if (near%distance(t) > least + room) cycle
-               if (near%distance(t) > least - room .and. cosine >= best - as_near) cycle
+      associate (i => sides%frames%node(frame))
+         associate (first => sides%frames%start(i), last => sides%frames%start(i + 1) - 1)
+            associate (cosine => matmul(transpose(near%normal), reshape([(frame_normal(sides, i, &
+                  g, x, u), g = first, last)], [3, last - first + 1])))
+               do t = 1, near%n
+                  if (minloc(cosine(t, :), 1) /= frame - first + 1) cycle
+                  associate (own => cosine(t, frame - first + 1), &
+                        room => as_near*sides%triangles%size(near%triangle(t)))
+                     if (own >= facing) cycle
+                     if (near%distance(t) > least + room) cycle
+                     if (near%distance(t) > least - room .and. own >= best - as_near) cycle
+                     least = near%distance(t)
+                     best = own
+                     nearest = t
+                  end associate
+               end do
             end associate
-            least = near%distance(t)
-            best = cosine
-            frame = g
-            nearest = t
-         end do
-      end do
-   end subroutine choose_frame
+         end associate
+      end associate
+   end function nearest_to
 
    !> The normal of a frame, outwards.
    pure function frame_normal(sides, i, frame, x, u) result(normal)
