@@ -175,6 +175,7 @@ contains
          if (cover(1) >= least) state%gap1 = height(1)/cover(1) - self%offset
          if (self%slack > 0.0_wp) state%closed = -self%slack*min(state%size, state%other_size)
          self%cover(i) = cover(1)
+         if (state%gap0 < -stencil%deepest - self%offset) state = gap_state_t()
       end associate
    end subroutine measure_frame
 

@@ -19,6 +19,8 @@ module emcon_patch_stencil_space
    real(wp), parameter :: patch_size = 0.1_wp
    !> Where a surface ends it goes on by this part of a facet, and fades on it.
    real(wp), parameter :: flange = 0.2_wp
+   !> A node is behind a triangle by no more than so many of its distances, and this by the facet.
+   real(wp), parameter :: distances = 2.0_wp, room_behind = 0.2_wp
    !> Triangles at distances that differ by less than this, per facet, are as near.
    real(wp), parameter :: as_near = 1.0e-6_wp
 
@@ -27,6 +29,7 @@ module emcon_patch_stencil_space
       integer :: triangle = 0                    !! nearest of the master; 0: none near
       type(patch_t) :: patch
       real(wp) :: size = 0.0_wp                  !! length of its facet [L]
+      real(wp) :: deepest = 0.0_wp               !! farther behind is another side of the body [L]
       integer :: n_node = 0
       integer :: n_slave = 0                     !! nodes 1..n_slave are of the frame
       integer, allocatable :: point(:)           !! (>= n_vertex) of the master; < 0: of a flange
@@ -68,6 +71,8 @@ contains
       if (nearest == 0) return
       normal = frame_normal(sides, i, frame, x, u)
       call list_triangles(sides, near, nearest, normal)
+      self%deepest = room_behind*sides%triangles%size(near%triangle(nearest)) - distances &
+         *near%distance(nearest)/dot_product(near%normal(:, nearest), normal)
       self%triangle = near%triangle(nearest)
       self%size = sides%triangles%size(self%triangle)
       self%patch%length = patch_size*min(self%size, sides%frames%size(i))
@@ -170,6 +175,8 @@ contains
                   associate (own => cosine(t, frame - first + 1), &
                         room => as_near*sides%triangles%size(near%triangle(t)))
                      if (own >= facing) cycle
+                     if (is_hidden(t, room_behind*min(sides%frames%size(i), &
+                        sides%triangles%size(near%triangle(t))))) cycle
                      if (near%distance(t) > least + room) cycle
                      if (near%distance(t) > least - room .and. own >= best - as_near) cycle
                      least = near%distance(t)
@@ -180,6 +187,19 @@ contains
             end associate
          end associate
       end associate
+
+   contains
+
+      !> Is the node behind a triangle, but nearer to another by more than `room`? Then that is in
+      !> front of it.
+      pure logical function is_hidden(t, room)
+         integer, intent(in) :: t
+         real(wp), intent(in) :: room            !! [L]
+
+         is_hidden = dot_product(near%corner(:, 1, t), near%normal(:, t)) > 0.0_wp .and. &
+            near%distance(t) > minval(near%distance) + room
+      end function is_hidden
+
    end function nearest_to
 
    !> The normal of a frame, outwards.
