@@ -3,7 +3,7 @@
 !>
 !> Source: docs/theory.md, section 4.11.
 module emcon_overlap_space
-   use emcon_inside_space, only : inside_confirm, inside_find, inside_nearest, inside_t, is_in
+   use emcon_inside_space, only : inside_confirm, inside_find, inside_nearest, inside_t
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : nearest_height, nearest_t
    use emcon_overlap_query, only : overlap_t, passing, passing_thin
@@ -58,21 +58,27 @@ contains
       real(wp), intent(in) :: least
       type(place_t), allocatable, intent(out) :: place(:)
       type(place_t), allocatable :: spare(:)
-      integer :: i, n
+      integer :: i, n, near
 
-      n = count(inside%state == is_in) + inside%n_middle
+      n = size(inside%point) + inside%n_middle
       allocate(spare(n), place(0))
       n = 0
       if (size(spare) == 0) return
-      do i = 1, size(inside%state)
-         if (inside%state(i) /= is_in) cycle
-         call judge(node_of(a, i), a%at(:, i), inside%near(i))
+      do i = 1, size(inside%point)
+         associate (point => inside%point(i), before => inside%before)
+            near = inside%near(point)
+            if (near == 0 .and. before(point) > 0) near = inside%near(before(point))
+            call judge(node_of(a, point), a%at(:, point), near)
+            inside%near(point) = near
+         end associate
       end do
       do i = 1, inside%n_middle
          associate (middle => inside%middle(i))
             associate (p => a%edge(1, middle%edge), q => a%edge(2, middle%edge))
+               near = middle%near
+               if (near == 0) near = inside%near(p)
                call judge(node_of(a, merge(p, q, middle%share < 0.5_wp)), &
-                  a%at(:, p) + middle%share*(a%at(:, q) - a%at(:, p)), middle%near)
+                  a%at(:, p) + middle%share*(a%at(:, q) - a%at(:, p)), near)
             end associate
          end associate
       end do
@@ -81,12 +87,14 @@ contains
    contains
 
       subroutine judge(node, at, near)
-         integer, intent(in) :: node, near
+         integer, intent(in) :: node
          real(wp), intent(in) :: at(3)
+         integer, intent(inout) :: near          !! in: about the nearest triangle; out: it is
          type(place_t) :: new
 
          new = place_t(node, at)
          call inside_nearest(inside, b, at, near, new%nearest)
+         near = new%nearest%triangle
          new%ratio = depth_of(b, inside%pad, at, new%nearest) &
             /b%length(b%split%facet(new%nearest%triangle))
          if (.not. new%ratio > least) return
