@@ -26,7 +26,7 @@ module emcon_inside_space
    type :: middle_t
       integer :: edge = 0
       real(wp) :: share = 0.0_wp                 !! of the edge before it
-      integer :: near = 0                        !! triangle that is crossed at an end of it; 0: none
+      integer :: near = 0                        !! triangle that an end of it is on; 0: none
    end type middle_t
 
    !> A look at outline a inside outline b.

@@ -10,7 +10,7 @@ module emcon_overlap_space
    use emcon_triangles_space, only : triangle_at, triangles_t
    implicit none
    private
-   public :: overlap_space_find, overlap_space_take
+   public :: overlap_space_find
 
    !> Less than this behind a facet, by its length, is on it.
    real(wp), parameter :: aligned = sqrt(epsilon(1.0_wp))
@@ -26,9 +26,10 @@ module emcon_overlap_space
 contains
 
    !> What of `a` is inside `b`.
-   subroutine overlap_space_find(a, b, reach, overlap)
+   subroutine overlap_space_find(a, b, reach, is_passing, overlap)
       type(triangles_t), intent(in) :: a, b      !! placed
       real(wp), intent(in) :: reach              !! length of the longest facet of both [L]
+      logical, intent(in) :: is_passing          !! it is on the way, not at the end of a step
       type(overlap_t), intent(inout) :: overlap  !! the deepest so far
       type(inside_t) :: inside
       type(place_t), allocatable :: place(:)
@@ -46,7 +47,11 @@ contains
                cycle
             end if
          end if
-         call overlap_space_take(b, place(k)%nearest, place(k)%node, .false., overlap)
+         if (is_passing .and. passes_by(b, place(k)%nearest)) then
+            place(k)%ratio = 0.0_wp
+            cycle
+         end if
+         call take(b, place(k), overlap)
          return
       end do
    end subroutine overlap_space_find
@@ -138,28 +143,31 @@ contains
       end if
    end function node_of
 
-   !> Keep what is behind a facet of `b` if it is the deepest so far; on the way, less than the
-   !> smaller of two bounds is the straight way past a corner.
-   pure subroutine overlap_space_take(b, nearest, node, is_passing, overlap)
-      type(triangles_t), intent(in) :: b         !! placed
-      type(nearest_t), intent(in) :: nearest     !! place of `b`
-      integer, intent(in) :: node                !! that is behind it, or the nearest
-      logical, intent(in) :: is_passing          !! it is on the way, not at the end of a step
-      type(overlap_t), intent(inout) :: overlap
-      real(wp) :: depth
+   !> Is what is behind a facet of `b`, on the way, the straight way past a corner?
+   pure logical function passes_by(b, nearest)
+      type(triangles_t), intent(in) :: b
+      type(nearest_t), intent(in) :: nearest
 
-      depth = sqrt(nearest%square)
       associate (f => b%split%facet(nearest%triangle))
-         if (.not. depth > overlap%depth*b%length(f)) return
-         if (is_passing .and. depth < min(passing*b%length(f), passing_thin*b%thickness(f))) return
-         overlap%depth = depth/b%length(f)
+         passes_by = sqrt(nearest%square) < min(passing*b%length(f), passing_thin*b%thickness(f))
+      end associate
+   end function passes_by
+
+   !> Keep the deepest place.
+   pure subroutine take(b, place, overlap)
+      type(triangles_t), intent(in) :: b
+      type(place_t), intent(in) :: place
+      type(overlap_t), intent(inout) :: overlap
+
+      associate (f => b%split%facet(place%nearest%triangle))
+         overlap%depth = place%ratio
          overlap%length = b%length(f)
-         overlap%node = node
+         overlap%node = place%node
          overlap%facet = 0
          associate (own => b%facets%facet(:, f))
             overlap%facet(:size(own)) = own
          end associate
       end associate
-   end subroutine overlap_space_take
+   end subroutine take
 
 end module emcon_overlap_space

@@ -69,8 +69,8 @@ contains
          call cpu_time(begin)
          call triangles_place(body(1), x, u, u, 1.0_wp)
          call triangles_place(body(2), y, v, v, 1.0_wp)
-         call overlap_space_find(body(1), body(2), reach, overlap)
-         call overlap_space_find(body(2), body(1), reach, overlap)
+         call overlap_space_find(body(1), body(2), reach, .false., overlap)
+         call overlap_space_find(body(2), body(1), reach, .false., overlap)
          call cpu_time(end)
          seconds = min(seconds, end - begin)
       end do

@@ -55,8 +55,8 @@ contains
       call take_up(a, first)
       call take_up(b, second)
       reach = max(maxval(a%length), maxval(b%length))
-      call overlap_space_find(a, b, reach, found(1))
-      call overlap_space_find(b, a, reach, found(2))
+      call overlap_space_find(a, b, reach, .false., found(1))
+      call overlap_space_find(b, a, reach, .false., found(2))
       depth = found%depth*found%length
       if (present(overlap)) overlap = found(1)
    end subroutine look
