@@ -4,7 +4,8 @@
 !> An edge that crosses a facet has one end on either side of it; from there the side is handed on
 !> along edges that cross nothing. What crosses nothing at all is inside if a ray from it goes out.
 !> The outline that is asked is moved by very little, so that edges which lie in facets of like
-!> meshes, and points on them, are on one side as neighbours are. Source: docs/theory.md, 4.11.
+!> meshes, and points on them, are on one side as neighbours are.
+!> Source: docs/theory.md, section 4.15.
 module emcon_inside_space
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t, box_tree_walk, leaf_size
    use emcon_kinds, only : wp

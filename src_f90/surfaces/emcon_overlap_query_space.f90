@@ -1,7 +1,7 @@
 !> Do pieces of a mesh in space overlap where they are? Their outlines are triangles: facets split
 !> about virtual centres, as contact sees them.
 !>
-!> Source: docs/theory.md, section 4.11.
+!> Source: docs/theory.md, section 4.15.
 module emcon_overlap_query_space
    use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp

@@ -1,7 +1,7 @@
 !> How deep one outline in space is inside another: the deepest of the points that are inside, and
 !> of the middles of inside parts of edges, by the nearest facet.
 !>
-!> Source: docs/theory.md, section 4.11.
+!> Source: docs/theory.md, section 4.15.
 module emcon_overlap_space
    use emcon_inside_space, only : inside_confirm, inside_find, inside_nearest, inside_t
    use emcon_kinds, only : wp

@@ -2,7 +2,7 @@
 !> instants points are behind facets, and edges beyond edges.
 !>
 !> A point and a triangle, or two edges, are in one plane where a volume vanishes: at roots of a
-!> cubic. Source: docs/theory.md, section 4.11.
+!> cubic. Source: docs/theory.md, section 4.15.
 module emcon_passages_space
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
    use emcon_kinds, only : wp

@@ -8,6 +8,7 @@ program bench_overlap
    use emcon_kinds, only : dp, wp
    use emcon_overlap_query, only : overlap_t
    use emcon_overlap_space, only : overlap_space_find
+   use emcon_search, only : candidates_t, search_candidates
    use emcon_triangles_space, only : triangles_init, triangles_place, triangles_t
    implicit none
    integer, parameter :: n_facets(5) = [1000, 3000, 10000, 30000, 100000], n_run = 5
@@ -16,21 +17,26 @@ program bench_overlap
    call bench("blocks on each other, unlike meshes", cells=0.8_wp, is_flat=.false., gap=0.0_wp)
    call bench("flat plates on each other, unlike meshes", cells=0.8_wp, is_flat=.true., gap=0.0_wp)
    call bench("flat plates in each other", cells=0.8_wp, is_flat=.true., gap=-0.01_wp)
+   call bench("search alone, flat plates on each other", cells=0.8_wp, is_flat=.true., &
+      gap=0.0_wp, only_search=.true.)
 
 contains
 
-   subroutine bench(what, cells, is_flat, gap)
+   subroutine bench(what, cells, is_flat, gap, only_search)
       character(len=*), intent(in) :: what
       real(wp), intent(in) :: cells              !! of the second body per length of the first one's
       logical, intent(in) :: is_flat             !! one cell high; else cubes
       real(wp), intent(in) :: gap                !! per cell
+      logical, intent(in), optional :: only_search   !! candidates within half a facet
       real(dp) :: seconds, first, per_facet, exponent
+      logical :: searches
       integer :: k, n, n_first
 
+      searches = present(only_search)
       write(output_unit, "(/, 2a)") "Overlap in space, ", what
       write(output_unit, "(3a16)") "facets", "ns/facet", "exponent"
       do k = 1, size(n_facets)
-         call measure(n_facets(k), cells, is_flat, gap, seconds, n)
+         call measure(n_facets(k), cells, is_flat, gap, searches, seconds, n)
          per_facet = 1.0e9_dp*seconds/real(n, dp)
          if (k == 1) first = seconds
          if (k == 1) n_first = n
@@ -41,15 +47,16 @@ contains
    end subroutine bench
 
    !> Seconds of one look at two blocks of together about `n` facets, and how many these are.
-   subroutine measure(n, cells, is_flat, gap, seconds, n_facet)
+   subroutine measure(n, cells, is_flat, gap, only_search, seconds, n_facet)
       integer, intent(in) :: n
       real(wp), intent(in) :: cells, gap
-      logical, intent(in) :: is_flat
+      logical, intent(in) :: is_flat, only_search
       real(dp), intent(out) :: seconds
       integer, intent(out) :: n_facet
       type(triangles_t) :: body(2)
       real(wp), allocatable :: x(:, :), u(:, :), v(:, :), y(:, :)
       type(overlap_t) :: overlap
+      type(candidates_t) :: list
       real(dp) :: begin, end
       real(wp) :: reach, high
       integer :: side, levels, run
@@ -67,6 +74,13 @@ contains
       do run = 1, n_run
          overlap = overlap_t()
          call cpu_time(begin)
+         if (only_search) then
+            call search_candidates(body(1)%low, body(1)%high, body(2)%low, body(2)%high, &
+               0.5_wp*reach, list)
+            call cpu_time(end)
+            seconds = min(seconds, end - begin)
+            cycle
+         end if
          call triangles_place(body(1), x, u, u, 1.0_wp)
          call triangles_place(body(2), y, v, v, 1.0_wp)
          call overlap_space_find(body(1), body(2), reach, .false., overlap)
