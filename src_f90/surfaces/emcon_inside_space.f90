@@ -4,7 +4,8 @@
 !> An edge that crosses a facet has one end on either side of it; from there the side is handed on
 !> along edges that cross nothing. What crosses nothing at all is inside if a ray from it goes out.
 !> The outline that is asked is moved by very little, so that edges which lie in facets of like
-!> meshes, and points on them, are on one side as neighbours are. Source: docs/theory.md, 4.11.
+!> meshes, and points on them, are on one side as neighbours are.
+!> Source: docs/theory.md, section 4.15.
 module emcon_inside_space
    use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t, box_tree_walk, leaf_size
    use emcon_kinds, only : wp
@@ -12,7 +13,7 @@ module emcon_inside_space
    use emcon_triangles_space, only : cross_product, triangle_at, triangles_t
    implicit none
    private
-   public :: inside_t, middle_t, inside_find, inside_confirm, inside_nearest, is_in
+   public :: inside_t, middle_t, inside_find, inside_confirm, inside_nearest
 
    !> Where a point is; `is_asked` while what hangs on it is gathered.
    integer, parameter :: is_unknown = 0, is_out = 1, is_in = 2, is_asked = 3
@@ -26,12 +27,14 @@ module emcon_inside_space
    type :: middle_t
       integer :: edge = 0
       real(wp) :: share = 0.0_wp                 !! of the edge before it
-      integer :: near = 0                        !! triangle that is crossed at an end of the part
+      integer :: near = 0                        !! triangle that an end of it is on; 0: none
    end type middle_t
 
    !> A look at outline a inside outline b.
    type :: inside_t
       integer, allocatable :: state(:)           !! (n_point of a) `is_in`, or not
+      integer, allocatable :: point(:)           !! that are inside, each after its `before`
+      integer, allocatable :: before(:)          !! (n_point of a) the point beside it; 0: none
       integer, allocatable :: near(:)            !! (n_point of a) a triangle of b near it; 0: none
       integer :: n_middle = 0
       type(middle_t), allocatable :: middle(:)
@@ -74,9 +77,11 @@ contains
       allocate(self%state(size(a%at, 2)), source=is_unknown)
       if (any(maxval(a%high, dim=2) < self%low) .or. any(minval(a%low, dim=2) > self%high)) then
          self%state = is_out
+         allocate(self%point(0))
          return
       end if
-      allocate(self%near(size(a%at, 2)), self%queue(size(a%at, 2)), source=0)
+      allocate(self%near(size(a%at, 2)), self%before(size(a%at, 2)), source=0)
+      allocate(self%queue(size(a%at, 2)))
       allocate(self%is_cut(size(a%edge, 2)), source=.false.)
       call find_facets(self, a, b)
       if (size(self%facet) > 0) call cut_edges(self, a, b)
@@ -240,20 +245,18 @@ contains
                .or. .not. b%is_closed) self%state(i) = is_out
          end if
       end do
+      if (b%is_closed) call hand_on(self, a, is_in, n, meets_out)
+      self%point = self%queue(:n)
       if (.not. b%is_closed) return
-      call hand_on(self, a, is_in, n, meets_out)
       do i = 1, size(self%state)
          if (self%state(i) /= is_unknown) cycle
          self%state(i) = is_asked
          self%queue(1) = i
          n = 1
          call hand_on(self, a, is_asked, n, meets_out)
-         if (meets_out) then
-            self%state(self%queue(:n)) = is_out
-         else
-            self%state(self%queue(:n)) = merge(is_in, is_out, &
-               inside_confirm(self, b, a%at(:, i)))
-         end if
+         if (.not. meets_out) meets_out = .not. inside_confirm(self, b, a%at(:, i))
+         self%state(self%queue(:n)) = merge(is_out, is_in, meets_out)
+         if (.not. meets_out) self%point = [self%point, self%queue(:n)]
       end do
       call add_whole_edges(self, a)
    end subroutine tell_points
@@ -264,14 +267,15 @@ contains
       type(triangles_t), intent(in) :: a
       integer :: i, k
 
-      do i = 1, size(self%state)
-         if (self%state(i) /= is_in) cycle
-         do k = a%around_start(i) + 1, a%around_start(i + 1)
-            associate (e => a%around(k))
-               if (a%edge(1, e) /= i .or. self%is_cut(e)) cycle
-               call add(self, middle_t(e, 0.5_wp, self%near(i)))
-            end associate
-         end do
+      do i = 1, size(self%point)
+         associate (point => self%point(i))
+            do k = a%around_start(point) + 1, a%around_start(point + 1)
+               associate (e => a%around(k))
+                  if (a%edge(1, e) /= point .or. self%is_cut(e)) cycle
+                  call add(self, middle_t(e, 0.5_wp))
+               end associate
+            end do
+         end associate
       end do
    end subroutine add_whole_edges
 
@@ -297,7 +301,7 @@ contains
                meets_out = meets_out .or. self%state(j) == is_out
                if (self%state(j) /= is_unknown) cycle
                self%state(j) = state
-               self%near(j) = self%near(point)
+               self%before(j) = point
                n = n + 1
                self%queue(n) = j
             end do

@@ -145,6 +145,7 @@ program main
    use test_overlap_boxes, only : collect_overlap_boxes
    use test_overlap_plane, only : collect_overlap_plane
    use test_overlap_space, only : collect_overlap_space
+   use test_passages_space, only : collect_passages_space
    use test_deck_parameters, only : collect_deck_parameters
    use test_deck_ties, only : collect_deck_ties
    use test_point_function, only : collect_point_function
@@ -322,6 +323,7 @@ program main
    call run("overlap_boxes", collect_overlap_boxes)
    call run("overlap_plane", collect_overlap_plane)
    call run("overlap_space", collect_overlap_space)
+   call run("passages_space", collect_passages_space)
    call run("bodies", collect_bodies)
    call run("arcs", collect_arcs)
    call run("circles", collect_circles)

@@ -2,7 +2,7 @@
 module test_overlap_space
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_errors, only : error_t
-   use emcon_inside_space, only : inside_find, inside_t, is_in
+   use emcon_inside_space, only : inside_find, inside_t
    use emcon_kinds, only : wp
    use emcon_overlap_query, only : overlap_t
    use emcon_overlap_space, only : overlap_space_find
@@ -55,8 +55,8 @@ contains
       call take_up(a, first)
       call take_up(b, second)
       reach = max(maxval(a%length), maxval(b%length))
-      call overlap_space_find(a, b, reach, found(1))
-      call overlap_space_find(b, a, reach, found(2))
+      call overlap_space_find(a, b, reach, .false., found(1))
+      call overlap_space_find(b, a, reach, .false., found(2))
       depth = found%depth*found%length
       if (present(overlap)) overlap = found(1)
    end subroutine look
@@ -86,9 +86,9 @@ contains
          call inside_find(inside, a, b, maxval(b%length))
          by_sphere = count([(norm2(one%x(:, i) - [0.0_wp, 0.0_wp, 2.0_wp - deep]) < 1.0_wp, i = 1, &
             size(one%x, 2))])
-         call check_true(error, count(inside%state == is_in) <= by_sphere &
-            .and. count(inside%state == is_in) >= by_sphere - missed(n), "nodes inside " &
-            // to_text(count(inside%state == is_in)) // " of " // to_text(by_sphere))
+         call check_true(error, size(inside%point) <= by_sphere &
+            .and. size(inside%point) >= by_sphere - missed(n), "nodes inside " &
+            // to_text(size(inside%point)) // " of " // to_text(by_sphere))
       end do
    end subroutine test_spheres
 
