@@ -114,34 +114,46 @@ contains
          end if
          first = last + 1
       end do
-      if (n_branch > 0) call add_error(reader%log, surface%origin, title // " branches: more than " &
-         // "two of its faces meet in " // place(branch, n_branch) // "; put them into surfaces " &
-         // "of their own")
-      if (n_back > 0) call add_error(reader%log, surface%origin, title // " has no common " // &
-         "outside: two of its faces meet back to back in " // place(back, n_back) // "; put " // &
-         "them into surfaces of their own")
+      if (n_branch > 0) call tell(" branches: more than two of its faces meet in ", branch, &
+         n_branch)
+      if (n_back > 0) call tell(" has no common outside: two of its faces meet back to back in ", &
+         back, n_back)
 
    contains
 
-      !> Where side `i` is, and what meets in it.
-      function place(i, n) result(text)
+      !> What is wrong in side `i` and others, `n` in all.
+      subroutine tell(what, i, n)
+         character(len=*), intent(in) :: what
          integer, intent(in) :: i, n
-         character(len=:), allocatable :: text
-         type(string_t), allocatable :: face(:)
-         integer :: k
+         character(len=:), allocatable :: more
 
-         associate (is_here => side%low == side(i)%low .and. side%high == side(i)%high)
-            allocate(face(count(is_here)))
-            do k = 1, size(face)
-               face(k)%text = face_text(scene, surface, side(i + k - 1)%facet)
-            end do
-         end associate
-         text = "the side of nodes " // to_text(scene%node%label(side(i)%low)) // " and " // &
-            to_text(scene%node%label(side(i)%high)) // " (" // joined(face, ", ", most_named) // ")"
-         if (n > 1) text = text // " and in " // to_text(n - 1) // " more"
-      end function place
+         more = ""
+         if (n > 1) more = " and in " // to_text(n - 1) // " more"
+         call add_error(reader%log, surface%origin, title // what // place_text(scene, surface, &
+            side, i) // more // "; put them into surfaces of their own")
+      end subroutine tell
 
    end subroutine check_sides
+
+   !> Where side `i` is, and what meets in it.
+   function place_text(scene, surface, side, i) result(text)
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      type(side_t), intent(in) :: side(:)
+      integer, intent(in) :: i                   !! the first one of its nodes
+      character(len=:), allocatable :: text
+      type(string_t), allocatable :: face(:)
+      integer :: k
+
+      associate (here => side(i))
+         allocate(face(count(side%low == here%low .and. side%high == here%high)))
+         do k = 1, size(face)
+            face(k)%text = face_text(scene, surface, side(i + k - 1)%facet)
+         end do
+         text = "the side of nodes " // to_text(scene%node%label(here%low)) // " and " // &
+            to_text(scene%node%label(here%high)) // " (" // joined(face, ", ", most_named) // ")"
+      end associate
+   end function place_text
 
    !> All sides of faces, those of the same nodes next to each other.
    pure subroutine list_sides(facet, side)

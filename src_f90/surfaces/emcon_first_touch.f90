@@ -12,8 +12,8 @@ module emcon_first_touch
 
 contains
 
-   !> The first time at which a node of a contact pair passes through the other surface from outside,
-   !> or the layer in front of it; huge if that never happens.
+   !> The first time at which a node of a contact pair passes through the other surface from
+   !> outside, or the layer in front of it; huge if that never happens.
    real(wp) function touch_time(scene, x, direction)
       type(scene_t), intent(in) :: scene
       real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) where nodes are [L]

@@ -22,7 +22,7 @@ module emcon_first_touch_space
    real(wp), parameter :: growth = 4.0_wp
    !> After ways as long as so many extents of the two surfaces they have passed by each other.
    real(wp), parameter :: longest_way = 64.0_wp
-   integer, parameter :: n_dim = 3, n_corner = 3
+   integer, parameter :: n_dim = 3, n_vertex = 3
 
    !> One of two surfaces: the points of its split facets.
    type :: side_t
@@ -92,8 +92,8 @@ contains
       allocate(found(0))
       do
          do k = 1, size(low, n_dim - 1)
-            associate (corner => other%split%corner(:, k))
-               call find_box(other%at(:, corner), other%way(:, corner), span, low(:, k), high(:, k))
+            associate (vertex => other%split%corner(:, k))
+               call find_box(other%at(:, vertex), other%way(:, vertex), span, low(:, k), high(:, k))
             end associate
          end do
          call box_tree_init(tree, low, high)
@@ -115,11 +115,11 @@ contains
          n = 0
          call box_tree_find(tree, bottom, top, offset, found, n)
          do k = 1, n
-            associate (corner => other%split%corner(:, found(k)))
+            associate (vertex => other%split%corner(:, found(k)))
                if (any(other%facets%facet(:, other%split%facet(found(k))) == one%facets%node(i))) &
                   cycle
-               call pass(one%at(:, i), one%way(:, i), lifted(other%at(:, corner), offset), &
-                  other%way(:, corner), min(first, span), first)
+               call pass(one%at(:, i), one%way(:, i), lifted(other%at(:, vertex), offset), &
+                  other%way(:, vertex), min(first, span), first)
             end associate
          end do
       end subroutine look_from
@@ -138,14 +138,14 @@ contains
    !> A triangle moved outwards.
    pure function lifted(at, offset)
       real(wp), intent(in) :: at(:, :), offset
-      real(wp) :: lifted(n_dim, n_corner), normal(n_dim)
+      real(wp) :: lifted(n_dim, n_vertex), normal(n_dim)
 
-      normal = cross_product(at(:, n_corner - 1) - at(:, 1), at(:, n_corner) - at(:, 1))
-      lifted = at + spread(offset*normal/sqrt(dot_product(normal, normal)), n_dim - 1, n_corner)
+      normal = cross_product(at(:, n_vertex - 1) - at(:, 1), at(:, n_vertex) - at(:, 1))
+      lifted = at + spread(offset*normal/sqrt(dot_product(normal, normal)), n_dim - 1, n_vertex)
    end function lifted
 
-   !> Make `first` the time up to `last` at which a point passes through a triangle from outside: the
-   !> volume v(0) + v(1) t + v(2) t^2 + v(3) t^3 falls through zero there, within the triangle.
+   !> Make `first` the time up to `last` at which a point passes through a triangle from outside:
+   !> the volume v(0) + v(1) t + v(2) t^2 + v(3) t^3 falls through zero there, within the triangle.
    pure subroutine pass(point, point_way, at, way, last, first)
       real(wp), intent(in) :: point(:), point_way(:), at(:, :), way(:, :), last
       real(wp), intent(inout) :: first
@@ -155,10 +155,10 @@ contains
 
       d = point - at(:, 1)
       dd = point_way - way(:, 1)
-      a = at(:, n_corner - 1) - at(:, 1)
-      da = way(:, n_corner - 1) - way(:, 1)
-      b = at(:, n_corner) - at(:, 1)
-      db = way(:, n_corner) - way(:, 1)
+      a = at(:, n_vertex - 1) - at(:, 1)
+      da = way(:, n_vertex - 1) - way(:, 1)
+      b = at(:, n_vertex) - at(:, 1)
+      db = way(:, n_vertex) - way(:, 1)
       n0 = cross_product(a, b)
       n1 = cross_product(da, b) + cross_product(a, db)
       n2 = cross_product(da, db)
