@@ -5,11 +5,13 @@ module emcon_deck_contact_space
    use emcon_deck_reader, only : reader_t
    use emcon_deck_rigid, only : mark_rigid
    use emcon_diagnostics, only : add_error
+   use emcon_interactions, only : formulation_user
    use emcon_kinds, only : dp, wp
    use emcon_mesh, only : surface_t
    use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
    use emcon_sort, only : sort_order
+   use emcon_steps, only : initiation_massless, step_initiation
    use emcon_surface_facets, only : surface_facets
    use emcon_surface_nodes, only : surface_nodes
    use emcon_text, only : joined, string_t, to_text
@@ -34,7 +36,7 @@ module emcon_deck_contact_space
 
 contains
 
-   !> Every surface that is in contact.
+   !> Every surface that is in contact, but for that of a program.
    subroutine check_contact_space(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
@@ -43,10 +45,12 @@ contains
       integer, allocatable :: facet(:, :)
       integer :: i, n_errors
 
-      if (size(scene%pair) == 0 .or. reader%doubt%shapes) return
+      if (all(scene%pair%formulation == formulation_user) .or. reader%doubt%shapes) return
+      call check_mass(reader, scene)
       call adjacency_init(adjacency, scene)
       do i = 1, size(scene%surface)
-         if (all(scene%pair%slave /= i .and. scene%pair%master /= i)) cycle
+         if (all((scene%pair%slave /= i .and. scene%pair%master /= i) .or. &
+            scene%pair%formulation == formulation_user)) cycle
          associate (surface => scene%surface(i))
             title = "contact surface " // surface%name
             call check_rigid(reader, scene, surface, title)
@@ -61,6 +65,21 @@ contains
          end associate
       end do
    end subroutine check_contact_space
+
+   !> What contact holds in space by nodes has mass.
+   subroutine check_mass(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      integer :: k
+
+      do k = 1, size(scene%step)
+         if (step_initiation(scene%step(k)) /= initiation_massless) cycle
+         call add_error(reader%log, scene%step(k)%origin, "step " // to_text(k) // " has contact " &
+            // "without mass (MASSLESS), which in three dimensions is not in this version; use " &
+            // "PERSISTENT")
+         return
+      end do
+   end subroutine check_mass
 
    !> Rigid bodies are in no contact in space.
    subroutine check_rigid(reader, scene, surface, title)
