@@ -4,12 +4,11 @@
 !> on a side or in a vertex; there the sum of the unit normals around, in a vertex weighted by the
 !> angles of the triangles, tells the side: also where the nearest triangle alone would not.
 module emcon_signed_distance_space
-   use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
+   use emcon_box_tree, only : box_tree_guess, box_tree_init, box_tree_next, box_tree_t, leaf_size
    use emcon_facet_split, only : facet_split_init, facet_split_place, facet_split_t
    use emcon_facets, only : facets_t
    use emcon_kinds, only : dp, wp
    use emcon_rotation, only : cross_product
-   use emcon_search, only : box_distance
    use emcon_sort, only : sort_order
    implicit none
    private
@@ -36,7 +35,6 @@ module emcon_signed_distance_space
       real(wp), allocatable, private :: side_normal(:, :)    !! (3, sides) sums
       integer, allocatable, private :: side(:, :)            !! (3, n_simplex) number of each side
       logical, allocatable, private :: is_free_side(:), is_free_point(:)
-      real(wp), private :: low(n_dim), high(n_dim), reach    !! of all; of a triangle [L]
    end type signed_distance_t
 
 contains
@@ -62,9 +60,6 @@ contains
                   self%at(:, triangle(n_side, k)) - a))
             end associate
          end do
-         self%low = minval(low, 2)
-         self%high = maxval(high, 2)
-         self%reach = sum(high - low)/real(max(1, n), wp)
          call box_tree_init(self%tree, low, high)
          call number_sides(triangle, self%side)
       end associate
@@ -151,23 +146,19 @@ contains
       type(signed_distance_t), intent(in) :: self
       real(wp), intent(in) :: point(:)           !! (3) [L]
       type(signed_foot_t), intent(out) :: foot
-      integer, allocatable :: found(:)
-      real(wp) :: reach
-      integer :: i, n
+      integer, allocatable :: guess(:)
+      integer :: found(leaf_size), i, k, n
 
-      if (size(self%split%facet) == 0) return
-      allocate(found(0))
-      reach = box_distance(point, point, self%low, self%high) + self%reach
-      do
-         n = 0
-         call box_tree_find(self%tree, point, point, reach, found, n)
+      call box_tree_guess(self%tree, point, guess)
+      do i = 1, size(guess)
+         call take_nearer(self, guess(i), point, foot)
+      end do
+      k = 1
+      do while (k > 0 .and. size(guess) > 0)
+         call box_tree_next(self%tree, point, abs(foot%distance), k, found, n)
          do i = 1, n
             call take_nearer(self, found(i), point, foot)
          end do
-         if (abs(foot%distance) <= reach .or. n == size(self%split%facet)) exit
-         if (.not. reach < huge(reach)) return   ! a place that is not finite is near nothing
-         reach = max(reach + reach, reach + self%reach)
-         if (foot%simplex > 0) reach = abs(foot%distance)
       end do
    end subroutine signed_distance_find
 
