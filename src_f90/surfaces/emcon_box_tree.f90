@@ -174,7 +174,7 @@ contains
    pure subroutine box_tree_guess(self, point, found)
       type(box_tree_t), intent(in) :: self
       real(wp), intent(in), contiguous :: point(:)           !! (n_dim) [L]
-      integer, allocatable, intent(out) :: found(:)
+      integer, allocatable, intent(out) :: found(:)          !! none where there are no boxes
       integer :: k
 
       k = 1
@@ -200,7 +200,7 @@ contains
       real(wp), intent(in) :: reach              !! >= 0 [L]
       integer, intent(inout) :: k                !! node where the walk goes on
       integer, intent(out) :: found(:)           !! (leaf_size)
-      integer, intent(out) :: n
+      integer, intent(out) :: n                  !! number in `found`; 0: the walk has ended
       real(wp) :: bound
       integer :: i, leaf
 
