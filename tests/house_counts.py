@@ -140,9 +140,10 @@ def planar_literals(path):
 SURFACED = ("scene deck space solid surfaces touch contact terms system prepare state solve "
             "active march results stepper record border app").split()  # fmt: skip
 WORD = re.compile(r"\b(?:[a-z]\w*_)?(?:chain|corner|edge|arc|outline)s?(?:_\w+)?\b", re.I)
-# Corners of elements and facets are there in space, too; those of an amplitude are instants.
+# Corners of elements and of facets are there in space, too; those of an amplitude are instants.
 ELSEWHERE = re.compile(
-    r"\b(?:(?:self|facets)%corner|n_corner|amplitude_corners|\w*grid_corner_t|march_next_corner|step%time%corner)\b", re.I
+    r"\b(?:n_corner|amplitude_corners|\w*grid_corner_t|march_next_corner|step%time%corner"
+    r"|(?:self|facets|split)%corner|allocatable :: corner)\b", re.I
 )
 
 

@@ -7,7 +7,7 @@
 !> meshes, and points on them, are on one side as neighbours are.
 !> Source: docs/theory.md, section 4.15.
 module emcon_inside_space
-   use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t, box_tree_walk, leaf_size
+   use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t, box_tree_next, leaf_size
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : crossing_find, nearest_t, nearest_update
    use emcon_triangles_space, only : cross_product, triangle_at, triangles_t
@@ -366,7 +366,7 @@ contains
 
       k = 1
       do while (k > 0)
-         call box_tree_walk(tree, point, point, sqrt(nearest%square), k, found, n)
+         call box_tree_next(tree, point, sqrt(nearest%square), k, found, n)
          do i = 1, n
             f = found(i)
             if (size(facet) > 0) f = facet(f)

@@ -64,6 +64,7 @@ program main
    use test_facets, only : collect_facets
    use test_facet_groups, only : collect_facet_groups
    use test_first_touch, only : collect_first_touch
+   use test_first_touch_space, only : collect_first_touch_space
    use test_friction, only : collect_friction
    use test_friction_ways, only : collect_friction_ways
    use test_gauss, only : collect_gauss
@@ -244,6 +245,7 @@ program main
    call run("initial_contact", collect_initial_contact)
    call run("lapack", collect_lapack)
    call run("first_touch", collect_first_touch)
+   call run("first_touch_space", collect_first_touch_space)
    call run("friction", collect_friction)
    call run("friction_ways", collect_friction_ways)
    call run("dashpot_law", collect_dashpot_law)
