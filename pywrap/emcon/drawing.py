@@ -37,6 +37,8 @@ EDGE, EDGE_ON_DARK, DARK = (0.1, 0.1, 0.1, 0.55), (1.0, 1.0, 1.0, 0.40), 0.35
 #: Lines of a mesh with more polygons than this are not drawn: they would cover it.
 MOST_LINES = 20000
 PALE = "#e9e9e9"
+#: Faces in space that have nothing of what is shown: what lies behind is seen through them.
+GLASS = (0.80, 0.82, 0.85, 0.22)
 
 
 @dataclass
@@ -155,7 +157,7 @@ class DrawnBodies:
             self.elements.set_facecolor(PALE if scene.sides is not None else "#dddddd")
         self.profiles = LineCollection([], linewidths=PROFILE_WIDTH, colors=GREY)
         for part in (self.elements, self.sides):
-            part.set(norm=scale.norm, cmap=scale.colours)
+            part.set(norm=scale.norm, cmap=scale.colours.with_extremes(bad=GLASS))
         for part in (self.profiles, self.elements, self.sides):
             axes.add_collection(part, autolim=False)
         self.show(frame)
@@ -170,9 +172,9 @@ class DrawnBodies:
             self.sides.set_segments(list(self._scene.halves(frame)[has_value]))
             self.sides.set_array(values[has_value])
         elif values is not None:
-            self.elements.set_array(values)
+            self.elements.set_array(np.ma.masked_invalid(values))
             if self._has_lines:
-                colours = self.elements.cmap(self.elements.norm(values))
+                colours = self.elements.cmap(self.elements.norm(np.ma.masked_invalid(values)))
                 light = colours[:, :3] @ (0.299, 0.587, 0.114)
                 self.elements.set_edgecolor(np.where((light < DARK)[:, None], EDGE_ON_DARK, EDGE))
 

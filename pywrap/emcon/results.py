@@ -289,11 +289,12 @@ class Pairs:
     slave: tuple[str, ...]      #: names of the surfaces
     master: tuple[str, ...]
     time: Array                 #: (n_time) [T]
-    force: Array                #: (n_time, n_pair, 2) [M L/T^2]
-    moment: Array               #: (n_time, n_pair) [M L^2/T^2]
-    master_force: Array         #: (n_time, n_pair, 2)
-    master_moment: Array        #: (n_time, n_pair)
-    length: Array               #: (n_time, n_pair) of the slave surface in contact [L]
+    force: Array                #: (n_time, n_pair, n_dim) [M L/T^2]
+    moment: Array               #: (n_time, n_pair), in space (n_time, n_pair, 3) [M L^2/T^2]
+    master_force: Array         #: as `force`
+    master_moment: Array        #: as `moment`
+    length: Array               #: (n_time, n_pair) of the slave surface in contact [L]; in space
+                                #: its area [L^2]
     active: NDArray[np.int64]   #: (n_time, n_pair) constraints that act
 
     def __repr__(self) -> str:
@@ -312,18 +313,21 @@ def read_pairs(paths: ResultPaths) -> Pairs | None:
         group = file.get("sets/PAIRS")
         if not isinstance(group, h5py.Group) or "CF" not in group:
             return None
+        extent = "CONTACT_AREA" if "CONTACT_AREA" in group else "CONTACT_LENGTH"
         time, on_slave, on_master, length, active = (
-            read(group, name) for name in ("CF_time", "CF", "CF_MASTER", "CONTACT_LENGTH", "CNUM"))
+            read(group, name) for name in ("CF_time", "CF", "CF_MASTER", extent, "CNUM"))
         slave, master = (tuple(str(name) for name in np.char.decode(group[side][()], "utf-8"))
                          for side in ("SLAVE", "MASTER"))
     rows = min(map(len, (time, on_slave, on_master, length, active)))
     n_pair = len(slave)
-    if (on_slave.shape[1:] != (n_pair, 3) or on_master.shape[1:] != (n_pair, 3)
+    n_dim = 2 if extent == "CONTACT_LENGTH" else 3
+    if (any(side.shape[1:] != (n_pair, 3*n_dim - 3) for side in (on_slave, on_master))
             or length.shape[1:] != (n_pair,) or active.shape[1:] != (n_pair,)):
         raise ResultError(f"{paths.history}: the data sets of /sets/PAIRS do not fit each other")
-    return Pairs(slave, master, time[:rows], on_slave[:rows, :, :2], on_slave[:rows, :, 2],
-                 on_master[:rows, :, :2], on_master[:rows, :, 2], length[:rows],
-                 active[:rows].astype(np.int64))
+    turns: int | slice = 2 if n_dim == 2 else slice(3, None)
+    return Pairs(slave, master, time[:rows], on_slave[:rows, :, :n_dim],
+                 on_slave[:rows, :, turns], on_master[:rows, :, :n_dim],
+                 on_master[:rows, :, turns], length[:rows], active[:rows].astype(np.int64))
 
 
 def read_wall_seconds(paths: ResultPaths) -> float | None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -42,9 +43,12 @@ FIELD_UNITS = {"von_mises": "stress", "cauchy_stress": "stress", "contact_pressu
 #: Fields that are 0 off some surfaces: of these bodies show the sides alone. A gap of 0 is one.
 OF_SIDES = ("contact_force", "contact_gap", "contact_pressure", "contact_shear", "contact_slip",
             "contact_status", "contact_active", "slip_path", "reaction_force")
-#: Fields that number states, and what the numbers mean.
+#: Fields that number states, and what the numbers mean; of faces in space.
 STATES = {"contact_status": ("none", "sticks", "slides"),
           "contact_active": ("not active", "active")}
+FACE_STATES = STATES | {"contact_status": ("open", "closed", "slides")}
+#: What of a field of surfaces is less than this part of the largest value is not shown in space.
+LEAST_SHOWN = 0.01
 
 #: (x_min, x_max, y_min, y_max) [L]
 View = tuple[float, float, float, float]
@@ -60,7 +64,8 @@ class Scene:
 
     times: list[float]
     position: list[Array]
-    values: list[Array] | None      #: each (n_polygon) or (2, n_side), units of the field
+    #: Each (n_polygon) or (2, n_side), units of the field; NaN where a face of space has none.
+    values: list[Array] | None
     label: str                      #: what they are
     cells: list[NDArray[np.int64]]  #: nodes of the polygons
     is_support: NDArray[np.bool_]   #: per node
@@ -207,6 +212,38 @@ def _side_values(file: FieldFile, name: str, frame: int, sides: NDArray[np.int64
     return np.where(is_nothing, np.nan, ends)
 
 
+def surfaces_path(path: Path) -> Path:
+    """The file of the faces of contact that stands beside a field file."""
+    return path.with_name(path.name.removesuffix(".vtkhdf") + ".surfaces.vtkhdf")
+
+
+def _face_values(file: FieldFile, name: str, frames: Sequence[int],
+                 faces: Sequence[NDArray[np.int64]]) -> list[Array]:
+    """A field of surfaces per face (n_face), NaN where it is nothing: as the file of the faces has
+    it, or else the mean over the nodes."""
+    path = surfaces_path(file.path)
+    found: list[Array] = []
+    if path.is_file():
+        with FieldFile(path) as surfaces:
+            if name in surfaces.cell_fields and max(frames) < len(surfaces.times):
+                node = surfaces.point("node", 0).astype(np.int64)
+                number = {tuple(sorted(node[cell])): k for k, cell in enumerate(surfaces.cells)}
+                place = np.array([number.get(tuple(sorted(face)), -1) for face in faces])
+                for frame in frames:
+                    values = surfaces.cell(name, frame)
+                    if values.ndim > 1:
+                        values = np.sqrt((values**2).sum(axis=1))
+                    found.append(np.where(place < 0, np.nan, values[place]))
+    if not found:
+        nodal = [_values(file, name, frame) for frame in frames]
+        found = [_means(faces, values) for values in nodal if values is not None]
+    if name == "contact_gap":
+        return found
+    every = np.concatenate(found) if found else np.zeros(0)
+    least = LEAST_SHOWN*np.abs(every[np.isfinite(every)]).max(initial=0.0)
+    return [np.where(np.abs(values) > least, values, np.nan) for values in found]
+
+
 def outer_sides(cells: Sequence[NDArray[np.int64]]) -> NDArray[np.int64]:
     """Pairs of nodes (n_side, 2) along the outlines of bodies: those of one element alone."""
     first = np.concatenate(cells)
@@ -233,7 +270,12 @@ def read_scene(file: FieldFile, frames: Sequence[int], name: str = "von_mises") 
         place = [file.points]
     in_space = bool(np.ptp(file.points[:, 2]) > 0.0)
     sides = outer_sides(file.cells) if name in OF_SIDES and not in_space else None
-    if sides is None:
+    if in_space and not np.isin(file.types, SOLIDS).all():
+        raise ResultError(f"{file.path} is three-dimensional, and not of tetrahedra and "
+                          "hexahedra alone; open it in ParaView")
+    if in_space and name in OF_SIDES:
+        values = _face_values(file, name, frames, outer_faces(file.cells)[0])
+    elif sides is None:
         values = [v for v in (_colour_values(file, name, k) for k in frames) if v is not None]
     else:
         values = [_side_values(file, name, k, sides) for k in frames]
@@ -241,14 +283,12 @@ def read_scene(file: FieldFile, frames: Sequence[int], name: str = "von_mises") 
         notes.append("no stress in the result (asked for by *EL FILE, S): bodies shown in grey")
     scene = Scene(times=[float(file.times[k]) for k in frames], position=[p[:, :2] for p in place],
                   values=values or None, label=_label(name), cells=file.cells,
-                  is_support=_supports(file, place), sides=sides, profiles=file.profiles, states=STATES.get(name, ()),
+                  is_support=_supports(file, place), sides=sides, profiles=file.profiles,
+                  states=(FACE_STATES if in_space else STATES).get(name, ()),
                   floor=ROUND_OFF*float(np.ptp(file.points)) if FIELD_UNITS.get(name) == "length"
                   else 0.0, notes=notes)
     if in_space:
-        if not np.isin(file.types, SOLIDS).all():
-            raise ResultError(f"{file.path} is three-dimensional, and not of tetrahedra and "
-                              "hexahedra alone; open it in ParaView")
-        _see(scene, place)
+        _see(scene, place, of_faces=name in OF_SIDES)
     return scene
 
 
@@ -268,10 +308,11 @@ def _supports(file: FieldFile, place: Sequence[Array]) -> NDArray[np.bool_]:
     return (body < 0) | support[body]
 
 
-def _see(scene: Scene, place: Sequence[Array]) -> None:
-    """Put a scene of three dimensions on paper; `place` has the nodes (n_node, 3) per frame [L]."""
+def _see(scene: Scene, place: Sequence[Array], of_faces: bool) -> None:
+    """Put a scene of three dimensions on paper; `place` has the nodes (n_node, 3) per frame [L],
+    values are those of faces, or of elements."""
     scene.cells, cell_of = outer_faces(scene.cells)
-    if scene.values is not None:
+    if scene.values is not None and not of_faces:
         scene.values = [values[cell_of] for values in scene.values]
     seen = [project(points) for points in place]
     scene.position = [on_paper for on_paper, _ in seen]

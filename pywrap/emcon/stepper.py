@@ -58,8 +58,9 @@ class Increment:
 class PairTotal:
     """What a contact pair transmits: sums over one side, and what is in contact.
 
-    `slave` and `master` are fx, fy and the moment about the origin on that side, opposite to each
-    other to round-off. `friction_loss` is the energy that friction has taken since the start; of a
+    `slave` and `master` are the force and the moment about the origin on that side, in the plane
+    fx, fy, m, in space fx, fy, fz, mx, my, mz: opposite to each other to round-off. `length` is the
+    length of the slave surface in contact, in space its area. `friction_loss` is the energy that friction has taken since the start; of a
     pair that holds both sides all of it, and 0 at its reverse.
     """
 
@@ -447,7 +448,8 @@ class Stepper(Queries, Conditions, Meshes):
         """
         total, active = self._handle.call(_core.emcon_get_pairs, self.n_pair)
         loss = self._handle.call(_core.emcon_get_pair_friction, self.n_pair)
-        return [PairTotal(row[:3].copy(), row[3:6].copy(), float(row[6]), int(n), float(taken))
+        m = total.shape[1]//2
+        return [PairTotal(row[:m].copy(), row[m:2*m].copy(), float(row[-1]), int(n), float(taken))
                 for row, n, taken in zip(total, active, loss)]
 
     def friction(self) -> Friction:

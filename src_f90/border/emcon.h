@@ -72,6 +72,7 @@ typedef struct emcon_sizes {
    int n_dim;        /* 2: in the plane; 3: in space */
    int n_slip;       /* components of slips along surfaces: n_dim - 1 */
    int n_momentum;   /* momenta of a body: n_dim linear ones, then 1 angular one, in space 3 */
+   int n_pair_total; /* figures of a contact pair: 2*n_momentum + 1 */
 } emcon_sizes;
 
 typedef struct emcon_increment {
@@ -362,8 +363,8 @@ int emcon_resume(emcon_model *model, const char *path);
 
 /* ---- what a model holds ---------------------------------------------------------------------- */
 
-/* Before emcon_build only n_node, n_element, n_step, n_dim and n_momentum are known; the others
- * are 0. */
+/* Before emcon_build only n_node, n_element, n_step, n_dim, n_slip, n_momentum and n_pair_total are
+ * known; the others are 0. */
 int emcon_get_sizes(emcon_model *model, emcon_sizes *sizes);
 
 int emcon_get_time(emcon_model *model, double *time);
@@ -444,9 +445,10 @@ int emcon_get_friction(emcon_model *model, int n_contact, double *shear /* n_con
  * sides all of it, and 0 at its reverse. Their sum is `friction_loss` of the ledger. */
 int emcon_get_pair_friction(emcon_model *model, int n_pair, double *loss /* n_pair */);
 
-/* Of each pair: 7 numbers, force and moment about the origin on the slave side (fx, fy, m), the
- * same on the master side, length in contact; and the number of active contacts. */
-int emcon_get_pairs(emcon_model *model, int n_pair, double *total /* n_pair x 7 */,
+/* Of each pair: force and moment about the origin on the slave side, in the plane fx, fy, m, in
+ * space fx, fy, fz, mx, my, mz; the same on the master side; length in contact, in space area; and
+ * the number of active contacts. */
+int emcon_get_pairs(emcon_model *model, int n_pair, double *total /* n_pair x n_pair_total */,
                     int *n_active /* n_pair */);
 
 /* The field that the field file has of a variable of decks, as U, V, RF, S, E, ENER, CDIS, CSTR,

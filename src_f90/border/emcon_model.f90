@@ -142,6 +142,7 @@ contains
          sizes%n_dim = scene%n_dim
          sizes%n_slip = scene%n_dim - 1
          sizes%n_momentum = scene%n_dim + n_turn(scene%n_dim)
+         sizes%n_pair_total = 2*sizes%n_momentum + 1
       end associate
       sizes%n_selected = model%query%march%active%set%n
       if (.not. allocated(model%stepper%march%scheme)) return

@@ -5,6 +5,7 @@ module emcon_model_state
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : dp, wp
    use emcon_model, only : model_t
+   use emcon_pair_record, only : pair_components
    use emcon_quantities, only : contact_quantity
    use emcon_report_row, only : report_rows_t, rows_json
    use emcon_scene_report, only : scene_report
@@ -226,14 +227,15 @@ contains
 
    pure subroutine model_pairs(model, total, n_active)
       type(model_t), intent(in) :: model
-      real(wp), allocatable, intent(out) :: total(:, :)      !! (7, n_pair)
+      real(wp), allocatable, intent(out) :: total(:, :)      !! (n_pair_total, n_pair)
       integer, allocatable, intent(out) :: n_active(:)       !! (n_pair)
       integer :: k
 
-      associate (pair => model%stepper%march%state%pairs%total)
-         allocate(total(7, size(pair)), n_active(size(pair)))
+      associate (pair => model%stepper%march%state%pairs%total, &
+            n => pair_components(model%stepper%march%state%pairs))
+         allocate(total(2*n + 1, size(pair)), n_active(size(pair)))
          do k = 1, size(pair)
-            total(:, k) = [pair(k)%slave(:3), pair(k)%master(:3), pair(k)%length]
+            total(:, k) = [pair(k)%slave(:n), pair(k)%master(:n), pair(k)%covered]
             n_active(k) = pair(k)%n_active
          end do
       end associate

@@ -90,6 +90,7 @@ module emcon_contact
       procedure :: mean_size
       procedure :: share
       procedure :: narrow
+      procedure :: pressures
       procedure :: mean_gap
       procedure :: could_hold
       ! To be called, with the displacements of nodes:
@@ -230,6 +231,17 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
       real(wp), intent(inout) :: area(:)         !! (n_constraint) [L^2]
    end subroutine narrow
+
+   !> Pressures by forces of constraints on their areas; 0 without area.
+   pure subroutine pressures(self, force, area, pressure)
+      class(contact_t), intent(in) :: self
+      real(wp), intent(in) :: force(:)           !! (n_constraint) [M L/T^2]
+      real(wp), intent(in) :: area(:)            !! (n_constraint) of `area` [L^2]
+      real(wp), intent(out) :: pressure(:)       !! (n_constraint) [M/(L T^2)]
+
+      pressure = 0.0_wp
+      where (area > 0.0_wp) pressure = force/area
+   end subroutine pressures
 
    !> The gap at the end of the step, as in `state`, of constraint `i` whose value there is `gap`.
    pure real(wp) function mean_gap(self, i, gap)

@@ -10,6 +10,7 @@ module emcon_patch_contact_space
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_facet_values, only : facets_pressed_areas, facets_pressures
    use emcon_facets, only : facets_init, facets_normal
    use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach
    use emcon_kinds, only : wp
@@ -47,6 +48,8 @@ module emcon_patch_contact_space
       procedure :: measure_points => patch_measure
       procedure :: evaluate_points => patch_evaluate
       procedure :: area_points => patch_area
+      procedure :: narrow => patch_narrow
+      procedure :: pressures => patch_pressures
       procedure :: share => patch_share
       procedure :: mean_gap => patch_mean_gap
       procedure :: could_hold => patch_could_hold
@@ -295,6 +298,24 @@ contains
       area = of_node(self%sides%frames%node)
       length = area/self%thickness
    end subroutine patch_area
+
+   !> What nodes between corners are pressed on.
+   pure subroutine patch_narrow(self, x, u, area)
+      class(patch_contact_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      real(wp), intent(inout) :: area(:)         !! (n_constraint) [L^2]
+
+      call facets_pressed_areas(self%sides%slave, x, u, area)
+   end subroutine patch_narrow
+
+   pure subroutine patch_pressures(self, force, area, pressure)
+      class(patch_contact_t), intent(in) :: self
+      real(wp), intent(in) :: force(:)           !! (n_constraint) [M L/T^2]
+      real(wp), intent(in) :: area(:)            !! (n_constraint) [L^2]
+      real(wp), intent(out) :: pressure(:)       !! (n_constraint) [M/(L T^2)]
+
+      call facets_pressures(self%sides%slave, force, area, pressure)
+   end subroutine patch_pressures
 
    !> Integrals of gaps are functions of the positions alone; their means know what was covered.
    pure real(wp) function patch_share(self, i) result(share)

@@ -178,7 +178,9 @@ contains
       real(wp) :: missed, largest
 
       call stand_off_add(increment%stand_off, self%system, self%active%set, h)
-      call nodal_pull_add(increment%nodal_pull, self%active%set, size(self%state%u, 2))
+      ! In space no multipliers are dual.
+      if (size(self%state%u, 1) < 3) call nodal_pull_add(increment%nodal_pull, self%active%set, &
+         size(self%state%u, 2))
       increment%give = max(increment%give, penalty_depth(self%active%penalty, self%active%set))
       if (self%active%penalty%is_at_ends) increment%give = max(increment%give, &
          penalty_depth(self%active%penalty, self%explicit%penalty(self%explicit%i_start)))

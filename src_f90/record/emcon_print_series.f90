@@ -89,6 +89,7 @@ contains
             if (row%place /= at_pairs) cycle
             new%variable = row%variable
             if (.not. merge(has_counts, has_sums, new%variable == "CNUM")) cycle
+            if (quantity_components(row%variable, at_pairs, stepper%scene%n_dim) == 0) cycle
             call define(self, history, stepper, output, new, error)
          end do
       end associate

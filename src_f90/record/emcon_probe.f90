@@ -11,6 +11,7 @@ module emcon_probe
    use emcon_recorder, only : recorder_close, recorder_open, recorder_t, recorder_write
    use emcon_report_row, only : report_row_t, report_rows_t, row_begin, row_put, rows_add
    use emcon_stepper, only : stepper_advance, stepper_is_done, stepper_t
+   use emcon_surface_recorder, only : surfaces_suffix
    use emcon_text, only : to_text
    use emcon_timer, only : cpu_seconds
    implicit none
@@ -162,6 +163,7 @@ contains
       if (is_open) call recorder_close(recorder, ignored)
       seconds = cpu_seconds() - seconds
       call file_remove(base // ".vtkhdf", ignored)
+      call file_remove(base // surfaces_suffix, ignored)
       call file_remove(base // ".h5", ignored)
       call file_remove(base // ".csv", ignored)
    end subroutine remove_files

@@ -8,8 +8,8 @@ module emcon_quantities
    use emcon_kinds, only : dp, wp
    use emcon_motion, only : at_rest, motion_of
    use emcon_quantity_registry, only : at_contacts, at_elements, at_nodes, at_pairs, &
-      at_sections, n_quantity_row, of_rotation, of_strain, of_vector, of_wrench, quantity_row, &
-      quantity_row_of, quantity_row_t
+      at_sections, n_quantity_row, of_area, of_length, of_rotation, of_strain, of_vector, &
+      of_wrench, quantity_row, quantity_row_of, quantity_row_t
    use emcon_rigid_bodies, only : rigid_body_t
    use emcon_rigid_rotation, only : rigid_rotation_spin
    use emcon_requests, only : output_section_print
@@ -73,6 +73,8 @@ contains
          n = n_turn(n_dim)
       else if (n == of_strain .or. n == of_wrench) then
          n = n_dim + n_turn(n_dim)
+      else if (n == of_length .or. n == of_area) then
+         n = merge(1, 0, (n == of_area) .eqv. (n_dim == 3))
       end if
    end function quantity_components
 
@@ -280,13 +282,9 @@ contains
                gap%is_near .and. gap%is_over), [1, n])
          case ("CSTR")
             allocate(values(2, n))
-            values(1, :) = 0.0_dp
-            where (state%pairs%area > 0.0_wp) values(1, :) &
-               = real(state%contacts%lam/state%pairs%area, dp)
-            if (allocated(state%pairs%jump_lam)) then
-               where (state%pairs%area > 0.0_wp) values(1, :) = values(1, :) &
-                  + real(state%pairs%jump_lam/state%pairs%area, dp)
-            end if
+            values(1, :) = pressures(stepper, state%contacts%lam)
+            if (allocated(state%pairs%jump_lam)) values(1, :) = values(1, :) &
+               + pressures(stepper, state%pairs%jump_lam)
             values(2, :) = real(min(1, state%contacts%status([(i, i = 1, n)])), dp)
          case ("CSHEAR", "CSLIP")
             values = rubbing(stepper, variable)
@@ -297,6 +295,27 @@ contains
          end select
       end associate
    end function contact_quantity
+
+   !> Pressures of all constraints by their forces `lam`.
+   pure function pressures(stepper, lam) result(pressure)
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(in) :: lam(:)             !! (n_constraint) [M L/T^2]
+      real(dp) :: pressure(size(lam))
+      real(wp) :: of_contact(size(lam))
+      integer :: k
+
+      pressure = 0.0_dp
+      associate (system => stepper%march%system, area => stepper%march%state%pairs%area)
+         do k = 1, size(system%contact)
+            associate (first => system%first_constraint(k) + 1, last => &
+                  system%first_constraint(k + 1))
+               call system%contact(k)%contact%pressures(lam(first:last), area(first:last), &
+                  of_contact(first:last))
+               pressure(first:last) = real(of_contact(first:last), dp)
+            end associate
+         end do
+      end associate
+   end function pressures
 
    !> CSHEAR traction against slip (n_dim - 1), and 1 where a contact sticks, 2 where it slides, 0
    !> where nothing rubs; CSLIP slip along the surface so far (n_dim - 1), and the length of its
@@ -425,7 +444,8 @@ contains
    end function section_quantity
 
    !> Of each contact pair (second index): CF, CF_MASTER force and moment about the origin on the
-   !> slave and on the master side (3 or 6); CONTACT_LENGTH; CNUM active constraints (1).
+   !> slave and on the master side (3 or 6); CONTACT_LENGTH, in space CONTACT_AREA; CNUM active
+   !> constraints (1).
    function pair_quantity(stepper, variable) result(values)
       type(stepper_t), intent(in) :: stepper
       character(len=*), intent(in) :: variable
@@ -443,8 +463,8 @@ contains
                values(:, k) = real(total(k)%master(:size(values, 1)), dp)
             case ("CNUM")
                values(:, k) = real(total(k)%n_active, dp)
-            case ("CONTACT_LENGTH")
-               values(:, k) = real(total(k)%length, dp)
+            case ("CONTACT_LENGTH", "CONTACT_AREA")
+               values(:, k) = real(total(k)%covered, dp)
             end select
          end do
       end associate

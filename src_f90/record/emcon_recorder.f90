@@ -18,6 +18,9 @@ module emcon_recorder
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_t
    use emcon_surface_facets, only : profile_facets
+   use emcon_surface_recorder, only : surface_recorder_close, surface_recorder_open, &
+      surface_recorder_publish, surface_recorder_resume, surface_recorder_t, &
+      surface_recorder_write
    use emcon_text, only : string_t
    use emcon_version, only : version
    use emcon_vtkhdf, only : field_t, vtkhdf_begin_frame, vtkhdf_close, vtkhdf_create, &
@@ -55,6 +58,7 @@ module emcon_recorder
 
    type :: recorder_t
       type(vtkhdf_t) :: fields
+      type(surface_recorder_t) :: surfaces       !! fields on faces of contact in space
       type(history_t) :: history
       type(string_t), allocatable :: variable(:) !! those that are written
       type(field_t), allocatable :: field(:)     !! of all of them
@@ -66,7 +70,7 @@ module emcon_recorder
 
 contains
 
-   !> Begin the files `base`.vtkhdf, .h5 and .csv.
+   !> Begin the files `base`.vtkhdf, .h5 and .csv, and `base`.surfaces.vtkhdf of contact in space.
    subroutine recorder_open(self, stepper, base, error)
       type(recorder_t), intent(out) :: self
       type(stepper_t), intent(inout) :: stepper
@@ -86,6 +90,8 @@ contains
          vtk_type, self%field, error)
       if (allocated(error)) return
       call vtkhdf_put_run(self%fields, run)
+      call surface_recorder_open(self%surfaces, stepper, self%variable, base, run, error)
+      if (allocated(error)) return
       call list_columns(stepper, column)
       call history_create(self%history, base, column, error)
       if (allocated(error)) return
@@ -147,6 +153,8 @@ contains
          stepper%until)
       call choose_fields(self, stepper%scene)
       call vtkhdf_resume(self%fields, base // ".vtkhdf", run, self%field, n_frame, error)
+      if (allocated(error)) return
+      call surface_recorder_resume(self%surfaces, stepper, self%variable, base, run, n_frame, error)
       if (allocated(error)) return
       call list_columns(stepper, column)
       call history_resume(self%history, base, run, column, n_row, error)
@@ -285,6 +293,7 @@ contains
          if (allocated(error)) return
       end do
       call vtkhdf_end_frame(self%fields, error)
+      if (.not. allocated(error)) call surface_recorder_write(self%surfaces, stepper, error)
    end subroutine write_fields
 
    !> The body of each element and of each line of a profile, as `body_field`.
@@ -350,6 +359,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call vtkhdf_publish(self%fields, is_forced, error)
+      if (.not. allocated(error)) call surface_recorder_publish(self%surfaces, is_forced, error)
       if (.not. allocated(error)) call history_publish(self%history, is_forced, error)
    end subroutine recorder_publish
 
@@ -371,6 +381,8 @@ contains
       type(error_t), allocatable :: second
 
       call vtkhdf_close(self%fields, error)
+      call surface_recorder_close(self%surfaces, second)
+      if (.not. allocated(error)) call move_alloc(second, error)
       call history_close(self%history, second)
       if (.not. allocated(error)) call move_alloc(second, error)
    end subroutine recorder_close

@@ -30,6 +30,7 @@ module emcon_run
    use emcon_stepper, only : stepper_advance, stepper_close, stepper_fraction, &
       stepper_is_done, stepper_open, stepper_set_threads, stepper_t
    use emcon_stepper_file, only : stepper_load, stepper_save
+   use emcon_surface_recorder, only : surfaces_suffix
    use emcon_text, only : note_add, notes_t, string_t, to_text
    use emcon_timer, only : wall_seconds
    use emcon_verdict, only : verdict_end, verdict_is_failure, verdict_is_good
@@ -287,8 +288,8 @@ contains
    !> Is `path` the name of one of the results of `base`?
    pure logical function is_result(path, base)
       character(len=*), intent(in) :: path, base
-      character(len=7), parameter :: suffix(6) = [character(len=7) :: ".csv", ".h5", ".log", &
-         ".json", ".vtkhdf", ".rst.h5"]
+      character(len=*), parameter :: suffix(7) = [character(len=16) :: ".csv", ".h5", ".log", &
+         ".json", ".vtkhdf", surfaces_suffix, ".rst.h5"]
       integer :: i
 
       is_result = .false.

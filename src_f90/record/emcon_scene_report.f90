@@ -13,6 +13,7 @@ module emcon_scene_report
    use emcon_evaluation, only : evaluation_at_end
    use emcon_report_bodies, only : bodies_find, bodies_rows, body_t
    use emcon_report_row, only : report_row_t, report_rows_t, row_begin, row_put, rows_add
+   use emcon_report_surfaces_space, only : report_surfaces
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_steps, only : initiation_massless, initiation_persistent, step_initiation, &
@@ -43,6 +44,7 @@ contains
       call bodies_find(stepper, body)
       call bodies_rows(stepper%scene, body, rows)
       call add_pairs(stepper, rows)
+      call report_surfaces(stepper%scene, rows)
       call add_ties(stepper%scene, rows)
       call add_choices(stepper, rows)
       call add_sizes(stepper, rows)

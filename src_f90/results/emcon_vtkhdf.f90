@@ -290,15 +290,18 @@ contains
 
    !> The values of the field `name` in the frame at hand. A field that is not written in a frame
    !> keeps the values it had.
-   subroutine vtkhdf_write(self, name, values, error)
+   subroutine vtkhdf_write(self, name, values, error, is_cell)
       type(vtkhdf_t), intent(inout) :: self
       character(len=*), intent(in) :: name
       real(dp), intent(in), contiguous :: values(:, :)   !! (n_component, n_item)
       type(error_t), allocatable, intent(out) :: error
+      logical, intent(in), optional :: is_cell       !! which one, where both have the name
       integer :: i, n
 
       do i = 1, size(self%stored)
-         if (self%stored(i)%field%name == name) exit
+         if (self%stored(i)%field%name /= name) cycle
+         if (.not. present(is_cell)) exit
+         if (self%stored(i)%field%is_cell .eqv. is_cell) exit
       end do
       if (i > size(self%stored)) then
          call raise(error, err_internal, "vtkhdf_write: no field was declared as " // name)

@@ -6,15 +6,17 @@ module emcon_quantity_registry
    private
    public :: quantity_row_t, quantity_row, n_quantity_row, quantity_row_of, quantities_of_card
    public :: at_nodes, at_elements, at_contacts, at_sections, at_pairs, &
-      of_vector, of_rotation, of_strain, of_wrench
+      of_vector, of_rotation, of_strain, of_wrench, of_length, of_area
 
    !> Where the values of a quantity are.
    integer, parameter :: at_nodes = 1, at_elements = 2, at_contacts = 3, &
       at_sections = 4, at_pairs = 5
 
    !> Components of a vector, in a row: one for each direction; of a rotation: for each plane.
-   !> Of a strain: of its tensor, shears twice; of a force and its moment.
-   integer, parameter :: of_vector = 0, of_rotation = -1, of_strain = -2, of_wrench = -3
+   !> Of a strain: of its tensor, shears twice; of a force and its moment. Of what is told of lines
+   !> in the plane alone, and of surfaces in space alone: one there.
+   integer, parameter :: of_vector = 0, of_rotation = -1, of_strain = -2, of_wrench = -3, &
+      of_length = -4, of_area = -5
 
    !> A quantity at one kind of places.
    type :: quantity_row_t

@@ -40,10 +40,12 @@ submodule (emcon_quantity_registry) emcon_quantity_rows
       quantity_row_t("SOMC", at_sections, of_rotation, card=at_sections), &
       quantity_row_t("SOCENTER", at_sections, of_vector, card=at_sections), &
       quantity_row_t("SOAREA", at_sections, card=at_sections), &
-      ! force on the slave side with its moment, on the master side; length in contact; how many
+      ! force on the slave side with its moment, on the master side; slave surface in contact; how
+      ! many
       quantity_row_t("CF", at_pairs, of_wrench), &
       quantity_row_t("CF_MASTER", at_pairs, of_wrench), &
-      quantity_row_t("CONTACT_LENGTH", at_pairs), &
+      quantity_row_t("CONTACT_LENGTH", at_pairs, of_length), &
+      quantity_row_t("CONTACT_AREA", at_pairs, of_area), &
       quantity_row_t("CNUM", at_pairs, card=at_contacts)]
 
 contains

@@ -22,7 +22,8 @@ module emcon_pair_record
       !> Force [M L/T^2] and moment about the origin: the first 3 in the plane, in space all
       real(wp) :: slave(most_components) = 0.0_wp
       real(wp) :: master(most_components) = 0.0_wp   !! the same on the master side
-      real(wp) :: length = 0.0_wp                !! of the slave surface in contact [L]
+      !> Of the slave surface in contact: length [L], in space area [L^2]
+      real(wp) :: covered = 0.0_wp
       integer :: n_active = 0                    !! constraints that act
    end type pair_total_t
 
@@ -263,7 +264,7 @@ contains
 
    end subroutine measure_nodes
 
-   !> Areas of all multipliers of contact `k`, and the length over which it acts.
+   !> Areas of all multipliers of contact `k`, and of what slave surface it acts.
    subroutine measure_areas(self, system, k, id, x, u)
       type(pair_record_t), intent(inout) :: self
       type(system_t), intent(in) :: system
@@ -274,8 +275,12 @@ contains
 
       associate (contact => system%contact(k)%contact, before => system%first_constraint(k))
          call contact%area(x, u, self%area(before + 1:before + contact%n_constraint), length)
-         associate (total => self%total(abs(system%contact(k)%of_pair)))
-            total%length = total%length + sum(length(id - before))
+         associate (covered => self%total(abs(system%contact(k)%of_pair))%covered)
+            if (size(x, 1) == 3) then
+               covered = covered + sum(self%area(id))
+            else
+               covered = covered + sum(length(id - before))
+            end if
          end associate
       end associate
    end subroutine measure_areas

@@ -421,7 +421,7 @@ contains
       do k = 1, size(pairs%total)
          call restart_exchange(restart, "pair_total", pairs%total(k)%slave(:n))
          call restart_exchange(restart, "pair_total", pairs%total(k)%master(:n))
-         call restart_exchange(restart, "pair_total", pairs%total(k)%length)
+         call restart_exchange(restart, "pair_total", pairs%total(k)%covered)
       end do
       call restart_exchange(restart, "pair_active", pairs%total%n_active)
       if (restart%is_reading .and. allocated(pairs%jump)) deallocate(pairs%jump, pairs%jump_lam, &
