@@ -12,11 +12,13 @@ module emcon_patch_contact_space
    use emcon_errors, only : err_input, error_t, raise
    use emcon_facet_values, only : facets_pressed_areas, facets_pressures
    use emcon_facets, only : facets_init, facets_normal
-   use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach
+   use emcon_guards, only : crossing_bar, overlap_bar
+   use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach, &
+      pair_has_order
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
    use emcon_patch_gap_space, only : patch_ahead, patch_gap, patch_gap_t, patch_means, patch_way
-   use emcon_patch_sides_space, only : node_frames_init, patch_sides_t, triangles_init
+   use emcon_patch_sides_space, only : node_frames_init, patch_sides_t, patch_triangles_init
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
       patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
@@ -35,7 +37,7 @@ module emcon_patch_contact_space
 
    type, extends(contact_t) :: patch_contact_t
       type(patch_sides_t) :: sides
-      logical :: both_sides = .false.                 !! this and another hold all nodes
+      logical :: holds_all = .false.                  !! all nodes, with one that is its reverse
       type(near_list_t) :: near
       type(position_memo_t) :: memo                   !! of the nodes as stencils were chosen:
       real(wp) :: chosen_reach = 0.0_wp               !! among facets up to there [L]
@@ -53,6 +55,7 @@ module emcon_patch_contact_space
       procedure :: share => patch_share
       procedure :: mean_gap => patch_mean_gap
       procedure :: could_hold => patch_could_hold
+      procedure :: lets_in => patch_lets_in
    end type patch_contact_t
 
 contains
@@ -77,7 +80,7 @@ contains
          call facets_init(sides%master, scene, scene%surface(pair%master), error)
          if (allocated(error)) return
          call node_frames_init(sides%frames, sides%slave, scene%x)
-         call triangles_init(sides%triangles, sides%master, scene%x)
+         call patch_triangles_init(sides%triangles, sides%master, scene%x)
          self%node = sides%slave%node(sides%frames%node)
          self%n_constraint = size(self%node)
          allocate(self%duplicate(self%n_constraint), source=0)
@@ -90,8 +93,8 @@ contains
             + interaction_reach(pair%interaction))
          self%state%other_size = sides%frames%size(sides%frames%node)
       end associate
-      self%both_sides = pair%both_sides
-      if (self%both_sides) self%area_factor = 0.5_wp
+      self%holds_all = .not. pair_has_order(pair)
+      if (self%holds_all) self%area_factor = 0.5_wp
       self%may_leave = .true.
       self%slack = pair%slack
       self%offset = pair%interaction%offset
@@ -339,7 +342,14 @@ contains
       class(patch_contact_t), intent(in) :: self
       logical, intent(in) :: is_loose(:)         !! (n_constraint) it is not held, and goes in
 
-      could_hold = self%both_sides .and. any(is_loose)
+      could_hold = self%holds_all .and. any(is_loose)
    end function patch_could_hold
+
+   !> Nodes are held, edges cross between them.
+   pure real(wp) function patch_lets_in(self) result(lets_in)
+      class(patch_contact_t), intent(in) :: self
+
+      lets_in = merge(overlap_bar, crossing_bar, self%slack > 0.0_wp .or. .not. self%holds_all)
+   end function patch_lets_in
 
 end module emcon_patch_contact_space

@@ -5,6 +5,7 @@
 module emcon_patch_stencil_space
    use emcon_element_kind, only : max_face_nodes
    use emcon_kinds, only : wp
+   use emcon_nearest_space, only : nearest_t, nearest_update
    use emcon_patch_gap_space, only : patch_t
    use emcon_patch_sides_space, only : patch_sides_t, sides_point
    use emcon_rotation, only : cross_product
@@ -76,7 +77,7 @@ contains
       self%triangle = near%triangle(nearest)
       self%size = sides%triangles%size(self%triangle)
       self%patch%length = patch_size*min(self%size, sides%frames%size(i))
-      call make_patch(self, sides, i, frame, near, normal, x, u)
+      call make_patch(self, sides, frame, near, normal, x, u)
    end subroutine patch_stencil_choose
 
    !> Where the triangles of facets are, from `node`.
@@ -85,6 +86,7 @@ contains
       integer, intent(in) :: node, facet(:)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       type(near_t), intent(out) :: near
+      type(nearest_t) :: nearest
       integer :: f, t
 
       associate (start => sides%triangles%split%start)
@@ -100,7 +102,9 @@ contains
          end do
          associate (c => near%corner(:, :, t), n => near%normal(:, t))
             n = cross_product(c(:, 2) - c(:, 1), c(:, 3) - c(:, 1))
-            near%distance(t) = distance_to(c, n)
+            call nearest_update(nearest, t, [0.0_wp, 0.0_wp, 0.0_wp], c)
+            near%distance(t) = sqrt(nearest%square)
+            nearest = nearest_t()
             if (dot_product(n, n) > 0.0_wp) n = n/sqrt(dot_product(n, n))
          end associate
       end do
@@ -121,37 +125,6 @@ contains
          place = place + weight(k)*((x(:, part(k)) - x(:, node)) + (u(:, part(k)) - u(:, node)))
       end do
    end function place_of
-
-   !> How far a triangle is from the origin.
-   pure real(wp) function distance_to(corner, normal) result(distance)
-      real(wp), intent(in) :: corner(3, 3), normal(3)      !! any length
-      real(wp) :: square
-      integer :: k
-      logical :: is_over
-
-      is_over = dot_product(normal, normal) > 0.0_wp
-      square = huge(square)
-      do k = 1, 3
-         associate (a => corner(:, k), along => corner(:, 1 + mod(k, 3)) - corner(:, k))
-            is_over = is_over .and. dot_product(cross_product(along, -a), normal) >= 0.0_wp
-            square = min(square, sum((a + share(a, along)*along)**2))
-         end associate
-      end do
-      distance = sqrt(square)
-      if (is_over) distance = abs(dot_product(corner(:, 1), normal))/sqrt(dot_product(normal, &
-         normal))
-
-   contains
-
-      !> Where on a side the origin is nearest.
-      pure real(wp) function share(a, along)
-         real(wp), intent(in) :: a(3), along(3)
-
-         share = -dot_product(a, along)/max(dot_product(along, along), tiny(1.0_wp))
-         share = max(0.0_wp, min(1.0_wp, share))
-      end function share
-
-   end function distance_to
 
    !> The nearest triangle that faces a frame more than any other frame of its node; of those as
    !> near the one that faces it most. 0: there is none.
@@ -220,13 +193,15 @@ contains
       integer, intent(in) :: i, frame
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       real(wp), intent(out) :: a(3), b(3)
+      real(wp) :: d(3)
       integer :: k
 
       a = 0.0_wp
       b = 0.0_wp
       associate (frames => sides%frames, node => sides%slave%node(i))
          do k = frames%ring_start(frame), frames%ring_start(frame + 1) - 1
-            associate (d => (x(:, frames%ring(k)) - x(:, node)) + (u(:, frames%ring(k)) - u(:, node)))
+            associate (other => frames%ring(k))
+               d = (x(:, other) - x(:, node)) + (u(:, other) - u(:, node))
                a = a + frames%weight(1, k)*d
                b = b + frames%weight(2, k)*d
             end associate
@@ -262,10 +237,10 @@ contains
    end subroutine list_triangles
 
    !> The vertices and triangles of the patch with their nodes.
-   pure subroutine make_patch(self, sides, i, frame, near, normal, x, u)
+   pure subroutine make_patch(self, sides, frame, near, normal, x, u)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: i, frame
+      integer, intent(in) :: frame
       type(near_t), intent(in) :: near
       real(wp), intent(in) :: normal(3)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
@@ -279,7 +254,7 @@ contains
             ends(k, t) = .not. goes_on(sides%triangles%beyond(k, near%triangle(t)))
          end do
       end do
-      call begin_patch(self, sides, i, frame, count(near%is_listed), count(ends))
+      call begin_patch(self, sides, frame, count(near%is_listed), count(ends))
       do t = 1, near%n
          if (near%is_listed(t)) call add_triangle(self, sides, near%triangle(t))
       end do
@@ -305,7 +280,8 @@ contains
          integer, intent(in) :: other            !! 0: none
 
          goes_on = other > 0
-         if (goes_on) goes_on = is_facing(sides, sides%slave%node(i), other, normal, x, u)
+         if (goes_on) goes_on = is_facing(sides, &
+            sides%slave%node(sides%frames%node(frame)), other, normal, x, u)
       end function goes_on
 
    end subroutine make_patch
@@ -327,10 +303,10 @@ contains
    end function is_facing
 
    !> Room for a patch of some triangles with flanges at some sides; its frame.
-   pure subroutine begin_patch(self, sides, i, frame, n_triangle, n_end)
+   pure subroutine begin_patch(self, sides, frame, n_triangle, n_end)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: i, frame, n_triangle, n_end
+      integer, intent(in) :: frame, n_triangle, n_end
       integer :: k
 
       self%patch%n_triangle = 0
@@ -345,7 +321,7 @@ contains
       end associate
       self%weight = 0.0_wp
       self%n_node = 1
-      self%node(1) = sides%slave%node(i)
+      self%node(1) = sides%slave%node(sides%frames%node(frame))
       associate (frames => sides%frames)
          do k = frames%ring_start(frame), frames%ring_start(frame + 1) - 1
             call add_weight(self, frames%ring(k), 1, frames%weight(1, k))
