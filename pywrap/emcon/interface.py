@@ -6,7 +6,7 @@ solver are the host's:
 
     from emcon.interface import Interface
 
-    with Interface(nodes) as face:                          # (n_node, 2) [L]
+    with Interface(nodes) as face:                          # (n_node, n_dim) [L]
         lower = face.add_surface("lower", lower_edges)      # (k, 2), the body to the left
         upper = face.add_surface("upper", upper_edges)
         face.add_pair(upper, lower, "mortar")
@@ -19,9 +19,10 @@ solver are the host's:
             ...                                             # Newton's method on face.evaluate
             active, outcome = face.update_active(u0, du, lam, active)
 
+In space nodes are (n_node, 3), and surfaces are faces: `add_faces`.
 `tests/embed/interface_springs.py` is a complete host. Numbers count from 0; freedom a of node i is
-2 i + a; the plane has thickness 1. Units are any consistent set, [L] [M] [T]. Wrong arguments and
-calls out of order raise `InputError`; the interface stays usable.
+n_dim i + a; the plane has thickness 1. Units are any consistent set, [L] [M] [T]. Wrong arguments
+and calls out of order raise `InputError`; the interface stays usable.
 """
 
 from __future__ import annotations
@@ -99,8 +100,8 @@ class Constraints:
     change: Floats      #: (n,) [L]
     defect: Floats      #: (n,) [L]
     edge: Floats        #: (n,) length of an edge, to which defects relate [L]
-    g: Csr              #: (n, 2 n_node) discrete gradients
-    c: Csr              #: (n, 2 n_node) gradients at the end, same pattern
+    g: Csr              #: (n, n_dim n_node) discrete gradients
+    c: Csr              #: (n, n_dim n_node) gradients at the end, same pattern
 
     @property
     def n(self) -> int:
@@ -110,7 +111,7 @@ class Constraints:
 
 @dataclass(frozen=True)
 class NullSpace:
-    """P and DF, (2 n_node, n_unknown - n): P^T g^T = 0 and c DF = 0, with ties and held freedoms.
+    """P and DF, (n_dim n_node, n_unknown - n): P^T g^T = 0, c DF = 0, with ties and held freedoms.
 
     If `redundant` is not empty, these places of the selection follow from others, and there are no
     matrices: `Interface.drop` them.
@@ -150,9 +151,10 @@ def _exclusive(is_prepared: bool | None = True
 class Interface:
     """Surfaces of a host with their contacts and ties; the module's text shows the order of calls.
 
-    `nodes`: reference positions, (n_node, 2) [L]; the host's nodes that no surface holds may be
-    left out. Arrays that come back are copies. Any number of interfaces live side by side; each may
-    be used from any thread, but not from two at once: that raises `InputError`.
+    `nodes`: reference positions, (n_node, 2), in space (n_node, 3) [L]; the host's nodes that no
+    surface holds may be left out. Arrays that come back are copies. Any number of interfaces live
+    side by side; each may be used from any thread, but not from two at once: that raises
+    `InputError`.
     """
 
     def __init__(self, nodes: ArrayLike) -> None:
@@ -163,7 +165,13 @@ class Interface:
             self.n_node = len(nodes)  # type: ignore[arg-type]
         except TypeError:
             raise InputError(f"nodes is {nodes!r}, not an array (n_node, 2)") from None
-        x = real_array(nodes, "nodes", (self.n_node, 2))
+        try:
+            of_first = len(nodes[0])  # type: ignore[index,arg-type]
+        except (TypeError, IndexError, KeyError):
+            of_first = 2
+        #: 2 in the plane, 3 in space
+        self.n_dim = 3 if of_first == 3 else 2
+        x = real_array(nodes, "nodes", (self.n_node, self.n_dim))
         if not self.n_node:
             raise InputError("there are no nodes")
         self.n_contact = 0      #: contacts possible, known after `prepare`
@@ -207,7 +215,7 @@ class Interface:
 
     @_exclusive(False)
     def add_surface(self, name: str, edges: ArrayLike) -> int:
-        """Add a surface and return its number.
+        """Add a surface of the plane and return its number.
 
         `edges`: first and last node of each edge, (k, 2) integers, the body to the left, so that
         the outward normal is the edge turned by -90 degrees; in any order, connected or in parts.
@@ -223,6 +231,35 @@ class Interface:
         return self._n_surface - 1
 
     @_exclusive(False)
+    def add_faces(self, name: str, *faces: ArrayLike) -> int:
+        """Add a surface of faces and return its number.
+
+        `faces`: nodes of faces, (k, m) integers, one such array for each kind that the surface has:
+        m is 3, 4, or with a node in the middle of each side 6, 8; in the plane 2, edges. Corners
+        come first, counter-clockwise as seen from outside the body, then the nodes between a corner
+        and the next. Raises `InputError` as `add_surface`.
+        """
+        if not isinstance(name, str) or "\0" in name:
+            raise InputError(f"name is {name!r}, not a text")
+        if not faces:
+            raise InputError("there are no faces")
+        known = {2: 3} if self.n_dim == 2 else {3: 5, 4: 9, 6: 22, 8: 23}
+        kind, count, node = [], [], []
+        for array in faces:
+            own = _whole("faces", array, 2, self.n_node)
+            if own.shape[1] not in known or not len(own):
+                raise InputError(f"faces are to have the shape (k, m), k > 0, m one of "
+                                 f"{', '.join(map(str, known))}, not {own.shape}")
+            kind += [known[own.shape[1]]]*len(own)
+            count += [own.shape[1]]*len(own)
+            node.append(own.ravel())
+        offset = np.cumsum(count, dtype=np.int32)
+        number = self._call(_core.emcon_add_faces, name.encode(), np.array(kind, np.int32), offset,
+                            np.concatenate(node))
+        self._n_surface = 1 + number
+        return self._n_surface - 1
+
+    @_exclusive(False)
     def add_pair(self, slave: int, master: int, formulation: str = "mortar", *,
                  integration: str = "segments", n_point: int | None = None,
                  multiplier: str = "dual", normal: str = "nodal", smoothing: str = "none",
@@ -233,7 +270,8 @@ class Interface:
         "segments" (exact) or "elements", with `n_point` Gauss points (1..10, 2..10 on segments).
         `multiplier`: "standard" or "dual". `normal` of slave nodes: "edge" or "nodal".
         `smoothing` of the master surface: "none" or "hermite". Turns sharper than the angles, 0 to
-        180 degrees, are corners. Rigid obstacles are masters of held nodes.
+        180 degrees, are corners. Rigid obstacles are masters of held nodes. In space contact is
+        "node to segment", of the nodes of the slave; a pair the other way round holds the others.
         """
         choice = [_choice("integration", integration),
                   0 if n_point is None else _number("n_point", n_point, 1, 10),
@@ -286,15 +324,15 @@ class Interface:
 
     @_exclusive(False)
     def prepare(self, held: ArrayLike | None = None) -> Floats:
-        """Finish; from here on there are steps. Returns the positions, (n_node, 2) [L].
+        """Finish; from here on there are steps. Returns the positions, (n_node, n_dim) [L].
 
-        `held`: freedoms that the host moves by itself, (n_node, 2) booleans, None for none. Slave
+        `held`: freedoms that the host moves by itself, (n_node, n_dim) booleans; None: none. Slave
         nodes of ties are moved onto their masters: the host takes over the positions. After an
         error in what was given before, begin with a new interface.
         """
         if held is None:
-            held = np.zeros((self.n_node, 2), bool)
-        flags = flag_array(held, "held", (self.n_node, 2))
+            held = np.zeros((self.n_node, self.n_dim), bool)
+        flags = flag_array(held, "held", (self.n_node, self.n_dim))
         self._call(_core.emcon_hold, flags)
         self._call(_core.emcon_build)
         sizes = self._sizes()
@@ -306,7 +344,7 @@ class Interface:
     @property
     @_exclusive(None)
     def positions(self) -> Floats:
-        """Reference positions, (n_node, 2) [L]; after `prepare` those that fulfil the ties."""
+        """Reference positions, (n_node, n_dim) [L]; after `prepare` those that fulfil the ties."""
         return self._call(_core.emcon_get_positions, self.n_node)
 
     @property
@@ -340,7 +378,7 @@ class Interface:
 
     @_exclusive()
     def tie_matrices(self, tie: int = 0) -> tuple[Csr, Csr]:
-        """D and M of a tie, (n_row, n_node) [L]: D x = M x in both directions."""
+        """D and M of a tie, (n_row, n_node) [L]: D x = M x in each direction."""
         if not self._n_tie:
             raise InputError("there is no tie")
         found = self._call(_core.emcon_get_tie_matrices,
@@ -349,25 +387,25 @@ class Interface:
 
     @_exclusive()
     def links(self) -> Csr:
-        """T, (2 n_node, n_unknown), of u = T w: a residual becomes T^T r, a tangent T^T K T.
+        """T, (n_dim n_node, n_unknown), of u = T w: a residual becomes T^T r, a tangent T^T K T.
 
         Rows of held freedoms are empty.
         """
         return matrix(self._call(_core.emcon_links))
 
     def follow(self, field: ArrayLike) -> Floats:
-        """A displacement or velocity, (n_node, 2), whose tied freedoms follow the others."""
+        """A displacement or velocity, (n_node, n_dim), whose tied freedoms follow the others."""
         return self._changed(_core.emcon_follow, field)
 
     def gather(self, field: ArrayLike) -> Floats:
-        """Forces, (n_node, 2); those on tied freedoms went to the ones that they follow."""
+        """Forces, (n_node, n_dim); those on tied freedoms went to the ones that they follow."""
         return self._changed(_core.emcon_gather, field)
 
     @_exclusive()
     def _changed(self, routine: Any, field: ArrayLike) -> Floats:
         return self._call(routine, self._field("field", field))
 
-    # ---- a step from the displacements u0 by du, (n_node, 2) each [L] ----------------------------
+    # ---- a step from the displacements u0 by du, (n_node, n_dim) each [L] ------------------------
 
     @_exclusive()
     def begin_step(self, u0: ArrayLike, du: ArrayLike, was_active: ArrayLike) -> Flags:
@@ -416,7 +454,7 @@ class Interface:
 
     @_exclusive()
     def curvature(self, lam: ArrayLike) -> Csr:
-        """sum of lam[k] d g[k]/d u1, (2 n_node, 2 n_node); the step's tangent gets minus this.
+        """sum of lam[k] d g[k]/d u1, n_dim n_node each way; the step's tangent gets minus this.
 
         `lam`: multipliers of the selected contacts as last evaluated, (n,) [M L/T^2].
         """
@@ -424,7 +462,7 @@ class Interface:
 
     @_exclusive()
     def second_times(self, lam: ArrayLike, direction: ArrayLike) -> Floats:
-        """`curvature(lam)` times a direction, (n_node, 2) like the result."""
+        """`curvature(lam)` times a direction, (n_node, n_dim) like the result."""
         along = self._field("direction", direction)
         return self._call(_core.emcon_curvature_times, self._of_selected("lam", lam), along)
 
@@ -433,13 +471,14 @@ class Interface:
                       magnitude: ArrayLike | None = None) -> tuple[Flags, Outcome | None]:
         """The next active set from a solved step: with what would penetrate, without what pulls.
 
-        `active`: what was selected; `lam`: its multipliers. `magnitude`, (n_node, 2): sums of the
-        sizes of the contributions to the residual, which tell signs of round-off from tension;
+        `active`: what was selected; `lam`: its multipliers. `magnitude`, (n_node, n_dim): sums of
+        the sizes of the contributions to the residual, which tell signs of round-off from tension;
         None: the contact forces. Returns the next set and None, or the last one and its `Outcome`.
         """
         u, d = self._motion(u0, du)
         flags = self._flags("active", active)
-        sizes = np.empty((0, 2)) if magnitude is None else self._field("magnitude", magnitude)
+        sizes = (np.empty((0, self.n_dim)) if magnitude is None
+                 else self._field("magnitude", magnitude))
         flags, is_done, outcome = self._call(_core.emcon_update_active, u, d,
                                              self._of_selected("lam", lam), sizes, flags)
         return self._contacts_of(flags), Outcome(outcome) if is_done else None
@@ -449,7 +488,7 @@ class Interface:
         """Areas that the multipliers of the step to `u1` act on, (n_contact,) [L^2], and lengths.
 
         The pressure of a contact is its multiplier over its area. The lengths, (n_contact,) [L],
-        are those of slave surface that belong to the contacts at the end.
+        are those of slave surface that belong to the contacts at the end, in space roots of areas.
         """
         area, length = self._call(_core.emcon_get_areas, self._field("u1", u1),
                                   self.n_contact + self._n_row)
@@ -492,14 +531,14 @@ class Interface:
 
     @_exclusive()
     def multipliers(self, residual: ArrayLike) -> Floats:
-        """lam, (n,), after `null_space`, from the residual without contact forces, (n_node, 2)."""
+        """lam, (n,), after `null_space`, from the residual without contact forces, a field."""
         force = self._field("residual", residual)
         return self._call(_core.emcon_multipliers, self.n_node, force,
                           self.n_contact + self._n_row)[self._selected]
 
     @_exclusive()
     def particular(self, defect: ArrayLike) -> Floats:
-        """The motion of dependent unknowns alone that closes `defect`, (n,); (n_node, 2) [L].
+        """The motion of dependent unknowns alone that closes `defect`, (n,); (n_node, n_dim) [L].
 
         After `null_space`. Newton's step is this plus DF times that of the others.
         """
@@ -509,7 +548,7 @@ class Interface:
 
     def _field(self, name: str, values: ArrayLike) -> Floats:
         """As the library wants it, without a copy where that is possible."""
-        return real_array(values, name, (self.n_node, 2))
+        return real_array(values, name, (self.n_node, self.n_dim))
 
     def _motion(self, u0: ArrayLike, du: ArrayLike) -> tuple[Floats, Floats]:
         return self._field("u0", u0), self._field("du", du)

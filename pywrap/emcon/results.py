@@ -63,6 +63,10 @@ class ResultPaths:
         return self._beside(".vtkhdf")
 
     @property
+    def surfaces(self) -> Path:
+        return self._beside(".surfaces.vtkhdf")
+
+    @property
     def history(self) -> Path:
         return self._beside(".h5")
 
@@ -92,6 +96,8 @@ def locate(result: str | os.PathLike[str]) -> ResultPaths:
         raise ResultError(f"{path} is a deck, not a result; run it first, then give "
                           f"{path.with_suffix('')}")
     base = path.with_suffix("") if path.suffix in _SUFFIXES else path
+    if path.name.endswith(".surfaces.vtkhdf"):
+        base = base.with_suffix("")
     paths = ResultPaths(base)
     if base.name in ("", "..") or not any(
             p.is_file() for p in (paths.table, paths.history, paths.field)):
@@ -361,6 +367,7 @@ class Results:
     def __init__(self, result: str | os.PathLike[str]) -> None:
         self.paths = locate(result)
         self._fields: FieldFile | None = None
+        self._surfaces: FieldFile | None = None
         self._series: HistoryFile | None = None
         self._history: NDArray[np.void] | None = None
         self._is_closed = False
@@ -382,6 +389,17 @@ class Results:
         if self._fields is None:
             self._fields = FieldFile(self.paths.field)
         return self._fields
+
+    @property
+    def surfaces(self) -> FieldFile:
+        """The faces of contact in space over time: `surfaces.cell("contact_pressure", -1)`.
+
+        Its points are nodes of `fields`, numbered by `surfaces.point("node", 0)`.
+        """
+        self._check()
+        if self._surfaces is None:
+            self._surfaces = FieldFile(self.paths.surfaces)
+        return self._surfaces
 
     @property
     def history(self) -> NDArray[np.void]:
@@ -409,7 +427,7 @@ class Results:
     def close(self) -> None:
         """Close all files; harmless if they are closed."""
         self._is_closed = True
-        for file in (self._fields, self._series):
+        for file in (self._fields, self._surfaces, self._series):
             if file is not None:
                 file.close()
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -212,16 +211,11 @@ def _side_values(file: FieldFile, name: str, frame: int, sides: NDArray[np.int64
     return np.where(is_nothing, np.nan, ends)
 
 
-def surfaces_path(path: Path) -> Path:
-    """The file of the faces of contact that stands beside a field file."""
-    return path.with_name(path.name.removesuffix(".vtkhdf") + ".surfaces.vtkhdf")
-
-
 def _face_values(file: FieldFile, name: str, frames: Sequence[int],
                  faces: Sequence[NDArray[np.int64]]) -> list[Array]:
     """A field of surfaces per face (n_face), NaN where it is nothing: as the file of the faces has
     it, or else the mean over the nodes."""
-    path = surfaces_path(file.path)
+    path = file.path.with_name(file.path.name.removesuffix(".vtkhdf") + ".surfaces.vtkhdf")
     found: list[Array] = []
     if path.is_file():
         with FieldFile(path) as surfaces:

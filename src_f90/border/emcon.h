@@ -273,18 +273,29 @@ int emcon_give_mass(emcon_model *model, const emcon_csr *mass);
  * in tests/embed/interface_bars.c and tests/embed/interface_springs.py; the notation is that of
  * docs/theory.md, sections 4 and 5. Units are consistent ones; the plane has thickness 1. */
 
-/* Nodes at the reference positions `x`; those that no surface holds may be left out. `*model` has
- * to be closed also after a failure. */
-int emcon_new(int n_node, const double *x /* n_node x 2 */, emcon_model **model);
+/* Nodes at the reference positions `x` in the plane, or in space, n_dim = 2 or 3; those that no
+ * surface holds may be left out. `*model` has to be closed also after a failure. */
+int emcon_new(int n_node, int n_dim, const double *x /* n_node x n_dim */, emcon_model **model);
 
-/* Add a surface: first and last node of each edge, 2*n_edge numbers, the body to the left, so that
- * the outward normal is the edge turned by -90 degrees. Edges in any order, connected or in parts,
- * open or closed. `name` is for messages, NULL: its number. `*surface` is its number. */
+/* Add a surface of the plane: first and last node of each edge, 2*n_edge numbers, the body to the
+ * left, so that the outward normal is the edge turned by -90 degrees. Edges in any order, connected
+ * or in parts, open or closed. `name` is for messages, NULL: its number. `*surface` is its number. */
 int emcon_add_surface(emcon_model *model, const char *name /* or NULL */, int n_edge,
                       const int *edge /* n_edge x 2 */, int *surface);
 
+/* Add a surface of faces whose kinds may differ, in any order, connected or in parts, open or
+ * closed. `kind` as VTK numbers cells: in space triangles 5 and quadrilaterals 9, with a node in
+ * the middle of each side 22 and 23; in the plane edges, 3. `offset`: entries of `node` up to and
+ * with those of the face, as files of VTK have it. `node`: of all faces one after the other, in
+ * each corners counter-clockwise as seen from outside the body, then the nodes between a corner
+ * and the next. */
+int emcon_add_faces(emcon_model *model, const char *name /* or NULL */, int n_face,
+                    const int *kind /* n_face */, const int *offset /* n_face */, int n_entry,
+                    const int *node /* n_entry */, int *surface);
+
 /* Add a contact pair; a surface in contact with itself is its own master. `options` NULL: the
- * defaults. Rigid obstacles are masters of held nodes. */
+ * defaults. Rigid obstacles are masters of held nodes. In space: EMCON_NODE_TO_SEGMENT, of two
+ * surfaces, the slaves' nodes held; a pair the other way round holds those of the master, too. */
 int emcon_add_pair(emcon_model *model, int slave, int master, int formulation,
                    const emcon_pair_options *options /* or NULL */);
 
@@ -619,7 +630,8 @@ int emcon_drop(emcon_model *model, int n_redundant, const int *redundant /* n_re
                int n_constraint, int *active /* n_constraint */);
 
 /* Areas that the multipliers of the step to `u1` act on, so that the pressure is lam/area, and
- * lengths of slave surface that belong to them at its end. */
+ * lengths of slave surface that belong to them at its end; in space about the roots of these
+ * areas. */
 int emcon_get_areas(emcon_model *model, int n_node, const double *u1 /* n_node x n_dim */,
                     int n_constraint, double *area /* n_constraint */,
                     double *length /* n_constraint */);

@@ -118,10 +118,11 @@ public:
 
    static Model load(const std::string &path) { return made(emcon_load, path.c_str()); }
 
-   // A model of a host in the plane: nodes at the positions x0, y0, x1, y1, ...
-   static Model of_nodes(const std::vector<double> &x)
+   // A model of a host in the plane, or in space: nodes at the positions x0, y0, x1, y1, ...
+   static Model of_nodes(const std::vector<double> &x, int n_dim = 2)
    {
-      return made(emcon_new, static_cast<int>(x.size()/2), x.data());
+      return made(emcon_new, static_cast<int>(x.size()/static_cast<std::size_t>(n_dim)), n_dim,
+                  x.data());
    }
 
    void build() { call(emcon_build); }

@@ -41,12 +41,12 @@
 !> `query_curvature_times`. After a change of conditions `query_follow`; last `query_free`.
 !>
 !> **Contact and ties for a program that has its own solids.** In place of a deck: `stepper_new`,
-!> `stepper_add_surface`, `stepper_add_pair` (options: `contact_options_t`), `stepper_add_tie`,
-!> `stepper_hold`, `stepper_set_contact`, then `stepper_build`. In each step `query_begin_contact`;
-!> then, until `query_update_active` is done, `query_select` or `query_choose`, and Newton's method
-!> on `query_contact`, `query_curvature`, with the multipliers or with `query_null_space`,
-!> `query_particular`, `query_multipliers`. Pressures are multipliers over `query_areas`;
-!> `query_overlap` judges the step by geometry alone.
+!> `stepper_add_surface`, in space `stepper_add_faces`, `stepper_add_pair` (options:
+!> `contact_options_t`), `stepper_add_tie`, `stepper_hold`, `stepper_set_contact`, then
+!> `stepper_build`. In each step `query_begin_contact`; then, until `query_update_active` is done,
+!> `query_select` or `query_choose`, and Newton's method on `query_contact`, `query_curvature`, with
+!> the multipliers or with `query_null_space`, `query_particular`, `query_multipliers`. Pressures
+!> are multipliers over `query_areas`; `query_overlap` judges the step by geometry alone.
 module emcon_api
    use emcon_contact, only : gap_state_t
    use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
@@ -96,8 +96,8 @@ module emcon_api
    use emcon_stepper_user, only : stepper_give_constraint, stepper_give_contact, &
       stepper_give_contact_law, stepper_give_element, stepper_give_force, stepper_give_law, &
       stepper_give_mass, stepper_give_potential, stepper_give_scheme, stepper_give_solver
-   use emcon_stepper_host, only : stepper_add_pair, stepper_add_surface, stepper_add_tie, &
-      stepper_hold, stepper_new, stepper_set_contact, stepper_tie_matrices
+   use emcon_stepper_host, only : stepper_add_faces, stepper_add_pair, stepper_add_surface, &
+      stepper_add_tie, stepper_hold, stepper_new, stepper_set_contact, stepper_tie_matrices
    use emcon_stepper_loads, only : stepper_add_loads, stepper_find_load, stepper_set_load
    use emcon_stepper_null_space, only : query_follow_links, query_gather_links, query_links, &
       query_multipliers, query_null_space, query_particular

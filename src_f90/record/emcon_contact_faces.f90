@@ -1,7 +1,7 @@
 !> The faces of contact surfaces in space, and what contact does to each.
 !>
-!> A force on a node belongs to the faces there, whichever side of a pair it is on: so both sides of a
-!> pair show all of the pressure between them.
+!> A force on a node belongs to the faces there, whichever side of a pair it is on: so both sides of
+!> a pair show all of the pressure between them.
 module emcon_contact_faces
    use, intrinsic :: ieee_arithmetic, only : ieee_is_nan, ieee_quiet_nan, ieee_value
    use emcon_facet_values, only : facets_share
@@ -36,6 +36,7 @@ module emcon_contact_faces
       real(dp), allocatable :: gap(:, :)         !! (1, n_face) mean of slave nodes; NaN: none [L]
       real(dp), allocatable :: status(:, :)      !! (1, n_face) 0 open, 1 closed, 2 slides
       real(dp), allocatable :: at_node(:, :)     !! (1, n_point) mean pressure of the faces there
+      real(dp), allocatable :: gap_there(:, :)   !! (1, n_point) of slave nodes; NaN: none [L]
    end type face_values_t
 
 contains
@@ -154,20 +155,23 @@ contains
          end associate
       end do
       values%force = real(push, dp)
-      call find_gaps(self, contact_field(stepper, "CDIS"), values%gap)
+      deallocate(of_all)
+      allocate(of_all, source=contact_field(stepper, "CDIS"))
+      values%gap_there = of_all(:, self%node)
+      call find_gaps(self, values%gap_there, values%gap)
       call find_status(self, stepper, values%pressure, values%status)
    end subroutine contact_faces_values
 
    !> The means of the gaps that nodes of a face have.
    pure subroutine find_gaps(self, at_node, gap)
       type(contact_faces_t), intent(in) :: self
-      real(dp), intent(in) :: at_node(:, :)      !! (1, n_node of the scene)
+      real(dp), intent(in) :: at_node(:, :)      !! (1, n_point)
       real(dp), allocatable, intent(out) :: gap(:, :)
       integer :: f
 
       allocate(gap(1, size(self%vertex, 2)), source=ieee_value(1.0_dp, ieee_quiet_nan))
       do f = 1, size(gap, 2)
-         associate (here => at_node(1, self%node(pack(self%vertex(:, f), self%vertex(:, f) > 0))))
+         associate (here => at_node(1, pack(self%vertex(:, f), self%vertex(:, f) > 0)))
             if (all(ieee_is_nan(here))) cycle
             gap(1, f) = sum(here, mask=.not. ieee_is_nan(here)) &
                /count(.not. ieee_is_nan(here))

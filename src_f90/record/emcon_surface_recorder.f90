@@ -1,5 +1,5 @@
-!> The field file NAME.surfaces.vtkhdf of runs with contact in space: the faces of contact surfaces as
-!> cells, with what contact does to them, in the frames of NAME.vtkhdf.
+!> The field file NAME.surfaces.vtkhdf of runs with contact in space: the faces of contact surfaces
+!> as cells, with what contact does to them, in the frames of NAME.vtkhdf.
 !>
 !> A file of its own: as more cells of the mesh, faces would lie on those of elements and be drawn
 !> through each other.
@@ -9,7 +9,7 @@ module emcon_surface_recorder
    use emcon_errors, only : error_t
    use emcon_files, only : file_exists, file_remove
    use emcon_kinds, only : dp
-   use emcon_quantities, only : contact_field, node_quantity
+   use emcon_quantities, only : node_quantity
    use emcon_quantity_registry, only : at_contacts, quantity_row_of, quantity_row_t
    use emcon_stepper, only : stepper_t
    use emcon_text, only : string_t
@@ -111,8 +111,8 @@ contains
       if (.not. allocated(error)) call vtkhdf_end_frame(self%fields, error)
    end subroutine surface_recorder_write
 
-   !> What stays as it is, and is not written again: of points the node of the field file, from 0 on;
-   !> of faces surface and body, from 1 on.
+   !> What stays as it is, and is not written again: of points the node of the field file, from 0
+   !> on; of faces surface and body, from 1 on.
    subroutine write_once(self, stepper, error)
       type(surface_recorder_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
@@ -142,15 +142,14 @@ contains
       type(stepper_t), intent(inout) :: stepper
       type(face_values_t), intent(in) :: values
       type(error_t), allocatable, intent(out) :: error
-      real(dp), allocatable :: u(:, :), gap(:, :)
+      real(dp), allocatable :: u(:, :)
 
       allocate(u, source=node_quantity(stepper, "U"))
       call vtkhdf_write(self%fields, "displacement", u(:, self%faces%node), error)
       if (allocated(error)) return
       call vtkhdf_write(self%fields, "contact_pressure", values%at_node, error, .false.)
       if (allocated(error)) return
-      allocate(gap, source=contact_field(stepper, "CDIS"))
-      call vtkhdf_write(self%fields, "contact_gap", gap(:, self%faces%node), error, .false.)
+      call vtkhdf_write(self%fields, "contact_gap", values%gap_there, error, .false.)
    end subroutine write_points
 
    subroutine write_faces(self, values, error)

@@ -28,7 +28,8 @@ module emcon_mesh
       integer, allocatable :: element(:)             !! (n_face)
       integer, allocatable :: face(:)                !! (n_face) 1..n_face of the element kind
       integer, allocatable :: node(:)                !! (n_node), only if `is_nodal`
-      !> (2, n_edge) first and last nodes, the body to the left; only of a surface of edges
+      !> Only of a surface of edges: (2, n_edge) first and last nodes, the body to the left; of a
+      !> host in space (most, n_face) the nodes of faces in turn, seen from outside, behind them 0
       integer, allocatable :: edge(:, :)
    end type surface_t
 

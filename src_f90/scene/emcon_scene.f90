@@ -92,6 +92,7 @@ contains
       real(wp), intent(in) :: x(:, :)                !! (n_dim, n_node) reference positions [L]
       integer :: i
 
+      scene%n_dim = size(x, 1)
       scene%deck%heading = ""
       allocate(scene%x, source=x)
       allocate(scene%u0(size(x, 1), size(x, 2)), scene%v0(size(x, 1), size(x, 2)), source=0.0_wp)

@@ -18,7 +18,8 @@ contains
 
       allocate(all_nodes(0))
       if (allocated(surface%element)) call find_face_nodes(scene, surface, all_nodes)
-      if (allocated(surface%edge)) all_nodes = [all_nodes, surface%edge]
+      if (allocated(surface%edge)) all_nodes = [all_nodes, &
+         pack(surface%edge, surface%edge > 0)]
       if (allocated(surface%node)) all_nodes = [all_nodes, surface%node]
       node = unique_sorted(pack(all_nodes, all_nodes > 0))
    end subroutine surface_nodes

@@ -47,14 +47,15 @@ contains
    !> A nodal field called `name` has the right shape and is finite.
    pure subroutine check_field(name, field, scene, error)
       character(len=*), intent(in) :: name
-      real(wp), intent(in) :: field(:, :)                  !! (2, n_node)
+      real(wp), intent(in) :: field(:, :)                  !! (n_dim, n_node)
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
       integer :: i
 
       if (allocated(error)) return
       if (any(shape(field) /= shape(scene%x))) then
-         call raise(error, err_input, name // " is to have 2 components at each of " // &
+         call raise(error, err_input, name // " is to have " // &
+            to_text(size(scene%x, 1)) // " components at each of " // &
             to_text(size(scene%x, 2)) // " nodes, not " // to_text(size(field, 1)) // " at " // &
             to_text(size(field, 2)))
          return

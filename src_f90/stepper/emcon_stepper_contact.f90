@@ -43,7 +43,7 @@ contains
    subroutine query_begin_contact(self, stepper, u0, du, was_active, active, error)
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
       logical, intent(in) :: was_active(:)       !! (n_constraint) at the end of the step before
       logical, allocatable, intent(out) :: active(:)           !! (n_constraint)
       type(error_t), allocatable, intent(out) :: error
@@ -90,7 +90,7 @@ contains
    subroutine query_gaps(self, stepper, u0, du, gap, error)
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
       type(gap_state_t), allocatable, intent(out) :: gap(:)    !! (n_constraint)
       type(error_t), allocatable, intent(out) :: error
 
@@ -115,7 +115,7 @@ contains
    subroutine query_select(self, stepper, u0, du, active, error)
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
       logical, intent(in) :: active(:)           !! (n_constraint)
       type(error_t), allocatable, intent(out) :: error
       integer :: i
@@ -134,7 +134,7 @@ contains
    subroutine query_choose(self, stepper, u0, du, id, target, error)
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
       integer, intent(in) :: id(:)               !! (n) ascending, 1..n_constraint
       real(wp), intent(in) :: target(:)          !! (n) mean gaps [L]
       type(error_t), allocatable, intent(out) :: error
@@ -183,7 +183,7 @@ contains
    subroutine query_contact(self, stepper, u0, du, report, error)
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
       type(contact_report_t), intent(out) :: report
       type(error_t), allocatable, intent(out) :: error
 
@@ -200,15 +200,15 @@ contains
       magnitude)
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
       real(wp), intent(in) :: lam(:)             !! (n) of the selected constraints [M L/T^2]
       logical, intent(inout) :: active(:)        !! (n_constraint) the selected ones; the next ones
       logical, intent(out) :: is_done
       integer, intent(out) :: outcome            !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      real(wp), intent(in), optional :: magnitude(:, :)   !! (2, n_node) sum of |contributions| to
-                                                          !! the residual [M L/T^2]
-      real(wp) :: force(2, size(stepper%scene%x, 2))
+      !> (n_dim, n_node) sum of |contributions| to the residual [M L/T^2]
+      real(wp), intent(in), optional :: magnitude(:, :)
+      real(wp) :: force(size(stepper%scene%x, 1), size(stepper%scene%x, 2))
 
       is_done = .false.
       outcome = step_done
@@ -257,7 +257,7 @@ contains
    subroutine query_areas(self, stepper, u1, area, length, error)
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
-      real(wp), intent(in), contiguous :: u1(:, :)         !! (2, n_node) [L]
+      real(wp), intent(in), contiguous :: u1(:, :)         !! (n_dim, n_node) [L]
       real(wp), allocatable, intent(out) :: area(:)        !! (n_constraint) [L^2]
       real(wp), allocatable, intent(out) :: length(:)      !! (n_constraint) [L]
       type(error_t), allocatable, intent(out) :: error
@@ -282,7 +282,7 @@ contains
    subroutine query_overlap(self, stepper, u0, du, overlap, error)
       type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
-      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (2, n_node) [L]
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
       type(overlap_t), intent(out) :: overlap
       type(error_t), allocatable, intent(out) :: error
 

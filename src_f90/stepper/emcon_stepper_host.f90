@@ -1,9 +1,11 @@
-!> A model without solids, for a host code that has its own: nodes, surfaces as edges, pairs, ties.
+!> A model without solids, for a host code that has its own: nodes, surfaces as edges, in space as
+!> faces, pairs, ties.
 !>
 !> `stepper_new` in place of reading a deck; then surfaces, pairs, ties and held freedoms, and
 !> `stepper_build`. What the host then asks for in each step: emcon_stepper_contact. Nodes that no
 !> surface holds may be left out. Edges run with the body to the left, so the outward normal is the
-!> edge turned by -90 degrees. The plane has thickness 1. Rigid obstacles: surfaces of held nodes.
+!> edge turned by -90 degrees; faces run counter-clockwise seen from outside. The plane has
+!> thickness 1. Rigid obstacles: surfaces of held nodes.
 !> Source: docs/theory.md, sections 4, 5 and 11.
 module emcon_stepper_host
    use emcon_couplings, only : tie_t
@@ -11,6 +13,7 @@ module emcon_stepper_host
    use emcon_element_registry, only : element_kinds_create
    use emcon_errors, only : error_t
    use emcon_facets, only : facets_init, facets_t
+   use emcon_host_faces, only : host_faces_in_turn
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
       formulation_nts, integration_elements, integration_segments, multiplier_dual, &
       multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none
@@ -27,7 +30,8 @@ module emcon_stepper_host
    use emcon_text, only : to_text
    implicit none
    private
-   public :: stepper_new, stepper_add_surface, stepper_add_pair, stepper_add_tie, stepper_hold, &
+   public :: stepper_new, stepper_add_surface, stepper_add_faces, stepper_add_pair, &
+      stepper_add_tie, stepper_hold, &
       stepper_set_contact, stepper_tie_matrices
 
    !> Gauss points at most, as in a deck.
@@ -39,10 +43,12 @@ contains
    !> Begin with the nodes of the host.
    subroutine stepper_new(self, x, error)
       type(stepper_t), intent(out) :: self
-      real(wp), intent(in) :: x(:, :)                      !! (2, n_node) reference positions [L]
+      real(wp), intent(in) :: x(:, :)                      !! (n_dim, n_node) in the reference [L]
       type(error_t), allocatable, intent(out) :: error
 
+      call check_choice("n_dim", size(x, 1), 2, 3, error)
       call check_that(size(x, 2) > 0, "x has no nodes", error)
+      if (allocated(error)) return
       call scene_of_nodes(self%scene, x)
       call check_field("x", x, self%scene, error)
       if (allocated(error)) return
@@ -60,22 +66,50 @@ contains
       integer, intent(in) :: edge(:, :)                    !! (2, n_edge) first and last node
       integer, intent(out) :: surface                      !! its number, from 1
       type(error_t), allocatable, intent(out) :: error
-      type(surface_t) :: new
-      type(facets_t) :: facets
 
       surface = 0
       call check_stage(self, error)
       call check_edges(edge, self%scene%x, error)
-      if (allocated(error)) return
+      if (.not. allocated(error)) call add_facets(self, name, edge, surface, error)
+   end subroutine stepper_add_surface
+
+   !> Add a surface of faces of several kinds, in any order, in one or several connected parts, open
+   !> or closed: in space triangles and quadrilaterals, in the plane edges.
+   subroutine stepper_add_faces(self, name, kind, offset, node, surface, error)
+      type(stepper_t), intent(inout) :: self
+      character(len=*), intent(in) :: name                 !! for messages; empty: its number
+      integer, intent(in) :: kind(:)                       !! (n_face) as VTK numbers cells
+      integer, intent(in) :: offset(:)                     !! (n_face) nodes up to and with a face's
+      integer, intent(in) :: node(:)                       !! of all faces: of each corners first
+      integer, intent(out) :: surface                      !! its number, from 1
+      type(error_t), allocatable, intent(out) :: error
+      integer, allocatable :: facet(:, :)
+
+      surface = 0
+      call check_stage(self, error)
+      if (.not. allocated(error)) call host_faces_in_turn(kind, offset, node, self%scene%x, facet, &
+         error)
+      if (.not. allocated(error)) call add_facets(self, name, facet, surface, error)
+   end subroutine stepper_add_faces
+
+   subroutine add_facets(self, name, facet, surface, error)
+      type(stepper_t), intent(inout) :: self
+      character(len=*), intent(in) :: name
+      integer, intent(in) :: facet(:, :)                   !! (most, n_facet)
+      integer, intent(inout) :: surface
+      type(error_t), allocatable, intent(out) :: error
+      type(surface_t) :: new
+      type(facets_t) :: facets
+
       new%name = name
       if (name == "") new%name = to_text(size(self%scene%surface) + 1)
       allocate(new%element(0), new%face(0))
-      allocate(new%edge, source=edge)
+      allocate(new%edge, source=facet)
       call facets_init(facets, self%scene, new, error)
       if (allocated(error)) return
       self%scene%surface = [self%scene%surface, new]
       surface = size(self%scene%surface)
-   end subroutine stepper_add_surface
+   end subroutine add_facets
 
    !> Edges of a surface: existing nodes, and a length.
    pure subroutine check_edges(edge, x, error)
@@ -88,7 +122,7 @@ contains
          to_text(size(edge, 1)) // ", " // to_text(size(edge, 2)) // &
          "), not (2, n_edge) with n_edge > 0", error)
       call check_that(size(edge, 1) == size(x, 1), "surfaces of edges are of the plane, and " // &
-         "nodes have " // to_text(size(x, 1)) // " coordinates", error)
+         "nodes have " // to_text(size(x, 1)) // " coordinates: add faces", error)
       do i = 1, size(edge, 2)
          call check_choice("edge(1, " // to_text(i) // ")", edge(1, i), 1, size(x, 2), error)
          call check_choice("edge(2, " // to_text(i) // ")", edge(2, i), 1, size(x, 2), error)
@@ -111,6 +145,7 @@ contains
       call check_surfaces(self, slave, master, error)
       call check_choice("formulation", formulation, formulation_nts, formulation_mortar, error)
       call check_options(options, error)
+      if (self%scene%n_dim == 3) call check_space(slave == master, formulation, options, error)
       call check_apart(self, slave, master, error)
       if (allocated(error)) return
       pair%slave = slave
@@ -137,6 +172,22 @@ contains
       call check_number("smoothing_angle", options%smoothing_angle, error, 0.0_wp, half_turn)
    end subroutine check_options
 
+   !> In space contact is of nodes on faces as they are.
+   pure subroutine check_space(is_own, formulation, options, error)
+      logical, intent(in) :: is_own              !! a surface is its own master
+      integer, intent(in) :: formulation
+      type(contact_options_t), intent(in) :: options
+      type(error_t), allocatable, intent(inout) :: error
+
+      call check_that(formulation == formulation_nts, "formulation is " // &
+         to_text(formulation) // ": contact in three dimensions is node to segment (" // &
+         to_text(formulation_nts) // ")", error)
+      call check_that(.not. is_own, "a surface that is its own master is not in this version in " &
+         // "three dimensions", error)
+      call check_that(options%smoothing == smoothing_none, "smoothing is of the plane: surfaces " &
+         // "in three dimensions are taken as they are", error)
+   end subroutine check_space
+
    !> The two surfaces of a pair share no node.
    subroutine check_apart(self, slave, master, error)
       type(stepper_t), intent(in) :: self
@@ -149,8 +200,9 @@ contains
       if (slave == master .or. allocated(error)) return
       allocate(is_slave(size(self%scene%x, 2)), source=.false.)
       associate (one => self%scene%surface(slave), other => self%scene%surface(master))
-         is_slave([one%edge]) = .true.
-         allocate(node, source=[other%edge])
+         call surface_nodes(self%scene, one, node)
+         is_slave(node) = .true.
+         call surface_nodes(self%scene, other, node)
          i = findloc(is_slave(node), .true., 1)
          if (i > 0) call check_that(.false., "slave surface " // one%name // " and master " // &
             "surface " // other%name // " of a pair share node " // to_text(node(i)), error)
@@ -170,6 +222,8 @@ contains
       call check_surfaces(self, slave, master, error)
       call check_choice("multiplier", multiplier, multiplier_standard, multiplier_dual, error)
       call check_number("tolerance", tolerance, error)
+      call check_that(self%scene%n_dim == 2, "ties in three dimensions are not in this version", &
+         error)
       if (allocated(error)) return
       call check_that(slave /= master, "slave and master are both surface " // &
          self%scene%surface(slave)%name, error)
@@ -198,7 +252,7 @@ contains
    !> Freedoms that the host moves by itself; of several calls the last one counts.
    subroutine stepper_hold(self, held, error)
       type(stepper_t), intent(inout) :: self
-      logical, intent(in) :: held(:, :)                    !! (2, n_node)
+      logical, intent(in) :: held(:, :)                    !! (n_dim, n_node)
       type(error_t), allocatable, intent(out) :: error
       type(prescribed_t), allocatable :: list(:)
       integer :: d, i
@@ -239,7 +293,7 @@ contains
       if (is_end) self%scene%step(1)%scheme = scheme_row("STATIC", "")
    end subroutine stepper_set_contact
 
-   !> D and M of tie `tie`, over nodes: D x = M x in both directions. A row for each multiplier.
+   !> D and M of tie `tie`, over nodes: D x = M x in each direction. A row for each multiplier.
    subroutine stepper_tie_matrices(self, tie, d, m, error)
       type(stepper_t), intent(in) :: self
       integer, intent(in) :: tie                           !! from 1, in the order of the model

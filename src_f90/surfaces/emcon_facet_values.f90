@@ -36,7 +36,7 @@ contains
 
    !> Pressures at the nodes of a surface by their forces and areas. Uniform pressure loads corners
    !> and nodes between them unlike: where there are such nodes, facet by facet and then the mean of
-   !> the facets at a node; docs/theory.md, section 15.
+   !> the facets at a node.
    pure subroutine facets_pressures(self, force, area, pressure)
       type(facets_t), intent(in) :: self         !! set up, in space
       real(wp), intent(in) :: force(:)           !! (n_node) [M L/T^2]

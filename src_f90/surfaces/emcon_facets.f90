@@ -262,6 +262,7 @@ contains
       integer :: k
 
       text = "the edge"
+      if (self%n_dim == 3) text = "the face"
       if (self%element(f) > 0) text = "face S" // to_text(self%face(f)) // " of element " &
          // to_text(scene%element%label(self%element(f)))
       text = text // " (nodes "

@@ -101,8 +101,9 @@ static void without_model(void)
    TELL(emcon_follow(m, 1, x));
    TELL(emcon_gather(m, 1, x));
    TELL(emcon_get_tie_matrices(m, 0, &matrix, &matrix));
-   TELL(emcon_new(1, x, NULL));
+   TELL(emcon_new(1, 2, x, NULL));
    TELL(emcon_add_surface(m, NULL, 1, i, i));
+   TELL(emcon_add_faces(m, NULL, 1, i, i, 1, i, i));
    TELL(emcon_add_pair(m, 0, 1, EMCON_MORTAR, NULL));
    TELL(emcon_add_tie(m, 0, 1, EMCON_DUAL, -1));
    TELL(emcon_hold(m, 1, i));

@@ -91,8 +91,11 @@ static void ask(void)
    WORKS(emcon_get_pressures(m, n, pressure, gap));
    WORKS(emcon_get_pressures(m, n, NULL, gap));
    REFUSED(emcon_get_pressures(m, n + 1, pressure, gap));
-   WORKS(emcon_get_friction(m, n, pressure, NULL, gap, NULL));
-   REFUSED(emcon_get_friction(m, n - 1, pressure, NULL, gap, NULL));
+   double *shear = numbers(sizes.n_slip*n), *slip = numbers(sizes.n_slip*n);
+   WORKS(emcon_get_friction(m, n, shear, NULL, slip, NULL));
+   REFUSED(emcon_get_friction(m, n - 1, shear, NULL, slip, NULL));
+   free(shear);
+   free(slip);
    WORKS(emcon_get_pair_friction(m, sizes.n_pair, NULL));
    REFUSED(emcon_find_nodes(m, "no such set", sizes.n_node, is_in));
    need(strstr(emcon_message(m), "no such set") != NULL, "the message names the set");
@@ -131,6 +134,13 @@ static void look(void)
    WORKS(emcon_get_state(m, sizes.n_node, u, x));
    WORKS(emcon_set_state(m, sizes.n_node, u, x, 0, NULL, NULL, NULL));
    WORKS(emcon_gather(m, sizes.n_node, u));
+   double *total = numbers(sizes.n_pair_total*sizes.n_pair);
+   int *active = calloc((size_t)sizes.n_pair + 1, sizeof *active);
+   need(sizes.n_pair_total == (sizes.n_dim == 2 ? 7 : 13), "figures of a pair");
+   WORKS(emcon_get_pairs(m, sizes.n_pair, total, active));
+   REFUSED(emcon_get_pairs(m, sizes.n_pair + 1, total, active));
+   free(total);
+   free(active);
    free(momenta);
    free(x);
    free(u);

@@ -48,10 +48,10 @@ static emcon_model *face;
 
 static void refuse_to_build(double *x)
 {
-   REFUSED(emcon_new(INT_MAX, x, NULL));
+   REFUSED(emcon_new(INT_MAX, 2, x, NULL));
    for (int i = 0; i < n_wrong; ++i) {
       if (wrong[i] == 1000) continue;                    /* that is a number of nodes */
-      REFUSED(emcon_new(wrong[i], wrong[i] > 0 ? NULL : x, &face));
+      REFUSED(emcon_new(wrong[i], 2, wrong[i] > 0 ? NULL : x, &face));
       emcon_close(face);
    }
 }
@@ -62,7 +62,7 @@ static void build(int formulation)
    int *edge = integers(6, 0), *held = integers(2*n_node, 0), surface[4];
    for (int i = 0; i < 2*n_node; ++i) x[i] = scene[i];
    refuse_to_build(x);
-   WORKS(emcon_new(n_node, x, &face));
+   WORKS(emcon_new(n_node, 2, x, &face));
    for (int i = 0; i < 6; ++i) edge[i] = lower[i];
    WORKS(emcon_add_surface(face, "lower", 3, edge, &surface[0]));
    WORKS(emcon_add_surface(face, NULL, 2, upper, &surface[1]));
@@ -70,6 +70,8 @@ static void build(int formulation)
    WORKS(emcon_add_surface(face, "glued", 1, glued, &surface[3]));
    REFUSED(emcon_add_surface(face, "none", INT_MAX, NULL, NULL));
    REFUSED(emcon_add_surface(face, "none", INT_MIN, edge, NULL));
+   REFUSED(emcon_add_faces(face, "none", INT_MAX, NULL, NULL, 1, edge, NULL));
+   REFUSED(emcon_add_faces(face, "none", 1, edge, edge, INT_MIN, edge, NULL));
    REFUSED_ALL(n, emcon_add_pair(face, n, surface[0], formulation, NULL));
    WORKS(emcon_add_pair(face, surface[1], surface[0], formulation, NULL));
    WORKS(emcon_add_tie(face, surface[3], surface[2], EMCON_DUAL, -1));

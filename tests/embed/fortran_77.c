@@ -29,7 +29,7 @@ void emnew_(int *ih, const int *n, const double *x, int *ierr)
 {
    emcon_model *model;
 
-   *ierr = emcon_new(*n, x, &model);
+   *ierr = emcon_new(*n, 2, x, &model);
    ih[1] = 0;
    memcpy(ih, &model, sizeof model);
    ih[2] = word_of(ih);

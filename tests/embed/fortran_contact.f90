@@ -1,12 +1,12 @@
 !> Contact alone, for a program that has its own solids: surfaces as lists of edges, one step, and
-!> what each formulation gives for it.
+!> what each formulation gives for it; then the same in space, with surfaces as lists of faces.
 !>
 !> usage: fortran_contact
 program fortran_contact
    use emcon_api, only : contact_options_t, contact_report_t, csr_multiply, csr_product, csr_t, &
       dp, error_t, formulation_mortar, formulation_nts, formulation_segment, query_begin_contact, &
-      query_contact, query_free, query_null_space, query_select, query_t, stepper_add_pair, &
-      stepper_add_surface, stepper_build, stepper_close, stepper_hold, stepper_new, stepper_t, wp
+      query_contact, query_free, query_null_space, query_select, query_t, stepper_add_faces, &
+      stepper_add_pair, stepper_add_surface, stepper_build, stepper_close, stepper_hold, stepper_new, stepper_t, wp
    implicit none
    integer, parameter :: n_node = 6
    !> The floor from right to left and the body from left to right: each has its body to the left.
@@ -20,6 +20,7 @@ program fortran_contact
    do k = 1, size(formulation)
       call look_at(formulation(k))
    end do
+   call look_in_space()
 
 contains
 
@@ -67,6 +68,46 @@ contains
       call query_free(query)
       call stepper_close(stepper)
    end subroutine look_at
+
+   !> A triangle comes down on a quadrilateral that is held, and turns.
+   subroutine look_in_space()
+      type(stepper_t) :: stepper
+      type(query_t) :: query
+      type(contact_report_t) :: values
+      type(error_t), allocatable :: error
+      real(wp), parameter :: place(3, 7) = reshape([-1.0_wp, -1.0_wp, 0.0_wp, 2.0_wp, -1.0_wp, &
+         0.1_wp, 2.0_wp, 2.0_wp, 0.0_wp, -1.0_wp, 2.0_wp, 0.1_wp, 0.0_wp, 0.0_wp, 0.3_wp, &
+         1.0_wp, 0.1_wp, 0.3_wp, 0.2_wp, 0.9_wp, 0.3_wp], [3, 7])
+      real(wp) :: u0(3, 7), du(3, 7)
+      logical, allocatable :: active(:)
+      logical :: held(3, 7)
+      integer :: slave, master, i
+
+      call stepper_new(stepper, place, error)
+      if (.not. allocated(error)) call stepper_add_faces(stepper, "FLOOR", [9], [4], [1, 2, 3, 4], &
+         master, error)
+      if (.not. allocated(error)) call stepper_add_faces(stepper, "FOOT", [5], [3], [5, 7, 6], &
+         slave, error)
+      if (.not. allocated(error)) call stepper_add_pair(stepper, slave, master, formulation_nts, &
+         contact_options_t(), error)
+      held = .false.
+      held(:, :4) = .true.
+      if (.not. allocated(error)) call stepper_hold(stepper, held, error)
+      if (.not. allocated(error)) call stepper_build(stepper, error)
+      call require(error)
+      u0 = 0.0_wp
+      du = 0.0_wp
+      do i = 5, 7
+         du(:, i) = [-0.1_wp*place(2, i), 0.1_wp*place(1, i), -0.4_wp]
+      end do
+      call query_begin_contact(query, stepper, u0, du, [.true., .true., .true.], active, error)
+      if (.not. allocated(error)) call query_select(query, stepper, u0, du, active, error)
+      if (.not. allocated(error)) call query_contact(query, stepper, u0, du, values, error)
+      call require(error)
+      call report(query, values, du)
+      call query_free(query)
+      call stepper_close(stepper)
+   end subroutine look_in_space
 
    !> Number of constraints; largest change of a gap; by how much g . du differs from that; largest
    !> entry of P^T G^T.

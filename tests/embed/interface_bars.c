@@ -178,7 +178,7 @@ static void make_interface(host *h, int formulation)
    emcon_sizes sizes;
    int master, slave;
 
-   require(h, emcon_new(h->n_node, h->x, &h->face));
+   require(h, emcon_new(h->n_node, 2, h->x, &h->face));
    require(h, emcon_add_surface(h->face, "lower truss", 4, lower, &master));
    require(h, emcon_add_surface(h->face, "upper truss", 2, upper, &slave));
    require(h, emcon_add_pair(h->face, slave, master, formulation, NULL));

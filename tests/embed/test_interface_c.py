@@ -40,16 +40,16 @@ int main(void)
    emcon_constraint_report values;
 
    TELL(NULL, emcon_hold(NULL, 4, held));
-   TELL(face, emcon_new(-1, x, &face));
+   TELL(face, emcon_new(-1, 2, x, &face));
    emcon_close(face);
-   TELL(face, emcon_new(4, NULL, &face));
+   TELL(face, emcon_new(4, 2, NULL, &face));
    emcon_close(face);
    bad[5] = NAN;
-   TELL(face, emcon_new(4, bad, &face));
+   TELL(face, emcon_new(4, 2, bad, &face));
    TELL(face, emcon_add_surface(face, "any", 1, lower, &surface));
    TELL(face, emcon_build(face));
    emcon_close(face);
-   TELL(face, emcon_new(4, x, &face));
+   TELL(face, emcon_new(4, 2, x, &face));
    TELL(face, emcon_add_pair(face, 0, 1, EMCON_MORTAR, NULL));
    TELL(face, emcon_add_surface(face, NULL, 1, wrong, &surface));
    TELL(face, emcon_add_surface(face, NULL, 1, lower, &surface));

@@ -85,10 +85,11 @@ def test_hosts_in_two_threads_get_the_bits_that_they_get_alone() -> None:
 
 def test_the_example_of_the_docs(capsys: pytest.CaptureFixture[str]) -> None:
     text = (Path(__file__).parents[2]/"docs"/"embedding.md").read_text(encoding="utf-8")
-    (example,) = [block for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL)
-                  if "emcon.interface" in block]
-    exec(compile(example, "embedding.md", "exec"), {})
-    assert capsys.readouterr().out.endswith("(14, 10)\n")
+    examples = [block for block in re.findall(r"```python\n(.*?)```", text, re.DOTALL)
+                if "emcon.interface" in block]
+    for example, said in zip(examples, ("(14, 10)\n", "3 True\n"), strict=True):
+        exec(compile(example, "embedding.md", "exec"), {})
+        assert capsys.readouterr().out.endswith(said)
 
 
 # ---- gradients -----------------------------------------------------------------------------------
@@ -280,7 +281,7 @@ def test_geometry_finds_what_is_behind_an_outline() -> None:
 # ---- bad calls -----------------------------------------------------------------------------------
 
 BAD_NODES = [
-    (np.zeros((0, 2)), "no nodes"), (np.zeros((3, 3)), r"nodes .*\(3, 3\)"), ("text", "nodes"),
+    (np.zeros((0, 2)), "no nodes"), (np.zeros((3, 4)), r"nodes .*\(3, 4\)"), ("text", "nodes"),
     (5, "nodes"), ([[0, 0], [1, np.nan]], "nodes is not finite"), ([[0, 0], [1]], "nodes"),
     (np.array([[1j, 0]]), "nodes .*complex"),
 ]

@@ -14,6 +14,8 @@ from scene_tools import generated
 from test_interface_c import BAD_CALLS
 from test_space_arrays import deck, flight
 
+from contact_blocks import Pair, pressed   # whose folder is in the path by the tests before
+
 DECKS = ROOT/"input_decks"
 #: The programs, and the arguments of each of their runs; {} is a folder to write into.
 RUNS = [
@@ -23,6 +25,7 @@ RUNS = [
     # arrays of exactly the size that is asked for, of the plane and of space
     ("exact_arrays.c", DECKS/"contact_patch.inp"),
     ("exact_arrays.c", "{}/block.inp"),
+    ("exact_arrays.c", "{}/blocks.inp"),
     # of C and of Fortran 77: counts up to the largest integer are refused
     ("exact_interface.c",),
     ("query.c", DECKS/"bouncing_bar.inp"),
@@ -76,6 +79,7 @@ def all_in_one(folder: Path, env: dict[str, str]) -> list[object]:
     """The program of all programs, and its arguments."""
     (folder/"wrong_contact.c").write_text(BAD_CALLS)
     deck(folder, flight("C3D8"))
+    (folder/"blocks.inp").write_text(Pair(("C3D8", "C3D8"), (1, 2)).deck(pressed()))
     # Two nodes of the ring in contact, on the fewest elements.
     (folder/"ring.inp").write_text(generated("make_ring", "--ring", "32x2", "--block", "30x2"))
     files = list(dict.fromkeys(name for name, *_ in RUNS))

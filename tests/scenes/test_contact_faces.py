@@ -12,8 +12,9 @@ from scene_tools import EPSILON, ROOT, Deck, emcon, run_deck
 sys.path.insert(0, str(ROOT / "pywrap"))
 
 from emcon.animation import animate  # noqa: E402
-from emcon.results import FieldFile, locate, read_pairs  # noqa: E402
+from emcon.results import FieldFile, Results, locate, read_pairs  # noqa: E402
 from emcon.scene import read_scene  # noqa: E402
+from emcon.stepper import Stepper  # noqa: E402
 
 #: Round-off of a sum of contact forces, in units of epsilon times the sum of their sizes.
 NOISE = 8
@@ -317,3 +318,47 @@ def test_the_report_tells_what_surfaces_consist_of(kind, tmp_path):
     assert upper["feature_angle"] == 20
     assert (upper["free_sides"], lower["features"], lower["free_sides"]) == (0, 0, 12)
     assert lower["sharpest_degrees"] == lower["deepest_degrees"] == 0
+
+
+# ---- Python, and what output must not change ----------------------------------------------------
+
+
+def test_python_reads_the_faces(impact):
+    run, pair = impact
+    with Results(f"{run.base}.surfaces.vtkhdf") as results:
+        assert results.paths.base == run.base
+        faces = results.surfaces
+        node = faces.point("node", 0).astype(int)
+        for k in (0, 5, -1):
+            np.testing.assert_array_equal(
+                faces.point("displacement", k), results.fields["displacement"][k][node])
+            force = results.fields["contact_force"][k][pair.is_upper].sum(axis=0)
+            upper = faces.cell("body", k) == 1
+            np.testing.assert_allclose(faces.cell("contact_force", k)[upper].sum(axis=0), force,
+                                       atol=1e-12)
+
+
+def test_the_stepper_tells_what_pairs_transmit(impact):
+    run, _ = impact
+    pairs = read_pairs(locate(run.base))
+    with Stepper(run.file(".inp")) as stepper:
+        for k in range(12):
+            for i, total in enumerate(stepper.pairs()):
+                np.testing.assert_array_equal(total.slave[:3], pairs.force[k, i])
+                np.testing.assert_array_equal(total.slave[3:], pairs.moment[k, i])
+                np.testing.assert_array_equal(total.master[3:], pairs.master_moment[k, i])
+                assert total.length == pairs.length[k, i] and total.active == pairs.active[k, i]
+            np.testing.assert_array_equal(stepper.field("CF"),
+                                          FieldsOf(run.file(".vtkhdf")).point["contact_force"][k])
+            stepper.step()
+    assert np.abs(pairs.force[:12]).max() > 0
+
+
+def test_output_does_not_change_the_run(impact, tmp_path):
+    run, pair = impact
+    text = run.file(".inp").read_text()
+    first, last = text.index("*NODE FILE"), text.index("*END STEP")
+    for name, asked in (("nothing", "*NODE FILE, FREQUENCY=0\nU\n"),
+                        ("all", "*OUTPUT, FIELD\n*CONTACT OUTPUT, VARIABLE=ALL\n")):
+        other = run_deck(Deck(text[:first] + asked + text[last:], name), tmp_path)
+        assert other.digits() == run.digits()
