@@ -17,7 +17,8 @@ module emcon_start_gaps_space
 
    !> A node counts as over a surface so far beyond its end, per facet: rims meet rims.
    real(wp), parameter :: end_tol = 1.0e-3_wp
-   !> Nodes are near so far from a facet, by its length. Behind a closed surface they always are.
+   !> Nodes are near so far from a facet, by its length. Behind a closed surface they always are, in
+   !> front of any so far as ADJUST moves them.
    real(wp), parameter :: near_per_facet = 0.5_wp
    !> Surfaces face each other where the cosine of their normals is below minus this.
    real(wp), parameter :: least_facing = 0.25_wp
@@ -26,6 +27,7 @@ module emcon_start_gaps_space
       type(signed_distance_t), private :: master !! where it is at the start
       type(signed_foot_t), allocatable, private :: foot(:)   !! (n) as last measured
       real(wp), private :: pad = 0.0_wp          !! gaps are counted from it on [L]
+      real(wp), private :: reach = 0.0_wp        !! in front of the master nodes are near so far [L]
    contains
       procedure :: nearest
       procedure :: measure
@@ -54,6 +56,8 @@ contains
       self%n = size(self%node)
       self%is_self = pair%slave == pair%master
       self%pad = pair%interaction%offset
+      self%reach = self%pad + max(0.0_wp, pair%adjust%distance)
+      if (pair%adjust%set > 0) self%reach = huge(self%reach)
       self%place = [(i, i = 1, self%n)]
       allocate(self%duplicate(self%n), self%facet(self%n), source=0)
       allocate(self%doubt(self%n), source=0.0_wp)
@@ -112,7 +116,7 @@ contains
          state%gap1 = state%gap0
          state%is_over = foot%past <= end_tol*state%size
          state%is_near = abs(foot%distance) <= self%pad + near_per_facet*state%size .or. &
-            (self%is_closed .and. foot%distance < 0.0_wp)
+            merge(self%is_closed, foot%distance <= self%reach, foot%distance < 0.0_wp)
       end associate
    end function state_of
 
