@@ -13,7 +13,7 @@ module emcon_signed_distance_space
    implicit none
    private
    public :: signed_distance_t, signed_foot_t, signed_distance_init, signed_distance_find, &
-      signed_distance_to
+      signed_distance_reaches, signed_distance_to
 
    integer, parameter :: n_dim = 3, n_side = 3
 
@@ -35,6 +35,7 @@ module emcon_signed_distance_space
       real(wp), allocatable, private :: side_normal(:, :)    !! (3, sides) sums
       integer, allocatable, private :: side(:, :)            !! (3, n_simplex) number of each side
       logical, allocatable, private :: is_free_side(:), is_free_point(:)
+      real(wp), private :: low(n_dim), high(n_dim)           !! of all [L]
    end type signed_distance_t
 
 contains
@@ -60,6 +61,8 @@ contains
                   self%at(:, triangle(n_side, k)) - a))
             end associate
          end do
+         self%low = minval(low, n_dim - 1)
+         self%high = maxval(high, n_dim - 1)
          call box_tree_init(self%tree, low, high)
          call number_sides(triangle, self%side)
       end associate
@@ -141,14 +144,16 @@ contains
       angle = atan2(length(c), dot_product(a, b))
    end function angle
 
-   !> The nearest place of the surface, searched among all.
-   pure subroutine signed_distance_find(self, point, foot)
+   !> The nearest place of the surface, searched among all, or among those nearer than `within`.
+   pure subroutine signed_distance_find(self, point, foot, within)
       type(signed_distance_t), intent(in) :: self
       real(wp), intent(in) :: point(:)           !! (3) [L]
       type(signed_foot_t), intent(out) :: foot
+      real(wp), intent(in), optional :: within   !! > 0 [L]
       integer, allocatable :: guess(:)
       integer :: found(leaf_size), i, k, n
 
+      if (present(within)) foot%distance = within
       call box_tree_guess(self%tree, point, guess)
       do i = 1, size(guess)
          call take_nearer(self, guess(i), point, foot)
@@ -161,6 +166,14 @@ contains
          end do
       end do
    end subroutine signed_distance_find
+
+   !> Is a point in the box around the whole surface?
+   pure logical function signed_distance_reaches(self, point) result(reaches)
+      type(signed_distance_t), intent(in) :: self
+      real(wp), intent(in) :: point(:)           !! (3) [L]
+
+      reaches = all(point >= self%low .and. point <= self%high)
+   end function signed_distance_reaches
 
    !> The nearest place of triangle `k` alone.
    pure subroutine signed_distance_to(self, k, point, foot)

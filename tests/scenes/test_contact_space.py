@@ -107,7 +107,10 @@ def test_other_ways_to_hold(more: str, tmp_path: Path) -> None:
     assert run.verdict["verdict"] == "good"
     # Penetrations of an augmented Lagrangian up to its tolerance have done work.
     balance = 1.0e-6 if "AUGMENTED" in more else BALANCE
-    assert np.ptp(history["total"]) <= balance*history["total"].max()
+    if "ADMISSIBLE" in more:                     # what is stopped loses a part
+        assert np.diff(history["total"]).max() <= balance*history["total"].max()
+    else:
+        assert np.ptp(history["total"]) <= balance*history["total"].max()
     p, angular = moments(run, "px py pz"), moments(run, "lx ly lz")
     assert np.abs(p - p[0]).max() <= BALANCE*np.abs(p).max()
     assert np.abs(angular - angular[0]).max() <= BALANCE*np.abs(angular).max()
