@@ -7,7 +7,7 @@ module emcon_overlap_query_space
    use emcon_kinds, only : wp
    use emcon_outline_space, only : outline_space_init
    use emcon_overlap_query, only : overlap_query_t, overlap_t, passing, passing_thin
-   use emcon_overlap_space, only : overlap_space_find
+   use emcon_overlap_space, only : overlap_space_find, overlap_space_own
    use emcon_passages_space, only : passage_t, passages_find, way_t
    use emcon_scene, only : scene_t
    use emcon_triangles_space, only : triangles_init, triangles_place, triangles_t
@@ -78,7 +78,7 @@ contains
       call triangles_place(self%piece(p), x, u0, du, share)
    end subroutine overlap_query_place
 
-   !> What of piece `p` is inside piece `q`, both placed.
+   !> What of piece `p` is inside piece `q`, both placed; the same one: in itself.
    subroutine overlap_query_one_way(self, p, q, x, reach, overlap)
       class(overlap_query_space_t), intent(inout) :: self
       integer, intent(in) :: p, q                !! from 1
@@ -87,8 +87,11 @@ contains
       type(overlap_t), intent(inout) :: overlap  !! the deepest so far
 
       associate (unused_x => x)
-         if (p /= q) call overlap_space_find(self%piece(p), self%piece(q), reach, &
-            self%is_passing, overlap)
+         if (p == q) then
+            call overlap_space_own(self%piece(p), overlap)
+         else
+            call overlap_space_find(self%piece(p), self%piece(q), reach, self%is_passing, overlap)
+         end if
       end associate
    end subroutine overlap_query_one_way
 

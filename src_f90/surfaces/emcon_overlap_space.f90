@@ -3,14 +3,15 @@
 !>
 !> Source: docs/theory.md, section 4.15.
 module emcon_overlap_space
-   use emcon_inside_space, only : inside_confirm, inside_find, inside_nearest, inside_t
+   use emcon_inside_space, only : inside_confirm, inside_find, inside_nearest, &
+      inside_nearest_own, inside_own, inside_t
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : nearest_height, nearest_t
    use emcon_overlap_query, only : overlap_t, passing, passing_thin
    use emcon_triangles_space, only : triangle_at, triangles_t
    implicit none
    private
-   public :: overlap_space_find
+   public :: overlap_space_find, overlap_space_own
 
    !> Less than this behind a facet, by its length, is on it.
    real(wp), parameter :: aligned = sqrt(epsilon(1.0_wp))
@@ -32,16 +33,36 @@ contains
       logical, intent(in) :: is_passing          !! it is on the way, not at the end of a step
       type(overlap_t), intent(inout) :: overlap  !! the deepest so far
       type(inside_t) :: inside
+
+      call inside_find(inside, a, b, reach)
+      call take_deepest(inside, a, b, is_passing, overlap)
+   end subroutine overlap_space_find
+
+   !> What of `a` is inside itself.
+   subroutine overlap_space_own(a, overlap)
+      type(triangles_t), intent(in) :: a         !! placed
+      type(overlap_t), intent(inout) :: overlap  !! the deepest so far
+      type(inside_t) :: inside
+
+      call inside_own(inside, a, maxval(a%length))
+      call take_deepest(inside, a, a, .false., overlap)
+   end subroutine overlap_space_own
+
+   !> The deepest of all places that a look has found.
+   subroutine take_deepest(inside, a, b, is_passing, overlap)
+      type(inside_t), intent(inout) :: inside
+      type(triangles_t), intent(in) :: a, b
+      logical, intent(in) :: is_passing
+      type(overlap_t), intent(inout) :: overlap
       type(place_t), allocatable :: place(:)
       integer :: i, k
 
-      call inside_find(inside, a, b, reach)
       call find_places(inside, a, b, overlap%depth, place)
       do i = 1, size(place)
          k = maxloc(place%ratio, dim=1)
          if (.not. place(k)%ratio > overlap%depth) return
          ! Rounding may have led astray along edges: what is deep is asked again.
-         if (b%is_closed .and. place(k)%ratio > aligned) then
+         if (b%is_closed .and. place(k)%ratio > aligned .and. .not. inside%is_own) then
             if (.not. inside_confirm(inside, b, place(k)%at)) then
                place(k)%ratio = 0.0_wp
                cycle
@@ -54,7 +75,7 @@ contains
          call take(b, place(k), overlap)
          return
       end do
-   end subroutine overlap_space_find
+   end subroutine take_deepest
 
    !> All places that are inside by more than `least`, per length of the facet.
    subroutine find_places(inside, a, b, least, place)
@@ -73,7 +94,7 @@ contains
          associate (point => inside%point(i), before => inside%before)
             near = inside%near(point)
             if (near == 0 .and. before(point) > 0) near = inside%near(before(point))
-            call judge(node_of(a, point), a%at(:, point), near)
+            call judge(node_of(a, point), a%at(:, point), [point, point], near)
             inside%near(point) = near
          end associate
       end do
@@ -83,7 +104,7 @@ contains
                near = middle%near
                if (near == 0) near = inside%near(p)
                call judge(node_of(a, merge(p, q, middle%share < 0.5_wp)), &
-                  a%at(:, p) + middle%share*(a%at(:, q) - a%at(:, p)), near)
+                  a%at(:, p) + middle%share*(a%at(:, q) - a%at(:, p)), [p, q], near)
             end associate
          end associate
       end do
@@ -91,14 +112,18 @@ contains
 
    contains
 
-      subroutine judge(node, at, near)
-         integer, intent(in) :: node
+      subroutine judge(node, at, own, near)
+         integer, intent(in) :: node, own(2)
          real(wp), intent(in) :: at(3)
          integer, intent(inout) :: near          !! in: about the nearest triangle; out: it is
          type(place_t) :: new
 
          new = place_t(node, at)
-         call inside_nearest(inside, b, at, near, new%nearest)
+         if (inside%is_own) then
+            call inside_nearest_own(inside, b, at, own, near, new%nearest)
+         else
+            call inside_nearest(inside, b, at, near, new%nearest)
+         end if
          near = new%nearest%triangle
          new%ratio = depth_of(b, inside%pad, at, new%nearest) &
             /b%length(b%split%facet(new%nearest%triangle))
