@@ -411,7 +411,7 @@ contains
       end associate
       call check_near(error, record%area, area, tol, 1.0_wp, "areas")
       call check_near(error, record%shear_area, shear, tol, 1.0_wp, "areas of friction")
-      call check_near(error, record%total%length, total, tol, 1.0_wp, "lengths")
+      call check_near(error, record%total%covered, total, tol, 1.0_wp, "lengths")
    end subroutine check_areas
 
    !> A jump of each pair, of a slave node, the first one at the place of another, and two master
