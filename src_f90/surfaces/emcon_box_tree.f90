@@ -206,7 +206,8 @@ contains
 
       n = 0
       if (self%n_leaf == 0) k = 0
-      bound = (1.0_wp + rounding)*reach**2
+      bound = huge(bound)
+      if (reach < 0.5_wp*sqrt(huge(reach))) bound = (1.0_wp + rounding)*reach**2
       do while (k > 0)
          if (square_to(self%around(:, k), point) <= bound) then
             if (k < self%n_leaf) then
