@@ -101,8 +101,6 @@ def silent_arguments(path):
 
 # ---- literals of the plane ----------------------------------------------------------------------
 
-#: Rooms where what is of three dimensions by nature ends in `_space`: a 2 there is a second of three.
-SOLID = {"dgrad", "elements", "laws", "solid", "surfaces"}
 
 # A 2 here counts or names what it says itself: a dimension of an array, a pass, a power,
 # a constant of a law, a figure of a record.
@@ -126,7 +124,7 @@ PLANAR = re.compile(
 
 def planar_literals(path):
     """(line, statement) of lines where a 2 is an extent or a component of the plane."""
-    if path.stem.endswith("_plane") or (path.stem.endswith("_space") and path.parent.name in SOLID):
+    if path.stem.endswith(("_plane", "_space")):
         return
     for number, line in enumerate(path.read_text().splitlines(), 1):
         code = STRING.sub('""', line).partition("!")[0].strip()
@@ -140,15 +138,16 @@ def planar_literals(path):
 SURFACED = ("scene deck space solid surfaces touch contact terms system prepare state solve "
             "active march results stepper record border app").split()  # fmt: skip
 WORD = re.compile(r"\b(?:[a-z]\w*_)?(?:chain|corner|edge|arc|outline)s?(?:_\w+)?\b", re.I)
-# Corners of elements and facets are there in space, too; those of an amplitude are instants.
+# Corners of elements and of facets are there in space, too; those of an amplitude are instants.
 ELSEWHERE = re.compile(
-    r"\b(?:(?:self|facets)%corner|n_corner|amplitude_corners|\w*grid_corner_t|march_next_corner|step%time%corner)\b", re.I
+    r"\b(?:n_corner|amplitude_corners|\w*grid_corner_t|march_next_corner|step%time%corner"
+    r"|(?:self|facets|split)%corner|allocatable :: corner)\b", re.I
 )
 
 
 def planar_words(path):
     """(line, statement) of lines that name a chain, a corner, an edge, an arc or an outline."""
-    if path.stem.endswith("_plane") or (path.stem.endswith("_space") and path.parent.name in SOLID):
+    if path.stem.endswith(("_plane", "_space")):
         return
     for number, line in enumerate(path.read_text().splitlines(), 1):
         code = STRING.sub('""', line).partition("!")[0].strip()

@@ -215,7 +215,7 @@ contains
       integer :: pair, left
 
       call phase_enter(system%phases, phase_gaps, left)
-      if (size(system%contact) > 0) call motion_bound_add(self%motion_bound, motion%u0)
+      call motion_bound_add(self%motion_bound, motion%u0)
       self%start%was_active = state%contacts%is_active
       self%start%lam0 = state%contacts%lam
       self%penalty%closure = state%contacts%closure

@@ -8,7 +8,7 @@
 module emcon_contact_support
    use emcon_constraint, only : condition_rate
    use emcon_constraints, only : constraint_set_t
-   use emcon_first_touch_plane, only : touch_time
+   use emcon_first_touch, only : touch_time
    use emcon_free_motions, only : find_assemblies, find_free_motions
    use emcon_contact_support_gaps, only : gaps_evaluate, gaps_keep_closed, gaps_measure, &
       gaps_nearest, gaps_next_guards, gaps_next_to_close, gaps_of_guards, gaps_that_can_act, &

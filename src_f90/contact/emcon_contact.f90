@@ -6,6 +6,7 @@ module emcon_contact
    use emcon_constraint, only : condition_normal, condition_t, constraint_t
    use emcon_contact_law, only : contact_laws_t
    use emcon_evaluation, only : evaluation_is_at_start, evaluation_is_equilibrium
+   use emcon_guards, only : overlap_bar, touching_bar
    use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
    use emcon_midside_plane, only : midside_distribute, midside_points, midside_stretch, midside_t
@@ -93,6 +94,7 @@ module emcon_contact
       procedure :: pressures
       procedure :: mean_gap
       procedure :: could_hold
+      procedure :: lets_in
       ! To be called, with the displacements of nodes:
       procedure, non_overridable :: begin_step
       procedure, non_overridable :: measure
@@ -374,6 +376,13 @@ contains
 
       could_hold = .false.
    end function could_hold
+
+   !> So far, by the edge, it lets bodies into each other that it holds.
+   pure real(wp) function lets_in(self)
+      class(contact_t), intent(in) :: self
+
+      lets_in = merge(overlap_bar, touching_bar, self%slack > 0.0_wp)
+   end function lets_in
 
    !> As `constraint_t` has it: second derivatives are by the end of the step. Conditions hold at
    !> that end, and work over the whole step, wherever in it a scheme evaluates forces, or push

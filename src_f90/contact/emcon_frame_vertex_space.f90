@@ -1,6 +1,6 @@
 !> Where a point is in a frame of two vectors: its affine coordinates and its height, over a step.
 !>
-!> Source: docs/theory.md, section 2 and eq. (60).
+!> Source: docs/theory.md, section 2 and eq. (43).
 module emcon_frame_vertex_space
    use emcon_dgrad9, only : dg_affine, dg_height, dg_t, difference, difference_t
    use emcon_dgrad9_first, only : affine_first => dg_affine, dg_first_t => dg_t, &

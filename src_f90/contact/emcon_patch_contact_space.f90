@@ -1,4 +1,5 @@
-!> Contact of nodes in space: one constraint per slave node, the gap of a small patch around it.
+!> Contact of nodes in space: one constraint per frame of a slave node, the gap of a small patch
+!> around it. A node of a smooth surface has one frame, one of a corner has several.
 !>
 !> The patch moves with the slave's surface, and its gap is the mean over what it covers of the
 !> master: smooth while the node slides over sides and corners. Source: docs/theory.md, section 15.
@@ -11,11 +12,13 @@ module emcon_patch_contact_space
    use emcon_errors, only : err_input, error_t, raise
    use emcon_facet_values, only : facets_pressed_areas, facets_pressures
    use emcon_facets, only : facets_init, facets_normal
-   use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach
+   use emcon_guards, only : crossing_bar, overlap_bar
+   use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach, &
+      pair_has_order
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
    use emcon_patch_gap_space, only : patch_ahead, patch_gap, patch_gap_t, patch_means, patch_way
-   use emcon_patch_sides_space, only : node_frames_init, patch_sides_t, triangles_init
+   use emcon_patch_sides_space, only : node_frames_init, patch_sides_t, patch_triangles_init
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
       patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
@@ -34,7 +37,7 @@ module emcon_patch_contact_space
 
    type, extends(contact_t) :: patch_contact_t
       type(patch_sides_t) :: sides
-      logical :: both_sides = .false.                 !! this and another hold all nodes
+      logical :: holds_all = .false.                  !! all nodes, with one that is its reverse
       type(near_list_t) :: near
       type(position_memo_t) :: memo                   !! of the nodes as stencils were chosen:
       real(wp) :: chosen_reach = 0.0_wp               !! among facets up to there [L]
@@ -52,6 +55,7 @@ module emcon_patch_contact_space
       procedure :: share => patch_share
       procedure :: mean_gap => patch_mean_gap
       procedure :: could_hold => patch_could_hold
+      procedure :: lets_in => patch_lets_in
    end type patch_contact_t
 
 contains
@@ -62,7 +66,6 @@ contains
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       type(error_t), allocatable, intent(out) :: error
-      integer :: i
 
       associate (sides => self%sides)
          call facets_init(sides%slave, scene, scene%surface(pair%slave), error)
@@ -77,21 +80,21 @@ contains
          call facets_init(sides%master, scene, scene%surface(pair%master), error)
          if (allocated(error)) return
          call node_frames_init(sides%frames, sides%slave, scene%x)
-         call triangles_init(sides%triangles, sides%master, scene%x)
-         self%node = sides%slave%node
+         call patch_triangles_init(sides%triangles, sides%master, scene%x)
+         self%node = sides%slave%node(sides%frames%node)
          self%n_constraint = size(self%node)
          allocate(self%duplicate(self%n_constraint), source=0)
          allocate(self%state(self%n_constraint), self%stencil(self%n_constraint))
          allocate(self%scale(self%n_constraint), source=1.0_wp)
          allocate(self%cover(self%n_constraint), self%sagitta(self%n_constraint), source=0.0_wp)
-         self%thickness = sqrt(sides%frames%area)
-         call near_list_init(self%near, reshape(self%node, [1, self%n_constraint]), &
+         self%thickness = sqrt(sides%frames%area(sides%frames%node))
+         call near_list_init(self%near, reshape(sides%slave%node, [1, size(sides%slave%node)]), &
             sides%master%facet, scene%x, scene%u0, pair%interaction%offset &
             + interaction_reach(pair%interaction))
-         self%state%other_size = [(sides%frames%size(i), i = 1, self%n_constraint)]
+         self%state%other_size = sides%frames%size(sides%frames%node)
       end associate
-      self%both_sides = pair%both_sides
-      if (self%both_sides) self%area_factor = 0.5_wp
+      self%holds_all = .not. pair_has_order(pair)
+      if (self%holds_all) self%area_factor = 0.5_wp
       self%may_leave = .true.
       self%slack = pair%slack
       self%offset = pair%interaction%offset
@@ -106,7 +109,7 @@ contains
       type(contact_options_t), intent(in) :: options
    end subroutine patch_configure
 
-   !> Choose for each slave node what its patch may see in the step. From the same start and up to
+   !> Choose for each frame what its patch may see in the step. From the same start and up to
    !> the same reach the choice is the same.
    pure subroutine patch_begin_step(self, x, u0, du)
       class(patch_contact_t), intent(inout) :: self
@@ -123,9 +126,11 @@ contains
       self%chosen_reach = self%reach
       associate (list => self%near%candidates)
          do i = 1, self%n_constraint
-            associate (of => list%facet(list%start(i):list%start(i + 1) - 1))
-               facet = pack(of, [(near_list_within(self%near, i, of(k), x, u0, self%reach), &
-                  k = 1, size(of))])
+            associate (item => self%sides%frames%node(i))
+               associate (of => list%facet(list%start(item):list%start(item + 1) - 1))
+                  facet = pack(of, [(near_list_within(self%near, item, of(k), x, u0, self%reach), &
+                     k = 1, size(of))])
+               end associate
             end associate
             call patch_stencil_choose(self%stencil(i), self%sides, i, facet, x, u0)
          end do
@@ -138,12 +143,12 @@ contains
       integer :: i
 
       do i = 1, self%n_constraint
-         call measure_node(self, i, x, u0, du)
+         call measure_frame(self, i, x, u0, du)
       end do
    end subroutine patch_measure
 
-   !> The gap of node `i` at both ends of the step, and what of its patch is covered.
-   pure subroutine measure_node(self, i, x, u0, du)
+   !> The gap of frame `i` at both ends of the step, and what of its patch is covered.
+   pure subroutine measure_frame(self, i, x, u0, du)
       type(patch_contact_t), intent(inout) :: self
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
@@ -161,7 +166,7 @@ contains
          self%scale(i) = max(cover(0), least)
          if (self%step%is_penalty) least = no_cover
          state%size = stencil%size
-         state%other_size = self%sides%frames%size(i)
+         state%other_size = self%sides%frames%size(self%sides%frames%node(i))
          state%is_near = maxval(cover) > no_cover
          state%is_over = cover(1) >= least .or. (self%step%is_penalty .and. cover(0) >= least)
          state%is_leaving = .not. state%is_over
@@ -176,8 +181,9 @@ contains
          if (cover(1) >= least) state%gap1 = height(1)/cover(1) - self%offset
          if (self%slack > 0.0_wp) state%closed = -self%slack*min(state%size, state%other_size)
          self%cover(i) = cover(1)
+         if (state%gap0 < -stencil%deepest - self%offset) state = gap_state_t()
       end associate
-   end subroutine measure_node
+   end subroutine measure_frame
 
    pure subroutine patch_evaluate(self, wanted, x, u0, du, target, item)
       class(patch_contact_t), intent(inout) :: self
@@ -188,12 +194,12 @@ contains
       integer :: k
 
       do k = 1, size(wanted)
-         call evaluate_node(self, wanted(k), x, u0, du, target(k) + self%offset, item(k))
+         call evaluate_frame(self, wanted(k), x, u0, du, target(k) + self%offset, item(k))
       end do
    end subroutine patch_evaluate
 
-   !> The condition of node `i`.
-   pure subroutine evaluate_node(self, i, x, u0, du, target, item)
+   !> The condition of frame `i`.
+   pure subroutine evaluate_frame(self, i, x, u0, du, target, item)
       type(patch_contact_t), intent(in) :: self
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
@@ -223,7 +229,7 @@ contains
             call spread_to_nodes(gap, stencil%weight(row, column(:n)), 1.0_wp/self%scale(i), item)
          end associate
       end associate
-   end subroutine evaluate_node
+   end subroutine evaluate_frame
 
    !> Derivatives by nodes from those by sums of nodes.
    pure subroutine spread_to_nodes(gap, weight, factor, item)
@@ -279,19 +285,20 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
       real(wp), intent(out) :: length(:)         !! (n_constraint) by their thickness [L]
-      real(wp) :: normal(3)
+      real(wp) :: normal(3), of_node(size(self%sides%slave%node))
       integer :: f, n
 
-      area = 0.0_wp
+      of_node = 0.0_wp
       associate (slave => self%sides%slave)
          do f = 1, slave%n_facet
             n = count(slave%corner(:, f) > 0)
             normal = facets_normal(slave, f, x, u)
             associate (to => slave%corner(:n, f))
-               area(to) = area(to) + sqrt(dot_product(normal, normal))/real(n, wp)
+               of_node(to) = of_node(to) + sqrt(dot_product(normal, normal))/real(n, wp)
             end associate
          end do
       end associate
+      area = of_node(self%sides%frames%node)
       length = area/self%thickness
    end subroutine patch_area
 
@@ -335,7 +342,14 @@ contains
       class(patch_contact_t), intent(in) :: self
       logical, intent(in) :: is_loose(:)         !! (n_constraint) it is not held, and goes in
 
-      could_hold = self%both_sides .and. any(is_loose)
+      could_hold = self%holds_all .and. any(is_loose)
    end function patch_could_hold
+
+   !> Nodes are held, edges cross between them.
+   pure real(wp) function patch_lets_in(self) result(lets_in)
+      class(patch_contact_t), intent(in) :: self
+
+      lets_in = merge(overlap_bar, crossing_bar, self%slack > 0.0_wp .or. .not. self%holds_all)
+   end function patch_lets_in
 
 end module emcon_patch_contact_space

@@ -1,7 +1,7 @@
 !> The mean height of a surface of triangles over a small one, the patch, that moves with a node.
 !>
 !> The field over the frame of the patch is continuous, so its integral is smooth while the patch
-!> slides over sides and corners of the triangles. Source: docs/theory.md, eqs. (60) to (66).
+!> slides over sides and corners of the triangles. Source: docs/theory.md, eqs. (43) to (49).
 module emcon_patch_gap_space
    use emcon_frame_vertex_space, only : at_eta, at_height, frame_place, frame_vertex, &
       frame_vertex_t, n_frame_var
@@ -25,9 +25,9 @@ module emcon_patch_gap_space
    type :: patch_t
       integer :: n_vertex = 0
       integer :: n_triangle = 0
-      integer, allocatable :: triangle(:, :)     !! (3, >= n_triangle) counter-clockwise in the frame
-      real(wp), allocatable :: chi(:)            !! (>= n_vertex) 1, or 0 where the surface has ended
-      real(wp) :: length = 0.0_wp                !! of the sides of the patch, in vectors of the frame
+      integer, allocatable :: triangle(:, :)     !! (3, >= n_triangle) counter-clockwise
+      real(wp), allocatable :: chi(:)            !! (>= n_vertex) 1; 0 where the surface ends
+      real(wp) :: length = 0.0_wp                !! of the patch' sides, in the frame's vectors
    end type patch_t
 
    !> The integral of chi (height - target) over the patch by its area, over a step.
@@ -48,7 +48,7 @@ module emcon_patch_gap_space
       real(wp) :: moment(3, 0:1) = 0.0_wp        !! over the part of the patch that it covers
       real(wp) :: value(3, 0:1) = 0.0_wp         !! its field at the corners of the patch [L]
       real(wp) :: slope(2, 0:1) = 0.0_wp         !! of the field [L]
-      real(wp) :: share(3, 3) = 0.0_wp           !! (j, v) of its corner j at v, of the mean triangle
+      real(wp) :: share(3, 3) = 0.0_wp           !! (j, v) of its corner j at v, in the mean
       real(wp) :: part(3) = 0.0_wp               !! of the integral that each corner takes
    end type field_t
 
@@ -203,7 +203,7 @@ contains
       field = found(:n)
    end subroutine choose_fields
 
-   !> The sum over triangles, docs/theory.md, eqs. (64) and (65).
+   !> The sum over triangles, docs/theory.md, eqs. (46) and (47).
    pure subroutine add_up(chi, target, at, field, leaves_second, gap)
       real(wp), intent(in) :: chi(:), target     !! (n_vertex); [L]
       type(frame_vertex_t), intent(in) :: at(:)  !! (n_vertex)
@@ -237,7 +237,7 @@ contains
    end subroutine add_up
 
    !> What the gradient lacks, put on the ways of the vertices, each by what it has to do with the
-   !> patch: docs/theory.md, eq. (66).
+   !> patch: docs/theory.md, eq. (48).
    pure subroutine close_sum(at, field, closing)
       type(frame_vertex_t), intent(in) :: at(:)
       type(field_t), intent(in) :: field(:)

@@ -2,7 +2,7 @@
 !> change with the corners.
 !>
 !> Places are given by coordinates y in which the patch is 0 <= y1, y2, y1 + y2 <= 1.
-!> Source: docs/theory.md, eqs. (63) and (65).
+!> Source: docs/theory.md, eqs. (45) and (49).
 module emcon_patch_moments_space
    use emcon_kinds, only : wp
    implicit none
@@ -21,7 +21,7 @@ contains
 
    !> Do they have no area in common, as one side of either shows?
    pure logical function patch_misses(corner)
-      real(wp), intent(in) :: corner(2, 3)
+      real(wp), intent(in) :: corner(2, 3)       !! of the triangle
 
       patch_misses = any(maxval(corner, 2) <= 0.0_wp) .or. minval(sum(corner, 1)) >= 1.0_wp
    end function patch_misses
@@ -150,7 +150,7 @@ contains
    !> The barycentric coordinates of place `y` in a triangle, also outside of it.
    pure function barycentric(corner, y) result(share)
       real(wp), intent(in) :: corner(2, 3)       !! not on one line
-      real(wp), intent(in) :: y(2)
+      real(wp), intent(in) :: y(2)               !! in the same coordinates
       real(wp) :: share(3)
       real(wp) :: d(2, 3)
 

@@ -13,7 +13,7 @@ module emcon_patch_sides_space
    use emcon_sort, only : unique_sorted
    implicit none
    private
-   public :: node_frames_t, node_frames_init, triangles_t, triangles_init, patch_sides_t
+   public :: node_frames_t, node_frames_init, patch_triangles_t, patch_triangles_init, patch_sides_t
    public :: sides_point
 
    !> The second vector of a frame is turned by 60 degrees: the patch is an equilateral triangle.
@@ -24,8 +24,10 @@ module emcon_patch_sides_space
    !> Frames of nodes: vectors a and b that are sums of weight times (x(ring) - x(node)), lengths as
    !> in the reference.
    type :: node_frames_t
-      integer, allocatable :: start(:)           !! (n_node + 1) frames of each node
-      integer, allocatable :: ring_start(:)      !! (n_frame + 1)
+      integer :: n = 0                           !! frames of all nodes
+      integer, allocatable :: start(:)           !! (n_node + 1) first frame of each node
+      integer, allocatable :: node(:)            !! (n) index of the node of each frame
+      integer, allocatable :: ring_start(:)      !! (n + 1)
       integer, allocatable :: ring(:)            !! nodes of the scene
       real(wp), allocatable :: weight(:, :)      !! (2, size of `ring`) in a, in b
       real(wp), allocatable :: size(:)           !! (n_node) mean length of facets there [L]
@@ -33,30 +35,30 @@ module emcon_patch_sides_space
    end type node_frames_t
 
    !> The triangles of a surface in space.
-   type :: triangles_t
+   type :: patch_triangles_t
       type(facet_split_t) :: split
       integer, allocatable :: beyond(:, :)       !! (3, n) triangle beyond each side; 0: none
       logical, allocatable :: is_ridge(:, :)     !! (3, n) the surface is sharp or ends at the side
       integer, allocatable :: around_start(:)    !! (n_point + 1) triangles at each point:
       integer, allocatable :: around(:)          !! around_start(i) to around_start(i + 1) - 1
       real(wp), allocatable :: size(:)           !! (n) length of the facet of each [L]
-   end type triangles_t
+   end type patch_triangles_t
 
    type :: patch_sides_t
       type(facets_t) :: slave
       type(facets_t), allocatable :: master      !! gfortran 12 loses a second one of its kind
       type(node_frames_t) :: frames              !! of the slave
-      type(triangles_t) :: triangles             !! of the master
+      type(patch_triangles_t) :: triangles             !! of the master
    end type patch_sides_t
 
 contains
 
-   !> The nodes of a point of the master and their weights: a node is itself, a centre is made of the
-   !> nodes of its facet.
+   !> The nodes of a point of the master and their weights: a node is itself, a centre is made
+   !> of the nodes of its facet.
    pure subroutine sides_point(self, point, n, node, weight)
       type(patch_sides_t), intent(in) :: self
       integer, intent(in) :: point               !! of the split
-      integer, intent(out) :: n
+      integer, intent(out) :: n                  !! number of nodes
       integer, intent(out) :: node(:)            !! (>= nodes of a facet) of the scene
       real(wp), intent(out) :: weight(:)         !! the same; of sum 1
       integer :: f
@@ -117,10 +119,12 @@ contains
                /real(count(facets%corner(:, facets%around(g)) > 0), wp), g = first, last)])
          end associate
       end do
+      self%n = self%start(size(facets%node) + 1) - 1
+      self%node = [((i, g = self%start(i), self%start(i + 1) - 1), i = 1, size(facets%node))]
    end subroutine node_frames_init
 
    !> Add the frame of the facets `facet` at node `i`, if they have a mean normal: docs/theory.md,
-   !> eq. (61).
+   !> eq. (44).
    pure subroutine add_frame(self, facets, x, still, i, facet, ring)
       type(node_frames_t), intent(inout) :: self
       type(facets_t), intent(in) :: facets
@@ -162,40 +166,48 @@ contains
    end subroutine add_frame
 
    !> The triangles of a surface.
-   pure subroutine triangles_init(self, facets, x)
-      type(triangles_t), intent(out) :: self
+   pure subroutine patch_triangles_init(self, facets, x)
+      type(patch_triangles_t), intent(out) :: self
       type(facets_t), intent(in) :: facets       !! in space
       real(wp), intent(in) :: x(:, :)            !! (3, n_node of the scene) reference [L]
-      real(wp), allocatable :: turns(:, :)
-      integer :: f, k, n, t
+      integer :: t
 
       call facet_split_init(self%split, facets)
+      call find_beyond(self, facets, x)
+      associate (split => self%split, n => size(self%split%facet))
+         self%size = [(facets_length(facets, split%facet(t)), t = 1, n)]
+         call csr_list_users(split%n_point, [(1 + 3*t, t = 0, n)], reshape(split%corner, [3*n]), &
+            self%around_start, self%around)
+      end associate
+      self%around_start = self%around_start + 1
+   end subroutine patch_triangles_init
+
+   !> What is beyond each side of the triangles. The first side of one with a centre is a side of
+   !> its facet, beyond the others are the triangles after and before it.
+   pure subroutine find_beyond(self, facets, x)
+      type(patch_triangles_t), intent(inout) :: self
+      type(facets_t), intent(in) :: facets
+      real(wp), intent(in) :: x(:, :)
+      real(wp), allocatable :: turns(:, :)
+      integer :: f, k, t
+
       call find_turns(facets, x, turns)
-      n = size(self%split%facet)
-      allocate(self%beyond(3, n), source=0)
-      allocate(self%is_ridge(3, n), source=.false.)
-      allocate(self%size(n))
-      do t = 1, n
+      allocate(self%beyond(3, size(self%split%facet)), source=0)
+      allocate(self%is_ridge(3, size(self%split%facet)), source=.false.)
+      do t = 1, size(self%split%facet)
          f = self%split%facet(t)
-         self%size(t) = facets_length(facets, f)
          associate (first => self%split%start(f), m => &
                self%split%start(f + 1) - self%split%start(f))
             if (m == 1) then
-               do k = 1, 3
-                  self%beyond(k, t) = across(f, k)
-                  self%is_ridge(k, t) = is_ridge(turns(k, f))
-               end do
+               self%beyond(:, t) = [(across(f, k), k = 1, 3)]
+               self%is_ridge(:, t) = abs(turns(:3, f)) > ridge_angle
             else
                k = t - first + 1
-               self%beyond(1, t) = across(f, k)
-               self%is_ridge(1, t) = is_ridge(turns(k, f))
-               self%beyond(2:3, t) = first + [mod(k, m), mod(k - 2 + m, m)]
+               self%beyond(:, t) = [across(f, k), first + mod(k, m), first + mod(k - 2 + m, m)]
+               self%is_ridge(1, t) = abs(turns(k, f)) > ridge_angle
             end if
          end associate
       end do
-      call csr_list_users(self%split%n_point, [(1 + 3*t, t = 0, n)], &
-         reshape(self%split%corner, [3*n]), self%around_start, self%around)
-      self%around_start = self%around_start + 1
 
    contains
 
@@ -216,13 +228,6 @@ contains
          end do
       end function across
 
-      !> Does a surface end for a patch that goes over a side at which it turns by so much?
-      pure logical function is_ridge(angle)
-         real(wp), intent(in) :: angle           !! [degrees]; huge: nothing is beyond
-
-         is_ridge = abs(angle) > ridge_angle
-      end function is_ridge
-
-   end subroutine triangles_init
+   end subroutine find_beyond
 
 end module emcon_patch_sides_space

@@ -5,6 +5,7 @@
 module emcon_patch_stencil_space
    use emcon_element_kind, only : max_face_nodes
    use emcon_kinds, only : wp
+   use emcon_nearest_space, only : nearest_t, nearest_update
    use emcon_patch_gap_space, only : patch_t
    use emcon_patch_sides_space, only : patch_sides_t, sides_point
    use emcon_rotation, only : cross_product
@@ -19,14 +20,17 @@ module emcon_patch_stencil_space
    real(wp), parameter :: patch_size = 0.1_wp
    !> Where a surface ends it goes on by this part of a facet, and fades on it.
    real(wp), parameter :: flange = 0.2_wp
+   !> A node is behind a triangle by no more than so many of its distances, and this by the facet.
+   real(wp), parameter :: distances = 2.0_wp, room_behind = 0.2_wp
    !> Triangles at distances that differ by less than this, per facet, are as near.
    real(wp), parameter :: as_near = 1.0e-6_wp
 
-   !> The patch of one node for a step, and its vertices as sums of nodes.
+   !> The patch of one frame for a step, and its vertices as sums of nodes.
    type :: patch_stencil_t
       integer :: triangle = 0                    !! nearest of the master; 0: none near
       type(patch_t) :: patch
       real(wp) :: size = 0.0_wp                  !! length of its facet [L]
+      real(wp) :: deepest = 0.0_wp               !! farther behind is another side of the body [L]
       integer :: n_node = 0
       integer :: n_slave = 0                     !! nodes 1..n_slave are of the frame
       integer, allocatable :: point(:)           !! (>= n_vertex) of the master; < 0: of a flange
@@ -47,29 +51,33 @@ module emcon_patch_stencil_space
 
 contains
 
-   !> Choose the stencil of node `i` of the slave at x + u, where the facets `facet` of the master are
-   !> near: the frame that faces the nearest triangle, and what hangs together with that and faces
-   !> the frame too.
-   pure subroutine patch_stencil_choose(self, sides, i, facet, x, u)
+   !> Choose the stencil of frame `frame` of the slave at x + u, where the facets `facet` of the
+   !> master are near its node: the nearest triangle that faces this frame more than any other of
+   !> the node, and what hangs together with that and faces the frame too.
+   pure subroutine patch_stencil_choose(self, sides, frame, facet, x, u)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: i                   !! index into the slave's nodes
+      integer, intent(in) :: frame               !! 1 to the number of all frames
       integer, intent(in) :: facet(:)            !! ascending
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       type(near_t) :: near
       real(wp) :: normal(3)
-      integer :: frame, nearest
+      integer :: i, nearest
 
       self%triangle = 0
+      if (size(facet) == 0) return
+      i = sides%frames%node(frame)
       call look_around(sides, sides%slave%node(i), facet, x, u, near)
-      call choose_frame(sides, i, near, x, u, frame, nearest)
+      nearest = nearest_to(sides, frame, near, x, u)
       if (nearest == 0) return
       normal = frame_normal(sides, i, frame, x, u)
       call list_triangles(sides, near, nearest, normal)
+      self%deepest = room_behind*sides%triangles%size(near%triangle(nearest)) - distances &
+         *near%distance(nearest)/dot_product(near%normal(:, nearest), normal)
       self%triangle = near%triangle(nearest)
       self%size = sides%triangles%size(self%triangle)
       self%patch%length = patch_size*min(self%size, sides%frames%size(i))
-      call make_patch(self, sides, i, frame, near, normal, x, u)
+      call make_patch(self, sides, frame, near, normal, x, u)
    end subroutine patch_stencil_choose
 
    !> Where the triangles of facets are, from `node`.
@@ -78,6 +86,7 @@ contains
       integer, intent(in) :: node, facet(:)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       type(near_t), intent(out) :: near
+      type(nearest_t) :: nearest
       integer :: f, t
 
       associate (start => sides%triangles%split%start)
@@ -93,7 +102,9 @@ contains
          end do
          associate (c => near%corner(:, :, t), n => near%normal(:, t))
             n = cross_product(c(:, 2) - c(:, 1), c(:, 3) - c(:, 1))
-            near%distance(t) = distance_to(c, n)
+            call nearest_update(nearest, t, [0.0_wp, 0.0_wp, 0.0_wp], c)
+            near%distance(t) = sqrt(nearest%square)
+            nearest = nearest_t()
             if (dot_product(n, n) > 0.0_wp) n = n/sqrt(dot_product(n, n))
          end associate
       end do
@@ -115,68 +126,54 @@ contains
       end do
    end function place_of
 
-   !> How far a triangle is from the origin.
-   pure real(wp) function distance_to(corner, normal) result(distance)
-      real(wp), intent(in) :: corner(3, 3), normal(3)      !! any length
-      real(wp) :: square
-      integer :: k
-      logical :: is_over
-
-      is_over = dot_product(normal, normal) > 0.0_wp
-      square = huge(square)
-      do k = 1, 3
-         associate (a => corner(:, k), along => corner(:, 1 + mod(k, 3)) - corner(:, k))
-            is_over = is_over .and. dot_product(cross_product(along, -a), normal) >= 0.0_wp
-            square = min(square, sum((a + share(a, along)*along)**2))
-         end associate
-      end do
-      distance = sqrt(square)
-      if (is_over) distance = abs(dot_product(corner(:, 1), normal))/sqrt(dot_product(normal, &
-         normal))
-
-   contains
-
-      !> Where on a side the origin is nearest.
-      pure real(wp) function share(a, along)
-         real(wp), intent(in) :: a(3), along(3)
-
-         share = -dot_product(a, along)/max(dot_product(along, along), tiny(1.0_wp))
-         share = max(0.0_wp, min(1.0_wp, share))
-      end function share
-
-   end function distance_to
-
-   !> The frame and the nearest triangle that face each other; of those as near the ones that face
-   !> each other most.
-   pure subroutine choose_frame(sides, i, near, x, u, frame, nearest)
+   !> The nearest triangle that faces a frame more than any other frame of its node; of those as
+   !> near the one that faces it most. 0: there is none.
+   pure integer function nearest_to(sides, frame, near, x, u) result(nearest)
       type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: i
+      integer, intent(in) :: frame
       type(near_t), intent(in) :: near
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      integer, intent(out) :: frame, nearest     !! 0: none do
-      real(wp) :: normal(3), cosine, best, least
+      real(wp) :: best, least
       integer :: g, t
 
-      frame = 0
       nearest = 0
       best = 0.0_wp
       least = huge(least)
-      do g = sides%frames%start(i), sides%frames%start(i + 1) - 1
-         normal = frame_normal(sides, i, g, x, u)
-         do t = 1, near%n
-            cosine = dot_product(normal, near%normal(:, t))
-            if (cosine >= facing) cycle
-            associate (room => as_near*sides%triangles%size(near%triangle(t)))
-               if (near%distance(t) > least + room) cycle
-               if (near%distance(t) > least - room .and. cosine >= best - as_near) cycle
+      associate (i => sides%frames%node(frame))
+         associate (first => sides%frames%start(i), last => sides%frames%start(i + 1) - 1)
+            associate (cosine => matmul(transpose(near%normal), reshape([(frame_normal(sides, i, &
+                  g, x, u), g = first, last)], [3, last - first + 1])))
+               do t = 1, near%n
+                  if (minloc(cosine(t, :), 1) /= frame - first + 1) cycle
+                  associate (own => cosine(t, frame - first + 1), &
+                        room => as_near*sides%triangles%size(near%triangle(t)))
+                     if (own >= facing) cycle
+                     if (is_hidden(t, room_behind*min(sides%frames%size(i), &
+                        sides%triangles%size(near%triangle(t))))) cycle
+                     if (near%distance(t) > least + room) cycle
+                     if (near%distance(t) > least - room .and. own >= best - as_near) cycle
+                     least = near%distance(t)
+                     best = own
+                     nearest = t
+                  end associate
+               end do
             end associate
-            least = near%distance(t)
-            best = cosine
-            frame = g
-            nearest = t
-         end do
-      end do
-   end subroutine choose_frame
+         end associate
+      end associate
+
+   contains
+
+      !> Is the node behind a triangle, but nearer to another by more than `room`? Then that is in
+      !> front of it.
+      pure logical function is_hidden(t, room)
+         integer, intent(in) :: t
+         real(wp), intent(in) :: room            !! [L]
+
+         is_hidden = dot_product(near%corner(:, 1, t), near%normal(:, t)) > 0.0_wp .and. &
+            near%distance(t) > minval(near%distance) + room
+      end function is_hidden
+
+   end function nearest_to
 
    !> The normal of a frame, outwards.
    pure function frame_normal(sides, i, frame, x, u) result(normal)
@@ -196,13 +193,15 @@ contains
       integer, intent(in) :: i, frame
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       real(wp), intent(out) :: a(3), b(3)
+      real(wp) :: d(3)
       integer :: k
 
       a = 0.0_wp
       b = 0.0_wp
       associate (frames => sides%frames, node => sides%slave%node(i))
          do k = frames%ring_start(frame), frames%ring_start(frame + 1) - 1
-            associate (d => (x(:, frames%ring(k)) - x(:, node)) + (u(:, frames%ring(k)) - u(:, node)))
+            associate (other => frames%ring(k))
+               d = (x(:, other) - x(:, node)) + (u(:, other) - u(:, node))
                a = a + frames%weight(1, k)*d
                b = b + frames%weight(2, k)*d
             end associate
@@ -238,10 +237,10 @@ contains
    end subroutine list_triangles
 
    !> The vertices and triangles of the patch with their nodes.
-   pure subroutine make_patch(self, sides, i, frame, near, normal, x, u)
+   pure subroutine make_patch(self, sides, frame, near, normal, x, u)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: i, frame
+      integer, intent(in) :: frame
       type(near_t), intent(in) :: near
       real(wp), intent(in) :: normal(3)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
@@ -255,7 +254,7 @@ contains
             ends(k, t) = .not. goes_on(sides%triangles%beyond(k, near%triangle(t)))
          end do
       end do
-      call begin_patch(self, sides, i, frame, count(near%is_listed), count(ends))
+      call begin_patch(self, sides, frame, count(near%is_listed), count(ends))
       do t = 1, near%n
          if (near%is_listed(t)) call add_triangle(self, sides, near%triangle(t))
       end do
@@ -281,7 +280,8 @@ contains
          integer, intent(in) :: other            !! 0: none
 
          goes_on = other > 0
-         if (goes_on) goes_on = is_facing(sides, sides%slave%node(i), other, normal, x, u)
+         if (goes_on) goes_on = is_facing(sides, &
+            sides%slave%node(sides%frames%node(frame)), other, normal, x, u)
       end function goes_on
 
    end subroutine make_patch
@@ -303,10 +303,10 @@ contains
    end function is_facing
 
    !> Room for a patch of some triangles with flanges at some sides; its frame.
-   pure subroutine begin_patch(self, sides, i, frame, n_triangle, n_end)
+   pure subroutine begin_patch(self, sides, frame, n_triangle, n_end)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: i, frame, n_triangle, n_end
+      integer, intent(in) :: frame, n_triangle, n_end
       integer :: k
 
       self%patch%n_triangle = 0
@@ -321,7 +321,7 @@ contains
       end associate
       self%weight = 0.0_wp
       self%n_node = 1
-      self%node(1) = sides%slave%node(i)
+      self%node(1) = sides%slave%node(sides%frames%node(frame))
       associate (frames => sides%frames)
          do k = frames%ring_start(frame), frames%ring_start(frame + 1) - 1
             call add_weight(self, frames%ring(k), 1, frames%weight(1, k))

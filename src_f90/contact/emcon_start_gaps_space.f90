@@ -9,7 +9,7 @@ module emcon_start_gaps_space
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_signed_distance_space, only : signed_distance_find, signed_distance_init, &
-      signed_distance_t, signed_distance_to, signed_foot_t
+      signed_distance_reaches, signed_distance_t, signed_distance_to, signed_foot_t
    use emcon_start_gaps, only : is_master, is_slave, start_gaps_t
    implicit none
    private
@@ -17,7 +17,8 @@ module emcon_start_gaps_space
 
    !> A node counts as over a surface so far beyond its end, per facet: rims meet rims.
    real(wp), parameter :: end_tol = 1.0e-3_wp
-   !> Nodes are near so far from a facet, by its length. Behind a closed surface they always are.
+   !> Nodes are near so far from a facet, by its length. Behind a closed surface they always are, in
+   !> front of any so far as ADJUST moves them.
    real(wp), parameter :: near_per_facet = 0.5_wp
    !> Surfaces face each other where the cosine of their normals is below minus this.
    real(wp), parameter :: least_facing = 0.25_wp
@@ -26,6 +27,8 @@ module emcon_start_gaps_space
       type(signed_distance_t), private :: master !! where it is at the start
       type(signed_foot_t), allocatable, private :: foot(:)   !! (n) as last measured
       real(wp), private :: pad = 0.0_wp          !! gaps are counted from it on [L]
+      real(wp), private :: reach = 0.0_wp        !! in front of the master nodes are near so far [L]
+      real(wp), private :: farthest = 0.0_wp     !! what is farther is not near, or in a body [L]
    contains
       procedure :: nearest
       procedure :: measure
@@ -54,6 +57,13 @@ contains
       self%n = size(self%node)
       self%is_self = pair%slave == pair%master
       self%pad = pair%interaction%offset
+      self%reach = self%pad + max(0.0_wp, pair%adjust%distance)
+      if (pair%adjust%set > 0) self%reach = 0.5_wp*sqrt(huge(self%reach))
+      associate (master => self%surface(is_master))
+         self%farthest = max(self%reach, self%pad + near_per_facet* &
+            maxval([0.0_wp, (facets_length(master, i), i = 1, master%n_facet)]))
+         self%farthest = (1.0_wp + 4.0_wp*epsilon(1.0_wp))*self%farthest
+      end associate
       self%place = [(i, i = 1, self%n)]
       allocate(self%duplicate(self%n), self%facet(self%n), source=0)
       allocate(self%doubt(self%n), source=0.0_wp)
@@ -80,13 +90,19 @@ contains
    pure subroutine measure(self, scene)
       class(start_gaps_space_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
-      real(wp) :: gap
-      logical :: is_over
       integer :: i
 
+      self%facet = 0
       do i = 1, self%n
-         call self%nearest(i, scene, gap, is_over)
-         if (.not. self%state(i)%is_near) self%facet(i) = 0
+         associate (place => place_of(self, i, scene))
+            if (self%is_closed .and. signed_distance_reaches(self%master, place)) then
+               call signed_distance_find(self%master, place, self%foot(i))
+            else
+               call signed_distance_find(self%master, place, self%foot(i), self%farthest)
+            end if
+         end associate
+         self%state(i) = state_of(self, i)
+         if (self%state(i)%is_near) self%facet(i) = self%foot(i)%facet
       end do
    end subroutine measure
 
@@ -112,7 +128,7 @@ contains
          state%gap1 = state%gap0
          state%is_over = foot%past <= end_tol*state%size
          state%is_near = abs(foot%distance) <= self%pad + near_per_facet*state%size .or. &
-            (self%is_closed .and. foot%distance < 0.0_wp)
+            merge(self%is_closed, foot%distance <= self%reach, foot%distance < 0.0_wp)
       end associate
    end function state_of
 

@@ -1,6 +1,6 @@
 !> The contact pairs, as far as they can be judged before anything moves.
 !>
-!> Which surface is the slave: docs/theory.md, section 4.12.
+!> Which surface is the slave: docs/theory.md, section 4.12; in space no more than advice.
 module emcon_deck_check_contact
    use emcon_deck_check_sides, only : find_advice
    use emcon_deck_check_surfaces, only : mark_nodes

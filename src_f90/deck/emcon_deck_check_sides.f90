@@ -7,6 +7,7 @@ module emcon_deck_check_sides
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_surface_shape_plane, only : surface_shape, surface_shape_t
+   use emcon_surface_shape_space, only : surface_size
    use emcon_text, only : to_text
    implicit none
    private
@@ -23,8 +24,7 @@ module emcon_deck_check_sides
 
 contains
 
-   !> Why the slave of `pair` should be the master, to follow on its name; empty if it should not,
-   !> and in space.
+   !> Why the slave of `pair` should be the master, to follow on its name; empty if it should not.
    subroutine find_advice(scene, pair, advice, is_bent)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
@@ -35,7 +35,10 @@ contains
 
       advice = ""
       is_bent = .false.
-      if (scene%n_dim /= n_plane) return
+      if (scene%n_dim /= n_plane) then
+         call advise_space(scene, pair, advice)
+         return
+      end if
       slave = surface_shape(scene, scene%surface(pair%slave))
       master = surface_shape(scene, scene%surface(pair%master))
       if (master%length <= 0.0_wp .or. slave%length <= 0.0_wp) return
@@ -59,5 +62,27 @@ contains
          end if
       end associate
    end subroutine find_advice
+
+   !> The same in space, by the sizes of the surfaces and of their faces.
+   subroutine advise_space(scene, pair, advice)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      character(len=:), allocatable, intent(inout) :: advice     !! "" stays where there is none
+      real(wp) :: slave_area, slave_length, master_area, master_length
+
+      call surface_size(scene, scene%surface(pair%slave), slave_area, slave_length)
+      call surface_size(scene, scene%surface(pair%master), master_area, master_length)
+      if (.not. min(slave_area, master_area) > 0.0_wp) return
+      associate (name => scene%surface(pair%master)%name, ratio => slave_length/master_length, &
+            share => slave_area/master_area)
+         if (ratio > coarse_ratio) then
+            advice = " has faces " // to_text(ratio, 3) // " times as long as those of master " &
+               // "surface " // name // "; the finer one should be the slave"
+         else if (share > large_ratio**2 .and. coarse_ratio*ratio >= 1.0_wp) then
+            advice = " has " // to_text(share, 3) // " times the area of master surface " // name &
+               // "; the smaller one should be the slave"
+         end if
+      end associate
+   end subroutine advise_space
 
 end module emcon_deck_check_sides

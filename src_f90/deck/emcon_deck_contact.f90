@@ -279,7 +279,8 @@ contains
 
       if (pair%slave == 0 .or. pair%master == 0) return
       associate (slave => scene%surface(pair%slave), master => scene%surface(pair%master))
-         if (pair%slave == pair%master .and. reader%n_dim == n_space) then
+         if (pair%slave == pair%master .and. reader%n_dim == n_space .and. &
+            pair%formulation /= formulation_user) then
             call refuse_self(reader, data, slave)
          else if (pair%slave == pair%master) then
             call need_facets(reader, data, slave, "surface", &

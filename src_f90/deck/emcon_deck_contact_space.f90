@@ -5,11 +5,13 @@ module emcon_deck_contact_space
    use emcon_deck_reader, only : reader_t
    use emcon_deck_rigid, only : mark_rigid
    use emcon_diagnostics, only : add_error
+   use emcon_interactions, only : formulation_user
    use emcon_kinds, only : dp, wp
    use emcon_mesh, only : surface_t
    use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
    use emcon_sort, only : sort_order
+   use emcon_steps, only : initiation_massless, step_initiation
    use emcon_surface_facets, only : surface_facets
    use emcon_surface_nodes, only : surface_nodes
    use emcon_text, only : joined, string_t, to_text
@@ -34,7 +36,7 @@ module emcon_deck_contact_space
 
 contains
 
-   !> Every surface that is in contact.
+   !> Every surface that is in contact, but for that of a program.
    subroutine check_contact_space(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
@@ -43,10 +45,12 @@ contains
       integer, allocatable :: facet(:, :)
       integer :: i, n_errors
 
-      if (size(scene%pair) == 0 .or. reader%doubt%shapes) return
+      if (all(scene%pair%formulation == formulation_user) .or. reader%doubt%shapes) return
+      call check_mass(reader, scene)
       call adjacency_init(adjacency, scene)
       do i = 1, size(scene%surface)
-         if (all(scene%pair%slave /= i .and. scene%pair%master /= i)) cycle
+         if (all((scene%pair%slave /= i .and. scene%pair%master /= i) .or. &
+            scene%pair%formulation == formulation_user)) cycle
          associate (surface => scene%surface(i))
             title = "contact surface " // surface%name
             call check_rigid(reader, scene, surface, title)
@@ -61,6 +65,21 @@ contains
          end associate
       end do
    end subroutine check_contact_space
+
+   !> What contact holds in space by nodes has mass.
+   subroutine check_mass(reader, scene)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      integer :: k
+
+      do k = 1, size(scene%step)
+         if (step_initiation(scene%step(k)) /= initiation_massless) cycle
+         call add_error(reader%log, scene%step(k)%origin, "step " // to_text(k) // " has contact " &
+            // "without mass (MASSLESS), which in three dimensions is not in this version; use " &
+            // "PERSISTENT")
+         return
+      end do
+   end subroutine check_mass
 
    !> Rigid bodies are in no contact in space.
    subroutine check_rigid(reader, scene, surface, title)
@@ -114,34 +133,46 @@ contains
          end if
          first = last + 1
       end do
-      if (n_branch > 0) call add_error(reader%log, surface%origin, title // " branches: more than " &
-         // "two of its faces meet in " // place(branch, n_branch) // "; put them into surfaces " &
-         // "of their own")
-      if (n_back > 0) call add_error(reader%log, surface%origin, title // " has no common " // &
-         "outside: two of its faces meet back to back in " // place(back, n_back) // "; put " // &
-         "them into surfaces of their own")
+      if (n_branch > 0) call tell(" branches: more than two of its faces meet in ", branch, &
+         n_branch)
+      if (n_back > 0) call tell(" has no common outside: two of its faces meet back to back in ", &
+         back, n_back)
 
    contains
 
-      !> Where side `i` is, and what meets in it.
-      function place(i, n) result(text)
+      !> What is wrong in side `i` and others, `n` in all.
+      subroutine tell(what, i, n)
+         character(len=*), intent(in) :: what
          integer, intent(in) :: i, n
-         character(len=:), allocatable :: text
-         type(string_t), allocatable :: face(:)
-         integer :: k
+         character(len=:), allocatable :: more
 
-         associate (is_here => side%low == side(i)%low .and. side%high == side(i)%high)
-            allocate(face(count(is_here)))
-            do k = 1, size(face)
-               face(k)%text = face_text(scene, surface, side(i + k - 1)%facet)
-            end do
-         end associate
-         text = "the side of nodes " // to_text(scene%node%label(side(i)%low)) // " and " // &
-            to_text(scene%node%label(side(i)%high)) // " (" // joined(face, ", ", most_named) // ")"
-         if (n > 1) text = text // " and in " // to_text(n - 1) // " more"
-      end function place
+         more = ""
+         if (n > 1) more = " and in " // to_text(n - 1) // " more"
+         call add_error(reader%log, surface%origin, title // what // place_text(scene, surface, &
+            side, i) // more // "; put them into surfaces of their own")
+      end subroutine tell
 
    end subroutine check_sides
+
+   !> Where side `i` is, and what meets in it.
+   function place_text(scene, surface, side, i) result(text)
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      type(side_t), intent(in) :: side(:)
+      integer, intent(in) :: i                   !! the first one of its nodes
+      character(len=:), allocatable :: text
+      type(string_t), allocatable :: face(:)
+      integer :: k
+
+      associate (here => side(i))
+         allocate(face(count(side%low == here%low .and. side%high == here%high)))
+         do k = 1, size(face)
+            face(k)%text = face_text(scene, surface, side(i + k - 1)%facet)
+         end do
+         text = "the side of nodes " // to_text(scene%node%label(here%low)) // " and " // &
+            to_text(scene%node%label(here%high)) // " (" // joined(face, ", ", most_named) // ")"
+      end associate
+   end function place_text
 
    !> All sides of faces, those of the same nodes next to each other.
    pure subroutine list_sides(facet, side)

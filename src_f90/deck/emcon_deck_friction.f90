@@ -5,7 +5,8 @@ module emcon_deck_friction
       refuse_lines
    use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
    use emcon_diagnostics, only : add_error, add_warning
-   use emcon_interactions, only : contact_pair_t, pressure_hard, smoothing_hermite
+   use emcon_interactions, only : contact_pair_t, formulation_user, pressure_hard, &
+      smoothing_hermite
    use emcon_kinds, only : wp
    use emcon_massless_surfaces, only : pair_keeps_mass
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
@@ -38,7 +39,6 @@ contains
       if (has_option(card, "ROUGH")) then
          coefficient = rough
          call refuse_lines(reader, card)
-         call suit_dimension(reader, card, coefficient, stick)
          return
       end if
       call data_open(data, card)
@@ -67,21 +67,7 @@ contains
          end if
       end do
       if (n == 0) call card_error(reader, card, "a data line with the coefficient is missing")
-      call suit_dimension(reader, card, coefficient, stick)
    end subroutine read_friction
-
-   !> Contact slides freely in space: what rubs there is refused.
-   subroutine suit_dimension(reader, card, coefficient, stick)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      real(wp), intent(inout) :: coefficient, stick
-
-      if (reader%n_dim /= n_space .or. .not. coefficient > 0.0_wp) return
-      call card_error(reader, card, "friction in three dimensions is not in this version; take " &
-         // "it out: contact there slides freely")
-      coefficient = 0.0_wp
-      stick = 0.0_wp
-   end subroutine suit_dimension
 
    !> Friction is in steps whose scheme has its forces along discrete gradients or which are static,
    !> and which hold contact exactly.
@@ -96,6 +82,10 @@ contains
             if (pair(i)%slave == 0 .or. pair(i)%master == 0) cycle   ! unknown surfaces are told
             call check_other_way(reader, pair(:i), given)
             if (.not. pair(i)%interaction%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
+            if (scene%n_dim == n_space) then
+               call refuse_space(reader, pair(i))
+               cycle
+            end if
             do k = 1, size(step)
                call check_step(reader, pair(i), step(k), k)
             end do
@@ -110,6 +100,16 @@ contains
          end do
       end associate
    end subroutine check_friction
+
+   !> Contact slides freely in space. What a program gives is refused friction by its card.
+   subroutine refuse_space(reader, pair)
+      type(reader_t), intent(inout) :: reader
+      type(contact_pair_t), intent(in) :: pair
+
+      if (pair%formulation /= formulation_user) call add_error(reader%log, pair%origin, &
+         "*CONTACT PAIR: its surface interaction has *FRICTION: friction in three dimensions is " &
+         // "not in this version; take it out: contact there slides freely")
+   end subroutine refuse_space
 
    !> What holds gaps sticks exactly.
    subroutine check_stick(reader, pair)

@@ -26,6 +26,8 @@ module emcon_deck_general_contact
    public :: read_general_contact
 
    character(len=*), parameter :: exterior_name = "ALL_EXTERIOR"
+   !> Each body with each makes twice as many pairs as half their square.
+   integer, parameter :: most_bodies = 50
 
 contains
 
@@ -218,6 +220,12 @@ contains
       if (n_body == 1) then
          call card_error(reader, card, "there is one body, and contact of a body with itself in " &
             // "three dimensions is not in this version")
+         return
+      end if
+      if (n_body > most_bodies) then
+         call card_error(reader, card, "ALL EXTERIOR: there are " // to_text(n_body) // " bodies," &
+            // " and contact of each with each in three dimensions is for " // &
+            to_text(most_bodies) // " at most; name those that can meet by *CONTACT PAIR")
          return
       end if
       call card_warning(reader, card, "ALL EXTERIOR: each body is in contact with the others, " &

@@ -109,10 +109,6 @@ contains
       integer :: k
 
       reason = ""
-      if (scene%n_dim == n_space) then
-         reason = "contact in three dimensions needs them"
-         return
-      end if
       k = findloc(takes_massless(scene%step), .false., 1)
       if (k > 0) then
          reason = "the scheme or the constraint method of step " // to_text(k) // " needs them"
@@ -124,6 +120,8 @@ contains
       do k = 1, size(scene%pair)
          if (len(reason) == 0) call find_reason_of(scene%pair(k), reason)
       end do
+      if (len(reason) == 0 .and. scene%n_dim == n_space) reason = &
+         "contact in three dimensions needs them"
       if (len(reason) > 0) return
       call find_shares(scene, share)
       k = maxloc(share, 1)

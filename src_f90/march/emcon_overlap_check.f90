@@ -285,6 +285,10 @@ contains
 
       reach = max(self%longest(p), self%longest(q))
       n = count_looks(self, p, q)
+      if (n > 1 .and. self%query%finds_passages) then
+         call self%query%pass(p, q, x, u0, du, overlap)
+         n = 1
+      end if
       do k = 1, n
          share = real(k, wp)/real(n, wp)
          self%query%is_passing = k < n

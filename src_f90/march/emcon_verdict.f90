@@ -10,7 +10,7 @@ module emcon_verdict
    use emcon_evaluation, only : evaluation_has_inertia
    use emcon_far_nodes, only : far_element_find
    use emcon_force_scatter, only : force_scatter_t, scatter_follow
-   use emcon_guards, only : overlap_bar, overlap_told, touching_bar
+   use emcon_guards, only : overlap_told, touching_bar
    use emcon_kinds, only : wp
    use emcon_locking, only : locking_advice, locking_element
    use emcon_ledger, only : ledger_t
@@ -110,7 +110,7 @@ contains
 
       call energy_start(self%energy, march%ledger)
       do k = 1, size(march%system%contact)
-         if (march%system%contact(k)%contact%slack > 0.0_wp) self%overlap%bar = overlap_bar
+         self%overlap%bar = max(self%overlap%bar, march%system%contact(k)%contact%lets_in())
       end do
       self%overlap%place = ""
       self%message = ""

@@ -31,6 +31,8 @@ module emcon_scene_report
    !> Waves are not resolved by increments of so many transits.
    real(wp), parameter :: many_transits = 10.0_wp
 
+   integer, parameter :: n_space = 3
+
 contains
 
    !> The report, before the first increment.
@@ -343,13 +345,14 @@ contains
       transit = shortest_transit(body)
       if (.not. (transit < huge(transit) .and. scene%step(k)%time%h < transit)) return
       call row_begin(row, "advice", "h is")
-      cure = "*CONTACT INITIATION, TYPE=MASSLESS makes them smooth on bodies at least two " // &
+      cure = "; *CONTACT INITIATION, TYPE=MASSLESS makes them smooth on bodies at least two " // &
          "elements thick"
-      if (allocated(scene%deck%keeps_mass)) cure = "they are smooth where bodies are ten " // &
+      if (allocated(scene%deck%keeps_mass)) cure = "; they are smooth where bodies are ten " // &
          "elements across, and lose the mass there"
+      if (scene%n_dim == n_space) cure = ""          ! where nothing else is to be had
       call row_put(row, "courant_number", scene%step(k)%time%h/transit, &
          " # of the wave transit time " &
-         // "of the smallest element: contact forces of nodes with mass jump up and down; " // cure)
+         // "of the smallest element: contact forces of nodes with mass jump up and down" // cure)
       call rows_add(rows, row)
    end subroutine advise_massless
 

@@ -2,7 +2,7 @@
 module emcon_verdict_lines
    use emcon_energy_watch, only : closing_text, energy_bar, energy_rounding
    use emcon_force_scatter, only : scatter_is_comb, scatter_of
-   use emcon_guards, only : overlap_told, touching_bar
+   use emcon_guards, only : crossing_bar, overlap_told, touching_bar
    use emcon_interactions, only : contact_pair_t, formulation_nts, multiplier_dual
    use emcon_kinds, only : wp
    use emcon_ledger, only : ledger_t
@@ -75,6 +75,9 @@ contains
                " of an edge, nothing else does, "
          else if (self%overlap%deepest > overlap_told) then
             line = line // "nothing penetrates by more than guards allow, "
+         else if (self%overlap%deepest > touching_bar .and. self%overlap%bar <= crossing_bar) then
+            line = line // "edges cross between nodes by up to " // &
+               to_text(self%overlap%deepest, 3) // " of an edge, nothing else penetrates, "
          else if (size(self%largest_force) > 0) then
             line = line // "nothing " // trim(merge("else penetrates,", "penetrates,     ", &
                overlaps_stay(self))) // " "

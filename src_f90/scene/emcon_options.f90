@@ -75,8 +75,7 @@ module emcon_options
          "ADMISSIBLE", ""), &
       option_row_t("initiation", initiation_velocity_update, "VELOCITY UPDATE", "", &
          "VELOCITY UPDATE", ""), &
-      option_row_t("initiation", initiation_massless, "MASSLESS", "", "MASSLESS", "", n_plane, &
-         instead="PERSISTENT"), &
+      option_row_t("initiation", initiation_massless, "MASSLESS", "", "MASSLESS", ""), &
       option_row_t("method", method_null_space, "NULL SPACE", "", "", ""), &
       option_row_t("method", method_saddle_point, "SADDLE POINT", "", "", ""), &
       option_row_t("method", method_penalty, "PENALTY", "", "by penalty", ""), &

@@ -10,10 +10,13 @@ module emcon_box_tree
    use emcon_sort, only : sort_few, sort_order
    implicit none
    private
-   public :: box_tree_t, box_tree_init, box_tree_find, box_tree_walk, leaf_size
+   public :: box_tree_t, box_tree_init, box_tree_find, box_tree_guess, box_tree_next, &
+      leaf_size
 
    !> Boxes in a leaf, at most; a leaf of several has more than half of that.
    integer, parameter :: leaf_size = 8
+   !> Squares of distances are off by less, relatively.
+   real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
    !> Up to this length, lists are sorted by insertion.
    integer, parameter :: short_list = 16
 
@@ -167,27 +170,53 @@ contains
       call sort_list(found(n_before + 1:n))
    end subroutine box_tree_find
 
-   !> The boxes of the next leaf that are no farther than `reach` from that of `low`, `high`: what
-   !> makes `reach` shorter from call to call finds the nearest of all.
-   pure subroutine box_tree_walk(self, low, high, reach, k, found, n)
+   !> Some boxes near a point: where it is for the nearer of two branches, again and again.
+   pure subroutine box_tree_guess(self, point, found)
       type(box_tree_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: low(:), high(:)    !! (n_dim) finite [L]
+      real(wp), intent(in), contiguous :: point(:)           !! (n_dim) [L]
+      integer, allocatable, intent(out) :: found(:)          !! none where there are no boxes
+      integer :: k
+
+      k = 1
+      do while (k < self%n_leaf)
+         associate (one => self%around(:, k + k), other => self%around(:, k + k + 1))
+            k = k + k + merge(1, 0, square_to(other, point) < square_to(one, point))
+         end associate
+      end do
+      if (self%n_leaf == 0) then
+         allocate(found(0))
+      else
+         associate (leaf => k - self%n_leaf + 1)
+            found = self%box(self%start(leaf):self%start(leaf + 1) - 1)
+         end associate
+      end if
+   end subroutine box_tree_guess
+
+   !> The boxes of the next leaf that has some no farther than `reach` from a point, straight to it,
+   !> by found(:n); it may fall from call to call. The walk begins at k = 1 and ends with k = 0.
+   pure subroutine box_tree_next(self, point, reach, k, found, n)
+      type(box_tree_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: point(:)           !! (n_dim) [L]
       real(wp), intent(in) :: reach              !! >= 0 [L]
-      integer, intent(inout) :: k                !! where the walk is: first 1, in the end 0
-      integer, intent(out) :: found(leaf_size)   !! those boxes
-      integer, intent(out) :: n                  !! number in `found`
-      integer :: i
+      integer, intent(inout) :: k                !! node where the walk goes on
+      integer, intent(out) :: found(:)           !! (leaf_size)
+      integer, intent(out) :: n                  !! number in `found`; 0: the walk has ended
+      real(wp) :: bound
+      integer :: i, leaf
 
       n = 0
       if (self%n_leaf == 0) k = 0
+      bound = huge(bound)
+      if (reach < 0.5_wp*sqrt(huge(reach))) bound = (1.0_wp + rounding)*reach**2
       do while (k > 0)
-         if (is_near(self%around(:, k), low, high, reach)) then
+         if (square_to(self%around(:, k), point) <= bound) then
             if (k < self%n_leaf) then
-               k = 2*k
+               k = k + k
                cycle
             end if
-            do i = self%start(k - self%n_leaf + 1), self%start(k - self%n_leaf + 2) - 1
-               if (.not. is_near(self%bounds(:, i), low, high, reach)) cycle
+            leaf = k - self%n_leaf + 1
+            do i = self%start(leaf), self%start(leaf + 1) - 1
+               if (.not. square_to(self%bounds(:, i), point) <= bound) cycle
                n = n + 1
                found(n) = self%box(i)
             end do
@@ -195,7 +224,20 @@ contains
          k = next_node(k)
          if (n > 0) return
       end do
-   end subroutine box_tree_walk
+   end subroutine box_tree_next
+
+   !> The square of the distance of a point from a box.
+   pure real(wp) function square_to(bounds, point) result(square)
+      real(wp), intent(in), contiguous :: bounds(:), point(:)
+      integer :: a
+
+      square = 0.0_wp
+      associate (n_dim => size(point))
+         do a = 1, n_dim
+            square = square + max(0.0_wp, bounds(a) - point(a), point(a) - bounds(n_dim + a))**2
+         end do
+      end associate
+   end function square_to
 
    !> The node after the branch of node `k`; 0 after the last one.
    pure integer function next_node(k)

@@ -188,7 +188,7 @@ contains
    !> nothing is beyond.
    pure subroutine find_turns(facets, x, turn)
       type(facets_t), intent(in) :: facets
-      real(wp), intent(in) :: x(:, :)
+      real(wp), intent(in) :: x(:, :)            !! (3, n_node of the scene) reference [L]
       real(wp), allocatable, intent(out) :: turn(:, :)     !! (most nodes, n_facet)
       real(wp), allocatable :: normal(:, :), still(:, :)
       real(wp), dimension(3) :: sine, way

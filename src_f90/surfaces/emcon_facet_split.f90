@@ -62,7 +62,7 @@ contains
    end subroutine facet_split_init
 
    !> The weights of the nodes of a facet, in turn around it, in its virtual centre: docs/theory.md,
-   !> section 15.
+   !> eq. (15l).
    pure function facet_split_centre(n) result(weight)
       integer, intent(in) :: n                   !! nodes of the facet: 4, 6 or 8
       real(wp) :: weight(n)                      !! of sum 1

@@ -4,15 +4,17 @@
 !> An edge that crosses a facet has one end on either side of it; from there the side is handed on
 !> along edges that cross nothing. What crosses nothing at all is inside if a ray from it goes out.
 !> The outline that is asked is moved by very little, so that edges which lie in facets of like
-!> meshes, and points on them, are on one side as neighbours are. Source: docs/theory.md, 4.11.
+!> meshes, and points on them, are on one side as neighbours are.
+!> Source: docs/theory.md, section 4.15.
 module emcon_inside_space
-   use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t, box_tree_walk, leaf_size
+   use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t, box_tree_next, leaf_size
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : crossing_find, nearest_t, nearest_update
    use emcon_triangles_space, only : cross_product, triangle_at, triangles_t
    implicit none
    private
-   public :: inside_t, middle_t, inside_find, inside_confirm, inside_nearest, is_in
+   public :: inside_t, middle_t, inside_find, inside_own, inside_confirm, inside_nearest, &
+      inside_nearest_own
 
    !> Where a point is; `is_asked` while what hangs on it is gathered.
    integer, parameter :: is_unknown = 0, is_out = 1, is_in = 2, is_asked = 3
@@ -26,13 +28,16 @@ module emcon_inside_space
    type :: middle_t
       integer :: edge = 0
       real(wp) :: share = 0.0_wp                 !! of the edge before it
-      integer :: near = 0                        !! triangle that is crossed at an end of the part
+      integer :: near = 0                        !! triangle that an end of it is on; 0: none
    end type middle_t
 
    !> A look at outline a inside outline b.
    type :: inside_t
       integer, allocatable :: state(:)           !! (n_point of a) `is_in`, or not
+      integer, allocatable :: point(:)           !! that are inside, each after its `before`
+      integer, allocatable :: before(:)          !! (n_point of a) the point beside it; 0: none
       integer, allocatable :: near(:)            !! (n_point of a) a triangle of b near it; 0: none
+      logical :: is_own = .false.                !! a is b: what it crosses of itself
       integer :: n_middle = 0
       type(middle_t), allocatable :: middle(:)
       ! Private to this module:
@@ -65,23 +70,49 @@ contains
       type(triangles_t), intent(in) :: a, b      !! placed
       real(wp), intent(in) :: reach              !! length of the longest facet of both [L]
 
-      allocate(self%middle(0))
-      self%reach = reach
       self%shift = moved_by*reach*moved_along
-      self%pad = 2.0_wp*moved_by*reach
-      self%low = minval(b%low, dim=2) - self%pad
-      self%high = maxval(b%high, dim=2) + self%pad
-      allocate(self%state(size(a%at, 2)), source=is_unknown)
+      call begin(self, a, b, reach)
       if (any(maxval(a%high, dim=2) < self%low) .or. any(minval(a%low, dim=2) > self%high)) then
          self%state = is_out
+         allocate(self%point(0))
          return
       end if
-      allocate(self%near(size(a%at, 2)), self%queue(size(a%at, 2)), source=0)
-      allocate(self%is_cut(size(a%edge, 2)), source=.false.)
       call find_facets(self, a, b)
       if (size(self%facet) > 0) call cut_edges(self, a, b)
       call tell_points(self, a, b)
    end subroutine inside_find
+
+   !> Which parts of edges of `a` are behind triangles that share no point with them, and which ends
+   !> of these edges? What hangs on them is not asked: an outline that crosses itself has no inside.
+   pure subroutine inside_own(self, a, reach)
+      type(inside_t), intent(out) :: self
+      type(triangles_t), intent(in) :: a         !! placed
+      real(wp), intent(in) :: reach              !! length of its longest facet [L]
+      integer :: i
+
+      self%is_own = .true.
+      call begin(self, a, a, reach)
+      call find_facets(self, a, a)
+      call cut_edges(self, a, a)
+      self%point = pack([(i, i = 1, size(self%state))], self%state == is_in)
+   end subroutine inside_own
+
+   !> Nothing is known yet.
+   pure subroutine begin(self, a, b, reach)
+      type(inside_t), intent(inout) :: self
+      type(triangles_t), intent(in) :: a, b
+      real(wp), intent(in) :: reach
+
+      allocate(self%middle(0))
+      self%reach = reach
+      self%pad = 2.0_wp*moved_by*reach
+      self%low = minval(b%low, dim=2) - self%pad
+      self%high = maxval(b%high, dim=2) + self%pad
+      allocate(self%state(size(a%at, 2)), source=is_unknown)
+      allocate(self%near(size(a%at, 2)), self%before(size(a%at, 2)), source=0)
+      allocate(self%queue(size(a%at, 2)))
+      allocate(self%is_cut(size(a%edge, 2)), source=.false.)
+   end subroutine begin
 
    !> The facets of `b` within reach of the box of `a`, with their normals, in a tree.
    pure subroutine find_facets(self, a, b)
@@ -123,24 +154,25 @@ contains
          call box_tree_find(self%tree, a%low(:, f), a%high(:, f), self%pad, found, n)
          if (n == 0) cycle
          do e = a%edge_start(f), a%edge_start(f + 1) - 1
-            call find_crossings(self, b, a%at(:, a%edge(1, e)) + self%shift, &
-               a%at(:, a%edge(2, e)) + self%shift, found(:n), crossings)
+            call find_crossings(self, a, b, e, found(:n), crossings)
             if (crossings%n > 0) call cut(self, a, e, crossings)
          end do
       end do
    end subroutine cut_edges
 
-   !> Where the edge from `p` to `q` crosses triangles of some facets of `b`.
-   pure subroutine find_crossings(self, b, p, q, found, crossings)
+   !> Where edge `e` of `a` crosses triangles of some facets of `b`.
+   pure subroutine find_crossings(self, a, b, e, found, crossings)
       type(inside_t), intent(in) :: self
-      type(triangles_t), intent(in) :: b
-      real(wp), intent(in) :: p(3), q(3)
+      type(triangles_t), intent(in) :: a, b
+      integer, intent(in) :: e
       integer, intent(in) :: found(:)            !! indices of `self%facet`
       type(crossings_t), intent(inout) :: crossings
-      real(wp) :: low(3), high(3), height(2)
+      real(wp) :: p(3), q(3), low(3), high(3), height(2)
       integer :: i, t
 
       crossings%n = 0
+      p = a%at(:, a%edge(1, e)) + self%shift
+      q = a%at(:, a%edge(2, e)) + self%shift
       low = min(p, q)
       high = max(p, q)
       do i = 1, size(found)
@@ -152,12 +184,28 @@ contains
                   height(2) = dot_product(n, q - at)
                end associate
                if ((height(1) > 0.0_wp) .eqv. (height(2) > 0.0_wp)) cycle
+               if (self%is_own) then
+                  if (have_common(a%edge(:, e), b%split%corner(:, t))) cycle
+                  ! Both move alike, and what touches is on either side by rounding.
+                  if (minval(abs(height)) <= self%pad*sqrt(sum(self%normal(:, t)**2))) cycle
+               end if
                if (.not. crossing_find(p, q, triangle_at(b, t), b%split%corner(:, t))) cycle
                call insert(crossings, t, height)
             end do
          end associate
       end do
    end subroutine find_crossings
+
+   !> Is a point in both lists?
+   pure logical function have_common(list, other)
+      integer, intent(in) :: list(:), other(:)
+      integer :: i
+
+      have_common = .false.
+      do i = 1, size(list)
+         have_common = have_common .or. any(other == list(i))
+      end do
+   end function have_common
 
    !> Take up a crossing with triangle `t`.
    pure subroutine insert(self, t, height)
@@ -240,20 +288,18 @@ contains
                .or. .not. b%is_closed) self%state(i) = is_out
          end if
       end do
+      if (b%is_closed) call hand_on(self, a, is_in, n, meets_out)
+      self%point = self%queue(:n)
       if (.not. b%is_closed) return
-      call hand_on(self, a, is_in, n, meets_out)
       do i = 1, size(self%state)
          if (self%state(i) /= is_unknown) cycle
          self%state(i) = is_asked
          self%queue(1) = i
          n = 1
          call hand_on(self, a, is_asked, n, meets_out)
-         if (meets_out) then
-            self%state(self%queue(:n)) = is_out
-         else
-            self%state(self%queue(:n)) = merge(is_in, is_out, &
-               inside_confirm(self, b, a%at(:, i)))
-         end if
+         if (.not. meets_out) meets_out = .not. inside_confirm(self, b, a%at(:, i))
+         self%state(self%queue(:n)) = merge(is_out, is_in, meets_out)
+         if (.not. meets_out) self%point = [self%point, self%queue(:n)]
       end do
       call add_whole_edges(self, a)
    end subroutine tell_points
@@ -264,14 +310,15 @@ contains
       type(triangles_t), intent(in) :: a
       integer :: i, k
 
-      do i = 1, size(self%state)
-         if (self%state(i) /= is_in) cycle
-         do k = a%around_start(i) + 1, a%around_start(i + 1)
-            associate (e => a%around(k))
-               if (a%edge(1, e) /= i .or. self%is_cut(e)) cycle
-               call add(self, middle_t(e, 0.5_wp, self%near(i)))
-            end associate
-         end do
+      do i = 1, size(self%point)
+         associate (point => self%point(i))
+            do k = a%around_start(point) + 1, a%around_start(point + 1)
+               associate (e => a%around(k))
+                  if (a%edge(1, e) /= point .or. self%is_cut(e)) cycle
+                  call add(self, middle_t(e, 0.5_wp))
+               end associate
+            end do
+         end associate
       end do
    end subroutine add_whole_edges
 
@@ -297,7 +344,7 @@ contains
                meets_out = meets_out .or. self%state(j) == is_out
                if (self%state(j) /= is_unknown) cycle
                self%state(j) = state
-               self%near(j) = self%near(point)
+               self%before(j) = point
                n = n + 1
                self%queue(n) = j
             end do
@@ -351,6 +398,58 @@ contains
       call walk(self%whole, [integer ::], b, point, nearest)
    end subroutine inside_nearest
 
+   !> The same of the outline that the point is on: no farther away than the triangle that is
+   !> crossed, and hanging together with it there, past what is on the other side of the material.
+   pure subroutine inside_nearest_own(self, b, point, own, near, nearest)
+      type(inside_t), intent(in) :: self
+      type(triangles_t), intent(in) :: b
+      real(wp), intent(in) :: point(3)           !! [L]
+      integer, intent(in) :: own(2)              !! ends of its edge: what has them does not count
+      integer, intent(in) :: near                !! the triangle that is crossed
+      type(nearest_t), intent(out) :: nearest
+      integer, allocatable :: found(:)
+      integer :: n, n_met, i, k, t
+
+      call nearest_update(nearest, near, point, triangle_at(b, near))
+      allocate(found(64))
+      n = 0
+      call box_tree_find(self%tree, point, point, sqrt(nearest%square), found, n)
+      found(:n) = self%facet(found(:n))
+      n_met = 0                                  ! of those found, put first
+      k = findloc(found(:n), b%split%facet(near), dim=1)
+      do while (k > 0)
+         n_met = n_met + 1
+         found([n_met, k]) = found([k, n_met])
+         do t = b%split%start(found(n_met)), b%split%start(found(n_met) + 1) - 1
+            call nearest_update(nearest, t, point, triangle_at(b, t))
+         end do
+         k = 0
+         do i = n_met + 1, n
+            if (have_common(own, b%facets%corner(:, found(i)))) cycle
+            if (.not. meets_one_of(found(:n_met), found(i))) cycle
+            k = i
+            exit
+         end do
+      end do
+
+   contains
+
+      !> Has facet `f` a node in common with one of a list?
+      pure logical function meets_one_of(list, f)
+         integer, intent(in) :: list(:), f
+         integer :: j
+
+         meets_one_of = .false.
+         associate (corner => b%facets%corner)
+            do j = 1, size(list)
+               meets_one_of = meets_one_of .or. have_common(pack(corner(:, f), corner(:, f) > 0), &
+                  corner(:, list(j)))
+            end do
+         end associate
+      end function meets_one_of
+
+   end subroutine inside_nearest_own
+
    !> Look for a nearer place among the facets of a tree.
    pure subroutine walk(tree, facet, b, point, nearest)
       type(box_tree_t), intent(in) :: tree
@@ -362,7 +461,7 @@ contains
 
       k = 1
       do while (k > 0)
-         call box_tree_walk(tree, point, point, sqrt(nearest%square), k, found, n)
+         call box_tree_next(tree, point, sqrt(nearest%square), k, found, n)
          do i = 1, n
             f = found(i)
             if (size(facet) > 0) f = facet(f)

@@ -1,7 +1,7 @@
 !> The nearest place of triangles to a point, and where an edge crosses a triangle: from positions
 !> alone.
 !>
-!> Triangles run counter-clockwise from outside. Source: docs/theory.md, section 4.11.
+!> Triangles run counter-clockwise from outside. Source: docs/theory.md, section 4.15.
 module emcon_nearest_space
    use emcon_kinds, only : wp
    use emcon_triangles_space, only : cross_product

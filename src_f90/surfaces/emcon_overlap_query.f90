@@ -31,11 +31,14 @@ module emcon_overlap_query
    type, abstract :: overlap_query_t
       type(outline_t) :: outline
       logical :: is_passing = .false.            !! it is on the way, not at the end of a step
+      !> What goes through within a step is found by `pass`, not by looks at equal parts of it.
+      logical :: finds_passages = .false.
    contains
       procedure(begin_interface), deferred :: begin
       procedure(longest_interface), deferred :: longest
       procedure(place_interface), deferred :: place
       procedure(overlap_interface), deferred :: overlap
+      procedure :: pass
    end type overlap_query_t
 
    abstract interface
@@ -76,6 +79,19 @@ module emcon_overlap_query
    end interface
 
 contains
+
+   !> What pieces `p` and `q` go through of each other within a step: nothing, if parts of it are
+   !> looked at.
+   subroutine pass(self, p, q, x, u0, du, overlap)
+      class(overlap_query_t), intent(inout) :: self
+      integer, intent(in) :: p, q                !! 1..n_piece
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+      type(overlap_t), intent(inout) :: overlap  !! the deepest so far
+
+      associate (unused_self => self, unused_p => p, unused_q => q, unused_x => x, &
+            unused_u0 => u0, unused_du => du, unused_overlap => overlap)
+      end associate
+   end subroutine pass
 
    !> Does the overlap stand on `node`?
    elemental logical function overlap_names(self, node)

@@ -1,18 +1,22 @@
 !> Do pieces of a mesh in space overlap where they are? Their outlines are triangles: facets split
 !> about virtual centres, as contact sees them.
 !>
-!> Source: docs/theory.md, section 4.11.
+!> Source: docs/theory.md, section 4.15.
 module emcon_overlap_query_space
    use emcon_interactions, only : contact_options_t
    use emcon_kinds, only : wp
    use emcon_outline_space, only : outline_space_init
-   use emcon_overlap_query, only : overlap_query_t, overlap_t
-   use emcon_overlap_space, only : overlap_space_find
+   use emcon_overlap_query, only : overlap_query_t, overlap_t, passing, passing_thin
+   use emcon_overlap_space, only : overlap_space_find, overlap_space_own
+   use emcon_passages_space, only : passage_t, passages_find, way_t
    use emcon_scene, only : scene_t
    use emcon_triangles_space, only : triangles_init, triangles_place, triangles_t
    implicit none
    private
    public :: overlap_query_space_t, overlap_query_space_init
+
+   !> Looks at what goes through within a step, at most.
+   integer, parameter :: most_looks = 64
 
    type, extends(overlap_query_t) :: overlap_query_space_t
       type(triangles_t), allocatable :: piece(:) !! (n_piece)
@@ -21,6 +25,7 @@ module emcon_overlap_query_space
       procedure :: longest => overlap_query_longest
       procedure :: place => overlap_query_place
       procedure :: overlap => overlap_query_one_way
+      procedure :: pass => overlap_query_pass
    end type overlap_query_space_t
 
 contains
@@ -31,6 +36,7 @@ contains
       type(scene_t), intent(in) :: scene
       integer :: p
 
+      self%finds_passages = .true.
       call outline_space_init(self%outline, scene)
       allocate(self%piece(self%outline%n_piece))
       do p = 1, self%outline%n_piece
@@ -72,7 +78,7 @@ contains
       call triangles_place(self%piece(p), x, u0, du, share)
    end subroutine overlap_query_place
 
-   !> What of piece `p` is inside piece `q`, both placed.
+   !> What of piece `p` is inside piece `q`, both placed; the same one: in itself.
    subroutine overlap_query_one_way(self, p, q, x, reach, overlap)
       class(overlap_query_space_t), intent(inout) :: self
       integer, intent(in) :: p, q                !! from 1
@@ -81,8 +87,80 @@ contains
       type(overlap_t), intent(inout) :: overlap  !! the deepest so far
 
       associate (unused_x => x)
-         if (p /= q) call overlap_space_find(self%piece(p), self%piece(q), reach, overlap)
+         if (p == q) then
+            call overlap_space_own(self%piece(p), overlap)
+         else
+            call overlap_space_find(self%piece(p), self%piece(q), reach, self%is_passing, overlap)
+         end if
       end associate
    end subroutine overlap_query_one_way
+
+   !> What pieces `p` and `q` go through of each other: a look halfway through each passage that
+   !> could be deeper than what was found, the longest ones first.
+   subroutine overlap_query_pass(self, p, q, x, u0, du, overlap)
+      class(overlap_query_space_t), intent(inout) :: self
+      integer, intent(in) :: p, q                !! from 1
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      type(overlap_t), intent(inout) :: overlap  !! the deepest so far
+      type(passage_t), allocatable :: passage(:)
+      real(wp) :: shortest, longest, share
+      integer :: i, k
+
+      if (p == q) return
+      associate (a => self%piece(p), b => self%piece(q))
+         shortest = min(minval(a%length), minval(b%length))
+         longest = max(maxval(a%length), maxval(b%length))
+         call find_passages(a, b, x, u0, du, passage)
+         do k = 1, min(size(passage), most_looks)
+            i = maxloc(passage%path, dim=1)
+            ! Halfway through nothing is deeper than half of its path.
+            if (.not. 0.5_wp*passage(i)%path > overlap%depth*shortest) return
+            share = 0.5_wp*(passage(i)%from + passage(i)%to)
+            call triangles_place(a, x, u0, du, share)
+            call triangles_place(b, x, u0, du, share)
+            call overlap_space_find(a, b, longest, .true., overlap)
+            call overlap_space_find(b, a, longest, .true., overlap)
+            where (abs(2.0_wp*share - passage%from - passage%to) <= 0.5_wp*(passage%to &
+               - passage%from)) passage%path = 0.0_wp
+         end do
+      end associate
+   end subroutine overlap_query_pass
+
+   !> The passages of two pieces through each other that may be too deep.
+   pure subroutine find_passages(a, b, x, u0, du, passage)
+      type(triangles_t), intent(inout) :: a, b
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      type(passage_t), allocatable, intent(out) :: passage(:)
+      type(way_t) :: way_a, way_b
+      real(wp) :: least, drift(3)
+      integer :: i
+
+      call find_way(a, way_a)
+      call find_way(b, way_b)
+      ! What both have in common makes boxes long, and nothing meet.
+      drift = sum(way_b%rate, dim=2)/real(size(way_b%rate, 2), wp)
+      do i = 1, size(drift)
+         way_a%rate(i, :) = way_a%rate(i, :) - drift(i)
+         way_b%rate(i, :) = way_b%rate(i, :) - drift(i)
+      end do
+      least = 2.0_wp*min(passing*min(minval(a%length), minval(b%length)), &
+         passing_thin*min(minval(a%thickness), minval(b%thickness)))
+      allocate(passage(0))
+      call passages_find(a, b, way_a, way_b, least, passage)
+      call passages_find(b, a, way_b, way_a, least, passage)
+
+   contains
+
+      pure subroutine find_way(piece, way)
+         type(triangles_t), intent(inout) :: piece
+         type(way_t), intent(out) :: way
+
+         call triangles_place(piece, x, u0, du, 0.0_wp)
+         way%start = piece%at
+         call triangles_place(piece, x, u0, du, 1.0_wp)
+         way%rate = piece%at - way%start
+      end subroutine find_way
+
+   end subroutine find_passages
 
 end module emcon_overlap_query_space

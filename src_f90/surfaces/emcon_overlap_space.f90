@@ -1,16 +1,17 @@
 !> How deep one outline in space is inside another: the deepest of the points that are inside, and
 !> of the middles of inside parts of edges, by the nearest facet.
 !>
-!> Source: docs/theory.md, section 4.11.
+!> Source: docs/theory.md, section 4.15.
 module emcon_overlap_space
-   use emcon_inside_space, only : inside_confirm, inside_find, inside_nearest, inside_t, is_in
+   use emcon_inside_space, only : inside_confirm, inside_find, inside_nearest, &
+      inside_nearest_own, inside_own, inside_t
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : nearest_height, nearest_t
    use emcon_overlap_query, only : overlap_t, passing, passing_thin
    use emcon_triangles_space, only : triangle_at, triangles_t
    implicit none
    private
-   public :: overlap_space_find, overlap_space_take
+   public :: overlap_space_find, overlap_space_own
 
    !> Less than this behind a facet, by its length, is on it.
    real(wp), parameter :: aligned = sqrt(epsilon(1.0_wp))
@@ -26,30 +27,55 @@ module emcon_overlap_space
 contains
 
    !> What of `a` is inside `b`.
-   subroutine overlap_space_find(a, b, reach, overlap)
+   subroutine overlap_space_find(a, b, reach, is_passing, overlap)
       type(triangles_t), intent(in) :: a, b      !! placed
       real(wp), intent(in) :: reach              !! length of the longest facet of both [L]
+      logical, intent(in) :: is_passing          !! it is on the way, not at the end of a step
       type(overlap_t), intent(inout) :: overlap  !! the deepest so far
       type(inside_t) :: inside
+
+      call inside_find(inside, a, b, reach)
+      call take_deepest(inside, a, b, is_passing, overlap)
+   end subroutine overlap_space_find
+
+   !> What of `a` is inside itself.
+   subroutine overlap_space_own(a, overlap)
+      type(triangles_t), intent(in) :: a         !! placed
+      type(overlap_t), intent(inout) :: overlap  !! the deepest so far
+      type(inside_t) :: inside
+
+      call inside_own(inside, a, maxval(a%length))
+      call take_deepest(inside, a, a, .false., overlap)
+   end subroutine overlap_space_own
+
+   !> The deepest of all places that a look has found.
+   subroutine take_deepest(inside, a, b, is_passing, overlap)
+      type(inside_t), intent(inout) :: inside
+      type(triangles_t), intent(in) :: a, b
+      logical, intent(in) :: is_passing
+      type(overlap_t), intent(inout) :: overlap
       type(place_t), allocatable :: place(:)
       integer :: i, k
 
-      call inside_find(inside, a, b, reach)
       call find_places(inside, a, b, overlap%depth, place)
       do i = 1, size(place)
          k = maxloc(place%ratio, dim=1)
          if (.not. place(k)%ratio > overlap%depth) return
          ! Rounding may have led astray along edges: what is deep is asked again.
-         if (b%is_closed .and. place(k)%ratio > aligned) then
+         if (b%is_closed .and. place(k)%ratio > aligned .and. .not. inside%is_own) then
             if (.not. inside_confirm(inside, b, place(k)%at)) then
                place(k)%ratio = 0.0_wp
                cycle
             end if
          end if
-         call overlap_space_take(b, place(k)%nearest, place(k)%node, .false., overlap)
+         if (is_passing .and. passes_by(b, place(k)%nearest)) then
+            place(k)%ratio = 0.0_wp
+            cycle
+         end if
+         call take(b, place(k), overlap)
          return
       end do
-   end subroutine overlap_space_find
+   end subroutine take_deepest
 
    !> All places that are inside by more than `least`, per length of the facet.
    subroutine find_places(inside, a, b, least, place)
@@ -58,21 +84,27 @@ contains
       real(wp), intent(in) :: least
       type(place_t), allocatable, intent(out) :: place(:)
       type(place_t), allocatable :: spare(:)
-      integer :: i, n
+      integer :: i, n, near
 
-      n = count(inside%state == is_in) + inside%n_middle
+      n = size(inside%point) + inside%n_middle
       allocate(spare(n), place(0))
       n = 0
       if (size(spare) == 0) return
-      do i = 1, size(inside%state)
-         if (inside%state(i) /= is_in) cycle
-         call judge(node_of(a, i), a%at(:, i), inside%near(i))
+      do i = 1, size(inside%point)
+         associate (point => inside%point(i), before => inside%before)
+            near = inside%near(point)
+            if (near == 0 .and. before(point) > 0) near = inside%near(before(point))
+            call judge(node_of(a, point), a%at(:, point), [point, point], near)
+            inside%near(point) = near
+         end associate
       end do
       do i = 1, inside%n_middle
          associate (middle => inside%middle(i))
             associate (p => a%edge(1, middle%edge), q => a%edge(2, middle%edge))
+               near = middle%near
+               if (near == 0) near = inside%near(p)
                call judge(node_of(a, merge(p, q, middle%share < 0.5_wp)), &
-                  a%at(:, p) + middle%share*(a%at(:, q) - a%at(:, p)), middle%near)
+                  a%at(:, p) + middle%share*(a%at(:, q) - a%at(:, p)), [p, q], near)
             end associate
          end associate
       end do
@@ -80,13 +112,19 @@ contains
 
    contains
 
-      subroutine judge(node, at, near)
-         integer, intent(in) :: node, near
+      subroutine judge(node, at, own, near)
+         integer, intent(in) :: node, own(2)
          real(wp), intent(in) :: at(3)
+         integer, intent(inout) :: near          !! in: about the nearest triangle; out: it is
          type(place_t) :: new
 
          new = place_t(node, at)
-         call inside_nearest(inside, b, at, near, new%nearest)
+         if (inside%is_own) then
+            call inside_nearest_own(inside, b, at, own, near, new%nearest)
+         else
+            call inside_nearest(inside, b, at, near, new%nearest)
+         end if
+         near = new%nearest%triangle
          new%ratio = depth_of(b, inside%pad, at, new%nearest) &
             /b%length(b%split%facet(new%nearest%triangle))
          if (.not. new%ratio > least) return
@@ -130,28 +168,31 @@ contains
       end if
    end function node_of
 
-   !> Keep what is behind a facet of `b` if it is the deepest so far; on the way, less than the
-   !> smaller of two bounds is the straight way past a corner.
-   pure subroutine overlap_space_take(b, nearest, node, is_passing, overlap)
-      type(triangles_t), intent(in) :: b         !! placed
-      type(nearest_t), intent(in) :: nearest     !! place of `b`
-      integer, intent(in) :: node                !! that is behind it, or the nearest
-      logical, intent(in) :: is_passing          !! it is on the way, not at the end of a step
-      type(overlap_t), intent(inout) :: overlap
-      real(wp) :: depth
+   !> Is what is behind a facet of `b`, on the way, the straight way past a corner?
+   pure logical function passes_by(b, nearest)
+      type(triangles_t), intent(in) :: b
+      type(nearest_t), intent(in) :: nearest
 
-      depth = sqrt(nearest%square)
       associate (f => b%split%facet(nearest%triangle))
-         if (.not. depth > overlap%depth*b%length(f)) return
-         if (is_passing .and. depth < min(passing*b%length(f), passing_thin*b%thickness(f))) return
-         overlap%depth = depth/b%length(f)
+         passes_by = sqrt(nearest%square) < min(passing*b%length(f), passing_thin*b%thickness(f))
+      end associate
+   end function passes_by
+
+   !> Keep the deepest place.
+   pure subroutine take(b, place, overlap)
+      type(triangles_t), intent(in) :: b
+      type(place_t), intent(in) :: place
+      type(overlap_t), intent(inout) :: overlap
+
+      associate (f => b%split%facet(place%nearest%triangle))
+         overlap%depth = place%ratio
          overlap%length = b%length(f)
-         overlap%node = node
+         overlap%node = place%node
          overlap%facet = 0
          associate (own => b%facets%facet(:, f))
             overlap%facet(:size(own)) = own
          end associate
       end associate
-   end subroutine overlap_space_take
+   end subroutine take
 
 end module emcon_overlap_space

@@ -1,20 +1,19 @@
 !> How far points are from a surface in space, and on which side of it they are.
 !>
 !> The surface is the triangles of its split facets. The nearest place of it is within a triangle,
-!> on a side or in a corner; there the sum of the unit normals around, in a corner weighted by the
+!> on a side or in a vertex; there the sum of the unit normals around, in a vertex weighted by the
 !> angles of the triangles, tells the side: also where the nearest triangle alone would not.
 module emcon_signed_distance_space
-   use emcon_box_tree, only : box_tree_find, box_tree_init, box_tree_t
+   use emcon_box_tree, only : box_tree_guess, box_tree_init, box_tree_next, box_tree_t, leaf_size
    use emcon_facet_split, only : facet_split_init, facet_split_place, facet_split_t
    use emcon_facets, only : facets_t
    use emcon_kinds, only : dp, wp
    use emcon_rotation, only : cross_product
-   use emcon_search, only : box_distance
    use emcon_sort, only : sort_order
    implicit none
    private
    public :: signed_distance_t, signed_foot_t, signed_distance_init, signed_distance_find, &
-      signed_distance_to
+      signed_distance_reaches, signed_distance_to
 
    integer, parameter :: n_dim = 3, n_side = 3
 
@@ -36,7 +35,7 @@ module emcon_signed_distance_space
       real(wp), allocatable, private :: side_normal(:, :)    !! (3, sides) sums
       integer, allocatable, private :: side(:, :)            !! (3, n_simplex) number of each side
       logical, allocatable, private :: is_free_side(:), is_free_point(:)
-      real(wp), private :: low(n_dim), high(n_dim), reach    !! of all; of a triangle [L]
+      real(wp), private :: low(n_dim), high(n_dim)           !! of all [L]
    end type signed_distance_t
 
 contains
@@ -62,16 +61,15 @@ contains
                   self%at(:, triangle(n_side, k)) - a))
             end associate
          end do
-         self%low = minval(low, 2)
-         self%high = maxval(high, 2)
-         self%reach = sum(high - low)/real(max(1, n), wp)
+         self%low = minval(low, n_dim - 1)
+         self%high = maxval(high, n_dim - 1)
          call box_tree_init(self%tree, low, high)
          call number_sides(triangle, self%side)
       end associate
       call sum_normals(self)
    end subroutine signed_distance_init
 
-   !> Number the sides of triangles: side j goes from corner j to the next one.
+   !> Number the sides of triangles: side j goes from vertex j to the next one.
    pure subroutine number_sides(triangle, side)
       integer, intent(in) :: triangle(:, :)      !! (3, n)
       integer, allocatable, intent(out) :: side(:, :)        !! (3, n)
@@ -107,7 +105,7 @@ contains
       allocate(self%is_free_point(self%split%n_point), source=.false.)
       do k = 1, size(self%normal, n_dim - 1)
          do j = 1, n_side
-            associate (side => self%side(j, k), here => corner_of(self, k, j))
+            associate (side => self%side(j, k), here => vertex_of(self, k, j))
                n_use(side) = n_use(side) + 1
                self%side_normal(:, side) = self%side_normal(:, side) + self%normal(:, k)
                self%point_normal(:, here) = self%point_normal(:, here) + angle(self, k, j) &
@@ -118,58 +116,64 @@ contains
       self%is_free_side = n_use == 1
       do k = 1, size(self%normal, n_dim - 1)
          do j = 1, n_side
-            if (self%is_free_side(self%side(j, k))) self%is_free_point([corner_of(self, k, j), &
-               corner_of(self, k, j + 1)]) = .true.
+            if (self%is_free_side(self%side(j, k))) self%is_free_point([vertex_of(self, k, j), &
+               vertex_of(self, k, j + 1)]) = .true.
          end do
       end do
    end subroutine sum_normals
 
-   !> Point at corner `j` of triangle `k`; behind the last one the first follows.
-   pure integer function corner_of(self, k, j)
+   !> Point at vertex `j` of triangle `k`; behind the last one the first follows.
+   pure integer function vertex_of(self, k, j)
       type(signed_distance_t), intent(in) :: self
       integer, intent(in) :: k, j
 
-      corner_of = self%split%corner(1 + mod(j - 1, n_side), k)
-   end function corner_of
+      vertex_of = self%split%corner(1 + mod(j - 1, n_side), k)
+   end function vertex_of
 
-   !> The angle of triangle `k` at its corner `j`.
+   !> The angle of triangle `k` at its vertex `j`.
    pure real(wp) function angle(self, k, j)
       type(signed_distance_t), intent(in) :: self
       integer, intent(in) :: k, j
       real(wp), dimension(n_dim) :: a, b, c
 
-      associate (here => self%at(:, corner_of(self, k, j)))
-         a = self%at(:, corner_of(self, k, j + 1)) - here
-         b = self%at(:, corner_of(self, k, j + n_side - 1)) - here
+      associate (here => self%at(:, vertex_of(self, k, j)))
+         a = self%at(:, vertex_of(self, k, j + 1)) - here
+         b = self%at(:, vertex_of(self, k, j + n_side - 1)) - here
       end associate
       c = cross_product(a, b)
       angle = atan2(length(c), dot_product(a, b))
    end function angle
 
-   !> The nearest place of the surface, searched among all.
-   pure subroutine signed_distance_find(self, point, foot)
+   !> The nearest place of the surface, searched among all, or among those nearer than `within`.
+   pure subroutine signed_distance_find(self, point, foot, within)
       type(signed_distance_t), intent(in) :: self
       real(wp), intent(in) :: point(:)           !! (3) [L]
       type(signed_foot_t), intent(out) :: foot
-      integer, allocatable :: found(:)
-      real(wp) :: reach
-      integer :: i, n
+      real(wp), intent(in), optional :: within   !! > 0 [L]
+      integer, allocatable :: guess(:)
+      integer :: found(leaf_size), i, k, n
 
-      if (size(self%split%facet) == 0) return
-      allocate(found(0))
-      reach = box_distance(point, point, self%low, self%high) + self%reach
-      do
-         n = 0
-         call box_tree_find(self%tree, point, point, reach, found, n)
+      if (present(within)) foot%distance = within
+      call box_tree_guess(self%tree, point, guess)
+      do i = 1, size(guess)
+         call take_nearer(self, guess(i), point, foot)
+      end do
+      k = 1
+      do while (k > 0 .and. size(guess) > 0)
+         call box_tree_next(self%tree, point, abs(foot%distance), k, found, n)
          do i = 1, n
             call take_nearer(self, found(i), point, foot)
          end do
-         if (abs(foot%distance) <= reach .or. n == size(self%split%facet)) exit
-         if (.not. reach < huge(reach)) return   ! a place that is not finite is near nothing
-         reach = max(reach + reach, reach + self%reach)
-         if (foot%simplex > 0) reach = abs(foot%distance)
       end do
    end subroutine signed_distance_find
+
+   !> Is a point in the box around the whole surface?
+   pure logical function signed_distance_reaches(self, point) result(reaches)
+      type(signed_distance_t), intent(in) :: self
+      real(wp), intent(in) :: point(:)           !! (3) [L]
+
+      reaches = all(point >= self%low .and. point <= self%high)
+   end function signed_distance_reaches
 
    !> The nearest place of triangle `k` alone.
    pure subroutine signed_distance_to(self, k, point, foot)
@@ -194,11 +198,11 @@ contains
       is_within = .true.
       do j = 1, n_side
          is_within = is_within .and. dot_product(self%normal(:, k), cross_product( &
-            self%at(:, corner_of(self, k, j + 1)) - self%at(:, corner_of(self, k, j)), &
-            point - self%at(:, corner_of(self, k, j)))) > 0.0_wp
+            self%at(:, vertex_of(self, k, j + 1)) - self%at(:, vertex_of(self, k, j)), &
+            point - self%at(:, vertex_of(self, k, j)))) > 0.0_wp
       end do
       if (is_within) then
-         associate (d => dot_product(self%normal(:, k), point - self%at(:, corner_of(self, k, 1))))
+         associate (d => dot_product(self%normal(:, k), point - self%at(:, vertex_of(self, k, 1))))
             if (.not. abs(d) < abs(foot%distance)) return
             foot = signed_foot_t(k, self%split%facet(k), d, self%normal(:, k), 0.0_wp)
          end associate
@@ -227,8 +231,8 @@ contains
 
       call find_way(self, k, j, point, way, end)
       if (end > 0) then
-         outwards = self%point_normal(:, corner_of(self, k, end))
-         is_free = self%is_free_point(corner_of(self, k, end))
+         outwards = self%point_normal(:, vertex_of(self, k, end))
+         is_free = self%is_free_point(vertex_of(self, k, end))
       else
          outwards = self%side_normal(:, self%side(j, k))
          is_free = self%is_free_side(self%side(j, k))
@@ -247,7 +251,7 @@ contains
    end subroutine settle
 
    !> The way to a point from the nearest place on side `j` of triangle `k`, and which of its
-   !> corners that is; 0: none.
+   !> vertices that is; 0: none.
    pure subroutine find_way(self, k, j, point, way, end)
       type(signed_distance_t), intent(in) :: self
       integer, intent(in) :: k, j
@@ -256,8 +260,8 @@ contains
       integer, intent(out) :: end
       real(wp) :: along(n_dim), t
 
-      associate (from => self%at(:, corner_of(self, k, j)), &
-            to => self%at(:, corner_of(self, k, j + 1)))
+      associate (from => self%at(:, vertex_of(self, k, j)), &
+            to => self%at(:, vertex_of(self, k, j + 1)))
          along = to - from
          t = dot_product(point - from, along)
          end = 0

@@ -1,7 +1,7 @@
 !> The outline of one piece in space as triangles: facets split about their virtual centres, with
 !> the edges between them, and where all of it is.
 !>
-!> Source: docs/theory.md, section 4.11.
+!> Source: docs/theory.md, section 4.15.
 module emcon_triangles_space
    use emcon_csr, only : csr_list_users
    use emcon_facet_split, only : facet_split_centre, facet_split_init, facet_split_t

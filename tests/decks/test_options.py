@@ -86,7 +86,7 @@ def test_the_reference_tells_which_models_a_value_is_for():
     for rows in OPTIONS.values():
         for row in rows:
             assert (row.models == ("plane", "axial", "space")) == (row.instead == "")
-            assert row.instead in ("", *(other.word for other in rows if not other.instead))
+            assert row.instead in ("", *(other.word for other in rows if other.is_default))
 
 
 @pytest.mark.parametrize("option", OPTIONS)

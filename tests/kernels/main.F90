@@ -65,6 +65,7 @@ program main
    use test_facet_groups, only : collect_facet_groups
    use test_facet_values, only : collect_facet_values
    use test_first_touch, only : collect_first_touch
+   use test_first_touch_space, only : collect_first_touch_space
    use test_friction, only : collect_friction
    use test_friction_ways, only : collect_friction_ways
    use test_gauss, only : collect_gauss
@@ -146,6 +147,7 @@ program main
    use test_overlap_boxes, only : collect_overlap_boxes
    use test_overlap_plane, only : collect_overlap_plane
    use test_overlap_space, only : collect_overlap_space
+   use test_passages_space, only : collect_passages_space
    use test_deck_parameters, only : collect_deck_parameters
    use test_deck_ties, only : collect_deck_ties
    use test_point_function, only : collect_point_function
@@ -244,6 +246,7 @@ program main
    call run("initial_contact", collect_initial_contact)
    call run("lapack", collect_lapack)
    call run("first_touch", collect_first_touch)
+   call run("first_touch_space", collect_first_touch_space)
    call run("friction", collect_friction)
    call run("friction_ways", collect_friction_ways)
    call run("dashpot_law", collect_dashpot_law)
@@ -324,6 +327,7 @@ program main
    call run("overlap_boxes", collect_overlap_boxes)
    call run("overlap_plane", collect_overlap_plane)
    call run("overlap_space", collect_overlap_space)
+   call run("passages_space", collect_passages_space)
    call run("bodies", collect_bodies)
    call run("arcs", collect_arcs)
    call run("circles", collect_circles)

@@ -10,8 +10,6 @@ module test_host_contact
    use emcon_initial_contact, only : initial_contact_prepare
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_user
    use emcon_kinds, only : wp
-   use emcon_overlap_query, only : overlap_query_t
-   use emcon_overlap_query_registry, only : new_overlap_query
    use emcon_scene, only : scene_t
    use emcon_surface_nodes, only : surface_nodes
    use emcon_text, only : notes_t
@@ -41,7 +39,6 @@ contains
          test_case_t("what is left out is filled in", test_set_up), &
          test_case_t("faults are told with the pair", test_faults), &
          test_case_t("gaps at the start", test_start), &
-         test_case_t("no outlines in space", test_outlines), &
          test_case_t("formulations by pairs", test_list)]
    end subroutine collect_host_contact
 
@@ -183,22 +180,6 @@ contains
       call check_error(error, raised, err_input, "3 slave nodes of surface", "overlap")
       call check_error(error, raised, err_input, "by 0.125 at most", "its depth")
    end subroutine test_start
-
-   !> Where nodes have three coordinates nothing is looked at, and it is known that it is not.
-   subroutine test_outlines(error)
-      type(error_t), allocatable, intent(out) :: error
-      type(scene_t) :: scene
-      type(block_t) :: lower, upper
-      class(overlap_query_t), allocatable :: query
-
-      call make_two_blocks(scene, 0.0_wp, lower, upper)
-      call new_overlap_query(scene, query)
-      call check_equal(error, query%outline%n_piece, 2, "two pieces")
-      scene%n_dim = 3
-      scene%x = reshape([scene%x, scene%x(:1, :)], [3, size(scene%x, 2)])
-      call new_overlap_query(scene, query)
-      call check_true(error, .not. allocated(query), "none in space")
-   end subroutine test_outlines
 
    !> Given in any order, each stays with its pair.
    subroutine test_list(error)

@@ -2,6 +2,7 @@
 module test_search
    use, intrinsic :: ieee_arithmetic, only : ieee_positive_inf, ieee_quiet_nan, ieee_value
    use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_box_tree, only : box_tree_guess, box_tree_init, box_tree_next, box_tree_t, leaf_size
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_search, only : box_distance, candidates_t, search_candidates
@@ -30,8 +31,54 @@ contains
          test_case_t("one edge that spans all", test_long_edge), &
          test_case_t("nothing to search", test_empty), &
          test_case_t("candidates grow linearly", test_linear), &
+         test_case_t("boxes straight to a point", test_straight), &
          test_case_t("distance of boxes", test_box_distance)]
    end subroutine collect_search
+
+   !> A walk finds each box within a distance once, and the nearest one with a reach that falls; a
+   !> guess is no farther than most.
+   subroutine test_straight(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(box_tree_t) :: tree
+      integer, parameter :: n_box = 300
+      real(wp) :: low(3, n_box), high(3, n_box), point(3), distance(n_box), reach
+      integer :: found(leaf_size), n_seen(n_box), i, k, n
+      integer, allocatable :: guess(:)
+
+      call draw_random(low)
+      call draw_random(high)
+      high = low + 0.1_wp*high
+      call box_tree_init(tree, low, high)
+      do i = 1, 50
+         call draw_random(point)
+         point = 2.0_wp*point - 0.5_wp
+         distance = sqrt(sum(max(0.0_wp, low - spread(point, 2, n_box), &
+            spread(point, 2, n_box) - high)**2, 1))
+         reach = 0.02_wp*i
+         n_seen = 0
+         k = 1
+         do
+            call box_tree_next(tree, point, reach, k, found, n)
+            n_seen(found(:n)) = n_seen(found(:n)) + 1
+            if (n == 0) exit
+         end do
+         call check_equal(error, n_seen, merge(1, 0, distance <= reach), "within reach")
+         call box_tree_guess(tree, point, guess)
+         call check_true(error, count(distance < minval(distance(guess))) < n_box/10, "guess")
+         reach = minval(distance(guess))
+         k = 1
+         do while (k > 0)
+            call box_tree_next(tree, point, reach, k, found, n)
+            if (n > 0) reach = min(reach, minval(distance(found(:n))))
+         end do
+         call check_near(error, reach, minval(distance), 0.0_wp, 1.0_wp, "nearest")
+      end do
+      call box_tree_init(tree, low(:, :0), high(:, :0))
+      call box_tree_guess(tree, point, guess)
+      k = 1
+      call box_tree_next(tree, point, reach, k, found, n)
+      call check_equal(error, [size(guess), k, n], [0, 0, 0], "no boxes")
+   end subroutine test_straight
 
    !> The list holds every pair of a point and an edge box within `reach`, each once, no others.
    subroutine check_list(error, point, ends, reach, what)

@@ -134,7 +134,7 @@ contains
       type(signed_distance_t) :: surface, large
       type(signed_foot_t) :: foot, other
       real(wp) :: point(3, n_point)
-      real(wp), parameter :: factor = 2.0_wp**40
+      real(wp), parameter :: factor = 2.0_wp**20
       integer :: i
 
       call space_begin(scene)

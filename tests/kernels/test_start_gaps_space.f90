@@ -191,6 +191,12 @@ contains
          call check_equal(error, count(start%facet > 0), merge(18, 0, i == 0), "near")
          if (i == 0) call check_near(error, minval(start%state%gap0), -0.25_wp, tol, 1.0_wp, &
             "to the bottom")
+         if (i == 0) cycle
+         scene%pair%adjust%distance = 2.5_wp
+         call start_gaps_space_init(start, scene, scene%pair(1), error)
+         if (allocated(error)) return
+         call start%measure(scene)
+         call check_equal(error, count(start%facet > 0), 9, "near enough to be moved")
       end do
    end subroutine test_closed
 

@@ -87,11 +87,64 @@ def turned(seed: int, to: tuple[float, ...] = (0., 0., 0.)):
 def test_depths_are_those_that_an_outsider_finds(seed: int, kind: str, tmp_path: Path) -> None:
     """Two cubes of cells of unlike sizes that fly through each other, both turned."""
     blocks = [Block(kind, (2, 2, 2), place=turned(seed)),
-              Block(kind, (3, 3, 3), place=turned(seed + 100, (0.2, 0.1, 1.5)))]
-    run = together(tmp_path, blocks, [(0., 0., 0.), (0., 0.1, -1.)], 0.1, 10)
+              Block(kind, (3, 3, 3), place=turned(seed + 100, (0.2, 0.1, 1.8)))]
+    run = together(tmp_path, blocks, [(0., 0., 0.), (0., 0.1, -1.)], 0.05, 24)
     fields = run.fields()
     bodies = overlap.BodiesInSpace(fields.cells, centres=False)
-    frames = [bodies.overlap(x) for x in fields.x + fields["displacement"]]
-    told = run.history["penetration"]
+    frames = [bodies.overlap(x) for x in (fields.x + fields["displacement"])[::4]]
+    told = run.history["penetration"][::4]
     assert max(f.by_edge for f in frames) > 0.3
     assert [f.by_edge for f in frames] == pytest.approx(list(told), rel=1e-6, abs=1e-9)
+
+
+def test_bodies_without_a_pair_meet_from_afar_in_the_plane(tmp_path: Path) -> None:
+    """In steps that are small beside what was between them."""
+    deck = tmp_path/"deck.inp"
+    squares = "".join(f"{4*k + i}, {x}, {y + 3.0*k}\n" for k in range(2)
+                      for i, (x, y) in enumerate([(0, 0), (1, 0), (1, 1), (0, 1)], 1))
+    deck.write_text(f"*MATERIAL, NAME=M\n{RUBBER}*NODE\n{squares}*ELEMENT, TYPE=CPE4, ELSET=ALL\n1, 1, 2, 3, 4\n"
+                    "2, 5, 6, 7, 8\n*SOLID SECTION, ELSET=ALL, MATERIAL=M\n1.\n*NSET, NSET=UP, GENERATE\n5, 8\n"
+                    "*INITIAL CONDITIONS, TYPE=VELOCITY\nUP, 2, -1.\n*STEP, NLGEOM, INC=22\n*DYNAMIC, DIRECT\n0.1, 2.2\n"
+                    "*END STEP\n")
+    run = run_deck(deck, tmp_path, 3)
+    assert run.verdict["penetration"] == pytest.approx(0.2, rel=1e-8)
+
+
+def plate(kind: str, at: float = 0.) -> Block:
+    return Block(kind, (8, 8, 1), (2, 2, 0.05), place=moved(-1., -1., at))
+
+
+@pytest.mark.parametrize("kind", ["C3D4", "C3D8", "C3D10", "C3D20"])
+def test_a_block_goes_through_a_plate_in_one_step(kind: str, tmp_path: Path) -> None:
+    """It is on the other side at the end. Halfway, nodes of the plate are deep in the block."""
+    block = Block(kind, (2, 2, 2), (0.3, 0.3, 0.3), place=turned(3, (-0.3, -0.3, 0.)))
+    run = together(tmp_path, [plate(kind), block], [(0., 0., 0.), (0.1, 0.05, -1.2)], 1., 1)
+    assert 0.3 < run.verdict["penetration"] < 1.5
+    assert "no contact pair brings the two together" in run.verdict["reasons"][0]
+    frames = overlap.frames(run.fields())
+    assert max(frames).depth == 0
+
+
+def test_bars_go_through_each_other_in_one_step(tmp_path: Path) -> None:
+    """No node of one meets a face of the other."""
+    blocks = [Block("C3D8", (3, 1, 1), (2, 0.2, 0.2), place=moved(-1., -0.1, 0.)),
+              Block("C3D8", (1, 1, 1), (0.2, 2, 0.2), place=moved(-0.1, -1., 0.5))]
+    run = together(tmp_path, blocks, [(0., 0., 0.), (0.03, 0.02, -1.)], 1., 1)
+    assert run.verdict["penetration"] > 0.1
+
+
+@pytest.mark.parametrize("speed", [(3., 0., 0.), (0., 0., 3.), (2., 1., 0.), (-3., 0., -3.)])
+def test_what_passes_by_in_one_step_is_no_overlap(speed: tuple[float, float, float], tmp_path: Path) -> None:
+    """Along a plate that it stands on, away from it, and beside its edge."""
+    where = (1.2, 0., 0.3) if speed[0] < 0 else (-0.15, 0., 0.05)
+    speed = (-speed[0], 0., speed[2]) if speed[0] < 0 else speed
+    block = Block("C3D8", (2, 2, 2), (0.3, 0.3, 0.3), place=moved(*where))
+    run = together(tmp_path, [plate("C3D8"), block], [(0., 0., 0.), speed], 1., 1, code=0)
+    assert run.verdict["penetration"] <= 16*EPSILON
+
+
+def test_bodies_that_fly_together_are_looked_at_once(tmp_path: Path) -> None:
+    """Far and fast, in touch all the way."""
+    blocks = [Block("C3D8", (2, 2, 2)), Block("C3D8", (3, 3, 3), place=moved(0., 0., 1.))]
+    run = together(tmp_path, blocks, [(30., 10., -20.)]*2, 1., 2, code=0)
+    assert run.verdict["penetration"] <= 1e-12

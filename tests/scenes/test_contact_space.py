@@ -1,0 +1,191 @@
+"""Contact of nodes in space: impacts through rebound, patch tests, slides, and what must not change them."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import overlap
+import pytest
+from contact_space_scenes import impact, press, stack, turned
+from scene_tools import EPSILON, Run, run_deck
+
+#: Energy and momenta through an impact, of the largest of each.
+BALANCE = 1.0e-11
+#: Depths that numpy finds in a run whose gaps are closed to round-off, per facet: roundings of positions of size 1.
+DEPTH = 64*EPSILON
+#: Where edges of a coarse ball cross others between nodes, per facet.
+CROSSING = 1.0e-2
+
+
+def ran(folder: Path, text: str, code: int = 0) -> Run:
+    deck = folder/"deck.inp"
+    deck.write_text(text)
+    return run_deck(deck, folder, code)
+
+
+def moments(run: Run, names: str) -> np.ndarray:
+    return np.array([run.history[name] for name in names.split()]).T
+
+
+def check_impact(run: Run, depth: float = DEPTH) -> None:
+    """Energy, six momenta, no overlap by the check and by another one, no cut, and there was a rebound."""
+    history = run.history
+    assert run.verdict["verdict"] == "good", run.log[-600:]
+    assert np.ptp(history["total"]) <= BALANCE*history["total"].max()
+    p, angular = moments(run, "px py pz"), moments(run, "lx ly lz")
+    size = max(np.abs(history[f"pair1_impulse_{a}"]).max() for a in "xyz")
+    assert np.abs(p - p[0]).max() <= BALANCE*size
+    assert np.abs(angular - angular[0]).max() <= BALANCE*max(size, np.abs(angular).max())
+    assert run.verdict["penetration"] <= depth
+    assert overlap.worst(run.fields()).depth <= depth
+    assert history["cuts"].sum() == 0
+    assert history["active"].max() > 0
+    assert history["active"][-1] == 0
+
+
+@pytest.mark.parametrize(("first", "second"), [
+    ("C3D8", "C3D8"), ("C3D4", "C3D8"), ("C3D8", "C3D4"), ("C3D4", "C3D4"), ("C3D8I", "C3D8H"), ("C3D10", "C3D8"),
+    ("C3D8", "C3D10"), ("C3D10", "C3D10"), ("C3D20", "C3D8"), ("C3D4", "C3D20R"), ("C3D10", "C3D20")])
+def test_a_ball_bounces_off_a_plate(first: str, second: str, tmp_path: Path) -> None:
+    check_impact(ran(tmp_path, impact(first, second)), CROSSING)
+
+
+@pytest.mark.parametrize(("cells", "angle"), [
+    ([(1, 1, 1), (1, 1, 1)], 0.0), ([(2, 2, 2), (2, 2, 2)], 0.0), ([(3, 3, 2), (3, 3, 2)], 0.0),
+    ([(2, 2, 2), (3, 3, 3)], 0.0), ([(3, 3, 1), (2, 2, 1)], 0.0), ([(2, 2, 2), (2, 2, 2)], 0.1),
+    ([(2, 2, 2), (2, 2, 2)], -0.1)])
+@pytest.mark.parametrize("kind", ["C3D8", "C3D4"])
+def test_cubes_node_on_node(kind: str, cells: list[tuple[int, int, int]], angle: float, tmp_path: Path) -> None:
+    """Meshes that match, or do not, with outlines in one plane: flat, and on an edge first."""
+    run = ran(tmp_path, stack(cells, 0.03, angle, kind=kind))
+    check_impact(run)
+    if angle == 0.0 and kind == "C3D8":          # as it is, mirrored: nothing turns
+        for names in ("px py", "lx ly lz"):
+            assert np.ptp(moments(run, names), axis=0).max() <= BALANCE
+
+
+def test_newton_is_quadratic(tmp_path: Path) -> None:
+    """Residuals of steps with contact: each about the square of the one before, or round-off."""
+    run = ran(tmp_path, impact("C3D8", "C3D8", "*NEWTON, TYPE=FULL\n", cells=4))
+    n = 0
+    for row, active in zip(run.increments, run.history["active"][1:], strict=True):
+        residuals = [float(word) for word in row[-1].split()[9:]]
+        if active == 0 or len(residuals) < 4:
+            continue
+        n += 1
+        for before, after in zip(residuals[1:], residuals[2:], strict=False):
+            assert after <= max(1.0e3*before**2, 1.0e-14), row[-1]
+    assert n > 10
+
+
+@pytest.mark.parametrize(("cells", "kind"), [
+    ([(1, 1, 1), (1, 1, 1)], ["C3D8", "C3D8"]), ([(3, 3, 2), (3, 3, 2)], ["C3D8", "C3D8"]),
+    ([(2, 2, 2), (3, 3, 3)], ["C3D8", "C3D8"]), ([(3, 3, 3), (2, 2, 2)], ["C3D8", "C3D8"]),
+    ([(3, 3, 2), (4, 4, 2)], ["C3D8", "C3D8"])])
+@pytest.mark.parametrize("angle", [0.0, 0.7])
+def test_uniform_pressure(cells: list[tuple[int, int, int]], kind: list[str], angle: float, tmp_path: Path) -> None:
+    """Nodes of both sides hand a uniform pressure on through meshes that do not match, in any direction."""
+    turn = turned(angle)
+    run = ran(tmp_path, press(cells, kind, 0.01, turn))
+    stress = run.fields()["cauchy_stress"][-1]
+    s = np.array([[[v[0], v[3], v[4]], [v[3], v[1], v[5]], [v[4], v[5], v[2]]] for v in stress])
+    if angle == 0.0:
+        assert np.abs(s[:, 2, 2] - s[:, 2, 2].mean()).max() <= 1.0e-11*np.abs(s).max()
+    pressure = np.einsum("nij,i,j->n", s, turn[:, 2], turn[:, 2]) if angle == 0.0 else np.trace(s, axis1=1, axis2=2)
+    assert np.abs(pressure + 5.0).max() <= 1.0e-10*5.0
+
+
+@pytest.mark.parametrize("more", [
+    "*CONTACT INITIATION, TYPE=ADMISSIBLE\n", "*CONTACT INITIATION, TYPE=VELOCITY UPDATE\n",
+    "*CONSTRAINT METHOD, TYPE=SADDLE POINT\n", "*CONSTRAINT METHOD, TYPE=PENALTY\n",
+    "*CONSTRAINT METHOD, TYPE=AUGMENTED LAGRANGE\n"])
+def test_other_ways_to_hold(more: str, tmp_path: Path) -> None:
+    """Energy and momenta through all of them."""
+    run = ran(tmp_path, impact("C3D8", "C3D8", more))
+    history = run.history
+    assert run.verdict["verdict"] == "good"
+    # Penetrations of an augmented Lagrangian up to its tolerance have done work.
+    balance = 1.0e-6 if "AUGMENTED" in more else BALANCE
+    if "ADMISSIBLE" in more:                     # what is stopped loses a part
+        assert np.diff(history["total"]).max() <= balance*history["total"].max()
+    else:
+        assert np.ptp(history["total"]) <= balance*history["total"].max()
+    p, angular = moments(run, "px py pz"), moments(run, "lx ly lz")
+    assert np.abs(p - p[0]).max() <= BALANCE*np.abs(p).max()
+    assert np.abs(angular - angular[0]).max() <= BALANCE*np.abs(angular).max()
+
+
+def test_null_space_and_saddle_point_agree(tmp_path: Path) -> None:
+    states = []
+    for k, more in enumerate(["", "*CONSTRAINT METHOD, TYPE=SADDLE POINT\n"]):
+        folder = tmp_path/str(k)
+        folder.mkdir()
+        states.append(ran(folder, impact("C3D8", "C3D4", more)).fields()["displacement"][-1])
+    assert np.abs(states[0] - states[1]).max() <= 1.0e-9
+
+
+@pytest.mark.parametrize("interaction", [
+    "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n200.\n",
+    "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=EXPONENTIAL\n.05, 2.\n", "*CONTACT DAMPING\n2., .05\n"])
+def test_laws_of_contact(interaction: str, tmp_path: Path) -> None:
+    """What pressures store comes back; what a damper takes is told."""
+    run = ran(tmp_path, impact("C3D8", "C3D8", interaction=interaction, cells=4))
+    history = run.history
+    taken = history["contact_damping_loss"] + history["contact_energy"]
+    total = history["kinetic"] + history["strain"] + taken
+    assert run.verdict["verdict"] == "good", run.log[-600:]
+    assert np.ptp(total) <= BALANCE*total.max()
+    assert history["active"].max() > 0
+    if "DAMPING" in interaction:
+        assert history["contact_damping_loss"][-1] > 0.0
+    p = moments(run, "px py pz")
+    assert np.abs(p - p[0]).max() <= BALANCE*np.abs(p).max()
+
+
+def test_a_mirrored_scene_is_mirrored(tmp_path: Path) -> None:
+    """A cube on one of its edges, from either side."""
+    ends = []
+    for k, angle in enumerate([0.1, -0.1]):
+        folder = tmp_path/str(k)
+        folder.mkdir()
+        run = ran(folder, stack([(2, 2, 2), (3, 3, 2)], 0.03, angle))
+        ends.append(run.history["lx"])
+        check_impact(run)
+    assert np.ptp(ends[0]) <= BALANCE
+
+
+def scaled(text: str, power: int) -> str:
+    """Coordinates, times, velocities of a deck in a unit of length 2**power times smaller; speeds alike."""
+    unit, out, card = 2.0**power, [], ""
+    for line in text.splitlines():
+        if line.startswith("*"):
+            card = line.split(",")[0]
+        elif card == "*NODE":
+            label, *x = line.split(",")
+            line = ", ".join([label, *(repr(float(w)*unit) for w in x)])
+        elif card == "*DYNAMIC":
+            line = ", ".join(repr(float(w)*unit) for w in line.split(","))
+        out.append(line)
+    return "\n".join(out) + "\n"
+
+
+def test_bits_do_not_depend_on_units(tmp_path: Path) -> None:
+    """In a unit of length and time 1024 times smaller: the same velocities."""
+    text = impact("C3D8", "C3D4").replace("*NODE FILE\nU\n", "*NODE FILE\nU, V\n")
+    found = []
+    for power in (0, 10):
+        folder = tmp_path/str(power)
+        folder.mkdir()
+        found.append(ran(folder, scaled(text, power)).fields()["velocity"][-1])
+    assert np.array_equal(found[0], found[1])
+
+
+def test_bits_do_not_depend_on_a_restart(tmp_path: Path) -> None:
+    whole = ran(tmp_path, impact("C3D8", "C3D8", "*RESTART, WRITE, FREQUENCY=10\n"))
+    short = tmp_path/"short"
+    short.mkdir()
+    deck = short/"deck.inp"
+    deck.write_text(impact("C3D8", "C3D8", "*RESTART, WRITE, FREQUENCY=10\n"))
+    run_deck(deck, short, 0)
+    assert whole.digits() == Run(short/"deck").digits()
