@@ -10,7 +10,7 @@ module emcon_patch_contact_space
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_facet_values, only : facets_pressed_areas, facets_pressures
+   use emcon_facet_values, only : facets_pressed_area, facets_pressures
    use emcon_facets, only : facets_init, facets_normal
    use emcon_guards, only : crossing_bar, overlap_bar
    use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach, &
@@ -18,7 +18,8 @@ module emcon_patch_contact_space
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
    use emcon_patch_gap_space, only : patch_ahead, patch_gap, patch_gap_t, patch_means, patch_way
-   use emcon_patch_sides_space, only : node_frames_init, patch_sides_t, patch_triangles_init
+   use emcon_patch_sides_space, only : frame_normal, node_frames_init, patch_sides_t, &
+      patch_triangles_init
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
       patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
@@ -302,13 +303,18 @@ contains
       length = area/self%thickness
    end subroutine patch_area
 
-   !> What nodes between corners are pressed on.
+   !> What of the facets at a node each of its frames is pressed on.
    pure subroutine patch_narrow(self, x, u, area)
       class(patch_contact_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       real(wp), intent(inout) :: area(:)         !! (n_constraint) [L^2]
+      real(wp) :: normal(3)
+      integer :: i
 
-      call facets_pressed_areas(self%sides%slave, x, u, area)
+      do i = 1, self%n_constraint
+         normal = frame_normal(self%sides%frames, i, self%node(i), x, u)
+         area(i) = facets_pressed_area(self%sides%slave, self%sides%frames%node(i), normal, x, u)
+      end do
    end subroutine patch_narrow
 
    pure subroutine patch_pressures(self, force, area, pressure)
@@ -317,7 +323,7 @@ contains
       real(wp), intent(in) :: area(:)            !! (n_constraint) [L^2]
       real(wp), intent(out) :: pressure(:)       !! (n_constraint) [M/(L T^2)]
 
-      call facets_pressures(self%sides%slave, force, area, pressure)
+      call facets_pressures(self%sides%slave, self%sides%frames%node, force, area, pressure)
    end subroutine patch_pressures
 
    !> Integrals of gaps are functions of the positions alone; their means know what was covered.

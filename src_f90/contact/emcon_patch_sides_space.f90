@@ -14,7 +14,7 @@ module emcon_patch_sides_space
    implicit none
    private
    public :: node_frames_t, node_frames_init, patch_triangles_t, patch_triangles_init, patch_sides_t
-   public :: sides_point
+   public :: sides_point, frame_normal
 
    !> The second vector of a frame is turned by 60 degrees: the patch is an equilateral triangle.
    real(wp), parameter :: turn(2) = [0.5_wp, 0.5_wp*sqrt(3.0_wp)]
@@ -164,6 +164,25 @@ contains
       self%start(i + 1) = self%start(i + 1) + 1
       self%ring_start(self%start(i + 1)) = n + size(ring)
    end subroutine add_frame
+
+   !> The unit normal of frame `k` at `node` of the scene, at x + u.
+   pure function frame_normal(self, k, node, x, u) result(normal)
+      type(node_frames_t), intent(in) :: self
+      integer, intent(in) :: k                   !! 1 to n
+      integer, intent(in) :: node                !! that it is at
+      real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node of the scene) [L]
+      real(wp) :: normal(3), side(3, 2), way(3)
+      integer :: i
+
+      side = 0.0_wp
+      do i = self%ring_start(k), self%ring_start(k + 1) - 1
+         way = (x(:, self%ring(i)) - x(:, node)) + (u(:, self%ring(i)) - u(:, node))
+         side(:, 1) = side(:, 1) + self%weight(1, i)*way
+         side(:, 2) = side(:, 2) + self%weight(2, i)*way
+      end do
+      normal = cross_product(side(:, 1), side(:, 2))
+      normal = normal/max(sqrt(dot_product(normal, normal)), tiny(normal))
+   end function frame_normal
 
    !> The triangles of a surface.
    pure subroutine patch_triangles_init(self, facets, x)

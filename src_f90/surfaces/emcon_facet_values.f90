@@ -4,71 +4,82 @@ module emcon_facet_values
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: facets_pressed_areas, facets_pressures, facets_share
+   public :: facets_pressed_area, facets_pressures, facets_share
 
    !> Facets of more nodes have some in the middle of their sides.
    integer, parameter :: most_simple = 4
 
 contains
 
-   !> Uniform pressure on a facet with nodes between its corners presses on these alone (of eight
-   !> nodes it pulls at the corners, which contact does not): they have all of its area.
-   pure subroutine facets_pressed_areas(self, x, u, area)
+   !> The area at a node on which uniform pressure along `normal` presses. On a facet with nodes
+   !> between its corners it presses on these alone (of eight nodes it pulls at the corners, which
+   !> contact does not).
+   pure real(wp) function facets_pressed_area(self, i, normal, x, u) result(area)
       type(facets_t), intent(in) :: self         !! set up, in space
+      integer, intent(in) :: i                   !! index into the nodes
+      real(wp), intent(in) :: normal(:)          !! (3) unit vector
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node of the scene) [L]
-      real(wp), intent(inout) :: area(:)         !! (n_node) equal parts of facets at x + u [L^2]
-      real(wp) :: normal(size(x, 1)), part
-      integer :: node(size(self%facet, 1)), f, n
+      integer :: k, n
 
-      if (size(self%facet, 1) <= most_simple) return
-      do f = 1, self%n_facet
-         n = count(self%facet(:, f) > 0)
-         if (n <= most_simple) cycle
-         normal = facets_normal(self, f, x, u)
-         part = length(normal)/real(n, wp)
-         node(:n) = nodes_of(self, f)
-         area(node(1:n:2)) = area(node(1:n:2)) - part
-         area(node(2:n:2)) = area(node(2:n:2)) + part
+      area = 0.0_wp
+      do k = self%around_start(i), self%around_start(i + 1) - 1
+         associate (f => self%around(k))
+            n = count(self%facet(:, f) > 0)
+            associate (part => merge(merge(2.0_wp, 0.0_wp, mod(findloc(nodes_of(self, f), i, 1), 2) &
+                  == 0), 1.0_wp, n > most_simple)/real(n, wp))
+               area = area + part*max(0.0_wp, dot_product(normal, facets_normal(self, f, x, u)))
+            end associate
+         end associate
       end do
-      ! Of corners that only such facets have nothing but round-off is left.
-      where (area < sqrt(epsilon(area))*maxval(area)) area = 0.0_wp
-   end subroutine facets_pressed_areas
+   end function facets_pressed_area
 
-   !> Pressures at the nodes of a surface by their forces and areas. Uniform pressure loads corners
-   !> and nodes between them unlike: where there are such nodes, facet by facet and then the mean of
-   !> the facets at a node.
-   pure subroutine facets_pressures(self, force, area, pressure)
+   !> Pressures by forces on areas at nodes of a surface, of which a node may have several. Uniform
+   !> pressure loads corners and nodes between them unlike: where there are such nodes, facet by
+   !> facet and then the mean of the facets at a node; of several the first has it.
+   pure subroutine facets_pressures(self, node, force, area, pressure)
       type(facets_t), intent(in) :: self         !! set up, in space
-      real(wp), intent(in) :: force(:)           !! (n_node) [M L/T^2]
-      real(wp), intent(in) :: area(:)            !! (n_node) that uniform pressure acts on [L^2]
-      real(wp), intent(out) :: pressure(:)       !! (n_node) 0 without area
-      real(wp), dimension(size(force)) :: whole, mean
-      logical :: is_of_quadratic(size(force))
+      integer, intent(in) :: node(:)             !! (n) index of the node, ascending
+      real(wp), intent(in) :: force(:)           !! (n) [M L/T^2]
+      real(wp), intent(in) :: area(:)            !! (n) that uniform pressure acts on [L^2]
+      real(wp), intent(out) :: pressure(:)       !! (n) 0 without area
+      real(wp), dimension(size(self%node)) :: whole, mean, push_there, on_there
+      logical :: is_of_quadratic(size(self%node))
       real(wp) :: push, on
-      integer :: f, n
+      integer :: f, i
 
       pressure = 0.0_wp
       where (area > 0.0_wp) pressure = force/area
       if (size(self%facet, 1) <= most_simple) return
+      push_there = 0.0_wp
+      on_there = 0.0_wp
+      do i = 1, size(node)
+         push_there(node(i)) = push_there(node(i)) + force(i)
+         on_there(node(i)) = max(on_there(node(i)), area(i))
+      end do
       whole = 0.0_wp
       is_of_quadratic = .false.
       do f = 1, self%n_facet
-         n = count(self%facet(:, f) > 0)
-         associate (node => nodes_of(self, f))
-            whole(node) = whole(node) + self%size(f)
-            if (n > most_simple) is_of_quadratic(node) = .true.
+         associate (own => nodes_of(self, f))
+            whole(own) = whole(own) + self%size(f)
+            if (size(own) > most_simple) is_of_quadratic(own) = .true.
          end associate
       end do
       mean = 0.0_wp
       do f = 1, self%n_facet
-         n = count(self%facet(:, f) > 0)
-         associate (node => nodes_of(self, f), share => self%size(f)/whole(nodes_of(self, f)))
-            push = sum(share*force(node))
-            on = sum(share*area(node))
-            if (on > 0.0_wp) mean(node) = mean(node) + share*(push/on)
+         associate (own => nodes_of(self, f), share => self%size(f)/whole(nodes_of(self, f)))
+            push = sum(share*push_there(own))
+            on = sum(share*on_there(own))
+            if (on > 0.0_wp) mean(own) = mean(own) + share*(push/on)
          end associate
       end do
-      where (is_of_quadratic) pressure = mean
+      do i = 1, size(node)
+         if (.not. is_of_quadratic(node(i))) cycle
+         if (any(node(max(1, i - 1):i - 1) == node(i))) cycle
+         ! With several, those of other sides keep theirs.
+         if (any(node(i + 1:min(i + 1, size(node))) == node(i)) .and. on_there(node(i)) > 0.0_wp) &
+            cycle
+         pressure(i) = mean(node(i))
+      end do
    end subroutine facets_pressures
 
    !> The nodes of facet `f`, in turn.

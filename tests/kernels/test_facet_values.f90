@@ -1,11 +1,12 @@
 !> Pressures at nodes by forces on facets, and forces at nodes divided among facets.
 module test_facet_values
-   use check, only : check_near, check_true, test_case_t
+   use check, only : check_near, test_case_t
    use emcon_element_kind, only : find_element_kind
    use emcon_errors, only : error_t
-   use emcon_facet_values, only : facets_pressed_areas, facets_pressures, facets_share
+   use emcon_facet_values, only : facets_pressed_area, facets_pressures, facets_share
    use emcon_facets, only : facets_init, facets_normal, facets_t
    use emcon_kinds, only : wp
+   use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
    use space_scenes, only : add_box, skin, space_begin
    implicit none
@@ -37,41 +38,37 @@ contains
       call facets_init(facets, scene, skin(scene), error)
    end subroutine box
 
-   !> Equal parts of the areas of facets.
-   subroutine equal_parts(facets, x, area)
+   !> The areas at all nodes that a pressure along `normal` acts on.
+   subroutine pressed(facets, x, normal, area)
       type(facets_t), intent(in) :: facets
-      real(wp), intent(in) :: x(:, :)
+      real(wp), intent(in) :: x(:, :), normal(:)
       real(wp), allocatable, intent(out) :: area(:)
-      integer :: f, n
+      integer :: i
 
-      allocate(area(size(facets%node)), source=0.0_wp)
-      do f = 1, facets%n_facet
-         n = count(facets%corner(:, f) > 0)
-         associate (node => facets%corner(:n, f), normal => facets_normal(facets, f, x, 0.0_wp*x))
-            area(node) = area(node) + sqrt(dot_product(normal, normal))/real(n, wp)
-         end associate
-      end do
-   end subroutine equal_parts
+      area = [(facets_pressed_area(facets, i, normal, x, 0.0_wp*x), i = 1, size(facets%node))]
+   end subroutine pressed
 
+   !> The lower side of a box has a quarter of each of its two cells at each of their corners, and its
+   !> other sides have nothing of a pressure from below.
    subroutine test_corners(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
       type(facets_t) :: facets
-      real(wp), allocatable :: area(:), same(:), pressure(:)
+      real(wp), allocatable :: area(:), pressure(:)
+      integer :: i
 
       call box(facets, scene, error)
       if (allocated(error)) return
-      call equal_parts(facets, scene%x, area)
-      same = area
-      call facets_pressed_areas(facets, scene%x, 0.0_wp*scene%x, area)
-      call check_near(error, area, same, 0.0_wp, 1.0_wp, "nothing between corners")
+      call pressed(facets, scene%x, [0.0_wp, 0.0_wp, -1.0_wp], area)
+      call check_near(error, area, [0.25_wp, 0.5_wp, 0.25_wp, 0.25_wp, 0.5_wp, 0.25_wp, &
+         (0.0_wp, i = 1, 6)], tol, 1.0_wp, "areas")
       allocate(pressure(size(area)))
-      call facets_pressures(facets, 3.0_wp*area, area, pressure)
-      call check_near(error, pressure, 0.0_wp*area + 3.0_wp, tol, 3.0_wp, "uniform")
+      call facets_pressures(facets, [(i, i = 1, size(area))], 3.0_wp*area, area, pressure)
+      call check_near(error, pressure, merge(3.0_wp, 0.0_wp, area > 0.0_wp), tol, 3.0_wp, "uniform")
    end subroutine test_corners
 
-   !> Faces of eight nodes: pressure 2 of their corners with -1/12 of a face and of the others with
-   !> 1/3; nothing acts at corners, and a quarter at each of the others; and of six nodes.
+   !> A face of eight nodes: pressure 2 of its corners with -1/12 of it and of the others with 1/3,
+   !> or with nothing at corners and a quarter at each of the others; and of six nodes.
    subroutine test_between(error)
       type(error_t), allocatable, intent(out) :: error
 
@@ -83,47 +80,35 @@ contains
 
       subroutine of_kind(name, part)
          character(len=*), intent(in) :: name
-         real(wp), intent(in) :: part(2)         !! of a face, of a corner and of a node between
+         real(wp), intent(in) :: part(2)         !! of the face, of a corner and of a node between
          type(facets_t) :: facets
          type(scene_t) :: scene
          real(wp), allocatable :: area(:), force(:), pressure(:)
          real(wp) :: normal(3), whole
-         integer :: f, n
+         integer :: i, n
 
          if (allocated(error)) return
-         call one_element(facets, scene, name, error)
+         call one_face(facets, scene, name, error)
          if (allocated(error)) return
-         call equal_parts(facets, scene%x, area)
-         whole = sum(area)
-         allocate(force(size(area)), pressure(size(area)))
-         force = 0.0_wp
-         do f = 1, facets%n_facet
-            n = count(facets%corner(:, f) > 0)
-            normal = facets_normal(facets, f, scene%x, 0.0_wp*scene%x)
-            associate (corners => facets%corner(1:n:2, f), others => facets%corner(2:n:2, f), &
-                  load => 2.0_wp*sqrt(dot_product(normal, normal)))
-               force(corners) = force(corners) + part(1)*load
-               force(others) = force(others) + part(2)*load
-            end associate
-         end do
-         call facets_pressed_areas(facets, scene%x, 0.0_wp*scene%x, area)
-         call check_near(error, [sum(area)], [whole], tol, whole, name // " all of the area")
-         call check_true(error, count(area > 0.0_wp) == size(area) - count_corners(name), &
-            name // " none at corners")
-         call facets_pressures(facets, force, area, pressure)
+         normal = facets_normal(facets, 1, scene%x, 0.0_wp*scene%x)
+         whole = sqrt(dot_product(normal, normal))
+         call pressed(facets, scene%x, normal/whole, area)
+         call check_near(error, sum(area), whole, tol, whole, name // " all of the area")
+         n = size(area)
+         allocate(force(n), pressure(n))
+         associate (corners => facets%corner(1:n:2, 1), others => facets%corner(2:n:2, 1))
+            force(corners) = 2.0_wp*part(1)*whole
+            force(others) = 2.0_wp*part(2)*whole
+            call check_near(error, maxval(abs(area(corners))), 0.0_wp, 0.0_wp, 1.0_wp, "corners")
+         end associate
+         call facets_pressures(facets, [(i, i = 1, n)], force, area, pressure)
          call check_near(error, pressure, 0.0_wp*area + 2.0_wp, tol, 2.0_wp, name // " uniform")
       end subroutine of_kind
 
    end subroutine test_between
 
-   pure integer function count_corners(name)
-      character(len=*), intent(in) :: name
-
-      count_corners = merge(8, 4, name == "C3D20")
-   end function count_corners
-
-   !> The skin of one element with straight edges.
-   subroutine one_element(facets, scene, name, error)
+   !> The first face of an element with straight edges.
+   subroutine one_face(facets, scene, name, error)
       type(facets_t), intent(out) :: facets
       type(scene_t), intent(out) :: scene
       character(len=*), intent(in) :: name
@@ -135,6 +120,7 @@ contains
          1, 5, 2, 6, 3, 7, 4, 8], [2, 12])
       integer, parameter :: side(2, 6) = reshape([1, 2, 2, 3, 3, 1, 1, 4, 2, 4, 3, 4], [2, 6])
       integer, parameter :: corner(4) = [1, 2, 4, 5]
+      type(surface_t) :: surface
       integer :: i
 
       call space_begin(scene)
@@ -148,8 +134,11 @@ contains
       scene%element%kind = [find_element_kind(scene%element%kinds, name)]
       scene%node%label = [(i, i = 1, size(scene%x, 2))]
       scene%element%label = [1]
-      call facets_init(facets, scene, skin(scene), error)
-   end subroutine one_element
+      surface%name = "FACE"
+      surface%element = [1]
+      surface%face = [1]
+      call facets_init(facets, scene, surface, error)
+   end subroutine one_face
 
    !> A corner of a box: a push along x belongs to the face that it is normal to, one from all sides
    !> to all; a pull is divided likewise, a force of 0 by areas. Shares at a node are 1 in sum.
