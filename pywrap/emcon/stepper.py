@@ -60,8 +60,9 @@ class PairTotal:
 
     `slave` and `master` are the force and the moment about the origin on that side, in the plane
     fx, fy, m, in space fx, fy, fz, mx, my, mz: opposite to each other to round-off. `length` is the
-    length of the slave surface in contact, in space its area. `friction_loss` is the energy that friction has taken since the start; of a
-    pair that holds both sides all of it, and 0 at its reverse.
+    length of the slave surface in contact, in space its area. `friction_loss` is the energy that
+    friction has taken since the start; of a pair that holds both sides all of it, and 0 at its
+    reverse.
     """
 
     slave: NDArray[np.float64]

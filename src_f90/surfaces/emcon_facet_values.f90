@@ -19,16 +19,18 @@ contains
       integer, intent(in) :: i                   !! index into the nodes
       real(wp), intent(in) :: normal(:)          !! (3) unit vector
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node of the scene) [L]
+      real(wp) :: part
       integer :: k, n
 
       area = 0.0_wp
       do k = self%around_start(i), self%around_start(i + 1) - 1
          associate (f => self%around(k))
             n = count(self%facet(:, f) > 0)
-            associate (part => merge(merge(2.0_wp, 0.0_wp, mod(findloc(nodes_of(self, f), i, 1), 2) &
-                  == 0), 1.0_wp, n > most_simple)/real(n, wp))
-               area = area + part*max(0.0_wp, dot_product(normal, facets_normal(self, f, x, u)))
-            end associate
+            part = 1.0_wp/real(n, wp)
+            ! In turn around it, every other node is a corner, the first one is.
+            if (n > most_simple) part = 2.0_wp*part*real(mod(findloc(nodes_of(self, f), i, 1) &
+               - 1, 2), wp)
+            area = area + part*max(0.0_wp, dot_product(normal, facets_normal(self, f, x, u)))
          end associate
       end do
    end function facets_pressed_area

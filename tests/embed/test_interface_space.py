@@ -1,4 +1,4 @@
-"""Contact for host codes in three dimensions: faces of several kinds, gradients, a host's impact."""
+"""Contact for host codes in three dimensions: faces of mixed kinds, gradients, an impact."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ WIDTH = EPS**(1/3)
 
 
 def floor(n: int = 3, size: float = 3.0) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Nodes of a curved floor of n by n cells; its quadrilaterals, and the last row as triangles."""
+    """Nodes of a curved floor of n by n cells; quadrilaterals, and the last row as triangles."""
     at = np.linspace(-0.5*size, 0.5*size, n + 1)
     x, y = (part.ravel() for part in np.meshgrid(at, at, indexing="ij"))
     cell = [(n + 1)*i + j for i in range(n) for j in range(n)]
@@ -92,7 +92,7 @@ def dense(matrix: object, n_column: int) -> np.ndarray:
 
 
 def test_forces_keep_energy_and_both_momenta() -> None:
-    """g du is the change of f; forces have neither resultant nor moment in the mid-configuration."""
+    """g du is the change of f; forces have neither resultant nor moment in the middle."""
     face, _ = over_the_floor()
     u0, du = motion(face)
     all_near(face, u0, du)

@@ -48,8 +48,8 @@ contains
       area = [(facets_pressed_area(facets, i, normal, x, 0.0_wp*x), i = 1, size(facets%node))]
    end subroutine pressed
 
-   !> The lower side of a box has a quarter of each of its two cells at each of their corners, and its
-   !> other sides have nothing of a pressure from below.
+   !> The lower side of a box has a quarter of each of its two cells at each of their corners, and
+   !> its other sides have nothing of a pressure from below.
    subroutine test_corners(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene

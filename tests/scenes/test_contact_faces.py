@@ -1,4 +1,4 @@
-"""What contact writes in space: sums of forces, moments and impulses, pressures, the faces' file."""
+"""What contact writes in space: sums of forces and moments, pressures, the file of faces."""
 
 import json
 import sys
