@@ -37,7 +37,8 @@ contains
 
    !> Pressures by forces on areas at nodes of a surface, of which a node may have several. Uniform
    !> pressure loads corners and nodes between them unlike: where there are such nodes, facet by
-   !> facet and then the mean of the facets at a node; of several the first has it.
+   !> facet and then the mean of the facets at a node; of several the first has it. Source:
+   !> docs/theory.md, eq. (50).
    pure subroutine facets_pressures(self, node, force, area, pressure)
       type(facets_t), intent(in) :: self         !! set up, in space
       integer, intent(in) :: node(:)             !! (n) index of the node, ascending
