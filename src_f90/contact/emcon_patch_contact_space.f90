@@ -16,13 +16,16 @@ module emcon_patch_contact_space
    use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach, &
       pair_has_order
    use emcon_kinds, only : wp
+   use emcon_mesh, only : surface_t
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
+   use emcon_outline_space, only : outline_faces_at
    use emcon_patch_gap_space, only : patch_ahead, patch_gap, patch_gap_t, patch_means, patch_way
    use emcon_patch_sides_space, only : node_frames_init, patch_sides_t, patch_triangles_init
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
       patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t, where_text
+   use emcon_text, only : to_text
    implicit none
    private
    public :: patch_contact_t, patch_contact_init
@@ -68,18 +71,11 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       associate (sides => self%sides)
-         call facets_init(sides%slave, scene, scene%surface(pair%slave), error)
+         call init_slave(sides, scene, scene%surface(pair%slave), error)
          if (allocated(error)) return
-         if (sides%slave%n_facet == 0) then
-            call raise(error, err_input, where_text(scene, scene%surface(pair%slave)%origin) &
-               // ": surface " // scene%surface(pair%slave)%name // " has nodes without faces, " &
-               // "which the gap needs; name faces of elements")
-            return
-         end if
          allocate(sides%master)
          call facets_init(sides%master, scene, scene%surface(pair%master), error)
          if (allocated(error)) return
-         call node_frames_init(sides%frames, sides%slave, scene%x)
          call patch_triangles_init(sides%triangles, sides%master, scene%x)
          self%node = sides%slave%node(sides%frames%node)
          self%n_constraint = size(self%node)
@@ -101,6 +97,39 @@ contains
       self%max_penetration_at_start = deepest_start
       call contact_laws_of_surface(pair%interaction, self%laws)
    end subroutine patch_contact_init
+
+   !> The slave with its frames; nodes that are named without faces stand on those of elements.
+   subroutine init_slave(sides, scene, surface, error)
+      type(patch_sides_t), intent(inout) :: sides
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      type(error_t), allocatable, intent(out) :: error
+      type(surface_t) :: faces
+      integer :: i
+
+      faces = surface
+      if (surface%is_nodal) then
+         faces%name = surface%name
+         call outline_faces_at(scene, surface%node, faces%edge)
+         deallocate(faces%node)
+      end if
+      call facets_init(sides%slave, scene, faces, error)
+      if (allocated(error)) return
+      if (.not. surface%is_nodal) then
+         call node_frames_init(sides%frames, sides%slave, scene%x, [(.true., i = 1, &
+            size(sides%slave%node))])
+         return
+      end if
+      call node_frames_init(sides%frames, sides%slave, scene%x, [(any(surface%node == &
+         sides%slave%node(i)), i = 1, size(sides%slave%node))])
+      do i = 1, size(surface%node)
+         if (any(sides%slave%node == surface%node(i))) cycle
+         call raise(error, err_input, where_text(scene, surface%origin) // ": node " // &
+            to_text(scene%node%label(surface%node(i))) // " of surface " // surface%name // &
+            " is on no outer face of an element, which its gap needs; leave it out")
+         return
+      end do
+   end subroutine init_slave
 
    !> No option of a step changes what a gap is made of.
    pure subroutine patch_configure(self, x, options)
