@@ -63,6 +63,7 @@ program main
    use test_explicit_closed, only : collect_explicit_closed
    use test_facets, only : collect_facets
    use test_facet_groups, only : collect_facet_groups
+   use test_facet_values, only : collect_facet_values
    use test_first_touch, only : collect_first_touch
    use test_first_touch_space, only : collect_first_touch_space
    use test_friction, only : collect_friction
@@ -284,6 +285,7 @@ program main
    call run("bent_bodies", collect_bent_bodies)
    call run("facets", collect_facets)
    call run("facet_groups", collect_facet_groups)
+   call run("facet_values", collect_facet_values)
    call run("chain", collect_chain)
    call run("search", collect_search)
    call run("segment", collect_segment)
