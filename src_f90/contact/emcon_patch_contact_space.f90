@@ -19,7 +19,7 @@ module emcon_patch_contact_space
    use emcon_mesh, only : surface_t
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
    use emcon_outline_space, only : outline_faces_at
-   use emcon_patch_gap_space, only : patch_ahead, patch_gap, patch_gap_t, patch_means, patch_way
+   use emcon_patch_gap_space, only : patch_gap, patch_gap_t, patch_look, patch_look_t
    use emcon_patch_sides_space, only : node_frames_init, patch_sides_t, patch_triangles_init
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
       patch_stencil_t
@@ -108,14 +108,14 @@ contains
       integer :: i
 
       faces = surface
-      if (surface%is_nodal) then
+      if (allocated(surface%node)) then
          faces%name = surface%name
          call outline_faces_at(scene, surface%node, faces%edge)
          deallocate(faces%node)
       end if
       call facets_init(sides%slave, scene, faces, error)
       if (allocated(error)) return
-      if (.not. surface%is_nodal) then
+      if (.not. allocated(surface%node)) then
          call node_frames_init(sides%frames, sides%slave, scene%x, [(.true., i = 1, &
             size(sides%slave%node))])
          return
@@ -182,14 +182,14 @@ contains
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       real(wp), dimension(3, 3 + self%stencil(i)%patch%n_vertex) :: at, way
-      real(wp) :: height(0:1), cover(0:1), least
+      type(patch_look_t) :: look
+      real(wp) :: least
 
-      associate (state => self%state(i), stencil => self%stencil(i))
+      associate (state => self%state(i), stencil => self%stencil(i), cover => look%cover)
          state = gap_state_t()
          if (stencil%triangle == 0) return
          call patch_stencil_gather(stencil, x, u0, du, at, way)
-         call patch_means(stencil%patch, at, height(0), cover(0))
-         call patch_means(stencil%patch, at + way, height(1), cover(1))
+         look = patch_look(stencil%patch, at, way)
          ! What stores energy is followed as long as there is any to give back.
          least = least_cover
          self%scale(i) = max(cover(0), least)
@@ -200,14 +200,12 @@ contains
          state%is_over = cover(1) >= least .or. (self%step%is_penalty .and. cover(0) >= least)
          state%is_leaving = .not. state%is_over
          state%is_arriving = cover(0) < least
-         state%is_covered = patch_way(stencil%patch, at, way) <= self%chosen_reach
-         state%gap0 = 0.0_wp
+         state%is_covered = look%way <= self%chosen_reach
          state%gap1 = self%step%engages             ! what is not covered asks for nothing
-         state%was_open = .true.
-         if (cover(0) > no_cover) state%gap0 = height(0)/cover(0) - self%offset
-         if (state%is_arriving) state%was_open = patch_ahead(stencil%patch, at, way) &
-            - self%offset >= -max_penetration_on_entry*state%size
-         if (cover(1) >= least) state%gap1 = height(1)/cover(1) - self%offset
+         if (cover(0) > no_cover) state%gap0 = look%height(0)/cover(0) - self%offset
+         if (state%is_arriving) state%was_open = look%ahead - self%offset &
+            >= -max_penetration_on_entry*state%size
+         if (cover(1) >= least) state%gap1 = look%height(1)/cover(1) - self%offset
          if (self%slack > 0.0_wp) state%closed = -self%slack*min(state%size, state%other_size)
          self%cover(i) = cover(1)
          if (state%gap0 < -stencil%deepest - self%offset) state = gap_state_t()
