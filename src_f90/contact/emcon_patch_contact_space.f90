@@ -105,17 +105,19 @@ contains
       type(surface_t), intent(in) :: surface
       type(error_t), allocatable, intent(out) :: error
       type(surface_t) :: faces
+      logical :: is_nodal
       integer :: i
 
       faces = surface
-      if (allocated(surface%node)) then
+      is_nodal = .not. (allocated(surface%element) .or. allocated(surface%edge))
+      if (is_nodal) then
          faces%name = surface%name
          call outline_faces_at(scene, surface%node, faces%edge)
          deallocate(faces%node)
       end if
       call facets_init(sides%slave, scene, faces, error)
       if (allocated(error)) return
-      if (.not. allocated(surface%node)) then
+      if (.not. is_nodal) then
          call node_frames_init(sides%frames, sides%slave, scene%x, [(.true., i = 1, &
             size(sides%slave%node))])
          return
