@@ -16,14 +16,17 @@ module emcon_patch_contact_space
    use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach, &
       pair_has_order
    use emcon_kinds, only : wp
+   use emcon_mesh, only : surface_t
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
-   use emcon_patch_gap_space, only : patch_ahead, patch_gap, patch_gap_t, patch_means, patch_way
+   use emcon_outline_space, only : outline_faces_at
+   use emcon_patch_gap_space, only : patch_gap, patch_gap_t, patch_look, patch_look_t
    use emcon_patch_sides_space, only : frame_normal, node_frames_init, patch_sides_t, &
       patch_triangles_init
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
       patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t, where_text
+   use emcon_text, only : to_text
    implicit none
    private
    public :: patch_contact_t, patch_contact_init
@@ -69,18 +72,11 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       associate (sides => self%sides)
-         call facets_init(sides%slave, scene, scene%surface(pair%slave), error)
+         call init_slave(sides, scene, scene%surface(pair%slave), error)
          if (allocated(error)) return
-         if (sides%slave%n_facet == 0) then
-            call raise(error, err_input, where_text(scene, scene%surface(pair%slave)%origin) &
-               // ": surface " // scene%surface(pair%slave)%name // " has nodes without faces, " &
-               // "which the gap needs; name faces of elements")
-            return
-         end if
          allocate(sides%master)
          call facets_init(sides%master, scene, scene%surface(pair%master), error)
          if (allocated(error)) return
-         call node_frames_init(sides%frames, sides%slave, scene%x)
          call patch_triangles_init(sides%triangles, sides%master, scene%x)
          self%node = sides%slave%node(sides%frames%node)
          self%n_constraint = size(self%node)
@@ -102,6 +98,42 @@ contains
       self%max_penetration_at_start = deepest_start
       call contact_laws_of_surface(pair%interaction, self%laws)
    end subroutine patch_contact_init
+
+   !> The slave with its frames; nodes that are named without faces stand on those of elements.
+   subroutine init_slave(sides, scene, surface, error)
+      type(patch_sides_t), intent(inout) :: sides
+      type(scene_t), intent(in) :: scene
+      type(surface_t), intent(in) :: surface
+      type(error_t), allocatable, intent(out) :: error
+      type(surface_t) :: faces
+      logical :: is_nodal
+      integer :: i
+
+      faces = surface
+      is_nodal = allocated(surface%node) .and. .not. allocated(surface%edge)
+      if (is_nodal .and. allocated(surface%element)) is_nodal = size(surface%element) == 0
+      if (is_nodal) then
+         faces%name = surface%name
+         call outline_faces_at(scene, surface%node, faces%edge)
+         deallocate(faces%node)
+      end if
+      call facets_init(sides%slave, scene, faces, error)
+      if (allocated(error)) return
+      if (.not. is_nodal) then
+         call node_frames_init(sides%frames, sides%slave, scene%x, [(.true., i = 1, &
+            size(sides%slave%node))])
+         return
+      end if
+      call node_frames_init(sides%frames, sides%slave, scene%x, [(any(surface%node == &
+         sides%slave%node(i)), i = 1, size(sides%slave%node))])
+      do i = 1, size(surface%node)
+         if (any(sides%slave%node == surface%node(i))) cycle
+         call raise(error, err_input, where_text(scene, surface%origin) // ": node " // &
+            to_text(scene%node%label(surface%node(i))) // " of surface " // surface%name // &
+            " is on no outer face of an element, which its gap needs; leave it out")
+         return
+      end do
+   end subroutine init_slave
 
    !> No option of a step changes what a gap is made of.
    pure subroutine patch_configure(self, x, options)
@@ -154,14 +186,14 @@ contains
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       real(wp), dimension(3, 3 + self%stencil(i)%patch%n_vertex) :: at, way
-      real(wp) :: height(0:1), cover(0:1), least
+      type(patch_look_t) :: look
+      real(wp) :: least
 
-      associate (state => self%state(i), stencil => self%stencil(i))
+      associate (state => self%state(i), stencil => self%stencil(i), cover => look%cover)
          state = gap_state_t()
          if (stencil%triangle == 0) return
          call patch_stencil_gather(stencil, x, u0, du, at, way)
-         call patch_means(stencil%patch, at, height(0), cover(0))
-         call patch_means(stencil%patch, at + way, height(1), cover(1))
+         look = patch_look(stencil%patch, at, way)
          ! What stores energy is followed as long as there is any to give back.
          least = least_cover
          self%scale(i) = max(cover(0), least)
@@ -172,14 +204,12 @@ contains
          state%is_over = cover(1) >= least .or. (self%step%is_penalty .and. cover(0) >= least)
          state%is_leaving = .not. state%is_over
          state%is_arriving = cover(0) < least
-         state%is_covered = patch_way(stencil%patch, at, way) <= self%chosen_reach
-         state%gap0 = 0.0_wp
+         state%is_covered = look%way <= self%chosen_reach
          state%gap1 = self%step%engages             ! what is not covered asks for nothing
-         state%was_open = .true.
-         if (cover(0) > no_cover) state%gap0 = height(0)/cover(0) - self%offset
-         if (state%is_arriving) state%was_open = patch_ahead(stencil%patch, at, way) &
-            - self%offset >= -max_penetration_on_entry*state%size
-         if (cover(1) >= least) state%gap1 = height(1)/cover(1) - self%offset
+         if (cover(0) > no_cover) state%gap0 = look%height(0)/cover(0) - self%offset
+         if (state%is_arriving) state%was_open = look%ahead - self%offset &
+            >= -max_penetration_on_entry*state%size
+         if (cover(1) >= least) state%gap1 = look%height(1)/cover(1) - self%offset
          if (self%slack > 0.0_wp) state%closed = -self%slack*min(state%size, state%other_size)
          self%cover(i) = cover(1)
          if (state%gap0 < -stencil%deepest - self%offset) state = gap_state_t()

@@ -10,7 +10,7 @@ module emcon_patch_gap_space
       patch_moments
    implicit none
    private
-   public :: patch_t, patch_gap_t, patch_gap, patch_means, patch_way, patch_ahead
+   public :: patch_t, patch_gap_t, patch_gap, patch_look_t, patch_look
 
    !> Remainders below so many epsilons of what they are the difference of are round-off.
    real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
@@ -29,6 +29,15 @@ module emcon_patch_gap_space
       real(wp), allocatable :: chi(:)            !! (>= n_vertex) 1; 0 where the surface ends
       real(wp) :: length = 0.0_wp                !! of the patch' sides, in the frame's vectors
    end type patch_t
+
+   !> What a patch sees at both ends of a step.
+   type :: patch_look_t
+      real(wp) :: height(0:1) = 0.0_wp           !! integral of chi times height, by its area [L]
+      real(wp) :: cover(0:1) = 0.0_wp            !! that of chi: what is covered
+      real(wp) :: way = 0.0_wp                   !! how far vertices go along it, at most [L]
+      real(wp) :: ahead = 0.0_wp                 !! height at the start of what is over it at the
+                                                 !! end, the least; huge: nothing is [L]
+   end type patch_look_t
 
    !> The integral of chi (height - target) over the patch by its area, over a step.
    type :: patch_gap_t
@@ -77,16 +86,29 @@ contains
       end do
    end subroutine place_vertices
 
-   !> The integral of chi times height over the patch by its area, and what of it is covered.
-   pure subroutine patch_means(patch, x, height, cover)
+   !> What a patch sees at both ends of a step.
+   pure function patch_look(patch, x, dx) result(look)
       type(patch_t), intent(in) :: patch
-      real(wp), intent(in) :: x(:, :)            !! (3, 3 + n_vertex) origin, frame, vertices [L]
-      real(wp), intent(out) :: height            !! [L]
-      real(wp), intent(out) :: cover             !! 0 to 1
-      real(wp) :: place(3, patch%n_vertex), moment(3), share(3)
+      real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
+      type(patch_look_t) :: look
+      real(wp), dimension(3, patch%n_vertex) :: from, to
+
+      call place_vertices(patch, x, from)
+      call place_vertices(patch, x + dx, to)
+      call find_means(patch, from, look%height(0), look%cover(0))
+      call find_means(patch, to, look%height(1), look%cover(1))
+      look%way = patch%length*sqrt(maxval(sum((to(:2, :) - from(:2, :))**2, 1)))
+      look%ahead = height_ahead(patch, from, to)
+   end function patch_look
+
+   !> The integral of chi times height over the patch by its area, and what of it is covered.
+   pure subroutine find_means(patch, place, height, cover)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: place(:, :)        !! (3, n_vertex)
+      real(wp), intent(out) :: height, cover
+      real(wp) :: moment(3), share(3)
       integer :: k, v
 
-      call place_vertices(patch, x, place)
       height = 0.0_wp
       cover = 0.0_wp
       do k = 1, patch%n_triangle
@@ -100,29 +122,15 @@ contains
             end do
          end associate
       end do
-   end subroutine patch_means
-
-   !> How far vertices go along the frame at most, relative to the patch.
-   pure real(wp) function patch_way(patch, x, dx) result(farthest)
-      type(patch_t), intent(in) :: patch
-      real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
-      real(wp), dimension(3, patch%n_vertex) :: from, to
-
-      call place_vertices(patch, x, from)
-      call place_vertices(patch, x + dx, to)
-      farthest = patch%length*sqrt(maxval(sum((to(:2, :) - from(:2, :))**2, 1)))
-   end function patch_way
+   end subroutine find_means
 
    !> How high the planes of the triangles that are over the patch at the end are over it at the
    !> start: the least; huge if there are none [L].
-   pure real(wp) function patch_ahead(patch, x, dx) result(least)
+   pure real(wp) function height_ahead(patch, from, to) result(least)
       type(patch_t), intent(in) :: patch
-      real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
-      real(wp), dimension(3, patch%n_vertex) :: from, to
+      real(wp), intent(in) :: from(:, :), to(:, :)   !! (3, n_vertex)
       integer :: k
 
-      call place_vertices(patch, x, from)
-      call place_vertices(patch, x + dx, to)
       least = huge(least)
       do k = 1, patch%n_triangle
          associate (t => patch%triangle(:, k))
@@ -131,7 +139,7 @@ contains
             least = min(least, dot_product(barycentric(from(:2, t), [centre, centre]), from(3, t)))
          end associate
       end do
-   end function patch_ahead
+   end function height_ahead
 
    !> The gap over a step with its derivatives. None of its vertices counts where nothing is over
    !> the patch at either end.

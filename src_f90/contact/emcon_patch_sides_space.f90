@@ -79,10 +79,11 @@ contains
 
    !> The frames at all nodes of a surface: of each smooth group of its facets there, and of all of
    !> them where there are several.
-   pure subroutine node_frames_init(self, facets, x)
+   pure subroutine node_frames_init(self, facets, x, is_meant)
       type(node_frames_t), intent(out) :: self
       type(facets_t), intent(in) :: facets       !! in space
       real(wp), intent(in) :: x(:, :)            !! (3, n_node of the scene) reference [L]
+      logical, intent(in) :: is_meant(:)         !! (n_node) it needs frames
       type(facet_groups_t) :: groups
       integer, allocatable :: ring(:)
       real(wp) :: still(3, size(x, 2))
@@ -98,6 +99,7 @@ contains
       end associate
       do i = 1, size(facets%node)
          self%start(i + 1) = self%start(i)
+         if (.not. is_meant(i)) cycle
          associate (first => groups%node_start(i), last => groups%node_start(i + 1) - 1)
             do g = first, last
                ring = groups%ring(groups%ring_start(g):groups%ring_start(g + 1) - 1)

@@ -9,7 +9,7 @@ module emcon_outline_space
    use emcon_scene, only : scene_t
    implicit none
    private
-   public :: outline_space_init
+   public :: outline_space_init, outline_faces_at
 
    !> Nodes that tell a face from others: no two faces of a mesh have three of them in common.
    integer, parameter :: n_mark = 3
@@ -22,6 +22,33 @@ contains
       type(scene_t), intent(in) :: scene
       integer, allocatable :: facet(:, :)
       real(wp), allocatable :: thickness(:)
+
+      call find_free_faces(scene, facet, thickness)
+      call add_lone_facets(scene, facet, thickness)
+      call pieces_of_facets(self, scene, facet, thickness)
+   end subroutine outline_space_init
+
+   !> The outer faces of elements that have one of some nodes at least, by their nodes in turn.
+   pure subroutine outline_faces_at(scene, node, facet)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: node(:)             !! of the scene
+      integer, allocatable, intent(out) :: facet(:, :)       !! (most nodes, n) 0: no more
+      real(wp), allocatable :: thickness(:)
+      logical :: is_meant(0:size(scene%x, 2))
+      integer :: f
+
+      is_meant = .false.
+      is_meant(node) = .true.
+      call find_free_faces(scene, facet, thickness)
+      facet = facet(:, pack([(f, f = 1, size(facet, 2))], [(any(is_meant(facet(:, f))), &
+         f = 1, size(facet, 2))]))
+   end subroutine outline_faces_at
+
+   !> The faces that one element alone has.
+   pure subroutine find_free_faces(scene, facet, thickness)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: facet(:, :)       !! (most nodes, n)
+      real(wp), allocatable, intent(out) :: thickness(:)     !! (n) [L]
       logical, allocatable :: is_free(:)
       integer :: i
 
@@ -31,9 +58,7 @@ contains
          facet = facet(:, free)
          thickness = thickness(free)
       end associate
-      call add_lone_facets(scene, facet, thickness)
-      call pieces_of_facets(self, scene, facet, thickness)
-   end subroutine outline_space_init
+   end subroutine find_free_faces
 
    !> The faces of all elements, and for each the shortest side of its element.
    pure subroutine find_faces(scene, facet, thickness)

@@ -30,7 +30,8 @@ contains
          test_case_t("one body all within another", test_within), &
          test_case_t("a body in the hole of another", test_hole), &
          test_case_t("a surface that is not closed", test_open), &
-         test_case_t("a body in itself", test_own)]
+         test_case_t("a body in itself", test_own), &
+         test_case_t("in other units, bit by bit", test_units)]
    end subroutine collect_overlap_space
 
    subroutine take_up(triangles, surface)
@@ -254,5 +255,25 @@ contains
          end if
       end do
    end subroutine test_own
+
+   !> Powers of two change nothing but the length.
+   subroutine test_units(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(shape_surface_t) :: one, other
+      type(overlap_t) :: overlap, scaled
+      real(wp) :: depth(2), small(2)
+
+      call make_sphere(one, 2, 1.0_wp)
+      call make_box(other, [3, 2, 2], [-0.5_wp, -0.5_wp, 0.0_wp], [0.5_wp, 0.5_wp, 1.0_wp])
+      call turn_surface(other, [0.0_wp, 0.0_wp, 1.1_wp])
+      call look(one, other, depth, overlap)
+      call check_true(error, minval(depth) > 0.0_wp, "in each other")
+      one%x = scale(one%x, -40)
+      other%x = scale(other%x, -40)
+      call look(one, other, small, scaled)
+      call check_near(error, scale(small, 40), depth, 0.0_wp, 1.0_wp, "depth")
+      call check_equal(error, scaled%facet, overlap%facet, "facet")
+      call check_equal(error, scaled%node, overlap%node, "node")
+   end subroutine test_units
 
 end module test_overlap_space

@@ -4,7 +4,7 @@ module test_patch_gap
    use emcon_dgrad_nodes, only : nodes_add_first
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_patch_gap_space, only : patch_gap, patch_gap_t, patch_means, patch_t
+   use emcon_patch_gap_space, only : patch_gap, patch_gap_t, patch_look, patch_look_t, patch_t
    use emcon_text, only : to_text
    use random_draws, only : draw_random
    implicit none
@@ -109,6 +109,18 @@ contains
       turn = matmul(turn, one)
    end function turned
 
+   !> The mean height at rest, and what is covered.
+   subroutine look_at(patch, x, height, cover)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: x(3, n_point)
+      real(wp), intent(out) :: height, cover
+      type(patch_look_t) :: look
+
+      look = patch_look(patch, x, 0.0_wp*x)
+      height = look%height(1)
+      cover = look%cover(1)
+   end subroutine look_at
+
    !> Wherever the patch is and however the grid is cut.
    subroutine test_flat(error)
       type(error_t), allocatable, intent(out) :: error
@@ -122,7 +134,7 @@ contains
          if (mod(k, 4) == 0) draw(1) = 0.0_wp
          if (mod(k, 8) == 0) draw(2) = 0.0_wp
          x(:, :3) = x(:, :3) + spread(draw, 2, 3)
-         call patch_means(patch, x, height, cover)
+         call look_at(patch, x, height, cover)
          call check_near(error, [height, cover], [-draw(3), 1.0_wp], tol, 1.0_wp, to_text(k))
       end do
    end subroutine test_flat
@@ -139,11 +151,11 @@ contains
       x(2, 1:3) = 0.0_wp
       x(2, 3) = 1.0_wp
       x(3, 4:) = 0.5_wp
-      call patch_means(patch, x, height, cover)
+      call look_at(patch, x, height, cover)
       ! Of a triangle a line along a leg through its centre cuts off 4/9.
       call check_near(error, [cover, height], [5.0_wp, 2.5_wp]/9.0_wp, tol, 1.0_wp, "half of it")
       x(2, 1:3) = x(2, 1:3) + 1.0_wp
-      call patch_means(patch, x, height, cover)
+      call look_at(patch, x, height, cover)
       call check_near(error, [cover, height], [0.0_wp, 0.0_wp], 0.0_wp, 1.0_wp, "none of it")
    end subroutine test_cover
 
@@ -162,7 +174,7 @@ contains
             call check_near(error, dot_product(gap%g, way_of(gap, dx)), gap%df, tol, &
                sum(abs(gap%g*way_of(gap, dx))), "identity, step " // to_text(slide(i), 2))
             call check_near(error, gap%f0 + gap%df, gap%f1, tol, 1.0_wp, "values")
-            call patch_means(patch, x, height, cover)
+            call look_at(patch, x, height, cover)
             call check_near(error, gap%f0, height, tol, 1.0_wp, "mean height")
          end do
       end do

@@ -117,3 +117,41 @@ def press(cells: list[tuple[int, int, int]], kind: list[str], by: float, turn: n
     text += pair(options) + "*BOUNDARY\nBOTTOM, 1, 3\n*STEP\n*STATIC, DIRECT\n1., 1.\n*BOUNDARY\n"
     text += "".join(f"TOP, {a}, {a}, {s!r}\n" for a, s in enumerate(way.tolist(), 1))
     return text + "*NODE FILE\nU\n*EL FILE\nS\n*END STEP\n"
+
+
+def slide(h: float, until: float, hill: bool) -> str:
+    """A block that slides over facets of length 1 on a cylinder of radius 20, held on it by its weight."""
+    sign = -1.0 if hill else 1.0
+
+    def bend(x: np.ndarray) -> np.ndarray:
+        y = x - np.array([1.0, 2.0, 1.0])
+        y[:, 2] += sign*(20.0 - np.sqrt(400.0 - y[:, 0]**2))
+        return y
+
+    one = Block("C3D8", (2, 2, 1), size=(2.0, 1.6, 0.5), place=lambda x: x - np.array([1.0, 0.77, 0.0]) + np.array(
+        [0.53, 0.0, 0.02 if hill else 0.066]))
+    two = Block("C3D8", (16, 4, 1), size=(16.0, 4.0, 1.0), place=bend)
+    n = len(one.x)
+    return (bodies([one, two], [faces(one, 2, 0), faces(two, 2, 1)], "*HYPERELASTIC, NEO HOOKE\n2000., 1e-3\n*DENSITY\n1.\n")
+            + pair() + velocities(one, (4.0, 0.7, 0.0), (0., 0., 0.)) + f"*NSET, NSET=FLOOR, GENERATE\n{n + 1}, {n + len(two.x)}\n"
+            + "*BOUNDARY\nFLOOR, 1, 3\n" + dynamic(h, until, "*DLOAD\nB1, GRAV, 10., 0., 0., -1.\n"))
+
+
+def dent(angle: float) -> str:
+    """A cube that is pressed into a valley of two planes, its middle node over the fold; it finds rest in the dent."""
+    lean = float(np.tan(0.5*angle))
+
+    def fold(x: np.ndarray) -> np.ndarray:
+        y = x - np.array([1.5, 2.0, 1.0])
+        y[:, 2] += lean*np.abs(y[:, 1])*(x[:, 2])
+        return y
+
+    one = Block("C3D8", (1, 2, 1), size=(0.8, 0.9, 0.6), place=lambda x: x - np.array([0.37, 0.41, -0.28]) - np.array(
+        [[0., 0., 1.]])*0.25*(1.0 - 2.2*np.abs(x[:, 1:2] - 0.45))*(1.0 - x[:, 2:]/0.6))
+    two = Block("C3D8", (3, 4, 1), size=(3.0, 4.0, 1.0), place=fold)
+    n = len(one.x)
+    top = "".join(f"{k}\n" for k in one.on(2, 1))
+    return (bodies([one, two], [faces(one, 2, 0), faces(two, 2, 1)]) + pair(", SIDES=ONE")
+            + f"*NSET, NSET=FLOOR, GENERATE\n{n + 1}, {n + len(two.x)}\n*NSET, NSET=TOP\n{top}*BOUNDARY\nFLOOR, 1, 3\n"
+            + "*STEP, NLGEOM\n*STATIC, DIRECT\n.25, 1.\n*NEWTON, TYPE=FULL\n*BOUNDARY\nTOP, 1, 1, 0.\n"
+            + f"TOP, 2, 2, -.05\nTOP, 3, 3, -.1\n*NODE FILE\nU\n*END STEP\n")

@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import overlap
 import pytest
-from contact_space_scenes import impact, press, stack, turned
+from contact_space_scenes import dent, impact, press, slide, stack, turned
 from scene_tools import EPSILON, Run, run_deck
+from space_mesh import Block
 
 #: Energy and momenta through an impact, of the largest of each.
 BALANCE = 1.0e-11
@@ -189,3 +190,46 @@ def test_bits_do_not_depend_on_a_restart(tmp_path: Path) -> None:
     deck.write_text(impact("C3D8", "C3D8", "*RESTART, WRITE, FREQUENCY=10\n"))
     run_deck(deck, short, 0)
     assert whole.digits() == Run(short/"deck").digits()
+
+
+@pytest.mark.parametrize(("h", "until", "is_hill"), [(0.05, 1.5, False), (0.0125, 0.5, False), (0.05, 1.2, True)])
+def test_sliding_over_facets(h: float, until: float, is_hill: bool, tmp_path: Path) -> None:
+    """Over sides and vertices of facets that turn by .05 each: nothing is lost, no step is cut."""
+    run = ran(tmp_path, slide(h, until, is_hill))
+    assert run.verdict["verdict"] == "good"
+    assert run.verdict["largest_energy_error"] <= 1.0e-13*run.verdict["largest_energy"]
+    assert run.history["cuts"].sum() == 0
+    assert run.history["active"].max() >= 3
+    travelled = run.fields()["displacement"][-1, 0, 0]
+    assert travelled > 0.35*4.0*until
+
+
+@pytest.mark.parametrize("angle", [0.5, 1.0])
+def test_rest_in_a_dent(angle: float, tmp_path: Path) -> None:
+    """Two feet are pulled to a fold of the floor and come to rest on it, where a sharp gap has no gradient."""
+    run = ran(tmp_path, dent(angle))
+    assert run.verdict["verdict"] == "good"
+    feet = (run.fields().x + run.fields()["displacement"])[-1, 2:4]
+    width = 0.1*np.sqrt(0.8*0.45)                # a patch of the shorter facets
+    assert np.abs(feet[:, 1]).max() < 0.5*width
+    assert run.history["newton"][1:].max() <= 9
+    last = [float(word) for word in run.increments[-1][-1].split()[9:]]
+    assert len(last) <= 8
+
+
+def test_nodes_without_faces(tmp_path: Path) -> None:
+    """A slave surface of nodes of the ball: on the faces of its elements, as the surface of these."""
+    ends = []
+    for k, kind in enumerate(["face", "node"]):
+        text = impact("C3D8", "C3D8", options=", SIDES=ONE")
+        if kind == "node":
+            head, rest = text.split("*SURFACE, NAME=S1\n")
+            cut = rest.index("*")
+            block = Block("C3D8", (2, 2, 2))
+            outer = sorted({int(n) for axis in range(3) for end in (0, 1) for n in block.on(axis, end)})
+            nodes = "".join(f"{n}\n" for n in outer)
+            text = head + "*SURFACE, NAME=S1, TYPE=NODE\n" + nodes + rest[cut:]
+        folder = tmp_path/str(k)
+        folder.mkdir()
+        ends.append(ran(folder, text).fields()["displacement"][-1])
+    assert np.array_equal(ends[0], ends[1])
