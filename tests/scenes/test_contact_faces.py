@@ -362,3 +362,18 @@ def test_output_does_not_change_the_run(impact, tmp_path):
                         ("all", "*OUTPUT, FIELD\n*CONTACT OUTPUT, VARIABLE=ALL\n")):
         other = run_deck(Deck(text[:first] + asked + text[last:], name), tmp_path)
         assert other.digits() == run.digits()
+
+
+def test_a_surface_of_nodes_has_contact_and_no_faces(tmp_path):
+    pair = Pair(("C3D8", "C3D8"), (2, 3))
+    text = pair.deck(pressed(), ", SIDES=ONE")
+    nodes = "*SURFACE, NAME=FOOT, TYPE=NODE\nBASE_UPPER\n*SURFACE INTERACTION"
+    text = text.replace("*SURFACE INTERACTION", nodes).replace("\nUPPER, LOWER\n", "\nFOOT, LOWER\n")
+    run = run_deck(Deck(text, "nodes"), tmp_path)
+    assert series(run, "PAIRS", "CNUM")[-1] == [9]
+    upper, _, noise = sums(run, pair, False)
+    assert (np.abs(series(run, "PAIRS", "CF")[:, 0] - upper) <= noise).all()
+    assert upper[-1, 2] == pytest.approx(PRESSURE, rel=0.05)
+    faces = FieldsOf(run.file(".surfaces.vtkhdf"))
+    assert set(faces.cell["body"][0]) == {2} and len(faces.cells) == 9
+    assert faces.cell["contact_force"][-1].sum(axis=0)[2] == pytest.approx(-upper[-1, 2])
