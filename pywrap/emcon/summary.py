@@ -77,6 +77,7 @@ def _effort_lines(history: NDArray[np.void], wall: float | None) -> list[str]:
 def _file_lines(paths: ResultPaths) -> list[str]:
     lines = []
     for path, what in ((paths.picture, "picture"), (paths.field, "fields (ParaView)"),
+                       (paths.surfaces, "faces of contact"),
                        (paths.table, "history"), (paths.history, "history, bodies"),
                        (paths.log, "log"), (paths.restart, "restart")):
         if path.is_file():
