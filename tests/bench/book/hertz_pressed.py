@@ -10,7 +10,7 @@ from .common import Chapter, order, table
 sys.path.append(str(DECKS))
 import make_pressed_ball as ball  # noqa: E402
 
-CELLS = (3, 4, 6, 8)
+CELLS = (3, 4, 6)
 PAIR = {False: "ball on plane", True: "ball on ball"}
 
 

@@ -1,9 +1,9 @@
 """A ball that hits an elastic plate in three dimensions, as decks for EMCON and for CalculiX."""
 
 import dataclasses
+import pathlib
 import re
 import sys
-import pathlib
 
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[3]/"input_decks"))
 
@@ -16,8 +16,9 @@ VELOCITY = (1.0, 0.4, -2.0)
 RADIUS, GAP = 1.0, 0.005
 #: The plate: lengths, and its top at z = 0; its bottom is held.
 SIZE = (3.0, 3.0, 0.8)
-#: Pressure per penetration for CalculiX: fifty times the modulus over a length of one.
-PENALTY = 50*YOUNG
+#: Pressure per penetration for CalculiX: twice the modulus over a length of one. From five times
+#: on its iterations end in "solution seems to diverge" with these increments.
+PENALTY = 2*YOUNG
 #: Cells of the inner cube, layers around it, cells of the plate: about 20,000 unknowns.
 MESH = ((8, 6), (20, 20, 6))
 
@@ -33,10 +34,6 @@ class Scene:
     @property
     def unknowns(self):
         return 3*(len(self.ball.node) + len(self.plate.node) - len(self.bottom))
-
-    def rim(self):
-        """Nodes on the surface of the ball."""
-        return sorted({a for k in self.outer for a in self.ball.element[k][4:]})
 
 
 def scene(mesh=MESH):
@@ -57,29 +54,23 @@ def scene(mesh=MESH):
 
 def deck(it, h, increments, peer=False):
     """Its text: hard contact of nodes, or the penalty of CalculiX (`peer`)."""
-    shear, bulk = YOUNG/(2 + 2*NU), YOUNG/(3 - 6*NU)
     lines = ["*HEADING", "A ball on a plate"]
     for part in (it.ball, it.plate):
         lines += [re.sub(r"[^, ]+\.[^, ]*", lambda x: number(x[0]), line) if peer else line
                   for line in part.node_lines()] + part.element_lines()
     lines += [*labels("*NSET, NSET=BOTTOM", it.bottom), *labels("*ELSET, ELSET=TOP", it.top),
-              *labels("*ELSET, ELSET=OUTER", it.outer), "*ELSET, ELSET=ALL", "BALL, PLATE",
+              *labels("*ELSET, ELSET=OUTER", it.outer),
               "*SURFACE, NAME=MASTER, TYPE=ELEMENT", "TOP, S2",
-              "*MATERIAL, NAME=RUBBER", "*HYPERELASTIC, NEO HOOKE",
-              f"{number(shear/2)}, {number(2/bulk)}", "*DENSITY", number(DENSITY),
+              "*SURFACE, NAME=SLAVE, TYPE=ELEMENT", "OUTER, S2",
+              "*MATERIAL, NAME=RUBBER", "*ELASTIC", f"{number(YOUNG)}, {number(NU)}",
+              "*DENSITY", number(DENSITY),
               "*SOLID SECTION, ELSET=BALL, MATERIAL=RUBBER",
               "*SOLID SECTION, ELSET=PLATE, MATERIAL=RUBBER", "*SURFACE INTERACTION, NAME=CONTACT"]
     if peer:
-        lines += [*labels("*NSET, NSET=RIM", it.rim()), "*SURFACE, NAME=SLAVE, TYPE=NODE", "RIM",
-                  "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", number(PENALTY)]
-    else:
-        lines += ["*SURFACE, NAME=SLAVE, TYPE=ELEMENT", "OUTER, S2"]
+        lines += ["*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR", number(PENALTY)]
     lines += ["*CONTACT PAIR, INTERACTION=CONTACT, TYPE=NODE TO SURFACE", "SLAVE, MASTER",
               "*BOUNDARY", "BOTTOM, 1, 3", "*INITIAL CONDITIONS, TYPE=VELOCITY",
               *(f"BALL, {k}, {number(v)}" for k, v in enumerate(VELOCITY, start=1)),
               "*STEP, NLGEOM, INC=1000000", "*DYNAMIC, DIRECT", f"{h}, {number(h*increments)}"]
-    if peer:
-        lines += ["*EL PRINT, ELSET=ALL, TOTALS=ONLY", "ELSE, ELKE"]
-    else:
-        lines += [f"*NODE FILE, FREQUENCY={increments}", "U"]
+    lines += [f"*NODE FILE, FREQUENCY={increments}", "U"]
     return "\n".join([*lines, "*END STEP"]) + "\n"
