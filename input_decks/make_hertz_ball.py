@@ -29,7 +29,7 @@ What to look at: the force of the contact in the history of the pair, the veloci
 
 Expected at speed {speed:g} (Hertz; the whole ball, a quarter has a quarter of the force):
           contact time {time:.6g}, largest force {force:.6g}, radius of the contact {radius:.6g}, approach {depth:.6g},
-          impulse twice that before impact, but for what is left in vibrations, less than 1e-3.
+          impulse twice that before impact, but for what is left in vibrations, less than 2e-3.
 
 Made by make_hertz_ball.py. Change a parameter for one run: --set h=0.0005
 """
