@@ -109,8 +109,8 @@ def no_such_freedom(case: Case) -> str:
 
 def contact(case: Case) -> str:
     case.before = ("*SURFACE, NAME=A\nALL, S1\n*SURFACE, NAME=B\nALL, S2\n"
-                   "*SURFACE INTERACTION, NAME=I\n*CONTACT PAIR, INTERACTION=I\nA, B\n")
-    return "contact in three dimensions is not in this version"
+                   "*SURFACE INTERACTION, NAME=I\n*FRICTION\n.2\n*CONTACT PAIR, INTERACTION=I\nA, B\n")
+    return "in three dimensions is not in this version"
 
 
 def plane_elements_too(case: Case) -> str:

@@ -1,0 +1,51 @@
+"""A ball is pressed on a rigid plane and on another ball: Hertz in statics, over the mesh."""
+
+import sys
+
+import numpy as np
+from scene_tools import DECKS
+
+from .common import Chapter, order, table
+
+sys.path.append(str(DECKS))
+import make_pressed_ball as ball  # noqa: E402
+
+CELLS = (3, 4, 6)
+PAIR = {False: "ball on plane", True: "ball on ball"}
+
+
+def errors(run, pair):
+    """Of the radius of the contact and the largest pressure for the force found, of that force.
+
+    The radius is that of Hertz's pressure with the same second moment, 2/5 of its square.
+    """
+    fields = run.fields()
+    upper = fields.x[:, 2] > 0
+    force = fields["contact_force"][-1][upper, 2]
+    square = (fields.x[upper, :2]**2).sum(axis=1)
+    total, radius = 4*force.sum(), np.sqrt(2.5*(force*square).sum()/force.sum())
+    half = 0.5 if pair else 1.0
+    curve, stiffness = half*ball.RADIUS, half*ball.STIFFNESS
+    hertz = (0.75*total*curve/stiffness)**(1/3)
+    pushed = 4/3*stiffness*ball.CONTACT**3/curve
+    return radius/hertz - 1, (hertz/radius)**2 - 1, total/pushed - 1
+
+
+def start(runs):
+    return {(pair, cells): runs.start(runs.generated(
+        "pressed_ball", "--cells", cells, *(["--pair"] if pair else [])))
+            for pair in PAIR for cells in CELLS}
+
+
+def report(started, _):
+    rows = []
+    for pair, name in PAIR.items():
+        found = np.array([errors(started[pair, cells].result(), pair) for cells in CELLS])
+        what = ("radius", "largest pressure", "force by the approach")
+        for k, word in enumerate(what):
+            rows.append(("" if k else name, word, *(f"{100*e:+.2f} %" for e in found[:, k]),
+                         f"{order([1/n for n in CELLS], found[:, k]):.1f}"))
+    return table(["", "error of", *(f"a/{n}" for n in CELLS), "order"], rows)
+
+
+CHAPTERS = [Chapter("hertz_pressed", start, report)]
