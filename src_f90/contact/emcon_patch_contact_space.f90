@@ -74,6 +74,12 @@ contains
       associate (sides => self%sides)
          call init_slave(sides, scene, scene%surface(pair%slave), error)
          if (allocated(error)) return
+         if (sides%frames%n == 0) then
+            call raise(error, err_input, where_text(scene, scene%surface(pair%slave)%origin) &
+               // ": surface " // scene%surface(pair%slave)%name // " has no face with a normal to " // &
+               "measure gaps along")
+            return
+         end if
          allocate(sides%master)
          call facets_init(sides%master, scene, scene%surface(pair%master), error)
          if (allocated(error)) return

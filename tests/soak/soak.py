@@ -212,7 +212,7 @@ class Twin:
         return code, self.message() if code else b""
 
     def n_node(self):
-        sizes = (self.INT*16)()                       # more than there are
+        sizes = (self.INT*64)()                       # more than there are
         assert self.call("get_sizes", sizes)[0] == 0
         return sizes[0]
 
