@@ -76,8 +76,8 @@ contains
          if (allocated(error)) return
          if (sides%frames%n == 0) then
             call raise(error, err_input, where_text(scene, scene%surface(pair%slave)%origin) &
-               // ": surface " // scene%surface(pair%slave)%name // " has no face with a normal to " // &
-               "measure gaps along")
+               // ": surface " // scene%surface(pair%slave)%name // " has no face with a " // &
+               "normal to measure gaps along")
             return
          end if
          allocate(sides%master)
