@@ -1,7 +1,7 @@
 """Deck of an elastic ball pressed on a rigid plane, or on its like: Hertz in statics.
 
-    python3 make_pressed_ball.py --output pressed_ball.inp
-    python3 make_pressed_ball.py --pair --cells 6 --output pressed_pair.inp
+    python3 make_pressed_ball.py --pair --cells 3 --output pressed_ball.inp
+    python3 make_pressed_ball.py --cells 6 --output pressed_plane.inp
 """
 
 from __future__ import annotations

@@ -23,7 +23,7 @@ CHAPTERS = {
                "bouncing_ball crossing_tubes",
     "Friction": "sliding_block",
     "Contact at rest": "hertz press_fit roller ironing two_blocks_static patch_pressure "
-                       "contact_patch",
+                       "contact_patch pressed_ball",
     "Ties": "tied_ring tied_spin tied_rotation tied_cantilever tied_patch tied_smooth",
     "Bodies alone": "spinning_ring tumbling_block cantilever",
 }
