@@ -1,7 +1,7 @@
 """Deck of an elastic ball that hits a rigid plane: Hertz's law of impact, a quarter of the ball.
 
     python3 make_hertz_ball.py --output hertz_ball.inp
-    python3 make_hertz_ball.py --speed 1 --cells 6 --output fast.inp
+    python3 make_hertz_ball.py --cells 8 --output fine.inp
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def plane_part(first: tuple[int, int], reach: float) -> Part:
 def main() -> None:
     parser = arguments(__doc__)
     parser.add_argument("--speed", type=float, default=0.1)
-    parser.add_argument("--cells", type=int, default=8, help="over the radius of the contact")
+    parser.add_argument("--cells", type=int, default=3, help="over the radius of the contact")
     parser.add_argument("--increments", type=int, default=200, help="in the time of contact")
     options = parser.parse_args()
     expected = law(options.speed)

@@ -1,7 +1,7 @@
-"""Deck of an elastic ball pressed on a rigid plane, or on its like: Hertz in statics.
+"""Deck of an elastic ball pressed on its like, or on a rigid plane: Hertz in statics.
 
     python3 make_pressed_ball.py --output pressed_ball.inp
-    python3 make_pressed_ball.py --pair --cells 6 --output pressed_pair.inp
+    python3 make_pressed_ball.py --plane --cells 6 --output pressed_plane.inp
 """
 
 from __future__ import annotations
@@ -65,21 +65,22 @@ def middle(part: Part, height: float) -> list[int]:
 
 def main() -> None:
     parser = arguments(__doc__)
-    parser.add_argument("--pair", action="store_true", help="two balls")
-    parser.add_argument("--cells", type=int, default=4, help="over the radius of the contact")
+    parser.add_argument("--plane", action="store_true", help="one ball, on a rigid plane")
+    parser.add_argument("--cells", type=int, default=3, help="over the radius of the contact")
     options = parser.parse_args()
-    radius, stiffness = (RADIUS/2, STIFFNESS/2) if options.pair else (RADIUS, STIFFNESS)
+    pair = not options.plane
+    radius, stiffness = (RADIUS/2, STIFFNESS/2) if pair else (RADIUS, STIFFNESS)
     depth = CONTACT**2/radius
     gap = GAP*depth
     upper = Part("UPPER")
     rim = add_quarter(upper, RADIUS, (0.0, 0.0, RADIUS + gap), CONTACT, options.cells)
     first = max(upper.node) + 1, max(upper.element) + 1
     lines = heading(HEADING.format(
-        what="another one" if options.pair else "a rigid plane", cells=options.cells,
+        what="another one" if pair else "a rigid plane", cells=options.cells,
         radius=radius, stiffness=stiffness)) + ["**", "*PARAMETER", f"push = {number(-depth - gap)}"]
     sets = set_lines("ELSET", "UPPER_RIM", rim) + set_lines(
         "NSET", "HIGH", middle(upper, RADIUS + gap))
-    if options.pair:
+    if pair:
         lower = Part("LOWER")
         other = add_quarter(lower, RADIUS, (0.0, 0.0, -RADIUS), 1.15*CONTACT, options.cells, first,
                             up=-1)
@@ -98,7 +99,7 @@ def main() -> None:
     lines += sets + comment("Material, contact, supports") + MODEL.strip().format(
         modulus=number(MODULUS), poisson=number(POISSON), lower=lower.name, floor=floor,
         face=OUTER_FACE).splitlines()
-    lines += ["LOW, 3" if options.pair else "LOW, 1, 3"]
+    lines += ["LOW, 3" if pair else "LOW, 1, 3"]
     lines += comment("The run") + STEP.strip().splitlines()
     write_deck(lines, options.output)
 

@@ -20,10 +20,10 @@ PROGRAM = ROOT/"build"/"release"/"emcon"
 #: Decks by what they show; those that are not named stand last.
 CHAPTERS = {
     "Impacts": "ring two_bodies three_bodies self_contact bouncing_bar bar_on_wall rigid_bar "
-               "bouncing_ball crossing_tubes",
+               "bouncing_ball hertz_ball pressed_ball",
     "Friction": "sliding_block",
     "Contact at rest": "hertz press_fit roller ironing two_blocks_static patch_pressure "
-                       "contact_patch",
+                       "contact_patch pressed_ball",
     "Ties": "tied_ring tied_spin tied_rotation tied_cantilever tied_patch tied_smooth",
     "Bodies alone": "spinning_ring tumbling_block cantilever",
 }

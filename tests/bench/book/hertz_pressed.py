@@ -33,7 +33,7 @@ def errors(run, pair):
 
 def start(runs):
     return {(pair, cells): runs.start(runs.generated(
-        "pressed_ball", "--cells", cells, *(["--pair"] if pair else [])))
+        "pressed_ball", "--cells", cells, *([] if pair else ["--plane"])))
             for pair in PAIR for cells in CELLS}
 
 
