@@ -144,35 +144,36 @@ contains
       subroutine tell(what, i, n)
          character(len=*), intent(in) :: what
          integer, intent(in) :: i, n
-         character(len=:), allocatable :: more
+         character(len=:), allocatable :: more, place
 
          more = ""
          if (n > 1) more = " and in " // to_text(n - 1) // " more"
-         call add_error(reader%log, surface%origin, title // what // place_text(scene, surface, &
-            side, i) // more // "; put them into surfaces of their own")
+         call place_text(scene, surface, side, i, place)
+         call add_error(reader%log, surface%origin, title // what // place // more // &
+            "; put them into surfaces of their own")
       end subroutine tell
 
    end subroutine check_sides
 
    !> Where side `i` is, and what meets in it.
-   function place_text(scene, surface, side, i) result(text)
+   subroutine place_text(scene, surface, side, i, text)
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
       type(side_t), intent(in) :: side(:)
       integer, intent(in) :: i                   !! the first one of its nodes
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
       type(string_t), allocatable :: face(:)
       integer :: k
 
       associate (here => side(i))
          allocate(face(count(side%low == here%low .and. side%high == here%high)))
          do k = 1, size(face)
-            face(k)%text = face_text(scene, surface, side(i + k - 1)%facet)
+            call face_text(scene, surface, side(i + k - 1)%facet, face(k)%text)
          end do
          text = "the side of nodes " // to_text(scene%node%label(here%low)) // " and " // &
             to_text(scene%node%label(here%high)) // " (" // joined(face, ", ", most_named) // ")"
       end associate
-   end function place_text
+   end subroutine place_text
 
    !> All sides of faces, those of the same nodes next to each other.
    pure subroutine list_sides(facet, side)
@@ -199,15 +200,15 @@ contains
    end subroutine list_sides
 
    !> "S2 of element 7" for facet `f`.
-   function face_text(scene, surface, f) result(text)
+   subroutine face_text(scene, surface, f, text)
       type(scene_t), intent(in) :: scene
       type(surface_t), intent(in) :: surface
       integer, intent(in) :: f                   !! in space one for each face
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(out) :: text
 
       text = "S" // to_text(surface%face(f)) // " of element " // &
          to_text(scene%element%label(surface%element(f)))
-   end function face_text
+   end subroutine face_text
 
    !> Faces have an area, and about their middle they are not folded.
    subroutine check_shapes(reader, scene, surface, facet, title)
@@ -240,7 +241,7 @@ contains
          do k = 1, size(is_wrong)
             if (.not. is_wrong(k)) cycle
             n = n + 1
-            face(n)%text = face_text(scene, surface, k)
+            call face_text(scene, surface, k, face(n)%text)
          end do
          call add_error(reader%log, surface%origin, title // what // joined(face, ", ", most_named))
       end subroutine tell

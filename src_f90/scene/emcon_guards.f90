@@ -17,7 +17,7 @@ module emcon_guards
    !> So far, by the edge, bodies may be in each other where nodes are held themselves.
    real(wp), parameter :: touching_bar = 1.0e-3_wp
    !> So far where nodes are held, in space: edges may cross between them.
-   real(wp), parameter :: crossing_bar = 1.0e-2_wp
+   real(wp), parameter :: crossing_bar = 2.0e-2_wp
    !> So far a node may go in: a corner, and any other one. Polygons of coarse curved surfaces, and
    !> gaps that are closed in the mean, stay above it.
    real(wp), parameter :: corner_slack = 0.8_wp*touching_bar, guard_slack = 0.05_wp

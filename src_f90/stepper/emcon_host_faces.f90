@@ -34,6 +34,7 @@ contains
       real(wp), intent(in) :: x(:, :)            !! (n_dim, n_node) [L]
       integer, allocatable, intent(out) :: facet(:, :)     !! (most, n_face); 0: no more
       type(error_t), allocatable, intent(inout) :: error
+      character(len=:), allocatable :: known
       integer :: f, first, k, n
 
       call check_that(size(kind) > 0, "there are no faces", error)
@@ -44,14 +45,17 @@ contains
       do f = 1, size(kind)
          k = findloc(kinds%vtk_type == kind(f) .and. kinds%n_dim == size(x, 1), .true., 1)
          if (k == 0) then
-            call check_that(.false., unknown_kind(f, kind(f), size(x, 1)), error)
+            call list_kinds(size(x, 1), known)
+            call check_that(.false., "kind(" // to_text(f) // ") is " // to_text(kind(f)) // &
+               "; faces of nodes with " // to_text(size(x, 1)) // " coordinates are " // known, &
+               error)
             return
          end if
          n = kinds(k)%n_node
-         call check_that(offset(f) == first + n, place("offset", f) // " is " // &
+         call check_that(offset(f) == first + n, "offset(" // to_text(f) // ")" // " is " // &
             to_text(offset(f)) // ", but the face is a " // trim(kinds(k)%name) // " of " // &
             to_text(n) // " nodes behind " // to_text(first), error)
-         call check_that(offset(f) <= size(node), place("offset", f) // " is " // &
+         call check_that(offset(f) <= size(node), "offset(" // to_text(f) // ")" // " is " // &
             to_text(offset(f)) // ", but node has " // to_text(size(node)) // " entries", error)
          if (allocated(error)) return
          associate (own => node(first + 1:first + n))
@@ -66,9 +70,10 @@ contains
          " entries, but faces have " // to_text(first), error)
    end subroutine host_faces_in_turn
 
-   pure function unknown_kind(f, kind, n_dim) result(text)
-      integer, intent(in) :: f, kind, n_dim
-      character(len=:), allocatable :: text
+   !> The kinds of faces by their numbers and names.
+   pure subroutine list_kinds(n_dim, text)
+      integer, intent(in) :: n_dim               !! coordinates of nodes
+      character(len=:), allocatable, intent(out) :: text
       integer :: k
 
       text = ""
@@ -77,17 +82,7 @@ contains
          if (len(text) > 0) text = text // ", "
          text = text // to_text(kinds(k)%vtk_type) // " (" // trim(kinds(k)%name) // ")"
       end do
-      text = place("kind", f) // " is " // to_text(kind) // "; faces of nodes with " // &
-         to_text(n_dim) // " coordinates are " // text
-   end function unknown_kind
-
-   pure function place(name, i) result(text)
-      character(len=*), intent(in) :: name
-      integer, intent(in) :: i
-      character(len=:), allocatable :: text
-
-      text = name // "(" // to_text(i) // ")"
-   end function place
+   end subroutine list_kinds
 
    !> Nodes of face `f` exist, each once, and the face has a size.
    subroutine check_nodes(f, first, node, x, error)
@@ -100,7 +95,7 @@ contains
       integer :: k, n
 
       do k = 1, size(node)
-         call check_choice(place("node", first + k), node(k), 1, size(x, 2), error)
+         call check_choice("node(" // to_text(first + k) // ")", node(k), 1, size(x, 2), error)
          call check_that(.not. any(node(:k - 1) == node(k)), "face " // to_text(f) // &
             " has node " // to_text(node(k)) // " twice", error)
       end do

@@ -17,6 +17,8 @@ module emcon_box_tree
    integer, parameter :: leaf_size = 8
    !> Squares of distances are off by less, relatively.
    real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
+   !> Squares of longer reaches are too large.
+   real(wp), parameter :: farthest = 0.5_wp*sqrt(huge(1.0_wp))
    !> Up to this length, lists are sorted by insertion.
    integer, parameter :: short_list = 16
 
@@ -207,7 +209,7 @@ contains
       n = 0
       if (self%n_leaf == 0) k = 0
       bound = huge(bound)
-      if (reach < 0.5_wp*sqrt(huge(reach))) bound = (1.0_wp + rounding)*reach**2
+      if (reach < farthest) bound = (1.0_wp + rounding)*reach**2
       do while (k > 0)
          if (square_to(self%around(:, k), point) <= bound) then
             if (k < self%n_leaf) then

@@ -457,11 +457,15 @@ contains
       type(triangles_t), intent(in) :: b
       real(wp), intent(in) :: point(3)
       type(nearest_t), intent(inout) :: nearest
+      real(wp) :: reach
       integer :: found(leaf_size), k, n, i, f, t
 
       k = 1
       do while (k > 0)
-         call box_tree_next(tree, point, sqrt(nearest%square), k, found, n)
+         ! The root of a huge number is too much for quadruple ones.
+         reach = huge(reach)
+         if (nearest%square < huge(reach)) reach = sqrt(nearest%square)
+         call box_tree_next(tree, point, reach, k, found, n)
          do i = 1, n
             f = found(i)
             if (size(facet) > 0) f = facet(f)

@@ -243,7 +243,8 @@ contains
                call check_near(error, dot_product(reshape(item(i)%c(:, :n), [3*n]), by), &
                   (up(i)%gap1 - down(i)%gap1)/(2.0_wp*step), bound, 1.0_wp, "gradient")
                call check_near(error, matmul(item(i)%h(:3*n, :3*n), by), reshape((up(i)%g(:, :n) &
-                  - down(i)%g(:, :n))/(2.0_wp*step), [3*n]), bound, 1.0_wp, "second derivative")
+                  - down(i)%g(:, :n))/(2.0_wp*step), [3*n]), bound, &
+                  max(1.0_wp, maxval(abs(item(i)%h(:3*n, :3*n)))), "second derivative")
             end associate
          end do
       end do

@@ -16,7 +16,7 @@ BALANCE = 1.0e-11
 #: Depths that numpy finds in a run whose gaps are closed to round-off, per facet: roundings of positions of size 1.
 DEPTH = 64*EPSILON
 #: Where edges of a coarse ball cross others between nodes, per facet.
-CROSSING = 1.0e-2
+CROSSING = 2.0e-2
 
 
 def ran(folder: Path, text: str, code: int = 0) -> Run:
