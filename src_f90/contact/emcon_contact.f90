@@ -447,16 +447,19 @@ contains
       real(wp), intent(in) :: target(:)               !! (n)
       type(condition_t), intent(inout) :: item(:)     !! (n)
       type(condition_t) :: start(size(item))
-      integer :: k, n
+      integer :: i, k, n
 
       start%leaves_second = .true.
       call self%evaluate(wanted, motion%x, motion%from, motion%by, target, start)
       call self%evaluate(wanted, motion%x, motion%u0, motion%du, target, item)
       do k = 1, size(item)
          n = item(k)%n_node
-         if (start(k)%n_node /= n) cycle
-         if (any(start(k)%node(:n) /= item(k)%node(:n))) cycle
-         item(k)%g(:, :n) = start(k)%g(:, :n)
+         associate (place => [(findloc(item(k)%node(:n), start(k)%node(i), 1), &
+               i = 1, start(k)%n_node)])
+            if (any(place == 0)) cycle
+            item(k)%g(:, :n) = 0.0_wp
+            item(k)%g(:, place) = start(k)%g(:, :size(place))
+         end associate
          item(k)%h = 0.0_wp
       end do
    end subroutine from_start

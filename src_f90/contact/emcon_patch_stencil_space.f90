@@ -18,8 +18,9 @@ module emcon_patch_stencil_space
    real(wp), parameter :: facing = -0.25_wp
    !> Sides of the patch, by the shorter of the facets of both sides.
    real(wp), parameter :: patch_size = 0.1_wp
-   !> Where a surface ends it goes on by this part of a facet, and fades on it.
+   !> Where a surface ends it goes on by strips of this part of a facet, and fades on the last one.
    real(wp), parameter :: flange = 0.2_wp
+   integer, parameter :: n_strip = 2
    !> A node is behind a triangle by no more than so many of its distances, and this by the facet.
    real(wp), parameter :: distances = 2.0_wp, room_behind = 0.2_wp
    !> Triangles at distances that differ by less than this, per facet, are as near.
@@ -264,7 +265,7 @@ contains
             associate (from => sides%triangles%split%corner(k, near%triangle(t)), &
                   to => sides%triangles%split%corner(1 + mod(k, 3), near%triangle(t)))
                if (sides%triangles%is_ridge(k, near%triangle(t))) then
-                  call add_flange(self, sides, from, to, normal, x, u)
+                  call add_flange(self, sides, [from, to], normal, x, u)
                else
                   self%patch%chi(vertex_of(self, from)) = 0.0_wp
                   self%patch%chi(vertex_of(self, to)) = 0.0_wp
@@ -311,7 +312,8 @@ contains
 
       self%patch%n_triangle = 0
       self%patch%n_vertex = 0
-      associate (most => n_triangle + 2*n_end, most_points => 3*n_triangle + 2*n_end)
+      associate (most => n_triangle + 2*n_strip*n_end, most_points => &
+            3*n_triangle + 2*n_strip*n_end)
          call make_room(self%patch, self%point, most, most_points)
          if (allocated(self%weight)) then
             if (size(self%weight, 2) < 2 + most_points) deallocate(self%weight, self%node)
@@ -433,41 +435,47 @@ contains
       patch%triangle(:, patch%n_triangle) = vertex
    end subroutine append
 
-   !> Add two triangles beyond a side of the master, on which the field fades.
-   pure subroutine add_flange(self, sides, from, to, normal, x, u)
+   !> Add two strips beyond a side of the master: on the first the field goes on, so that a patch at
+   !> the end is covered, on the second it fades.
+   pure subroutine add_flange(self, sides, side, normal, x, u)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: from, to            !! points, as the master runs
+      integer, intent(in) :: side(2)             !! points, as the master runs
       real(wp), intent(in) :: normal(3)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      integer :: a, b, outer(2)
+      integer :: from(0:n_strip), to(0:n_strip), k
 
-      call add_outer(self, sides, from, normal, x, u, outer(1))
-      call add_outer(self, sides, to, normal, x, u, outer(2))
-      a = vertex_of(self, from)
-      b = vertex_of(self, to)
-      call append(self%patch, [b, outer(1), a])
-      call append(self%patch, [b, outer(2), outer(1)])
+      from(0) = vertex_of(self, side(1))
+      to(0) = vertex_of(self, side(2))
+      call add_outer(self, sides, side(1), normal, x, u, from(1:))
+      call add_outer(self, sides, side(2), normal, x, u, to(1:))
+      do k = 1, n_strip
+         call append(self%patch, [to(k - 1), from(k), from(k - 1)])
+         call append(self%patch, [to(k - 1), to(k), from(k)])
+      end do
    end subroutine add_flange
 
-   !> The vertex of flanges at a point: away from the points inside.
+   !> The vertices of flanges at a point, one for each strip: away from the points inside.
    pure subroutine add_outer(self, sides, point, normal, x, u, vertex)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: point
       real(wp), intent(in) :: normal(3)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      integer, intent(out) :: vertex
+      integer, intent(out) :: vertex(n_strip)
       integer, allocatable :: inner(:)
-      integer :: k
+      integer :: i, k
 
-      vertex = vertex_of(self, -point)
-      if (vertex > 0) return
+      k = vertex_of(self, -point)
+      vertex = [(k + i - 1, i = 1, n_strip)]
+      if (k > 0) return
       call find_inner(sides, self%node(1), point, normal, x, u, inner)
-      call begin_vertex(self, -point, 0.0_wp, vertex)
-      call add_point(self, sides, point, vertex, 1.0_wp + flange)
-      do k = 1, size(inner)
-         call add_point(self, sides, inner(k), vertex, -flange/real(size(inner), wp))
+      do i = 1, n_strip
+         call begin_vertex(self, -point, merge(1.0_wp, 0.0_wp, i < n_strip), vertex(i))
+         call add_point(self, sides, point, vertex(i), 1.0_wp + i*flange)
+         do k = 1, size(inner)
+            call add_point(self, sides, inner(k), vertex(i), -i*flange/real(size(inner), wp))
+         end do
       end do
    end subroutine add_outer
 
