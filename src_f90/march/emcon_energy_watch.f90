@@ -192,8 +192,8 @@ contains
             "contact that gives way has made or taken an energy of " // &
             to_text(self%contact_kept, 3) // ", " // to_text(self%contact_kept/largest, 3) // &
             " of the largest, which it should have stored: nodes that were in a surface have " // &
-            "lost it at an end or a corner, where TYPE=NODE TO SURFACE of *CONTACT PAIR " // &
-            "follows them; TYPE=NULL SPACE of *CONSTRAINT METHOD stores nothing")
+            "lost it at an end or a corner; in the plane TYPE=NODE TO SURFACE of " // &
+            "*CONTACT PAIR follows them; TYPE=NULL SPACE of *CONSTRAINT METHOD stores nothing")
          if (self%has_explicit .and. self%contact_taken > most_loss*largest + rounding) then
             call taken_text(self, text)
             call note_add(reasons, text // " as explicit steps stop what touches: a finer mesh " &
