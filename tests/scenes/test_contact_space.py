@@ -233,3 +233,32 @@ def test_nodes_without_faces(tmp_path: Path) -> None:
         folder.mkdir()
         ends.append(ran(folder, text).fields()["displacement"][-1])
     assert np.array_equal(ends[0], ends[1])
+
+
+@pytest.mark.parametrize("cells", [[(2, 2, 2), (2, 2, 2)], [(1, 1, 1), (1, 1, 1)]])
+def test_pressure_by_the_overclosure(cells: list[tuple[int, int, int]], tmp_path: Path) -> None:
+    """A soft layer between two cubes: springs in a row, also where nodes stand at the ends of both surfaces."""
+    text = press(cells, ["C3D8", "C3D8"], 0.02, turned(0.0)).replace(
+        "NAME=I\n", "NAME=I\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n500.\n", 1)
+    run = ran(tmp_path, text.replace("INTERACTION=I\n", "INTERACTION=I, SIDES=ONE\n"))
+    # Two cubes of E = 1000 and height 1, and a layer of 500: flexibilities add up.
+    assert abs(run.history["pair1_force_z"][-1]) == pytest.approx(0.02/(2/1000 + 1/500), rel=1.0e-4)
+
+
+def test_momenta_of_explicit_steps(tmp_path: Path) -> None:
+    """Pushes along gradients at the start of each step have no moment there."""
+    text = impact("C3D8", "C3D8").replace("*DYNAMIC, DIRECT\n0.02, 0.9", "*DYNAMIC, DIRECT, EXPLICIT\n0.004, 0.5")
+    run = ran(tmp_path, text)
+    p, angular = moments(run, "px py pz"), moments(run, "lx ly lz")
+    assert run.history["active"].max() > 0
+    assert np.abs(p - p[0]).max() <= BALANCE*np.abs(p).max()
+    assert np.abs(angular - angular[0]).max() <= BALANCE*np.abs(angular).max()
+
+
+@pytest.mark.parametrize("angle", [0.2, 0.3, 0.5])
+def test_cubes_on_an_edge_come_to_an_end(angle: float, tmp_path: Path) -> None:
+    """Nodes at the ends of both surfaces come and go: energy is kept, no step is given up."""
+    run = ran(tmp_path, stack([(2, 2, 2), (3, 3, 3)], 0.0, angle))
+    history = run.history
+    assert history["time"][-1] == pytest.approx(0.6)
+    assert np.ptp(history["total"]) <= BALANCE*history["total"].max()
