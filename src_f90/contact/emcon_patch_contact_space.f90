@@ -10,8 +10,8 @@ module emcon_patch_contact_space
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_facet_values, only : facets_pressed_area, facets_pressures
-   use emcon_facets, only : facets_init, facets_normal
+   use emcon_facet_values, only : facets_faced_area, facets_pressed_area, facets_pressures
+   use emcon_facets, only : facets_init
    use emcon_guards, only : crossing_bar, overlap_bar
    use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach, &
       pair_has_order
@@ -26,6 +26,7 @@ module emcon_patch_contact_space
       patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t, where_text
+   use emcon_sort, only : find_sorted, unique_sorted
    use emcon_text, only : to_text
    implicit none
    private
@@ -112,6 +113,7 @@ contains
       type(surface_t), intent(in) :: surface
       type(error_t), allocatable, intent(out) :: error
       type(surface_t) :: faces
+      integer, allocatable :: named(:)
       logical :: is_nodal
       integer :: i
 
@@ -119,7 +121,7 @@ contains
       is_nodal = allocated(surface%node) .and. .not. allocated(surface%edge)
       if (is_nodal .and. allocated(surface%element)) is_nodal = size(surface%element) == 0
       if (is_nodal) then
-         faces%name = surface%name
+         named = unique_sorted(surface%node)
          call outline_faces_at(scene, surface%node, faces%edge)
          deallocate(faces%node)
       end if
@@ -130,12 +132,12 @@ contains
             size(sides%slave%node))])
          return
       end if
-      call node_frames_init(sides%frames, sides%slave, scene%x, [(any(surface%node == &
-         sides%slave%node(i)), i = 1, size(sides%slave%node))])
-      do i = 1, size(surface%node)
-         if (any(sides%slave%node == surface%node(i))) cycle
+      call node_frames_init(sides%frames, sides%slave, scene%x, [(find_sorted(named, &
+         sides%slave%node(i)) > 0, i = 1, size(sides%slave%node))])
+      do i = 1, size(named)
+         if (find_sorted(sides%slave%node, named(i)) > 0) cycle
          call raise(error, err_input, where_text(scene, surface%origin) // ": node " // &
-            to_text(scene%node%label(surface%node(i))) // " of surface " // surface%name // &
+            to_text(scene%node%label(named(i))) // " of surface " // surface%name // &
             " is on no outer face of an element, which its gap needs; leave it out")
          return
       end do
@@ -316,26 +318,19 @@ contains
 
    end subroutine spread_to_nodes
 
-   !> As `contact_t` has it: areas of facets are shared by their nodes alike.
+   !> As `contact_t` has it: what of the facets at its node faces along each frame. At the corner of
+   !> a body each face is that of its own frame alone.
    pure subroutine patch_area(self, x, u, area, length)
       class(patch_contact_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
       real(wp), intent(out) :: length(:)         !! (n_constraint) by their thickness [L]
-      real(wp) :: normal(3), of_node(size(self%sides%slave%node))
-      integer :: f, n
+      integer :: i
 
-      of_node = 0.0_wp
-      associate (slave => self%sides%slave)
-         do f = 1, slave%n_facet
-            n = count(slave%corner(:, f) > 0)
-            normal = facets_normal(slave, f, x, u)
-            associate (to => slave%corner(:n, f))
-               of_node(to) = of_node(to) + sqrt(dot_product(normal, normal))/real(n, wp)
-            end associate
-         end do
-      end associate
-      area = of_node(self%sides%frames%node)
+      do i = 1, self%n_constraint
+         area(i) = facets_faced_area(self%sides%slave, self%sides%frames%node(i), &
+            frame_normal(self%sides%frames, i, self%node(i), x, u), x, u)
+      end do
       length = area/self%thickness
    end subroutine patch_area
 

@@ -4,12 +4,29 @@ module emcon_facet_values
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: facets_pressed_area, facets_pressures, facets_share
+   public :: facets_faced_area, facets_pressed_area, facets_pressures, facets_share
 
    !> Facets of more nodes have some in the middle of their sides.
    integer, parameter :: most_simple = 4
 
 contains
+
+   !> The area at a node that faces along `normal`: facets are shared by their nodes alike.
+   pure real(wp) function facets_faced_area(self, i, normal, x, u) result(area)
+      type(facets_t), intent(in) :: self         !! set up, in space
+      integer, intent(in) :: i                   !! index into the nodes
+      real(wp), intent(in) :: normal(:)          !! (3) unit vector
+      real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node of the scene) [L]
+      integer :: k
+
+      area = 0.0_wp
+      do k = self%around_start(i), self%around_start(i + 1) - 1
+         associate (f => self%around(k))
+            area = area + max(0.0_wp, dot_product(normal, facets_normal(self, f, x, u))) &
+               /real(count(self%facet(:, f) > 0), wp)
+         end associate
+      end do
+   end function facets_faced_area
 
    !> The area at a node on which uniform pressure along `normal` presses. On a facet with nodes
    !> between its corners it presses on these alone (of eight nodes it pulls at the corners, which

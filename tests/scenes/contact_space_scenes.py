@@ -104,14 +104,15 @@ def stack(cells: list[tuple[int, int, int]], gap: float, angle: float = 0.0, opt
 
 
 def press(cells: list[tuple[int, int, int]], kind: list[str], by: float, turn: np.ndarray, nu: float = 0.0,
-          options: str = "") -> str:
+          options: str = "", is_whole: bool = False) -> str:
     """A cube pressed flat onto one of the same size, all turned by `turn`; along the sides they move freely."""
     one = Block(kind[0], cells[0], place=lambda x: x @ turn.T)
     two = Block(kind[1], cells[1], place=lambda x: (x - np.array([0., 0., 1.])) @ turn.T)
     n = len(one.x)
     top, bottom = one.on(2, 1), two.on(2, 0) + n
     way = -by*turn[:, 2]
-    text = bodies([one, two], [faces(one, 2, 0), faces(two, 2, 1)], f"*ELASTIC\n1000., {nu!r}\n")
+    sides = [faces(one), faces(two)] if is_whole else [faces(one, 2, 0), faces(two, 2, 1)]
+    text = bodies([one, two], sides, f"*ELASTIC\n1000., {nu!r}\n")
     text += "*NSET, NSET=TOP\n" + "".join(f"{k}\n" for k in top)
     text += "*NSET, NSET=BOTTOM\n" + "".join(f"{k}\n" for k in bottom)
     text += pair(options) + "*BOUNDARY\nBOTTOM, 1, 3\n*STEP\n*STATIC, DIRECT\n1., 1.\n*BOUNDARY\n"

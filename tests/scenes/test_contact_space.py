@@ -236,11 +236,15 @@ def test_nodes_without_faces(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("cells", [[(2, 2, 2), (2, 2, 2)], [(1, 1, 1), (1, 1, 1)]])
-def test_pressure_by_the_overclosure(cells: list[tuple[int, int, int]], tmp_path: Path) -> None:
-    """A soft layer between two cubes: springs in a row, also where nodes stand at the ends of both surfaces."""
-    text = press(cells, ["C3D8", "C3D8"], 0.02, turned(0.0)).replace(
+@pytest.mark.parametrize("is_whole", [False, True])
+@pytest.mark.parametrize("sides", ["", ", SIDES=ONE"])
+def test_pressure_by_the_overclosure(sides: str, is_whole: bool, cells: list[tuple[int, int, int]],
+                                     tmp_path: Path) -> None:
+    """A soft layer between two cubes: springs in a row, also where nodes stand at the ends of both surfaces, and
+    where the surfaces are the whole outlines: the other faces at an edge are not pressed."""
+    text = press(cells, ["C3D8", "C3D8"], 0.02, turned(0.0), is_whole=is_whole).replace(
         "NAME=I\n", "NAME=I\n*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n500.\n", 1)
-    run = ran(tmp_path, text.replace("INTERACTION=I\n", "INTERACTION=I, SIDES=ONE\n"))
+    run = ran(tmp_path, text.replace("INTERACTION=I\n", f"INTERACTION=I{sides}\n"))
     # Two cubes of E = 1000 and height 1, and a layer of 500: flexibilities add up.
     assert abs(run.history["pair1_force_z"][-1]) == pytest.approx(0.02/(2/1000 + 1/500), rel=1.0e-4)
 
