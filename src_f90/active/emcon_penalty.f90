@@ -104,6 +104,7 @@ contains
       real(wp) :: area(system%contact(k)%contact%n_constraint), by_area
 
       associate (contact => system%contact(k)%contact, before => system%first_constraint(k))
+         if (contact%n_constraint == 0) return
          call contact%own_area(scene%x, area)
          if (.not. sum(area) > 0.0_wp) then
             call refuse(scene, step, system%contact(k)%of_pair, "a slave surface " // &

@@ -18,6 +18,9 @@ module emcon_supernodal_factor
    !> Entries are below it: sums of their squares in the range of single precision.
    real(dp), parameter :: largest = 2.0_dp**(maxexponent(1.0_sp)/4)
 
+   !> Of a triangle that is inverted at once.
+   integer, parameter :: most_rows = 128
+
    type :: supernodal_factor_t
       !> For each node the inverse of its triangle, packed column by column; then the block below
       !> it: `n_side` columns side by side, of these `n_lane` rows at a time.
@@ -192,8 +195,30 @@ contains
          call ssyrk("L", "N", m, n_column, -1.0_sp, front(n_column + 1, 1), n_row, 1.0_sp, &
             front(n_column + 1, n_column + 1), n_row)
       end if
-      call strtri("L", "N", n_column, front, n_row, info)
+      call invert_triangle(n_column, front, n_row, info)
    end subroutine factorise_front
+
+   !> The inverse of a lower triangle in its place. OpenBLAS 0.3.21 crashes in STRTRI with more than
+   !> 128 rows on processors that it does not know, so larger ones are inverted by halves.
+   recursive subroutine invert_triangle(n, a, lda, info)
+      integer, intent(in) :: n, lda
+      real(sp), intent(inout) :: a(lda, *)
+      integer, intent(out) :: info
+      integer :: half
+
+      if (n <= most_rows) then
+         call strtri("L", "N", n, a, lda, info)
+         return
+      end if
+      half = n/2
+      associate (rest => n - half)
+         call strsm("L", "L", "N", "N", rest, half, -1.0_sp, a(half + 1, half + 1), lda, &
+            a(half + 1, 1), lda)
+         call strsm("R", "L", "N", "N", rest, half, 1.0_sp, a, lda, a(half + 1, 1), lda)
+         call invert_triangle(half, a, lda, info)
+         if (info == 0) call invert_triangle(rest, a(half + 1, half + 1), lda, info)
+      end associate
+   end subroutine invert_triangle
 
    !> The columns of the factor as they are kept.
    pure subroutine keep(front, n_row, n_column, value)

@@ -1,8 +1,10 @@
 !> The contact formulations: one case each.
 submodule (emcon_contact_registry) emcon_contact_kinds
+   use emcon_edge_contact_space, only : edge_contact_init, edge_contact_t
    use emcon_errors, only : err_input, raise
    use emcon_host_contact, only : host_contact_set_up
-   use emcon_interactions, only : formulation_user, formulation_mortar, formulation_segment
+   use emcon_interactions, only : formulation_edges, formulation_mortar, &
+      formulation_segment, formulation_user
    use emcon_midside_plane, only : midside_init
    use emcon_mortar, only : mortar_init, mortar_t
    use emcon_nts, only : nts_init, nts_t
@@ -22,10 +24,16 @@ contains
       type(nts_t), allocatable :: nts
       type(segment_t), allocatable :: segment
       type(patch_contact_t), allocatable :: patch
+      type(edge_contact_t), allocatable :: edges
 
       select case (pair%formulation)
       case (formulation_user)
          call new_given(scene, pair, contact, error, user)
+         return
+      case (formulation_edges)
+         allocate(edges)
+         call edge_contact_init(edges, scene, pair)
+         call move_alloc(edges, contact)
          return
       end select
       if (scene%n_dim == n_space) then

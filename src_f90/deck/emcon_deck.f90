@@ -132,7 +132,7 @@ contains
       call check_pairs(reader, scene)
       call check_ties(reader, scene)
       call check_rigid(reader, scene)
-      call guards_find(scene%pair, scene%surface, scene%guard)
+      call guards_find(scene%pair, scene%surface, scene%n_dim, scene%guard)
    end subroutine read_scene
 
    !> The shapes of elements, and what of the scene is of the plane alone.

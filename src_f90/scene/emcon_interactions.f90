@@ -8,13 +8,14 @@ module emcon_interactions
    public :: pressure_t, pressure_reach, pressure_slope, interaction_reach
    public :: pressure_hard, pressure_linear, pressure_exponential, pressure_tabular, pressure_tied
    public :: pair_has_order, pair_holds_nodes, pair_may_exchange, pair_is_reverse_of, pair_of_one
-   public :: formulation_nts, formulation_segment, formulation_mortar, formulation_user
+   public :: formulation_nts, formulation_segment, formulation_mortar, formulation_user, &
+      formulation_edges
    public :: integration_segments, integration_elements
    public :: multiplier_standard, multiplier_dual
    public :: normal_edge, normal_nodal, smoothing_none, smoothing_hermite
 
    integer, parameter :: formulation_nts = 1, formulation_segment = 2, formulation_mortar = 3, &
-      formulation_user = 4
+      formulation_user = 4, formulation_edges = 5
    integer, parameter :: integration_segments = 1, integration_elements = 2
    integer, parameter :: multiplier_standard = 1, multiplier_dual = 2
    integer, parameter :: normal_edge = 1, normal_nodal = 2
@@ -85,6 +86,7 @@ module emcon_interactions
       logical :: is_asked = .false.                  !! the deck says so, or which
       logical :: is_exchanged = .false.              !! the deck names what is the master first
       logical :: is_guarded = .true.                 !! nodes that no pair holds get guards
+      logical :: holds_edges = .true.                !! sharp edges that cross are held, in space
       integer :: initiation = 0                      !! one of `initiation_`, 0: as the step
       real(wp) :: slack = 0.0_wp                     !! so far nodes may go in, by the edge: a guard
       type(interaction_t) :: interaction

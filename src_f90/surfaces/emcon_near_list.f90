@@ -113,29 +113,37 @@ contains
    !> be.
    pure logical function near_list_within(self, i, f, x, u, within) result(is_near)
       type(near_list_t), intent(in) :: self
-      integer, intent(in) :: i                   !! item that is a node, 1..n_item
+      integer, intent(in) :: i                   !! item, 1..n_item
       integer, intent(in) :: f                   !! facet of the master
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
       real(wp), intent(in) :: within             !! [L]
-      real(wp) :: at, low, high, here
-      integer :: a, k
+      real(wp), dimension(2) :: own, other
+      integer :: a
 
       is_near = .true.
       do a = 1, size(x, 1)
-         at = x(a, self%item(1, i)) + u(a, self%item(1, i))
-         low = x(a, self%facet(1, f)) + u(a, self%facet(1, f))
-         high = low
-         do k = 2, size(self%facet, 1)
-            associate (node => self%facet(k, f))
-               if (node == 0) exit
-               here = x(a, node) + u(a, node)
-               low = min(low, here)
-               high = max(high, here)
-            end associate
-         end do
-         is_near = is_near .and. max(low - at, at - high) <= within
+         own = range_of(self%item(:, i), a, x, u)
+         other = range_of(self%facet(:, f), a, x, u)
+         is_near = is_near .and. max(other(1) - own(2), own(1) - other(2)) <= within
       end do
    end function near_list_within
+
+   !> The lowest and the highest coordinate of some nodes along an axis at x + u.
+   pure function range_of(nodes, axis, x, u) result(range)
+      integer, intent(in) :: nodes(:)            !! of the scene; 0: no more
+      integer, intent(in) :: axis
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
+      real(wp) :: range(2)
+      integer :: k
+
+      range = x(axis, nodes(1)) + u(axis, nodes(1))
+      do k = 2, size(nodes)
+         if (nodes(k) == 0) exit
+         associate (here => x(axis, nodes(k)) + u(axis, nodes(k)))
+            range = [min(range(1), here), max(range(2), here)]
+         end associate
+      end do
+   end function range_of
 
    !> List what lies within `reach`. Surfaces far apart get a reach as large as their distance and
    !> an empty list: then nothing is done until one has moved half of that.
