@@ -31,8 +31,9 @@ module emcon_edge_contact_space
    !> An edge holds what comes from between its faces, and from so much outside: the sine of that
    !> angle by the sine of the angle between the faces. Edges that lie on faces would be on the limit.
    real(wp), parameter :: beside = 0.25_wp
-   !> So far past its end, by its length, an edge begins to hold, and goes on to hold.
-   real(wp), parameter :: begins_beyond = 1.0e-3_wp, ends_beyond = 0.05_wp
+   !> So far inside its ends, by its length, an edge begins to hold, where nodes do not; so far past
+   !> them it goes on to hold.
+   real(wp), parameter :: begins_beyond = -1.0e-3_wp, ends_beyond = 0.05_wp
    !> So deep, by the edge, two edges may be in each other, and may be as a contact begins.
    real(wp), parameter :: deepest = 0.3_wp, deepest_start = 0.1_wp
 
@@ -43,6 +44,7 @@ module emcon_edge_contact_space
    end type edge_stencil_t
 
    type, extends(contact_t) :: edge_contact_t
+      logical :: is_exchanged = .false.               !! the edges below are the master's, of the pair
       type(sharp_edges_t) :: slave
       type(sharp_edges_t), allocatable :: master      !! gfortran 12 loses a second one of its kind
       integer, allocatable :: class(:)                !! (n of the master) 1 to n_class
@@ -62,7 +64,7 @@ module emcon_edge_contact_space
 contains
 
    !> Set up the edges of the pair `pair` of `scene`; without sharp edges on both sides there are no
-   !> constraints. The slave is the side with more of them, so that each crosses few.
+   !> constraints. They are those of the side with more edges, so that each crosses few.
    subroutine edge_contact_init(self, scene, pair)
       type(edge_contact_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
@@ -76,7 +78,8 @@ contains
       call sharp_edges_init(second, scene, scene%surface(pair%master))
       self%n_constraint = n_class*max(size(first%node, 2), size(second%node, 2))
       if (min(size(first%node, 2), size(second%node, 2)) == 0) self%n_constraint = 0
-      if (size(second%node, 2) > size(first%node, 2)) then
+      self%is_exchanged = size(second%node, 2) > size(first%node, 2)
+      if (self%is_exchanged) then
          self%slave = second
          call move_alloc(first, self%master)
       else
@@ -343,9 +346,12 @@ contains
       type(condition_t), intent(inout) :: item(:)   !! (n)
       real(wp), dimension(3, n_edge_pair_node) :: at, way, still
       type(edge_pair_gap_t) :: gap
-      integer :: k
+      integer :: k, order(n_edge_pair_node), place(3*n_edge_pair_node)
 
       still = 0.0_wp
+      ! The side that the pair names as the slave comes first.
+      order = cshift([1, 2, 3, 4], merge(2, 0, self%is_exchanged))
+      place = cshift([(k, k = 1, size(place))], merge(6, 0, self%is_exchanged))
       do k = 1, size(wanted)
          associate (i => 1 + (wanted(k) - 1)/n_class, stencil => self%stencil(wanted(k)), &
                hold => target(k) + self%offset)
@@ -353,15 +359,18 @@ contains
             call gather_motion(self, i, stencil, du, way)
             call edge_pair_gap(at, way, stencil%side, item(k)%leaves_second, gap)
             call condition_resize(item(k), n_edge_pair_node, size(x, 1))
-            item(k)%node(:n_edge_pair_node) = nodes_of(self, i, stencil)
+            associate (node => nodes_of(self, i, stencil))
+               item(k)%node(:n_edge_pair_node) = node(order)
+            end associate
             item(k)%n_slave = 2
             item(k)%size = length_of(at(:, :2))
             item(k)%gap0 = gap%gap(0) - hold
             item(k)%gap1 = gap%gap(1) - hold
             item(k)%dgap = gap%dgap
-            item(k)%g(:, :n_edge_pair_node) = gap%g
-            item(k)%c(:, :n_edge_pair_node) = gap%c
-            if (.not. item(k)%leaves_second) item(k)%h(:size(gap%h, 1), :size(gap%h, 2)) = gap%h
+            item(k)%g(:, :n_edge_pair_node) = gap%g(:, order)
+            item(k)%c(:, :n_edge_pair_node) = gap%c(:, order)
+            if (.not. item(k)%leaves_second) item(k)%h(:size(place), :size(place)) = &
+               gap%h(place, place)
          end associate
       end do
    end subroutine edge_evaluate

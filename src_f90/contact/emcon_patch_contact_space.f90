@@ -10,7 +10,7 @@ module emcon_patch_contact_space
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_errors, only : err_input, error_t, raise
-   use emcon_facet_values, only : facets_faced_area, facets_pressed_area, facets_pressures
+   use emcon_facet_values, only : facets_point_area, facets_pressures
    use emcon_facets, only : facets_init
    use emcon_guards, only : crossing_bar, overlap_bar
    use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach, &
@@ -20,7 +20,7 @@ module emcon_patch_contact_space
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
    use emcon_outline_space, only : outline_faces_at
    use emcon_patch_gap_space, only : patch_gap, patch_gap_t, patch_look, patch_look_t
-   use emcon_patch_sides_space, only : frame_normal, node_frames_init, patch_sides_t, &
+   use emcon_patch_sides_space, only : frame_normal, point_frames_init, patch_sides_t, &
       patch_triangles_init
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
       patch_stencil_t
@@ -55,7 +55,6 @@ module emcon_patch_contact_space
       procedure :: measure_points => patch_measure
       procedure :: evaluate_points => patch_evaluate
       procedure :: area_points => patch_area
-      procedure :: narrow => patch_narrow
       procedure :: pressures => patch_pressures
       procedure :: share => patch_share
       procedure :: mean_gap => patch_mean_gap
@@ -85,17 +84,16 @@ contains
          call facets_init(sides%master, scene, scene%surface(pair%master), error)
          if (allocated(error)) return
          call patch_triangles_init(sides%triangles, sides%master, scene%x)
-         self%node = sides%slave%node(sides%frames%node)
+         self%node = sides%frames%base(sides%frames%point)
          self%n_constraint = size(self%node)
          allocate(self%duplicate(self%n_constraint), source=0)
          allocate(self%state(self%n_constraint), self%stencil(self%n_constraint))
          allocate(self%scale(self%n_constraint), source=1.0_wp)
          allocate(self%cover(self%n_constraint), self%sagitta(self%n_constraint), source=0.0_wp)
-         self%thickness = sqrt(sides%frames%area(sides%frames%node))
-         call near_list_init(self%near, reshape(sides%slave%node, [1, size(sides%slave%node)]), &
-            sides%master%facet, scene%x, scene%u0, pair%interaction%offset &
+         self%thickness = sqrt(sides%frames%area(sides%frames%point))
+         call near_list_init(self%near, point_items(sides), sides%master%facet, scene%x, scene%u0, pair%interaction%offset &
             + interaction_reach(pair%interaction))
-         self%state%other_size = sides%frames%size(sides%frames%node)
+         self%state%other_size = sides%frames%size(sides%frames%point)
       end associate
       self%holds_all = .not. pair_has_order(pair)
       if (self%holds_all) self%area_factor = 0.5_wp
@@ -105,6 +103,23 @@ contains
       self%max_penetration_at_start = deepest_start
       call contact_laws_of_surface(pair%interaction, self%laws)
    end subroutine patch_contact_init
+
+   !> The nodes that contact points are made of.
+   pure function point_items(sides) result(item)
+      type(patch_sides_t), intent(in) :: sides
+      integer, allocatable :: item(:, :)
+      integer :: k, n
+
+      n = size(sides%slave%node)
+      associate (middle => sides%frames%middle)
+         allocate(item(merge(size(sides%slave%facet, 1), 1, size(middle) > 0), n + size(middle)), &
+            source=0)
+         item(1, :n) = sides%slave%node
+         do k = 1, size(middle)
+            item(:, n + k) = sides%slave%facet(:, middle(k))
+         end do
+      end associate
+   end function point_items
 
    !> The slave with its frames; nodes that are named without faces stand on those of elements.
    subroutine init_slave(sides, scene, surface, error)
@@ -128,11 +143,11 @@ contains
       call facets_init(sides%slave, scene, faces, error)
       if (allocated(error)) return
       if (.not. is_nodal) then
-         call node_frames_init(sides%frames, sides%slave, scene%x, [(.true., i = 1, &
+         call point_frames_init(sides%frames, sides%slave, scene%x, [(.true., i = 1, &
             size(sides%slave%node))])
          return
       end if
-      call node_frames_init(sides%frames, sides%slave, scene%x, [(find_sorted(named, &
+      call point_frames_init(sides%frames, sides%slave, scene%x, [(find_sorted(named, &
          sides%slave%node(i)) > 0, i = 1, size(sides%slave%node))])
       do i = 1, size(named)
          if (find_sorted(sides%slave%node, named(i)) > 0) cycle
@@ -167,7 +182,7 @@ contains
       self%chosen_reach = self%reach
       associate (list => self%near%candidates)
          do i = 1, self%n_constraint
-            associate (item => self%sides%frames%node(i))
+            associate (item => self%sides%frames%point(i))
                associate (of => list%facet(list%start(item):list%start(item + 1) - 1))
                   facet = pack(of, [(near_list_within(self%near, item, of(k), x, u0, self%reach), &
                      k = 1, size(of))])
@@ -207,7 +222,7 @@ contains
          self%scale(i) = max(cover(0), least)
          if (self%step%is_penalty) least = no_cover
          state%size = stencil%size
-         state%other_size = self%sides%frames%size(self%sides%frames%node(i))
+         state%other_size = self%sides%frames%size(self%sides%frames%point(i))
          state%is_near = maxval(cover) > no_cover
          state%is_over = cover(1) >= least .or. (self%step%is_penalty .and. cover(0) >= least)
          state%is_leaving = .not. state%is_over
@@ -318,7 +333,7 @@ contains
 
    end subroutine spread_to_nodes
 
-   !> As `contact_t` has it: what of the facets at its node faces along each frame. At the corner of
+   !> As `contact_t` has it: what of the facets at its point faces along each frame. At the corner of
    !> a body each face is that of its own frame alone.
    pure subroutine patch_area(self, x, u, area, length)
       class(patch_contact_t), intent(in) :: self
@@ -327,26 +342,14 @@ contains
       real(wp), intent(out) :: length(:)         !! (n_constraint) by their thickness [L]
       integer :: i
 
-      do i = 1, self%n_constraint
-         area(i) = facets_faced_area(self%sides%slave, self%sides%frames%node(i), &
-            frame_normal(self%sides%frames, i, self%node(i), x, u), x, u)
-      end do
+      associate (frames => self%sides%frames)
+         do i = 1, self%n_constraint
+            area(i) = facets_point_area(self%sides%slave, frames%middle, frames%point(i), &
+               frame_normal(frames, i, self%node(i), x, u), x, u)
+         end do
+      end associate
       length = area/self%thickness
    end subroutine patch_area
-
-   !> What of the facets at a node each of its frames is pressed on.
-   pure subroutine patch_narrow(self, x, u, area)
-      class(patch_contact_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      real(wp), intent(inout) :: area(:)         !! (n_constraint) [L^2]
-      real(wp) :: normal(3)
-      integer :: i
-
-      do i = 1, self%n_constraint
-         normal = frame_normal(self%sides%frames, i, self%node(i), x, u)
-         area(i) = facets_pressed_area(self%sides%slave, self%sides%frames%node(i), normal, x, u)
-      end do
-   end subroutine patch_narrow
 
    pure subroutine patch_pressures(self, force, area, pressure)
       class(patch_contact_t), intent(in) :: self
@@ -354,7 +357,8 @@ contains
       real(wp), intent(in) :: area(:)            !! (n_constraint) [L^2]
       real(wp), intent(out) :: pressure(:)       !! (n_constraint) [M/(L T^2)]
 
-      call facets_pressures(self%sides%slave, self%sides%frames%node, force, area, pressure)
+      call facets_pressures(self%sides%slave, self%sides%frames%middle, &
+         self%sides%frames%point, force, area, pressure)
    end subroutine patch_pressures
 
    !> Integrals of gaps are functions of the positions alone; their means know what was covered.

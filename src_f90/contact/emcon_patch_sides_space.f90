@@ -13,26 +13,32 @@ module emcon_patch_sides_space
    use emcon_sort, only : unique_sorted
    implicit none
    private
-   public :: node_frames_t, node_frames_init, patch_triangles_t, patch_triangles_init, patch_sides_t
+   public :: point_frames_t, point_frames_init, patch_triangles_t, patch_triangles_init, patch_sides_t
    public :: sides_point, frame_normal
 
    !> The second vector of a frame is turned by 60 degrees: the patch is an equilateral triangle.
    real(wp), parameter :: turn(2) = [0.5_wp, 0.5_wp*sqrt(3.0_wp)]
+   !> Facets of more nodes have some between their corners.
+   integer, parameter :: most_corners = 4
    !> A mean normal shorter than this, by the area, is none.
    real(wp), parameter :: blunt = 1.0e-2_wp
 
-   !> Frames of nodes: vectors a and b that are sums of weight times (x(ring) - x(node)), lengths as
-   !> in the reference.
-   type :: node_frames_t
-      integer :: n = 0                           !! frames of all nodes
-      integer, allocatable :: start(:)           !! (n_node + 1) first frame of each node
-      integer, allocatable :: node(:)            !! (n) index of the node of each frame
+   !> Frames of contact points: the nodes of a surface, then the virtual centres of its facets that
+   !> have nodes between corners. The vectors a and b of a frame, and where its point is from the
+   !> node it is counted from, are sums of weight times (x(ring) - x(base)); lengths of a and b are
+   !> as in the reference.
+   type :: point_frames_t
+      integer :: n = 0                           !! frames of all points
+      integer, allocatable :: middle(:)          !! (n_point - n_node) facets of the centres
+      integer, allocatable :: base(:)            !! (n_point) node of the scene
+      integer, allocatable :: start(:)           !! (n_point + 1) first frame of each point
+      integer, allocatable :: point(:)           !! (n) that of each frame
       integer, allocatable :: ring_start(:)      !! (n + 1)
       integer, allocatable :: ring(:)            !! nodes of the scene
-      real(wp), allocatable :: weight(:, :)      !! (2, size of `ring`) in a, in b
-      real(wp), allocatable :: size(:)           !! (n_node) mean length of facets there [L]
-      real(wp), allocatable :: area(:)           !! (n_node) in the reference [L^2]
-   end type node_frames_t
+      real(wp), allocatable :: weight(:, :)      !! (3, size of `ring`) in a, in b, in the point
+      real(wp), allocatable :: size(:)           !! (n_point) mean length of facets there [L]
+      real(wp), allocatable :: area(:)           !! (n_point) in the reference [L^2]
+   end type point_frames_t
 
    !> The triangles of a surface in space.
    type :: patch_triangles_t
@@ -47,7 +53,7 @@ module emcon_patch_sides_space
    type :: patch_sides_t
       type(facets_t) :: slave
       type(facets_t), allocatable :: master      !! gfortran 12 loses a second one of its kind
-      type(node_frames_t) :: frames              !! of the slave
+      type(point_frames_t) :: frames             !! of the slave
       type(patch_triangles_t) :: triangles             !! of the master
    end type patch_sides_t
 
@@ -77,64 +83,101 @@ contains
       end associate
    end subroutine sides_point
 
-   !> The frames at all nodes of a surface: of each smooth group of its facets there, and of all of
-   !> them where there are several.
-   pure subroutine node_frames_init(self, facets, x, is_meant)
-      type(node_frames_t), intent(out) :: self
+   !> The frames at all contact points of a surface: at a node of each smooth group of its facets
+   !> there, and of all of them where there are several; at a centre of its facet.
+   pure subroutine point_frames_init(self, facets, x, is_meant)
+      type(point_frames_t), intent(out) :: self
       type(facets_t), intent(in) :: facets       !! in space
       real(wp), intent(in) :: x(:, :)            !! (3, n_node of the scene) reference [L]
       logical, intent(in) :: is_meant(:)         !! (n_node) it needs frames
       type(facet_groups_t) :: groups
-      integer, allocatable :: ring(:)
-      real(wp) :: still(3, size(x, 2))
-      integer :: i, g
+      real(wp), allocatable :: still(:, :)
+      integer :: f, g, i
 
       call facet_groups_init(groups, facets, x, group_angle)
+      allocate(still, mold=x)
       still = 0.0_wp
-      associate (n => size(facets%node), n_frame => groups%n_group + size(facets%node), &
-            n_ring => 2*size(groups%ring))
+      self%middle = pack([(f, f = 1, facets%n_facet)], [(has_middle(facets, f), &
+         f = 1, facets%n_facet)])
+      self%base = [facets%node, facets%facet(2, self%middle)]
+      associate (n => size(self%base), n_frame => groups%n_group + size(self%base), &
+            n_ring => 2*size(groups%ring) + size(facets%facet, 1)*size(self%middle))
          allocate(self%start(n + 1), self%ring_start(n_frame + 1), source=1)
-         allocate(self%size(n), self%area(n), self%weight(2, n_ring), source=0.0_wp)
+         allocate(self%size(n), self%area(n), self%weight(3, n_ring), source=0.0_wp)
          allocate(self%ring(n_ring), source=0)
       end associate
-      do i = 1, size(facets%node)
+      do i = 1, size(self%base)
          self%start(i + 1) = self%start(i)
-         if (.not. is_meant(i)) cycle
-         associate (first => groups%node_start(i), last => groups%node_start(i + 1) - 1)
-            do g = first, last
-               ring = groups%ring(groups%ring_start(g):groups%ring_start(g + 1) - 1)
-               call add_frame(self, facets, x, still, i, groups%facet(groups%start(g): &
-                  groups%start(g + 1) - 1), ring)
-            end do
-            if (last > first) then
-               ring = unique_sorted(groups%ring(groups%ring_start(first): &
-                  groups%ring_start(last + 1) - 1))
-               call add_frame(self, facets, x, still, i, groups%facet(groups%start(first): &
-                  groups%start(last + 1) - 1), ring)
-            end if
-         end associate
-         associate (first => facets%around_start(i), last => facets%around_start(i + 1) - 1)
-            if (last < first) cycle
-            self%size(i) = sum([(facets_length(facets, facets%around(g)), g = first, last)]) &
-               /real(last - first + 1, wp)
-            self%area(i) = sum([(facets%size(facets%around(g)) &
-               /real(count(facets%corner(:, facets%around(g)) > 0), wp), g = first, last)])
-         end associate
+         if (i <= size(facets%node)) then
+            if (is_meant(i)) call add_node(self, facets, groups, x, still, i)
+         else
+            f = self%middle(i - size(facets%node))
+            if (all(is_meant(pack(facets%corner(:, f), facets%corner(:, f) > 0)))) &
+               call add_centre(self, facets, x, still, i, f)
+         end if
       end do
-      self%n = self%start(size(facets%node) + 1) - 1
-      self%node = [((i, g = self%start(i), self%start(i + 1) - 1), i = 1, size(facets%node))]
-   end subroutine node_frames_init
+      self%n = self%start(size(self%start)) - 1
+      self%point = [((i, g = self%start(i), self%start(i + 1) - 1), i = 1, size(self%base))]
+   end subroutine point_frames_init
 
-   !> Add the frame of the facets `facet` at node `i`, if they have a mean normal: docs/theory.md,
-   !> eq. (44).
-   pure subroutine add_frame(self, facets, x, still, i, facet, ring)
-      type(node_frames_t), intent(inout) :: self
+   !> Has facet `f` nodes between its corners? Uniform pressure loads its corners by nothing, or
+   !> pulls at them, where it presses on all nodes and on the virtual centre.
+   pure logical function has_middle(facets, f)
+      type(facets_t), intent(in) :: facets
+      integer, intent(in) :: f                   !! 1 to n_facet
+
+      has_middle = count(facets%facet(:, f) > 0) > most_corners
+   end function has_middle
+
+   !> The frames of node `i`.
+   pure subroutine add_node(self, facets, groups, x, still, i)
+      type(point_frames_t), intent(inout) :: self
+      type(facets_t), intent(in) :: facets
+      type(facet_groups_t), intent(in) :: groups
+      real(wp), intent(in) :: x(:, :), still(:, :)
+      integer, intent(in) :: i
+      integer :: g
+
+      associate (first => groups%node_start(i), last => groups%node_start(i + 1) - 1)
+         do g = first, last
+            call add_frame(self, facets, x, still, i, groups%facet(groups%start(g): &
+               groups%start(g + 1) - 1), groups%ring(groups%ring_start(g): &
+               groups%ring_start(g + 1) - 1))
+         end do
+         if (last > first) call add_frame(self, facets, x, still, i, groups%facet(groups%start(first): &
+            groups%start(last + 1) - 1), unique_sorted(groups%ring(groups%ring_start(first): &
+            groups%ring_start(last + 1) - 1)))
+      end associate
+      associate (around => facets%around(facets%around_start(i):facets%around_start(i + 1) - 1))
+         if (size(around) == 0) return
+         self%size(i) = sum([(facets_length(facets, around(g)), g = 1, size(around))]) &
+            /real(size(around), wp)
+         self%area(i) = sum([(facets%size(around(g))/real(count(facets%corner(:, around(g)) > 0), &
+            wp), g = 1, size(around))])
+      end associate
+   end subroutine add_node
+
+   !> The frame of the centre of facet `f`, point `i`.
+   pure subroutine add_centre(self, facets, x, still, i, f)
+      type(point_frames_t), intent(inout) :: self
       type(facets_t), intent(in) :: facets
       real(wp), intent(in) :: x(:, :), still(:, :)
-      integer, intent(in) :: i                   !! index into the nodes
-      integer, intent(in) :: facet(:), ring(:)   !! facets, and their nodes but `i` as such indices
-      real(wp) :: normal(3), area, first(3), second(3), flat(2, size(ring))
-      real(wp) :: square(2, 2), inverse(2, 2), weight(2, size(ring))
+      integer, intent(in) :: i, f
+
+      self%size(i) = facets_length(facets, f)
+      self%area(i) = facets%size(f)/real(count(facets%corner(:, f) > 0), wp)
+      call add_frame(self, facets, x, still, i, [f], pack(facets%corner(:, f), facets%corner(:, f) > 0))
+   end subroutine add_centre
+
+   !> Add the frame of the facets `facet` at point `i`, if they have a mean normal: docs/theory.md,
+   !> eq. (44).
+   pure subroutine add_frame(self, facets, x, still, i, facet, ring)
+      type(point_frames_t), intent(inout) :: self
+      type(facets_t), intent(in) :: facets
+      real(wp), intent(in) :: x(:, :), still(:, :)
+      integer, intent(in) :: i                   !! a node or a centre
+      integer, intent(in) :: facet(:), ring(:)   !! facets, and nodes of them as indices
+      real(wp) :: normal(3), area, from(3, size(ring)), weight(3, size(ring))
       integer :: k, n
 
       normal = 0.0_wp
@@ -145,20 +188,18 @@ contains
       end do
       if (.not. sqrt(dot_product(normal, normal)) > blunt*area) return
       normal = normal/sqrt(dot_product(normal, normal))
-      associate (at => facets%node(i), other => facets%node(ring))
-         first = x(:, other(1)) - x(:, at)
-         first = first - dot_product(first, normal)*normal
-         first = first/sqrt(dot_product(first, first))
-         second = cross_product(normal, first)
-         do k = 1, size(ring)
-            flat(:, k) = [dot_product(first, x(:, other(k)) - x(:, at)), &
-               dot_product(second, x(:, other(k)) - x(:, at))]
+      associate (other => facets%node(ring))
+         from = x(:, other) - spread(x(:, self%base(i)), 2, size(ring))
+         weight(3, :) = 0.0_wp
+         if (i > size(facets%node)) then
+            weight(3, :) = facet_split_centre(size(ring))
+            from = from - spread(matmul(from, weight(3, :)), 2, size(ring))
+         end if
+         weight(:2, :) = frame_weights(from, normal)
+         ! Places are counted from the base, the frame is about its point.
+         do k = 1, 2
+            weight(k, :) = weight(k, :) - sum(weight(k, :))*weight(3, :)
          end do
-         square = matmul(flat, transpose(flat))
-         inverse = reshape([square(2, 2), -square(2, 1), -square(1, 2), square(1, 1)], [2, 2]) &
-            /(square(1, 1)*square(2, 2) - square(1, 2)*square(2, 1))
-         weight = matmul(inverse, flat)
-         weight(2, :) = turn(1)*weight(1, :) + turn(2)*weight(2, :)
          n = self%ring_start(self%start(i + 1))
          self%ring(n:n + size(ring) - 1) = other
          self%weight(:, n:n + size(ring) - 1) = weight
@@ -167,11 +208,32 @@ contains
       self%ring_start(self%start(i + 1)) = n + size(ring)
    end subroutine add_frame
 
-   !> The unit normal of frame `k` at `node` of the scene, at x + u.
+   !> The weights of points around another one in its frame.
+   pure function frame_weights(from, normal) result(weight)
+      real(wp), intent(in) :: from(:, :)         !! (3, n) where they are from it [L]
+      real(wp), intent(in) :: normal(3)          !! of unit length
+      real(wp) :: weight(2, size(from, 2))       !! [1/L]
+      real(wp) :: first(3), second(3), flat(2, size(from, 2)), square(2, 2), inverse(2, 2)
+      integer :: k
+
+      first = from(:, 1) - dot_product(from(:, 1), normal)*normal
+      first = first/sqrt(dot_product(first, first))
+      second = cross_product(normal, first)
+      do k = 1, size(from, 2)
+         flat(:, k) = [dot_product(first, from(:, k)), dot_product(second, from(:, k))]
+      end do
+      square = matmul(flat, transpose(flat))
+      inverse = reshape([square(2, 2), -square(2, 1), -square(1, 2), square(1, 1)], [2, 2]) &
+         /(square(1, 1)*square(2, 2) - square(1, 2)*square(2, 1))
+      weight = matmul(inverse, flat)
+      weight(2, :) = turn(1)*weight(1, :) + turn(2)*weight(2, :)
+   end function frame_weights
+
+   !> The unit normal of frame `k`, at x + u.
    pure function frame_normal(self, k, node, x, u) result(normal)
-      type(node_frames_t), intent(in) :: self
+      type(point_frames_t), intent(in) :: self
       integer, intent(in) :: k                   !! 1 to n
-      integer, intent(in) :: node                !! that it is at
+      integer, intent(in) :: node                !! of the scene, its base
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node of the scene) [L]
       real(wp) :: normal(3), side(3, 2), way(3)
       integer :: i

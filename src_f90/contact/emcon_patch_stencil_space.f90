@@ -34,6 +34,8 @@ module emcon_patch_stencil_space
       real(wp) :: deepest = 0.0_wp               !! farther behind is another side of the body [L]
       integer :: n_node = 0
       integer :: n_slave = 0                     !! nodes 1..n_slave are of the frame
+      integer :: n_origin = 0                    !! of these that its point is a sum of; 0: it is one
+      real(wp) :: origin(max_face_nodes) = 0.0_wp   !! their weights in it
       integer, allocatable :: point(:)           !! (>= n_vertex) of the master; < 0: of a flange
       integer, allocatable :: node(:)            !! (>= n_node) the slave node, then others
       !> (>= n_node, >= 2 + n_vertex) of nodes in the vectors of the frame and in vertices
@@ -67,8 +69,8 @@ contains
 
       self%triangle = 0
       if (size(facet) == 0) return
-      i = sides%frames%node(frame)
-      call look_around(sides, sides%slave%node(i), facet, x, u, near)
+      i = sides%frames%point(frame)
+      call look_around(sides, i, facet, x, u, near)
       nearest = nearest_to(sides, frame, near, x, u)
       if (nearest == 0) return
       normal = frame_normal(sides, i, frame, x, u)
@@ -81,15 +83,17 @@ contains
       call make_patch(self, sides, frame, near, normal, x, u)
    end subroutine patch_stencil_choose
 
-   !> Where the triangles of facets are, from `node`.
-   pure subroutine look_around(sides, node, facet, x, u, near)
+   !> Where the triangles of facets are, from contact point `i` of the slave.
+   pure subroutine look_around(sides, i, facet, x, u, near)
       type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: node, facet(:)
+      integer, intent(in) :: i, facet(:)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       type(near_t), intent(out) :: near
       type(nearest_t) :: nearest
+      real(wp) :: origin(3)
       integer :: f, t
 
+      origin = point_origin(sides, i, x, u)
       associate (start => sides%triangles%split%start)
          near%triangle = [((t, t = start(facet(f)), start(facet(f) + 1) - 1), f = 1, size(facet))]
       end associate
@@ -99,7 +103,7 @@ contains
       do t = 1, near%n
          do f = 1, 3
             near%corner(:, f, t) = place_of(sides, sides%triangles%split%corner(f, &
-               near%triangle(t)), node, x, u)
+               near%triangle(t)), sides%frames%base(i), x, u) - origin
          end do
          associate (c => near%corner(:, :, t), n => near%normal(:, t))
             n = cross_product(c(:, 2) - c(:, 1), c(:, 3) - c(:, 1))
@@ -110,6 +114,26 @@ contains
          end associate
       end do
    end subroutine look_around
+
+   !> Contact point `i` of the slave, from its base.
+   pure function point_origin(sides, i, x, u) result(origin)
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
+      real(wp) :: origin(3)
+      integer :: k
+
+      origin = 0.0_wp
+      associate (frames => sides%frames, base => sides%frames%base(i))
+         if (i <= size(sides%slave%node) .or. frames%start(i + 1) == frames%start(i)) return
+         do k = frames%ring_start(frames%start(i)), frames%ring_start(frames%start(i) + 1) - 1
+            associate (other => frames%ring(k))
+               origin = origin + frames%weight(3, k)*((x(:, other) - x(:, base)) &
+                  + (u(:, other) - u(:, base)))
+            end associate
+         end do
+      end associate
+   end function point_origin
 
    !> A point of the master, from `node`.
    pure function place_of(sides, point, node, x, u) result(place)
@@ -140,7 +164,7 @@ contains
       nearest = 0
       best = 0.0_wp
       least = huge(least)
-      associate (i => sides%frames%node(frame))
+      associate (i => sides%frames%point(frame))
          associate (first => sides%frames%start(i), last => sides%frames%start(i + 1) - 1)
             associate (cosine => matmul(transpose(near%normal), reshape([(frame_normal(sides, i, &
                   g, x, u), g = first, last)], [3, last - first + 1])))
@@ -199,7 +223,7 @@ contains
 
       a = 0.0_wp
       b = 0.0_wp
-      associate (frames => sides%frames, node => sides%slave%node(i))
+      associate (frames => sides%frames, node => sides%frames%base(i))
          do k = frames%ring_start(frame), frames%ring_start(frame + 1) - 1
             associate (other => frames%ring(k))
                d = (x(:, other) - x(:, node)) + (u(:, other) - u(:, node))
@@ -282,7 +306,7 @@ contains
 
          goes_on = other > 0
          if (goes_on) goes_on = is_facing(sides, &
-            sides%slave%node(sides%frames%node(frame)), other, normal, x, u)
+            sides%frames%base(sides%frames%point(frame)), other, normal, x, u)
       end function goes_on
 
    end subroutine make_patch
@@ -323,14 +347,20 @@ contains
       end associate
       self%weight = 0.0_wp
       self%n_node = 1
-      self%node(1) = sides%slave%node(sides%frames%node(frame))
+      self%node(1) = sides%frames%base(sides%frames%point(frame))
       associate (frames => sides%frames)
          do k = frames%ring_start(frame), frames%ring_start(frame + 1) - 1
             call add_weight(self, frames%ring(k), 1, frames%weight(1, k))
             call add_weight(self, frames%ring(k), 2, frames%weight(2, k))
          end do
+         self%n_slave = self%n_node
+         self%n_origin = 0
+         if (sides%frames%point(frame) <= size(sides%slave%node)) return
+         self%n_origin = self%n_slave
+         do k = frames%ring_start(frame), frames%ring_start(frame + 1) - 1
+            self%origin(findloc(self%node(:self%n_slave), frames%ring(k), 1)) = frames%weight(3, k)
+         end do
       end associate
-      self%n_slave = self%n_node
    end subroutine begin_patch
 
    !> Let a patch have room for so many triangles and vertices.
@@ -407,6 +437,7 @@ contains
       self%patch%n_vertex = vertex
       self%point(vertex) = point
       self%patch%chi(vertex) = chi
+      self%weight(2:self%n_origin, 2 + vertex) = -self%origin(2:self%n_origin)
    end subroutine begin_vertex
 
    !> Add a triangle of the master, which runs the other way seen from the slave.

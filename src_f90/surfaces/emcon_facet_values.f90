@@ -1,105 +1,109 @@
-!> What nodes of a surface have, told by its facets: forces are divided among the facets at a node.
+!> What contact points of a surface have, told by its facets: forces are divided among the facets at
+!> a node.
+!>
+!> Points are the nodes, then the virtual centres of facets with nodes between corners.
 module emcon_facet_values
    use emcon_facets, only : facets_normal, facets_t
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: facets_faced_area, facets_pressed_area, facets_pressures, facets_share
+   public :: facets_point_area, facets_pressures, facets_share
 
    !> Facets of more nodes have some in the middle of their sides.
    integer, parameter :: most_simple = 4
+   !> What of the pressure on such a facet is on its virtual centre.
+   real(wp), parameter :: of_centre = 1.0_wp/3.0_wp
 
 contains
 
-   !> The area at a node that faces along `normal`: facets are shared by their nodes alike.
-   pure real(wp) function facets_faced_area(self, i, normal, x, u) result(area)
+   !> The area at a point that faces along `normal`: as uniform pressure loads the points, which its
+   !> nodes alike are, and a virtual centre by a third.
+   pure real(wp) function facets_point_area(self, middle, i, normal, x, u) result(area)
       type(facets_t), intent(in) :: self         !! set up, in space
-      integer, intent(in) :: i                   !! index into the nodes
+      integer, intent(in) :: middle(:)           !! facets with nodes between corners, ascending
+      integer, intent(in) :: i                   !! point: a node, or behind them of `middle`
       real(wp), intent(in) :: normal(:)          !! (3) unit vector
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node of the scene) [L]
-      integer :: k
-
-      area = 0.0_wp
-      do k = self%around_start(i), self%around_start(i + 1) - 1
-         associate (f => self%around(k))
-            area = area + max(0.0_wp, dot_product(normal, facets_normal(self, f, x, u))) &
-               /real(count(self%facet(:, f) > 0), wp)
-         end associate
-      end do
-   end function facets_faced_area
-
-   !> The area at a node on which uniform pressure along `normal` presses. On a facet with nodes
-   !> between its corners it presses on these alone (of eight nodes it pulls at the corners, which
-   !> contact does not).
-   pure real(wp) function facets_pressed_area(self, i, normal, x, u) result(area)
-      type(facets_t), intent(in) :: self         !! set up, in space
-      integer, intent(in) :: i                   !! index into the nodes
-      real(wp), intent(in) :: normal(:)          !! (3) unit vector
-      real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node of the scene) [L]
-      real(wp) :: part
       integer :: k, n
 
+      if (i > size(self%node)) then
+         area = of_centre*max(0.0_wp, dot_product(normal, facets_normal(self, &
+            middle(i - size(self%node)), x, u)))
+         return
+      end if
       area = 0.0_wp
       do k = self%around_start(i), self%around_start(i + 1) - 1
          associate (f => self%around(k))
             n = count(self%facet(:, f) > 0)
-            part = 1.0_wp/real(n, wp)
-            ! In turn around it, every other node is a corner, the first one is.
-            if (n > most_simple) part = 2.0_wp*part*real(mod(findloc(nodes_of(self, f), i, 1) &
-               - 1, 2), wp)
-            area = area + part*max(0.0_wp, dot_product(normal, facets_normal(self, f, x, u)))
+            area = area + max(0.0_wp, dot_product(normal, facets_normal(self, f, x, u))) &
+               *merge(1.0_wp - of_centre, 1.0_wp, n > most_simple)/real(n, wp)
          end associate
       end do
-   end function facets_pressed_area
+   end function facets_point_area
 
-   !> Pressures by forces on areas at nodes of a surface, of which a node may have several. Uniform
-   !> pressure loads corners and nodes between them unlike: where there are such nodes, facet by
-   !> facet and then the mean of the facets at a node; of several the first has it. Source:
+   !> Pressures by forces on areas at points of a surface, of which a point may have several. On a
+   !> facet with nodes between corners forces may be divided in more than one way: there facet by
+   !> facet, and then the mean of the facets at a node; of several the first has it. Source:
    !> docs/theory.md, eq. (50).
-   pure subroutine facets_pressures(self, node, force, area, pressure)
+   pure subroutine facets_pressures(self, middle, point, force, area, pressure)
       type(facets_t), intent(in) :: self         !! set up, in space
-      integer, intent(in) :: node(:)             !! (n) index of the node, ascending
+      integer, intent(in) :: middle(:)           !! facets with nodes between corners, ascending
+      integer, intent(in) :: point(:)            !! (n) index of the point, ascending
       real(wp), intent(in) :: force(:)           !! (n) [M L/T^2]
       real(wp), intent(in) :: area(:)            !! (n) that uniform pressure acts on [L^2]
       real(wp), intent(out) :: pressure(:)       !! (n) 0 without area
-      real(wp), dimension(size(self%node)) :: whole, mean, push_there, on_there
-      logical :: is_of_quadratic(size(self%node))
-      real(wp) :: push, on
-      integer :: f, i
+      real(wp), dimension(size(self%node) + size(middle)) :: whole, mean, push, on
+      logical :: is_of_quadratic(size(mean))
+      integer :: f, i, k
 
       pressure = 0.0_wp
       where (area > 0.0_wp) pressure = force/area
-      if (size(self%facet, 1) <= most_simple) return
-      push_there = 0.0_wp
-      on_there = 0.0_wp
-      do i = 1, size(node)
-         push_there(node(i)) = push_there(node(i)) + force(i)
-         on_there(node(i)) = max(on_there(node(i)), area(i))
+      if (size(middle) == 0) return
+      push = 0.0_wp
+      on = 0.0_wp
+      do i = 1, size(point)
+         push(point(i)) = push(point(i)) + force(i)
+         on(point(i)) = max(on(point(i)), area(i))
       end do
       whole = 0.0_wp
-      is_of_quadratic = .false.
       do f = 1, self%n_facet
-         associate (own => nodes_of(self, f))
-            whole(own) = whole(own) + self%size(f)
-            if (size(own) > most_simple) is_of_quadratic(own) = .true.
-         end associate
+         whole(nodes_of(self, f)) = whole(nodes_of(self, f)) + self%size(f)
       end do
+      is_of_quadratic = .false.
       mean = 0.0_wp
+      k = 0
       do f = 1, self%n_facet
          associate (own => nodes_of(self, f), share => self%size(f)/whole(nodes_of(self, f)))
-            push = sum(share*push_there(own))
-            on = sum(share*on_there(own))
-            if (on > 0.0_wp) mean(own) = mean(own) + share*(push/on)
+            if (size(own) <= most_simple) then
+               call add_mean(own, share, mean)
+            else
+               k = k + 1
+               is_of_quadratic([own, size(self%node) + k]) = .true.
+               call add_mean([own, size(self%node) + k], [share, 1.0_wp], mean)
+            end if
          end associate
       end do
-      do i = 1, size(node)
-         if (.not. is_of_quadratic(node(i))) cycle
-         if (any(node(max(1, i - 1):i - 1) == node(i))) cycle
+      do i = 1, size(point)
+         if (.not. is_of_quadratic(point(i))) cycle
+         if (any(point(max(1, i - 1):i - 1) == point(i))) cycle
          ! With several, those of other sides keep theirs.
-         if (any(node(i + 1:min(i + 1, size(node))) == node(i)) .and. on_there(node(i)) > 0.0_wp) &
+         if (any(point(i + 1:min(i + 1, size(point))) == point(i)) .and. on(point(i)) > 0.0_wp) &
             cycle
-         pressure(i) = mean(node(i))
+         pressure(i) = mean(point(i))
       end do
+
+   contains
+
+      !> Let the points of a facet have their shares of its mean pressure.
+      pure subroutine add_mean(own, share, mean)
+         integer, intent(in) :: own(:)
+         real(wp), intent(in) :: share(:)
+         real(wp), intent(inout) :: mean(:)
+
+         if (sum(share*on(own)) > 0.0_wp) mean(own) = mean(own) &
+            + share*(sum(share*push(own))/sum(share*on(own)))
+      end subroutine add_mean
+
    end subroutine facets_pressures
 
    !> The nodes of facet `f`, in turn.
