@@ -90,6 +90,7 @@ module emcon_contact
       procedure :: own_area
       procedure :: mean_size
       procedure :: share
+      procedure :: narrow
       procedure :: pressures
       procedure :: mean_gap
       procedure :: could_hold
@@ -225,6 +226,14 @@ contains
       share = 1.0_wp
    end function share
 
+   !> Take off the areas at x + u of constraints what they do not press on; nothing unless
+   !> overridden.
+   pure subroutine narrow(self, x, u, area)
+      class(contact_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+      real(wp), intent(inout) :: area(:)         !! (n_constraint) [L^2]
+   end subroutine narrow
+
    !> Pressures by forces of constraints on their areas; 0 without area.
    pure subroutine pressures(self, force, area, pressure)
       class(contact_t), intent(in) :: self
@@ -353,8 +362,10 @@ contains
 
       if (self%midside%n == 0) then
          call self%area_points(x, u, of_multiplier, length)
+         call self%narrow(x, u, of_multiplier)
       else
          call self%area_points(x, midside_points(self%midside, u), of_multiplier, length)
+         call self%narrow(x, midside_points(self%midside, u), of_multiplier)
       end if
    end subroutine area
 

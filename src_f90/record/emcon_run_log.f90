@@ -13,7 +13,9 @@ module emcon_run_log
    use emcon_scene_report, only : scene_report
    use emcon_scheme_registry, only : scheme_user
    use emcon_solver_registry, only : solver_user
+   use emcon_sort, only : unique_sorted
    use emcon_stepper, only : stepper_t
+   use emcon_system, only : system_t
    use emcon_text, only : note_add, notes_append, notes_t, string_t, to_text
    use emcon_version, only : precision_names, this_precision, version
    implicit none
@@ -81,20 +83,41 @@ contains
          do k = 1, size(scene%pair)
             call formulation_text(scene%pair(k)%formulation, scene%step(1)%contact%options, how)
             call note_add(notes, "contact: " // scene%surface(scene%pair(k)%slave)%name // &
-               " (slave, " // to_text(system%contact(k)%contact%n_constraint) // " nodes" // &
-               trim(merge(", named second", "              ", &
+               " (slave, " // to_text(size(unique_sorted(system%contact(k)%contact%node))) // &
+               " nodes" // trim(merge(", named second", "              ", &
                scene%pair(k)%is_exchanged)) // ") on " // &
                scene%surface(scene%pair(k)%master)%name // ", " // how)
          end do
-         if (system%n_pair < size(system%contact)) call note_add(notes, "contact: guards hold " // &
-            "nodes that the pairs do not: corners that are deeper than " // to_text(corner_slack) &
-            // " of an edge, other nodes than " // to_text(guard_slack))
+         call add_watching(scene, system, notes)
          do k = 1, size(scene%step)
             call add_step(notes, scene, k)
          end do
       end associate
       call notes_append(notes, stepper%notes)
    end function model_notes
+
+   !> What is held beside the pairs.
+   subroutine add_watching(scene, system, notes)
+      type(scene_t), intent(in) :: scene
+      type(system_t), intent(in) :: system
+      type(notes_t), intent(inout) :: notes
+      logical :: has_guards
+      integer :: k
+
+      has_guards = .false.
+      do k = system%n_pair + 1, size(system%contact)
+         associate (contact => system%contact(k)%contact, &
+               pair => scene%pair(abs(system%contact(k)%of_pair)))
+            has_guards = has_guards .or. contact%slack > 0.0_wp
+            if (contact%slack > 0.0_wp .or. contact%n_constraint == 0) cycle
+            call note_add(notes, "contact: sharp edges of " // scene%surface(pair%slave)%name // &
+               " and " // scene%surface(pair%master)%name // " that cross are held")
+         end associate
+      end do
+      if (has_guards) call note_add(notes, "contact: guards hold nodes that the pairs do not: " // &
+         "corners that are deeper than " // to_text(corner_slack) // " of an edge, other nodes " &
+         // "than " // to_text(guard_slack))
+   end subroutine add_watching
 
    !> What step `k` is, and where contact is computed otherwise than in the step before.
    subroutine add_step(notes, scene, k)

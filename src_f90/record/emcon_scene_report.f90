@@ -158,11 +158,13 @@ contains
       type(stepper_t), intent(in) :: stepper
       type(report_rows_t), intent(inout) :: rows
       logical :: is_dynamic
+      integer :: k
 
       associate (scene => stepper%scene, system => stepper%march%system)
          is_dynamic = any(step_is_dynamic(scene%step))
          call choose("contact", size(system%contact) > 0, "no *CONTACT PAIR, no *CONTACT")
-         call choose("guards", size(system%contact) > system%n_pair, &
+         call choose("guards", any([(system%contact(k)%contact%slack > 0.0_wp, k = 1, &
+            size(system%contact))]), &
             "no pairs, both sides of all pairs are held, or GUARD=NO")
          call add_first_contact(stepper, rows)
          call choose("ties and equations", system%space%linear%n > 0, &

@@ -64,10 +64,14 @@ contains
       associate (system => self%march%system, set => self%march%active%set)
          call gaps_search(system, self%march%motion, gap)
          is_wanted = gap%is_near .and. gap%is_over
-         associate (first_guard => system%first_constraint(system%n_pair + 1) + 1)
-            is_wanted(first_guard:) = is_wanted(first_guard:) .and. &
-               gap(first_guard:)%gap1 < gap(first_guard:)%closed
-         end associate
+         do k = 1, size(system%contact)
+            if (.not. system%contact(k)%contact%slack > 0.0_wp) cycle
+            associate (first => system%first_constraint(k) + 1, last => &
+                  system%first_constraint(k + 1))
+               is_wanted(first:last) = is_wanted(first:last) .and. &
+                  gap(first:last)%gap1 < gap(first:last)%closed
+            end associate
+         end do
          call constraints_select(set, pack([(k, k = 1, size(gap))], is_wanted))
          if (keeps_gap) set%target = gap(set%id)%gap0
       end associate

@@ -19,6 +19,7 @@ program main
    use test_circles, only : collect_circles
 #ifndef EMCON_PERMISSIVE
    use test_diagonal_blocks, only : collect_diagonal_blocks
+   use test_edge_pair, only : collect_edge_pair
    use test_kept_factor, only : collect_kept_factor
    use test_cholmod, only : collect_cholmod
    use test_supernodal, only : collect_supernodal
@@ -222,6 +223,7 @@ program main
    call run("blas", collect_blas)
    call run("critical_step", collect_critical_step)
    call run("csr", collect_csr)
+   call run("edge_pair", collect_edge_pair)
    call run("triple_product", collect_triple_product)
    call run("row_elimination", collect_row_elimination)
    call run("row_order", collect_row_order)

@@ -3,7 +3,8 @@ module test_facet_values
    use check, only : check_near, test_case_t
    use emcon_element_kind, only : find_element_kind
    use emcon_errors, only : error_t
-   use emcon_facet_values, only : facets_pressed_area, facets_pressures, facets_share
+   use emcon_facet_values, only : facets_point_area, facets_pressures, facets_share
+   use emcon_facet_split, only : facet_split_centre
    use emcon_facets, only : facets_init, facets_normal, facets_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
@@ -15,6 +16,7 @@ module test_facet_values
 
    !> Sums over some dozen nodes.
    real(wp), parameter :: tol = 100.0_wp*epsilon(1.0_wp)
+   integer, parameter :: none(0) = [integer ::]
 
 contains
 
@@ -38,14 +40,16 @@ contains
       call facets_init(facets, scene, skin(scene), error)
    end subroutine box
 
-   !> The areas at all nodes that a pressure along `normal` acts on.
-   subroutine pressed(facets, x, normal, area)
+   !> The areas at all points that a pressure along `normal` acts on.
+   subroutine pressed(facets, middle, x, normal, area)
       type(facets_t), intent(in) :: facets
+      integer, intent(in) :: middle(:)
       real(wp), intent(in) :: x(:, :), normal(:)
       real(wp), allocatable, intent(out) :: area(:)
       integer :: i
 
-      area = [(facets_pressed_area(facets, i, normal, x, 0.0_wp*x), i = 1, size(facets%node))]
+      area = [(facets_point_area(facets, middle, i, normal, x, 0.0_wp*x), &
+         i = 1, size(facets%node) + size(middle))]
    end subroutine pressed
 
    !> The lower side of a box has a quarter of each of its two cells at each of their corners, and
@@ -59,28 +63,32 @@ contains
 
       call box(facets, scene, error)
       if (allocated(error)) return
-      call pressed(facets, scene%x, [0.0_wp, 0.0_wp, -1.0_wp], area)
+      call pressed(facets, none, scene%x, [0.0_wp, 0.0_wp, -1.0_wp], area)
       call check_near(error, area, [0.25_wp, 0.5_wp, 0.25_wp, 0.25_wp, 0.5_wp, 0.25_wp, &
          (0.0_wp, i = 1, 6)], tol, 1.0_wp, "areas")
       allocate(pressure(size(area)))
-      call facets_pressures(facets, [(i, i = 1, size(area))], 3.0_wp*area, area, pressure)
+      call facets_pressures(facets, none, [(i, i = 1, size(area))], 3.0_wp*area, area, pressure)
       call check_near(error, pressure, merge(3.0_wp, 0.0_wp, area > 0.0_wp), tol, 3.0_wp, "uniform")
    end subroutine test_corners
 
-   !> A face of eight nodes: pressure 2 of its corners with -1/12 of it and of the others with 1/3,
-   !> or with nothing at corners and a quarter at each of the others; and of six nodes.
+   !> Pressure 2 on a face of eight nodes: its corners and the others with 1/12 of it and the centre
+   !> with 1/3, or without corners 5/24 and 1/6; and of six nodes. In each way the nodes of the face
+   !> get the loads of its element.
    subroutine test_between(error)
       type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: third = 1.0_wp/3.0_wp, twelfth = 1.0_wp/12.0_wp
 
-      call of_kind("C3D20", [-1.0_wp/12.0_wp, 1.0_wp/3.0_wp])
-      call of_kind("C3D20", [0.0_wp, 0.25_wp])
-      call of_kind("C3D10", [0.0_wp, 1.0_wp/3.0_wp])
+      call of_kind("C3D20", [twelfth, twelfth, third], [-twelfth, third])
+      call of_kind("C3D20", [0.0_wp, 5.0_wp/24.0_wp, 1.0_wp/6.0_wp], [-twelfth, third])
+      call of_kind("C3D10", [1.0_wp/9.0_wp, 1.0_wp/9.0_wp, third], [0.0_wp, third])
+      call of_kind("C3D10", [0.0_wp, third, 0.0_wp], [0.0_wp, third])
 
    contains
 
-      subroutine of_kind(name, part)
+      subroutine of_kind(name, part, load)
          character(len=*), intent(in) :: name
-         real(wp), intent(in) :: part(2)         !! of the face, of a corner and of a node between
+         real(wp), intent(in) :: part(3)         !! on a corner, a node between, the centre
+         real(wp), intent(in) :: load(2)         !! of the element, on a corner, a node between
          type(facets_t) :: facets
          type(scene_t) :: scene
          real(wp), allocatable :: area(:), force(:), pressure(:)
@@ -92,18 +100,30 @@ contains
          if (allocated(error)) return
          normal = facets_normal(facets, 1, scene%x, 0.0_wp*scene%x)
          whole = sqrt(dot_product(normal, normal))
-         call pressed(facets, scene%x, normal/whole, area)
+         call pressed(facets, [1], scene%x, normal/whole, area)
          call check_near(error, sum(area), whole, tol, whole, name // " all of the area")
          n = size(area)
          allocate(force(n), pressure(n))
-         associate (corners => facets%corner(1:n:2, 1), others => facets%corner(2:n:2, 1))
+         associate (corners => facets%corner(1:n - 1:2, 1), others => facets%corner(2:n - 1:2, 1))
             force(corners) = 2.0_wp*part(1)*whole
             force(others) = 2.0_wp*part(2)*whole
-            call check_near(error, maxval(abs(area(corners))), 0.0_wp, 0.0_wp, 1.0_wp, "corners")
+            force(n) = 2.0_wp*part(3)*whole
+            associate (on => part(:2) + part(3)*facet_split_weights(n - 1))
+               call check_near(error, on, load, tol, 1.0_wp, name // " loads")
+            end associate
          end associate
-         call facets_pressures(facets, [(i, i = 1, n)], force, area, pressure)
+         call facets_pressures(facets, [1], [(i, i = 1, n)], force, area, pressure)
          call check_near(error, pressure, 0.0_wp*area + 2.0_wp, tol, 2.0_wp, name // " uniform")
       end subroutine of_kind
+
+      !> What a corner and a node between have of the virtual centre.
+      pure function facet_split_weights(n) result(weight)
+         integer, intent(in) :: n
+         real(wp) :: weight(2), all_weights(n)
+
+         all_weights = facet_split_centre(n)
+         weight = all_weights(:2)
+      end function facet_split_weights
 
    end subroutine test_between
 

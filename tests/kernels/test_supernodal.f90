@@ -29,6 +29,7 @@ contains
          test_case_t("a sparse right-hand side has the bits of a full one", test_reach), &
          test_case_t("powers of two keep the bits", test_powers_of_two), &
          test_case_t("short columns have no blocks", test_small), &
+         test_case_t("one dense block of any width", test_dense), &
          test_case_t("a large condition asks for all digits", test_condition), &
          test_case_t("so do numbers out of range", test_range), &
          test_case_t("not positive definite", test_indefinite)]
@@ -112,6 +113,27 @@ contains
       if (.not. allocated(error)) call check_solution(solver, a, tol, error)
       call solver%free()
    end subroutine test_small
+
+   !> All unknowns meet: one triangle, which is inverted by parts where it is large.
+   subroutine test_dense(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: width(4) = [128, 135, 143, 300]
+      type(csr_t) :: a
+      type(cholmod_t) :: solver
+      integer :: i, j, k
+
+      do k = 1, size(width)
+         associate (m => width(k))
+            a = csr_t(m, m, [(m*i, i = 0, m)], [((j, j = 0, m - 1), i = 1, m)], &
+               [((merge(real(m, dp), -0.5_dp, i == j), j = 1, m), i = 1, m)])
+         end associate
+         call prepare(solver, a, error)
+         if (allocated(error)) return
+         call check_true(error, solver%is_rough, "the factors are rough")
+         if (.not. allocated(error)) call check_solution(solver, a, rough_tol, error)
+         call solver%free()
+      end do
+   end subroutine test_dense
 
    !> Off the diagonal -1, rows that sum to 1e-9 of what they have: a condition of 1e9 at least,
    !> which double precision bears. Then rows whose sums are larger.
