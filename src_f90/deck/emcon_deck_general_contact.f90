@@ -234,7 +234,6 @@ contains
       do i = 1, n_body
          surface = exterior
          surface%name = exterior_name // "_" // to_text(i)
-         surface%is_exterior = .false.
          associate (is_own => body(scene%element%node(1, exterior%element)) == i)
             surface%element = pack(exterior%element, is_own)
             surface%face = pack(exterior%face, is_own)

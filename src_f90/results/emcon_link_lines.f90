@@ -7,7 +7,7 @@ module emcon_link_lines
    use emcon_surface_facets, only : surface_facets
    use emcon_system, only : system_t
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
-   use emcon_ties, only : find_crosspoints
+   use emcon_tie_meetings, only : find_crosspoints
    implicit none
    private
    public :: add_link_lines
