@@ -76,7 +76,7 @@ contains
       call option_word(reader, card, "ADJUST", "YES", word, "NO", "slave nodes are always put " // &
          "onto the master surface: across a gap angular momentum would be lost")
       call option_word(reader, card, "TYPE", "SURFACE TO SURFACE", word, "NODE TO SURFACE", &
-         "ties are integrated over edges, so that a uniform stress passes through")
+         "ties are integrated over faces, so that a uniform stress passes through")
    end subroutine read_tie_options
 
    !> The card `i` must not have the name of an earlier one.
@@ -147,7 +147,7 @@ contains
       do side = 1, 2
          i = merge(tie%slave, tie%master, side == 1)
          call need_facets(reader, data, scene%surface(i), trim(role(side)) // " surface", &
-            ", but ties are integrated over edges; ")
+            ", but ties are integrated over faces; ")
       end do
    end subroutine check_sides
 
