@@ -50,7 +50,7 @@ contains
    !> The common polygon of a triangle and the patch, in turn as the corners of the triangle.
    pure subroutine patch_clip(corner, polygon, n)
       real(wp), intent(in) :: corner(2, 3)       !! of the triangle
-      real(wp), intent(out) :: polygon(2, most_corners)
+      real(wp), intent(out) :: polygon(2, most_corners)      !! places
       integer, intent(out) :: n                  !! corners that it has; fewer than 3: no area
       integer :: k
 

@@ -63,8 +63,8 @@ contains
       end associate
    end subroutine find_advice
 
-   !> Why the slave of a tie in space should be the master, to follow on its name; empty if it should
-   !> not, or could not, as it would cover more than half a facet less.
+   !> Why the slave of a tie in space should be the master, to follow on its name; empty if it
+   !> should not, or could not, as the master is larger.
    subroutine advise_tie(scene, slave, master, advice)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: slave, master       !! surfaces by their numbers

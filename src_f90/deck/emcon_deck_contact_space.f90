@@ -1,4 +1,5 @@
-!> The surfaces of contact pairs and ties in space: outer faces that make up surfaces, none of them flat.
+!> The surfaces of contact pairs and ties in space: outer faces that make up surfaces, none of them
+!> flat.
 module emcon_deck_contact_space
    use emcon_deck_check_surfaces, only : check_free
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t

@@ -1,11 +1,11 @@
 !> The multipliers of a tie on one slave facet: which node each belongs to, and what they are made
 !> of.
 !>
-!> The dual multipliers of a facet are biorthogonal to its shape functions over what is covered. Those
-!> of corners of facets with nodes between them integrate to 0 or less: there they are biorthogonal
-!> to a basis in which each corner takes a share of what is between it and the next ones. Nodes
-!> without a multiplier hand theirs to the others of the facet. Source: docs/theory.md, section
-!> 11.10.
+!> The dual multipliers of a facet are biorthogonal to its shape functions over what is covered.
+!> Those of corners of facets with nodes between them integrate to 0 or less: there they are
+!> biorthogonal to a basis in which each corner takes a share of what is between it and the next
+!> ones. Nodes without a multiplier hand theirs to the others of the facet. Source:
+!> docs/theory.md, eqs. (51) and (52).
 module emcon_tie_multipliers_space
    use emcon_kinds, only : wp
    use emcon_tie_cells_space, only : most_nodes
@@ -28,8 +28,8 @@ module emcon_tie_multipliers_space
 
 contains
 
-   !> Set up for a facet with the integrals `mass`. If none of its nodes keeps a multiplier, there is
-   !> one of 1 for another node.
+   !> Set up for a facet with the integrals `mass`. If none of its nodes keeps a multiplier, there
+   !> is one of 1 for another node.
    pure subroutine tie_multipliers_find(self, mass, is_kept, is_dual)
       type(tie_multipliers_t), intent(out) :: self
       real(wp), intent(in) :: mass(:, :)         !! (node, node) int N_i N_j, definite [L^2]

@@ -1,5 +1,5 @@
-!> Ties of the plane before the first step: frozen integrals, multipliers at crosspoints, slave nodes
-!> moved onto the master surface.
+!> Ties of the plane before the first step: frozen integrals, multipliers at crosspoints, slave
+!> nodes moved onto the master surface.
 !>
 !> Source: docs/theory.md, section 11.
 module emcon_ties_plane
