@@ -8,7 +8,7 @@
 !> docs/theory.md, eqs. (51) and (52).
 module emcon_tie_multipliers_space
    use emcon_kinds, only : wp
-   use emcon_tie_cells_space, only : most_nodes
+   use emcon_tie_shapes_space, only : most_nodes
    implicit none
    private
    public :: tie_multipliers_t, tie_multipliers_find

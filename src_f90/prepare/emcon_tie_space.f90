@@ -5,7 +5,6 @@
 module emcon_tie_space
    use emcon_couplings, only : tie_rows_t, tie_t
    use emcon_errors, only : error_t
-   use emcon_facet_split, only : facet_split_centre
    use emcon_facets, only : facets_t
    use emcon_interactions, only : multiplier_dual
    use emcon_kinds, only : wp
@@ -133,22 +132,13 @@ contains
       real(wp), intent(in) :: psi(:)             !! (most nodes) over shape functions of the slave
       type(tie_side_t), intent(in) :: master
       type(tie_cells_t), intent(in) :: cells
-      real(wp) :: moment
-      integer :: i, v, point, n
+      integer :: i, n
 
       do i = 1, cells%n
-         do v = 1, 3
-            moment = -dot_product(psi, cells%cross(:, v, i))
-            point = master%split%corner(v, cells%triangle(i))
-            if (point <= master%split%n_node) then
-               call add(entries, row, [master%facets%node(point)], [moment])
-            else
-               associate (node => master%facets%facet(:, master%split%facet(cells%triangle(i))))
-                  n = count(node > 0)
-                  call add(entries, row, node(:n), moment*facet_split_centre(n))
-               end associate
-            end if
-         end do
+         associate (node => master%facets%facet(:, master%split%facet(cells%triangle(i))))
+            n = count(node > 0)
+            call add(entries, row, node(:n), -matmul(psi, cells%cross(:, :n, i)))
+         end associate
       end do
    end subroutine add_masters
 
