@@ -31,6 +31,7 @@ contains
          test_case_t("matching meshes", test_matching), &
          test_case_t("linear fields at any ratio", test_linear), &
          test_case_t("nodes that are held have no row", test_held), &
+         test_case_t("a facet without a row of its own", test_lonely), &
          test_case_t("multipliers of a facet", test_multipliers), &
          test_case_t("what cannot be tied", test_errors)]
    end subroutine collect_tie_space
@@ -82,13 +83,14 @@ contains
       scene%surface = [scene%surface, surface]
    end subroutine add_side
 
-   !> Rows of the tie of surface 1 to surface 2, which are in no other tie.
-   subroutine measure(scene, multiplier, rows, error, held_below)
+   !> Rows of the tie of surface 1 to surface 2.
+   subroutine measure(scene, multiplier, rows, error, held_below, shared_below)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: multiplier
       type(tie_rows_t), intent(out) :: rows
       type(error_t), allocatable, intent(out) :: error
       real(wp), intent(in), optional :: held_below   !! nodes with a lesser x are held along x
+      real(wp), intent(in), optional :: shared_below     !! or in another tie too
       type(tie_t) :: tie
       logical :: is_held(3, size(scene%x, 2))
       integer :: n_tie(size(scene%x, 2))
@@ -100,6 +102,7 @@ contains
       is_held = .false.
       if (present(held_below)) is_held(1, :) = scene%x(1, :) < held_below
       n_tie = 1
+      if (present(shared_below)) where (scene%x(1, :) < shared_below) n_tie = 2
       call tie_measure_space(scene, tie, n_tie, is_held, rows, error)
    end subroutine measure
 
@@ -209,6 +212,24 @@ contains
          end do
       end do
    end subroutine test_held
+
+   !> All four nodes of the first of three facets in a row are in another tie: it counts for the
+   !> nearest of the nodes that are not, and the row of that is as large as a facet and its share.
+   subroutine test_lonely(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      type(tie_rows_t) :: rows
+
+      call make_boxes(scene, ["C3D8", "C3D8"], [3, 1, 1], [2, 2, 1], 0.05_wp)
+      call measure(scene, multiplier_dual, rows, error, shared_below=1.0_wp)
+      if (allocated(error)) return
+      call check_equal(error, rows%slave, [3, 4, 7, 8], "rows")
+      call check_rows(scene, rows, error)
+      if (allocated(error)) return
+      ! Facets of area 1: halves of the second one go to nodes 3 and 7, quarters of the third to all.
+      call check_near(error, rows%size, [1.75_wp, 0.25_wp, 0.75_wp, 0.25_wp], tol, 1.0_wp, &
+         "sizes")
+   end subroutine test_lonely
 
    !> Whatever the integrals: multipliers sum up to 1, and are dual to what nodes stand for.
    subroutine test_multipliers(error)
