@@ -24,15 +24,17 @@ module emcon_tie_check_space
 
 contains
 
-   !> Both surfaces have faces, and no node in common.
+   !> Both surfaces have faces, or the slave is one of nodes, and no node in common.
    pure subroutine tie_check_sides(scene, tie, sides, error)
       type(scene_t), intent(in) :: scene
       type(tie_t), intent(in) :: tie
       type(tie_sides_t), intent(in) :: sides
       type(error_t), allocatable, intent(out) :: error
 
-      call raise_shared(scene, tie, [sides%slave%facets%n_facet, sides%master%facets%n_facet], &
-         sides%slave%facets%node, sides%master%facets%node, error)
+      associate (slave => sides%slave%facets, master => sides%master%facets)
+         call raise_shared(scene, tie, [merge(size(slave%node), slave%n_facet, &
+            scene%surface(tie%slave)%is_nodal), master%n_facet], slave%node, master%node, error)
+      end associate
    end subroutine tie_check_sides
 
    !> No slave node is farther from the master than the tolerance.

@@ -8,6 +8,7 @@ module emcon_tie_space
    use emcon_facets, only : facets_t
    use emcon_interactions, only : multiplier_dual
    use emcon_kinds, only : wp
+   use emcon_nearest_space, only : nearest_t
    use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
    use emcon_sort, only : sort_order
@@ -15,7 +16,9 @@ module emcon_tie_space
    use emcon_tie_cells_space, only : tie_cells_find, tie_cells_t
    use emcon_tie_check_space, only : tie_check_cover, tie_check_nodes, tie_check_sides
    use emcon_tie_multipliers_space, only : tie_multipliers_find, tie_multipliers_t
-   use emcon_tie_sides_space, only : tie_side_t, tie_sides_init, tie_sides_t, triangle_at
+   use emcon_tie_shapes_space, only : tie_shapes
+   use emcon_tie_sides_space, only : tie_side_t, tie_sides_init, tie_sides_nearest, tie_sides_t, &
+      triangle_at
    implicit none
    private
    public :: tie_measure_space
@@ -38,7 +41,8 @@ contains
    !> The rows of `tie`. Only reference positions are looked at.
    !>
    !> Errors: surfaces without faces, or with a node in common; slave nodes without partner within
-   !> the tolerance; slave faces that the master does not cover, or in two layers.
+   !> the tolerance; slave faces that the master does not cover, or in two layers. The nodes of a
+   !> slave surface of nodes are tied to the places of the master nearest to them.
    subroutine tie_measure_space(scene, tie, n_tie, is_held, rows, error)
       type(scene_t), intent(in) :: scene
       type(tie_t), intent(in) :: tie
@@ -55,6 +59,10 @@ contains
       if (.not. allocated(error)) call tie_check_sides(scene, tie, sides, error)
       if (.not. allocated(error)) call tie_check_nodes(scene, tie, sides, error)
       if (allocated(error)) return
+      if (scene%surface(tie%slave)%is_nodal) then
+         call find_node_rows(sides, rows)
+         return
+      end if
       allocate(cells(sides%slave%facets%n_facet))
       do f = 1, size(cells)
          call tie_cells_find(cells(f), sides, f)
@@ -65,6 +73,34 @@ contains
       call find_rows(sides, cells, is_kept, tie%multiplier == multiplier_dual, rows)
       call find_covered(sides%master, cells, rows)
    end subroutine tie_measure_space
+
+   !> Each slave node at the place of the master nearest to it, as shape functions interpolate: such
+   !> a row is as large as the facet of that place.
+   subroutine find_node_rows(sides, rows)
+      type(tie_sides_t), intent(in) :: sides
+      type(tie_rows_t), intent(inout) :: rows
+      type(nearest_t) :: nearest
+      type(entries_t) :: entries
+      real(wp) :: length(size(sides%slave%facets%node))
+      integer :: k, n
+
+      allocate(entries%row(0), entries%node(0), entries%weight(0))
+      associate (slave => sides%slave%facets, master => sides%master%facets, &
+            split => sides%master%split)
+         do k = 1, size(length)
+            call tie_sides_nearest(sides, sides%slave%at(:, k), nearest)
+            associate (f => split%facet(nearest%triangle))
+               n = count(master%facet(:, f) > 0)
+               length(k) = master%size(f)
+               call add(entries, k, slave%node(k:k), length(k:k))
+               call add(entries, k, master%facet(:n, f), -length(k)*tie_shapes(n, &
+                  nearest%triangle - split%start(f) + 1, nearest%weight))
+            end associate
+         end do
+         allocate(rows%covered(size(master%facet, 1), 0))
+         call fill_rows(slave, [(k, k = 1, size(length))], length, entries, rows)
+      end associate
+   end subroutine find_node_rows
 
    !> Add up what the facets give to the rows.
    subroutine find_rows(sides, cells, is_kept, is_dual, rows)

@@ -147,3 +147,25 @@ def test_rigid_master(tmp_path: Path) -> None:
     history = done.history
     assert np.ptp(history["total"]) < 1e-13*history["total"][0]
     assert max(np.ptp(history[k]) for k in ("lx", "ly", "lz")) < 1e-13*max(abs(history[k][0]) for k in ("lx", "ly", "lz"))
+
+
+def as_nodes(text: str) -> str:
+    """The slave as a surface of the nodes of its faces: here all of its block that are on the master."""
+    return text.replace("*TIE, NAME=T", "*SURFACE, NAME=T1N, TYPE=NODE\nSLAVES\n*TIE, NAME=T").replace("T1S, T1M", "T1N, T1M")
+
+
+@pytest.mark.parametrize(("cells", "is_exact"), [((2, 2), True), ((3, 2), False)])
+def test_slave_of_nodes(cells, is_exact, tmp_path: Path) -> None:
+    """Nodes on nodes are one mesh; elsewhere a uniform stress scatters, and the warning says so. Nothing is lost in flight."""
+    blocks = [box("C3D8", (cells[0],)*3, (0, 0, 0), (1, 1, .5)), box("C3D8", (cells[1],)*3, (0, 0, .5), (1, 1, 1))]
+    first = len(blocks[0].x)
+    labels = "*NSET, NSET=SLAVES\n" + "".join(f"{first + k}\n" for k in blocks[1].on(2, 0))
+    text, x = tied(blocks, [(1, 0, 2)])
+    done = run(as_nodes(text.replace("*TIE", labels + "*TIE", 1)) + stretch(x), tmp_path/"rest")
+    assert "its nodes are tied one by one" in done.errors
+    if is_exact:
+        check_stretched(done, x)
+    else:
+        assert np.ptp(done.fields()["cauchy_stress"][-1].reshape(len(x), -1)[:, 2]) > 1e-3
+    text, x = tied(blocks, [(1, 0, 2)], RUBBER)
+    check_flight(run(as_nodes(text.replace("*TIE", labels + "*TIE", 1)) + flight(x, steps=6), tmp_path/"flight"), blocks)
