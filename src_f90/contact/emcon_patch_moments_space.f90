@@ -7,7 +7,8 @@ module emcon_patch_moments_space
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: patch_moments, patch_moment_slopes, patch_misses, barycentric
+   public :: patch_moments, patch_moment_slopes, patch_misses, patch_clip, most_corners
+   public :: barycentric
 
    !> Corners of what three half planes leave of a triangle, at most.
    integer, parameter :: most_corners = 6
@@ -36,11 +37,7 @@ contains
 
       moment = 0.0_wp
       if (patch_misses(corner)) return
-      polygon(:, :3) = corner
-      n = 3
-      do k = 1, 3
-         call cut(k, polygon, n)
-      end do
+      call patch_clip(corner, polygon, n)
       do k = 2, n - 1
          associate (a => polygon(:, k) - polygon(:, 1), b => polygon(:, k + 1) - polygon(:, 1))
             area = a(1)*b(2) - a(2)*b(1)         ! twice it, by that of the patch, 1/2
@@ -49,6 +46,20 @@ contains
          moment = moment + area*[1.0_wp - sum(centre), centre]
       end do
    end function patch_moments
+
+   !> The common polygon of a triangle and the patch, in turn as the corners of the triangle.
+   pure subroutine patch_clip(corner, polygon, n)
+      real(wp), intent(in) :: corner(2, 3)       !! of the triangle
+      real(wp), intent(out) :: polygon(2, most_corners)      !! places
+      integer, intent(out) :: n                  !! corners that it has; fewer than 3: no area
+      integer :: k
+
+      polygon(:, :3) = corner
+      n = 3
+      do k = 1, 3
+         call cut(k, polygon, n)
+      end do
+   end subroutine patch_clip
 
    !> How far inside the `k`th side of the patch a place is.
    pure real(wp) function inside(k, y)

@@ -11,7 +11,7 @@ module emcon_deck_check_sides
    use emcon_text, only : to_text
    implicit none
    private
-   public :: find_advice
+   public :: find_advice, advise_tie
 
    !> A slave surface longer than this times its master: force leaks where it reaches beyond. The
    !> rest is room for curved surfaces on straight ones.
@@ -62,6 +62,25 @@ contains
          end if
       end associate
    end subroutine find_advice
+
+   !> Why the slave of a tie in space should be the master, to follow on its name; empty if it
+   !> should not, or could not, as the master is larger.
+   subroutine advise_tie(scene, slave, master, advice)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: slave, master       !! surfaces by their numbers
+      character(len=:), allocatable, intent(out) :: advice
+      real(wp) :: slave_area, slave_length, master_area, master_length
+
+      advice = ""
+      call surface_size(scene, scene%surface(slave), slave_area, slave_length)
+      call surface_size(scene, scene%surface(master), master_area, master_length)
+      if (.not. min(slave_area, master_area) > 0.0_wp) return
+      if (slave_length <= coarse_ratio*master_length) return
+      if (master_area > slave_area + 0.5_wp*slave_length*sqrt(slave_area)) return
+      advice = " has faces " // to_text(slave_length/master_length, 3) // " times as long as " &
+         // "those of master surface " // scene%surface(master)%name // ", which follow it in " &
+         // "the mean only; the finer one should be the slave: swap the two"
+   end subroutine advise_tie
 
    !> The same in space, by the sizes of the surfaces and of their faces.
    subroutine advise_space(scene, pair, advice)

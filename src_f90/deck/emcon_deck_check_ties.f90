@@ -1,9 +1,11 @@
 !> The ties, as far as they can be judged by their meshes alone.
 module emcon_deck_check_ties
    use emcon_couplings, only : tie_t
+   use emcon_deck_check_sides, only : advise_tie
    use emcon_deck_check_surfaces, only : find_common_edges
+   use emcon_deck_dimension, only : n_space
    use emcon_deck_reader, only : reader_t
-   use emcon_diagnostics, only : add_error, label_list
+   use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted, unique_sorted
@@ -28,9 +30,23 @@ contains
          if (scene%tie(i)%slave == 0) cycle
          call check_common_nodes(reader, scene, scene%tie(i))
          call check_common_faces(reader, scene, i, tied)
+         if (reader%n_dim == n_space .and. reader%log%n_errors == 0) &
+            call check_order(reader, scene, scene%tie(i))
       end do
       if (size(scene%pair) > 0) call check_contact(reader, scene)
    end subroutine check_ties
+
+   !> Warn of a slave that should be the master.
+   subroutine check_order(reader, scene, tie)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(tie_t), intent(in) :: tie
+      character(len=:), allocatable :: advice
+
+      call advise_tie(scene, tie%slave, tie%master, advice)
+      if (advice /= "") call add_warning(reader%log, tie%origin, "*TIE: slave surface " // &
+         scene%surface(tie%slave)%name // advice)
+   end subroutine check_order
 
    !> Only what is not connected by its nodes can be tied.
    subroutine check_common_nodes(reader, scene, tie)

@@ -373,12 +373,6 @@ contains
       type(contact_pair_t), intent(inout) :: pair
 
       if (min(pair%slave, pair%master) == 0) return
-      if (reader%n_dim == n_space) then
-         call card_error(reader, card, "its surfaces are tied, and ties in three dimensions are " &
-            // "not in this version")
-         pair%slave = 0
-         return
-      end if
       if (.not. (scene%surface(pair%slave)%is_nodal .or. pair%slave == pair%master)) return
       call card_error(reader, card, "its surfaces are tied, and ties join the element faces of " &
          // "two surfaces")

@@ -1,4 +1,5 @@
-!> The surfaces of contact pairs in space: outer faces that make up surfaces, none of them flat.
+!> The surfaces of contact pairs and ties in space: outer faces that make up surfaces, none of them
+!> flat.
 module emcon_deck_contact_space
    use emcon_deck_check_surfaces, only : check_free
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t
@@ -36,24 +37,28 @@ module emcon_deck_contact_space
 
 contains
 
-   !> Every surface that is in contact, but for that of a program.
+   !> Every surface that is in contact, but for that of a program, or tied.
    subroutine check_contact_space(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
       type(adjacency_t) :: adjacency
       character(len=:), allocatable :: title
       integer, allocatable :: facet(:, :)
+      logical :: is_tied, in_contact
       integer :: i, n_errors
 
-      if (all(scene%pair%formulation == formulation_user) .or. reader%doubt%shapes) return
-      call check_mass(reader, scene)
+      if (reader%doubt%shapes) return
+      if (all(scene%pair%formulation == formulation_user) .and. size(scene%tie) == 0) return
+      if (any(scene%pair%formulation /= formulation_user)) call check_mass(reader, scene)
       call adjacency_init(adjacency, scene)
       do i = 1, size(scene%surface)
-         if (all((scene%pair%slave /= i .and. scene%pair%master /= i) .or. &
-            scene%pair%formulation == formulation_user)) cycle
+         in_contact = any((scene%pair%slave == i .or. scene%pair%master == i) .and. &
+            scene%pair%formulation /= formulation_user)
+         is_tied = any(scene%tie%slave == i .or. scene%tie%master == i)
+         if (.not. (in_contact .or. is_tied)) cycle
          associate (surface => scene%surface(i))
-            title = "contact surface " // surface%name
-            call check_rigid(reader, scene, surface, title)
+            title = trim(merge("contact", "tied   ", in_contact)) // " surface " // surface%name
+            if (in_contact) call check_rigid(reader, scene, surface, title)
             n_errors = reader%log%n_errors
             call check_free(reader, scene, adjacency, surface, title)
             if (reader%log%n_errors > n_errors) cycle

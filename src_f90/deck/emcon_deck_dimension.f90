@@ -30,7 +30,7 @@ module emcon_deck_dimension
    type(plane_card_t), parameter :: plane_cards(*) = [ &
       plane_card_t("CONTACTPAIR", "contact", is_of_space=.true.), &
       plane_card_t("CONTACT", "contact", is_of_space=.true.), &
-      plane_card_t("TIE", "ties", "are"), &
+      plane_card_t("TIE", "ties", "are", .true.), &
       plane_card_t("RIGIDBODY", "rigid bodies", "are", .true.), &
       plane_card_t("USERELEMENT", "elements of a program", "are"), &
       plane_card_t("USERMATERIAL", "laws of a program", "are", .true.), &

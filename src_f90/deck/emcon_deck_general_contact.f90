@@ -5,7 +5,7 @@
 !> analytical surface, too; faces that ties cover go out of it when the ties are known
 !> (`emcon_ties`). In space it is one surface for each body, in contact with those of the others.
 module emcon_deck_general_contact
-   use emcon_bodies, only : bodies_find
+   use emcon_bodies, only : bodies_find_lists
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t, n_neighbours
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, is_blank, &
       next_line
@@ -216,7 +216,7 @@ contains
       integer, allocatable :: body(:)
       integer :: i, k, n_body, n_before
 
-      call bodies_find(scene%element%node, size(scene%node%label), body, n_body)
+      call find_bodies(scene, body, n_body)
       if (n_body == 1) then
          call card_error(reader, card, "there is one body, and contact of a body with itself in " &
             // "three dimensions is not in this version")
@@ -234,7 +234,6 @@ contains
       do i = 1, n_body
          surface = exterior
          surface%name = exterior_name // "_" // to_text(i)
-         surface%is_exterior = .false.
          associate (is_own => body(scene%element%node(1, exterior%element)) == i)
             surface%element = pack(exterior%element, is_own)
             surface%face = pack(exterior%face, is_own)
@@ -245,6 +244,26 @@ contains
          end do
       end do
    end subroutine include_bodies
+
+   !> Number the parts that elements and ties hold together, in the order of their first node.
+   pure subroutine find_bodies(scene, body, n_body)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable, intent(out) :: body(:)     !! (n_node), 0: no element
+      integer, intent(out) :: n_body
+      integer, allocatable :: start(:), node(:), slave(:), master(:)
+      integer :: t, e
+
+      node = reshape(scene%element%node, [size(scene%element%node)])
+      start = [(1 + size(scene%element%node, 1)*e, e = 0, size(scene%element%node, 2))]
+      do t = 1, size(scene%tie)
+         if (min(scene%tie(t)%slave, scene%tie(t)%master) == 0) cycle      ! unknown, and told
+         call surface_nodes(scene, scene%surface(scene%tie(t)%slave), slave)
+         call surface_nodes(scene, scene%surface(scene%tie(t)%master), master)
+         node = [node, slave, master]
+         start = [start, size(node) + 1]
+      end do
+      call bodies_find_lists(start, node, size(scene%node%label), body, n_body)
+   end subroutine find_bodies
 
    !> Add a surface that no card defines.
    subroutine add_surface(reader, card, surface, scene)

@@ -1,7 +1,8 @@
 !> *TIE: surfaces that stay together.
 module emcon_deck_ties
    use emcon_couplings, only : tie_t
-   use emcon_deck_fields, only : data_error, data_open, data_t, next_line
+   use emcon_deck_fields, only : data_error, data_open, data_t, data_warning, next_line
+   use emcon_deck_dimension, only : n_space
    use emcon_deck_options, only : choose_option
    use emcon_deck_reader, only : card_error, card_t, line_origin, n_lines, need_name, &
       option_name, option_real, option_word, reader_t
@@ -76,7 +77,7 @@ contains
       call option_word(reader, card, "ADJUST", "YES", word, "NO", "slave nodes are always put " // &
          "onto the master surface: across a gap angular momentum would be lost")
       call option_word(reader, card, "TYPE", "SURFACE TO SURFACE", word, "NODE TO SURFACE", &
-         "ties are integrated over edges, so that a uniform stress passes through")
+         "ties are integrated over faces, so that a uniform stress passes through")
    end subroutine read_tie_options
 
    !> The card `i` must not have the name of an earlier one.
@@ -130,7 +131,7 @@ contains
          // "surface, master surface")
    end subroutine read_tie_lines
 
-   !> The sides of a tie are two surfaces of element faces.
+   !> The sides of a tie are two surfaces of element faces; in space the slave may be one of nodes.
    subroutine check_sides(reader, data, scene, tie)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
@@ -146,8 +147,14 @@ contains
       end if
       do side = 1, 2
          i = merge(tie%slave, tie%master, side == 1)
+         if (side == 1 .and. reader%n_dim == n_space .and. scene%surface(i)%is_nodal) then
+            call data_warning(reader, data, "slave surface " // quoted(scene%surface(i)%name) // &
+               " has TYPE=NODE: its nodes are tied one by one, and a uniform stress does not " // &
+               "pass exactly; with element faces it would")
+            cycle
+         end if
          call need_facets(reader, data, scene%surface(i), trim(role(side)) // " surface", &
-            ", but ties are integrated over edges; ")
+            ", but ties are integrated over faces; ")
       end do
    end subroutine check_sides
 

@@ -4,16 +4,15 @@ module emcon_tie_check_plane
    use emcon_couplings, only : tie_t
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_scene, only : scene_t, where_text
+   use emcon_scene, only : scene_t
    use emcon_sort, only : find_sorted
    use emcon_text, only : joined, string_t, to_text
    use emcon_tie_partner_plane, only : default_tolerance, tie_partners_t
+   use emcon_tie_text, only : most_named, raise_shared, tie_text
    implicit none
    private
    public :: tie_check_surfaces, tie_check_partners
 
-   !> Nodes or edges named in a message.
-   integer, parameter :: most_named = 10
    !> Nodes whose distance is measured for a message.
    integer, parameter :: most_measured = 10000
    character(len=*), parameter :: advice = "swap slave and master, leave the faces without " // &
@@ -28,28 +27,9 @@ contains
       type(tie_t), intent(in) :: tie
       type(tie_partners_t), intent(in) :: partners
       type(error_t), allocatable, intent(out) :: error
-      type(string_t) :: shared(size(partners%slave%node))
-      integer :: i, n, empty
 
-      empty = 0
-      if (partners%master%n_facet == 0) empty = tie%master
-      if (partners%slave%n_facet == 0) empty = tie%slave
-      if (empty > 0) then
-         call raise(error, err_input, tie_text(scene, tie) // "surface " // &
-            scene%surface(empty)%name // " has no element faces; both surfaces of a tie need them")
-         return
-      end if
-      n = 0
-      do i = 1, size(partners%slave%node)
-         if (find_sorted(partners%master%node, partners%slave%node(i)) == 0) cycle
-         n = n + 1
-         shared(n)%text = to_text(scene%node%label(partners%slave%node(i)))
-      end do
-      if (n == 0) return
-      call raise(error, err_input, tie_text(scene, tie) // "slave surface " // &
-         scene%surface(tie%slave)%name // " and master surface " // &
-         scene%surface(tie%master)%name // " share nodes (" // &
-         joined(shared(:n), ", ", most_named) // "); a tie joins meshes without common nodes")
+      call raise_shared(scene, tie, [partners%slave%n_facet, partners%master%n_facet], &
+         partners%slave%node, partners%master%node, error)
    end subroutine tie_check_surfaces
 
    !> Every slave node has a partner within the tolerance, and the master surface has no holes.
@@ -181,21 +161,6 @@ contains
          "tolerance (" // tolerance_text(tie) // "); nodes of the face (length): " // &
          joined(found, ", ", most_named) // "; " // advice)
    end subroutine raise_holes
-
-   pure function tie_text(scene, tie) result(text)
-      type(scene_t), intent(in) :: scene
-      type(tie_t), intent(in) :: tie
-      character(len=tie_length(scene, tie)) :: text
-
-      text = where_text(scene, tie%origin) // ": error: tie " // tie%name // ": "
-   end function tie_text
-
-   pure integer function tie_length(scene, tie)
-      type(scene_t), intent(in) :: scene
-      type(tie_t), intent(in) :: tie
-
-      tie_length = len(where_text(scene, tie%origin)) + len(": error: tie : ") + len(tie%name)
-   end function tie_length
 
    pure function tolerance_text(tie) result(text)
       type(tie_t), intent(in) :: tie

@@ -2,11 +2,14 @@
 !>
 !> Source: docs/theory.md, section 11.
 module emcon_tie_moves
+   use emcon_deck_jacobian, only : determinant
+   use emcon_element_kind, only : element_kind_t
    use emcon_errors, only : err_input, error_t, raise
    use emcon_kinds, only : wp
    use emcon_linear_rows, only : linear_rows_init, linear_rows_t
    use emcon_numbering, only : numbering_init, numbering_t
    use emcon_scene, only : scene_t, where_text
+   use emcon_shape, only : max_element_nodes
    use emcon_steps, only : prescribed_t
    use emcon_text, only : note_add, notes_t, to_text
    implicit none
@@ -15,7 +18,7 @@ module emcon_tie_moves
 
    !> A node that would move by less than this part of the largest coordinate stays where it is.
    real(wp), parameter :: rounding = 64.0_wp*epsilon(1.0_wp)
-   !> An element is spoilt if a corner keeps less than this part of its area.
+   !> An element is spoilt if a corner keeps less than this part of its area or volume.
    real(wp), parameter :: least_area = 0.1_wp
 
 contains
@@ -63,7 +66,7 @@ contains
    !> Tell the largest move of each tie.
    subroutine note_moves(scene, move, notes)
       type(scene_t), intent(in) :: scene
-      real(wp), intent(in) :: move(:, :)                 !! (2, n_node)
+      real(wp), intent(in) :: move(:, :)                 !! (n_dim, n_node)
       type(notes_t), intent(inout) :: notes
       real(wp), allocatable :: distance(:)
       integer :: t, k
@@ -84,23 +87,24 @@ contains
       end do
    end subroutine note_moves
 
-   !> An error if a corner of an element would lose most of its area.
+   !> An error if a corner of an element would lose most of its area or volume.
    subroutine check_elements(scene, move, error)
       type(scene_t), intent(in) :: scene
-      real(wp), intent(in) :: move(:, :)                 !! (2, n_node)
+      real(wp), intent(in) :: move(:, :)                 !! (n_dim, n_node)
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: tie
-      real(wp) :: before, after
-      integer :: e, i, n, k
+      real(wp), dimension(max_element_nodes) :: before, after
+      integer :: e, n, k
 
       do e = 1, size(scene%element%kind)
-         n = scene%element%kinds(scene%element%kind(e))%n_corner
-         associate (node => scene%element%node(:n, e))
-            if (all(abs(move(:, node)) <= 0.0_wp)) cycle
-            do i = 1, n
-               before = corner_area(scene%x(:, node), i)
-               after = corner_area(scene%x(:, node) + move(:, node), i)
-               if (.not. before > 0.0_wp .or. after > least_area*before) cycle
+         associate (kind => scene%element%kinds(scene%element%kind(e)))
+            n = kind%n_corner
+            associate (node => scene%element%node(:kind%n_node, e))
+               if (all(abs(move(:, node)) <= 0.0_wp)) cycle
+               call find_corners(kind, scene%x(:, node), before(:n))
+               call find_corners(kind, scene%x(:, node) + move(:, node), after(:n))
+               if (.not. any(before(:n) > 0.0_wp .and. .not. after(:n) > least_area*before(:n))) &
+                  cycle
                k = maxloc(sum(abs(move(:, node)), 1), 1)
                call tie_text(scene, node(k), tie)
                call raise(error, err_input, tie // "element " // &
@@ -109,7 +113,7 @@ contains
                   to_text(norm2(move(:, node(k)))) // " onto the master surface; let the " // &
                   "surfaces meet, or refine the coarser one")
                return
-            end do
+            end associate
          end associate
       end do
    end subroutine check_elements
@@ -128,15 +132,21 @@ contains
       end do
    end subroutine tie_text
 
-   !> Twice the area of the triangle at corner `i` of a polygon.
-   pure real(wp) function corner_area(x, i)
-      real(wp), intent(in) :: x(:, :)                    !! (2, corners) counter-clockwise
-      integer, intent(in) :: i
-      real(wp) :: a(2), b(2)
+   !> The Jacobian of an element at its corners.
+   pure subroutine find_corners(kind, x, det)
+      class(element_kind_t), intent(in) :: kind
+      real(wp), intent(in) :: x(:, :)                    !! (n_dim, n_node) [L]
+      real(wp), intent(out) :: det(:)                    !! (corners)
+      real(wp), allocatable :: place(:, :)
+      real(wp) :: value(size(x, 2)), slope(size(x, 1), size(x, 2))
+      integer :: i
 
-      a = x(:, 1 + mod(i, size(x, 2))) - x(:, i)
-      b = x(:, 1 + mod(i + size(x, 2) - 2, size(x, 2))) - x(:, i)
-      corner_area = a(1)*b(2) - a(2)*b(1)
-   end function corner_area
+      if (size(det) == 0) return
+      call kind%shape%places(place)
+      do i = 1, size(det)
+         call kind%shape%values(place(:, i), value, slope)
+         det(i) = determinant(matmul(x, transpose(slope)))
+      end do
+   end subroutine find_corners
 
 end module emcon_tie_moves

@@ -2,12 +2,13 @@
 !> and what elimination leaves.
 module emcon_link_lines
    use emcon_couplings, only : tie_t
+   use emcon_deck_dimension, only : n_plane
    use emcon_interactions, only : multiplier_dual
    use emcon_scene, only : scene_t
    use emcon_surface_facets, only : surface_facets
    use emcon_system, only : system_t
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
-   use emcon_ties, only : find_crosspoints
+   use emcon_tie_meetings, only : find_crosspoints
    implicit none
    private
    public :: add_link_lines
@@ -23,24 +24,29 @@ contains
       type(system_t), intent(in) :: system
       type(notes_t), intent(inout) :: notes
       integer, allocatable :: node(:), place(:)
-      character(len=:), allocatable :: text
+      character(len=:), allocatable :: text, crosspoints
       integer :: k, n_place
 
       if (system%space%linear%n == 0) return
       call find_crosspoints(scene, node, place, n_place)
+      crosspoints = " crosspoints, "
+      if (scene%n_dim /= n_plane) then
+         n_place = size(node)                    ! along whole edges: as many as these have
+         crosspoints = " nodes where ties meet, "
+      end if
       call elimination_text(system, text)
       if (size(scene%rigid) > 0) text = to_text(size(scene%rigid)) // " rigid; " // text
       if (size(scene%node%turned) > 0) text = to_text(count(scene%node%turned%stand_in > 0)) // &
          " nodes held along axes of *TRANSFORM; " // text
       call note_add(notes, to_text(system%space%n_body) // " subdomains, " // &
-         to_text(size(scene%tie)) // " ties, " // to_text(n_place) // " crosspoints, " // &
+         to_text(size(scene%tie)) // " ties, " // to_text(n_place) // crosspoints // &
          to_text(count(scene%equation%turned == 0)) // " equations; " // text)
       if (size(scene%tie) > 0) call add_subdomains(scene, system, notes)
       do k = 1, size(scene%tie)
          call tie_text(scene, scene%tie(k), text)
          call note_add(notes, "tie " // text)
       end do
-      do k = 1, n_place
+      do k = 1, merge(n_place, 0, scene%n_dim == n_plane)
          call labels_text(scene, pack(node, place == k), text)
          call note_add(notes, "crosspoint " // to_text(k) // ": nodes " // text)
       end do
@@ -96,13 +102,15 @@ contains
       type(tie_t), intent(in) :: tie
       character(len=:), allocatable, intent(out) :: text
       integer, allocatable :: slave(:, :), master(:, :)
+      character(len=6) :: facets
 
+      facets = merge(" edges", " faces", scene%n_dim == n_plane)
       call surface_facets(scene, scene%surface(tie%slave), slave)
       call surface_facets(scene, scene%surface(tie%master), master)
       text = tie%name // ": " // scene%surface(tie%slave)%name // " (slave, " // &
-         to_text(size(slave, 2)) // " edges) to " // &
+         to_text(size(slave, 2)) // facets // ") to " // &
          scene%surface(tie%master)%name // " (" // &
-         to_text(size(master, 2)) // " edges), " // &
+         to_text(size(master, 2)) // facets // "), " // &
          to_text(size(tie%rows%slave)) // " " // &
          trim(merge("dual    ", "standard", tie%multiplier == multiplier_dual)) // " multipliers"
    end subroutine tie_text

@@ -11,13 +11,14 @@ module emcon_couplings
    !> over its entries is zero. Row k belongs to the multiplier psi_k of slave node k: the entries
    !> are D_kB = int psi_k N_B for slave nodes and -M_kC = -int psi_k N_C for master nodes.
    type :: tie_rows_t
-      integer, allocatable :: slave(:)               !! (n) slave nodes, along the chains
-      integer, allocatable :: neighbour(:, :)        !! (2, n) row before and after; 0: an end
+      integer, allocatable :: slave(:)               !! (n) slave nodes, in the plane in turn
+      !> Of the plane: (2, n) row before and after; 0: an end
+      integer, allocatable :: neighbour(:, :)
       integer, allocatable :: start(:)               !! (n + 1) entries before each row, from 0
       integer, allocatable :: node(:)                !! entries; the first is the slave node
-      real(wp), allocatable :: weight(:)             !! [L]; the weights of a row sum up to 0
-      real(wp), allocatable :: size(:)               !! (n) int psi_k, > 0 [L]
-      integer, allocatable :: covered(:, :)          !! (2, any) master edges all under slave ones
+      real(wp), allocatable :: weight(:)             !! [L^(n_dim - 1)]; those of a row sum up to 0
+      real(wp), allocatable :: size(:)               !! (n) int psi_k, > 0 [L^(n_dim - 1)]
+      integer, allocatable :: covered(:, :)          !! (most nodes, any) master facets all covered
       integer, allocatable :: buried(:)              !! master nodes with the slave on both sides
       !> (3, any) ends of the slave: the node, first and last node of the master edge under it
       integer, allocatable :: ending(:, :)

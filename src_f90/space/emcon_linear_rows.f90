@@ -19,7 +19,8 @@ module emcon_linear_rows
       integer, allocatable :: tie(:)             !! (n) that it is of; 0: an equation; -b: a body
       integer, allocatable :: place(:)           !! (n) row of tie, number of equation, rigid node
       integer, allocatable :: own(:)             !! (n) the freedom to eliminate, if possible
-      !> (n) what a row that is not met is measured by: int psi_k; else the extent of x.
+      !> (n) what a row that is not met is measured by: int psi_k, in space its root; else the
+      !> extent of x [L]
       real(wp), allocatable :: size(:)
       integer, allocatable :: start(:)           !! (n + 1) entries before each row, from 0
       integer, allocatable :: dof(:)             !! places in an (n_dim, n_node) array, ascending
@@ -93,7 +94,7 @@ contains
                self%tie(n) = t
                self%place(n) = k
                self%own(n) = n_dim*(rows%slave(k) - 1) + a
-               self%size(n) = rows%size(k)
+               self%size(n) = rows%size(k)**(1.0_wp/real(n_dim - 1, wp))
                associate (from => rows%start(k) + 1, to => rows%start(k + 1))
                   call add_row(self, n, n_dim*(rows%node(from:to) - 1) + a, &
                      rows%weight(from:to)/rows%size(k))

@@ -222,8 +222,6 @@ contains
       call check_surfaces(self, slave, master, error)
       call check_choice("multiplier", multiplier, multiplier_standard, multiplier_dual, error)
       call check_number("tolerance", tolerance, error)
-      call check_that(self%scene%n_dim == 2, "ties in three dimensions are not in this version", &
-         error)
       if (allocated(error)) return
       call check_that(slave /= master, "slave and master are both surface " // &
          self%scene%surface(slave)%name, error)

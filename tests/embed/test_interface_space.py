@@ -278,8 +278,28 @@ def test_what_is_of_the_plane_is_refused() -> None:
         face.add_pair(upper, lower, "node to segment", smoothing="hermite")
     with pytest.raises(InputError, match="its own master is not in this version in three"):
         face.add_pair(upper, upper, "node to segment")
-    with pytest.raises(InputError, match="ties in three dimensions are not in this version"):
-        face.add_tie(upper, lower)
+
+
+def test_tie_of_faces() -> None:
+    """A triangle on a square: weights that give positions back, and a slave that is too far off."""
+    x = np.array([[0, 0, 0], [2, 0, 0], [2, 2, 0], [0, 2, 0], [.5, .5, 0], [1, .5, 0], [.5, 1, 0], [0, 0, 1], [1, 0, 1], [0, 1, 1]],
+                 float)
+    face = Interface(x)
+    lower, upper = face.add_faces("lower", [[0, 1, 2, 3]]), face.add_faces("upper", [[4, 6, 5]])
+    far = face.add_faces("far", [[7, 9, 8]])
+    assert face.add_tie(upper, lower) == 0
+    face.prepare()
+    # On each triangle of the square about its middle positions are linear: the weights give them back.
+    d, m = face.tie_matrices()
+    ratio = m.toarray()[:, :4]/d.toarray()[:, 4:7].diagonal()[:, None]
+    np.testing.assert_allclose(ratio @ x[:4], x[4:7], rtol=0, atol=1e-14)
+    np.testing.assert_allclose(ratio.sum(1), 1.0, rtol=0, atol=1e-14)
+    assert face.largest_move == 0.0
+    other = Interface(x)
+    lower, far = other.add_faces("lower", [[0, 1, 2, 3]]), other.add_faces("far", [[7, 9, 8]])
+    other.add_tie(far, lower)
+    with pytest.raises(InputError, match="the surfaces do not meet: slave node 8, the nearest one, is 1 from"):
+        other.prepare()
 
 
 def test_edges_of_the_plane_may_be_given_as_faces() -> None:

@@ -189,6 +189,7 @@ program main
    use test_tie, only : collect_tie
    use test_tie_partner, only : collect_tie_partner
    use test_tie_balance, only : collect_tie_balance
+   use test_tie_space, only : collect_tie_space
    use test_ties, only : collect_ties
    use test_triple_product, only : collect_triple_product
 #ifndef EMCON_PERMISSIVE
@@ -322,6 +323,7 @@ program main
    call run("tie", collect_tie)
    call run("tie_partner", collect_tie_partner)
    call run("tie_balance", collect_tie_balance)
+   call run("tie_space", collect_tie_space)
    call run("numbering", collect_numbering)
    call run("patch_contact", collect_patch_contact)
    call run("patch_gap", collect_patch_gap)
