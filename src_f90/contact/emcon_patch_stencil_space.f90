@@ -18,7 +18,8 @@ module emcon_patch_stencil_space
    real(wp), parameter :: facing = -0.25_wp
    !> Sides of the patch, by the shorter of the facets of both sides.
    real(wp), parameter :: patch_size = 0.1_wp
-   !> Where a surface ends it goes on by strips of this part of a facet, and fades on the last one.
+   !> Where a surface ends it goes on by strips of this part of a facet, by less where those of the
+   !> slave are smaller, and fades on the last one.
    real(wp), parameter :: flange = 0.2_wp
    integer, parameter :: n_strip = 2
    !> A node is behind a triangle by no more than so many of its distances, and this by the facet.
@@ -495,17 +496,21 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       integer, intent(out) :: vertex(n_strip)
       integer, allocatable :: inner(:)
+      real(wp) :: strip
       integer :: i, k
 
       k = vertex_of(self, -point)
       vertex = [(k + i - 1, i = 1, n_strip)]
       if (k > 0) return
       call find_inner(sides, self%node(1), point, normal, x, u, inner)
+      ! As wide by the patch on a facet that is much larger: where it fades, heights are those at its
+      ! inner side, which a slanted frame sees far from the plane of the facet on a wide one.
+      strip = flange*self%patch%length/(patch_size*self%size)
       do i = 1, n_strip
          call begin_vertex(self, -point, merge(1.0_wp, 0.0_wp, i < n_strip), vertex(i))
-         call add_point(self, sides, point, vertex(i), 1.0_wp + i*flange)
+         call add_point(self, sides, point, vertex(i), 1.0_wp + i*strip)
          do k = 1, size(inner)
-            call add_point(self, sides, inner(k), vertex(i), -i*flange/real(size(inner), wp))
+            call add_point(self, sides, inner(k), vertex(i), -i*strip/real(size(inner), wp))
          end do
       end do
    end subroutine add_outer

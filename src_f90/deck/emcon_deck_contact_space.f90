@@ -4,7 +4,6 @@ module emcon_deck_contact_space
    use emcon_deck_check_surfaces, only : check_free
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t
    use emcon_deck_reader, only : reader_t
-   use emcon_deck_rigid, only : mark_rigid
    use emcon_diagnostics, only : add_error
    use emcon_interactions, only : formulation_user
    use emcon_kinds, only : dp, wp
@@ -14,7 +13,6 @@ module emcon_deck_contact_space
    use emcon_sort, only : sort_order
    use emcon_steps, only : initiation_massless, step_initiation
    use emcon_surface_facets, only : surface_facets
-   use emcon_surface_nodes, only : surface_nodes
    use emcon_text, only : joined, string_t, to_text
    implicit none
    private
@@ -58,7 +56,6 @@ contains
          if (.not. (in_contact .or. is_tied)) cycle
          associate (surface => scene%surface(i))
             title = trim(merge("contact", "tied   ", in_contact)) // " surface " // surface%name
-            if (in_contact) call check_rigid(reader, scene, surface, title)
             n_errors = reader%log%n_errors
             call check_free(reader, scene, adjacency, surface, title)
             if (reader%log%n_errors > n_errors) cycle
@@ -85,24 +82,6 @@ contains
          return
       end do
    end subroutine check_mass
-
-   !> Rigid bodies are in no contact in space.
-   subroutine check_rigid(reader, scene, surface, title)
-      type(reader_t), intent(inout) :: reader
-      type(scene_t), intent(in) :: scene
-      type(surface_t), intent(in) :: surface
-      character(len=*), intent(in) :: title
-      integer, allocatable :: node(:)
-      integer :: body(size(scene%node%label))
-
-      if (size(scene%rigid) == 0) return
-      call mark_rigid(scene, body)
-      call surface_nodes(scene, surface, node)
-      if (all(body(node) == 0)) return
-      call add_error(reader%log, surface%origin, title // " is of rigid body " // &
-         scene%rigid(maxval(body(node)))%name // ": rigid bodies in contact in three dimensions " &
-         // "are not in this version; give it a stiff material in place of *RIGID BODY")
-   end subroutine check_rigid
 
    !> Two faces at most meet in a side, and they run it in unlike ways.
    subroutine check_sides(reader, scene, surface, facet, title)
