@@ -43,6 +43,7 @@ module emcon_edge_contact_space
    end type edge_stencil_t
 
    type, extends(contact_t) :: edge_contact_t
+      logical :: is_self = .false.                    !! of a surface with itself
       logical :: is_exchanged = .false.               !! the edges below are the master's, of the pair
       type(sharp_edges_t) :: slave
       type(sharp_edges_t), allocatable :: master      !! gfortran 12 loses a second one of its kind
@@ -77,6 +78,7 @@ contains
       call sharp_edges_init(second, scene, scene%surface(pair%master))
       self%n_constraint = n_class*max(size(first%node, 2), size(second%node, 2))
       if (min(size(first%node, 2), size(second%node, 2)) == 0) self%n_constraint = 0
+      self%is_self = pair%slave == pair%master
       self%is_exchanged = size(second%node, 2) > size(first%node, 2)
       if (self%is_exchanged) then
          self%slave = second
@@ -177,6 +179,7 @@ contains
       type(crossing_t) :: crossing
       type(edge_stencil_t) :: new
 
+      if (self%is_self .and. m <= i) return
       if (any(self%slave%node(1, i) == self%master%node(:, m)) .or. &
          any(self%slave%node(2, i) == self%master%node(:, m))) return
       new = edge_stencil_t(m, 1.0_wp)

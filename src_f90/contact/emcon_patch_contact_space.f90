@@ -28,6 +28,8 @@ module emcon_patch_contact_space
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted, unique_sorted
    use emcon_text, only : to_text
+   use emcon_touch_rule_space, only : touch_rule_space_init, touch_rule_space_may, &
+      touch_rule_space_sees
    implicit none
    private
    public :: patch_contact_t, patch_contact_init
@@ -46,6 +48,9 @@ module emcon_patch_contact_space
       type(near_list_t) :: near
       type(position_memo_t) :: memo                   !! of the nodes as stencils were chosen:
       real(wp) :: chosen_reach = 0.0_wp               !! among facets up to there [L]
+      integer :: n_sifted = 0                         !! the list that `sift` has gone through
+      integer, allocatable :: frame(:)                !! (n_constraint)
+      integer, allocatable :: class(:)                !! (n_constraint) of bodies it looks at
       type(patch_stencil_t), allocatable :: stencil(:)   !! (n_constraint)
       real(wp), allocatable :: scale(:)               !! (n_constraint) covered at the start
       real(wp), allocatable :: cover(:)               !! (n_constraint) covered at the end
@@ -70,6 +75,7 @@ contains
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       type(error_t), allocatable, intent(out) :: error
+      integer :: i
 
       associate (sides => self%sides)
          call init_slave(sides, scene, scene%surface(pair%slave), error)
@@ -84,16 +90,22 @@ contains
          call facets_init(sides%master, scene, scene%surface(pair%master), error)
          if (allocated(error)) return
          call patch_triangles_init(sides%triangles, sides%master, scene%x)
-         self%node = sides%frames%base(sides%frames%point)
+         if (pair%slave == pair%master) call touch_rule_space_init(sides%rule, sides%slave, &
+            sides%frames%middle, scene)
+         associate (n => sides%frames%n, m => sides%rule%n_class)
+            self%frame = [(1 + (i - 1)/m, i = 1, n*m)]
+            self%class = [(1 + mod(i - 1, m), i = 1, n*m)]
+         end associate
+         self%node = sides%frames%base(sides%frames%point(self%frame))
          self%n_constraint = size(self%node)
          allocate(self%duplicate(self%n_constraint), source=0)
          allocate(self%state(self%n_constraint), self%stencil(self%n_constraint))
          allocate(self%scale(self%n_constraint), source=1.0_wp)
          allocate(self%cover(self%n_constraint), self%sagitta(self%n_constraint), source=0.0_wp)
-         self%thickness = sqrt(sides%frames%area(sides%frames%point))
-         call near_list_init(self%near, point_items(sides), sides%master%facet, scene%x, scene%u0, pair%interaction%offset &
-            + interaction_reach(pair%interaction))
-         self%state%other_size = sides%frames%size(sides%frames%point)
+         self%thickness = sqrt(sides%frames%area(sides%frames%point(self%frame)))
+         call near_list_init(self%near, point_items(sides), sides%master%facet, scene%x, scene%u0, &
+            pair%interaction%offset + interaction_reach(pair%interaction))
+         self%state%other_size = sides%frames%size(sides%frames%point(self%frame))
       end associate
       self%holds_all = .not. pair_has_order(pair)
       if (self%holds_all) self%area_factor = 0.5_wp
@@ -174,6 +186,7 @@ contains
       integer :: i, k
 
       call near_list_update(self%near, x, u0, du, self%reach)
+      if (self%sides%rule%is_self .and. self%n_sifted /= self%near%n_list) call sift(self)
       call self%has_looked(self%near%clearance)
       if (abs(self%chosen_reach - self%reach) <= 0.0_wp) then
          if (position_memo_holds(self%memo, self%near%node, x, u0)) return
@@ -182,16 +195,40 @@ contains
       self%chosen_reach = self%reach
       associate (list => self%near%candidates)
          do i = 1, self%n_constraint
-            associate (item => self%sides%frames%point(i))
+            associate (item => self%sides%frames%point(self%frame(i)))
                associate (of => list%facet(list%start(item):list%start(item + 1) - 1))
-                  facet = pack(of, [(near_list_within(self%near, item, of(k), x, u0, self%reach), &
+                  facet = pack(of, [(touch_rule_space_sees(self%sides%rule, self%class(i), of(k)) &
+                     .and. near_list_within(self%near, item, of(k), x, u0, self%reach), &
                      k = 1, size(of))])
                end associate
             end associate
-            call patch_stencil_choose(self%stencil(i), self%sides, i, facet, x, u0)
+            call patch_stencil_choose(self%stencil(i), self%sides, self%frame(i), facet, x, u0)
          end do
       end associate
    end subroutine patch_begin_step
+
+   !> Leave out of a new list of candidates what a surface never touches of itself.
+   pure subroutine sift(self)
+      type(patch_contact_t), intent(inout) :: self
+      integer :: item, k, from, n
+
+      n = 0
+      associate (list => self%near%candidates, sides => self%sides)
+         do item = 1, size(list%start) - 1
+            from = list%start(item)
+            list%start(item) = n + 1
+            do k = from, list%start(item + 1) - 1
+               if (.not. touch_rule_space_may(sides%rule, sides%slave, item, list%facet(k))) cycle
+               n = n + 1
+               list%facet(n) = list%facet(k)
+            end do
+         end do
+         list%start(size(list%start)) = n + 1
+      end associate
+      self%near%candidates%facet = self%near%candidates%facet(:n)
+      if (n == 0) self%near%nearest = self%near%reach
+      self%n_sifted = self%near%n_list
+   end subroutine sift
 
    pure subroutine patch_measure(self, x, u0, du)
       class(patch_contact_t), intent(inout) :: self
@@ -222,7 +259,7 @@ contains
          self%scale(i) = max(cover(0), least)
          if (self%step%is_penalty) least = no_cover
          state%size = stencil%size
-         state%other_size = self%sides%frames%size(self%sides%frames%point(i))
+         state%other_size = self%sides%frames%size(self%sides%frames%point(self%frame(i)))
          state%is_near = maxval(cover) > no_cover
          state%is_over = cover(1) >= least .or. (self%step%is_penalty .and. cover(0) >= least)
          state%is_leaving = .not. state%is_over
@@ -344,8 +381,8 @@ contains
 
       associate (frames => self%sides%frames)
          do i = 1, self%n_constraint
-            area(i) = facets_point_area(self%sides%slave, frames%middle, frames%point(i), &
-               frame_normal(frames, i, self%node(i), x, u), x, u)
+            area(i) = facets_point_area(self%sides%slave, frames%middle, frames%point(self%frame(i)), &
+               frame_normal(frames, self%frame(i), self%node(i), x, u), x, u)
          end do
       end associate
       length = area/self%thickness
@@ -358,7 +395,7 @@ contains
       real(wp), intent(out) :: pressure(:)       !! (n_constraint) [M/(L T^2)]
 
       call facets_pressures(self%sides%slave, self%sides%frames%middle, &
-         self%sides%frames%point, force, area, pressure)
+         self%sides%frames%point(self%frame), force, area, pressure)
    end subroutine patch_pressures
 
    !> Integrals of gaps are functions of the positions alone; their means know what was covered.

@@ -11,6 +11,7 @@ module emcon_patch_sides_space
    use emcon_kinds, only : wp
    use emcon_rotation, only : cross_product
    use emcon_sort, only : unique_sorted
+   use emcon_touch_rule_space, only : touch_rule_space_t
    implicit none
    private
    public :: point_frames_t, point_frames_init, patch_triangles_t, patch_triangles_init, patch_sides_t
@@ -55,6 +56,7 @@ module emcon_patch_sides_space
       type(facets_t), allocatable :: master      !! gfortran 12 loses a second one of its kind
       type(point_frames_t) :: frames             !! of the slave
       type(patch_triangles_t) :: triangles             !! of the master
+      type(touch_rule_space_t) :: rule           !! what may touch where both are one
    end type patch_sides_t
 
 contains

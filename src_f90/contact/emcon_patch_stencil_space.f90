@@ -10,6 +10,7 @@ module emcon_patch_stencil_space
    use emcon_patch_sides_space, only : patch_sides_t, sides_point
    use emcon_rotation, only : cross_product
    use emcon_sort, only : unique_sorted
+   use emcon_touch_rule_space, only : touch_rule_space_is_through
    implicit none
    private
    public :: patch_stencil_t, patch_stencil_choose, patch_stencil_gather
@@ -84,7 +85,8 @@ contains
       call make_patch(self, sides, frame, near, normal, x, u)
    end subroutine patch_stencil_choose
 
-   !> Where the triangles of facets are, from contact point `i` of the slave.
+   !> Where the triangles of facets are, from contact point `i` of the slave. Those that it is on the
+   !> other side of face nothing.
    pure subroutine look_around(sides, i, facet, x, u, near)
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: i, facet(:)
@@ -110,8 +112,10 @@ contains
             n = cross_product(c(:, 2) - c(:, 1), c(:, 3) - c(:, 1))
             call nearest_update(nearest, t, [0.0_wp, 0.0_wp, 0.0_wp], c)
             near%distance(t) = sqrt(nearest%square)
-            nearest = nearest_t()
             if (dot_product(n, n) > 0.0_wp) n = n/sqrt(dot_product(n, n))
+            if (touch_rule_space_is_through(sides%rule, i, sides%triangles%split%facet( &
+               near%triangle(t)), n, -matmul(c, nearest%weight))) n = 0.0_wp
+            nearest = nearest_t()
          end associate
       end do
    end subroutine look_around

@@ -84,13 +84,13 @@ module emcon_start_gaps
          logical, intent(out) :: sharp(:)        !! (n)
       end subroutine is_sharp_interface
 
-      !> The first two facets in which a surface crosses itself at the start; 0, 0: nowhere.
-      pure subroutine crossing_interface(self, which, scene, first, second)
+      !> Two facets in which a surface crosses itself at the start.
+      subroutine crossing_interface(self, which, scene, first, second)
          import :: scene_t, start_gaps_t
          class(start_gaps_t), intent(in) :: self
          integer, intent(in) :: which            !! `is_slave` or `is_master`
          type(scene_t), intent(in) :: scene
-         integer, intent(out) :: first, second   !! first < second
+         integer, intent(out) :: first, second   !! 0, 0: nowhere
       end subroutine crossing_interface
    end interface
 

@@ -12,7 +12,7 @@ module emcon_deck_contact
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, n_lines, need_name, &
       note_idle, option_name, option_number, option_word, reader_t, refuse_option, &
       card_warning
-   use emcon_deck_surfaces, only : get_surfaces, need_facets, refuse_self
+   use emcon_deck_surfaces, only : get_surfaces, need_facets
    use emcon_diagnostics, only : add_error, quoted, suggestion
    use emcon_interactions, only : adjustment_t, contact_damping_t, contact_pair_t, &
       formulation_user, formulation_mortar, formulation_nts, formulation_segment, pressure_hard, &
@@ -279,10 +279,7 @@ contains
 
       if (pair%slave == 0 .or. pair%master == 0) return
       associate (slave => scene%surface(pair%slave), master => scene%surface(pair%master))
-         if (pair%slave == pair%master .and. reader%n_dim == n_space .and. &
-            pair%formulation /= formulation_user) then
-            call refuse_self(reader, data, slave)
-         else if (pair%slave == pair%master) then
+         if (pair%slave == pair%master) then
             call need_facets(reader, data, slave, "surface", &
                " and cannot be in contact with itself; ")
          else

@@ -3,16 +3,14 @@
 !> What is included becomes pairs with both sides held: a surface with itself, on one body or on
 !> many, or with another one. All exterior is one surface, of every free face, in contact with every
 !> analytical surface, too; faces that ties cover go out of it when the ties are known
-!> (`emcon_ties`). In space it is one surface for each body, in contact with those of the others.
+!> (`emcon_ties`).
 module emcon_deck_general_contact
-   use emcon_bodies, only : bodies_find_lists
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t, n_neighbours
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, is_blank, &
       next_line
-   use emcon_deck_dimension, only : n_space
    use emcon_deck_named, only : refuse_name
-   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, reader_t
-   use emcon_deck_surfaces, only : need_facets, refuse_self, surface_names
+   use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
+   use emcon_deck_surfaces, only : need_facets, surface_names
    use emcon_diagnostics, only : quoted, suggestion
    use emcon_interactions, only : contact_pair_t, formulation_nts, pressure_hard
    use emcon_kinds, only : wp
@@ -20,14 +18,11 @@ module emcon_deck_general_contact
    use emcon_name_index, only : name_index_find, name_index_put
    use emcon_scene, only : scene_t, where_text
    use emcon_surface_nodes, only : surface_nodes
-   use emcon_text, only : to_text
    implicit none
    private
    public :: read_general_contact
 
    character(len=*), parameter :: exterior_name = "ALL_EXTERIOR"
-   !> Each body with each makes twice as many pairs as half their square.
-   integer, parameter :: most_bodies = 50
 
 contains
 
@@ -137,11 +132,7 @@ contains
             return
          end associate
       end do
-      if (surface(1) == surface(size(surface)) .and. scene%n_dim == n_space) then
-         call refuse_self(reader, data, scene%surface(surface(1)))
-      else
-         call append_pairs(scene, data%card, surface)
-      end if
+      call append_pairs(scene, data%card, surface)
    end subroutine include_pair
 
    !> Two surfaces, the nodes of both of them held, or one, with itself.
@@ -194,10 +185,6 @@ contains
          call card_error(reader, card, "there is no free face")
          return
       end if
-      if (scene%n_dim == n_space) then
-         call include_bodies(reader, card, surface, scene)
-         return
-      end if
       call add_surface(reader, card, surface, scene)
       all = size(scene%surface)
       call append_pairs(scene, card, [all])
@@ -205,65 +192,6 @@ contains
          if (scene%surface(i)%is_profile) call append_pairs(scene, card, [all, i])
       end do
    end subroutine include_exterior
-
-   !> The surface of each body in contact with that of each other one.
-   subroutine include_bodies(reader, card, exterior, scene)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      type(surface_t), intent(in) :: exterior    !! of all bodies
-      type(scene_t), intent(inout) :: scene
-      type(surface_t) :: surface
-      integer, allocatable :: body(:)
-      integer :: i, k, n_body, n_before
-
-      call find_bodies(scene, body, n_body)
-      if (n_body == 1) then
-         call card_error(reader, card, "there is one body, and contact of a body with itself in " &
-            // "three dimensions is not in this version")
-         return
-      end if
-      if (n_body > most_bodies) then
-         call card_error(reader, card, "ALL EXTERIOR: there are " // to_text(n_body) // " bodies," &
-            // " and contact of each with each in three dimensions is for " // &
-            to_text(most_bodies) // " at most; name those that can meet by *CONTACT PAIR")
-         return
-      end if
-      call card_warning(reader, card, "ALL EXTERIOR: each body is in contact with the others, " &
-         // "none with itself: that is not in this version in three dimensions")
-      n_before = size(scene%surface)
-      do i = 1, n_body
-         surface = exterior
-         surface%name = exterior_name // "_" // to_text(i)
-         associate (is_own => body(scene%element%node(1, exterior%element)) == i)
-            surface%element = pack(exterior%element, is_own)
-            surface%face = pack(exterior%face, is_own)
-         end associate
-         call add_surface(reader, card, surface, scene)
-         do k = n_before + 1, size(scene%surface) - 1
-            call append_pairs(scene, card, [k, size(scene%surface)])
-         end do
-      end do
-   end subroutine include_bodies
-
-   !> Number the parts that elements and ties hold together, in the order of their first node.
-   pure subroutine find_bodies(scene, body, n_body)
-      type(scene_t), intent(in) :: scene
-      integer, allocatable, intent(out) :: body(:)     !! (n_node), 0: no element
-      integer, intent(out) :: n_body
-      integer, allocatable :: start(:), node(:), slave(:), master(:)
-      integer :: t, e
-
-      node = reshape(scene%element%node, [size(scene%element%node)])
-      start = [(1 + size(scene%element%node, 1)*e, e = 0, size(scene%element%node, 2))]
-      do t = 1, size(scene%tie)
-         if (min(scene%tie(t)%slave, scene%tie(t)%master) == 0) cycle      ! unknown, and told
-         call surface_nodes(scene, scene%surface(scene%tie(t)%slave), slave)
-         call surface_nodes(scene, scene%surface(scene%tie(t)%master), master)
-         node = [node, slave, master]
-         start = [start, size(node) + 1]
-      end do
-      call bodies_find_lists(start, node, size(scene%node%label), body, n_body)
-   end subroutine find_bodies
 
    !> Add a surface that no card defines.
    subroutine add_surface(reader, card, surface, scene)

@@ -20,7 +20,7 @@ module emcon_deck_surfaces
    use emcon_text, only : string_t, to_text
    implicit none
    private
-   public :: read_surfaces, get_surfaces, need_facets, refuse_self, surface_names
+   public :: read_surfaces, get_surfaces, need_facets, surface_names
 
    !> Faces of a surface while it grows.
    type :: faces_t
@@ -395,17 +395,6 @@ contains
          quoted(surface%name) // " has TYPE=NODE" // why // "define it by element faces " // &
          "(*SURFACE, TYPE=ELEMENT)")
    end subroutine need_facets
-
-   !> Refuse a surface that is its own master where there are three dimensions: `data%ok` is then
-   !> false.
-   subroutine refuse_self(reader, data, surface)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
-      type(surface_t), intent(in) :: surface
-
-      call data_error(reader, data, "contact of a surface with itself (" // quoted(surface%name) &
-         // ") in three dimensions is not in this version; name two surfaces")
-   end subroutine refuse_self
 
    pure function surface_names(surface) result(list)
       type(surface_t), intent(in) :: surface(:)

@@ -96,11 +96,9 @@ def test_unreadable(tmp_path):
     assert code == 2 and "cannot be read" in messages[0][1]
 
 
-@pytest.mark.parametrize(("n", "words"), [
-    (1, "there is one body, and contact of a body with itself in three dimensions"),
-    (51, "there are 51 bodies, and contact of each with each in three dimensions is for 50 at most")])
-def test_all_exterior_in_space(n, words, tmp_path):
-    """Each body meets each other one: of one, and of very many, that is refused."""
+@pytest.mark.parametrize("n", [1, 120])
+def test_all_exterior_in_space(n, tmp_path):
+    """One surface of all bodies, however many."""
     corner = [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)]
     node = [f"{8*b + k + 1}, {x + 2*b}, {y}, {z}" for b in range(n) for k, (x, y, z) in enumerate(corner)]
     element = [", ".join(map(str, [b + 1, *range(8*b + 1, 8*b + 9)])) for b in range(n)]
@@ -110,7 +108,7 @@ def test_all_exterior_in_space(n, words, tmp_path):
         "*CONTACT INCLUSIONS, ALL EXTERIOR", "*BOUNDARY", "ALL, 1, 3", "*STEP", "*STATIC", "1., 1.",
         "*NODE FILE", "U", "*END STEP", ""]))
     code, messages, shown = check("a.inp", cwd=tmp_path)
-    assert code == 2 and len(messages) == 1 and words in messages[0][1], shown
+    assert code == 0 and not messages, shown
 
 
 @pytest.mark.parametrize("text", ["", "\n\n", "** only a remark\n", " \t\r\n"])

@@ -1,0 +1,158 @@
+!> Which facets a contact point may touch where a surface in space is in contact with itself.
+!>
+!> Points are its nodes, then the middles of some facets. The surface may run over many bodies. As a
+!> point may touch several of them at once, it has a constraint for each class of bodies. Of its own body it never touches the facets around it, nor
+!> those beside them, nor another closed surface, nor what it is behind with the body in between.
+!> Source: docs/theory.md, section 15.
+module emcon_touch_rule_space
+   use emcon_bodies, only : bodies_find_tied
+   use emcon_facets, only : facets_normal, facets_t
+   use emcon_kinds, only : wp
+   use emcon_scene, only : scene_t
+   implicit none
+   private
+   public :: touch_rule_space_t, touch_rule_space_init, touch_rule_space_sees, &
+      touch_rule_space_may, touch_rule_space_is_through
+
+   !> Classes of bodies at most, and with them constraints of a frame.
+   integer, parameter :: most_classes = 4
+   !> Behind a facet by more than this part of the element there, a node of the body is on the other
+   !> side of it: under it, where the way there and the normal have a cosine below this.
+   real(wp), parameter :: through = 0.5_wp, under = -0.5_wp
+
+   type :: touch_rule_space_t
+      logical :: is_self = .false.               !! else any node may touch any facet
+      integer :: n_class = 1
+      integer, allocatable :: body(:)            !! (n_facet)
+      integer, allocatable :: middle(:)          !! facets whose middles are points
+      integer, allocatable :: body_of_point(:)   !! (n_node of the facets + size of `middle`)
+      real(wp), allocatable :: depth(:)          !! (n_facet) of the element behind it [L]
+      logical, allocatable :: is_closed(:)       !! (n_facet) its connected part has no rim
+   end type touch_rule_space_t
+
+contains
+
+   !> The rule for the facets of a surface in contact with itself, whose bodies fall into classes in
+   !> turn.
+   pure subroutine touch_rule_space_init(self, facets, middle, scene)
+      type(touch_rule_space_t), intent(out) :: self
+      type(facets_t), intent(in) :: facets       !! in space
+      integer, intent(in) :: middle(:)           !! facets whose middles are points
+      type(scene_t), intent(in) :: scene
+      integer, allocatable :: body(:)
+      logical, allocatable :: has_rim(:)
+      real(wp), allocatable :: still(:, :)
+      integer :: f, n_body
+
+      self%is_self = .true.
+      call bodies_find_tied(scene, facets%facet, body, n_body)
+      self%body = body(facets%facet(1, :))
+      self%middle = middle
+      self%body_of_point = body([facets%node, facets%facet(1, middle)])
+      self%n_class = max(1, min(n_body, most_classes))
+      allocate(has_rim(facets%n_facet), source=.false.)
+      do f = 1, facets%n_facet
+         if (any(facets%neighbour(:, f) == 0 .and. facets%facet(:, f) > 0)) &
+            has_rim(facets%part(f)) = .true.
+      end do
+      self%is_closed = .not. has_rim(facets%part)
+      allocate(still, mold=scene%x)
+      still = 0.0_wp
+      self%depth = [(depth_behind(facets, f, scene, still), f = 1, facets%n_facet)]
+   end subroutine touch_rule_space_init
+
+   !> How far the element behind facet `f` reaches behind it in the reference; where there is none,
+   !> as far as the facet is long [L].
+   pure real(wp) function depth_behind(facets, f, scene, still) result(depth)
+      type(facets_t), intent(in) :: facets
+      integer, intent(in) :: f                   !! 1 to n_facet
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: still(:, :)        !! (3, n_node) zeros
+      real(wp) :: normal(3)
+      integer :: k
+
+      depth = sqrt(facets%size(f))
+      if (facets%element(f) == 0) return
+      normal = facets_normal(facets, f, scene%x, still)/facets%size(f)
+      depth = 0.0_wp
+      associate (node => scene%element%node(:, facets%element(f)), first => facets%facet(1, f))
+         do k = 1, size(node)
+            if (node(k) == 0) cycle
+            depth = max(depth, -dot_product(normal, scene%x(:, node(k)) - scene%x(:, first)))
+         end do
+      end associate
+   end function depth_behind
+
+   !> Does a constraint of class `class` look at facet `f`?
+   pure logical function touch_rule_space_sees(self, class, f) result(sees)
+      type(touch_rule_space_t), intent(in) :: self
+      integer, intent(in) :: class               !! 1 to n_class
+      integer, intent(in) :: f                   !! 1 to n_facet
+
+      sees = .true.
+      if (self%n_class > 1) sees = 1 + mod(self%body(f) - 1, self%n_class) == class
+   end function touch_rule_space_sees
+
+   !> May point `i` ever touch facet `f`?
+   pure logical function touch_rule_space_may(self, facets, i, f) result(may)
+      type(touch_rule_space_t), intent(in) :: self
+      type(facets_t), intent(in) :: facets       !! that the rule is for
+      integer, intent(in) :: i                   !! a node, or behind these a middle
+      integer, intent(in) :: f                   !! 1 to n_facet
+      integer :: k
+
+      may = .true.
+      if (.not. self%is_self) return
+      if (self%body_of_point(i) /= self%body(f)) return
+      if (i > size(facets%node)) then
+         may = may_facets_touch(self, facets, self%middle(i - size(facets%node)), f)
+         return
+      end if
+      do k = facets%around_start(i), facets%around_start(i + 1) - 1
+         may = may_facets_touch(self, facets, facets%around(k), f)
+         if (.not. may) return
+      end do
+   end function touch_rule_space_may
+
+   !> May a point of facet `own` of a body touch facet `f` of it?
+   pure logical function may_facets_touch(self, facets, own, f) result(may)
+      type(touch_rule_space_t), intent(in) :: self
+      type(facets_t), intent(in) :: facets
+      integer, intent(in) :: own, f              !! 1 to n_facet
+
+      may = .not. (facets%part(own) /= facets%part(f) .and. self%is_closed(own) .and. &
+         self%is_closed(f))
+      if (may) may = .not. shares_a_node(facets, own, f)
+   end function may_facets_touch
+
+   !> Have two facets a node in common?
+   pure logical function shares_a_node(facets, f, g) result(shares)
+      type(facets_t), intent(in) :: facets
+      integer, intent(in) :: f, g
+      integer :: k
+
+      shares = .false.
+      do k = 1, size(facets%facet, 1)
+         if (facets%facet(k, f) == 0) return
+         shares = any(facets%facet(:, g) == facets%facet(k, f))
+         if (shares) return
+      end do
+   end function shares_a_node
+
+   !> Is point `i` on the other side of its own body, seen from facet `f`?
+   pure logical function touch_rule_space_is_through(self, i, f, normal, way) result(is_through)
+      type(touch_rule_space_t), intent(in) :: self
+      integer, intent(in) :: i                   !! as in `touch_rule_space_may`
+      integer, intent(in) :: f                   !! 1 to n_facet
+      real(wp), intent(in) :: normal(3)          !! of it or a part of it, of length 1, outwards
+      real(wp), intent(in) :: way(3)             !! from its nearest place to the node [L]
+      real(wp) :: distance
+
+      is_through = .false.
+      if (.not. self%is_self) return
+      if (self%body_of_point(i) /= self%body(f)) return
+      distance = sqrt(dot_product(way, way))
+      is_through = distance > through*self%depth(f) .and. dot_product(way, normal) < under*distance
+   end function touch_rule_space_is_through
+
+end module emcon_touch_rule_space
