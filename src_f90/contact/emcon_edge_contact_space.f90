@@ -29,7 +29,7 @@ module emcon_edge_contact_space
    !> The sine of the angle between edges below which they run along each other, and nodes hold.
    real(wp), parameter :: least_sine = 1.0e-2_wp
    !> An edge holds what comes from between its faces, and from so much outside: the sine of that
-   !> angle by the sine of the angle between the faces. Edges that lie on faces would be on the limit.
+   !> angle by the sine of that between the faces. Edges that lie on faces would be on the limit.
    real(wp), parameter :: beside = 0.25_wp
    !> So far past its end, by its length, an edge begins to hold, and goes on to hold.
    real(wp), parameter :: begins_beyond = 1.0e-3_wp, ends_beyond = 0.05_wp
@@ -44,7 +44,7 @@ module emcon_edge_contact_space
 
    type, extends(contact_t) :: edge_contact_t
       logical :: is_self = .false.                    !! of a surface with itself
-      logical :: is_exchanged = .false.               !! the edges below are the master's, of the pair
+      logical :: is_exchanged = .false.               !! the edges below are the pair's master's
       type(sharp_edges_t) :: slave
       type(sharp_edges_t), allocatable :: master      !! gfortran 12 loses a second one of its kind
       integer, allocatable :: class(:)                !! (n of the master) 1 to n_class

@@ -370,8 +370,8 @@ contains
 
    end subroutine spread_to_nodes
 
-   !> As `contact_t` has it: what of the facets at its point faces along each frame. At the corner of
-   !> a body each face is that of its own frame alone.
+   !> As `contact_t` has it: what of the facets at its point faces along each frame. At the corner
+   !> of a body each face is that of its own frame alone.
    pure subroutine patch_area(self, x, u, area, length)
       class(patch_contact_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
@@ -381,8 +381,9 @@ contains
 
       associate (frames => self%sides%frames)
          do i = 1, self%n_constraint
-            area(i) = facets_point_area(self%sides%slave, frames%middle, frames%point(self%frame(i)), &
-               frame_normal(frames, self%frame(i), self%node(i), x, u), x, u)
+            area(i) = facets_point_area(self%sides%slave, frames%middle, &
+               frames%point(self%frame(i)), frame_normal(frames, self%frame(i), self%node(i), x, &
+               u), x, u)
          end do
       end associate
       length = area/self%thickness

@@ -14,8 +14,8 @@ module emcon_patch_sides_space
    use emcon_touch_rule_space, only : touch_rule_space_t
    implicit none
    private
-   public :: point_frames_t, point_frames_init, patch_triangles_t, patch_triangles_init, patch_sides_t
-   public :: sides_point, frame_normal
+   public :: point_frames_t, point_frames_init, patch_triangles_t, patch_triangles_init, &
+      patch_sides_t, sides_point, frame_normal
 
    !> The second vector of a frame is turned by 60 degrees: the patch is an equilateral triangle.
    real(wp), parameter :: turn(2) = [0.5_wp, 0.5_wp*sqrt(3.0_wp)]
@@ -146,8 +146,8 @@ contains
                groups%start(g + 1) - 1), groups%ring(groups%ring_start(g): &
                groups%ring_start(g + 1) - 1))
          end do
-         if (last > first) call add_frame(self, facets, x, still, i, groups%facet(groups%start(first): &
-            groups%start(last + 1) - 1), unique_sorted(groups%ring(groups%ring_start(first): &
+         if (last > first) call add_frame(self, facets, x, still, i, &
+            groups%facet(groups%start(first):groups%start(last + 1) - 1), unique_sorted(groups%ring(groups%ring_start(first): &
             groups%ring_start(last + 1) - 1)))
       end associate
       associate (around => facets%around(facets%around_start(i):facets%around_start(i + 1) - 1))
@@ -168,7 +168,8 @@ contains
 
       self%size(i) = facets_length(facets, f)
       self%area(i) = facets%size(f)/real(count(facets%corner(:, f) > 0), wp)
-      call add_frame(self, facets, x, still, i, [f], pack(facets%corner(:, f), facets%corner(:, f) > 0))
+      call add_frame(self, facets, x, still, i, [f], pack(facets%corner(:, f), &
+         facets%corner(:, f) > 0))
    end subroutine add_centre
 
    !> Add the frame of the facets `facet` at point `i`, if they have a mean normal: docs/theory.md,

@@ -36,7 +36,7 @@ module emcon_patch_stencil_space
       real(wp) :: deepest = 0.0_wp               !! farther behind is another side of the body [L]
       integer :: n_node = 0
       integer :: n_slave = 0                     !! nodes 1..n_slave are of the frame
-      integer :: n_origin = 0                    !! of these that its point is a sum of; 0: it is one
+      integer :: n_origin = 0                    !! of these that its point is a sum of; 0: is one
       real(wp) :: origin(max_face_nodes) = 0.0_wp   !! their weights in it
       integer, allocatable :: point(:)           !! (>= n_vertex) of the master; < 0: of a flange
       integer, allocatable :: node(:)            !! (>= n_node) the slave node, then others
@@ -85,8 +85,8 @@ contains
       call make_patch(self, sides, frame, near, normal, x, u)
    end subroutine patch_stencil_choose
 
-   !> Where the triangles of facets are, from contact point `i` of the slave. Those that it is on the
-   !> other side of face nothing.
+   !> Where the triangles of facets are, from contact point `i` of the slave. Those that it is on
+   !> the other side of face nothing.
    pure subroutine look_around(sides, i, facet, x, u, near)
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: i, facet(:)

@@ -1,8 +1,9 @@
 !> Which facets a contact point may touch where a surface in space is in contact with itself.
 !>
 !> Points are its nodes, then the middles of some facets. The surface may run over many bodies. As a
-!> point may touch several of them at once, it has a constraint for each class of bodies. Of its own body it never touches the facets around it, nor
-!> those beside them, nor another closed surface, nor what it is behind with the body in between.
+!> point may touch several of them at once, it has a constraint for each class of bodies. Of its own
+!> body it never touches the facets around it, nor those beside them, nor another closed surface,
+!> nor what it is behind with the body in between.
 !> Source: docs/theory.md, section 15.
 module emcon_touch_rule_space
    use emcon_bodies, only : bodies_find_tied
