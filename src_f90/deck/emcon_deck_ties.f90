@@ -9,6 +9,7 @@ module emcon_deck_ties
    use emcon_deck_surfaces, only : get_surfaces, need_facets
    use emcon_diagnostics, only : add_warning, quoted
    use emcon_interactions, only : pair_is_reverse_of, pressure_tied
+   use emcon_mesh, only : surface_t
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_scene, only : scene_t, where_text
    implicit none
@@ -147,7 +148,7 @@ contains
       end if
       do side = 1, 2
          i = merge(tie%slave, tie%master, side == 1)
-         if (side == 1 .and. reader%n_dim == n_space .and. scene%surface(i)%is_nodal) then
+         if (side == 1 .and. reader%n_dim == n_space .and. has_nodes(scene%surface(i))) then
             call data_warning(reader, data, "slave surface " // quoted(scene%surface(i)%name) // &
                " has TYPE=NODE: its nodes are tied one by one, and a uniform stress does not " // &
                "pass exactly; with element faces it would")
@@ -157,6 +158,14 @@ contains
             ", but ties are integrated over faces; ")
       end do
    end subroutine check_sides
+
+   !> Is a surface one of nodes?
+   pure logical function has_nodes(surface)
+      type(surface_t), intent(in) :: surface
+
+      has_nodes = allocated(surface%node)
+      if (has_nodes) has_nodes = size(surface%node) > 0
+   end function has_nodes
 
    !> The last of `tie` must not be there already, in either order.
    subroutine check_repeated(reader, data, scene, tie, tie_of)

@@ -2,47 +2,86 @@
 !>
 !> Source: docs/theory.md, section 11.10.
 module emcon_tie_basket_space
-   use emcon_facets, only : facets_rim, facets_t
+   use emcon_facets, only : facets_normal, facets_rim, facets_t
    use emcon_kinds, only : wp
    use emcon_rotation, only : cross_product
    implicit none
    private
-   public :: tie_basket_find
+   public :: tie_basket_find, tie_basket_release, tie_basket_edges
 
    !> Places are on one line if a triangle of them has less than this part of the square of its
    !> longest side as its area.
    real(wp), parameter :: thin = 1.0e-3_wp
+   !> Facets have an edge between them if the cosine of their turn is less: of 60 degrees.
+   real(wp), parameter :: edge = 0.5_wp
 
 contains
 
    !> On the rim of the slave surface nodes have none that take part in another tie too, or that are
-   !> held in a direction in which one beside them is not. A connected part that would keep less
-   !> than three nodes that are not on one line, and so could turn about them, keeps all it has.
+   !> held in a direction in which one beside them is not.
    pure subroutine tie_basket_find(slave, x, n_tie, is_held, is_kept)
       type(facets_t), intent(in) :: slave
       real(wp), intent(in) :: x(:, :)                    !! (3, n_node of the scene) [L]
       integer, intent(in) :: n_tie(:)                    !! (n_node of the scene) ties of each
       logical, intent(in) :: is_held(:, :)               !! (3, n_node of the scene)
       logical, allocatable, intent(out) :: is_kept(:)    !! (n_node of the surface)
-      logical :: is_rim(size(slave%node)), is_part(size(slave%node))
-      integer :: k, p
+      logical :: is_rim(size(slave%node)), is_free(size(slave%node))
+      integer :: k
 
       call facets_rim(slave, is_rim)
-      allocate(is_kept(size(slave%node)), source=.true.)
-      do k = 1, size(is_kept)
-         if (.not. is_rim(k)) cycle
-         is_kept(k) = n_tie(slave%node(k)) == 1 .and. .not. is_held_alone(slave, k, is_held)
+      do k = 1, size(is_rim)
+         is_free(k) = is_rim(k)
+         if (is_free(k)) is_free(k) = n_tie(slave%node(k)) > 1 .or. &
+            is_held_alone(slave, k, is_held)
       end do
+      allocate(is_kept(size(slave%node)), source=.true.)
+      call tie_basket_release(slave, x, is_free, is_kept)
+   end subroutine tie_basket_find
+
+   !> Take the multipliers of nodes. A connected part that would keep less than three nodes that are
+   !> not on one line, and so could turn about them, keeps what it has.
+   pure subroutine tie_basket_release(slave, x, is_free, is_kept)
+      type(facets_t), intent(in) :: slave
+      real(wp), intent(in) :: x(:, :)                    !! (3, n_node of the scene) [L]
+      logical, intent(in) :: is_free(:)                  !! (n_node of the surface) to be taken
+      logical, intent(inout) :: is_kept(:)               !! (n_node of the surface)
+      logical :: is_part(size(is_free))
+      integer :: k, p
+
       do p = 1, maxval(slave%part)
          is_part = .false.
          do k = 1, slave%n_facet
             if (slave%part(k) == p) is_part(pack(slave%corner(:, k), slave%corner(:, k) > 0)) &
                = .true.
          end do
-         if (.not. span_a_plane(x(:, pack(slave%node, is_part .and. is_kept)))) &
-            is_kept = is_kept .or. is_part
+         if (span_a_plane(x(:, pack(slave%node, is_part .and. is_kept .and. .not. is_free)))) &
+            is_kept = is_kept .and. .not. (is_part .and. is_free)
       end do
-   end subroutine tie_basket_find
+   end subroutine tie_basket_release
+
+   !> At which nodes do facets beside each other turn by more than 60 degrees?
+   pure subroutine tie_basket_edges(slave, x, is_edge)
+      type(facets_t), intent(in) :: slave
+      real(wp), intent(in) :: x(:, :)                    !! (3, n_node of the scene) [L]
+      logical, intent(out) :: is_edge(:)                 !! (n_node of the surface)
+      real(wp) :: normal(3, slave%n_facet), still(size(x, 1), size(x, 2))
+      integer :: f, g, k, n
+
+      still = 0.0_wp
+      do f = 1, slave%n_facet
+         normal(:, f) = facets_normal(slave, f, x, still)
+      end do
+      is_edge = .false.
+      do f = 1, slave%n_facet
+         n = count(slave%corner(:, f) > 0)
+         do k = 1, n
+            g = slave%neighbour(k, f)
+            if (g == 0) cycle
+            if (dot_product(normal(:, f), normal(:, g)) < edge*norm2(normal(:, f)) &
+               *norm2(normal(:, g))) is_edge(slave%corner([k, 1 + mod(k, n)], f)) = .true.
+         end do
+      end do
+   end subroutine tie_basket_edges
 
    !> Is a node held in a direction in which another one of its facets is not?
    pure logical function is_held_alone(slave, k, is_held)

@@ -32,8 +32,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       associate (slave => sides%slave%facets, master => sides%master%facets)
-         call raise_shared(scene, tie, [merge(size(slave%node), slave%n_facet, &
-            scene%surface(tie%slave)%is_nodal), master%n_facet], slave%node, master%node, error)
+         call raise_shared(scene, tie, [size(slave%node), master%n_facet], slave%node, &
+            master%node, error)
       end associate
    end subroutine tie_check_sides
 

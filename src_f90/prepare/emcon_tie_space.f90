@@ -7,12 +7,12 @@ module emcon_tie_space
    use emcon_errors, only : error_t
    use emcon_facets, only : facets_t
    use emcon_interactions, only : multiplier_dual
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : dp, wp
    use emcon_nearest_space, only : nearest_t
    use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
-   use emcon_sort, only : sort_order
-   use emcon_tie_basket_space, only : tie_basket_find
+   use emcon_sort, only : find_sorted, sort_order
+   use emcon_tie_basket_space, only : tie_basket_edges, tie_basket_find, tie_basket_release
    use emcon_tie_cells_space, only : tie_cells_find, tie_cells_t
    use emcon_tie_check_space, only : tie_check_cover, tie_check_nodes, tie_check_sides
    use emcon_tie_multipliers_space, only : tie_multipliers_find, tie_multipliers_t
@@ -52,14 +52,14 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(tie_sides_t) :: sides
       type(tie_cells_t), allocatable :: cells(:)
-      logical, allocatable :: is_kept(:)
+      logical, allocatable :: is_kept(:), is_edge(:)
       integer :: f
 
       call tie_sides_init(sides, scene, tie, error)
       if (.not. allocated(error)) call tie_check_sides(scene, tie, sides, error)
       if (.not. allocated(error)) call tie_check_nodes(scene, tie, sides, error)
       if (allocated(error)) return
-      if (scene%surface(tie%slave)%is_nodal) then
+      if (sides%slave%facets%n_facet == 0) then
          call find_node_rows(sides, rows)
          return
       end if
@@ -71,8 +71,51 @@ contains
       if (allocated(error)) return
       call tie_basket_find(sides%slave%facets, scene%x, n_tie, is_held, is_kept)
       call find_rows(sides, cells, is_kept, tie%multiplier == multiplier_dual, rows)
+      associate (slave => sides%slave%facets)
+         allocate(is_edge(size(slave%node)))
+         call tie_basket_edges(slave, scene%x, is_edge)
+         if (any(is_edge)) then
+            call spare_matching(slave, rows, is_edge)
+            call tie_basket_release(slave, scene%x, is_edge, is_kept)
+            call find_rows(sides, cells, is_kept, tie%multiplier == multiplier_dual, rows)
+         end if
+      end associate
       call find_covered(sides%master, cells, rows)
    end subroutine tie_measure_space
+
+   !> Nodes are left out of `is_edge` if the meshes match around them: at all nodes of their facets
+   !> rows say the same of both sides. They are one with those of the master.
+   pure subroutine spare_matching(slave, rows, is_edge)
+      type(facets_t), intent(in) :: slave
+      type(tie_rows_t), intent(in) :: rows
+      logical, intent(inout) :: is_edge(:)       !! (node of the slave)
+      real(wp), allocatable :: own(:), other(:)
+      logical :: matches(0:size(is_edge))
+      integer :: k, i
+
+      matches = .false.
+      matches(0) = .true.                        ! behind the last node of a facet
+      do k = 1, size(rows%slave)
+         associate (node => rows%node(rows%start(k) + 1:rows%start(k + 1)), &
+               weight => rows%weight(rows%start(k) + 1:rows%start(k + 1)))
+            associate (is_own => [(find_sorted(slave%node, node(i)) > 0, i = 1, size(node))])
+               own = pack(weight, is_own)
+               other = pack(-weight, .not. is_own)
+            end associate
+         end associate
+         if (size(own) /= size(other)) cycle
+         own = own(sort_order(real(own, dp)))
+         other = other(sort_order(real(other, dp)))
+         matches(find_sorted(slave%node, rows%slave(k))) = all(abs(own - other) <= &
+            rounding*rows%size(k))
+      end do
+      do k = 1, size(is_edge)
+         associate (around => slave%around(slave%around_start(k):slave%around_start(k + 1) - 1))
+            is_edge(k) = is_edge(k) .and. .not. all(matches(reshape(slave%corner(:, around), &
+               [size(around)*size(slave%corner, 1)])))
+         end associate
+      end do
+   end subroutine spare_matching
 
    !> Each slave node at the place of the master nearest to it, as shape functions interpolate: such
    !> a row is as large as the facet of that place.
@@ -108,7 +151,7 @@ contains
       type(tie_cells_t), intent(in) :: cells(:)
       logical, intent(in) :: is_kept(:)          !! (node of the slave)
       logical, intent(in) :: is_dual
-      type(tie_rows_t), intent(inout) :: rows
+      type(tie_rows_t), intent(out) :: rows
       type(tie_multipliers_t) :: multipliers
       type(entries_t) :: entries
       real(wp) :: length(size(is_kept))          !! int psi_k

@@ -34,7 +34,7 @@ contains
    pure subroutine raise_shared(scene, tie, n_facet, slave, master, error)
       type(scene_t), intent(in) :: scene
       type(tie_t), intent(in) :: tie
-      integer, intent(in) :: n_facet(2)          !! of the slave, of the master
+      integer, intent(in) :: n_facet(2)          !! or nodes, of the slave, of the master
       integer, intent(in) :: slave(:), master(:) !! their nodes, ascending
       type(error_t), allocatable, intent(out) :: error
       type(string_t) :: shared(size(slave))

@@ -9,7 +9,7 @@ import pytest
 from contact_space_scenes import RUBBER, ball, bodies, faces, straight, turned, velocities
 from scene_tools import Deck, Run, run_deck
 from space_mesh import Block
-from tie_space_scenes import (box, eighths, flight, momenta, quarter_shells, shaken, shells, stretch, tied)
+from tie_space_scenes import (box, cube_in_hole, eighths, flight, momenta, quarter_shells, shaken, shells, stretch, tied)
 
 
 def run(text: str, folder: Path, **more: object) -> Run:
@@ -71,6 +71,15 @@ def check_flight(done: Run, blocks: list[Block]) -> None:
     start, end = (momenta(element, x, x + u[i], v[i]) for i in (0, -1))
     # Fields are written in double; the sums have some hundred terms.
     np.testing.assert_allclose(end, start, rtol=0, atol=1e-13*np.abs(start).max())
+
+
+@pytest.mark.parametrize(("cells", "kinds", "slave"), [
+    ((1, 2), ("C3D8", "C3D8"), 2), ((2, 3), ("C3D8", "C3D8"), 1), ((2, 2), ("C3D8", "C3D8"), 2),
+    ((1, 2), ("C3D20", "C3D8"), 2), ((1, 2), ("C3D8", "C3D10"), 2)])
+def test_interface_with_edges(cells, kinds, slave, tmp_path: Path) -> None:
+    """At its edges a constant stress has two tractions: nodes there have no multiplier that both sides share."""
+    text, x = cube_in_hole(cells, kinds, slave)
+    check_stretched(run(text + stretch(x), tmp_path), x)
 
 
 @pytest.mark.parametrize("more", ["", "*CONSTRAINT METHOD, TYPE=SADDLE POINT\n"])

@@ -127,3 +127,17 @@ def quarter_shells(cells: list[tuple[int, int]], kinds: list[str]) -> tuple[str,
 
     blocks = [Block(kinds[0], (1, *cells[0]), place=bent(1.0, 1.3)), Block(kinds[1], (1, *cells[1]), place=bent(1.3, 1.6))]
     return tied(blocks, [(1, 0, 0)], RUBBER)
+
+
+def cube_in_hole(cells: tuple[int, int], kinds: tuple[str, str], slave: int, law: str = ELASTIC) -> tuple[str, np.ndarray]:
+    """A cube in the hole of a larger one: a closed interface with edges. Meshes of (hole, cube), `slave` 1 or 2."""
+    third = [np.array(at)/3 for at in itertools.product(range(3), repeat=3) if at != (1, 1, 1)]
+    outer = Mesh([box(kinds[0], (cells[0],)*3, low, low + 1/3) for low in third])
+    inner = box(kinds[1], (cells[1],)*3, (1/3,)*3, (2/3,)*3)
+    corners = TETRAHEDRON_FACES if outer.kind in ("C3D4", "C3D10") else CUBE_FACES
+    at = [(e, f, outer.x[[nodes[i] - 1 for i in c]]) for e, nodes in enumerate(outer.element, 1) for f, c in enumerate(corners, 1)]
+    hole = [(e, f) for e, f, x in at if np.all(np.abs(x - 0.5) < 1/6 + 1e-9) and
+            np.any(np.all(np.abs(np.abs(x - 0.5) - 1/6) < 1e-9, axis=0) & (np.ptp(x, axis=0) < 1e-9))]
+    text = bodies([outer, inner], [hole, faces(inner)], law)
+    text += f"*TIE, NAME=T\nS{slave}, S{3 - slave}\n"
+    return text, np.vstack([outer.x, inner.x])
