@@ -53,7 +53,8 @@ contains
             scene%pair%formulation == formulation_user)) cycle
          associate (surface => scene%surface(i))
             title = "contact surface " // surface%name
-            call check_rigid(reader, scene, surface, title)
+            if (allocated(surface%wall)) cycle
+            call check_rigid(reader, scene, i, title)
             n_errors = reader%log%n_errors
             call check_free(reader, scene, adjacency, surface, title)
             if (reader%log%n_errors > n_errors) cycle
@@ -81,20 +82,22 @@ contains
       end do
    end subroutine check_mass
 
-   !> Rigid bodies are in no contact in space.
-   subroutine check_rigid(reader, scene, surface, title)
+   !> Rigid bodies are in contact with shapes alone in space.
+   subroutine check_rigid(reader, scene, number, title)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
-      type(surface_t), intent(in) :: surface
+      integer, intent(in) :: number              !! of the surface
       character(len=*), intent(in) :: title
       integer, allocatable :: node(:)
-      integer :: body(size(scene%node%label))
+      integer :: body(size(scene%node%label)), k
 
       if (size(scene%rigid) == 0) return
+      if (all([(scene%pair(k)%slave /= number .or. allocated(scene%surface(scene%pair(k)%master) &
+         %wall), k = 1, size(scene%pair))]) .and. all(scene%pair%master /= number)) return
       call mark_rigid(scene, body)
-      call surface_nodes(scene, surface, node)
+      call surface_nodes(scene, scene%surface(number), node)
       if (all(body(node) == 0)) return
-      call add_error(reader%log, surface%origin, title // " is of rigid body " // &
+      call add_error(reader%log, scene%surface(number)%origin, title // " is of rigid body " // &
          scene%rigid(maxval(body(node)))%name // ": rigid bodies in contact in three dimensions " &
          // "are not in this version; give it a stiff material in place of *RIGID BODY")
    end subroutine check_rigid

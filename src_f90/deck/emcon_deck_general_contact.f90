@@ -144,14 +144,20 @@ contains
       end if
    end subroutine include_pair
 
-   !> Two surfaces, the nodes of both of them held, or one, with itself.
+   !> Two surfaces, the nodes of both of them held, or one, with itself; with a shape, which has no
+   !> nodes, those of the other one.
    subroutine append_pairs(scene, card, surface)
       type(scene_t), intent(inout) :: scene
       type(card_t), intent(in) :: card
       integer, intent(in) :: surface(:)
 
       associate (slave => surface(1), master => surface(size(surface)))
+         if (allocated(scene%surface(slave)%wall)) then
+            call append_pair(scene, card, master, slave, is_reverse=.false.)
+            return
+         end if
          call append_pair(scene, card, slave, master, is_reverse=.false.)
+         if (allocated(scene%surface(master)%wall)) return
          if (slave /= master) call append_pair(scene, card, master, slave, is_reverse=.true.)
       end associate
    end subroutine append_pairs
@@ -167,7 +173,7 @@ contains
       pair%slave = slave
       pair%master = master
       pair%formulation = formulation_nts
-      pair%both_sides = .true.
+      pair%both_sides = .not. allocated(scene%surface(master)%wall)
       pair%is_guarded = .false.
       pair%is_reverse = is_reverse
       scene%pair = [scene%pair, pair]
@@ -214,10 +220,12 @@ contains
       type(scene_t), intent(inout) :: scene
       type(surface_t) :: surface
       integer, allocatable :: body(:)
+      logical, allocatable :: is_wall(:)
       integer :: i, k, n_body, n_before
 
       call bodies_find(scene%element%node, size(scene%node%label), body, n_body)
-      if (n_body == 1) then
+      allocate(is_wall, source=[(allocated(scene%surface(k)%wall), k = 1, size(scene%surface))])
+      if (n_body == 1 .and. .not. any(is_wall)) then
          call card_error(reader, card, "there is one body, and contact of a body with itself in " &
             // "three dimensions is not in this version")
          return
@@ -239,9 +247,13 @@ contains
             surface%element = pack(exterior%element, is_own)
             surface%face = pack(exterior%face, is_own)
          end associate
+         if (size(surface%element) == 0) cycle   ! others meet the shape of its rigid body
          call add_surface(reader, card, surface, scene)
          do k = n_before + 1, size(scene%surface) - 1
             call append_pairs(scene, card, [k, size(scene%surface)])
+         end do
+         do k = 1, n_before
+            if (is_wall(k)) call append_pairs(scene, card, [size(scene%surface), k])
          end do
       end do
    end subroutine include_bodies
