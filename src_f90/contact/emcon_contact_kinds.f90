@@ -13,6 +13,8 @@ submodule (emcon_contact_registry) emcon_contact_kinds
    use emcon_segment, only : segment_init, segment_t
    use emcon_start_gaps_plane, only : start_gaps_plane_init, start_gaps_plane_t
    use emcon_start_gaps_space, only : start_gaps_space_init, start_gaps_space_t
+   use emcon_start_gaps_wall_space, only : start_gaps_wall_init, start_gaps_wall_t
+   use emcon_wall_contact_space, only : wall_contact_init, wall_contact_t
    implicit none
 
    integer, parameter :: n_space = 3
@@ -25,6 +27,7 @@ contains
       type(segment_t), allocatable :: segment
       type(patch_contact_t), allocatable :: patch
       type(edge_contact_t), allocatable :: edges
+      type(wall_contact_t), allocatable :: wall
 
       select case (pair%formulation)
       case (formulation_user)
@@ -36,6 +39,12 @@ contains
          call move_alloc(edges, contact)
          return
       end select
+      if (allocated(scene%surface(pair%master)%wall)) then
+         allocate(wall)
+         call wall_contact_init(wall, scene, pair, error)
+         call move_alloc(wall, contact)
+         return
+      end if
       if (scene%n_dim == n_space) then
          allocate(patch)
          call patch_contact_init(patch, scene, pair, error)
@@ -63,7 +72,14 @@ contains
    module procedure new_start_gaps
       type(start_gaps_plane_t), allocatable :: plane
       type(start_gaps_space_t), allocatable :: space
+      type(start_gaps_wall_t), allocatable :: wall
 
+      if (allocated(scene%surface(pair%master)%wall)) then
+         allocate(wall)
+         call start_gaps_wall_init(wall, scene, pair, error)
+         call move_alloc(wall, gaps)
+         return
+      end if
       if (scene%n_dim == n_space) then
          allocate(space)
          call start_gaps_space_init(space, scene, pair, error)

@@ -16,9 +16,7 @@ module emcon_patch_contact_space
    use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach, &
       pair_has_order
    use emcon_kinds, only : wp
-   use emcon_mesh, only : surface_t
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
-   use emcon_outline_space, only : outline_faces_at
    use emcon_patch_gap_space, only : patch_gap, patch_gap_t, patch_look, patch_look_t
    use emcon_patch_sides_space, only : frame_normal, point_frames_init, patch_sides_t, &
       patch_triangles_init
@@ -26,8 +24,7 @@ module emcon_patch_contact_space
       patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t, where_text
-   use emcon_sort, only : find_sorted, unique_sorted
-   use emcon_text, only : to_text
+   use emcon_slave_faces_space, only : slave_faces_init
    use emcon_touch_rule_space, only : touch_rule_space_init, touch_rule_space_may, &
       touch_rule_space_sees
    implicit none
@@ -76,10 +73,12 @@ contains
       type(contact_pair_t), intent(in) :: pair
       type(error_t), allocatable, intent(out) :: error
       integer :: i
+      logical, allocatable :: is_meant(:)
 
       associate (sides => self%sides)
-         call init_slave(sides, scene, scene%surface(pair%slave), error)
+         call slave_faces_init(sides%slave, scene, scene%surface(pair%slave), is_meant, error)
          if (allocated(error)) return
+         call point_frames_init(sides%frames, sides%slave, scene%x, is_meant)
          if (sides%frames%n == 0) then
             call raise(error, err_input, where_text(scene, scene%surface(pair%slave)%origin) &
                // ": surface " // scene%surface(pair%slave)%name // " has no face with a " // &
@@ -132,43 +131,6 @@ contains
          end do
       end associate
    end function point_items
-
-   !> The slave with its frames; nodes that are named without faces stand on those of elements.
-   subroutine init_slave(sides, scene, surface, error)
-      type(patch_sides_t), intent(inout) :: sides
-      type(scene_t), intent(in) :: scene
-      type(surface_t), intent(in) :: surface
-      type(error_t), allocatable, intent(out) :: error
-      type(surface_t) :: faces
-      integer, allocatable :: named(:)
-      logical :: is_nodal
-      integer :: i
-
-      faces = surface
-      is_nodal = allocated(surface%node) .and. .not. allocated(surface%edge)
-      if (is_nodal .and. allocated(surface%element)) is_nodal = size(surface%element) == 0
-      if (is_nodal) then
-         named = unique_sorted(surface%node)
-         call outline_faces_at(scene, surface%node, faces%edge)
-         deallocate(faces%node)
-      end if
-      call facets_init(sides%slave, scene, faces, error)
-      if (allocated(error)) return
-      if (.not. is_nodal) then
-         call point_frames_init(sides%frames, sides%slave, scene%x, [(.true., i = 1, &
-            size(sides%slave%node))])
-         return
-      end if
-      call point_frames_init(sides%frames, sides%slave, scene%x, [(find_sorted(named, &
-         sides%slave%node(i)) > 0, i = 1, size(sides%slave%node))])
-      do i = 1, size(named)
-         if (find_sorted(sides%slave%node, named(i)) > 0) cycle
-         call raise(error, err_input, where_text(scene, surface%origin) // ": node " // &
-            to_text(scene%node%label(named(i))) // " of surface " // surface%name // &
-            " is on no outer face of an element, which its gap needs; leave it out")
-         return
-      end do
-   end subroutine init_slave
 
    !> No option of a step changes what a gap is made of.
    pure subroutine patch_configure(self, x, options)

@@ -6,7 +6,8 @@ module emcon_patch_sides_space
    use emcon_csr, only : csr_list_users
    use emcon_facet_groups, only : facet_groups_init, facet_groups_t, find_turns, group_angle, &
       ridge_angle
-   use emcon_facet_split, only : facet_split_centre, facet_split_init, facet_split_t
+   use emcon_facet_split, only : facet_split_centre, facet_split_init, &
+      facet_split_middles, facet_split_t
    use emcon_facets, only : facets_length, facets_normal, facets_t
    use emcon_kinds, only : wp
    use emcon_rotation, only : cross_product
@@ -19,13 +20,11 @@ module emcon_patch_sides_space
 
    !> The second vector of a frame is turned by 60 degrees: the patch is an equilateral triangle.
    real(wp), parameter :: turn(2) = [0.5_wp, 0.5_wp*sqrt(3.0_wp)]
-   !> Facets of more nodes have some between their corners.
-   integer, parameter :: most_corners = 4
    !> A mean normal shorter than this, by the area, is none.
    real(wp), parameter :: blunt = 1.0e-2_wp
 
    !> Frames of contact points: the nodes of a surface, then the virtual centres of its facets that
-   !> have nodes between corners. The vectors a and b of a frame, and where its point is from the
+   !> have nodes between corners, as far as these are meant. The vectors a and b of a frame, and where its point is from the
    !> node it is counted from, are sums of weight times (x(ring) - x(base)); lengths of a and b are
    !> as in the reference.
    type :: point_frames_t
@@ -94,13 +93,12 @@ contains
       logical, intent(in) :: is_meant(:)         !! (n_node) it needs frames
       type(facet_groups_t) :: groups
       real(wp), allocatable :: still(:, :)
-      integer :: f, g, i
+      integer :: g, i
 
       call facet_groups_init(groups, facets, x, group_angle)
       allocate(still, mold=x)
       still = 0.0_wp
-      self%middle = pack([(f, f = 1, facets%n_facet)], [(has_middle(facets, f), &
-         f = 1, facets%n_facet)])
+      self%middle = facet_split_middles(facets, is_meant)
       self%base = [facets%node, facets%facet(2, self%middle)]
       associate (n => size(self%base), n_frame => groups%n_group + size(self%base), &
             n_ring => 2*size(groups%ring) + size(facets%facet, 1)*size(self%middle))
@@ -113,23 +111,12 @@ contains
          if (i <= size(facets%node)) then
             if (is_meant(i)) call add_node(self, facets, groups, x, still, i)
          else
-            f = self%middle(i - size(facets%node))
-            if (all(is_meant(pack(facets%corner(:, f), facets%corner(:, f) > 0)))) &
-               call add_centre(self, facets, x, still, i, f)
+            call add_centre(self, facets, x, still, i, self%middle(i - size(facets%node)))
          end if
       end do
       self%n = self%start(size(self%start)) - 1
       self%point = [((i, g = self%start(i), self%start(i + 1) - 1), i = 1, size(self%base))]
    end subroutine point_frames_init
-
-   !> Has facet `f` nodes between its corners? Uniform pressure loads its corners by nothing, or
-   !> pulls at them, where it presses on all nodes and on the virtual centre.
-   pure logical function has_middle(facets, f)
-      type(facets_t), intent(in) :: facets
-      integer, intent(in) :: f                   !! 1 to n_facet
-
-      has_middle = count(facets%facet(:, f) > 0) > most_corners
-   end function has_middle
 
    !> The frames of node `i`.
    pure subroutine add_node(self, facets, groups, x, still, i)

@@ -4,7 +4,7 @@
 !> in. Source: docs/theory.md, section 4.
 module emcon_start_gaps
    use emcon_contact, only : gap_state_t
-   use emcon_facets, only : facets_t
+   use emcon_facets, only : facets_length, facets_t, facets_text
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    implicit none
@@ -28,6 +28,8 @@ module emcon_start_gaps
       real(wp), allocatable :: doubt(:)
    contains
       procedure :: is_connected
+      procedure :: other_size
+      procedure :: other_text
       procedure(nearest_interface), deferred :: nearest
       procedure(measure_interface), deferred :: measure
       procedure(offset_interface), deferred :: offset
@@ -107,5 +109,23 @@ contains
          end associate
       end associate
    end function is_connected
+
+   !> How large what the master has at node `i` is [L].
+   pure real(wp) function other_size(self, i)
+      class(start_gaps_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n
+
+      other_size = facets_length(self%surface(is_master), self%facet(i))
+   end function other_size
+
+   !> What the master has at node `i`, for a message.
+   subroutine other_text(self, i, scene, text)
+      class(start_gaps_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n
+      type(scene_t), intent(in) :: scene
+      character(len=:), allocatable, intent(out) :: text     !! no line ends
+
+      call facets_text(self%surface(is_master), scene, self%facet(i), text)
+   end subroutine other_text
 
 end module emcon_start_gaps

@@ -127,6 +127,9 @@ contains
       call profile_facets(scene, profile)
       is_bare([profile]) = .false.
       is_bare(pack(scene%surface%inner_node, scene%surface%inner_node > 0)) = .false.
+      do i = 1, size(scene%surface)
+         if (allocated(scene%surface(i)%wall)) is_bare(scene%surface(i)%node) = .false.
+      end do
       if (.not. any(is_bare) .or. all(is_bare)) return
       call mark_coupled(scene, 0, is_coupled)
       is_idle = is_bare .and. .not. any(is_coupled, 1)

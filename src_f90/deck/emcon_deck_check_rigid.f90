@@ -1,12 +1,14 @@
 !> Rigid bodies in ties and equations: their nodes follow them already.
 module emcon_deck_check_rigid
    use emcon_deck_check_surfaces, only : mark_nodes
+   use emcon_deck_dimension, only : n_plane
    use emcon_deck_reader, only : reader_t
    use emcon_deck_rigid, only : mark_rigid
    use emcon_diagnostics, only : add_error, label_list
    use emcon_requests, only : output_section_print
    use emcon_scene, only : scene_t
    use emcon_steps, only : prescribed_find
+   use emcon_surface_nodes, only : surface_nodes
    use emcon_text, only : to_text
    implicit none
    private
@@ -93,13 +95,15 @@ contains
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: body(:)             !! (n_node) rigid ones, 0: none
+      integer, allocatable :: node(:)
       integer :: i, k, a
 
       do i = 1, size(scene%surface)
          if (.not. scene%surface(i)%is_profile .or. reader%doubt%rigid) cycle
-         if (any(body([scene%surface(i)%edge]) == 0)) call add_error(reader%log, &
-            scene%surface(i)%origin, "surface " // scene%surface(i)%name // " of TYPE=SEGMENTS " &
-            // "is that of no *RIGID BODY, ANALYTICAL SURFACE=")
+         call surface_nodes(scene, scene%surface(i), node)
+         if (any(body(node) == 0)) call add_error(reader%log, scene%surface(i)%origin, &
+            "surface " // scene%surface(i)%name // " is that of no *RIGID BODY, ANALYTICAL " // &
+            "SURFACE=")
       end do
       do i = 1, size(scene%rigid)
          associate (rigid => scene%rigid(i))
@@ -110,7 +114,8 @@ contains
                call add_error(reader%log, rigid%origin, "rigid body " // rigid%name // " has no " &
                   // "elements, and so no mass: in step " // to_text(k) // " its reference node " &
                   // to_text(scene%node%label(rigid%reference)) // " is not prescribed in all " &
-                  // "degrees of freedom, 1, 2 and 6")
+                  // "degrees of freedom, " // trim(merge("1, 2 and 6", "1 to 6    ", &
+                  scene%n_dim == n_plane)))
                exit
             end do
          end associate

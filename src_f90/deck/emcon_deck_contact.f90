@@ -209,13 +209,18 @@ contains
       end if
    end subroutine read_sides
 
-   !> Where the program may choose: both sides node to surface, if the slave has edges; one of them
-   !> if gaps are integrated. ADJUST speaks of the slave, and so names it.
+   !> Where the program may choose: both sides node to surface, if the slave has edges and the
+   !> master is no shape without nodes; one of them if gaps are integrated. ADJUST speaks of the
+   !> slave, and so names it.
    pure subroutine set_sides(scene, pair)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(inout) :: pair
 
-      if (.not. pair%may_choose .or. pair%slave == 0) return
+      if (.not. pair%may_choose .or. min(pair%slave, pair%master) == 0) return
+      if (allocated(scene%surface(pair%master)%wall)) then
+         pair%may_choose = .false.
+         return
+      end if
       if (pair%formulation == formulation_nts) then
          pair%both_sides = .not. scene%surface(pair%slave)%is_nodal
       end if
@@ -290,6 +295,10 @@ contains
                ", but under SIDES=BOTH its edges are needed too; ")
             call need_facets(reader, data, master, "master surface", &
                "; only the slave surface may, and only under NODE TO SURFACE; ")
+            if (allocated(slave%wall)) call data_error(reader, data, "surface " // slave%name // &
+               " has a shape and no nodes that could be slaves; swap the two")
+            if (allocated(master%wall) .and. pair%both_sides) call data_error(reader, data, &
+               "surface " // master%name // " has a shape and no nodes; leave out SIDES=BOTH")
          end if
       end associate
       if (.not. data%ok) pair%master = 0
@@ -346,6 +355,8 @@ contains
          pair(i)%is_guarded = of_card%is_guarded .and. (has_option(card, "GUARD") .or. &
             pair(i)%interaction%pressure%kind == pressure_hard)
          pair(i)%holds_edges = of_card%holds_edges
+         if (pair(i)%master > 0) pair(i)%is_guarded = pair(i)%is_guarded .and. &
+            .not. allocated(scene%surface(pair(i)%master)%wall)
          pair(i)%initiation = of_card%initiation
          if (pair(i)%interaction%pressure%kind == pressure_tied) call check_tied(reader, card, &
             scene, pair(i))

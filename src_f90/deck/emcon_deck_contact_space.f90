@@ -56,6 +56,7 @@ contains
          if (.not. (in_contact .or. is_tied)) cycle
          associate (surface => scene%surface(i))
             title = trim(merge("contact", "tied   ", in_contact)) // " surface " // surface%name
+            if (allocated(surface%wall)) cycle
             n_errors = reader%log%n_errors
             call check_free(reader, scene, adjacency, surface, title)
             if (reader%log%n_errors > n_errors) cycle

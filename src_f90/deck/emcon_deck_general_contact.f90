@@ -135,14 +135,20 @@ contains
       call append_pairs(scene, data%card, surface)
    end subroutine include_pair
 
-   !> Two surfaces, the nodes of both of them held, or one, with itself.
+   !> Two surfaces, the nodes of both of them held, or one, with itself; with a shape, which has no
+   !> nodes, those of the other one.
    subroutine append_pairs(scene, card, surface)
       type(scene_t), intent(inout) :: scene
       type(card_t), intent(in) :: card
       integer, intent(in) :: surface(:)
 
       associate (slave => surface(1), master => surface(size(surface)))
+         if (allocated(scene%surface(slave)%wall)) then
+            call append_pair(scene, card, master, slave, is_reverse=.false.)
+            return
+         end if
          call append_pair(scene, card, slave, master, is_reverse=.false.)
+         if (allocated(scene%surface(master)%wall)) return
          if (slave /= master) call append_pair(scene, card, master, slave, is_reverse=.true.)
       end associate
    end subroutine append_pairs
@@ -158,7 +164,7 @@ contains
       pair%slave = slave
       pair%master = master
       pair%formulation = formulation_nts
-      pair%both_sides = .true.
+      pair%both_sides = .not. allocated(scene%surface(master)%wall)
       pair%is_guarded = .false.
       pair%is_reverse = is_reverse
       scene%pair = [scene%pair, pair]
@@ -189,7 +195,8 @@ contains
       all = size(scene%surface)
       call append_pairs(scene, card, [all])
       do i = 1, all
-         if (scene%surface(i)%is_profile) call append_pairs(scene, card, [all, i])
+         if (scene%surface(i)%is_profile .or. allocated(scene%surface(i)%wall)) &
+            call append_pairs(scene, card, [all, i])
       end do
    end subroutine include_exterior
 

@@ -411,7 +411,11 @@ contains
                // " may be a label of any instance; write INSTANCE." // field(data, 1) &
                // ", with the name of one")
          end if
-         if (is_profile(card) .and. instance%is_moved) then
+         if (is_wall(card) .and. instance%is_moved) then
+            call add_error(log, origin_of(source, i), card%title // ": a shape in space is not " &
+               // "moved with the instance of a part in this version; define it in the assembly")
+            return
+         else if (is_profile(card) .and. instance%is_moved) then
             call make_profile_line(data, instance, line)
          else
             call make_data_line(self, card, data, instance, line)
@@ -482,7 +486,7 @@ contains
       case ("NSET", "ELSET")
          is_label = i <= n_ends .or. option_place(card%option, "GENERATE") == 0
       case ("SURFACE")
-         is_label = i == 1 .and. .not. is_profile(card)
+         is_label = i == 1 .and. .not. (is_profile(card) .or. is_wall(card))
       case ("EQUATION")                          ! node, degree of freedom, coefficient
          is_label = n > 1 .and. mod(i - 1, n_term) == 0
       case default
@@ -495,6 +499,14 @@ contains
 
       is_profile = card%name == "SURFACE" .and. option_value(card%option, "TYPE") == "SEGMENTS"
    end function is_profile
+
+   !> A shape in space: its lines are coordinates.
+   pure logical function is_wall(card)
+      type(card_text_t), intent(in) :: card
+
+      is_wall = card%name == "SURFACE" .and. any(option_value(card%option, "TYPE") == [ &
+         character(len=10) :: "PLANE", "SPHERE", "REVOLUTION", "CYLINDER"])
+   end function is_wall
 
    !> Does a line name a label that no part can have? It would be one of another instance.
    pure logical function has_stray_label(self, card, data, instance)
@@ -526,7 +538,7 @@ contains
       has_bare_label = .false.
       if (instance%name /= "" .or. self%in_assembly .or. self%has_own) return
       if (all(card%name /= [character(len=17) :: "BOUNDARY", "CLOAD", "DLOAD", "NSET", "ELSET", &
-         "SURFACE", "INITIALCONDITIONS"]) .or. is_profile(card)) return
+         "SURFACE", "INITIALCONDITIONS"]) .or. is_profile(card) .or. is_wall(card)) return
       call read_integer(field(data, 1), label, has_bare_label)
    end function has_bare_label
 

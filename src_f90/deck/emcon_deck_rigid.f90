@@ -116,9 +116,13 @@ contains
          if (.not. reader%doubt%names) call card_error(reader, card, "unknown surface " // &
             quoted(name) // suggestion(name, surface_names(scene%surface)))
       else if (.not. scene%surface(i)%is_profile) then
-         call card_error(reader, card, "surface " // name // " is not of TYPE=SEGMENTS; a " // &
-            "surface of elements becomes rigid with these, by ELSET=")
-      else
+         call card_error(reader, card, "surface " // name // " is not of TYPE=" // &
+            trim(merge("SEGMENTS                             ", &
+            "PLANE, SPHERE, REVOLUTION or CYLINDER", scene%n_dim == n_plane)) // "; a surface " // &
+            "of elements becomes rigid with these, by ELSET=")
+      else if (size(scene%surface(i)%node) > 0) then
+         node = scene%surface(i)%node
+      else if (allocated(scene%surface(i)%edge)) then
          node = reshape(scene%surface(i)%edge, [size(scene%surface(i)%edge)])
          if (scene%surface(i)%inner_node > 0) node = [node, scene%surface(i)%inner_node]
       end if

@@ -3,23 +3,20 @@
 !> Going on from the start, the body is to the right. Nodes behind those of the deck get the labels
 !> that follow the largest one; a *RIGID BODY takes them.
 module emcon_deck_segments_plane
-   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, next_line
+   use emcon_deck_fields, only : data_error, data_open, data_t, next_line
+   use emcon_deck_own_nodes, only : add_own_nodes
    use emcon_deck_reader, only : card_error, card_t, reader_t
-   use emcon_diagnostics, only : quoted
+   use emcon_deck_segment_lines_plane, only : check_arc, get_segment, rounding
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_origin, only : origin_t
    use emcon_scene, only : scene_t
-   use emcon_text, only : to_text, to_upper
    implicit none
    private
    public :: read_segments
 
    !> Edges of an arc span this angle at most: they lie within 4e-5 of its radius.
    real(wp), parameter :: finest = acos(-1.0_wp)/180.0_wp
-   !> Ends of an arc are as far from its centre as each other, and ends of a closed profile are one,
-   !> to this part of that distance and of the extent.
-   real(wp), parameter :: rounding = 1.0e-6_wp
 
 contains
 
@@ -52,28 +49,12 @@ contains
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
       real(wp), allocatable, intent(inout) :: place(:, :)
-      character(len=5) :: word
       real(wp) :: x(4)
-      integer :: k, n
+      logical :: is_arc
 
-      word = to_upper(data%text(data%from(1):data%to(1)))
-      if (data%to(1) - data%from(1) >= len(word)) word = ""
-      n = merge(5, 3, word == "CIRCL")
-      if (all(word /= ["START", "LINE ", "CIRCL"])) then
-         call data_error(reader, data, "expected START, LINE or CIRCL, not " &
-            // quoted(data%text(data%from(1):data%to(1))))
-      else if ((word == "START") .neqv. size(place, 2) == 0) then
-         call data_error(reader, data, "a profile begins with START, and has it once")
-      else if (n == 5) then
-         call check_count(reader, data, n, n, "CIRCL, x, y, xc, yc")
-      else
-         call check_count(reader, data, n, n, trim(word) // ", x, y")
-      end if
-      do k = 2, n
-         if (data%ok) call get_real(reader, data, k, "coordinate", x(k - 1))
-      end do
+      call get_segment(reader, data, size(place, 2) == 0, is_arc, x)
       if (.not. data%ok) return
-      if (n == 5) then
+      if (is_arc) then
          call add_arc(reader, data, x(1:2), x(3:4), place)
          return
       end if
@@ -90,24 +71,14 @@ contains
       type(data_t), intent(inout) :: data
       real(wp), intent(in) :: end(2), centre(2)
       real(wp), allocatable, intent(inout) :: place(:, :)
-      real(wp) :: from(2), to(2), angle, part, radius
+      real(wp) :: from(2), to(2), angle, part
       real(wp), allocatable :: point(:, :)
       integer :: k, n
 
       from = place(:, size(place, 2)) - centre
       to = end - centre
-      radius = norm2(from)
-      if (.not. radius > 0.0_wp .or. abs(norm2(to) - radius) > rounding*radius) then
-         call data_error(reader, data, "the ends of the arc are " // to_text(radius) // " and " &
-            // to_text(norm2(to)) // " from its centre, they have to be as far from it")
-         return
-      end if
-      angle = atan2(from(1)*to(2) - from(2)*to(1), dot_product(from, to))
-      if (abs(angle) <= rounding .or. abs(angle) >= acos(-1.0_wp) - rounding) then
-         call data_error(reader, data, "the arc spans no angle, or half a turn or more; make it " &
-            // "of two")
-         return
-      end if
+      call check_arc(reader, data, from, to, angle)
+      if (.not. data%ok) return
       n = ceiling(abs(angle)/finest)
       allocate(point(2, n))
       do k = 1, n - 1
@@ -125,26 +96,19 @@ contains
       type(origin_t), intent(in) :: origin
       real(wp), intent(in) :: place(:, :)
       type(surface_t), intent(inout) :: surface
-      integer, allocatable :: node(:)
-      integer :: i, n, n_before, last
+      integer, allocatable :: node(:), inner(:)
+      integer :: i, n
 
       n = size(place, 2)
       if (norm2(place(:, n) - place(:, 1)) <= rounding*norm2(maxval(place, 2) &
          - minval(place, 2))) n = n - 1
-      n_before = size(scene%node%label)
-      last = maxval([0, scene%node%label])
-      allocate(node, source=[(n_before + i, i = 1, n)])
-      if (n < size(place, 2)) node = [node, n_before + 1]
+      call add_own_nodes(scene, origin, place(:, :n), node)
+      if (n < size(place, 2)) node = [node, node(1)]
       surface%edge = reshape([(node(i + 1), node(i), i = 1, size(node) - 1)], &
          [2, size(node) - 1])
-      scene%x = reshape([scene%x, place(:, :n)], [2, n_before + n])
-      if (is_straight(place)) then
-         n = n + 1
-         surface%inner_node = n_before + n
-         scene%x = reshape([scene%x, inner_place(place)], [2, n_before + n])
-      end if
-      scene%node%label = [scene%node%label, [(last + i, i = 1, n)]]
-      scene%node%origin = [scene%node%origin, [(origin, i = 1, n)]]
+      if (.not. is_straight(place)) return
+      call add_own_nodes(scene, origin, reshape(inner_place(place), [2, 1]), inner)
+      surface%inner_node = inner(1)
    end subroutine add_nodes
 
    !> Do all points lie on one line? Then they do not tell how the body is turned.

@@ -10,10 +10,12 @@ module emcon_deck_surfaces
    use emcon_deck_reader, only : card_error, card_t, card_warning, n_cards, need_name, &
       option_name, reader_t, refuse_option
    use emcon_deck_segments_plane, only : read_segments
+   use emcon_deck_walls_space, only : read_wall
    use emcon_diagnostics, only : label_list, quoted
    use emcon_kinds, only : wp
-   use emcon_mesh, only : surface_of_lines, surface_of_faces, surface_of_nodes, &
-      surface_of_segments, surface_t
+   use emcon_mesh, only : surface_of_extrusion, surface_of_faces, surface_of_lines, &
+      surface_of_nodes, surface_of_plane, surface_of_revolution, surface_of_segments, &
+      surface_of_sphere, surface_t
    use emcon_name_index, only : name_index_find, name_index_put
    use emcon_options, only : option_default, option_words
    use emcon_scene, only : scene_t, where_text
@@ -76,8 +78,7 @@ contains
 
       n_before = reader%log%n_errors
       allocate(surface%element(0), surface%face(0), surface%node(0))
-      if (any(["CYLINDER      ", "CUTTINGSURFACE", "REVOLUTION    ", "USER          "] &
-         == option_name(card, "TYPE"))) then
+      if (any(["CUTTINGSURFACE", "USER          "] == option_name(card, "TYPE"))) then
          call option_words("surface", known)
          call refuse_option(reader, card, "TYPE", known, "it is not in this version")
          return
@@ -95,6 +96,8 @@ contains
          call read_edges(reader, card, scene, surface)
       case (surface_of_segments)
          call read_segments(reader, card, scene, surface)
+      case (surface_of_plane, surface_of_sphere, surface_of_revolution, surface_of_extrusion)
+         call read_wall(reader, card, kind, scene, surface)
       end select
       n_item = size(surface%element) + size(surface%node)
       if (allocated(surface%edge)) n_item = size(surface%edge, 2)

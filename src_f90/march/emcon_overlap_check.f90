@@ -196,8 +196,10 @@ contains
       logical :: is_apart
 
       self%stray = overlap_t()
+      self%clearance = 0.0_wp
+      if (self%query%has_walls) call self%query%behind_walls(x, u0 + du, overlap)
       if (self%n_piece == 0) return
-      is_apart = .true.
+      is_apart = .not. self%query%has_walls
       call place(self, x, u0, du, tree)
       do p = 1, self%n_piece
          call find_later(self, tree, p, n)
@@ -211,7 +213,6 @@ contains
             is_apart = .false.
          end do
       end do
-      self%clearance = 0.0_wp
       if (is_apart) self%clearance = half_way*least_distance(self)
    end subroutine check_points
 

@@ -224,7 +224,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       class(start_gaps_t), allocatable :: contact
 
-      if (measured%surface(is_slave)%n_facet == 0) return
+      if (measured%surface(is_slave)%n_facet == 0 .or. measured%surface(is_master)%n_facet == 0) &
+         return
       call new_start_gaps(scene, reversed(pair), contact, error)
       if (allocated(error)) return
       call check_sides(scene, reversed(pair), contact, noise, "slave", error)
@@ -277,8 +278,7 @@ contains
       real(wp), intent(in) :: gap                !! over contact%facet(i) [L]
       real(wp), intent(in) :: noise              !! of coordinates [L]
 
-      is_behind = gap < -deepest_overlap &
-         *facets_length(contact%surface(is_master), contact%facet(i))
+      is_behind = gap < -deepest_overlap*contact%other_size(i)
       if (is_behind .or. gap >= -noise .or. contact%surface(is_slave)%n_facet == 0) return
       is_behind = .not. contact%faces(i, scene)
    end function is_behind
@@ -371,7 +371,7 @@ contains
 
       associate (deepest => minloc(contact%state%gap0, dim=1, mask=contact%state%is_over .and. &
             contact%state%gap0 < -limit))
-         call facets_text(contact%surface(is_master), scene, contact%facet(deepest), face)
+         call contact%other_text(deepest, scene, face)
          text = text // "; the deepest, " // to_text(scene%node%label(contact%node(deepest))) // &
             ", is behind " // face
       end associate

@@ -7,8 +7,7 @@
 !> Source: docs/theory.md, section 4.11.
 module emcon_guards
    use emcon_interactions, only : contact_pair_t, formulation_edges, formulation_nts, &
-      formulation_user, &
-      pair_holds_nodes
+      formulation_user, pair_holds_nodes
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
@@ -53,22 +52,25 @@ contains
          if (.not. surface(pair(i)%slave)%is_nodal) call watch(pair, i, .true., known, all, n)
       end do
       guard = all(:n)
-      if (n_dim == n_space) guard = [guard, edges_of(pair)]
+      if (n_dim == n_space) guard = [guard, edges_of(pair, surface)]
    end subroutine guards_find
 
    !> The edges of pairs that hold them; those of a pair with both sides once.
-   pure function edges_of(pair) result(edges)
+   pure function edges_of(pair, surface) result(edges)
       type(contact_pair_t), intent(in) :: pair(:)
+      type(surface_t), intent(in) :: surface(:)
       type(contact_pair_t), allocatable :: edges(:)
+      logical :: has_faces(0:size(surface))
       integer :: i
 
+      has_faces = [.false., (.not. allocated(surface(i)%wall), i = 1, size(surface))]
       edges = pair
       edges%formulation = formulation_edges
       edges%both_sides = .true.
       edges%of_pair = [(i, i = 1, size(pair))]
       edges = pack(edges, pair%holds_edges .and. .not. pair%is_reverse .and. &
          pair%formulation /= formulation_user .and. &
-         min(pair%slave, pair%master) > 0)
+         has_faces(pair%slave) .and. has_faces(pair%master))
    end function edges_of
 
    !> Append the guard of pair `i`, or of it with its sides exchanged, unless there is one.

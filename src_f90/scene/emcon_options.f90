@@ -12,7 +12,9 @@ module emcon_options
       smoothing_hermite, smoothing_none
    use emcon_materials, only : kinematics_corotated, kinematics_linear, kinematics_nonlinear, &
       section_t
-   use emcon_mesh, only : surface_of_lines, surface_of_faces, surface_of_nodes, surface_of_segments
+   use emcon_mesh, only : surface_of_extrusion, surface_of_faces, surface_of_lines, &
+      surface_of_nodes, surface_of_plane, surface_of_revolution, surface_of_segments, &
+      surface_of_sphere
    use emcon_scheme, only : scheme_row_t
    use emcon_scheme_registry, only : n_scheme_row, scheme_energy_momentum, scheme_row, &
       scheme_static
@@ -27,7 +29,7 @@ module emcon_options
    public :: option_row_t, n_option_row, option_row, option_code, option_default, option_refusal, &
       option_models, option_words, option_text
 
-   integer, parameter :: n_plane = 2
+   integer, parameter :: n_plane = 2, n_space = 3
 
    !> One value that an option may have.
    type :: option_row_t
@@ -95,6 +97,14 @@ module emcon_options
       option_row_t("surface", surface_of_lines, "EDGE", "", "", "", n_plane, instead="ELEMENT"), &
       option_row_t("surface", surface_of_segments, "SEGMENTS", "", "", "", n_plane, &
          instead="ELEMENT"), &
+      option_row_t("surface", surface_of_plane, "PLANE", "", "", "", n_space, &
+         instead="SEGMENTS"), &
+      option_row_t("surface", surface_of_sphere, "SPHERE", "", "", "", n_space, &
+         instead="SEGMENTS"), &
+      option_row_t("surface", surface_of_revolution, "REVOLUTION", "", "", "", n_space, &
+         instead="SEGMENTS"), &
+      option_row_t("surface", surface_of_extrusion, "CYLINDER", "", "", "", n_space, &
+         instead="SEGMENTS"), &
       option_row_t("procedure", scheme_static, "STATIC", "", "", ""), &
       option_row_t("procedure", scheme_energy_momentum, "DYNAMIC", "", "", "")]
 
@@ -166,8 +176,12 @@ contains
          row = option_row(i)
          if (row%kind /= kind .or. row%code /= code) cycle
          if (row%n_dim > 0 .and. row%n_dim /= n_dim) then
-            text = trim(row%word) // " is for plane models, and this one has three dimensions" &
-               // "; use " // trim(row%instead)
+            if (row%n_dim == n_plane) then
+               text = " is for plane models, and this one has three dimensions; use "
+            else
+               text = " is for models in three dimensions, and this one is plane; use "
+            end if
+            text = trim(row%word) // text // trim(row%instead)
          else if (n_dim == n_plane .and. .not. (is_flat .or. row%is_axial)) then
             text = trim(row%word) // " is not for solids of revolution; use " // trim(row%instead)
          end if
@@ -179,6 +193,8 @@ contains
       type(option_row_t), intent(in) :: row
       character(len=:), allocatable, intent(out) :: text
 
+      text = "space"
+      if (row%n_dim == n_space) return
       text = "plane"
       if (row%is_axial) text = text // " axial"
       if (row%n_dim == 0) text = text // " space"

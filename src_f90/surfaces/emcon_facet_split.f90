@@ -8,7 +8,11 @@ module emcon_facet_split
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: facet_split_t, facet_split_init, facet_split_place, facet_split_centre
+   public :: facet_split_t, facet_split_init, facet_split_place, facet_split_centre, &
+      facet_split_middles
+
+   !> Facets of more nodes have some between their corners.
+   integer, parameter :: most_corners = 4
 
    !> Points are the nodes of the surface, numbered as `node` of its facets, then centres.
    type :: facet_split_t
@@ -78,6 +82,29 @@ contains
          weight = 1.0_wp/n
       end select
    end function facet_split_centre
+
+   !> The facets with nodes between corners, all of which are meant. Uniform pressure loads the
+   !> corners of one by nothing, or pulls at them, where it presses on all nodes and on the centre.
+   pure function facet_split_middles(facets, is_meant) result(middle)
+      type(facets_t), intent(in) :: facets
+      logical, intent(in) :: is_meant(:)         !! (n_node)
+      integer, allocatable :: middle(:)          !! ascending
+      integer :: f
+
+      middle = pack([(f, f = 1, facets%n_facet)], [(has_middle(f), f = 1, facets%n_facet)])
+
+   contains
+
+      pure logical function has_middle(f)
+         integer, intent(in) :: f
+
+         associate (n => count(facets%facet(:, f) > 0))
+            has_middle = n > most_corners
+            if (has_middle) has_middle = all(is_meant(facets%corner(:n, f)))
+         end associate
+      end function has_middle
+
+   end function facet_split_middles
 
    !> Where all points are at x + u.
    pure subroutine facet_split_place(self, facets, x, u, at)

@@ -54,7 +54,7 @@ contains
       real(wp), intent(out) :: pressure(:)       !! (n) 0 without area
       real(wp), dimension(size(self%node) + size(middle)) :: whole, mean, push, on
       logical :: is_of_quadratic(size(mean))
-      integer :: f, i, k
+      integer :: centre(self%n_facet), f, i
 
       pressure = 0.0_wp
       where (area > 0.0_wp) pressure = force/area
@@ -71,15 +71,15 @@ contains
       end do
       is_of_quadratic = .false.
       mean = 0.0_wp
-      k = 0
+      centre = 0
+      centre(middle) = [(size(self%node) + i, i = 1, size(middle))]
       do f = 1, self%n_facet
          associate (own => nodes_of(self, f), share => self%size(f)/whole(nodes_of(self, f)))
-            if (size(own) <= most_simple) then
+            if (centre(f) == 0) then
                call add_mean(own, share, mean)
             else
-               k = k + 1
-               is_of_quadratic([own, size(self%node) + k]) = .true.
-               call add_mean([own, size(self%node) + k], [share, 1.0_wp], mean)
+               is_of_quadratic([own, centre(f)]) = .true.
+               call add_mean([own, centre(f)], [share, 1.0_wp], mean)
             end if
          end associate
       end do

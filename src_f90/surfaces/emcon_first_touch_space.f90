@@ -8,10 +8,12 @@ module emcon_first_touch_space
    use emcon_errors, only : error_t
    use emcon_facet_split, only : facet_split_init, facet_split_place, facet_split_t
    use emcon_facets, only : facets_init, facets_t
+   use emcon_first_touch_wall_space, only : wall_touch_time
    use emcon_interactions, only : formulation_user
    use emcon_kinds, only : wp
    use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
+   use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
    public :: touch_time
@@ -41,14 +43,21 @@ contains
       real(wp), intent(in) :: x(:, :)            !! (3, n_node) where nodes are [L]
       real(wp), intent(in) :: direction(:, :)    !! (3, n_node) how they move per time [L]
       type(side_t) :: slave, master
+      integer, allocatable :: node(:)
       integer :: i
 
       touch_time = huge(touch_time)
       do i = 1, size(scene%pair)
          if (scene%pair(i)%formulation == formulation_user) cycle   ! it sees all gaps itself
-         call find_side(scene, scene%pair(i)%slave, x, direction, slave)
-         call find_side(scene, scene%pair(i)%master, x, direction, master)
-         associate (offset => scene%pair(i)%interaction%offset)
+         associate (offset => scene%pair(i)%interaction%offset, &
+               other => scene%surface(scene%pair(i)%master))
+            if (allocated(other%wall)) then
+               call surface_nodes(scene, scene%surface(scene%pair(i)%slave), node)
+               touch_time = min(touch_time, wall_touch_time(other%wall, node, x, direction, offset))
+               cycle
+            end if
+            call find_side(scene, scene%pair(i)%slave, x, direction, slave)
+            call find_side(scene, scene%pair(i)%master, x, direction, master)
             call look_at(slave, master, offset, touch_time)
             call look_at(master, slave, offset, touch_time)
          end associate

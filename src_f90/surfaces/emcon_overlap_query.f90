@@ -33,12 +33,14 @@ module emcon_overlap_query
       logical :: is_passing = .false.            !! it is on the way, not at the end of a step
       !> What goes through within a step is found by `pass`, not by looks at equal parts of it.
       logical :: finds_passages = .false.
+      logical :: has_walls = .false.             !! surfaces without facets are looked at too
    contains
       procedure(begin_interface), deferred :: begin
       procedure(longest_interface), deferred :: longest
       procedure(place_interface), deferred :: place
       procedure(overlap_interface), deferred :: overlap
       procedure :: pass
+      procedure :: behind_walls
    end type overlap_query_t
 
    abstract interface
@@ -92,6 +94,16 @@ contains
             unused_u0 => u0, unused_du => du, unused_overlap => overlap)
       end associate
    end subroutine pass
+
+   !> What is behind walls at x + u: nothing, where there are none.
+   pure subroutine behind_walls(self, x, u, overlap)
+      class(overlap_query_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
+      type(overlap_t), intent(inout) :: overlap  !! the deepest so far
+
+      associate (unused_self => self, unused_x => x, unused_u => u, unused_overlap => overlap)
+      end associate
+   end subroutine behind_walls
 
    !> Does the overlap stand on `node`?
    elemental logical function overlap_names(self, node)

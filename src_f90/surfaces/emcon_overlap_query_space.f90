@@ -8,6 +8,7 @@ module emcon_overlap_query_space
    use emcon_outline_space, only : outline_space_init
    use emcon_overlap_query, only : overlap_query_t, overlap_t, passing, passing_thin
    use emcon_overlap_space, only : overlap_space_find, overlap_space_own
+   use emcon_overlap_walls_space, only : overlap_walls_find, overlap_walls_init, overlap_walls_t
    use emcon_passages_space, only : passage_t, passages_find, way_t
    use emcon_scene, only : scene_t
    use emcon_triangles_space, only : triangles_init, triangles_place, triangles_t
@@ -20,12 +21,14 @@ module emcon_overlap_query_space
 
    type, extends(overlap_query_t) :: overlap_query_space_t
       type(triangles_t), allocatable :: piece(:) !! (n_piece)
+      type(overlap_walls_t), allocatable :: wall(:)
    contains
       procedure :: begin => overlap_query_begin
       procedure :: longest => overlap_query_longest
       procedure :: place => overlap_query_place
       procedure :: overlap => overlap_query_one_way
       procedure :: pass => overlap_query_pass
+      procedure :: behind_walls => overlap_query_walls
    end type overlap_query_space_t
 
 contains
@@ -45,6 +48,8 @@ contains
                self%outline%thickness(first:last))
          end associate
       end do
+      call overlap_walls_init(self%wall, scene, self%outline, self%piece)
+      self%has_walls = size(self%wall) > 0
    end subroutine overlap_query_space_init
 
    !> Facets stand for themselves, whatever the options.
@@ -125,6 +130,14 @@ contains
          end do
       end associate
    end subroutine overlap_query_pass
+
+   pure subroutine overlap_query_walls(self, x, u, overlap)
+      class(overlap_query_space_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      type(overlap_t), intent(inout) :: overlap  !! the deepest so far
+
+      call overlap_walls_find(self%wall, x, u, overlap)
+   end subroutine overlap_query_walls
 
    !> The passages of two pieces through each other that may be too deep.
    pure subroutine find_passages(a, b, x, u0, du, passage)

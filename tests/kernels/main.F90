@@ -198,6 +198,7 @@ program main
    use test_quantities, only : collect_quantities
    use test_verdict, only : collect_verdict
    use test_verdict_follow, only : collect_verdict_follow
+   use test_wall_gap, only : collect_wall_gap
    use test_velocity_update, only : collect_velocity_update
    implicit none
 
@@ -327,6 +328,7 @@ program main
    call run("numbering", collect_numbering)
    call run("patch_contact", collect_patch_contact)
    call run("patch_gap", collect_patch_gap)
+   call run("wall_gap", collect_wall_gap)
    call run("outline", collect_outline)
    call run("overlap_boxes", collect_overlap_boxes)
    call run("overlap_plane", collect_overlap_plane)

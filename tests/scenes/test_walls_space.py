@@ -1,0 +1,362 @@
+"""Walls in space: shapes without faces, fixed, driven and free, from outside and inside."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from contact_space_scenes import RUBBER, ball, bodies, dynamic, faces, straight, turned, velocities
+from scene_tools import EPSILON, Run, emcon, run_deck
+from space_mesh import Block
+from wall_space_scenes import FIXED, REFERENCE, cube, falling, pair, plane, sphere, wall
+
+#: Energy and momenta, of the largest of each.
+BALANCE = 1.0e-11
+#: Depths of nodes whose gaps are closed to round-off, per facet.
+DEPTH = 64*EPSILON
+GRAVITY = "*DLOAD\nB1, GRAV, 10., 0., 0., -1.\n"
+#: A body that keeps its shape where it slides: 1 % of its size by waves of its weight at most.
+STIFF = "*HYPERELASTIC, NEO HOOKE\n5e5, 1e-6\n*DENSITY\n1.\n"
+
+DOME = "TYPE=REVOLUTION\n0., 0., -2., 0., 0., 1.\nSTART, 0., 2.\nCIRCL, 2., 0., 0., 0.\n"
+TUBE = "TYPE=REVOLUTION\n0., 0., 0., 0., 0., 1.\nSTART, 1.05, -5.\nLINE, 1.05, 5.\n"
+#: A table with a rounded rim.
+TABLE = "TYPE=REVOLUTION\n0., 0., -2., 0., 0., 1.\nSTART, 0., 2.\nLINE, 0.3, 2.\nCIRCL, 1.3, 1., 0.3, 1.\nLINE, 1.3, -1.\n"
+RAIL = "TYPE=CYLINDER\n0., 0., -1., 1., 0., -1.\n0., 1., -1.\nSTART, -5., 1.\nLINE, 0.2, 1.\nCIRCL, 1.2, 0., 0.2, 0.\nLINE, 1.2, -3.\n"
+CONE = "TYPE=REVOLUTION\n0., 0., -1.06, 0., 0., 1.\nSTART, 0., 1.\nLINE, 3., -0.5\n"
+
+
+def ran(folder: Path, text: str, code: int = 0) -> Run:
+    deck = folder/"deck.inp"
+    deck.write_text(text)
+    return run_deck(deck, folder, code)
+
+
+def refusal(folder: Path, text: str) -> str:
+    deck = folder/"deck.inp"
+    deck.write_text(text)
+    done = emcon(deck, "--quiet", "--output", folder)
+    assert done.returncode == 2, done.stderr
+    return done.stderr
+
+
+def rubber_ball(place: tuple[float, float, float], cells: int = 3) -> Block:
+    return straight(Block("C3D8", (cells,)*3, size=(2, 2, 2),
+                          place=lambda x: ball(x) @ turned(0.15).T + np.array(place)))
+
+
+def moments(run: Run, names: str) -> np.ndarray:
+    return np.array([run.history[name] for name in names.split()]).T
+
+
+def check_balance(run: Run, is_free: bool = False) -> None:
+    """Energy; momentum with the impulse of the wall, or all six; nothing is behind the shape; there was a rebound."""
+    history = run.history
+    assert run.verdict["verdict"] == "good", run.log[-600:]
+    assert np.ptp(history["total"]) <= BALANCE*history["total"].max()
+    p, angular = moments(run, "px py pz"), moments(run, "lx ly lz")
+    push = moments(run, "pair1_impulse_x pair1_impulse_y pair1_impulse_z")
+    size = np.abs(push).max()
+    if is_free:
+        assert np.abs(angular - angular[0]).max() <= BALANCE*max(size, np.abs(angular).max())
+        push = 0.0*push
+    assert np.abs(p - p[0] - push).max() <= 1.0e-12*size
+    assert run.verdict["penetration"] <= DEPTH
+    assert history["cuts"].sum() == 0
+    assert history["active"].max() > 0
+
+
+@pytest.mark.parametrize(("shape", "place", "velocity"), [
+    (plane(), (0., 0., 1.06), (0.6, 0.25, -1.)), (sphere(2., (0., 0., -2.)), (0.3, 0., 1.06), (0., 0.25, -1.)),
+    (sphere(1.1, inside=True), (0., 0., 0.), (0.5, 0.25, -1.)), (DOME, (0.3, 0., 1.06), (0., 0.25, -1.)),
+    (TABLE, (0.2, 0., 1.06), (0.6, 0.25, -1.)), (CONE, (0., 0.2, 1.3), (0.3, 0., -1.)),
+    (TUBE, (0., 0., 0.), (1., 0.25, -1.)), (RAIL, (0.1, 0., 1.06), (0.6, 0.25, -1.))])
+def test_a_ball_bounces_off(shape: str, place: tuple[float, float, float], velocity: tuple[float, float, float],
+                            tmp_path: Path) -> None:
+    check_balance(ran(tmp_path, falling(rubber_ball(place), shape, velocity, (0., 0.4, 1.), until=0.9)))
+
+
+def test_moments_about_axes(tmp_path: Path) -> None:
+    """A wall without friction does not turn a body about an axis of its own: of a sphere all, of a tube its axis."""
+    run = ran(tmp_path, falling(rubber_ball((0.05, 0., 0.)), sphere(1.1, inside=True), (0.5, 0.25, -1.), (0., 0., 1.), until=0.9))
+    assert np.ptp(moments(run, "lx ly lz"), axis=0).max() <= BALANCE
+    run = ran(tmp_path, falling(rubber_ball((0.02, 0., 0.)), TUBE, (1., 0.25, -1.), (0., 0., 1.), until=0.9))
+    assert np.ptp(run.history["lz"]) <= BALANCE
+    assert np.ptp(run.history["pz"]) <= BALANCE
+    assert run.history["active"].max() > 0
+
+
+@pytest.mark.parametrize("angle", [0.0, 0.3])
+def test_a_cube_lands(angle: float, tmp_path: Path) -> None:
+    """Flat, where nothing turns, and on an edge first."""
+    run = ran(tmp_path, falling(cube(gap=0.03 + 0.5*np.sin(angle), turn=turned(angle)), plane(), (0., 0., -1.)))
+    check_balance(run)
+    if angle == 0.0:
+        assert np.ptp(moments(run, "px py lx ly lz"), axis=0).max() <= BALANCE
+
+
+def test_a_plane_is_a_large_face(tmp_path: Path) -> None:
+    """As a fixed mesh of one element: by nodes, or by means over patches, which see how the face of the cube bulges."""
+    block = cube()
+    plate = Block("C3D8", (1, 1, 1), size=(8, 8, 1), place=lambda x: x - np.array([4., 4., 1.]))
+    mesh = (bodies([block, plate], [faces(block), faces(plate, 2, 1)]) + pair(", SIDES=ONE").replace("S1, W", "S1, S2")
+            + velocities(block, (0., 0., -1.), (0., 0., 0.)) + "*BOUNDARY\nN2, 1, 3\n" + dynamic(0.02, 0.6))
+    one = ran(tmp_path, falling(block, plane(), (0., 0., -1.)))
+    other = ran(tmp_path, mesh)
+    assert np.abs(one.history["pz"] - other.history["pz"]).max() < 1.0e-6
+    assert np.ptp(one.history["pz"]) > 1.8
+
+
+@pytest.mark.parametrize("shape", [plane((0., 0., 0.)), sphere(2., (0., 0., -2.)), TABLE, RAIL])
+def test_a_free_wall(shape: str, tmp_path: Path) -> None:
+    """A rigid body with mass and a shape: energy and all six momenta of both."""
+    one = rubber_ball((0.2, 0.1, 1.06))
+    two = Block("C3D8", (2, 2, 2), size=(2, 2, 1), place=lambda x: x - np.array([1., 1., 2.5]))
+    text = bodies([one, two], [faces(one), []]).replace("*SURFACE, NAME=S2\n", "")
+    run = ran(tmp_path, text + wall(shape, (0.1, 0., -0.5), "ELSET=B2, ") + pair()
+              + velocities(one, (0.3, 0.25, -1.), (0., 0.4, 1.)) + dynamic(0.02, 0.9))
+    check_balance(run, is_free=True)
+    assert run.history["active"][-1] == 0
+
+
+def test_a_rigid_body_meets_a_wall(tmp_path: Path) -> None:
+    """Both are rigid: a cube that falls askew onto a plane, and into a bowl."""
+    for shape, gap in ((plane(), 0.3), (sphere(2., (0., 0., 0.5), inside=True), 0.0)):
+        block = cube((1, 1, 1), gap, turned(0.3))
+        text = bodies([block], [faces(block)]) + "*NODE\n80000, 0., 0., 0.8\n*RIGID BODY, ELSET=B1, REF NODE=80000\n" + wall(shape)
+        text += pair() + "*INITIAL CONDITIONS, TYPE=VELOCITY\n" + "".join(
+            f"80000, {a}, {v}\n" for a, v in enumerate((0.4, 0.3, -1., 0.5, 1., 0.2), 1))
+        check_balance(ran(tmp_path, text + f"*BOUNDARY\n{FIXED}" + dynamic(0.01, 1.5)))
+
+
+def test_a_driven_wall(tmp_path: Path) -> None:
+    """What a wall that moves does on a body is all in the ledger."""
+    run = ran(tmp_path, "*AMPLITUDE, NAME=RAMP\n0., 0., 1., .8\n" + falling(
+        cube(), plane(), (0., 0., 0.), support=f"{REFERENCE}, 1, 2\n{REFERENCE}, 4, 6\n",
+        more=f"*BOUNDARY, AMPLITUDE=RAMP\n{REFERENCE}, 3, 3, 1.\n"))
+    history = run.history
+    energy = history["kinetic"] + history["strain"]
+    assert np.abs(history["external_work"] - energy).max() <= BALANCE*energy.max()
+    # The push of the wall times its way: the work of one that does not stop.
+    work = 0.8*np.sum(np.diff(history["pz"]))
+    assert history["external_work"][-1] == pytest.approx(work, rel=1.0e-11)
+    # A bounce: nearly twice the speed of the wall.
+    assert history["pz"][-1] > 1.2
+
+
+def on_sphere(angle: float, radius: float, size: float, inside: bool = False) -> Block:
+    """A small cube whose four lower nodes are on a sphere, away from its top; or from its bottom, inside."""
+    block = Block("C3D8", (1, 1, 1), size=(size,)*3)
+    end = np.sqrt(radius**2 - 0.5*size**2)
+    c, s = np.cos(angle), np.sin(angle)
+    turn = np.array([[c, 0, -s], [0, 1, 0], [s, 0, c]] if inside else [[c, 0, s], [0, 1, 0], [-s, 0, c]])
+    block.x = (block.x - np.array([0.5*size, 0.5*size, 0.]) + np.array([0., 0., -end if inside else end])) @ turn.T
+    return block
+
+
+def test_slides_off_a_sphere(tmp_path: Path) -> None:
+    """A small body that slides down without friction leaves where cos = 2/3, after 48.19 degrees."""
+    start, size = 0.1, 0.01
+    block = on_sphere(start, 1.0, size)
+    radius = np.linalg.norm(block.x.mean(0))
+    arm = radius**2 + size**2/6.0
+    rate = np.array([0., np.sqrt(20.0*radius*(1.0 - np.cos(start))/arm), 0.])
+    run = ran(tmp_path, falling(block, sphere(1.0), tuple(np.cross(rate, block.x.mean(0))), tuple(rate), h=0.002,
+                                until=0.7, law=STIFF, more=GRAVITY))
+    history = run.history
+    last = np.flatnonzero(history["active"] > 0)[-1]
+    assert last + 1 < len(history)
+    height = radius*np.cos(start) - history["external_work"][last:last + 2]/(10.0*size**3)
+    assert np.degrees(np.arccos(height/radius)).mean() == pytest.approx(48.19, abs=0.2)
+    assert np.abs(history["total"] - history["total"][0]).max() <= BALANCE*history["kinetic"].max()
+
+
+def test_bowl_pendulum(tmp_path: Path) -> None:
+    """A small body that swings in a bowl: the period of a pendulum."""
+    size, start, h = 0.02, 0.1, 0.01
+    block = on_sphere(start, 1.0, size, inside=True)
+    radius = np.linalg.norm(block.x.mean(0))
+    run = ran(tmp_path, falling(block, sphere(1.0, inside=True), (0., 0., 0.), h=h, until=2.1, law=STIFF, more=GRAVITY))
+    time, p = run.history["time"], run.history["px"]
+    k = np.flatnonzero(p[1:-1]*p[2:] < 0.0) + 1
+    turns = time[k] - p[k]*(time[k + 1] - time[k])/(p[k + 1] - p[k])
+    period = 2.0*np.pi*np.sqrt((radius**2 + size**2/6.0)/(10.0*radius))*(1.0 + start**2/16.0)
+    assert turns[1] == pytest.approx(period, rel=2.0e-3)
+    assert run.history["active"][1:].min() == 4
+
+
+def indented(cells: int) -> tuple[str, float]:
+    """A quarter of a block of size 2, finer towards the place where a rigid sphere of radius 1 is pressed in; the force."""
+    by, e, nu = 0.01, 1000.0, 0.3
+
+    def grade(x: np.ndarray) -> np.ndarray:
+        y = 2.0*x**2.2
+        y[:, 2] = -2.0*(1.0 - x[:, 2])**2.2
+        return y
+
+    block = Block("C3D8", (cells,)*3, place=grade)
+    text = bodies([block], [faces(block, 2, 1)], f"*ELASTIC\n{e}, {nu}\n")
+    for name, axis in (("LEFT", 0), ("FRONT", 1), ("BOTTOM", 2)):
+        text += f"*NSET, NSET={name}\n" + "".join(f"{k}\n" for k in block.on(axis, 0))
+    text += wall(sphere(1.0, (0., 0., 1.)), (0., 0., 2.5)) + pair() + "*BOUNDARY\nLEFT, 1\nFRONT, 2\nBOTTOM, 1, 3\n"
+    text += f"{REFERENCE}, 1, 2\n{REFERENCE}, 4, 6\n*STEP, NLGEOM\n*STATIC, DIRECT\n.5, 1.\n*BOUNDARY\n{REFERENCE}, 3, 3, {-by}\n"
+    return text + "*NODE FILE\nU\n*END STEP\n", e/(1.0 - nu**2)/3.0*by**1.5
+
+
+def test_hertz(tmp_path: Path) -> None:
+    """A rigid sphere pressed into an elastic block: the force of Hertz, on a mesh with five elements in the contact's radius.
+
+    Off by 7.5 % there, by 4.5 % with twelve elements, of the first a twelfth of the radius."""
+    text, force = indented(8)
+    run = ran(tmp_path, text)
+    assert run.verdict["verdict"] == "good"
+    assert -run.history["pair1_force_z"][-1] == pytest.approx(force, rel=0.09)
+
+
+def test_pin_in_a_hole(tmp_path: Path) -> None:
+    """Too large by .2 %: its nodes come to the hole itself, and the pressure is that of a disc in plane strain."""
+    radius, e, nu = 1.002, 1000.0, 0.3
+
+    def disc(x: np.ndarray) -> np.ndarray:
+        p = x[:, :2] - 1.0
+        most, length = np.abs(p).max(1)[:, None], np.linalg.norm(p, axis=1)[:, None]
+        length[length == 0.0] = 1.0
+        return np.hstack([radius*(0.7*(1.0 - most)*p + most*most/length*p), x[:, 2:]])
+
+    block = Block("C3D8", (4, 4, 1), size=(2, 2, 1), place=disc)
+    text = bodies([block], [faces(block)], f"*ELASTIC\n{e}, {nu}\n") + "*NSET, NSET=ENDS\n"
+    text += "".join(f"{k}\n" for k in [*block.on(2, 0), *block.on(2, 1)])
+    text += wall("TYPE=REVOLUTION\n0., 0., 0., 0., 0., 1.\nSTART, 1., -5.\nLINE, 1., 5.\n") + pair()
+    text += f"*BOUNDARY\nENDS, 3\n{FIXED}*STEP\n*STATIC, DIRECT\n.5, 1.\n*CONTACT INTERFERENCE, SHRINK\nS1, W\n"
+    fields = ran(tmp_path, text + "*NODE FILE\nU\n*CONTACT FILE\nCF, CSTRESS\n*END STEP\n").fields()
+    n = len(block.x)
+    rim = np.flatnonzero(np.abs(np.linalg.norm(block.x[:, :2], axis=1) - radius) < 1.0e-9)
+    at = (fields.x + fields["displacement"][-1])[:n][rim]
+    assert np.abs(np.linalg.norm(at[:, :2], axis=1) - 1.0).max() <= DEPTH
+    pressure = np.array(fields["contact_pressure"][-1]).ravel()[:n][rim]
+    assert pressure == pytest.approx((radius - 1.0)/radius*e/((1.0 + nu)*(1.0 - 2.0*nu)), rel=0.04)
+    force = np.array(fields["contact_force"][-1])[:n][rim]
+    assert np.abs(force[:, 0]*at[:, 1] - force[:, 1]*at[:, 0]).max() <= 1.0e-12
+    assert np.abs(force[:, 2]).max() <= 1.0e-12
+
+
+@pytest.mark.parametrize("size", [1.0e-6, 1.0e6])
+def test_units(size: float, tmp_path: Path) -> None:
+    """The same in other units of length."""
+    block = Block("C3D8", (2, 2, 2), place=lambda x: (x + np.array([0., 0., 0.03]))*size)
+    law = f"*HYPERELASTIC, NEO HOOKE\n{40*size**2!r}, {0.01/size**2!r}\n*DENSITY\n1.\n"
+    run = ran(tmp_path, falling(block, plane(), (0., 0., -size), law=law).replace("0.0, 0.0, -3.0", f"0., 0., {-size!r}"))
+    check_balance(run)
+    other = ran(tmp_path, falling(cube(), plane(), (0., 0., -1.)))
+    assert run.history["pz"]/size**4 == pytest.approx(other.history["pz"], rel=1.0e-9, abs=1.0e-9)
+
+
+def test_a_corner_of_two_walls(tmp_path: Path) -> None:
+    """Two planes hold the nodes on their common line together."""
+    block = Block("C3D8", (2, 2, 2), place=lambda x: x + np.array([0.1, 0., 0.1]))
+    other = f"*NODE\n91000, -3., 0., 0.\n*SURFACE, NAME=W2, {plane((0., 0., 0.), (1., 0., 0.))}"
+    text = falling(block, plane(), (-1., 0.1, -1.), until=1., support=f"{FIXED}91000, ENCASTRE\n").replace(
+        pair(), f"{other}*RIGID BODY, ANALYTICAL SURFACE=W2, REF NODE=91000\n{pair()}S1, W2\n")
+    history = ran(tmp_path, text).history
+    assert np.ptp(history["total"]) <= BALANCE*history["total"].max()
+    assert np.ptp(history["py"]) <= BALANCE
+    assert history["pair1_active"].max() == history["pair2_active"].max() == 9
+    assert history["active"][-1] == 0
+
+
+def test_over_a_sharp_edge(tmp_path: Path) -> None:
+    """A cube slides over the edge of a table, in steps of a fifth of its size, tips and falls."""
+    table = "TYPE=CYLINDER\n0., 0., 0., 1., 0., 0.\n0., 1., 0.\nSTART, -5., 0.\nLINE, .2, 0.\nLINE, .2, -5.\n"
+    run = ran(tmp_path, falling(cube(gap=0.01), table, (2., 0.2, -.2), h=0.1, until=1.2, more=GRAVITY))
+    total = run.history["total"] + 0.0
+    assert run.verdict["verdict"] == "good"
+    assert np.ptp(total) <= BALANCE*(run.history["kinetic"].max() + run.history["external_work"].max())
+    assert run.history["active"].max() >= 6
+
+
+def test_penalty(tmp_path: Path) -> None:
+    """A pressure by the overclosure stores what it takes; a uniform one is uniform at all nodes of a flat face."""
+    law = "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1e4\n"
+    run = ran(tmp_path, falling(cube(), plane(), (0., 0., -1.), interaction=law))
+    assert run.verdict["verdict"] == "good"
+    assert np.ptp(run.history["total"]) <= BALANCE*run.history["total"].max()
+    assert run.history["active"][-1] == 0
+    block = cube((2, 3, 1), 0.0)
+    text = bodies([block], [faces(block)], "*ELASTIC\n1000., 0.\n") + wall(plane()) + pair("", law)
+    text += "*NSET, NSET=TOP\n" + "".join(f"{k}\n" for k in block.on(2, 1))
+    text += f"*BOUNDARY\nTOP, 1, 2\n{FIXED}*STEP\n*STATIC, DIRECT\n1., 1.\n*BOUNDARY\nTOP, 3, 3, -.01\n"
+    fields = ran(tmp_path, text + "*NODE FILE\nU\n*CONTACT FILE\nCSTRESS\n*END STEP\n").fields()
+    pressure = np.array(fields["contact_pressure"][-1]).ravel()[:len(block.x)][block.on(2, 0) - 1]
+    # A spring of the pressure and one of the block, 1e4 and 1000 by its height, one behind the other.
+    assert pressure == pytest.approx(0.01/(1.0e-4 + 1.0e-3), rel=1.0e-9)
+
+
+def test_newton_is_quadratic(tmp_path: Path) -> None:
+    """On curved walls, past joints of a profile too: each residual about the square of the one before."""
+    run = ran(tmp_path, falling(rubber_ball((0.2, 0., 1.06)), TABLE, (0.6, 0.25, -1.), (0., 0.4, 1.), until=0.9,
+                                more="*NEWTON, TYPE=FULL\n"))
+    n = 0
+    for row, active in zip(run.increments, run.history["active"][1:], strict=True):
+        residuals = [float(word) for word in row[-1].split()[9:]]
+        if active == 0 or len(residuals) < 4:
+            continue
+        n += 1
+        for before, after in zip(residuals[1:], residuals[2:], strict=False):
+            assert after <= max(1.0e3*before**2, 1.0e-14), row[-1]
+    assert n > 5
+
+
+def test_a_body_held_by_a_bowl(tmp_path: Path) -> None:
+    """A cube in a bowl under its weight, with nothing else that holds it but against turning and drift."""
+    block = on_sphere(0.0, 2.0, 1.0, inside=True)
+    block.x[:, 2] += 0.01
+    text = bodies([block], [faces(block)], "*ELASTIC\n1000., .3\n*DENSITY\n1.\n") + wall(sphere(2.0, inside=True)) + pair()
+    text += f"*BOUNDARY\n{FIXED}N1, 1, 2\n*STEP\n*STATIC, DIRECT\n1., 1.\n*DLOAD\nB1, GRAV, 10., 0., 0., -1.\n*NODE FILE\nU\n*END STEP\n"
+    run = ran(tmp_path, text)
+    assert run.verdict["verdict"] == "good"
+    assert run.history["pair1_force_z"][-1] == pytest.approx(10.0, rel=1.0e-9)
+
+
+def test_past_the_end_of_a_profile(tmp_path: Path) -> None:
+    """A block that slides off a narrow rail falls."""
+    rail = "TYPE=CYLINDER\n0., 0., 0., 1., 0., 0.\n0., 1., 0.\nSTART, -1., 0.\nLINE, 0.4, 0.\n"
+    run = ran(tmp_path, falling(cube(gap=0.0), rail, (1.5, 0., 0.), until=1.2, more=GRAVITY))
+    assert run.verdict["verdict"] == "good", run.log[-600:]
+    assert run.history["active"][1] > 0
+    assert run.history["active"][-1] == 0
+    total = run.history["total"]
+    assert np.ptp(total) <= BALANCE*(total.max() + run.history["external_work"].max())
+
+
+def test_all_exterior_meets_walls(tmp_path: Path) -> None:
+    text = falling(cube(), plane(), (0., 0., -1.)).replace(
+        pair(), "*CONTACT\n*CONTACT INCLUSIONS, ALL EXTERIOR\n")
+    check_balance(ran(tmp_path, text))
+
+
+def test_behind_at_the_start(tmp_path: Path) -> None:
+    said = refusal(tmp_path, falling(cube(gap=-0.1), plane(), (0., 0., -1.)))
+    assert "9 slave nodes of surface S1 penetrate surface W, by 0.1 at most" in said
+    ran(tmp_path, falling(cube(gap=-0.01), plane(), (0., 0., -1.), options=", ADJUST=0."))
+
+
+@pytest.mark.parametrize(("shape", "said"), [
+    ("TYPE=REVOLUTION\n0, 0, 0, 0, 0, 1\nSTART, 1., 2.\nLINE, 1., 0.\nLINE, 3., 0.\n", "hollow corner at 1, 0"),
+    ("TYPE=REVOLUTION\n0, 0, 0, 0, 0, 1\nSTART, -1., 2.\nLINE, 1., 0.\n", "radii below 0"),
+    ("TYPE=REVOLUTION\n0, 0, 0, 0, 0, 0\nSTART, 1., 2.\nLINE, 1., 0.\n", "a and b are the same"),
+    ("TYPE=REVOLUTION\n0, 0, 0, 0, 0, 1\n", "a profile begins with START"),
+    ("TYPE=CYLINDER\n0, 0, 0, 1, 0, 0\n1., 1., 0.\nSTART, 1., 2.\nLINE, 1., 0.\n", "right angle"),
+    ("TYPE=SPHERE\n0., 0., 0., -1.\n", "radius is not above 0"), ("TYPE=SPHERE\n0., 0., 0., 1., UP\n", "INSIDE or OUTSIDE"),
+    ("TYPE=PLANE\n0., 0., 0., 0., 0., 0.\n", "normal has no length"), ("TYPE=PLANE\n", "a data line is missing")])
+def test_refused(shape: str, said: str, tmp_path: Path) -> None:
+    text = refusal(tmp_path, falling(cube(), shape, (0., 0., -1.)))
+    assert said in text
+    assert text.count("error:") == 1
+
+
+def test_pairs_refused(tmp_path: Path) -> None:
+    text = falling(cube(), plane(), (0., 0., -1.))
+    assert "swap the two" in refusal(tmp_path, text.replace("S1, W\n", "W, S1\n"))
+    assert "leave out SIDES=BOTH" in refusal(tmp_path, falling(cube(), plane(), (0., 0., -1.), options=", SIDES=BOTH"))
+    assert "degrees of freedom, 1 to 6" in refusal(tmp_path, falling(cube(), plane(), (0., 0., -1.), support=f"{REFERENCE}, 1, 2\n"))

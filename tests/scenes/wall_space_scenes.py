@@ -1,0 +1,42 @@
+"""Bodies in space that meet walls: shapes without faces, fixed, driven or free."""
+
+from __future__ import annotations
+
+import numpy as np
+from contact_space_scenes import RUBBER, bodies, dynamic, faces, velocities
+from space_mesh import Block
+
+#: Label of the reference node of a wall.
+REFERENCE = 90000
+FIXED = f"{REFERENCE}, ENCASTRE\n"
+
+
+def wall(shape: str, at: tuple[float, ...] = (0., 0., -3.), element_set: str = "") -> str:
+    """A surface W with a shape, of a rigid body about a reference node."""
+    return (f"*NODE\n{REFERENCE}, {', '.join(map(repr, at))}\n*SURFACE, NAME=W, {shape}"
+            f"*RIGID BODY, {element_set}ANALYTICAL SURFACE=W, REF NODE={REFERENCE}\n")
+
+
+def plane(point: tuple[float, ...] = (0., 0., 0.), normal: tuple[float, ...] = (0., 0., 1.)) -> str:
+    return f"TYPE=PLANE\n{', '.join(map(repr, (*point, *normal)))}\n"
+
+
+def sphere(radius: float, centre: tuple[float, ...] = (0., 0., 0.), inside: bool = False) -> str:
+    return f"TYPE=SPHERE\n{', '.join(map(repr, (*centre, radius)))}{', INSIDE' if inside else ''}\n"
+
+
+def pair(options: str = "", interaction: str = "") -> str:
+    return f"*SURFACE INTERACTION, NAME=I\n{interaction}*CONTACT PAIR, INTERACTION=I{options}\nS1, W\n"
+
+
+def falling(block: Block, shape: str, velocity: tuple[float, ...], spin: tuple[float, ...] = (0., 0., 0.),
+            h: float = 0.02, until: float = 0.6, more: str = "", law: str = RUBBER, options: str = "",
+            interaction: str = "", support: str = FIXED) -> str:
+    """A body that flies onto a fixed wall."""
+    return (bodies([block], [faces(block)], law) + wall(shape) + pair(options, interaction)
+            + velocities(block, velocity, spin) + f"*BOUNDARY\n{support}" + dynamic(h, until, more))
+
+
+def cube(cells: tuple[int, int, int] = (2, 2, 2), gap: float = 0.03, turn: np.ndarray | None = None) -> Block:
+    turn = np.eye(3) if turn is None else turn
+    return Block("C3D8", cells, place=lambda x: (x - np.array([0.5, 0.5, 0.0])) @ turn.T + np.array([0., 0., gap]))
