@@ -50,7 +50,6 @@ contains
       type(contact_options_t) :: options
       class(start_gaps_t), allocatable :: contact
       logical :: is_checked(size(scene%surface))
-      character(len=:), allocatable :: why       !! a half of a pair waits
       logical :: is_meant                        !! overclosure is
       real(wp) :: noise
       integer :: i
@@ -69,11 +68,7 @@ contains
                if (allocated(error)) return
                cycle
             end if
-            call find_waiting(scene, pair, why)
-            if (len(why) > 0) then
-               call become_guard(scene, pair, notes, why)
-               pair%initiation = initiation_persistent
-            end if
+            call let_wait(scene, pair, notes)
             call new_start_gaps(scene, pair, contact, error, options)
             if (allocated(error)) return
             if (.not. contact%is_self) call check_two(scene, pair, contact, noise, is_checked, &
@@ -119,6 +114,20 @@ contains
       if (.not. allocated(error)) call check_sides(scene, pair, contact, noise, "master", error)
       if (.not. allocated(error)) call check_slave_side(scene, pair, contact, noise, error)
    end subroutine check_two
+
+   !> Where the nodes of a half of a pair have to wait for those without mass of the other half they
+   !> are guards, and keep their mass.
+   subroutine let_wait(scene, pair, notes)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(inout) :: pair
+      type(notes_t), intent(inout) :: notes
+      character(len=:), allocatable :: why
+
+      call find_waiting(scene, pair, pair%is_reverse, why)
+      if (len(why) == 0) return
+      call become_guard(scene, pair, notes, why)
+      pair%initiation = initiation_persistent
+   end subroutine let_wait
 
    !> Nodes that cannot be held at their master, as where polygons of one curve dip into each other,
    !> are kept from going in farther than guards allow.

@@ -21,9 +21,10 @@ contains
    !> Why the nodes of the slave of `pair`, a half of one that holds both sides, wait for those of
    !> its master; "": they do not. As rows beside those of massless nodes they would be a second one
    !> on the same nodes, which cannot follow both. Denser ones would go in between massless nodes.
-   subroutine find_waiting(scene, pair, why)
+   subroutine find_waiting(scene, pair, is_second, why)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
+      logical, intent(in) :: is_second           !! of the two halves, as the deck has them
       character(len=:), allocatable, intent(out) :: why  !! to follow on the name of the slave
       real(wp) :: slave, master
       logical :: keeps
@@ -41,7 +42,7 @@ contains
       associate (name => scene%surface(pair%master)%name)
          if (keeps) then
             if (slave >= master) why = "keeps its mass, which " // name // " does not"
-         else if (slave > master + as_dense*master .or. (pair%is_reverse .and. &
+         else if (slave > master + as_dense*master .or. (is_second .and. &
             slave >= master - as_dense*master)) then
             why = "stands no denser than " // name // ", and of two without mass one is held"
          end if
