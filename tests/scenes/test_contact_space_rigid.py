@@ -19,7 +19,8 @@ GRAVITY = 10.0
 WEIGHT = f"*DLOAD\nB1, GRAV, {GRAVITY}, 0., 0., -1.\n"
 #: How a cube falls: on a face, an edge, a corner, and askew.
 WAYS = {"face": Rotation.identity(), "edge": Rotation.from_rotvec([np.pi/4, 0, 0]),
-        "corner": Rotation.align_vectors([[0, 0, -1]], [[1, 1, 1]])[0], "askew": Rotation.from_rotvec([.3, .2, .1])}
+        "corner": Rotation.from_rotvec(np.arccos(-1/np.sqrt(3))*np.array([-1, 1, 0])/np.sqrt(2)),
+        "askew": Rotation.from_rotvec([.3, .2, .1])}
 
 
 def ran(folder: Path, text: str) -> Run:
