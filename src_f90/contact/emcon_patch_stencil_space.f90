@@ -507,8 +507,8 @@ contains
       vertex = [(k + i - 1, i = 1, n_strip)]
       if (k > 0) return
       call find_inner(sides, self%node(1), point, normal, x, u, inner)
-      ! As wide by the patch on a facet that is much larger: where it fades, heights are those at its
-      ! inner side, which a slanted frame sees far from the plane of the facet on a wide one.
+      ! Of a facet much larger than the patch strips are no wider than of a small one: where they
+      ! fade, heights are those at their inner side, which a slanted frame sees far off the plane.
       strip = flange*self%patch%length/(patch_size*self%size)
       do i = 1, n_strip
          call begin_vertex(self, -point, merge(1.0_wp, 0.0_wp, i < n_strip), vertex(i))

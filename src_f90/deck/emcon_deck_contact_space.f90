@@ -11,7 +11,6 @@ module emcon_deck_contact_space
    use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
    use emcon_sort, only : sort_order
-   use emcon_steps, only : initiation_massless, step_initiation
    use emcon_surface_facets, only : surface_facets
    use emcon_text, only : joined, string_t, to_text
    implicit none
@@ -47,7 +46,6 @@ contains
 
       if (reader%doubt%shapes) return
       if (all(scene%pair%formulation == formulation_user) .and. size(scene%tie) == 0) return
-      if (any(scene%pair%formulation /= formulation_user)) call check_mass(reader, scene)
       call adjacency_init(adjacency, scene)
       do i = 1, size(scene%surface)
          in_contact = any((scene%pair%slave == i .or. scene%pair%master == i) .and. &
@@ -68,21 +66,6 @@ contains
          end associate
       end do
    end subroutine check_contact_space
-
-   !> What contact holds in space by nodes has mass.
-   subroutine check_mass(reader, scene)
-      type(reader_t), intent(inout) :: reader
-      type(scene_t), intent(in) :: scene
-      integer :: k
-
-      do k = 1, size(scene%step)
-         if (step_initiation(scene%step(k)) /= initiation_massless) cycle
-         call add_error(reader%log, scene%step(k)%origin, "step " // to_text(k) // " has contact " &
-            // "without mass (MASSLESS), which in three dimensions is not in this version; use " &
-            // "PERSISTENT")
-         return
-      end do
-   end subroutine check_mass
 
    !> Two faces at most meet in a side, and they run it in unlike ways.
    subroutine check_sides(reader, scene, surface, facet, title)

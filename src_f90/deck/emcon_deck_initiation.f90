@@ -4,7 +4,6 @@
 module emcon_deck_initiation
    use emcon_bodies, only : bodies_find
    use emcon_deck_check_massless, only : has_massless_sections
-   use emcon_deck_dimension, only : n_space
    use emcon_deck_jacobian, only : determinant
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error
@@ -120,8 +119,6 @@ contains
       do k = 1, size(scene%pair)
          if (len(reason) == 0) call find_reason_of(scene%pair(k), reason)
       end do
-      if (len(reason) == 0 .and. scene%n_dim == n_space) reason = &
-         "contact in three dimensions needs them"
       if (len(reason) > 0) return
       call find_shares(scene, share)
       k = maxloc(share, 1)

@@ -11,13 +11,12 @@ module emcon_initial_contact
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_user, &
       formulation_nts, pair_has_order, pair_holds_nodes, pair_may_exchange
    use emcon_kinds, only : wp
-   use emcon_massless_surfaces, only : pair_sheds_mass, surface_keeps_mass
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted
    use emcon_start_gaps, only : is_master, is_slave, start_gaps_t
-   use emcon_surface_shape_plane, only : surface_shape, surface_shape_t
-   use emcon_steps, only : step_is_dynamic
+   use emcon_steps, only : initiation_persistent, step_is_dynamic
    use emcon_text, only : joined, note_add, notes_t, string_t, to_text
+   use emcon_waiting_sides, only : find_waiting
    implicit none
    private
    public :: initial_contact_prepare
@@ -69,8 +68,7 @@ contains
                if (allocated(error)) return
                cycle
             end if
-            if (waits_for_mass(scene, pair)) call become_guard(scene, pair, notes, "keeps its " &
-               // "mass, which " // scene%surface(pair%master)%name // " does not")
+            call let_wait(scene, pair, notes)
             call new_start_gaps(scene, pair, contact, error, options)
             if (allocated(error)) return
             if (.not. contact%is_self) call check_two(scene, pair, contact, noise, is_checked, &
@@ -117,23 +115,19 @@ contains
       if (.not. allocated(error)) call check_slave_side(scene, pair, contact, noise, error)
    end subroutine check_two
 
-   !> Do the nodes of a half of a pair keep their mass where those of the other half do not, and
-   !> stand no denser? As rows beside those of the massless nodes they would be a second one on the
-   !> same nodes, which cannot follow both. Denser ones would go in between massless nodes.
-   logical function waits_for_mass(scene, pair)
+   !> Where the nodes of a half of a pair have to wait for those without mass of the other half they
+   !> are guards, and keep their mass.
+   subroutine let_wait(scene, pair, notes)
       type(scene_t), intent(in) :: scene
-      type(contact_pair_t), intent(in) :: pair
-      type(surface_shape_t) :: slave, master
+      type(contact_pair_t), intent(inout) :: pair
+      type(notes_t), intent(inout) :: notes
+      character(len=:), allocatable :: why
 
-      waits_for_mass = .not. pair_has_order(pair) .and. pair%slave /= pair%master .and. &
-         (pair%may_choose .or. .not. pair%is_asked) .and. pair_sheds_mass(scene, pair)
-      if (waits_for_mass) waits_for_mass = surface_keeps_mass(scene, pair%slave) .and. .not. &
-         surface_keeps_mass(scene, pair%master)
-      if (.not. waits_for_mass) return
-      slave = surface_shape(scene, scene%surface(pair%slave))
-      master = surface_shape(scene, scene%surface(pair%master))
-      waits_for_mass = slave%mean >= master%mean
-   end function waits_for_mass
+      call find_waiting(scene, pair, pair%is_reverse, why)
+      if (len(why) == 0) return
+      call become_guard(scene, pair, notes, why)
+      pair%initiation = initiation_persistent
+   end subroutine let_wait
 
    !> Nodes that cannot be held at their master, as where polygons of one curve dip into each other,
    !> are kept from going in farther than guards allow.

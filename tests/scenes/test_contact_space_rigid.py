@@ -19,7 +19,8 @@ GRAVITY = 10.0
 WEIGHT = f"*DLOAD\nB1, GRAV, {GRAVITY}, 0., 0., -1.\n"
 #: How a cube falls: on a face, an edge, a corner, and askew.
 WAYS = {"face": Rotation.identity(), "edge": Rotation.from_rotvec([np.pi/4, 0, 0]),
-        "corner": Rotation.align_vectors([[0, 0, -1]], [[1, 1, 1]])[0], "askew": Rotation.from_rotvec([.3, .2, .1])}
+        "corner": Rotation.from_rotvec(np.arccos(-1/np.sqrt(3))*np.array([-1, 1, 0])/np.sqrt(2)),
+        "askew": Rotation.from_rotvec([.3, .2, .1])}
 
 
 def ran(folder: Path, text: str) -> Run:
@@ -265,6 +266,20 @@ def test_a_ball_bounces_off_a_rigid_plate(held: str, tmp_path: Path) -> None:
         for before, after in zip(residuals[1:], residuals[2:], strict=False):
             assert after <= max(1.0e3*before**2, 1.0e-14), row[-1]
     assert n > 10
+
+
+@pytest.mark.parametrize("cells", [4, 6])
+def test_nothing_holds_a_ball_in_the_air(cells: int, tmp_path: Path) -> None:
+    """It flies away from a plate of one face that is much larger than its own, and turns: its nodes see the rim of the
+    plate along slanted normals, and far from it."""
+    one = Block("C3D8", (cells,)*3, size=(2, 2, 2), place=lambda x: Rotation.from_rotvec([.15, 0, 0]).apply(ball(x)))
+    one.x[:, 2] += 0.3 - one.x[:, 2].min()
+    two = plate(1, 6.0)
+    text = (bodies([one, two], [faces(one), faces(two, 2, 1)]) + pair() + rigid(1, one, v=(.8, .3, .4), w=(0, 0, 1))
+            + rigid(2, two, "1, 6") + dynamic(0.04, 2.0))
+    history = ran(tmp_path, text).history
+    assert history["active"].max() == 0
+    assert np.ptp(history["px"]) <= BALANCE
 
 
 def test_bodies_without_a_pair_are_found(tmp_path: Path) -> None:
