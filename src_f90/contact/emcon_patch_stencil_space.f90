@@ -557,8 +557,8 @@ contains
       end associate
    end subroutine patch_stencil_gather
 
-   !> How far the slave node of a stencil is from the curved surface that the nearest triangle stands
-   !> for, > 0 in front of it.
+   !> How far the slave node of a stencil is from the curved surface that the nearest triangle
+   !> stands for, > 0 in front of it.
    pure real(wp) function patch_stencil_height(self, sides, bulges, x, u) result(height)
       type(patch_stencil_t), intent(in) :: self  !! with a triangle
       type(patch_sides_t), intent(in) :: sides

@@ -1,8 +1,9 @@
 !> How far the curved surface that facets stand for rises over them: its nodes are on it, what lies
 !> between them is not.
 !>
-!> At each node a surface of second order is put through the nodes around it. Along a side of a triangle
-!> the surface rises by the mean of the curvatures at its ends. Source: docs/theory.md, section 15.
+!> At each node a surface of second order is put through the nodes around it. Along a side of a
+!> triangle the surface rises by the mean of the curvatures at its ends. Source: docs/theory.md,
+!> section 15.
 module emcon_bulges_space
    use emcon_facet_groups, only : facet_groups_init, facet_groups_t
    use emcon_facet_split, only : facet_split_centre, facet_split_t
@@ -40,8 +41,7 @@ contains
       real(wp), intent(in) :: angle              !! sharper turns are corners [degrees]
       type(facet_groups_t) :: groups
       real(wp), allocatable :: curvature(:, :, :)
-      real(wp) :: bent(3, 3, size(facets%facet, 1) + 1), at(3, size(facets%facet, 1) + 1)
-      integer :: f, g, i, k, m, t, corner(3)
+      integer :: f, g, i, k, m
 
       call facet_groups_init(groups, facets, x, angle)
       allocate(curvature(3, 3, groups%n_group))
@@ -53,25 +53,38 @@ contains
       allocate(self%side(3, size(split%facet)), self%point(split%n_point), source=0.0_wp)
       do f = 1, facets%n_facet
          m = count(facets%corner(:, f) > 0)
-         do k = 1, m
-            at(:, k) = x(:, facets%facet(k, f))
-            bent(:, :, k) = curvature(:, :, group_of(groups, facets%corner(k, f), f))
-         end do
-         at(:, m + 1) = matmul(at(:, :m), facet_split_centre(m))
-         bent(:, :, m + 1) = sum(bent(:, :, :m), 3)/real(m, wp)
-         if (split%centre(f) > 0) self%point(split%centre(f)) = arc_of(dot_product( &
-            facet_split_centre(m), [(along(bent(:, :, k), at(:, k) - at(:, m + 1)), k = 1, m)]), &
-            sum((at(:, :m) - spread(at(:, m + 1), 2, m))**2)/real(m, wp))
-         do t = split%start(f), split%start(f + 1) - 1
-            k = t - split%start(f) + 1
-            corner = [1, 2, 3]
-            if (split%centre(f) > 0) corner = [k, 1 + mod(k, m), m + 1]
-            do k = 1, 3
-               associate (a => corner(k), b => corner(1 + mod(k, 3)))
-                  self%side(k, t) = 4.0_wp*arc_of(0.25_wp*along(0.5_wp*(bent(:, :, a) &
-                     + bent(:, :, b)), at(:, b) - at(:, a)), 0.25_wp*sum((at(:, b) - at(:, a))**2))
-               end associate
-            end do
+         call rise_of_facet(self, split, f, x(:, facets%facet(:m, f)), curvature(:, :, &
+            [(group_of(groups, facets%corner(k, f), f), k = 1, m)]))
+      end do
+   end subroutine bulges_find
+
+   !> The rises over the triangles of facet `f`, whose nodes are at `x` with such curvatures.
+   pure subroutine rise_of_facet(self, split, f, x, curvature)
+      type(bulges_t), intent(inout) :: self
+      type(facet_split_t), intent(in) :: split
+      integer, intent(in) :: f
+      real(wp), intent(in) :: x(:, :), curvature(:, :, :)    !! (3, m), (3, 3, m)
+      real(wp) :: at(3, size(x, 2) + 1), bent(3, 3, size(x, 2) + 1), weight(size(x, 2))
+      integer :: corner(3), k, m, t
+
+      m = size(x, 2)
+      at(:, :m) = x
+      bent(:, :, :m) = curvature
+      weight = facet_split_centre(m)
+      at(:, m + 1) = matmul(x, weight)
+      bent(:, :, m + 1) = sum(curvature, 3)/real(m, wp)
+      if (split%centre(f) > 0) self%point(split%centre(f)) = arc_of(dot_product( &
+         weight, [(along(bent(:, :, k), at(:, k) - at(:, m + 1)), k = 1, m)]), &
+         sum((at(:, :m) - spread(at(:, m + 1), 2, m))**2)/real(m, wp))
+      do t = split%start(f), split%start(f + 1) - 1
+         k = t - split%start(f) + 1
+         corner = [1, 2, 3]
+         if (split%centre(f) > 0) corner = [k, 1 + mod(k, m), m + 1]
+         do k = 1, 3
+            associate (a => corner(k), b => corner(1 + mod(k, 3)))
+               self%side(k, t) = 4.0_wp*arc_of(0.25_wp*along(0.5_wp*(bent(:, :, a) &
+                  + bent(:, :, b)), at(:, b) - at(:, a)), 0.25_wp*sum((at(:, b) - at(:, a))**2))
+            end associate
          end do
       end do
 
@@ -95,7 +108,7 @@ contains
             - 4.0_wp*height**2/square)))
       end function arc_of
 
-   end subroutine bulges_find
+   end subroutine rise_of_facet
 
    !> The group of facet `f` at node `i`.
    pure integer function group_of(groups, i, f)
@@ -107,8 +120,8 @@ contains
       end do
    end function group_of
 
-   !> The curvature of a surface at node `i`, of the facets of group `g`, as a form of ways along it:
-   !> > 0 where it is convex [1/L].
+   !> The curvature of a surface at node `i`, of the facets of group `g`, as a form of ways along
+   !> it: > 0 where it is convex [1/L].
    pure subroutine fit(facets, groups, i, g, x, curvature)
       type(facets_t), intent(in) :: facets
       type(facet_groups_t), intent(in) :: groups
