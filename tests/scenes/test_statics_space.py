@@ -171,3 +171,34 @@ def test_press_fit_of_unlike_meshes(n: tuple[int, int], tmp_path: Path) -> None:
     assert run.verdict["verdict"] == "good"
     assert bore(run) == pytest.approx(lame(1e-3), rel=0.06)
     assert "F1 and F0: gaps are measured between the curves" in run.log
+
+
+@pytest.mark.parametrize(("method", "accuracy"), [("SADDLE POINT", ACCURACY), ("AUGMENTED LAGRANGE", 1.0e-3)])
+def test_other_ways_to_hold(method: str, accuracy: float, tmp_path: Path) -> None:
+    """A tower over gaps; an augmented Lagrangian lets in up to its tolerance."""
+    text, tops = tower([0.1, 0.0], [2, 3, 2], cards=f"*CONSTRAINT METHOD, TYPE={method}\n")
+    u = ran(tmp_path, text).fields()["displacement"][-1, :, 2]
+    for top, exact in zip(tops, -np.arange(1.0, 4.0)/E - [0.0, 0.1, 0.1], strict=True):
+        assert np.abs(u[top] - exact).max() <= accuracy*3.0/E
+
+
+@pytest.mark.parametrize("k", [0, 1])
+def test_nodes_that_the_deck_moves(k: int, tmp_path: Path) -> None:
+    """All nodes of a cube, as the slave or the master, go .03 into where the other one stands: that shortens by it."""
+    text, tops = tower([0.01], load="0.")
+    moved = [first + (0 if k == 0 else 27) for first in range(1, 28)]
+    way = 0.04 if k == 0 else -0.04
+    rest = tops[1 - k] + 1 if k == 0 else range(1, 1)
+    text = text.replace("E00, 1\n", "").replace("E01, 2\n", "").replace("E02, 3\n", "") if k == 0 else text
+    text = text.replace("E10, 1\n", "").replace("E11, 2\n", "") if k == 1 else text
+    cards = "*BOUNDARY\n" + "".join(f"{n}, {a}, {a}, {way if a == 3 else 0.0!r}\n" for n in moved for a in (1, 2, 3))
+    cards += "".join(f"{n}, 3, 3, 0.\n" for n in rest)
+    run = ran(tmp_path, text.replace("*DSLOAD", cards + "*DSLOAD"))
+    assert run.verdict["verdict"] == "good"
+    force = abs(run.history["pair1_force_z"][-1])
+    fields = run.fields()
+    z = fields.x[:, 2] + fields["displacement"][-1, :, 2]
+    foot, head = fields.x[:, 2] == 1.01, fields.x[:, 2] == 1.0
+    assert z[foot] == pytest.approx(z[head].mean(), abs=1.0e-9)
+    # Sides are free: the stress is E times the strain.
+    assert force == pytest.approx(E*0.03, rel=1.0e-6)
