@@ -127,7 +127,7 @@ contains
 
       middle = first + (last - first)/2
       after = last
-      if (last - first >= few_rows) after = reach(middle)
+      if (last - first >= few_rows) after = min(last, reach(middle))
       if (after < last) then
          call cut(walk, reach, first, middle, order, to)
          call cut(walk, reach, after + 1, last, order, to)

@@ -4,6 +4,7 @@
 !> The patch moves with the slave's surface, and its gap is the mean over what it covers of the
 !> master: smooth while the node slides over sides and corners. Source: docs/theory.md, section 15.
 module emcon_patch_contact_space
+   use emcon_bulges_space, only : bulges_find, bulges_largest, bulges_t
    use emcon_condition_nodes, only : condition_resize
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
@@ -21,7 +22,7 @@ module emcon_patch_contact_space
    use emcon_patch_sides_space, only : frame_normal, point_frames_init, patch_sides_t, &
       patch_triangles_init
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
-      patch_stencil_t
+      patch_stencil_height, patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t, where_text
    use emcon_slave_faces_space, only : slave_faces_init
@@ -49,10 +50,12 @@ module emcon_patch_contact_space
       integer, allocatable :: frame(:)                !! (n_constraint)
       integer, allocatable :: class(:)                !! (n_constraint) of bodies it looks at
       type(patch_stencil_t), allocatable :: stencil(:)   !! (n_constraint)
+      type(bulges_t), allocatable :: bulges           !! of the master; only if gaps follow arcs
       real(wp), allocatable :: scale(:)               !! (n_constraint) covered at the start
       real(wp), allocatable :: cover(:)               !! (n_constraint) covered at the end
    contains
       procedure :: configure => patch_configure
+      procedure :: follow_arcs => patch_follow_arcs
       procedure :: begin_points => patch_begin_step
       procedure :: measure_points => patch_measure
       procedure :: evaluate_points => patch_evaluate
@@ -139,6 +142,40 @@ contains
       type(contact_options_t), intent(in) :: options
    end subroutine patch_configure
 
+   !> Measure gaps of nodes to the curved surface that the master stands for, not of patches to its
+   !> facets, or these.
+   pure subroutine patch_follow_arcs(self, x, options, is_wanted)
+      class(patch_contact_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)   !! (3, n_node) reference positions [L]
+      type(contact_options_t), intent(in) :: options
+      logical, intent(in) :: is_wanted           !! else between facets
+
+      self%memo%is_known = .false.
+      self%sagitta = 0.0_wp
+      if (allocated(self%bulges)) deallocate(self%bulges)
+      if (.not. is_wanted) return
+      allocate(self%bulges)
+      call bulges_find(self%bulges, self%sides%master, self%sides%triangles%split, x, &
+         options%smoothing_angle)
+   end subroutine patch_follow_arcs
+
+   !> How much less than its patch has it the node of frame constraint `i` is in front of the curved
+   !> surface.
+   pure real(wp) function sagitta_under(self, i, x, u0) result(sagitta)
+      class(patch_contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
+      real(wp), dimension(3, 3 + self%stencil(i)%patch%n_vertex) :: at, way
+      type(patch_look_t) :: look
+
+      sagitta = 0.0_wp
+      if (self%stencil(i)%triangle == 0) return
+      call patch_stencil_gather(self%stencil(i), x, u0, 0.0_wp*u0, at, way)
+      look = patch_look(self%stencil(i)%patch, at, way)
+      if (look%cover(0) > no_cover) sagitta = look%height(0)/look%cover(0) &
+         - patch_stencil_height(self%stencil(i), self%sides, self%bulges, x, u0)
+   end function sagitta_under
+
    !> Choose for each frame what its patch may see in the step. From the same start and up to
    !> the same reach the choice is the same.
    pure subroutine patch_begin_step(self, x, u0, du)
@@ -165,6 +202,7 @@ contains
                end associate
             end associate
             call patch_stencil_choose(self%stencil(i), self%sides, self%frame(i), facet, x, u0)
+            if (allocated(self%bulges)) self%sagitta(i) = sagitta_under(self, i, x, u0)
          end do
       end associate
    end subroutine patch_begin_step
@@ -228,10 +266,12 @@ contains
          state%is_arriving = cover(0) < least
          state%is_covered = look%way <= self%chosen_reach
          state%gap1 = self%step%engages             ! what is not covered asks for nothing
-         if (cover(0) > no_cover) state%gap0 = look%height(0)/cover(0) - self%offset
+         if (cover(0) > no_cover) state%gap0 = look%height(0)/cover(0) - self%offset &
+            - self%sagitta(i)
          if (state%is_arriving) state%was_open = look%ahead - self%offset &
             >= -max_penetration_on_entry*state%size
-         if (cover(1) >= least) state%gap1 = look%height(1)/cover(1) - self%offset
+         if (cover(1) >= least) state%gap1 = look%height(1)/cover(1) - self%offset &
+            - self%sagitta(i)
          if (self%slack > 0.0_wp) state%closed = -self%slack*min(state%size, state%other_size)
          self%cover(i) = cover(1)
          if (state%gap0 < -stencil%deepest - self%offset) state = gap_state_t()
@@ -247,7 +287,8 @@ contains
       integer :: k
 
       do k = 1, size(wanted)
-         call evaluate_frame(self, wanted(k), x, u0, du, target(k) + self%offset, item(k))
+         call evaluate_frame(self, wanted(k), x, u0, du, target(k) + self%offset &
+            + self%sagitta(wanted(k)), item(k))
       end do
    end subroutine patch_evaluate
 
@@ -386,11 +427,15 @@ contains
       could_hold = self%holds_all .and. any(is_loose)
    end function patch_could_hold
 
-   !> Nodes are held, edges cross between them.
+   !> Nodes are held, edges cross between them, and so do chords of one curved surface.
    pure real(wp) function patch_lets_in(self) result(lets_in)
       class(patch_contact_t), intent(in) :: self
 
       lets_in = merge(overlap_bar, crossing_bar, self%slack > 0.0_wp .or. .not. self%holds_all)
+      if (.not. allocated(self%bulges)) return
+      associate (triangles => self%sides%triangles)
+         lets_in = lets_in + bulges_largest(self%bulges, triangles%split, triangles%size)
+      end associate
    end function patch_lets_in
 
 end module emcon_patch_contact_space

@@ -3,6 +3,7 @@
 !>
 !> Source: docs/theory.md, section 15.
 module emcon_patch_stencil_space
+   use emcon_bulges_space, only : bulges_rise, bulges_t
    use emcon_element_kind, only : max_face_nodes
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : nearest_t, nearest_update
@@ -13,7 +14,7 @@ module emcon_patch_stencil_space
    use emcon_touch_rule_space, only : touch_rule_space_is_through
    implicit none
    private
-   public :: patch_stencil_t, patch_stencil_choose, patch_stencil_gather
+   public :: patch_stencil_t, patch_stencil_choose, patch_stencil_gather, patch_stencil_height
 
    !> A triangle faces a frame if the cosine of their normals is below this.
    real(wp), parameter :: facing = -0.25_wp
@@ -591,5 +592,28 @@ contains
          end do
       end associate
    end subroutine patch_stencil_gather
+
+   !> How far the slave node of a stencil is from the curved surface that the nearest triangle
+   !> stands for, > 0 in front of it.
+   pure real(wp) function patch_stencil_height(self, sides, bulges, x, u) result(height)
+      type(patch_stencil_t), intent(in) :: self  !! with a triangle
+      type(patch_sides_t), intent(in) :: sides
+      type(bulges_t), intent(in) :: bulges       !! of the master
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      real(wp), dimension(3, 3 + self%patch%n_vertex) :: at, way
+      real(wp) :: corner(3, 3)
+      type(nearest_t) :: nearest
+      integer :: k
+
+      do k = 1, 3
+         corner(:, k) = place_of(sides, sides%triangles%split%corner(k, self%triangle), &
+            self%node(1), x, u)
+      end do
+      call nearest_update(nearest, self%triangle, [0.0_wp, 0.0_wp, 0.0_wp], corner)
+      call patch_stencil_gather(self, x, u, 0.0_wp*u, at, way)
+      height = sign(sqrt(nearest%square), dot_product(matmul(corner, nearest%weight), &
+         cross_product(at(:, 2), at(:, 3)))) &
+         - bulges_rise(bulges, sides%triangles%split, self%triangle, nearest%weight)
+   end function patch_stencil_height
 
 end module emcon_patch_stencil_space

@@ -12,6 +12,7 @@ program main
    use test_active_choice, only : collect_active_choice
    use test_arcs, only : collect_arcs
    use test_blas, only : collect_blas
+   use test_bulges_space, only : collect_bulges_space
    use test_band_blocks, only : collect_band_blocks
    use test_bodies, only : collect_bodies
    use test_chain, only : collect_chain
@@ -179,6 +180,7 @@ program main
    use test_solvers, only : collect_solvers
    use test_start_gaps, only : collect_start_gaps
    use test_start_gaps_space, only : collect_start_gaps_space
+   use test_touch_rule_space, only : collect_touch_rule_space
    use test_signed_distance, only : collect_signed_distance
    use test_stepper_free, only : collect_stepper_free
    use test_stepper_query, only : collect_stepper_query
@@ -235,6 +237,8 @@ program main
    call run("solvers", collect_solvers)
    call run("start_gaps", collect_start_gaps)
    call run("start_gaps_space", collect_start_gaps_space)
+   call run("bulges_space", collect_bulges_space)
+   call run("touch_rule_space", collect_touch_rule_space)
    call run("signed_distance", collect_signed_distance)
    call run("contact_scales", collect_contact_scales)
    call run("condition_reuse", collect_condition_reuse)

@@ -19,6 +19,7 @@ contains
 
       tests = [ &
          test_case_t("a chain that does not decay", test_chain), &
+         test_case_t("a band as wide as its halves", test_band), &
          test_case_t("rows in any order, in pieces, with a column of all", test_pieces)]
    end subroutine collect_row_order
 
@@ -126,6 +127,23 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_chain
+
+   !> Each row shares a column with so many before it that a half of a half is not cut off by what
+   !> cuts the halves: each row stands in the order once.
+   subroutine test_band(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n = 100, width = 30
+      type(csr_t) :: rows
+      integer :: order(n), i, k, m
+
+      rows%n_row = n
+      rows%n_col = n + width
+      rows%row_start = [(width*(i - 1), i = 1, n + 1)]
+      rows%column = [((i + k, k = 0, width - 1), i = 0, n - 1)]
+      rows%value = [(1.0_dp, m = 1, n*width)]
+      call row_order_nested(rows, order)
+      call check_true(error, is_permutation(order), "a permutation")
+   end subroutine test_band
 
    !> The chain in pieces of a hundred rows, turned inside out. Where all rows share a column
    !> nothing keeps halves apart, and an order there is all the same.
