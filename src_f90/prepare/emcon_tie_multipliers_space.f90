@@ -5,7 +5,7 @@
 !> Those of corners of facets with nodes between them integrate to 0 or less: there they are
 !> biorthogonal to a basis in which each corner takes a share of what is between it and the next
 !> ones. Nodes without a multiplier hand theirs to the others of the facet. Source:
-!> docs/theory.md, eqs. (51) and (52).
+!> docs/theory.md, eqs. (56) and (57).
 module emcon_tie_multipliers_space
    use emcon_kinds, only : wp
    use emcon_tie_shapes_space, only : most_nodes
