@@ -98,13 +98,13 @@ module emcon_options
       option_row_t("surface", surface_of_segments, "SEGMENTS", "", "", "", n_plane, &
          instead="ELEMENT"), &
       option_row_t("surface", surface_of_plane, "PLANE", "", "", "", n_space, &
-         instead="SEGMENTS"), &
+         instead="ELEMENT"), &
       option_row_t("surface", surface_of_sphere, "SPHERE", "", "", "", n_space, &
-         instead="SEGMENTS"), &
+         instead="ELEMENT"), &
       option_row_t("surface", surface_of_revolution, "REVOLUTION", "", "", "", n_space, &
-         instead="SEGMENTS"), &
+         instead="ELEMENT"), &
       option_row_t("surface", surface_of_extrusion, "CYLINDER", "", "", "", n_space, &
-         instead="SEGMENTS"), &
+         instead="ELEMENT"), &
       option_row_t("procedure", scheme_static, "STATIC", "", "", ""), &
       option_row_t("procedure", scheme_energy_momentum, "DYNAMIC", "", "", "")]
 

@@ -360,3 +360,23 @@ def test_pairs_refused(tmp_path: Path) -> None:
     assert "swap the two" in refusal(tmp_path, text.replace("S1, W\n", "W, S1\n"))
     assert "leave out SIDES=BOTH" in refusal(tmp_path, falling(cube(), plane(), (0., 0., -1.), options=", SIDES=BOTH"))
     assert "degrees of freedom, 1 to 6" in refusal(tmp_path, falling(cube(), plane(), (0., 0., -1.), support=f"{REFERENCE}, 1, 2\n"))
+
+
+def assembled(in_part: str, in_assembly: str) -> str:
+    """A cube that is an instance of a part, moved, and falls."""
+    nodes = "".join(f"{k}, {x}, {y}, {z}\n" for k, (x, y, z) in enumerate(
+        [(0, 0, 0), (1, 0, 0), (1, 1, 0), (0, 1, 0), (0, 0, 1), (1, 0, 1), (1, 1, 1), (0, 1, 1)], 1))
+    return (f"*PART, NAME=P\n*NODE\n{nodes}*ELEMENT, TYPE=C3D8, ELSET=E\n1, 1, 2, 3, 4, 5, 6, 7, 8\n*SOLID SECTION, ELSET=E, MATERIAL=M\n"
+            f"{in_part}*END PART\n*ASSEMBLY, NAME=A\n*INSTANCE, NAME=I, PART=P\n0., 0., 0.1\n*END INSTANCE\n*NODE\n900, 0., 0., -1.\n"
+            f"*NSET, NSET=REF\n900\n{in_assembly}*SURFACE, NAME=S1\nI.E\n*END ASSEMBLY\n*MATERIAL, NAME=M\n{RUBBER}"
+            "*SURFACE INTERACTION, NAME=J\n*CONTACT PAIR, INTERACTION=J\nS1, W\n*BOUNDARY\nREF, ENCASTRE\n"
+            + dynamic(0.02, 0.3, "*DLOAD\nI.E, GRAV, 10., 0., 0., -1.\n"))
+
+
+def test_walls_of_assemblies(tmp_path: Path) -> None:
+    """Their lines are coordinates, whole numbers too; in a part that is moved they are refused."""
+    shape = "*SURFACE, NAME=W, TYPE=SPHERE\n0, 0, -2, 2\n"
+    run = ran(tmp_path, assembled("", f"{shape}*RIGID BODY, ANALYTICAL SURFACE=W, REF NODE=REF\n"))
+    assert run.verdict["verdict"] == "good"
+    assert run.history["active"].max() > 0
+    assert "not moved with the instance of a part" in refusal(tmp_path, assembled(shape, ""))
