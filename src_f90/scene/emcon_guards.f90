@@ -7,7 +7,7 @@
 !> Source: docs/theory.md, section 4.11.
 module emcon_guards
    use emcon_interactions, only : contact_pair_t, formulation_edges, formulation_nts, &
-      formulation_user, pair_holds_nodes
+      formulation_user, pair_holds_nodes, pressure_hard
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
@@ -55,7 +55,8 @@ contains
       if (n_dim == n_space) guard = [guard, edges_of(pair, surface)]
    end subroutine guards_find
 
-   !> The edges of pairs that hold them; those of a pair with both sides once.
+   !> The edges of pairs that hold them; those of a pair with both sides once. Edges have no area that
+   !> a pressure could act on.
    pure function edges_of(pair, surface) result(edges)
       type(contact_pair_t), intent(in) :: pair(:)
       type(surface_t), intent(in) :: surface(:)
@@ -70,7 +71,8 @@ contains
       edges%of_pair = [(i, i = 1, size(pair))]
       edges = pack(edges, pair%holds_edges .and. .not. pair%is_reverse .and. &
          pair%formulation /= formulation_user .and. &
-         has_faces(pair%slave) .and. has_faces(pair%master))
+         pair%interaction%pressure%kind == pressure_hard .and. has_faces(pair%slave) .and. &
+         has_faces(pair%master))
    end function edges_of
 
    !> Append the guard of pair `i`, or of it with its sides exchanged, unless there is one.
