@@ -13,6 +13,8 @@ module test_touch_rule_space
    private
    public :: collect_touch_rule_space
 
+   integer, parameter :: none(0) = [integer ::]
+
 contains
 
    subroutine collect_touch_rule_space(tests)
@@ -43,7 +45,7 @@ contains
       surface = skin(scene)
       call facets_init(facets, scene, surface, error)
       if (allocated(error)) return
-      call touch_rule_space_init(rule, facets, scene)
+      call touch_rule_space_init(rule, facets, none, scene)
    end subroutine begin
 
    !> Of its own body a node touches what is two rings of facets away, of another one all.
