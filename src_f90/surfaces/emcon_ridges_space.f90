@@ -13,6 +13,7 @@ module emcon_ridges_space
    use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
    use emcon_sort, only : find_sorted
+   use emcon_surface_nodes, only : surface_nodes
    implicit none
    private
    public :: sharp_edges_t, sharp_edges_init, sharp_edge_normals
@@ -35,16 +36,21 @@ contains
       type(facets_t), allocatable :: outer
       type(ridges_t) :: ridges
       type(error_t), allocatable :: error
-      integer :: i, k
+      logical, allocatable :: is_kept(:)
+      integer :: i
 
       call facets_init(own, scene, surface, error)
       if (.not. allocated(error)) call find_outer(scene, own, outer, error)
       ! A mesh that touches itself in an edge has no outline there but its surface.
       if (allocated(error) .or. .not. allocated(outer)) outer = own
       call ridges_find(ridges, outer, scene%x, ridge_angle)
-      associate (kept => pack([(i, i = 1, size(ridges%point, 2))], [(all([(find_sorted( &
-            own%node, outer%node(ridges%point(k, i))) > 0, k = 1, 2)]), &
-            i = 1, size(ridges%point, 2))]))
+      allocate(is_kept(size(ridges%point, 2)))
+      do i = 1, size(is_kept)
+         is_kept(i) = all([find_sorted(own%node, outer%node(ridges%point(1, i))), &
+            find_sorted(own%node, outer%node(ridges%point(2, i)))] > 0)
+      end do
+      call leave_out_ties(scene, outer, ridges, is_kept)
+      associate (kept => pack([(i, i = 1, size(is_kept))], is_kept))
          allocate(self%node(2, size(kept)), self%face(size(outer%facet, 1), 2, size(kept)))
          do i = 1, size(kept)
             self%node(:, i) = outer%node(ridges%point(:, kept(i)))
@@ -52,6 +58,32 @@ contains
          end do
       end associate
    end subroutine sharp_edges_init
+
+   !> An edge of a face that is tied is not one of the body, which goes on there.
+   pure subroutine leave_out_ties(scene, outer, ridges, is_kept)
+      type(scene_t), intent(in) :: scene
+      type(facets_t), intent(in) :: outer
+      type(ridges_t), intent(in) :: ridges
+      logical, intent(inout) :: is_kept(:)       !! (n_ridge)
+      logical :: is_tied(0:size(scene%x, 2))
+      integer, allocatable :: node(:)
+      integer :: i, k, side, t
+
+      do t = 1, size(scene%tie)
+         do side = 1, 2
+            call surface_nodes(scene, scene%surface(merge(scene%tie(t)%slave, &
+               scene%tie(t)%master, side == 1)), node)
+            is_tied = .false.
+            is_tied(0) = .true.
+            is_tied(node) = .true.
+            do i = 1, size(is_kept)
+               do k = 1, 2
+                  if (all(is_tied(outer%facet(:, ridges%facet(k, i))))) is_kept(i) = .false.
+               end do
+            end do
+         end do
+      end do
+   end subroutine leave_out_ties
 
    !> The outer faces of elements around the nodes of a surface; not allocated where there are none.
    subroutine find_outer(scene, own, outer, error)
