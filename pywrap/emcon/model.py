@@ -397,8 +397,8 @@ class Model(Source):
 
     def contact_pair(self, slave: str, master: str, *, interaction: str | None = None,
                      type: str = "NODE TO SURFACE", sides: str | None = None,
-                     guard: str | None = None, adjust: Number | None = None,
-                     initiation: str | None = None) -> Model:
+                     guard: str | None = None, edges: str | None = None,
+                     adjust: Number | None = None, initiation: str | None = None) -> Model:
         """`*CONTACT PAIR` of two surfaces, or of one with itself.
 
         interaction   default one of its own, frictionless
@@ -408,6 +408,7 @@ class Model(Source):
                       the slave would push it sideways, of the slave with `adjust`
         guard         YES (default): nodes that the pair does not hold go in by a twentieth of an
                       edge at most; NO: they may go in
+        edges         YES (default): sharp edges that cross are held, in three dimensions; NO: not
         adjust        distance [L] up to which slave nodes are moved onto the master, or a node set
         initiation    MASSLESS: its slave nodes carry no mass; PERSISTENT: they do; default: as
                       `contact_initiation` says
@@ -418,8 +419,8 @@ class Model(Source):
                 self.interaction(interaction)
                 self._has_frictionless = True
         return self._card("CONTACT PAIR", {"INTERACTION": interaction, "TYPE": type,
-                                           "SIDES": sides, "GUARD": guard, "ADJUST": adjust,
-                                           "INITIATION": initiation},
+                                           "SIDES": sides, "GUARD": guard, "EDGES": edges,
+                                           "ADJUST": adjust, "INITIATION": initiation},
                           [(slave, master)])
 
     def contact(self, *surfaces: str | tuple[str, str],

@@ -31,8 +31,9 @@ module emcon_edge_contact_space
    !> An edge holds what comes from between its faces, and from so much outside: the sine of that
    !> angle by the sine of that between the faces. Edges that lie on faces would be on the limit.
    real(wp), parameter :: beside = 0.25_wp
-   !> So far past its end, by its length, an edge begins to hold, and goes on to hold.
-   real(wp), parameter :: begins_beyond = 1.0e-3_wp, ends_beyond = 0.05_wp
+   !> So far inside its ends, by its length, an edge begins to hold, as nodes hold there; so far
+   !> past them it goes on to hold.
+   real(wp), parameter :: begins_beyond = -1.0e-3_wp, ends_beyond = 0.05_wp
    !> So deep, by the edge, two edges may be in each other, and may be as a contact begins.
    real(wp), parameter :: deepest = 0.3_wp, deepest_start = 0.1_wp
 

@@ -55,7 +55,7 @@ contains
    pure subroutine edge_pair_gap(at, way, side, leaves_second, gap)
       real(wp), intent(in) :: at(n_dim, n_edge_pair_node)    !! where the ends start [L]
       real(wp), intent(in) :: way(n_dim, n_edge_pair_node)   !! how they move [L]
-      real(wp), intent(in) :: side
+      real(wp), intent(in) :: side               !! of the slave edge that the master is on
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(edge_pair_gap_t), intent(out) :: gap
       type(frame_vertex_t) :: vertex

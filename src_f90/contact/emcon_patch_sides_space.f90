@@ -24,7 +24,8 @@ module emcon_patch_sides_space
    real(wp), parameter :: blunt = 1.0e-2_wp
 
    !> Frames of contact points: the nodes of a surface, then the virtual centres of its facets that
-   !> have nodes between corners, as far as these are meant. The vectors a and b of a frame, and where its point is from the
+   !> have nodes between corners, as far as these are meant. The vectors a and b of a frame, and
+   !> where its point is from the
    !> node it is counted from, are sums of weight times (x(ring) - x(base)); lengths of a and b are
    !> as in the reference.
    type :: point_frames_t
@@ -134,8 +135,8 @@ contains
                groups%ring_start(g + 1) - 1))
          end do
          if (last > first) call add_frame(self, facets, x, still, i, &
-            groups%facet(groups%start(first):groups%start(last + 1) - 1), unique_sorted(groups%ring(groups%ring_start(first): &
-            groups%ring_start(last + 1) - 1)))
+            groups%facet(groups%start(first):groups%start(last + 1) - 1), &
+            unique_sorted(groups%ring(groups%ring_start(first):groups%ring_start(last + 1) - 1)))
       end associate
       associate (around => facets%around(facets%around_start(i):facets%around_start(i + 1) - 1))
          if (size(around) == 0) return

@@ -40,7 +40,9 @@ module emcon_deck
    use emcon_deck_ties, only : read_ties
    use emcon_deck_transform, only : read_transforms
    use emcon_diagnostics, only : diagnostics_t, diagnostics_texts
+   use emcon_edge_pairs_space, only : edge_pairs_find
    use emcon_guards, only : guards_find
+   use emcon_interactions, only : contact_pair_t
    use emcon_scene, only : scene_t
    use emcon_scene_motions, only : scene_is_flat
    use emcon_text, only : string_t
@@ -94,6 +96,7 @@ contains
    subroutine read_scene(reader, scene)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(inout) :: scene
+      type(contact_pair_t), allocatable :: crossing(:)
 
       call check_data(reader)
       if (.not. scene_is_flat(scene)) call refuse_plane_cards(reader, scene%n_dim)
@@ -132,7 +135,10 @@ contains
       call check_pairs(reader, scene)
       call check_ties(reader, scene)
       call check_rigid(reader, scene)
-      call guards_find(scene%pair, scene%surface, scene%n_dim, scene%guard)
+      call guards_find(scene%pair, scene%surface, scene%guard)
+      if (scene%n_dim == n_plane) return
+      call edge_pairs_find(scene%pair, scene%surface, crossing)
+      scene%guard = [scene%guard, crossing]
    end subroutine read_scene
 
    !> The shapes of elements, and what of the scene is of the plane alone.

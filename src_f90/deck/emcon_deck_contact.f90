@@ -346,7 +346,7 @@ contains
       end do
       if (has_option(card, "ADJUST")) call read_adjust(reader, card, scene, of_card)
       call read_guard(reader, card, any(pair%both_sides), of_card)
-      call read_edges(reader, card, of_card%holds_edges)
+      call read_crossings(reader, card, of_card%holds_crossings)
       call read_pair_initiation(reader, card, of_card%initiation)
       if (any(pair%formulation == formulation_user)) call suit_user(reader, card, of_card)
       do i = 1, size(pair)
@@ -354,7 +354,7 @@ contains
          ! Guards would push beside a pressure where that lets bodies in by more than their slack.
          pair(i)%is_guarded = of_card%is_guarded .and. (has_option(card, "GUARD") .or. &
             pair(i)%interaction%pressure%kind == pressure_hard)
-         pair(i)%holds_edges = of_card%holds_edges
+         pair(i)%holds_crossings = of_card%holds_crossings
          if (pair(i)%master > 0) pair(i)%is_guarded = pair(i)%is_guarded .and. &
             .not. allocated(scene%surface(pair(i)%master)%wall)
          pair(i)%initiation = of_card%initiation
@@ -449,18 +449,18 @@ contains
    end subroutine read_guard
 
    !> EDGES= of a card: are sharp edges that cross in contact?
-   subroutine read_edges(reader, card, holds_edges)
+   subroutine read_crossings(reader, card, holds_crossings)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
-      logical, intent(out) :: holds_edges
+      logical, intent(out) :: holds_crossings
       character(len=:), allocatable :: word
 
       call option_word(reader, card, "EDGES", "YES, NO", word)
-      holds_edges = word /= "NO"
+      holds_crossings = word /= "NO"
       if (reader%n_dim /= n_space .and. has_option(card, "EDGES")) call card_error(reader, card, &
          "EDGES is for three dimensions: in the plane bodies meet in nodes and edges alone; take " &
          // "it out")
-   end subroutine read_edges
+   end subroutine read_crossings
 
    !> ADJUST= a distance or a node set.
    subroutine read_adjust(reader, card, scene, of_card)

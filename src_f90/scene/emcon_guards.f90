@@ -1,13 +1,11 @@
-!> What watches beside pairs: guards, node-to-segment contact that begins only where a node has gone
-!> in too far, and in space sharp edges that cross, which no node sees.
+!> Guards: node-to-segment contact that begins only where a node has gone in too far.
 !>
 !> A pair holds the nodes of its slave, or means of gaps; a corner of the master may go in between
 !> two of them. For each direction in which no pair holds the nodes themselves a guard does, from a
 !> small depth on: a corner at once, a node of a smooth side where means of gaps have failed.
 !> Source: docs/theory.md, section 4.11.
 module emcon_guards
-   use emcon_interactions, only : contact_pair_t, formulation_edges, formulation_nts, &
-      formulation_user, pair_holds_nodes, pressure_hard
+   use emcon_interactions, only : contact_pair_t, formulation_nts, pair_holds_nodes
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
@@ -16,7 +14,6 @@ module emcon_guards
    public :: guards_find, guard_slack, corner_slack, overlap_bar, overlap_told, touching_bar, &
       crossing_bar
 
-   integer, parameter :: n_space = 3
    !> So far, by the edge, bodies may be in each other where nodes are held themselves.
    real(wp), parameter :: touching_bar = 1.0e-3_wp
    !> So far where nodes are held, in space: edges may cross between them.
@@ -30,11 +27,10 @@ module emcon_guards
 
 contains
 
-   !> The guards of the pairs, each direction once, and in space the edges of each pair, once.
-   pure subroutine guards_find(pair, surface, n_dim, guard)
+   !> The guards of the pairs, each direction once.
+   pure subroutine guards_find(pair, surface, guard)
       type(contact_pair_t), intent(in) :: pair(:)
       type(surface_t), intent(in) :: surface(:)
-      integer, intent(in) :: n_dim
       type(contact_pair_t), allocatable, intent(out) :: guard(:)     !! in the order of `pair`
       type(contact_pair_t), allocatable :: all(:)
       type(name_index_t) :: known                !! which sides' nodes are held or guarded, by pair
@@ -52,28 +48,7 @@ contains
          if (.not. surface(pair(i)%slave)%is_nodal) call watch(pair, i, .true., known, all, n)
       end do
       guard = all(:n)
-      if (n_dim == n_space) guard = [guard, edges_of(pair, surface)]
    end subroutine guards_find
-
-   !> The edges of pairs that hold them; those of a pair with both sides once. Edges have no area that
-   !> a pressure could act on.
-   pure function edges_of(pair, surface) result(edges)
-      type(contact_pair_t), intent(in) :: pair(:)
-      type(surface_t), intent(in) :: surface(:)
-      type(contact_pair_t), allocatable :: edges(:)
-      logical :: has_faces(0:size(surface))
-      integer :: i
-
-      has_faces = [.false., (.not. allocated(surface(i)%wall), i = 1, size(surface))]
-      edges = pair
-      edges%formulation = formulation_edges
-      edges%both_sides = .true.
-      edges%of_pair = [(i, i = 1, size(pair))]
-      edges = pack(edges, pair%holds_edges .and. .not. pair%is_reverse .and. &
-         pair%formulation /= formulation_user .and. &
-         pair%interaction%pressure%kind == pressure_hard .and. has_faces(pair%slave) .and. &
-         has_faces(pair%master))
-   end function edges_of
 
    !> Append the guard of pair `i`, or of it with its sides exchanged, unless there is one.
    pure subroutine watch(pair, i, is_reverse, known, guard, n)

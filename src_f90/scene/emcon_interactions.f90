@@ -86,7 +86,7 @@ module emcon_interactions
       logical :: is_asked = .false.                  !! the deck says so, or which
       logical :: is_exchanged = .false.              !! the deck names what is the master first
       logical :: is_guarded = .true.                 !! nodes that no pair holds get guards
-      logical :: holds_edges = .true.                !! sharp edges that cross are held, in space
+      logical :: holds_crossings = .true.            !! sharp ridges that cross are held, in space
       integer :: initiation = 0                      !! one of `initiation_`, 0: as the step
       real(wp) :: slack = 0.0_wp                     !! so far nodes may go in, by the edge: a guard
       type(interaction_t) :: interaction

@@ -12,7 +12,7 @@ module emcon_facet_split
       facet_split_middles
 
    !> Facets of more nodes have some between their corners.
-   integer, parameter :: most_corners = 4
+   integer, parameter :: most_simple = 4
 
    !> Points are the nodes of the surface, numbered as `node` of its facets, then centres.
    type :: facet_split_t
@@ -99,7 +99,7 @@ contains
          integer, intent(in) :: f
 
          associate (n => count(facets%facet(:, f) > 0))
-            has_middle = n > most_corners
+            has_middle = n > most_simple
             if (has_middle) has_middle = all(is_meant(facets%corner(:n, f)))
          end associate
       end function has_middle

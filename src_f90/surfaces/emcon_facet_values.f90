@@ -11,35 +11,65 @@ module emcon_facet_values
 
    !> Facets of more nodes have some in the middle of their sides.
    integer, parameter :: most_simple = 4
-   !> What of the pressure on such a facet is on its virtual centre.
-   real(wp), parameter :: of_centre = 1.0_wp/3.0_wp
+   !> What of a uniform pressure on such a facet is on each of its corners. It may be anything that
+   !> leaves pushes for the other points; with little a facet whose corners bear nothing is whole.
+   real(wp), parameter :: at_vertex = 0.01_wp
 
 contains
 
-   !> The area at a point that faces along `normal`: as uniform pressure loads the points, which its
-   !> nodes alike are, and a virtual centre by a third.
+   !> The area at a point that faces along `normal`: as uniform pressure loads the points.
    pure real(wp) function facets_point_area(self, middle, i, normal, x, u) result(area)
       type(facets_t), intent(in) :: self         !! set up, in space
       integer, intent(in) :: middle(:)           !! facets with nodes between corners, ascending
       integer, intent(in) :: i                   !! point: a node, or behind them of `middle`
       real(wp), intent(in) :: normal(:)          !! (3) unit vector
       real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node of the scene) [L]
-      integer :: k, n
+      integer :: k
 
       if (i > size(self%node)) then
-         area = of_centre*max(0.0_wp, dot_product(normal, facets_normal(self, &
-            middle(i - size(self%node)), x, u)))
+         area = faced(middle(i - size(self%node)))
          return
       end if
       area = 0.0_wp
       do k = self%around_start(i), self%around_start(i + 1) - 1
-         associate (f => self%around(k))
-            n = count(self%facet(:, f) > 0)
-            area = area + max(0.0_wp, dot_product(normal, facets_normal(self, f, x, u))) &
-               *merge(1.0_wp - of_centre, 1.0_wp, n > most_simple)/real(n, wp)
-         end associate
+         area = area + faced(self%around(k))
       end do
+
+   contains
+
+      !> What of facet `f` is the point's.
+      pure real(wp) function faced(f)
+         integer, intent(in) :: f
+         integer :: place
+
+         place = 0
+         if (i <= size(self%node)) place = findloc(nodes_of(self, f), i, 1)
+         faced = part_of(count(self%facet(:, f) > 0), place)*max(0.0_wp, dot_product(normal, &
+            facets_normal(self, f, x, u)))
+      end function faced
+
    end function facets_point_area
+
+   !> The part of a point in a facet of `n` nodes: the node at `place` in turn around it, those at
+   !> odd places vertices; 0: its virtual centre. Its nodes get the loads of its element: the weights of
+   !> the centre are -1/3 and 2/3 with six nodes, -1/2 and 3/4 with eight.
+   pure real(wp) function part_of(n, place) result(part)
+      integer, intent(in) :: n, place
+      real(wp) :: centre
+
+      if (n <= most_simple) then
+         part = 1.0_wp/real(n, wp)
+         return
+      end if
+      centre = merge(3.0_wp*at_vertex, 1.0_wp/6.0_wp + 2.0_wp*at_vertex, n == 6)
+      if (place == 0) then
+         part = centre
+      else if (btest(place, 0)) then
+         part = at_vertex
+      else
+         part = (1.0_wp - centre)/real(n/2, wp) - at_vertex
+      end if
+   end function part_of
 
    !> Pressures by forces on areas at points of a surface, of which a point may have several. On a
    !> facet with nodes between corners forces may be divided in more than one way: there facet by

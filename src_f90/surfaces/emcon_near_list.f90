@@ -117,33 +117,35 @@ contains
       integer, intent(in) :: f                   !! facet of the master
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
       real(wp), intent(in) :: within             !! [L]
-      real(wp), dimension(2) :: own, other
+      real(wp) :: low, high, other_low, other_high
       integer :: a
 
       is_near = .true.
       do a = 1, size(x, 1)
-         own = range_of(self%item(:, i), a, x, u)
-         other = range_of(self%facet(:, f), a, x, u)
-         is_near = is_near .and. max(other(1) - own(2), own(1) - other(2)) <= within
+         call find_range(self%item(:, i), a, x, u, low, high)
+         call find_range(self%facet(:, f), a, x, u, other_low, other_high)
+         is_near = is_near .and. max(other_low - high, low - other_high) <= within
       end do
    end function near_list_within
 
    !> The lowest and the highest coordinate of some nodes along an axis at x + u.
-   pure function range_of(nodes, axis, x, u) result(range)
+   pure subroutine find_range(nodes, axis, x, u, low, high)
       integer, intent(in) :: nodes(:)            !! of the scene; 0: no more
       integer, intent(in) :: axis
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      real(wp) :: range(2)
+      real(wp), intent(out) :: low, high         !! [L]
       integer :: k
 
-      range = x(axis, nodes(1)) + u(axis, nodes(1))
+      low = x(axis, nodes(1)) + u(axis, nodes(1))
+      high = low
       do k = 2, size(nodes)
          if (nodes(k) == 0) exit
          associate (here => x(axis, nodes(k)) + u(axis, nodes(k)))
-            range = [min(range(1), here), max(range(2), here)]
+            low = min(low, here)
+            high = max(high, here)
          end associate
       end do
-   end function range_of
+   end subroutine find_range
 
    !> List what lies within `reach`. Surfaces far apart get a reach as large as their distance and
    !> an empty list: then nothing is done until one has moved half of that.

@@ -250,7 +250,7 @@ def everything() -> Model:
     model.interaction("I4", pressure=("LINEAR", 1e3))
     model.interaction("I", friction=0.0, friction_restitution=0.5, pad_thickness=0.0,
                       restitution=0.5, damping=(0.0, 0.1, 0.5), tangent_fraction=0.5)
-    model.contact_pair("S1", "S2", interaction="I", adjust=0.1, sides="BOTH", guard="NO",
+    model.contact_pair("S1", "S2", interaction="I", adjust=0.1, sides="BOTH", guard="NO", edges="YES",
                        initiation="PERSISTENT")
     model.contact(interaction="I").contact("S1", ("S1", "S2"))
     model.tie("T", "S1", "S2", position_tolerance=0.1, multiplier="DUAL")

@@ -37,7 +37,7 @@ contains
       type(surface_t) :: surface(4)
 
       surface(4)%is_nodal = .true.
-      call guards_find(pair, surface, 2, guard)
+      call guards_find(pair, surface, guard)
       call check_equal(error, guard%slave, slave, "slaves")
       call check_equal(error, guard%master, master, "masters")
       call check_true(error, all(guard%formulation == formulation_nts), "node to segment")
