@@ -51,8 +51,8 @@ contains
    end function facets_point_area
 
    !> The part of a point in a facet of `n` nodes: the node at `place` in turn around it, those at
-   !> odd places vertices; 0: its virtual centre. Its nodes get the loads of its element: the weights of
-   !> the centre are -1/3 and 2/3 with six nodes, -1/2 and 3/4 with eight.
+   !> odd places vertices; 0: its virtual centre. Its nodes get the loads of its element: the
+   !> weights of the centre are -1/3 and 2/3 with six nodes, -1/2 and 3/4 with eight.
    pure real(wp) function part_of(n, place) result(part)
       integer, intent(in) :: n, place
       real(wp) :: centre
