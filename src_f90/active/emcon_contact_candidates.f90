@@ -59,18 +59,13 @@ contains
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
-      logical :: may_be(self%set%n), has_held
-      integer :: k, last, pair, i
+      logical :: may_be(self%set%n)
+      integer :: k, pair, i
 
       may_be = .false.
-      has_held = .false.
-      last = 0
       do k = self%set%n_permanent + 1, self%set%n
          call constraint_index(system, self%set%id(k), pair, i)
-         if (pair /= last) has_held = any(numbering_holds(system%space%numbering, &
-            system%contact(pair)%contact%node))
-         last = pair
-         may_be(k) = has_held
+         may_be(k) = numbering_holds(system%space%numbering, system%contact(pair)%contact%node(i))
       end do
       if (.not. any(may_be)) return
       call constraints_evaluate(self%set, system, motion, .true.)
@@ -134,16 +129,12 @@ contains
       end do
    end subroutine candidates_leave_out
 
-   !> Is nothing in row `k` of the set free to move, but by round-off?
+   !> Is nothing in row `k` of the set free to move?
    pure logical function is_bound(set, k)
       type(constraint_set_t), intent(in) :: set
       integer, intent(in) :: k
 
-      associate (first => set%force_rows%row_start(k) + 1, &
-            last => set%force_rows%row_start(k + 1), item => set%item(k))
-         is_bound = .not. sum(set%force_rows%value(first:last)**2) &
-            > epsilon(1.0_wp)*sum(item%g(:, :item%n_node)**2)
-      end associate
+      is_bound = set%force_rows%row_start(k) == set%force_rows%row_start(k + 1)
    end function is_bound
 
    !> Contact `id` cannot act in this step.
