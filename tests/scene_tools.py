@@ -1,6 +1,7 @@
 """Run the program on decks, read what it leaves, and edit decks: helpers of the tests of runs."""
 
 import contextlib
+import ctypes
 import dataclasses
 import functools
 import importlib
@@ -92,6 +93,18 @@ def attempt(deck, folder, options, parameters):
         deck = deck.write(folder / f"{deck.name}.inp")
     done = emcon(deck, "--quiet", "--output", folder, *options, *overrides(parameters))
     return done, Run(folder / deck.stem, done.stderr)
+
+
+def has_fused_products():
+    """Do OpenBLAS' kernels for this processor round products and sums once? Those for older ones, which it takes for
+    processors that it does not know, round twice."""
+    try:
+        blas = ctypes.CDLL("libopenblas.so.0")
+        blas.openblas_get_corename.restype = ctypes.c_char_p
+    except (OSError, AttributeError):
+        return True
+    return blas.openblas_get_corename().decode().lower() not in {
+        "prescott", "core2", "penryn", "dunnington", "nehalem", "atom", "nano", "sandybridge", "barcelona", "bobcat"}
 
 
 def run_deck(deck, folder, code=0, options=(), **parameters):

@@ -14,7 +14,7 @@ from friction_scenes import (
     stack_on_slope,
 )
 from plain_scenes import BOTH, ONE
-from scene_tools import run_deck
+from scene_tools import has_fused_products, run_deck
 
 NODES = "NODE TO SURFACE"
 
@@ -55,7 +55,8 @@ def test_an_arch(part, tmp_path):
     run = run_deck(arch(part*arch_needs(), BOTH, t_end=0.2), tmp_path, formulation=NODES,
                    method="SADDLE POINT")
     obeys(run)
-    assert run.history["cuts"].sum() <= 2        # none or two, by the kernels of the processor
+    # Where rounding is coarser Newton's method stalls twice before the first increment is solved.
+    assert run.history["cuts"].sum() <= (0 if has_fused_products() else 2)
 
 
 @pytest.mark.parametrize(("scene", "sides", "formulation", "most"), [

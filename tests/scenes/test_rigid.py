@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from scene_tools import EPSILON, Deck, number, run_deck
+from scene_tools import EPSILON, Deck, has_fused_products, number, run_deck
 from scipy.interpolate import CubicSpline
 from scipy.special import ellipk
 
@@ -383,7 +383,7 @@ def test_tilted_on_a_floor(initiation, floor, tmp_path):
     assert history["active"].max() >= 1
     if initiation != "ADMISSIBLE":                        # closes at once, and takes the energy
         # Newton's method ends at 1e-10 of the forces.
-        assert balance(history) < 1e-10          # as the verdict has it: some 1e5 roundings
+        assert balance(history) < (1e-11 if has_fused_products() else 1e-10)
     fields = run.fields()
     assert shape_error(fields.x[:15] + fields["displacement"][-1][:15], fields.x[:15]) < 1e-13
     # Velocities are those of a rigid motion but for what impacts leave: half the angle of a step
