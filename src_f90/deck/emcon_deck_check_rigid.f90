@@ -105,6 +105,7 @@ contains
             "surface " // scene%surface(i)%name // " is that of no *RIGID BODY, ANALYTICAL " // &
             "SURFACE=")
       end do
+      if (reader%doubt%prescribed) return
       do i = 1, size(scene%rigid)
          associate (rigid => scene%rigid(i))
             if (size(rigid%element) > 0) cycle

@@ -6,6 +6,7 @@
 !> (`emcon_ties`).
 module emcon_deck_general_contact
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t, n_neighbours
+   use emcon_deck_dimension, only : n_plane
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, is_blank, &
       next_line
    use emcon_deck_named, only : refuse_name
@@ -254,6 +255,9 @@ contains
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
       type(scene_t), intent(in) :: scene
+      character(len=*), parameter :: &
+         by_pair = "list the surfaces that need it by *CONTACT PAIR              ", &
+         in_space = "take it out; in three dimensions contact slides freely so far"
       type(data_t) :: data
       character(len=:), allocatable :: name
       integer :: i, side
@@ -276,28 +280,26 @@ contains
             call refuse_name(reader, data, "surface interaction", name, reader%interaction_name)
          else
             associate (given => reader%interaction(i))
-               call refuse(given%restitution < 1.0_wp, "a RESTITUTION, which is of pairs only", &
-                  "is of")
-               call refuse(given%friction > 0.0_wp, "*FRICTION, which is of pairs only", "is of")
-               call refuse(given%damping%coefficient > 0.0_wp, "*CONTACT DAMPING, which is of " // &
-                  "pairs only", "is of")
-               call refuse(given%pressure%kind /= pressure_hard, "a PRESSURE-OVERCLOSURE, " // &
-                  "which is by the area of a slave surface", "is of")
-               call refuse(given%offset > 0.0_wp, "a PAD THICKNESS, which has no meaning " // &
-                  "where surfaces may be in contact with themselves", "keeps apart")
+               call refuse(given%restitution < 1.0_wp, "RESTITUTION below 1", by_pair)
+               call refuse(given%friction > 0.0_wp, "*FRICTION", merge(by_pair, in_space, &
+                  reader%n_dim == n_plane))
+               call refuse(given%damping%coefficient > 0.0_wp, "*CONTACT DAMPING", by_pair)
+               call refuse(given%pressure%kind /= pressure_hard, "a PRESSURE-OVERCLOSURE that " // &
+                  "is not HARD", by_pair)
+               call refuse(given%offset > 0.0_wp, "a PAD THICKNESS", by_pair)
             end associate
          end if
       end do
 
    contains
 
-      subroutine refuse(has, what, does)
+      subroutine refuse(has, what, instead)
          logical, intent(in) :: has
          character(len=*), intent(in) :: what
-         character(len=*), intent(in) :: does        !! to what is to be named
+         character(len=*), intent(in) :: instead     !! what to do
 
          if (has) call data_error(reader, data, "the surface interaction " // quoted(name) // &
-            " has " // what // "; name what it " // does // " by *CONTACT PAIR")
+            " has " // what // ", which general contact has not: " // trim(instead))
       end subroutine refuse
 
    end subroutine check_properties

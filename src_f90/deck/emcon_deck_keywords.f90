@@ -93,7 +93,7 @@ module emcon_deck_keywords
          // "ADJUST=,INITIATION=,TIED,~SMALLSLIDING,~NOTHICKNESS,~SMOOTH," &
          // "~MECHANICALCONSTRAINT:KINEMATIC,~CPSET,~WEIGHT,~TRACKING,~GEOMETRICCORRECTION," &
          // "~SUPPLEMENTARYCONSTRAINTS,~HCRIT,~EXTENSIONZONE,~OP:NEW"), &
-      keyword_t("CONTACT", in_model, has_data=.false.), &
+      keyword_t("CONTACT", in_model, "~OP:NEW", has_data=.false.), &
       keyword_t("CONTACT INCLUSIONS", in_model, "ALLEXTERIOR"), &
       keyword_t("CONTACT PROPERTY ASSIGNMENT", in_model), &
       keyword_t("TIE", in_model, "NAME=,POSITIONTOLERANCE=,MULTIPLIER=,ADJUST=,TYPE=," &

@@ -95,6 +95,7 @@ contains
          if (data%ok) call check_rigid(reader, data, scene, is_held, item)
          if (data%ok) call check_turns(reader, data, scene, is_held, item, new%value)
          if (data%ok) call check_value(reader, data, scene, is_held, item, new)
+         reader%doubt%prescribed = reader%doubt%prescribed .or. .not. data%ok
          if (.not. data%ok) cycle
          allocate(is_other(size(item)), source=.false.)
          do i = 1, size(item)
@@ -162,9 +163,9 @@ contains
       do i = 1, size(item)
          if (.not. any(scene%rigid%reference == item(i))) cycle
          call data_error(reader, data, "reference node " // to_text(scene%node%label(item(i))) &
-            // ": a rigid body of three dimensions turns freely, or degrees of freedom 4 to 6 " &
-            // "are all held at 0 by one line; single axes and driven rotations are not in " &
-            // "this version")
+            // ": in three dimensions prescribe degrees of freedom 4 to 6 of a rigid body by one " &
+            // "line, all 0, or none of them; single axes and driven rotations are not in this " &
+            // "version")
          return
       end do
    end subroutine check_turns

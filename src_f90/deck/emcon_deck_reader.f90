@@ -45,6 +45,7 @@ module emcon_deck_reader
       logical :: shapes = .false.                        !! some element is not what it should be
       logical :: equations = .false.                     !! some equation is missing after an error
       logical :: rigid = .false.                         !! so is some rigid body
+      logical :: prescribed = .false.                    !! so is some prescribed degree of freedom
    end type doubts_t
 
    !> Where things stand in their lists, by name.

@@ -293,7 +293,8 @@ contains
       character(len=:), allocatable :: word
 
       call option_word(reader, card, "APPLICATION", "TRANSIENT FIDELITY, MODERATE DISSIPATION", &
-         word, "QUASI-STATIC", "use *STATIC, with STABILIZE where it snaps")
+         word, "QUASI-STATIC", "use *STATIC for bodies that are held or press on each other, " &
+         // "or leave it out and damp by *DAMPING where they fall")
       if (word == "MODERATEDISSIPATION") call card_warning(reader, card, "APPLICATION=MODERATE " &
          // "DISSIPATION has no effect: energy is kept; *DAMPING takes it")
    end subroutine read_application

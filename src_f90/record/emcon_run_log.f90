@@ -82,11 +82,7 @@ contains
          call add_link_lines(scene, system, notes)
          do k = 1, size(scene%pair)
             call formulation_text(scene%pair(k)%formulation, scene%step(1)%contact%options, how)
-            call note_add(notes, "contact: " // scene%surface(scene%pair(k)%slave)%name // &
-               " (slave, " // to_text(size(unique_sorted(system%contact(k)%contact%node))) // &
-               " nodes" // trim(merge(", named second", "              ", &
-               scene%pair(k)%is_exchanged)) // ") on " // &
-               scene%surface(scene%pair(k)%master)%name // ", " // how)
+            call add_pair(scene, k, size(unique_sorted(system%contact(k)%contact%node)), how, notes)
          end do
          call add_watching(scene, system, notes)
          do k = 1, size(scene%step)
@@ -95,6 +91,28 @@ contains
       end associate
       call notes_append(notes, stepper%notes)
    end function model_notes
+
+   !> Which surface is the slave of pair `k`, and on what its nodes are held.
+   subroutine add_pair(scene, k, n_node, how, notes)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: k
+      integer, intent(in) :: n_node              !! held ones
+      character(len=*), intent(in) :: how        !! formulation
+      type(notes_t), intent(inout) :: notes
+      character(len=:), allocatable :: text
+
+      associate (pair => scene%pair(k))
+         text = "contact: " // scene%surface(pair%slave)%name
+         if (pair%slave == pair%master) then
+            text = text // " (" // to_text(n_node) // " nodes) with itself, "
+         else
+            text = text // " (slave, " // to_text(n_node) // " nodes" // trim(merge( &
+               ", named second", "              ", pair%is_exchanged)) // ") on " // &
+               scene%surface(pair%master)%name // ", "
+         end if
+      end associate
+      call note_add(notes, text // how)
+   end subroutine add_pair
 
    !> What is held beside the pairs.
    subroutine add_watching(scene, system, notes)
@@ -110,8 +128,13 @@ contains
                pair => scene%pair(abs(system%contact(k)%of_pair)))
             has_guards = has_guards .or. contact%slack > 0.0_wp
             if (contact%slack > 0.0_wp .or. contact%n_constraint == 0) cycle
-            call note_add(notes, "contact: sharp edges of " // scene%surface(pair%slave)%name // &
-               " and " // scene%surface(pair%master)%name // " that cross are held")
+            if (pair%slave == pair%master) then
+               call note_add(notes, "contact: sharp edges of " // scene%surface(pair%slave)%name &
+                  // " that cross each other are held")
+            else
+               call note_add(notes, "contact: sharp edges of " // scene%surface(pair%slave)%name &
+                  // " and " // scene%surface(pair%master)%name // " that cross are held")
+            end if
          end associate
       end do
       if (has_guards) call note_add(notes, "contact: guards hold nodes that the pairs do not: " // &

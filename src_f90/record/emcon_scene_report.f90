@@ -4,7 +4,7 @@ module emcon_scene_report
    use emcon_contact, only : gap_state_t
    use emcon_deck_dimension, only : n_plane
    use emcon_gaps, only : gaps_forget, gaps_search
-   use emcon_interactions, only : contact_pair_t
+   use emcon_interactions, only : contact_pair_t, pressure_hard
    use emcon_kinds, only : wp
    use emcon_locking, only : locking_advice
    use emcon_massless_surfaces, only : most_moved
@@ -100,8 +100,12 @@ contains
 
       call row_put(row, "slave", scene%surface(pair%slave)%name, ": #")
       call count_pieces(pair%slave, "slave")
-      call row_put(row, "master", scene%surface(pair%master)%name, " on #")
-      call count_pieces(pair%master, "master")
+      if (pair%slave == pair%master) then
+         call row_put(row, "master", scene%surface(pair%master)%name, " with itself")
+      else
+         call row_put(row, "master", scene%surface(pair%master)%name, " on #")
+         call count_pieces(pair%master, "master")
+      end if
       call option_text("formulation", pair%formulation, how)
       call row_put(row, "formulation", how, ", #")
       how = "both"
@@ -164,8 +168,7 @@ contains
          is_dynamic = any(step_is_dynamic(scene%step))
          call choose("contact", size(system%contact) > 0, "no *CONTACT PAIR, no *CONTACT")
          call choose("guards", any([(system%contact(k)%contact%slack > 0.0_wp, k = 1, &
-            size(system%contact))]), &
-            "no pairs, both sides of all pairs are held, or GUARD=NO")
+            size(system%contact))]), no_guards(scene))
          call add_first_contact(stepper, rows)
          call choose("ties and equations", system%space%linear%n > 0, &
             "no *TIE, no *EQUATION, no *RIGID BODY")
@@ -195,6 +198,31 @@ contains
       end subroutine choose
 
    end subroutine add_choices
+
+   !> Why no pair has guards.
+   pure function no_guards(scene) result(text)
+      type(scene_t), intent(in) :: scene
+      character(len=:), allocatable :: text
+      logical :: has_one_side(size(scene%pair))
+      integer :: k
+
+      associate (pair => scene%pair)
+         has_one_side = .not. (pair%both_sides .or. pair%slave == pair%master)
+         if (size(pair) == 0) then
+            text = "no contact"
+         else if (.not. any(has_one_side)) then
+            text = "contact holds the nodes of both sides"
+         else if (any(has_one_side .and. pair%is_guarded)) then
+            text = "contact holds all nodes"
+         else if (any([(allocated(scene%surface(pair(k)%master)%wall), k = 1, size(pair))])) then
+            text = "walls have no nodes"
+         else if (any(pair%interaction%pressure%kind /= pressure_hard)) then
+            text = "contact gives way under its pressure"
+         else
+            text = "GUARD=NO"
+         end if
+      end associate
+   end function no_guards
 
    !> How contact begins in dynamic steps, and who says so.
    subroutine add_first_contact(stepper, rows)

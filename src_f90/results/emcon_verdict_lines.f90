@@ -40,7 +40,7 @@ contains
       do i = 1, self%reasons%n
          line = line // merge(": ", "; ", i == 1) // self%reasons%item(i)%text
       end do
-      if (self%n_warning > 0) line = line // "; warnings: " // to_text(self%n_warning)
+      if (self%n_warning > 0) line = line // "; warnings during the run: " // to_text(self%n_warning)
    end subroutine verdict_line
 
    !> What a good run is good for.
@@ -278,14 +278,20 @@ contains
       end do
    end subroutine add_pairs
 
-   !> "contact ... on ..." of pair `k`.
+   !> "contact ... on ..." of pair `k`, or "contact ... with itself".
    pure subroutine pair_text(scene, k, text)
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: k                   !! of the scene, from 1
       character(len=:), allocatable, intent(out) :: text
 
-      text = "contact " // scene%surface(scene%pair(k)%slave)%name // " on " // &
-         scene%surface(scene%pair(k)%master)%name
+      associate (pair => scene%pair(k))
+         text = "contact " // scene%surface(pair%slave)%name
+         if (pair%slave == pair%master) then
+            text = text // " with itself"
+         else
+            text = text // " on " // scene%surface(pair%master)%name
+         end if
+      end associate
    end subroutine pair_text
 
    !> What these pairs can do to need no guards.

@@ -248,7 +248,7 @@ FORMS = [
      "parameter NUMBERINTERVAL has no effect"),
     ("abaqus", "application=TRANSIENT FIDELITY", "application=MODERATE DISSIPATION,initial=NO", 0, "APPLICATION=MODERATE DISSIPATION "
      "has no effect"),
-    ("abaqus", "application=TRANSIENT FIDELITY", "application=QUASI-STATIC", 2, "use *STATIC, with STABILIZE where it snaps"),
+    ("abaqus", "application=TRANSIENT FIDELITY", "application=QUASI-STATIC", 2, "use *STATIC for bodies that are held or press on each other"),
     ("abaqus", "** LOADS", "*Dload\n, GRAV, 9810., 0., -1.\n** LOADS", 0, ""),
     ("abaqus", "** LOADS", "*Dload\n, P1, 1.\n** LOADS", 2, "the element label or set is missing"),
     ("abaqus", "** LOADS", "*Bulk Viscosity\n0.06, 1.2\n** LOADS", 0, ""),
