@@ -268,7 +268,8 @@ contains
          state%gap1 = self%step%engages             ! what is not covered asks for nothing
          if (cover(0) > no_cover) state%gap0 = look%height(0)/cover(0) - self%offset &
             - self%sagitta(i)
-         if (state%is_arriving) state%was_open = look%ahead - self%offset &
+         ! What is under a fading strip already comes from beside the surface.
+         if (state%is_arriving) state%was_open = min(look%ahead - self%offset, state%gap0) &
             >= -max_penetration_on_entry*state%size
          if (cover(1) >= least) state%gap1 = look%height(1)/cover(1) - self%offset &
             - self%sagitta(i)
