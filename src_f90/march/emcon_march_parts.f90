@@ -332,17 +332,17 @@ contains
          "let contact give way by *CONSTRAINT METHOD, TYPE=PENALTY"
    end subroutine cycling_text
 
-   !> A contact goes past the edges that it was to act on: at which nodes?
+   !> A contact meets in the step what its stencil does not know, or begins deep: at which nodes?
    subroutine too_far_text(self, scene, text)
       type(march_t), intent(in) :: self
       type(scene_t), intent(in) :: scene
       character(len=:), allocatable, intent(out) :: text
       character(len=:), allocatable :: nodes
 
-      text = "a contact slides farther than its stencil was chosen for"
+      text = "a contact begins too deep or slides too far for one increment"
       if (.not. any(self%active%candidates%is_blamed)) return
       call nodes_text(self, scene, self%active%candidates%is_blamed, nodes)
-      text = text // ", past the edge next to the one where it began: slave nodes " // nodes
+      text = text // ": slave nodes " // nodes
       if (.not. self%active%rules%may_cut) text = text // "; allow for smaller increments, or " // &
          "give the other surface longer edges there"
    end subroutine too_far_text
