@@ -216,7 +216,7 @@ class Cards:
         """`*BOUNDARY`: prescribe displacements [L]; before the first step as in it.
 
         dof        1, 2, 3 or some of them; 6: rotation of the reference node of a rigid body,
-                   radians; default (1, 2), of nodes that `add_nodes` gave three coordinates (1, 2, 3)
+                   radians; default all displacements: (1, 2), in three dimensions (1, 2, 3)
         value      one for all, (n_dof,), or (k, n_dof) for k nodes
         delay      how much later the amplitude begins [T]
         fixed      hold the degrees of freedom where the step finds them

@@ -115,6 +115,7 @@ class Model(Source):
             model.heading(heading)
         if parameters:
             model.parameter(**parameters)
+        model._nodes.n_dim = mesh.n_dim
         model._add(mesh.text())
         return model
 

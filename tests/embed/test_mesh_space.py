@@ -188,3 +188,11 @@ def test_files_of_meshio(kind: str, cell: str, side: str, tmp_path: Path) -> Non
                            tmp_path/"a.inp"], cwd=ROOT/"pywrap", capture_output=True, text=True)
     assert done.returncode == 0 and f"{kind} " in done.stdout and "TOP" in done.stdout
     assert np.array_equal(read(tmp_path/"a.inp").nodes, found.nodes)
+
+
+def test_supports_hold_all_directions() -> None:
+    """A support of a mesh in space holds three displacements where none are named."""
+    model = Model.from_mesh(block(kind="C3D8"))
+    deck = model.boundary("BLOCK_BACK").deck()
+    assert [line for line in deck.splitlines() if line.startswith("BLOCK_BACK, ")] == [
+        f"BLOCK_BACK, {dof}, {dof}, 0." for dof in (1, 2, 3)]
