@@ -212,14 +212,12 @@ contains
             text = "no contact"
          else if (.not. any(has_one_side)) then
             text = "contact holds the nodes of both sides"
-         else if (any(has_one_side .and. pair%is_guarded)) then
-            text = "contact holds all nodes"
          else if (any([(allocated(scene%surface(pair(k)%master)%wall), k = 1, size(pair))])) then
             text = "walls have no nodes"
          else if (any(pair%interaction%pressure%kind /= pressure_hard)) then
             text = "contact gives way under its pressure"
          else
-            text = "GUARD=NO"
+            text = "GUARD=NO, or no node needs one"
          end if
       end associate
    end function no_guards

@@ -40,7 +40,8 @@ contains
       do i = 1, self%reasons%n
          line = line // merge(": ", "; ", i == 1) // self%reasons%item(i)%text
       end do
-      if (self%n_warning > 0) line = line // "; warnings during the run: " // to_text(self%n_warning)
+      if (self%n_warning > 0) line = line // "; warnings during the run: " // &
+         to_text(self%n_warning)
    end subroutine verdict_line
 
    !> What a good run is good for.
