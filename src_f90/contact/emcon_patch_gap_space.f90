@@ -1,4 +1,4 @@
-!> The mean height of a surface of triangles over a small one, the patch, that moves with a node.
+!> The mean height of a surface of triangles over a small square, the patch, that moves with a node.
 !>
 !> The field over the frame of the patch is continuous, so its integral is smooth while the patch
 !> slides over sides and corners of the triangles. Source: docs/theory.md, eqs. (43) to (49).
@@ -6,8 +6,8 @@ module emcon_patch_gap_space
    use emcon_frame_vertex_space, only : at_eta, at_height, frame_place, frame_vertex, &
       frame_vertex_t, n_frame_var
    use emcon_kinds, only : wp
-   use emcon_patch_moments_space, only : barycentric, patch_misses, patch_moment_slopes, &
-      patch_moments
+   use emcon_patch_moments_space, only : patch_misses, patch_moment_slopes, patch_moments
+   use emcon_polygon_clip, only : barycentric
    implicit none
    private
    public :: patch_t, patch_gap_t, patch_gap, patch_look_t, patch_look
@@ -16,10 +16,10 @@ module emcon_patch_gap_space
    real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
    !> A vertex whose triangles cover so much of the patch at both ends together has half its weight.
    real(wp), parameter :: some = 0.1_wp
-   !> Corners of the patch, in its own coordinates.
-   real(wp), parameter :: patch_corner(2, 3) = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, &
+   !> Places at which a field is given, in coordinates in which the patch is 0 <= y1, y2 <= 1.
+   real(wp), parameter :: unit_corner(2, 3) = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, &
       1.0_wp], [2, 3])
-   real(wp), parameter :: centre = 1.0_wp/3.0_wp
+   real(wp), parameter :: centre = 0.5_wp
 
    !> The triangles that a patch may see in a step.
    type :: patch_t
@@ -55,7 +55,7 @@ module emcon_patch_gap_space
    type :: field_t
       integer :: vertex(3) = 0                   !! among those that count
       real(wp) :: moment(3, 0:1) = 0.0_wp        !! over the part of the patch that it covers
-      real(wp) :: value(3, 0:1) = 0.0_wp         !! its field at the corners of the patch [L]
+      real(wp) :: value(3, 0:1) = 0.0_wp         !! its field at the `unit_corner` [L]
       real(wp) :: slope(2, 0:1) = 0.0_wp         !! of the field [L]
       real(wp) :: share(3, 3) = 0.0_wp           !! (j, v) of its corner j at v, in the mean
       real(wp) :: part(3) = 0.0_wp               !! of the integral that each corner takes
@@ -116,7 +116,7 @@ contains
             if (patch_misses(place(:2, t))) cycle
             moment = patch_moments(place(:2, t))
             do v = 1, 3
-               share = moment(v)*barycentric(place(:2, t), patch_corner(:, v))
+               share = moment(v)*barycentric(place(:2, t), unit_corner(:, v))
                height = height + dot_product(share, patch%chi(t)*place(3, t))
                cover = cover + dot_product(share, patch%chi(t))
             end do
@@ -294,12 +294,12 @@ contains
             p(j) = chi(j)*(at(j)%f(at_height, end) - target)
          end do
          do v = 1, 3
-            field%value(v, end) = dot_product(p, barycentric(corner(:, :, end), patch_corner(:, v)))
+            field%value(v, end) = dot_product(p, barycentric(corner(:, :, end), unit_corner(:, v)))
          end do
          field%slope(:, end) = field%value(2:3, end) - field%value(1, end)
       end do
       do v = 1, 3
-         field%share(:, v) = barycentric(sum(corner, 3)/2.0_wp, patch_corner(:, v))
+         field%share(:, v) = barycentric(sum(corner, 3)/2.0_wp, unit_corner(:, v))
       end do
       field%part = matmul(field%share, sum(field%moment, 2)/2.0_wp)
    end subroutine form_field
@@ -318,7 +318,7 @@ contains
       end do
       part = 0.0_wp
       do v = 1, 3
-         part = part + field%moment(v, 1)*barycentric(corner, patch_corner(:, v))
+         part = part + field%moment(v, 1)*barycentric(corner, unit_corner(:, v))
       end do
       associate (to => field%vertex)
          by(at_height, to) = by(at_height, to) + chi*part
@@ -394,9 +394,9 @@ contains
       real(wp) :: lean(2, 3)
       real(wp) :: first(3)
 
-      first = barycentric(corner, patch_corner(:, 1))
-      lean(1, :) = barycentric(corner, patch_corner(:, 2)) - first
-      lean(2, :) = barycentric(corner, patch_corner(:, 3)) - first
+      first = barycentric(corner, unit_corner(:, 1))
+      lean(1, :) = barycentric(corner, unit_corner(:, 2)) - first
+      lean(2, :) = barycentric(corner, unit_corner(:, 3)) - first
    end function gradients
 
    !> Add how the closing term changes.
@@ -453,7 +453,7 @@ contains
       part = 0.0_wp
       do v = 1, 3
          part = part + 0.5_wp*(field%moment(v, 1) - field%moment(v, 0)) &
-            *barycentric(corner, patch_corner(:, v))
+            *barycentric(corner, unit_corner(:, v))
       end do
       do j = 1, 3
          associate (to => by_rest(:, field%vertex(j)), at_j => 3*(field%vertex(j) - 1))

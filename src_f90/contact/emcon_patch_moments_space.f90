@@ -1,17 +1,16 @@
-!> What a triangle covers of a small one, the patch: moments of the common polygon, and how they
+!> What a triangle covers of the patch of a slave node: moments of the common polygon, and how they
 !> change with the corners.
 !>
-!> Places are given by coordinates y in which the patch is 0 <= y1, y2, y1 + y2 <= 1.
+!> Places are given by coordinates y in which the patch is the square 0 <= y1, y2 <= 1.
 !> Source: docs/theory.md, eqs. (45) and (49).
 module emcon_patch_moments_space
    use emcon_kinds, only : wp
+   use emcon_polygon_clip, only : most_corners, polygon_clip, polygon_inside, polygon_misses, &
+      square_sides
    implicit none
    private
-   public :: patch_moments, patch_moment_slopes, patch_misses, patch_clip, most_corners
-   public :: barycentric
+   public :: patch_moments, patch_moment_slopes, patch_misses
 
-   !> Corners of what three half planes leave of a triangle, at most.
-   integer, parameter :: most_corners = 6
    !> A side of a triangle that lies on one of the patch is half in it, half not: the patch is taken
    !> this much wider and narrower.
    real(wp), parameter :: wider = 1.0e-10_wp
@@ -20,84 +19,32 @@ module emcon_patch_moments_space
 
 contains
 
-   !> Do they have no area in common, as one side of either shows?
+   !> Do they have no area in common, as one side of the patch shows?
    pure logical function patch_misses(corner)
       real(wp), intent(in) :: corner(2, 3)       !! of the triangle
 
-      patch_misses = any(maxval(corner, 2) <= 0.0_wp) .or. minval(sum(corner, 1)) >= 1.0_wp
+      patch_misses = polygon_misses(square_sides, corner)
    end function patch_misses
 
-   !> Moments of the common polygon with the patch' barycentric coordinates, by the area of the
-   !> patch; exactly 0 where there is none. Their sum is the part of the patch that is covered.
+   !> Moments of the common polygon with the functions 1 - y1 - y2, y1 and y2, by the area of the
+   !> patch, 1; exactly 0 where there is none. Their sum is the part of the patch that is covered.
    pure function patch_moments(corner) result(moment)
       real(wp), intent(in) :: corner(2, 3)       !! of the triangle, counter-clockwise
       real(wp) :: moment(3)
-      real(wp) :: polygon(2, most_corners), centre(2), area
+      real(wp) :: polygon(2, most_corners), middle(2), area
       integer :: k, n
 
       moment = 0.0_wp
       if (patch_misses(corner)) return
-      call patch_clip(corner, polygon, n)
+      call polygon_clip(square_sides, corner, polygon, n)
       do k = 2, n - 1
          associate (a => polygon(:, k) - polygon(:, 1), b => polygon(:, k + 1) - polygon(:, 1))
-            area = a(1)*b(2) - a(2)*b(1)         ! twice it, by that of the patch, 1/2
+            area = 0.5_wp*(a(1)*b(2) - a(2)*b(1))
          end associate
-         centre = (polygon(:, 1) + polygon(:, k) + polygon(:, k + 1))/3.0_wp
-         moment = moment + area*[1.0_wp - sum(centre), centre]
+         middle = (polygon(:, 1) + polygon(:, k) + polygon(:, k + 1))/3.0_wp
+         moment = moment + area*[1.0_wp - sum(middle), middle]
       end do
    end function patch_moments
-
-   !> The common polygon of a triangle and the patch, in turn as the corners of the triangle.
-   pure subroutine patch_clip(corner, polygon, n)
-      real(wp), intent(in) :: corner(2, 3)       !! of the triangle
-      real(wp), intent(out) :: polygon(2, most_corners)      !! places
-      integer, intent(out) :: n                  !! corners that it has; fewer than 3: no area
-      integer :: k
-
-      polygon(:, :3) = corner
-      n = 3
-      do k = 1, 3
-         call cut(k, polygon, n)
-      end do
-   end subroutine patch_clip
-
-   !> How far inside the `k`th side of the patch a place is.
-   pure real(wp) function inside(k, y)
-      integer, intent(in) :: k
-      real(wp), intent(in) :: y(2)
-
-      if (k < 3) then
-         inside = y(k)
-      else
-         inside = 1.0_wp - (y(1) + y(2))
-      end if
-   end function inside
-
-   !> Cut off of a polygon what is outside of the `k`th side of the patch.
-   pure subroutine cut(k, polygon, n)
-      integer, intent(in) :: k
-      real(wp), intent(inout) :: polygon(2, most_corners)
-      integer, intent(inout) :: n                !! corners that it has
-      real(wp) :: old(2, most_corners), here, there
-      integer :: i, n_old
-
-      old = polygon
-      n_old = n
-      n = 0
-      do i = 1, n_old
-         associate (a => old(:, i), b => old(:, 1 + mod(i, n_old)))
-            here = inside(k, a)
-            there = inside(k, b)
-            if (here >= 0.0_wp) then
-               n = n + 1
-               polygon(:, n) = a
-            end if
-            if ((here >= 0.0_wp) .eqv. (there >= 0.0_wp)) cycle
-            n = n + 1
-            polygon(:, n) = a + (here/(here - there))*(b - a)
-         end associate
-      end do
-   end subroutine cut
 
    !> How moments change with the corners: what each side sweeps of the patch.
    pure function patch_moment_slopes(corner) result(slope)
@@ -116,8 +63,8 @@ contains
                do i = 1, 2
                   t = low + (high - low)*gauss(i)
                   y = a + t*along
-                  ! Two for the area of the patch, half for the pass, half for the point of Gauss.
-                  at = (0.5_wp*(high - low))*[1.0_wp - sum(y), y]
+                  ! Half for the pass, half for the point of Gauss.
+                  at = (0.25_wp*(high - low))*[1.0_wp - sum(y), y]
                   call add(slope(:, :, k), (1.0_wp - t)*at, along)
                   call add(slope(:, :, next), t*at, along)
                end do
@@ -147,9 +94,9 @@ contains
 
       low = 0.0_wp
       high = 1.0_wp
-      do k = 1, 3
-         here = inside(k, from) + by
-         there = inside(k, from + along) + by
+      do k = 1, size(square_sides, 2)
+         here = polygon_inside(square_sides(:, k), from) + by
+         there = polygon_inside(square_sides(:, k), from + along) + by
          if (max(here, there) <= 0.0_wp) high = low
          if ((here > 0.0_wp) .eqv. (there > 0.0_wp)) cycle
          t = here/(here - there)
@@ -157,26 +104,5 @@ contains
          if (there > 0.0_wp) low = max(low, t)
       end do
    end subroutine part_inside
-
-   !> The barycentric coordinates of place `y` in a triangle, also outside of it.
-   pure function barycentric(corner, y) result(share)
-      real(wp), intent(in) :: corner(2, 3)       !! not on one line
-      real(wp), intent(in) :: y(2)               !! in the same coordinates
-      real(wp) :: share(3)
-      real(wp) :: d(2, 3)
-
-      d = corner - spread(y, 2, 3)
-      share = [turn(d(:, 2), d(:, 3)), turn(d(:, 3), d(:, 1)), turn(d(:, 1), d(:, 2))] &
-         /turn(corner(:, 2) - corner(:, 1), corner(:, 3) - corner(:, 1))
-
-   contains
-
-      pure real(wp) function turn(a, b)
-         real(wp), intent(in) :: a(2), b(2)
-
-         turn = a(1)*b(2) - a(2)*b(1)
-      end function turn
-
-   end function barycentric
 
 end module emcon_patch_moments_space

@@ -18,8 +18,6 @@ module emcon_patch_sides_space
    public :: point_frames_t, point_frames_init, patch_triangles_t, patch_triangles_init, &
       patch_sides_t, sides_point, frame_normal
 
-   !> The second vector of a frame is turned by 60 degrees: the patch is an equilateral triangle.
-   real(wp), parameter :: turn(2) = [0.5_wp, 0.5_wp*sqrt(3.0_wp)]
    !> A mean normal shorter than this, by the area, is none.
    real(wp), parameter :: blunt = 1.0e-2_wp
 
@@ -207,7 +205,9 @@ contains
       real(wp) :: first(3), second(3), flat(2, size(from, 2)), square(2, 2), inverse(2, 2)
       integer :: k
 
-      first = from(:, 1) - dot_product(from(:, 1), normal)*normal
+      ! Along the way to the nearest: of a mirrored surface that is mirrored too.
+      k = minloc(sum(from**2, 1), 1)
+      first = from(:, k) - dot_product(from(:, k), normal)*normal
       first = first/sqrt(dot_product(first, first))
       second = cross_product(normal, first)
       do k = 1, size(from, 2)
@@ -217,7 +217,6 @@ contains
       inverse = reshape([square(2, 2), -square(2, 1), -square(1, 2), square(1, 1)], [2, 2]) &
          /(square(1, 1)*square(2, 2) - square(1, 2)*square(2, 1))
       weight = matmul(inverse, flat)
-      weight(2, :) = turn(1)*weight(1, :) + turn(2)*weight(2, :)
    end function frame_weights
 
    !> The unit normal of frame `k`, at x + u.
