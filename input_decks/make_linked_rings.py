@@ -30,8 +30,8 @@ Units: any consistent set (length L, mass M, time T; stress M/(L T^2)).
 
 What to look at: two tubes that cross touch in one place, bend each other, and part.
 
-Expected: kinetic + strain energy - work of gravity constant to 1e-12 of the largest; the centre of
-          the lower ring stays on the axis x = y = 0 by symmetry, to the error of Newton's method.
+Expected: the total energy constant to 1e-12; the scene is its own mirror image in the planes x = 0
+          and y = 0, so the lower ring gets no momentum along x and y and none about z: 1e-12.
 
 Made by make_linked_rings.py. Change a parameter for one run: --set h=0.01
 """
