@@ -7,6 +7,7 @@
 !> place by place, each exactly, until nothing changes (Gauss and Seidel), which needs no inverse,
 !> so that contacts that follow from others do no harm; the two take turns. After two of them, in
 !> the plane, by the method of Lemke for forces that push at a and at 0, whose matrix is copositive.
+!> Without friction none of this is needed, but the least motion that closes no gap.
 !> Where W is positive definite there is a solution for any coefficient.
 !> Source: docs/theory.md, eq. (14i).
 module emcon_contact_problem
@@ -15,6 +16,7 @@ module emcon_contact_problem
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_lemke, only : lemke_solve
+   use emcon_push_problem, only : push_problem_solve
    use emcon_single_contact, only : single_contact_solve, single_contact_t
    implicit none
    private
@@ -88,6 +90,9 @@ contains
       integer :: turn
 
       is_solved = size(self%mu) == 0
+      if (is_solved) return
+      if (has_compliance(self) .and. .not. any(self%mu > 0.0_wp .or. self%hold(0, :) > 0.0_wp)) &
+         call solve_by_pushes(self, push, effort%n_pivot, is_solved)
       if (is_solved) return
       call solve_by_trials(self, push, first_trials, effort%n_trial, is_solved)
       if (is_solved .or. .not. has_compliance(self)) return
@@ -461,6 +466,25 @@ contains
          motion = motion + change(k)*w(:, k)
       end do
    end subroutine add_motion
+
+   !> Without friction and where nothing is held: the least motion that closes no gap. Contacts that
+   !> follow from others, as in stacks of aligned bodies, cost no more than others.
+   subroutine solve_by_pushes(self, push, n_pivot, is_solved)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
+      integer, intent(out) :: n_pivot                !! pushes that came or went
+      logical, intent(out) :: is_solved              !! else `push` is as it was
+      real(wp), dimension(0:self%n_slip, size(self%mu)) :: free, found
+
+      free = motion_of(self, -self%base)
+      found = -self%base
+      associate (of_gap => self%w(1::1 + self%n_slip, 1::1 + self%n_slip))
+         call push_problem_solve(of_gap, free(0, :), found(0, :), is_solved, n_pivot)
+      end associate
+      if (.not. is_solved) return
+      push = found
+      push(0, :) = push(0, :) - self%base(0, :)
+   end subroutine solve_by_pushes
 
    !> In the plane, by complementary pivoting over (lam, tau+, tau-, gamma+, gamma-): with slip
    !> counted towards a, 0 <= tau+ <= mu lam pushes back what is at a or past it, and

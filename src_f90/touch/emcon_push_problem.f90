@@ -1,0 +1,165 @@
+!> Gaps without friction: pushes lam >= 0 with g = b + W lam >= 0 and lam.g = 0, where W may be
+!> singular: rows may follow from others, as of aligned bodies in a stack.
+!>
+!> The least motion that closes no gap, by its dual: from no push on, the deepest gap is pushed open
+!> while those that push stay closed; what would come to pull is let go, also in favour of a row
+!> that follows from it. So those that push never depend on each other, and each push that is
+!> added does work. With a symmetric W the method ends; over a step rows and columns of W are
+!> gradients at its end and discrete ones, and differ a little. Source: Goldfarb and Idnani, Math.
+!> Program. 27 (1983) 1-33.
+module emcon_push_problem
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: push_problem_solve
+
+   !> Of what is less than this part of a row left of it, it follows from others.
+   real(wp), parameter :: dependent = 1.0e5_wp*epsilon(1.0_wp)
+   !> A gap is open where it is below 0 by no more than so much of its terms.
+   real(wp), parameter :: closed = 64.0_wp*epsilon(1.0_wp)
+   !> Steps per contact at most, and corrections of round-off after each.
+   integer, parameter :: most_steps = 30, n_refine = 2
+
+   !> Those that push.
+   type :: pushing_t
+      integer :: n = 0
+      integer, allocatable :: row(:)             !! (>= n) in the order in which they came
+      real(wp), allocatable :: inverse(:, :)     !! (>= n, >= n) of their part of W [M/T^2]
+      real(wp), allocatable :: push(:)           !! (>= n) [M L/T^2]
+   end type pushing_t
+
+contains
+
+   !> Solve for `push`. Not solved: no motion keeps all gaps open, or round-off has no end.
+   pure subroutine push_problem_solve(w, free, push, is_solved, n_step)
+      real(wp), intent(in) :: w(:, :)            !! (n, n) none of whose x.W x is below 0 [T^2/M]
+      real(wp), intent(in) :: free(:)            !! (n) gaps without pushes, b [L]
+      real(wp), intent(out) :: push(:)           !! (n) lam [M L/T^2]
+      logical, intent(out) :: is_solved
+      integer, intent(out) :: n_step             !! pushes that were added or taken away
+      type(pushing_t) :: set
+      real(wp) :: gap(size(free)), room(size(free))
+      integer :: p
+
+      allocate(set%row(size(free)), set%push(size(free)), set%inverse(size(free), size(free)))
+      gap = free
+      room = closed*abs(free)
+      is_solved = .false.
+      n_step = 0
+      push = 0.0_wp
+      do
+         p = minloc(gap + room, 1)
+         if (.not. gap(p) < -room(p)) exit
+         if (any(set%row(:set%n) == p) .or. n_step > most_steps*size(free)) return
+         call open(w, p, -gap(p), set, n_step)
+         if (set%n == 0) return
+         call measure(w, free, set, gap, room)
+         ! Rows that nearly follow from others may take turns for ever: round-off grows in time.
+         room = room*2.0_wp**(n_step/size(free))
+      end do
+      is_solved = .true.
+      push(set%row(:set%n)) = set%push(:set%n)
+   end subroutine push_problem_solve
+
+   !> Push at contact `p` until it is open; what comes to pull on the way is let go. Where nothing
+   !> can open it none is left.
+   pure subroutine open(w, p, depth, set, n_step)
+      real(wp), intent(in) :: w(:, :)
+      integer, intent(in) :: p
+      real(wp), intent(in) :: depth              !! of its gap as it begins, > 0 [L]
+      type(pushing_t), intent(inout) :: set
+      integer, intent(inout) :: n_step
+      real(wp) :: less(size(w, 1)), left, rest, push, way
+      integer :: j, first
+
+      rest = depth
+      push = 0.0_wp
+      do
+         n_step = n_step + 1
+         associate (n => set%n)
+            less(:n) = matmul(set%inverse(:n, :n), w(set%row(:n), p))
+            left = w(p, p) - dot_product(w(p, set%row(:n)), less(:n))
+            if (.not. left > dependent*w(p, p)) left = 0.0_wp
+            way = huge(way)
+            if (left > 0.0_wp) way = rest/left
+            first = 0
+            do j = 1, n
+               if (.not. less(j) > epsilon(way)*maxval(abs(less(:n)))) cycle
+               if (set%push(j)/less(j) >= way) cycle
+               way = set%push(j)/less(j)
+               first = j
+            end do
+            if (.not. way < huge(way)) then
+               n = 0
+               return
+            end if
+            set%push(:n) = set%push(:n) - way*less(:n)
+         end associate
+         push = push + way
+         rest = rest - way*left
+         if (first == 0) exit
+         call let_go(first, set)
+      end do
+      call take(w, p, push, left, less, set)
+   end subroutine open
+
+   !> Add contact `p` with its push: `less` is what others lose by one, `left` what it moves.
+   pure subroutine take(w, p, push, left, less, set)
+      real(wp), intent(in) :: w(:, :)
+      integer, intent(in) :: p
+      real(wp), intent(in) :: push, left, less(:)
+      type(pushing_t), intent(inout) :: set
+      real(wp) :: back(set%n)
+
+      associate (n => set%n, k => set%inverse)
+         back = matmul(w(p, set%row(:n)), k(:n, :n))
+         k(:n, :n) = k(:n, :n) + spread(less(:n), 2, n)*spread(back/left, 1, n)
+         k(:n, n + 1) = -less(:n)/left
+         k(n + 1, :n) = -back/left
+         k(n + 1, n + 1) = 1.0_wp/left
+         set%row(n + 1) = p
+         set%push(n + 1) = push
+      end associate
+      set%n = set%n + 1
+   end subroutine take
+
+   !> Take the `j`th away.
+   pure subroutine let_go(j, set)
+      integer, intent(in) :: j
+      type(pushing_t), intent(inout) :: set
+      integer :: i, rest(set%n - 1)
+
+      associate (n => set%n, k => set%inverse)
+         rest = [(i, i = 1, j - 1), (i, i = j + 1, n)]
+         k(:n - 1, :n - 1) = k(rest, rest) - spread(k(rest, j), 2, n - 1) &
+            *spread(k(j, rest)/k(j, j), 1, n - 1)
+         set%row(:n - 1) = set%row(rest)
+         set%push(:n - 1) = set%push(rest)
+      end associate
+      set%n = set%n - 1
+   end subroutine let_go
+
+   !> Gaps with the pushes, whose round-off is taken out first, and what of them is round-off.
+   pure subroutine measure(w, free, set, gap, room)
+      real(wp), intent(in) :: w(:, :), free(:)
+      type(pushing_t), intent(inout) :: set
+      real(wp), intent(out) :: gap(:), room(:)
+      integer :: j, k
+
+      associate (n => set%n, row => set%row(:set%n))
+         do k = 0, n_refine
+            gap = free
+            room = abs(free)
+            do j = 1, n
+               gap = gap + set%push(j)*w(:, row(j))
+               room = room + set%push(j)*abs(w(:, row(j)))
+            end do
+            if (k < n_refine) set%push(:n) = max(0.0_wp, set%push(:n) &
+               - matmul(set%inverse(:n, :n), gap(row)))
+         end do
+         room = closed*room
+         gap(row) = max(gap(row), -room(row))
+      end associate
+   end subroutine measure
+
+end module emcon_push_problem
