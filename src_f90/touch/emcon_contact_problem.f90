@@ -7,7 +7,7 @@
 !> place by place, each exactly, until nothing changes (Gauss and Seidel), which needs no inverse,
 !> so that contacts that follow from others do no harm; the two take turns. After two of them, in
 !> the plane, by the method of Lemke for forces that push at a and at 0, whose matrix is copositive.
-!> Without friction none of this is needed, but the least motion that closes no gap.
+!> Without friction, after a few trials, the least motion that closes no gap is found instead.
 !> Where W is positive definite there is a solution for any coefficient.
 !> Source: docs/theory.md, eq. (14i).
 module emcon_contact_problem
@@ -24,10 +24,11 @@ module emcon_contact_problem
       contact_problem_force, contact_problem_missed, contact_problem_status, &
       contact_problem_stiffness, contact_problem_pivot
 
-   !> Trials of all places at once at first, and when their turn comes again; sweeps in the first
-   !> turn, twice as many in each that follows; turns; after this one comes the method of Lemke.
-   integer, parameter :: first_trials = 60, more_trials = 20, first_sweeps = 20, most_turns = 8, &
-      pivot_turn = 2
+   !> Trials of all places at once at first, few of them without friction, and when their turn comes
+   !> again; sweeps in the first turn, twice as many in each that follows; turns; after this one
+   !> comes the method of Lemke.
+   integer, parameter :: first_trials = 60, few_trials = 10, more_trials = 20, first_sweeps = 20, &
+      most_turns = 8, pivot_turn = 2
    !> Halvings of a step of Newton's method, and the part of what is foreseen that it is to gain.
    integer, parameter :: most_halvings = 12
    real(wp), parameter :: least_gain = 1.0e-4_wp
@@ -91,11 +92,13 @@ contains
 
       is_solved = size(self%mu) == 0
       if (is_solved) return
-      if (has_compliance(self) .and. .not. any(self%mu > 0.0_wp .or. self%hold(0, :) > 0.0_wp)) &
-         call solve_by_pushes(self, push, effort%n_pivot, is_solved)
-      if (is_solved) return
-      call solve_by_trials(self, push, first_trials, effort%n_trial, is_solved)
-      if (is_solved .or. .not. has_compliance(self)) return
+      associate (has_pushes => .not. any(self%mu > 0.0_wp .or. self%hold(0, :) > 0.0_wp))
+         call solve_by_trials(self, push, merge(few_trials, first_trials, has_pushes), &
+            effort%n_trial, is_solved)
+         if (is_solved .or. .not. has_compliance(self)) return
+         if (has_pushes) call solve_by_pushes(self, push, effort%n_pivot, is_solved)
+         if (is_solved) return
+      end associate
       do turn = 1, most_turns
          call solve_by_sweeps(self, push, first_sweeps*2**(turn - 1), effort%n_sweep, is_solved)
          if (is_solved) return
