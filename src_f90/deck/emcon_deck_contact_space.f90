@@ -5,12 +5,10 @@ module emcon_deck_contact_space
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error
+   use emcon_face_sides_space, only : face_fault, face_sides, side_t
    use emcon_interactions, only : formulation_user
-   use emcon_kinds, only : dp, wp
    use emcon_mesh, only : surface_t
-   use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
-   use emcon_sort, only : sort_order
    use emcon_surface_facets, only : surface_facets
    use emcon_text, only : joined, string_t, to_text
    implicit none
@@ -19,18 +17,6 @@ module emcon_deck_contact_space
 
    !> Faces named in a message.
    integer, parameter :: most_named = 10
-   integer, parameter :: n_dim = 3
-   !> An area below this part of the square of the circumference is none.
-   real(wp), parameter :: least_area = 1.0e-8_wp
-
-   !> A side of a face: its nodes, the lower number first, and whether it runs from that to the
-   !> other one.
-   type :: side_t
-      integer :: low = 0
-      integer :: high = 0
-      logical :: is_up = .false.
-      integer :: facet = 0
-   end type side_t
 
 contains
 
@@ -54,7 +40,7 @@ contains
          if (.not. (in_contact .or. is_tied)) cycle
          associate (surface => scene%surface(i))
             title = trim(merge("contact", "tied   ", in_contact)) // " surface " // surface%name
-            if (allocated(surface%wall)) cycle
+            if (surface%is_profile) cycle        ! its reader has looked at it
             n_errors = reader%log%n_errors
             call check_free(reader, scene, adjacency, surface, title)
             if (reader%log%n_errors > n_errors) cycle
@@ -77,7 +63,7 @@ contains
       type(side_t), allocatable :: side(:)
       integer :: first, last, n_branch, n_back, branch, back
 
-      call list_sides(facet, side)
+      call face_sides(facet, side)
       n_branch = 0
       n_back = 0
       branch = 0
@@ -143,30 +129,6 @@ contains
       end associate
    end subroutine place_text
 
-   !> All sides of faces, those of the same nodes next to each other.
-   pure subroutine list_sides(facet, side)
-      integer, intent(in) :: facet(:, :)
-      type(side_t), allocatable, intent(out) :: side(:)
-      real(dp), allocatable :: key(:)
-      real(dp) :: stride
-      integer :: f, k, m, n, from, to
-
-      stride = real(maxval(facet) + 1, dp)
-      allocate(side(count(facet > 0)), key(count(facet > 0)))
-      n = 0
-      do f = 1, size(facet, 2)
-         m = count(facet(:, f) > 0)
-         do k = 1, m
-            from = facet(k, f)
-            to = facet(1 + mod(k, m), f)
-            n = n + 1
-            side(n) = side_t(min(from, to), max(from, to), from < to, f)
-            key(n) = real(side(n)%low, dp)*stride + real(side(n)%high, dp)
-         end do
-      end do
-      side = side(sort_order(key))
-   end subroutine list_sides
-
    !> "S2 of element 7" for facet `f`.
    subroutine face_text(scene, surface, f, text)
       type(scene_t), intent(in) :: scene
@@ -190,7 +152,7 @@ contains
 
       do f = 1, size(is_flat)
          associate (m => count(facet(:, f) > 0))
-            call find_fault(scene%x(:, facet(:m, f)), is_flat(f), is_folded(f))
+            call face_fault(scene%x(:, facet(:m, f)), is_flat(f), is_folded(f))
          end associate
       end do
       call tell(is_flat, " has a face without area: ")
@@ -215,37 +177,5 @@ contains
       end subroutine tell
 
    end subroutine check_shapes
-
-   !> Is a face flat, or are parts of it about its middle turned over?
-   pure subroutine find_fault(x, is_flat, is_folded)
-      real(wp), intent(in) :: x(:, :)            !! (3, n_node) in turn [L]
-      logical, intent(out) :: is_flat, is_folded
-      real(wp) :: at(n_dim, size(x, 2)), part(n_dim, size(x, 2)), round
-      integer :: k, m
-
-      m = size(x, 2)
-      is_flat = .true.
-      is_folded = .false.
-      ! Scaled by a power of two: coordinates may be as large or as small as numbers can be.
-      at = scale(x, -exponent(maxval(abs(x))))
-      associate (middle => sum(at, 2)/real(m, wp))
-         do k = 1, m
-            at(:, k) = at(:, k) - middle
-         end do
-      end associate
-      if (.not. any(abs(at) > 0.0_wp)) return
-      at = at/maxval(abs(at))
-      round = 0.0_wp
-      do k = 1, m
-         associate (here => at(:, k), there => at(:, 1 + mod(k, m)))
-            part(:, k) = cross_product(here, there)
-            round = round + norm2(there - here)
-         end associate
-      end do
-      associate (normal => sum(part, 2))
-         is_flat = norm2(normal) <= least_area*round**2
-         is_folded = .not. is_flat .and. any(matmul(normal, part) <= 0.0_wp)
-      end associate
-   end subroutine find_fault
 
 end module emcon_deck_contact_space

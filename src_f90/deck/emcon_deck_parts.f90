@@ -505,7 +505,7 @@ contains
       type(card_text_t), intent(in) :: card
 
       is_wall = card%name == "SURFACE" .and. any(option_value(card%option, "TYPE") == [ &
-         character(len=10) :: "PLANE", "SPHERE", "REVOLUTION", "CYLINDER"])
+         character(len=10) :: "PLANE", "SPHERE", "REVOLUTION", "CYLINDER", "STL"])
    end function is_wall
 
    !> Does a line name a label that no part can have? It would be one of another instance.

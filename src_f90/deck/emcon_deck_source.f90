@@ -1,6 +1,8 @@
 !> The text of a deck, from a file or from memory, with all the files it includes: one list of lines
 !> that know their origin.
 module emcon_deck_source
+   use emcon_deck_lines, only : deck_source_t
+   use emcon_deck_stl_lines, only : stl_lines_insert
    use emcon_diagnostics, only : add_error, diagnostics_t, quoted
    use emcon_origin, only : origin_t
    use emcon_text, only : squeezed, string_t, stripped, to_text
@@ -13,16 +15,6 @@ module emcon_deck_source
    integer, parameter :: max_includes = 10000      !! in all: files can include each other in powers
    character(len=3), parameter :: utf8_mark = char(239) // char(187) // char(191)
    character(len=*), parameter :: blanks = " " // achar(9)
-
-   !> A deck as it was read, before it was understood. A restart file carries this.
-   type :: deck_source_t
-      type(string_t), allocatable :: line(:)
-      integer, allocatable :: file(:)              !! (n_line) index into `file_name`
-      integer, allocatable :: number(:)            !! (n_line) line number in that file
-      type(string_t), allocatable :: file_name(:)  !! as typed; included ones as resolved
-      integer :: n_own_file = huge(1)              !! those behind hold further steps of a run
-      logical :: is_whole = .true.                 !! false: some included file could not be read
-   end type deck_source_t
 
    !> Lines of a text that follow each other, and where messages say that they stand.
    type :: passage_t
@@ -38,6 +30,7 @@ module emcon_deck_source
       type(diagnostics_t) :: log
       integer :: n_line = 0
       integer :: n_file = 0
+      integer :: n_memory = 0                      !! files that are texts in memory
       integer :: open_file(max_depth) = 0          !! the chain of files that are being read
       integer :: depth = 0
       logical :: is_full = .false.                 !! too many files: nothing more is read
@@ -73,6 +66,7 @@ contains
       do i = 1, size(file_name)
          call add_file_name(builder, file_name(i)%text)
       end do
+      builder%n_memory = size(file_name)
       call binary_fault(text, fault)
       if (size(passage) == 0 .or. size(file_name) == 0) then
          fault = "a deck in memory has passages and file names"
@@ -110,6 +104,7 @@ contains
       call move_alloc(builder%source%number, source%number)
       call move_alloc(builder%source%file_name, source%file_name)
       source%is_whole = builder%source%is_whole
+      call stl_lines_insert(source, builder%n_memory, builder%log)
       diagnostics = builder%log
       diagnostics%file_name = source%file_name
       if (n == 0 .and. diagnostics%n_errors == 0) then

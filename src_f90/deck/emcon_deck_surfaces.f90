@@ -7,15 +7,16 @@ module emcon_deck_surfaces
    use emcon_deck_labels, only : find_label
    use emcon_deck_named, only : get_elements, get_lines, get_nodes, refuse_name
    use emcon_deck_options, only : choose_option
-   use emcon_deck_reader, only : card_error, card_t, card_warning, n_cards, need_name, &
+   use emcon_deck_reader, only : card_error, card_t, card_warning, has_option, n_cards, need_name, &
       option_name, reader_t, refuse_option
    use emcon_deck_segments_plane, only : read_segments
+   use emcon_deck_stl_space, only : read_stl
    use emcon_deck_walls_space, only : read_wall
    use emcon_diagnostics, only : label_list, quoted
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_of_extrusion, surface_of_faces, surface_of_lines, &
       surface_of_nodes, surface_of_plane, surface_of_revolution, surface_of_segments, &
-      surface_of_sphere, surface_t
+      surface_of_sphere, surface_of_triangles, surface_t
    use emcon_name_index, only : name_index_find, name_index_put
    use emcon_options, only : option_default, option_words
    use emcon_scene, only : scene_t, where_text
@@ -86,6 +87,10 @@ contains
       kind = option_default("surface")
       call choose_option(reader, card, "TYPE", "surface", kind, is_refused)
       if (is_refused) return
+      if (has_option(card, "INPUT")) call card_error(reader, card, "INPUT= is of TYPE=STL; use " // &
+         "*INCLUDE")
+      if (has_option(card, "SCALE") .and. kind /= surface_of_triangles) call card_error(reader, &
+         card, "SCALE= is of TYPE=STL")
       select case (kind)
       case (surface_of_faces)
          call read_faces(reader, card, scene, adjacency, surface)
@@ -98,6 +103,8 @@ contains
          call read_segments(reader, card, scene, surface)
       case (surface_of_plane, surface_of_sphere, surface_of_revolution, surface_of_extrusion)
          call read_wall(reader, card, kind, scene, surface)
+      case (surface_of_triangles)
+         call read_stl(reader, card, scene, surface)
       end select
       n_item = size(surface%element) + size(surface%node)
       if (allocated(surface%edge)) n_item = size(surface%edge, 2)

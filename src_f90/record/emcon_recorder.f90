@@ -53,8 +53,8 @@ module emcon_recorder
    !> The body that an element is part of, in the order of /sets/BODIES from 1 on; 0: of none.
    type(field_t), parameter :: body_field = field_t("body", is_cell=.true., is_sparse=.true.)
 
-   !> The cell of VTK files that is a line between two nodes.
-   integer, parameter :: vtk_line = 3
+   !> The cell of VTK files that a facet of a profile is, by dimension: a line, a triangle.
+   integer, parameter :: cell_of_facet(2:3) = [3, 5]
 
    type :: recorder_t
       type(vtkhdf_t) :: fields
@@ -117,7 +117,7 @@ contains
       end associate
    end subroutine list_columns
 
-   !> The elements as cells of the field file, and behind them the lines of profiles.
+   !> The elements as cells of the field file, and behind them the facets of profiles.
    pure subroutine find_cells(scene, node, vtk_type)
       type(scene_t), intent(in) :: scene
       integer, allocatable, intent(out) :: node(:, :)    !! (most, n_cell), behind the last one 0
@@ -129,7 +129,7 @@ contains
       n_element = size(scene%element%node, 2)
       allocate(node(max(size(line, 1), size(scene%element%node, 1)), n_element + size(line, 2)), &
          source=0)
-      allocate(vtk_type(size(node, 2)), source=vtk_line)
+      allocate(vtk_type(size(node, 2)), source=cell_of_facet(scene%n_dim))
       do e = 1, n_element
          associate (kind => scene%element%kinds(scene%element%kind(e)))
             node(:kind%n_vtk, e) = scene%element%node(:kind%n_vtk, e)

@@ -127,16 +127,12 @@ contains
       subroutine count_pieces(number, side)
          integer, intent(in) :: number           !! of the surface
          character(len=*), intent(in) :: side
-         integer, allocatable :: edge(:, :)
+         integer, allocatable :: facet(:, :)
+         character(len=5) :: what
 
-         associate (surface => scene%surface(number))
-            if (scene%n_dim == n_plane) then
-               call surface_facets(scene, surface, edge)
-               call row_put(row, side // "_edges", size(edge, 2), " (# edges)")
-            else
-               call row_put(row, side // "_faces", size(surface%face), " (# faces)")
-            end if
-         end associate
+         what = merge("edges", "faces", scene%n_dim == n_plane)
+         call surface_facets(scene, scene%surface(number), facet)
+         call row_put(row, side // "_" // what, size(facet, 2), " (# " // what // ")")
       end subroutine count_pieces
    end subroutine describe_pair
 

@@ -14,7 +14,7 @@ module emcon_options
       section_t
    use emcon_mesh, only : surface_of_extrusion, surface_of_faces, surface_of_lines, &
       surface_of_nodes, surface_of_plane, surface_of_revolution, surface_of_segments, &
-      surface_of_sphere
+      surface_of_sphere, surface_of_triangles
    use emcon_scheme, only : scheme_row_t
    use emcon_scheme_registry, only : n_scheme_row, scheme_energy_momentum, scheme_row, &
       scheme_static
@@ -104,6 +104,8 @@ module emcon_options
       option_row_t("surface", surface_of_revolution, "REVOLUTION", "", "", "", n_space, &
          instead="ELEMENT"), &
       option_row_t("surface", surface_of_extrusion, "CYLINDER", "", "", "", n_space, &
+         instead="ELEMENT"), &
+      option_row_t("surface", surface_of_triangles, "STL", "", "", "", n_space, &
          instead="ELEMENT"), &
       option_row_t("procedure", scheme_static, "STATIC", "", "", ""), &
       option_row_t("procedure", scheme_energy_momentum, "DYNAMIC", "", "", "")]

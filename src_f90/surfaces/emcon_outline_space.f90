@@ -157,7 +157,7 @@ contains
       integer, allocatable, intent(inout) :: facet(:, :)     !! (most nodes, n)
       real(wp), allocatable, intent(inout) :: thickness(:)   !! (n) [L]
       integer, allocatable :: all_facets(:, :)
-      integer :: s, f, n, m
+      integer :: s, f, n
 
       do s = 1, size(scene%surface)
          if (.not. allocated(scene%surface(s)%edge)) cycle
@@ -167,10 +167,8 @@ contains
             all_facets(:size(facet, 1), :n) = facet
             all_facets(:size(own, 1), n + 1:) = own
             call move_alloc(all_facets, facet)
-            do f = n + 1, size(facet, 2)
-               m = count(facet(:, f) > 0)
-               thickness = [thickness, shortest_side(scene%x, facet(:m, f:f))]
-            end do
+            thickness = [thickness, (shortest_side(scene%x, facet(:count(facet(:, f) > 0), f:f)), &
+               f = n + 1, size(facet, 2))]
          end associate
       end do
    end subroutine add_lone_facets

@@ -170,6 +170,7 @@ program main
    use test_self_contact, only : collect_self_contact
    use test_shape, only : collect_shape
    use test_single_elements, only : collect_single_elements
+   use test_stl, only : collect_stl
    use test_stress, only : collect_stress
    use test_soft_law, only : collect_soft_law
    use test_solid, only : collect_solid
@@ -285,6 +286,7 @@ program main
    call run("corotated", collect_corotated)
    call run("single_elements", collect_single_elements)
    call run("soft_law", collect_soft_law)
+   call run("stl", collect_stl)
    call run("stress", collect_stress)
    call run("solid", collect_solid)
    call run("solid_parts", collect_solid_parts)
