@@ -152,7 +152,7 @@ contains
       real(wp) :: slave(scene%n_dim), master(scene%n_dim), axis(n_space), off(n_way)
       integer :: way
 
-      axis = (point(:, 2) - point(:, 1))/norm2(point(:, 2) - point(:, 1))
+      axis = (point(:, n_point) - point(:, 1))/norm2(point(:, n_point) - point(:, 1))
       slave = middle(scene%tie(k)%slave)
       master = middle(scene%tie(k)%master)
       do way = 1, n_way

@@ -54,13 +54,13 @@ contains
       integer, intent(in) :: t
       type(surface_t) :: surface
       type(surface_t), allocatable :: surfaces(:)
-      integer, allocatable :: element(:), node(:), corner(:, :), old(:), new(:, :)
+      integer, allocatable :: element(:), node(:), part(:, :), old(:), new(:, :)
       integer :: k, i, n, n_old
 
       surface = scene%surface(scene%tie(t)%master)
       allocate(element, source=unique_sorted(surface%element))
-      corner = scene%element%node(:, element)
-      node = unique_sorted(pack(corner, corner > 0))
+      part = scene%element%node(:, element)
+      node = unique_sorted(pack(part, part > 0))
       n = size(scene%x, 2)
       call add_nodes(scene, node, t)
       self%node = [self%node, node]
@@ -68,12 +68,12 @@ contains
       associate (all => scene%element)
          n_old = size(all%label)
          do k = 1, size(element)
-            do i = 1, size(corner, 1)
-               if (corner(i, k) > 0) corner(i, k) = n + find_sorted(node, corner(i, k))
+            do i = 1, size(part, 1)
+               if (part(i, k) > 0) part(i, k) = n + find_sorted(node, part(i, k))
             end do
          end do
-         allocate(old, source=[all%node, corner])
-         new = reshape(old, [size(corner, 1), n_old + size(element)])
+         allocate(old, source=[all%node, part])
+         new = reshape(old, [size(part, 1), n_old + size(element)])
          call move_alloc(new, all%node)
          all%label = [all%label, all%label(element)]
          all%origin = [all%origin, all%origin(element)]
