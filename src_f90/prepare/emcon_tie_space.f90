@@ -136,7 +136,7 @@ contains
                length(k) = master%size(f)
                call add(entries, k, slave%node(k:k), length(k:k))
                call add(entries, k, master%facet(:n, f), -length(k)*tie_shapes(n, &
-                  nearest%triangle - split%start(f) + 1, nearest%weight))
+                  nearest%triangle - split%start(f) + 1, nearest%weight, sides%master%skew(:, f)))
             end associate
          end do
          allocate(rows%covered(size(master%facet, 1), 0))

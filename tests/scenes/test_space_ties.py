@@ -31,7 +31,7 @@ def check_stretched(done: Run, x: np.ndarray) -> None:
     (("C3D8", "C3D8"), (2, 4), 0.1, ", MULTIPLIER=STANDARD"), (("C3D8", "C3D8"), (1, 1), 0.0, ""),
     (("C3D4", "C3D8"), (2, 3), 0.1, ""), (("C3D8", "C3D4"), (2, 2), 0.1, ""),
     (("C3D10", "C3D8"), (2, 3), 0.1, ""), (("C3D8", "C3D10"), (3, 2), 0.1, ""),
-    (("C3D20R", "C3D10"), (2, 1), 0.0, ""), (("C3D10", "C3D20"), (2, 1), 0.0, ""),
+    (("C3D20R", "C3D10"), (2, 1), 0.1, ""), (("C3D10", "C3D20"), (2, 2), 0.1, ""), (("C3D20", "C3D20R"), (3, 2), 0.2, ""),
     (("C3D8", "C3D20"), (2, 1), 0.0, ", MULTIPLIER=STANDARD")])
 def test_constant_stress(kinds, cells, shake, options, tmp_path: Path) -> None:
     """Over unlike meshes of any kinds, with nodes between corners on either side."""
@@ -39,6 +39,22 @@ def test_constant_stress(kinds, cells, shake, options, tmp_path: Path) -> None:
     upper = shaken(box(kinds[1], (cells[1],)*3, (0, 0, .5), (1, 1, 1)), 0.5, shake)
     text, x = tied([lower, upper], [(1, 0, 2)], options=options)
     check_stretched(run(text + stretch(x), tmp_path), x)
+
+
+def test_constant_stress_turned(tmp_path: Path) -> None:
+    """The same, of a body that is turned."""
+    turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    blocks = [shaken(box("C3D20", (2,)*3, (0, 0, 0), (1, 1, .5)), 0.5, 0.2), shaken(box("C3D8", (3,)*3, (0, 0, .5), (1, 1, 1)), 0.5, 0.2)]
+    x = np.vstack([b.x for b in blocks])
+    for block in blocks:
+        block.x = block.x @ turn.T
+    text, y = tied(blocks, [(1, 0, 2)])
+    u = 0.001*x*[-0.3, -0.3, 1.0] @ turn.T
+    text += "*STEP\n*STATIC, DIRECT\n1., 1.\n*BOUNDARY\n" + "".join(
+        f"{k + 1}, {a + 1}, {a + 1}, {float(u[k, a])!r}\n" for k in np.flatnonzero((x[:, 2] < 1e-9) | (x[:, 2] > 1 - 1e-9)) for a in range(3))
+    fields = run(text + "*NODE FILE\nU\n*EL FILE\nS\n*END STEP\n", tmp_path).fields()
+    np.testing.assert_allclose(fields["displacement"][-1], u, rtol=0, atol=1e-10*0.001)
 
 
 @pytest.mark.parametrize(("kinds", "cells"), [
@@ -83,10 +99,10 @@ def test_interface_with_edges(cells, kinds, slave, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("more", ["", "*CONSTRAINT METHOD, TYPE=SADDLE POINT\n"])
-@pytest.mark.parametrize("kinds", [("C3D8", "C3D8"), ("C3D8", "C3D10"), ("C3D10", "C3D8")])
+@pytest.mark.parametrize("kinds", [("C3D8", "C3D8"), ("C3D8", "C3D10"), ("C3D10", "C3D8"), ("C3D20", "C3D20R"), ("C3D10", "C3D20")])
 def test_flight_of_curved_pieces(kinds, more, tmp_path: Path) -> None:
     """Slave nodes are put onto the polygons of the master: then nothing is lost on a curved interface."""
-    cells = [(4, 2), (6, 3)] if kinds[0] == kinds[1] else [(3, 1), (4, 2)]
+    cells = [(4, 2), (6, 3)] if kinds[0] == kinds[1] else [(3, 1), (4, 2)] if "C3D8" in kinds else [(2, 1), (3, 1)]
     text, x = quarter_shells(cells, list(kinds))
     done = run(text + flight(x, more, 8), tmp_path)
     check_flight(done, [Block(k, (1, *n)) for k, n in zip(kinds, cells, strict=True)])
