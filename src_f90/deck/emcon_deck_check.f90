@@ -200,6 +200,7 @@ contains
          end associate
       end do
       is_coupled(:, scene%rigid%reference) = .true.
+      is_coupled(:, pack(scene%tie%map%reference, scene%tie%map%reference > 0)) = .true.
    end subroutine mark_coupled
 
 end module emcon_deck_check

@@ -6,14 +6,19 @@ module emcon_deck_check_ties
    use emcon_deck_dimension, only : n_space
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
+   use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted, unique_sorted
    use emcon_surface_facets, only : surface_facets
    use emcon_surface_nodes, only : surface_nodes
+   use emcon_tie_maps, only : tie_map_is_given, tie_map_place, tie_map_t
    implicit none
    private
    public :: check_ties
+
+   !> Decks round places: on an axis is what is nearer to it, per extent of the model.
+   real(wp), parameter :: near = 1.0e-6_wp
 
 contains
 
@@ -60,10 +65,22 @@ contains
       call surface_nodes(scene, scene%surface(tie%slave), slave)
       call surface_nodes(scene, scene%surface(tie%master), master)
       is_common = [(find_sorted(master, slave(i)) > 0, i = 1, size(slave))]
+      if (tie_map_is_given(tie%map)) is_common = is_common .and. .not. &
+         [(is_on_axis(scene, tie%map, slave(i)), i = 1, size(slave))]
       if (any(is_common)) call add_error(reader%log, tie%origin, title(scene, tie) &
          // " share node " // label_list(scene%node%label(pack(slave, is_common))) &
          // "; what is tied must not be connected already: take its faces off the surfaces")
    end subroutine check_common_nodes
+
+   !> Does a map leave a node where it is?
+   pure logical function is_on_axis(scene, map, node)
+      type(scene_t), intent(in) :: scene
+      type(tie_map_t), intent(in) :: map
+      integer, intent(in) :: node
+
+      is_on_axis = norm2(tie_map_place(map, scene%x(:, node)) - scene%x(:, node)) &
+         <= near*maxval(maxval(scene%x, 2) - minval(scene%x, 2))
+   end function is_on_axis
 
    !> A face that follows two masters is over-constrained.
    subroutine check_common_faces(reader, scene, i_tie, tied)

@@ -97,7 +97,9 @@ module emcon_deck_keywords
       keyword_t("CONTACT INCLUSIONS", in_model, "ALLEXTERIOR"), &
       keyword_t("CONTACT PROPERTY ASSIGNMENT", in_model), &
       keyword_t("TIE", in_model, "NAME=,POSITIONTOLERANCE=,MULTIPLIER=,ADJUST=,TYPE=," &
-         // "~NOROTATION,~NOTHICKNESS,!CYCLICSYMMETRY,!MULTISTAGE,!TIEDNSET,!CONSTRAINTRATIO"), &
+         // "CYCLICSYMMETRY?,TRANSLATION,REFNODE=,~NOROTATION,~NOTHICKNESS,!MULTISTAGE," &
+         // "!TIEDNSET,!CONSTRAINTRATIO"), &
+      keyword_t("CYCLIC SYMMETRY MODEL", in_model, "N=,TIE=,~NGRAPH,~ELSET,!CHECK:YES"), &
       keyword_t("EQUATION", in_both, "REMOVE,REMOVEALL,!INPUT"), &
       keyword_t("TRANSFORM", in_model, "NSET=,TYPE="), &
       keyword_t("CONTACT INTERFERENCE", in_step, "SHRINK,AMPLITUDE=,TYPE=,~OP:NEW"), &
@@ -209,8 +211,7 @@ module emcon_deck_keywords
       refusal_t("pairs and elements stay as they are for the whole run", "MODEL CHANGE,CHANGE " &
          // "CONTACT TYPE,CHANGE SURFACE BEHAVIOR,CHANGE MATERIAL"), &
       refusal_t("prescribe displacements by *BOUNDARY", "PRE-TENSION SECTION"), &
-      refusal_t("sectors of a model are not repeated; couple their edges by *EQUATION", &
-         "CYCLIC SYMMETRY MODEL,SELECT CYCLIC SYMMETRY MODES"), &
+      refusal_t("all sectors of a model deform alike", "SELECT CYCLIC SYMMETRY MODES"), &
       refusal_t("move the nodes in *NODE", "IMPERFECTION"), &
       refusal_t("use *BOUNDARY with an amplitude", "BASE MOTION"), &
       refusal_t("*NEWTON and the procedure say how steps are solved", "CONTROLS", &
@@ -324,8 +325,8 @@ contains
          reason = " (surfaces part; *TIE holds them together)"
       case ("RELATIVETOABSOLUTE")
          reason = " (motions are those in space)"
-      case ("CYCLICSYMMETRY", "MULTISTAGE")
-         reason = " (sectors of a model are not repeated; couple their edges by *EQUATION)"
+      case ("MULTISTAGE")
+         reason = " (rings of unlike sectors are not joined)"
       case ("TAUMAX")
          reason = " (nothing but the coefficient bounds friction)"
       case ("SHEARTRACTIONSLOPE")

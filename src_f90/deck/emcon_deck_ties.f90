@@ -1,20 +1,29 @@
 !> *TIE: surfaces that stay together.
 module emcon_deck_ties
    use emcon_couplings, only : tie_t
-   use emcon_deck_fields, only : data_error, data_open, data_t, data_warning, next_line
+   use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
+      get_real, next_line
    use emcon_deck_dimension, only : n_space
+   use emcon_deck_labels, only : find_label
    use emcon_deck_options, only : choose_option
-   use emcon_deck_reader, only : card_error, card_t, line_origin, n_lines, need_name, &
-      option_name, option_real, option_word, reader_t
+   use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, n_lines, need_name, &
+      option_count, option_name, option_real, option_word, reader_t
+   use emcon_deck_sectors, only : is_cyclic, read_sectors
    use emcon_deck_surfaces, only : get_surfaces, need_facets
    use emcon_diagnostics, only : add_warning, quoted
    use emcon_interactions, only : pair_is_reverse_of, pressure_tied
+   use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_scene, only : scene_t, where_text
+   use emcon_text, only : to_text
+   use emcon_tie_maps, only : tie_map_t, tie_map_translate
    implicit none
    private
    public :: read_ties
+
+   !> Surfaces that a data line names first.
+   integer, parameter :: n_side = 2
 
 contains
 
@@ -31,11 +40,12 @@ contains
       n = 0
       do i = 1, size(reader%card)
          if (reader%card(i)%name /= "TIE") cycle
-         call read_tie_options(reader, reader%card(i), common)
+         call read_tie_options(reader, reader%card(i), scene, common)
          call check_name(reader, i, scene, card_of)
          call read_tie_lines(reader, reader%card(i), scene, common, tie_of, tie, n)
       end do
       scene%tie = tie(:n)
+      call read_sectors(reader, scene)
       call tie_pairs(reader, scene)
    end subroutine read_ties
 
@@ -66,9 +76,10 @@ contains
    end subroutine tie_pairs
 
    !> What a card says of all its ties.
-   subroutine read_tie_options(reader, card, tie)
+   subroutine read_tie_options(reader, card, scene, tie)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
       type(tie_t), intent(out) :: tie
       character(len=:), allocatable :: word
 
@@ -79,7 +90,37 @@ contains
          "onto the master surface: across a gap angular momentum would be lost")
       call option_word(reader, card, "TYPE", "SURFACE TO SURFACE", word, "NODE TO SURFACE", &
          "ties are integrated over faces, so that a uniform stress passes through")
+      call option_word(reader, card, "CYCLIC SYMMETRY", "YES, NO", word)
+      if (has_option(card, "TRANSLATION") .and. is_cyclic(card)) call card_error(reader, card, &
+         "TRANSLATION and CYCLIC SYMMETRY exclude each other")
+      call find_reference(reader, card, scene, tie)
    end subroutine read_tie_options
+
+   !> The node by whose displacement a translation grows.
+   subroutine find_reference(reader, card, scene, tie)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      type(scene_t), intent(in) :: scene
+      type(tie_t), intent(inout) :: tie
+      integer :: label
+
+      if (.not. has_option(card, "REFNODE")) return
+      if (.not. has_option(card, "TRANSLATION")) then
+         call card_error(reader, card, "REF NODE needs TRANSLATION: the node moves the translation")
+         return
+      end if
+      label = 0
+      call option_count(reader, card, "REFNODE", 1, label)
+      if (label == 0) return
+      tie%map%reference = find_label(reader%node_map, label)
+      if (tie%map%reference == 0) then
+         call card_error(reader, card, "REF NODE=" // to_text(label) // ": there is no such node")
+      else if (any(scene%element%node == tie%map%reference)) then
+         call card_error(reader, card, "REF NODE=" // to_text(label) // " is a node of an " // &
+            "element; its displacement is to be that of the translation alone: give a node of " // &
+            "its own")
+      end if
+   end subroutine find_reference
 
    !> The card `i` must not have the name of an earlier one.
    subroutine check_name(reader, i, scene, card_of)
@@ -119,6 +160,7 @@ contains
          n = n + 1
          tie(n) = common
          tie(n)%origin = line_origin(reader, data%i_line)
+         if (has_option(card, "TRANSLATION")) call read_translation(reader, data, tie(n)%map)
          call get_surfaces(reader, data, scene, tie(n)%slave, tie(n)%master)
          if (tie(n)%slave > 0 .and. tie(n)%master > 0) then
             call check_sides(reader, data, scene, tie(n))
@@ -131,6 +173,27 @@ contains
       if (n == n_before) call card_error(reader, card, "no surfaces are given; expected slave " &
          // "surface, master surface")
    end subroutine read_tie_lines
+
+   !> Behind the surfaces: from where the slave is to where it is on the master.
+   subroutine read_translation(reader, data, map)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(inout) :: data
+      type(tie_map_t), intent(inout) :: map
+      real(wp) :: translation(reader%n_dim)
+      integer :: a
+
+      call check_count(reader, data, n_side + reader%n_dim, n_side + reader%n_dim, "slave " // &
+         "surface, master surface and the components of the translation from the one to the other")
+      if (.not. data%ok) return
+      translation = 0.0_wp
+      do a = 1, reader%n_dim
+         call get_real(reader, data, n_side + a, "component of the translation", translation(a))
+      end do
+      if (data%ok .and. .not. norm2(translation) > 0.0_wp) call data_error(reader, data, &
+         "the translation is 0; without TRANSLATION surfaces are tied where they are")
+      if (data%ok) call tie_map_translate(map, translation)
+      data%n = n_side
+   end subroutine read_translation
 
    !> The sides of a tie are two surfaces of element faces; in space the slave may be one of nodes.
    subroutine check_sides(reader, data, scene, tie)

@@ -17,25 +17,23 @@ module emcon_tie_basket_space
 
 contains
 
-   !> On the rim of the slave surface nodes have none that take part in another tie too, or that are
-   !> held in a direction in which one beside them is not.
-   pure subroutine tie_basket_find(slave, x, n_tie, is_held, is_kept)
+   !> Nodes on the rim of the slave surface that take part in another tie too, or that are held in a
+   !> direction in which one beside them is not.
+   pure subroutine tie_basket_find(slave, n_tie, is_held, is_free)
       type(facets_t), intent(in) :: slave
-      real(wp), intent(in) :: x(:, :)                    !! (3, n_node of the scene) [L]
       integer, intent(in) :: n_tie(:)                    !! (n_node of the scene) ties of each
       logical, intent(in) :: is_held(:, :)               !! (3, n_node of the scene)
-      logical, allocatable, intent(out) :: is_kept(:)    !! (n_node of the surface)
-      logical :: is_rim(size(slave%node)), is_free(size(slave%node))
+      logical, allocatable, intent(out) :: is_free(:)    !! (n_node of the surface)
+      logical :: is_rim(size(slave%node))
       integer :: k
 
       call facets_rim(slave, is_rim)
+      allocate(is_free(size(is_rim)))
       do k = 1, size(is_rim)
          is_free(k) = is_rim(k)
          if (is_free(k)) is_free(k) = n_tie(slave%node(k)) > 1 .or. &
             is_held_alone(slave, k, is_held)
       end do
-      allocate(is_kept(size(slave%node)), source=.true.)
-      call tie_basket_release(slave, x, is_free, is_kept)
    end subroutine tie_basket_find
 
    !> Take the multipliers of nodes. A connected part that would keep less than three nodes that are

@@ -19,8 +19,9 @@ module emcon_tie_cells_space
    public :: tie_cells_t, tie_cells_find
 
    !> Gauss points along each of two ways through a triangle, exact for products of shape functions:
-   !> of degree 2 in all; of degree 6 where a facet has nodes between its corners.
-   integer, parameter :: n_linear = 2, n_quadratic = 4
+   !> of degree 2 in all; of degree 6 where a facet has nodes between its corners. Where one is no
+   !> parallelogram they are no polynomials: what is left falls as the 16th power of the skew.
+   integer, parameter :: n_linear = 2, n_quadratic = 4, n_skew = 8
    !> Nodes of facets that have none between their corners, at most.
    integer, parameter :: most_linear = 4
    !> Triangles face each other whose normals are within 60 degrees of opposite: where a surface
@@ -133,14 +134,17 @@ contains
       real(wp), intent(in) :: place(2, 3)        !! corners of the master triangle
       real(wp), intent(in) :: polygon(:, :)      !! (2, corners), clockwise: the master faces it
       real(wp), intent(in) :: twice              !! the area of the slave triangle [L^2]
-      real(wp) :: at(n_quadratic), weight(n_quadratic), point(2), part, total
+      real(wp) :: at(n_skew), weight(n_skew), point(2), part, total
       real(wp) :: own(most_nodes), other(most_nodes)
       integer :: k, i, j, n, m, n_point
 
       n = count(sides%slave%facets%corner(:, sides%slave%split%facet(s)) > 0)
-      associate (t => self%triangle(self%n), split => sides%master%split)
+      associate (t => self%triangle(self%n), split => sides%master%split, &
+            f => sides%slave%split%facet(s), g => sides%master%split%facet(self%triangle(self%n)))
          m = count(sides%master%facets%corner(:, split%facet(t)) > 0)
          n_point = merge(n_linear, n_quadratic, max(n, m) <= most_linear)
+         if (any(abs(sides%slave%skew(:, f)) > 0.0_wp) .or. &
+            any(abs(sides%master%skew(:, g)) > 0.0_wp)) n_point = n_skew
          call gauss_points(at(:n_point), weight(:n_point))
          total = 0.0_wp
          self%cross(:, :, self%n) = 0.0_wp
@@ -151,10 +155,10 @@ contains
                   do i = 1, n_point
                      point = polygon(:, 1) + at(i)*(a + at(j)*b)
                      part = at(i)*weight(i)*weight(j)*twice*(a(1)*b(2) - a(2)*b(1))
-                     own(:n) = tie_shapes(n, s - sides%slave%split%start( &
-                        sides%slave%split%facet(s)) + 1, [1.0_wp - sum(point), point])
-                     other(:m) = tie_shapes(m, t - split%start(split%facet(t)) + 1, &
-                        barycentric(place, point))
+                     own(:n) = tie_shapes(n, s - sides%slave%split%start(f) + 1, &
+                        [1.0_wp - sum(point), point], sides%slave%skew(:, f))
+                     other(:m) = tie_shapes(m, t - split%start(g) + 1, &
+                        barycentric(place, point), sides%master%skew(:, g))
                      total = total + part
                      self%mass(:n, :n) = self%mass(:n, :n) + part*outer(own(:n), own(:n))
                      self%cross(:n, :m, self%n) = self%cross(:n, :m, self%n) &

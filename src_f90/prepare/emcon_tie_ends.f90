@@ -8,23 +8,29 @@ module emcon_tie_ends
    private
    public :: tie_ends_merge, tie_ends_take
 
+   !> Entries of a row that ties a node to one other.
+   integer, parameter :: n_pair = 2
+
 contains
 
    !> Where the end of a slave chain takes part in another tie too, or is held and its neighbour is
    !> not, its multiplier goes to the neighbour: on the end edge there is a constant one then. The
    !> rows are the same in all steps, as those that come back would not fit the displacements by
    !> then, and in both directions, as rotations would not fulfil them else. A chain that would
-   !> keep less than two multipliers stays as it is: one alone would be a hinge.
-   pure subroutine tie_ends_merge(rows, n_tie, is_held)
+   !> keep less than two multipliers stays as it is: one alone would be a hinge. So does an end that
+   !> is tied to the image of one node alone: sectors and cells whose meshes match are one mesh.
+   pure subroutine tie_ends_merge(rows, n_tie, is_held, has_map)
       type(tie_rows_t), intent(inout) :: rows
       integer, intent(in) :: n_tie(:)                    !! (n_node)
       logical, intent(in) :: is_held(:, :)               !! (2, n_node)
+      logical, intent(in) :: has_map                     !! the master is an image
       logical :: is_merged(size(rows%slave))
       integer :: k
 
       is_merged = .false.
       do k = 1, size(rows%slave)
          if (all(rows%neighbour(:, k) > 0) .or. all(rows%neighbour(:, k) == 0)) cycle
+         if (has_map .and. rows%start(k + 1) - rows%start(k) == n_pair) cycle
          associate (node => rows%slave(k), next => rows%slave(maxval(rows%neighbour(:, k))))
             is_merged(k) = n_tie(node) > 1 .or. any(is_held(:, node) .and. .not. is_held(:, next))
          end associate

@@ -48,24 +48,24 @@ contains
       end do
    end subroutine check_repeated
 
-   !> Number of ties that each node takes part in.
+   !> Number of sides of ties that each node takes part in: of one tie both only on its axis. A
+   !> master that is an image counts at the nodes that it is of.
    pure subroutine count_ties(scene, n_tie)
       type(scene_t), intent(in) :: scene
       integer, allocatable, intent(out) :: n_tie(:)      !! (n_node)
-      integer, allocatable :: seen(:), node(:)
-      integer :: t, k, side
+      integer, allocatable :: node(:)
+      integer :: t, side, surface
 
-      allocate(n_tie(size(scene%x, 2)), seen(size(scene%x, 2)), source=0)
+      allocate(n_tie(size(scene%x, 2)), source=0)
       do t = 1, size(scene%tie)
-         do side = 1, 2
-            call surface_nodes(scene, &
-               scene%surface(merge(scene%tie(t)%slave, scene%tie(t)%master, side == 1)), node)
-            do k = 1, size(node)
-               if (seen(node(k)) == t) cycle
-               seen(node(k)) = t
-               n_tie(node(k)) = n_tie(node(k)) + 1
+         associate (tie => scene%tie(t))
+            do side = 1, 2
+               surface = tie%slave
+               if (side == 2) surface = merge(tie%map%original, tie%master, tie%map%original > 0)
+               call surface_nodes(scene, scene%surface(surface), node)
+               n_tie(node) = n_tie(node) + 1
             end do
-         end do
+         end associate
       end do
    end subroutine count_ties
 

@@ -24,10 +24,13 @@ module emcon_tie_moves
 contains
 
    !> Move the slave nodes onto the places that their ties give them; the notes tell how far.
-   subroutine ties_move_nodes(scene, notes, error)
+   subroutine ties_move_nodes(scene, notes, error, before)
       type(scene_t), intent(inout) :: scene
       type(notes_t), intent(inout) :: notes
       type(error_t), allocatable, intent(out) :: error
+      !> (n_dim, n_node) places that were met by the ties: what has moved since is followed. To be
+      !> given with ties that have a map [L]
+      real(wp), intent(in), optional :: before(:, :)
       type(prescribed_t) :: nothing(0)
       type(linear_rows_t) :: linear
       type(numbering_t) :: numbering
@@ -40,7 +43,11 @@ contains
       allocate(is_alive(size(scene%x, 1), size(scene%x, 2)), source=.true.)
       call numbering_init(numbering, is_alive, nothing, linear)
       allocate(move, source=0.0_wp*scene%x)
-      call find_moves(numbering, scene%x, move)
+      if (present(before)) then
+         call find_moves(numbering, scene%x - before, move)
+      else
+         call find_moves(numbering, scene%x, move)
+      end if
       where (abs(move) <= rounding*maxval(abs(scene%x))) move = 0.0_wp
       call note_moves(scene, move, notes)
       call check_elements(scene, move, error)

@@ -9,6 +9,7 @@ module emcon_tie_sides_space
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : nearest_t, nearest_update
    use emcon_scene, only : scene_t
+   use emcon_tie_shapes_space, only : tie_skew
    implicit none
    private
    public :: tie_sides_t, tie_side_t, tie_sides_init, tie_sides_nearest, tie_sides_tolerance
@@ -18,6 +19,7 @@ module emcon_tie_sides_space
       type(facets_t) :: facets
       type(facet_split_t) :: split
       real(wp), allocatable :: at(:, :)          !! (3, n_point) of the split [L]
+      real(wp), allocatable :: skew(:, :)        !! (2, n_facet) of `tie_skew`
    end type tie_side_t
 
    type :: tie_sides_t
@@ -71,6 +73,7 @@ contains
       integer, intent(in) :: surface             !! its number
       type(error_t), allocatable, intent(out) :: error
       real(wp), allocatable :: still(:, :)
+      integer :: f
 
       call facets_init(self%facets, scene, scene%surface(surface), error)
       if (allocated(error)) return
@@ -78,6 +81,12 @@ contains
       allocate(self%at(3, self%split%n_point))
       allocate(still(size(scene%x, 1), size(scene%x, 2)), source=0.0_wp)
       call facet_split_place(self%split, self%facets, scene%x, still, self%at)
+      allocate(self%skew(2, self%facets%n_facet))
+      do f = 1, self%facets%n_facet
+         associate (node => self%facets%facet(:, f))
+            self%skew(:, f) = tie_skew(scene%x(:, node(:count(node > 0))))
+         end associate
+      end do
    end subroutine side_init
 
    !> The corners of a triangle of a side.

@@ -52,7 +52,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(tie_sides_t) :: sides
       type(tie_cells_t), allocatable :: cells(:)
-      logical, allocatable :: is_kept(:), is_edge(:)
+      logical, allocatable :: is_kept(:), is_spared(:), is_free(:)
       integer :: f
 
       call tie_sides_init(sides, scene, tie, error)
@@ -69,28 +69,27 @@ contains
       end do
       call tie_check_cover(scene, tie, sides, cells, error)
       if (allocated(error)) return
-      call tie_basket_find(sides%slave%facets, scene%x, n_tie, is_held, is_kept)
-      call find_rows(sides, cells, is_kept, tie%multiplier == multiplier_dual, rows)
-      associate (slave => sides%slave%facets)
-         allocate(is_edge(size(slave%node)))
-         call tie_basket_edges(slave, scene%x, is_edge)
-         if (any(is_edge)) then
-            call spare_matching(slave, rows, is_edge)
-            call tie_basket_release(slave, scene%x, is_edge, is_kept)
-            call find_rows(sides, cells, is_kept, tie%multiplier == multiplier_dual, rows)
-         end if
+      associate (slave => sides%slave%facets, is_dual => tie%multiplier == multiplier_dual)
+         is_kept = spread(.true., 1, size(slave%node))
+         call find_rows(sides, cells, is_kept, is_dual, rows)
+         is_spared = are_matching(slave, rows)
+         call tie_basket_find(slave, n_tie, is_held, is_free)
+         call tie_basket_release(slave, scene%x, is_free .and. .not. is_spared, is_kept)
+         call tie_basket_edges(slave, scene%x, is_free)
+         call tie_basket_release(slave, scene%x, is_free .and. .not. is_spared, is_kept)
+         if (.not. all(is_kept)) call find_rows(sides, cells, is_kept, is_dual, rows)
       end associate
       call find_covered(sides%master, cells, rows)
    end subroutine tie_measure_space
 
-   !> Nodes are left out of `is_edge` if the meshes match around them: at all nodes of their facets
-   !> rows say the same of both sides. They are one with those of the master.
-   pure subroutine spare_matching(slave, rows, is_edge)
+   !> Nodes around which the meshes match: at all nodes of their facets rows say the same of both
+   !> sides. They are one with those of the master.
+   pure function are_matching(slave, rows) result(is_matching)
       type(facets_t), intent(in) :: slave
       type(tie_rows_t), intent(in) :: rows
-      logical, intent(inout) :: is_edge(:)       !! (node of the slave)
+      logical :: is_matching(size(slave%node))
       real(wp), allocatable :: own(:), other(:)
-      logical :: matches(0:size(is_edge))
+      logical :: matches(0:size(slave%node))
       integer :: k, i
 
       matches = .false.
@@ -109,13 +108,13 @@ contains
          matches(find_sorted(slave%node, rows%slave(k))) = all(abs(own - other) <= &
             rounding*rows%size(k))
       end do
-      do k = 1, size(is_edge)
+      do k = 1, size(is_matching)
          associate (around => slave%around(slave%around_start(k):slave%around_start(k + 1) - 1))
-            is_edge(k) = is_edge(k) .and. .not. all(matches(reshape(slave%corner(:, around), &
+            is_matching(k) = all(matches(reshape(slave%corner(:, around), &
                [size(around)*size(slave%corner, 1)])))
          end associate
       end do
-   end subroutine spare_matching
+   end function are_matching
 
    !> Each slave node at the place of the master nearest to it, as shape functions interpolate: such
    !> a row is as large as the facet of that place.
@@ -137,7 +136,7 @@ contains
                length(k) = master%size(f)
                call add(entries, k, slave%node(k:k), length(k:k))
                call add(entries, k, master%facet(:n, f), -length(k)*tie_shapes(n, &
-                  nearest%triangle - split%start(f) + 1, nearest%weight))
+                  nearest%triangle - split%start(f) + 1, nearest%weight, sides%master%skew(:, f)))
             end associate
          end do
          allocate(rows%covered(size(master%facet, 1), 0))

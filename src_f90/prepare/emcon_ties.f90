@@ -8,6 +8,8 @@ module emcon_ties
    use emcon_errors, only : error_t
    use emcon_scene, only : scene_t
    use emcon_text, only : notes_t
+   use emcon_tie_images, only : tie_images_add, tie_images_settle, tie_images_t, tie_images_take
+   use emcon_tie_maps, only : tie_map_is_given
    use emcon_tie_meetings, only : check_repeated, count_ties, find_held, uncover_exterior
    use emcon_tie_moves, only : ties_move_nodes
    use emcon_tie_space, only : tie_measure_space
@@ -25,13 +27,35 @@ contains
       type(notes_t), intent(inout) :: notes
       type(error_t), allocatable, intent(out) :: error
 
+      type(scene_t) :: whole
+      type(tie_images_t) :: images
+
+      if (.not. any(tie_map_is_given(scene%tie%map))) then
+         call prepare(scene, notes, error)
+         return
+      end if
+      whole = scene
+      call tie_images_add(images, whole)
+      call prepare(whole, notes, error)
+      if (.not. allocated(error)) call tie_images_settle(images, whole, notes, error)
+      if (allocated(error)) return
+      call tie_images_take(images, whole, scene)
+      call uncover_exterior(scene)
+   end subroutine ties_prepare
+
+   !> The same, where no tie has a map, or the images are there.
+   subroutine prepare(scene, notes, error)
+      type(scene_t), intent(inout) :: scene
+      type(notes_t), intent(inout) :: notes
+      type(error_t), allocatable, intent(out) :: error
+
       if (size(scene%tie) == 0) return
       if (size(scene%x, 1) == n_plane) then
          call ties_prepare_plane(scene, notes, error)
       else
          call ties_prepare_space(scene, notes, error)
       end if
-   end subroutine ties_prepare
+   end subroutine prepare
 
    !> The same in space, where a curved tie is not balanced.
    subroutine ties_prepare_space(scene, notes, error)

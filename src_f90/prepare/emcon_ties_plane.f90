@@ -13,12 +13,13 @@ module emcon_ties_plane
    use emcon_text, only : note_add, notes_t
    use emcon_tie_balance_plane, only : tie_balance, tie_balance_report_t, tie_is_balanced
    use emcon_tie_ends, only : tie_ends_merge, tie_ends_take
+   use emcon_tie_maps, only : tie_map_is_given
    use emcon_tie_meetings, only : check_repeated, count_ties, find_held, uncover_exterior
    use emcon_tie_moves, only : ties_move_nodes
    use emcon_tie_plane, only : tie_measure
    implicit none
    private
-   public :: ties_prepare_plane
+   public :: ties_prepare_plane, tie_rows_part
 
    integer, parameter :: most_sweeps = 4
 
@@ -52,7 +53,8 @@ contains
       call count_ties(points, n_tie)
       call find_held(scene, is_held)
       do t = 1, size(scene%tie)
-         call tie_ends_merge(points%tie(t)%rows, n_tie, is_held)
+         call tie_ends_merge(points%tie(t)%rows, n_tie, is_held, &
+            tie_map_is_given(points%tie(t)%map))
       end do
       call balance(points, error)
       if (allocated(error)) return
@@ -67,6 +69,16 @@ contains
       call midside_places(midside, points%x)
       call note_unbalanced(points, notes, error)
    end subroutine ties_prepare_plane
+
+   !> The sides of a tie do not stand beside each other: its rows say nothing of where one ends on
+   !> the other, and are in no order.
+   pure subroutine tie_rows_part(rows)
+      type(tie_rows_t), intent(inout) :: rows
+
+      deallocate(rows%neighbour)
+      rows%buried = [integer ::]
+      rows%ending = rows%ending(:, :0)
+   end subroutine tie_rows_part
 
    !> Let curved ties keep the equilibrium of a constant stress. A tie may be master of another one
    !> whose slave nodes it moves: a few sweeps settle that.

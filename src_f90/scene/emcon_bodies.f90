@@ -31,6 +31,7 @@ contains
             if (.not. allocated(rows%slave)) cycle
             do k = 1, size(rows%slave)
                do s = rows%start(k) + 1, rows%start(k + 1)
+                  if (rows%node(s) == scene%tie(t)%map%reference) cycle
                   n = n + 1
                   connected(:2, n) = [rows%slave(k), rows%node(s)]
                end do

@@ -3,6 +3,7 @@ module emcon_couplings
    use emcon_interactions, only : multiplier_dual
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t
+   use emcon_tie_maps, only : tie_map_t
    implicit none
    private
    public :: tie_t, tie_rows_t, equation_t
@@ -17,6 +18,8 @@ module emcon_couplings
       integer, allocatable :: start(:)               !! (n + 1) entries before each row, from 0
       integer, allocatable :: node(:)                !! entries; the first is the slave node
       real(wp), allocatable :: weight(:)             !! [L^(n_dim - 1)]; those of a row sum up to 0
+      !> Entries of the image of a node; only with a map
+      logical, allocatable :: is_image(:)
       real(wp), allocatable :: size(:)               !! (n) int psi_k, > 0 [L^(n_dim - 1)]
       integer, allocatable :: covered(:, :)          !! (most nodes, any) master facets all covered
       integer, allocatable :: buried(:)              !! master nodes with the slave on both sides
@@ -32,6 +35,7 @@ module emcon_couplings
       integer :: master = 0
       real(wp) :: tolerance = -1.0_wp                !! POSITION TOLERANCE [L]; < 0: not given
       integer :: multiplier = multiplier_dual
+      type(tie_map_t) :: map                         !! of a cell that repeats itself, or a sector
       type(tie_rows_t) :: rows                       !! frozen before the first step
    end type tie_t
 

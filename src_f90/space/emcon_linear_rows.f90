@@ -4,6 +4,7 @@
 !> direction for each node of a rigid body that is not in its frame, and for each of its arms, then
 !> for each row of each tie, then the equations. Source: docs/theory.md, sections 11 and 13.
 module emcon_linear_rows
+   use emcon_couplings, only : tie_t
    use emcon_kinds, only : wp
    use emcon_rigid_bodies, only : rigid_body_t, rigid_weights
    use emcon_scene, only : scene_t
@@ -47,7 +48,8 @@ contains
       end do
       do t = 1, size(scene%tie)
          self%n = self%n + n_dim*size(scene%tie(t)%rows%slave)
-         most = most + n_dim*size(scene%tie(t)%rows%node)
+         most = most + n_dim*merge(n_dim, 1, allocated(scene%tie(t)%rows%is_image)) &
+            *size(scene%tie(t)%rows%node)
       end do
       do k = 1, size(scene%equation)
          most = most + size(scene%equation(k)%node)
@@ -96,13 +98,41 @@ contains
                self%own(n) = n_dim*(rows%slave(k) - 1) + a
                self%size(n) = rows%size(k)**(1.0_wp/real(n_dim - 1, wp))
                associate (from => rows%start(k) + 1, to => rows%start(k + 1))
-                  call add_row(self, n, n_dim*(rows%node(from:to) - 1) + a, &
-                     rows%weight(from:to)/rows%size(k))
+                  if (allocated(rows%is_image)) then
+                     call add_mapped(self, n, scene%tie(t), from, to, a, rows%size(k))
+                  else
+                     call add_row(self, n, n_dim*(rows%node(from:to) - 1) + a, &
+                        rows%weight(from:to)/rows%size(k))
+                  end if
                end associate
             end do
          end do
       end associate
    end subroutine add_tie
+
+   !> Append row `n` of direction `a`: images are displaced by what the map makes of their nodes.
+   pure subroutine add_mapped(self, n, tie, from, to, a, length)
+      type(linear_rows_t), intent(inout) :: self
+      integer, intent(in) :: n
+      type(tie_t), intent(in) :: tie
+      integer, intent(in) :: from, to, a         !! entries of the row; 1..n_dim
+      real(wp), intent(in) :: length             !! int psi
+      integer :: dof(size(tie%map%shift)*(to - from + 1)), i, b, m
+      real(wp) :: weight(size(dof))
+
+      m = 0
+      associate (rows => tie%rows, turn => tie%map%turn, n_dim => size(tie%map%shift))
+         do i = from, to
+            do b = 1, n_dim
+               if (.not. merge(abs(turn(a, b)) > 0.0_wp, a == b, rows%is_image(i))) cycle
+               m = m + 1
+               dof(m) = n_dim*(rows%node(i) - 1) + b
+               weight(m) = merge(turn(a, b), 1.0_wp, rows%is_image(i))*rows%weight(i)/length
+            end do
+         end do
+      end associate
+      call add_row(self, n, dof(:m), weight(:m))
+   end subroutine add_mapped
 
    !> Nodes of a rigid body that are not in its frame.
    pure integer function n_follower(rigid)

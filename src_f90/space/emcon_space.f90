@@ -106,6 +106,7 @@ contains
          self%is_alive(:, scene%rigid(i)%node) = .true.
          if (allocated(scene%rigid(i)%arm)) self%is_alive(:, scene%rigid(i)%arm) = .true.
       end do
+      self%is_alive(:, tie_references(scene)) = .true.
       allocate(self%unresolved(0))
    end subroutine space_init
 
@@ -185,6 +186,7 @@ contains
       do i = 1, size(scene%rigid)
          self%is_alive(:, scene%rigid(i)%node) = .true.
       end do
+      self%is_alive(:, tie_references(scene)) = .true.
       if (allocated(scene%host%node)) self%is_alive(:, scene%host%node) = .true.
 
    contains
@@ -197,6 +199,14 @@ contains
       end function freedoms
 
    end subroutine retire
+
+   !> The nodes by whose displacements the translations of ties grow.
+   pure function tie_references(scene) result(node)
+      type(scene_t), intent(in) :: scene
+      integer, allocatable :: node(:)
+
+      node = pack(scene%tie%map%reference, scene%tie%map%reference > 0)
+   end function tie_references
 
    !> The matrix of `numbering`: each freedom meets those of its lists, and itself.
    subroutine lay_out(self, lists, matrix, slot, is_too_full, error)

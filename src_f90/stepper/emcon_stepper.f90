@@ -20,6 +20,7 @@ module emcon_stepper
    use emcon_scene, only : scene_t
    use emcon_text, only : notes_append, notes_t, string_t, to_text
    use emcon_threads, only : threads_check, threads_default
+   use emcon_tie_maps, only : tie_map_is_given
    use emcon_tie_moves, only : ties_move_nodes
    use emcon_ties, only : ties_prepare
    use emcon_verdict, only : verdict_start, verdict_t, verdict_update
@@ -176,8 +177,11 @@ contains
       type(stepper_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error
 
+      real(wp), allocatable :: before(:, :)
+
+      if (any(tie_map_is_given(self%scene%tie%map))) allocate(before, source=self%scene%x)
       call initial_contact_prepare(self%scene, self%notes, error, self%host)
-      if (.not. allocated(error)) call ties_move_nodes(self%scene, self%notes, error)
+      if (.not. allocated(error)) call ties_move_nodes(self%scene, self%notes, error, before)
    end subroutine prepare_contact
 
    !> Free what libraries hold for `self`; call it before the object goes, also after an error.

@@ -31,7 +31,7 @@ def check_stretched(done: Run, x: np.ndarray) -> None:
     (("C3D8", "C3D8"), (2, 4), 0.1, ", MULTIPLIER=STANDARD"), (("C3D8", "C3D8"), (1, 1), 0.0, ""),
     (("C3D4", "C3D8"), (2, 3), 0.1, ""), (("C3D8", "C3D4"), (2, 2), 0.1, ""),
     (("C3D10", "C3D8"), (2, 3), 0.1, ""), (("C3D8", "C3D10"), (3, 2), 0.1, ""),
-    (("C3D20R", "C3D10"), (2, 1), 0.0, ""), (("C3D10", "C3D20"), (2, 1), 0.0, ""),
+    (("C3D20R", "C3D10"), (2, 1), 0.1, ""), (("C3D10", "C3D20"), (2, 2), 0.1, ""), (("C3D20", "C3D20R"), (3, 2), 0.2, ""),
     (("C3D8", "C3D20"), (2, 1), 0.0, ", MULTIPLIER=STANDARD")])
 def test_constant_stress(kinds, cells, shake, options, tmp_path: Path) -> None:
     """Over unlike meshes of any kinds, with nodes between corners on either side."""
@@ -39,6 +39,22 @@ def test_constant_stress(kinds, cells, shake, options, tmp_path: Path) -> None:
     upper = shaken(box(kinds[1], (cells[1],)*3, (0, 0, .5), (1, 1, 1)), 0.5, shake)
     text, x = tied([lower, upper], [(1, 0, 2)], options=options)
     check_stretched(run(text + stretch(x), tmp_path), x)
+
+
+def test_constant_stress_turned(tmp_path: Path) -> None:
+    """The same, of a body that is turned."""
+    turn = np.linalg.qr(np.random.default_rng(2).normal(size=(3, 3)))[0]
+    turn *= np.sign(np.linalg.det(turn))
+    blocks = [shaken(box("C3D20", (2,)*3, (0, 0, 0), (1, 1, .5)), 0.5, 0.2), shaken(box("C3D8", (3,)*3, (0, 0, .5), (1, 1, 1)), 0.5, 0.2)]
+    x = np.vstack([b.x for b in blocks])
+    for block in blocks:
+        block.x = block.x @ turn.T
+    text, y = tied(blocks, [(1, 0, 2)])
+    u = 0.001*x*[-0.3, -0.3, 1.0] @ turn.T
+    text += "*STEP\n*STATIC, DIRECT\n1., 1.\n*BOUNDARY\n" + "".join(
+        f"{k + 1}, {a + 1}, {a + 1}, {float(u[k, a])!r}\n" for k in np.flatnonzero((x[:, 2] < 1e-9) | (x[:, 2] > 1 - 1e-9)) for a in range(3))
+    fields = run(text + "*NODE FILE\nU\n*EL FILE\nS\n*END STEP\n", tmp_path).fields()
+    np.testing.assert_allclose(fields["displacement"][-1], u, rtol=0, atol=1e-10*0.001)
 
 
 @pytest.mark.parametrize(("kinds", "cells"), [
@@ -83,10 +99,10 @@ def test_interface_with_edges(cells, kinds, slave, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("more", ["", "*CONSTRAINT METHOD, TYPE=SADDLE POINT\n"])
-@pytest.mark.parametrize("kinds", [("C3D8", "C3D8"), ("C3D8", "C3D10"), ("C3D10", "C3D8")])
+@pytest.mark.parametrize("kinds", [("C3D8", "C3D8"), ("C3D8", "C3D10"), ("C3D10", "C3D8"), ("C3D20", "C3D20R"), ("C3D10", "C3D20")])
 def test_flight_of_curved_pieces(kinds, more, tmp_path: Path) -> None:
     """Slave nodes are put onto the polygons of the master: then nothing is lost on a curved interface."""
-    cells = [(4, 2), (6, 3)] if kinds[0] == kinds[1] else [(3, 1), (4, 2)]
+    cells = [(4, 2), (6, 3)] if kinds[0] == kinds[1] else [(3, 1), (4, 2)] if "C3D8" in kinds else [(2, 1), (3, 1)]
     text, x = quarter_shells(cells, list(kinds))
     done = run(text + flight(x, more, 8), tmp_path)
     check_flight(done, [Block(k, (1, *n)) for k, n in zip(kinds, cells, strict=True)])
@@ -178,3 +194,47 @@ def test_slave_of_nodes(cells, is_exact, tmp_path: Path) -> None:
         assert np.ptp(done.fields()["cauchy_stress"][-1].reshape(len(x), -1)[:, 2]) > 1e-3
     text, x = tied(blocks, [(1, 0, 2)], RUBBER)
     check_flight(run(as_nodes(text.replace("*TIE", labels + "*TIE", 1)) + flight(x, steps=6), tmp_path/"flight"), blocks)
+
+
+def two_sides(upper: Block, slave: tuple[int, int] = (2, 0), master: tuple[int, int] = (2, 1), options: str = "") -> str:
+    """A block of unlike mesh near another, and ends of axes that are slave and master."""
+    lower = box("C3D8", (2,)*3, (0, 0, 0), (1, 1, .5))
+    text = bodies([lower, upper], [faces(lower), faces(upper)])
+    text += "*SURFACE, NAME=SLAVE\n" + "".join(f"{len(lower.element) + e}, S{f}\n" for e, f in faces(upper, *slave))
+    text += "*SURFACE, NAME=MASTER\n" + "".join(f"{e}, S{f}\n" for e, f in faces(lower, *master))
+    return text + f"*TIE, NAME=T{options}\nSLAVE, MASTER\n" + stretch(np.vstack([lower.x, upper.x]))
+
+
+@pytest.mark.parametrize(("low", "slave", "master", "options", "told"), [
+    ((0, 0, .8), (2, 0), (2, 1), "", "the surfaces do not meet: slave node 28, the nearest one, is 0.3 from the master"),
+    ((.4, 0, .5), (2, 0), (2, 1), "", "8 of 16 nodes of slave surface SLAVE are farther from master surface MASTER than"),
+    ((0, 0, .5), (2, 1), (2, 1), ", POSITION TOLERANCE=1.", "their faces do not look at each other: check the face labels"),
+    ((0, 0, .5), (0, 0), (2, 1), ", POSITION TOLERANCE=.6", "their faces do not look at each other: check the face labels")])
+def test_sides_that_do_not_fit(low, slave, master, options, told, tmp_path: Path) -> None:
+    """Each is an error with its line and what there is to know."""
+    upper = box("C3D8", (3,)*3, low, np.array(low) + [1, 1, .5])
+    text = two_sides(upper, slave, master, options)
+    line = text[:text.index("SLAVE, MASTER\n")].count("\n") + 1
+    errors = run(text, tmp_path, code=2).errors
+    assert f"deck.inp:{line}: error: tie T: " in errors
+    assert told in errors
+
+
+@pytest.mark.parametrize("pair", ["SIDE, WALL", "WALL, SIDE"])
+def test_contact_of_tied_slave_nodes(pair: str, tmp_path: Path) -> None:
+    """Two tied blocks hit a third by a side that has the seam: nodes of the tie are in contact, too."""
+    blocks = [box("C3D8", (2,)*3, (0, 0, 0), (1, 1, .5)), box("C3D8", (3,)*3, (0, 0, .5), (1, 1, 1)),
+              box("C3D8", (2,)*3, (1.02, -.1, -.1), (2, 1.1, 1.1))]
+    text, x = tied(blocks, [(1, 0, 2)], RUBBER)
+    before = np.cumsum([0] + [len(b.element) for b in blocks])
+    for name, sides in (("SIDE", ((0, 0, 1), (1, 0, 1))), ("WALL", ((2, 0, 0),))):
+        text += f"*SURFACE, NAME={name}\n" + "".join(f"{before[i] + e}, S{f}\n" for i, a, end in sides for e, f in faces(blocks[i], a, end))
+    n = len(blocks[0].x) + len(blocks[1].x)
+    text += "*INITIAL CONDITIONS, TYPE=VELOCITY\n" + "".join(f"{k}, 1, 1.\n" for k in range(1, n + 1))
+    text += f"*SURFACE INTERACTION, NAME=I\n*CONTACT PAIR, INTERACTION=I\n{pair}\n"
+    done = run(text + "*STEP, NLGEOM\n*DYNAMIC, DIRECT\n.01, .5\n*NODE FILE\nU, V\n*END STEP\n", tmp_path)
+    history = done.history
+    assert history["active"].max() > 0
+    assert done.verdict["verdict"] == "good"
+    assert np.ptp(history["total"]) < 1e-12*history["total"][0]
+    assert np.ptp(history["px"]) < 1e-12*history["px"][0]
