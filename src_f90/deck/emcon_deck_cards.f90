@@ -228,7 +228,7 @@ contains
                   // suggestion(option%name, parameter_names(parameters))
                reader%doubt%names = .true.
             else if (mark == mark_unsupported) then
-               call parameter_reason(option%name, reason)
+               call parameter_reason(option%name, mark, reason)
                fault = "parameter " // option%name // " is known but not supported" // reason
             else if (mark == mark_value .and. option%value == "") then
                fault = "parameter " // option%name // " needs a value"
@@ -236,7 +236,7 @@ contains
             else if (mark == mark_flag .and. option%has_value) then
                fault = "parameter " // option%name // " takes no value"
             else if (mark == mark_without_effect) then
-               call parameter_reason(option%name, reason)
+               call parameter_reason(option%name, mark, reason)
                call card_warning(reader, card, "parameter " // option%name // " has no effect" &
                   // reason)
             else if (is_repeated(card%option(:i))) then

@@ -43,7 +43,7 @@ module emcon_deck_keywords
 
    character(len=*), parameter :: printed = "FREQUENCY=,TIMEPOINTS=,TOTALS="
    character(len=*), parameter :: filed = "FREQUENCY=,TIMEPOINTS=,~GLOBAL:YES,~OUTPUT:2D," &
-      // "~POSITION,!USER"
+      // "~POSITION,~CONTACTELEMENTS,!USER"
 
    type(keyword_t), parameter :: keywords(*) = [ &
       keyword_t("HEADING", in_both), &
@@ -132,8 +132,8 @@ module emcon_deck_keywords
          // "DISSIPATION=,TOLERANCE=", has_data=.false.), &
       keyword_t("EVENTS", in_step, "TYPE=,FRACTION=,OFF", has_data=.false.), &
       keyword_t("NODE FILE", in_step, "NSET=," // filed), &
-      keyword_t("EL FILE", in_step, "ELSET=," // filed), &
-      keyword_t("CONTACT FILE", in_step, filed), &
+      keyword_t("EL FILE", in_step, "ELSET=,~NSET," // filed), &
+      keyword_t("CONTACT FILE", in_step, "~NSET," // filed), &
       keyword_t("NODE PRINT", in_step, "NSET=,GLOBAL=," // printed), &
       keyword_t("EL PRINT", in_step, "ELSET=,~GLOBAL:YES," // printed), &
       keyword_t("CONTACT PRINT", in_step, "MASTER=,SLAVE=,~NSET,~SET,~GLOBAL:YES," // printed), &
@@ -310,11 +310,14 @@ contains
       if (is_number) is_neutral = abs(number - neutral) <= 0.0_wp
    end function is_neutral
 
-   !> Why a known parameter is not supported: " (...)", or nothing where the name says it.
-   pure subroutine parameter_reason(name, reason)
+   !> Why a known parameter is not supported or has no effect: " (...)", or nothing where the
+   !> name says it.
+   pure subroutine parameter_reason(name, mark, reason)
       character(len=*), intent(in) :: name
+      integer, intent(in) :: mark                !! how its keyword takes it
       character(len=:), allocatable, intent(out) :: reason
 
+      reason = ""
       select case (name)
       case ("ALPHA")
          reason = " (the energy-momentum scheme has no numerical damping: *TIME INTEGRATION, " &
@@ -339,7 +342,8 @@ contains
          call law_titles("HYPERELASTIC", reason)
          reason = " (laws are " // reason // ")"
       case ("ANALYTICALSURFACE", "NSET", "PINNSET", "TIENSET")
-         reason = " (a rigid body is made of elements: ELSET=)"
+         if (mark == mark_unsupported) reason = " (a rigid body is made of elements: ELSET=)"
+         if (mark == mark_without_effect) reason = " (it does not narrow what is written)"
       case ("ROTNODE")
          reason = " (degree of freedom 6 of the reference node is the rotation)"
       case ("READ")
@@ -348,8 +352,6 @@ contains
          reason = " (there is no *ASSEMBLY)"
       case ("INPUT")
          reason = " (use *INCLUDE)"
-      case default
-         reason = ""
       end select
    end subroutine parameter_reason
 

@@ -319,7 +319,7 @@ contains
             call get_name(reader, data, k, "variable", name)
             if (is_below(card)) name = whole_of(name)
             do i = 1, size(list)
-               if (list(i)%text == name .or. longer(i)%text == name) exit
+               if (is_name_of(name, list(i)%text, longer(i)%text)) exit
             end do
             if (i <= size(list)) then
                is_wanted(i) = .true.
@@ -354,6 +354,15 @@ contains
 
       whole = name
    end function whole_of
+
+   !> Does `name` stand for a variable? Between its short and its long form, as CSTR, CSTRE and
+   !> CSTRESS: CalculiX reads four letters.
+   pure logical function is_name_of(name, short, long)
+      character(len=*), intent(in) :: name, short, long
+
+      is_name_of = name == short .or. name == long &
+         .or. (index(name, short) == 1 .and. index(long, name) == 1)
+   end function is_name_of
 
    !> What says the same as a variable that is not written: "...; ", or nothing.
    pure subroutine say_instead(name, text)

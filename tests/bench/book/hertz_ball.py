@@ -6,6 +6,7 @@ import sys
 import numpy as np
 from scene_tools import DECKS
 
+from . import ball_law
 from .common import Chapter, drift, size, table
 
 sys.path.append(str(DECKS))
@@ -41,6 +42,12 @@ def measured(run, speed):
             momentum[-1]/momentum[0])
 
 
+def by_ball(speed):
+    """Time and largest force of the ball by those of the half space."""
+    energy = 0.5*make_hertz_ball.MASS*speed**2/(make_hertz_ball.MODULUS*make_hertz_ball.RADIUS**3)
+    return ball_law.impact(energy, make_hertz_ball.POISSON)
+
+
 def start(runs):
     return {(speed, cells): runs.start(runs.generated("hertz_ball", "--speed", speed, "--cells", cells,
                                                       "--increments", 150))
@@ -54,19 +61,17 @@ def unknowns(run):
 def report(started, _):
     rows = []
     for cells in CELLS:
-        found = {}
         for speed in SPEEDS:
             run = started[speed, cells].result()
-            found[speed] = time, force, impulse, energy, back = measured(run, speed)
-            radius = make_hertz_ball.law(speed)["radius"]
-            rows.append((f"1/{cells}", unknowns(run), f"{speed:g}", f"{radius:.3f}", f"{100*time:+.2f} %",
-                         f"{100*force:+.2f} %", size(impulse), size(energy), f"{back:.5f}"))
-        small = [make_hertz_ball.law(speed)["radius"] for speed in SPEEDS[-2:]]
-        limit = [found[SPEEDS[-1]][k] - small[1]/(small[0] - small[1])
-                 * (found[SPEEDS[-2]][k] - found[SPEEDS[-1]][k]) for k in (0, 1)]
-        rows.append((f"1/{cells}", "", "to 0", "0", *(f"{100*e:+.2f} %" for e in limit), "", "", ""))
-    return table(["facet / a", "unknowns", "speed", "a / R", "time", "largest force", "impulse", "energy",
-                  "rebound"], rows)
+            errors = measured(run, speed)
+            own = [(1 + error)/law - 1 for error, law in zip(errors, by_ball(speed), strict=False)]
+            rows.append((f"1/{cells}", unknowns(run), f"{speed:g}", f"{make_hertz_ball.law(speed)['radius']:.3f}",
+                         *(f"{100*e:+.2f} %" for e in (*errors[:2], *own)), size(errors[2]), size(errors[3]),
+                         f"{errors[4]:.5f}"))
+    rows.extend(("ball's law", "", f"{speed:g}", f"{make_hertz_ball.law(speed)['radius']:.3f}",
+                 *(f"{100*(e - 1):+.2f} %" for e in by_ball(speed)), *[""]*5) for speed in SPEEDS)
+    return table(["facet / a", "unknowns", "speed", "a / R", "time", "largest force", "time, by the ball",
+                  "force, by the ball", "impulse", "energy", "rebound"], rows)
 
 
 CHAPTERS = [Chapter("hertz_ball", start, report)]

@@ -5,6 +5,7 @@ import sys
 import numpy as np
 from scene_tools import DECKS
 
+from . import ball_law
 from .common import Chapter, order, table
 
 sys.path.append(str(DECKS))
@@ -15,7 +16,8 @@ PAIR = {False: "ball on plane", True: "ball on ball"}
 
 
 def errors(run, pair):
-    """Of the radius of the contact and the largest pressure for the force found, of that force.
+    """Of the radius of the contact and the largest pressure for the force found, of that force by half spaces
+    and by balls.
 
     The radius is that of Hertz's pressure with the same second moment, 2/5 of its square.
     """
@@ -28,7 +30,8 @@ def errors(run, pair):
     curve, stiffness = half*ball.RADIUS, half*ball.STIFFNESS
     hertz = (0.75*total*curve/stiffness)**(1/3)
     pushed = 4/3*stiffness*ball.CONTACT**3/curve
-    return radius/hertz - 1, (hertz/radius)**2 - 1, total/pushed - 1
+    own = ball_law.stiffer((ball.CONTACT/ball.RADIUS)**2, ball.POISSON)
+    return radius/hertz - 1, (hertz/radius)**2 - 1, total/pushed - 1, total/(pushed*own) - 1
 
 
 def start(runs):
@@ -41,7 +44,7 @@ def report(started, _):
     rows = []
     for pair, name in PAIR.items():
         found = np.array([errors(started[pair, cells].result(), pair) for cells in CELLS])
-        what = ("radius", "largest pressure", "force by the approach")
+        what = ("radius", "largest pressure", "force by the approach", "the same, by the ball's law")
         for k, word in enumerate(what):
             rows.append(("" if k else name, word, *(f"{100*e:+.2f} %" for e in found[:, k]),
                          f"{order([1/n for n in CELLS], found[:, k]):.1f}"))

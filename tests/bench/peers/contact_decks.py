@@ -1,0 +1,98 @@
+"""CalculiX' decks of contact and ties: where results differ, why, and what is edited to show it.
+
+A remark is a sentence and edits: pairs of what CalculiX and what EMCON reads in place of the deck's
+text; the differences that are left with them stand behind the sentence.
+"""
+
+import functools
+import re
+
+from peers.refined import refined
+
+PAIR = re.compile(r"(?im)^\*(?:CONTACT PAIR|TIE(?!.*(?:CYCLIC|MULTISTAGE)))")
+
+
+def is_one(text):
+    """Has the deck contact or ties that are none of a sector?"""
+    return bool(PAIR.search(text))
+
+
+def asked(text):
+    """The deck, with a request for displacements if it has none."""
+    if re.search(r"(?im)^\*NODE (PRINT|FILE)", text):
+        return text
+    return re.sub(r"(?im)^\*END STEP", "*NODE FILE\nU\n*END STEP", text)
+
+
+def static(text):
+    """Without steps of frequencies; None where no other step is left."""
+    head, *steps = re.split(r"(?im)^(?=\*STEP)", text)
+    kept = [step for step in steps if not re.search(r"(?im)^\*FREQUENCY", step)]
+    return head + "".join(kept) if kept else None
+
+
+def put(old, new):
+    """An edit that puts `new` in place of `old`, capitals or not."""
+    def edit(text):
+        found, count = re.subn(f"(?i){old}", new, text)
+        assert count, old
+        return found
+    return edit
+
+
+def shrunk(text):
+    """Overlaps at the start go out in the first step."""
+    return re.sub(r"(?im)^(\*STATIC.*\n(?:[^*].*\n)?)",
+                  r"\1*CONTACT INTERFERENCE, SHRINK\nSSLAV,SMAST\n", text, count=1)
+
+
+def chain(*edits):
+    return lambda text: functools.reduce(lambda now, edit: edit(now), edits, text)
+
+
+def split(counts, mine=None, theirs=None):
+    """Edits with each element split into n x n x n by both."""
+    def edit(n, own):
+        return chain(own or str, lambda text: refined(text, n))
+    return [(edit(n, theirs), edit(n, mine)) for n in counts]
+
+
+AREA = ("one node of a corner is the slave: CalculiX gives it a quarter of all faces of its element there, "
+        "EMCON of the one that faces the master; with three times the pressure")
+FACES = ("CalculiX integrates over faces of the slave, against the curved faces of the master; EMCON takes points, against "
+         "faces made of triangles; both with each element split into n x n x n")
+RIM = ("the area of a point is that of all faces around it: along the corner that the flat part of the punch ends at, "
+       "faces that rise from the other body count, half a face in width; at a hundredth of the stiffness, each element "
+       "split into n x n x n")
+SHRINK = "an overlap at the start, which CalculiX lets out over the step; with *CONTACT INTERFERENCE, SHRINK"
+STEPS = "without the steps of *FREQUENCY"
+MORTAR = "mortar is not in space, by nodes"
+ONE_SIDE = ("unlike meshes: points of one side alone press, by a pressure by the overclosure; CalculiX integrates over "
+            "the faces of this side")
+BY_NODES = put("TYPE=MORTAR", "TYPE=SURFACE TO SURFACE")
+SOFTER = put(r"1\.e7,3\.", "1.e5,.01")
+FLAT = chain(put(r"1\.0042779\d+e\+00", "1."), put(r"1\.0000004\d+e\+00", "1."), put(r",ADJUST=[.0-9]+", ""))
+
+#: Deck: sentence, edits. Of decks that do not run unchanged the first edit is what lets them run.
+REMARKS = {
+    "contact1": (AREA, [(None, put("1.5351e-7,6.66666", "1.5351e-7,19.99998"))]),
+    "contact3": (f"{SHRINK}; and {AREA}", [(None, shrunk), (None, chain(
+        shrunk, put(r"1\.e7,3\.", "3.e7,9.")))]),
+    "contact6": (f"{SHRINK}; and {AREA}", [(None, shrunk), (None, chain(
+        shrunk, put(r"1\.e9,3\.", "3.e9,9.")))]),
+    "contact4": (f"HARD of CalculiX is a pressure of 50 E by overclosure, here of 1E9; {FACES}, n = 1, 2, 3, 4",
+                 split((1, 2, 3, 4), theirs=put("=HARD", "=LINEAR\n1.E9,1."))),
+    "contact4_mortar": (f"{MORTAR}; {FACES}, n = 1, 2, 3", split((1, 2, 3), BY_NODES)),
+    "cubespring": (f"{FACES}, n = 2, 3, 4", split((2, 3, 4))),
+    "punch1": (f"{RIM}, n = 1, 2, 3", split((1, 2, 3), chain(FLAT, SOFTER), chain(FLAT, SOFTER))),
+    "punch2": ("as `punch1`", []),
+    "beamcontact": (f"{FACES}, n = 2", split((2,))),
+    "testmortar": (MORTAR, [(None, BY_NODES)]),
+    **{name: (ONE_SIDE, []) for name in ("hueeber1", "hueeber2", "hueeber3", "hueeber4")},
+    "cubef2f1": ("a penalty of CalculiX against a tie", []),
+    "cubef2f2": ("a penalty of CalculiX against a tie", []),
+    "cubef2f3": ("CalculiX ties nodes to faces here, which is 2.5e-02 off its own tied faces of `cubef2f1`", []),
+    "beamptied1noadjust": ("tied nodes are put onto the other surface; both with ADJUST=YES", [
+        (put("ADJUST=NO", "ADJUST=YES"),)*2]),
+    **{name: (STEPS, [(static, static)]) for name in ("beamptied3", "beamptied4", "beamptied7")},
+}
