@@ -40,8 +40,12 @@ REGISTRY = {
     "constraint_t": {"emcon_constraint_kinds"},
     "host_force_t": {"emcon_stepper_user", "emcon_c_given"},
 }
-#: What is made of another kind of its room: gaps of nodes, interpolated or looked at.
-MADE_OF = {("emcon_segment", "emcon_nts"), ("emcon_start_gaps_plane", "emcon_nts")}
+#: What is made of another kind of its room: gaps of nodes, interpolated or looked at; laws with
+#: their lanes of space.
+MADE_OF = {("emcon_segment", "emcon_nts"), ("emcon_start_gaps_plane", "emcon_nts")} | {
+    (f"emcon_law_{law}_space", f"emcon_law_{law}")
+    for law in ("linear", "neo_hooke", "coupled_neo_hooke", "mooney_rivlin", "yeoh")
+}
 
 COLUMNS = 100
 #: A procedure fits a screen, and its arguments a line; but what C hands over one by one.

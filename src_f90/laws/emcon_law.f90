@@ -15,6 +15,7 @@ module emcon_law
    public :: law_t, law_volumetric_t, law_box_t, law_points_t, law_response_t, n_lane
    public :: law_response_plane, law_respond_one, law_hold_one, volume_excess
    public :: change_points_t, law_change_points, max_part
+   public :: law_slopes_t, law_find_slopes_one, n_invariant
    public :: claim, isochoric_excess, lame_constants, take_elastic, volume_energy
 
    !> Points that are computed side by side. No lane knows of another: the bits of a point depend
@@ -24,6 +25,7 @@ module emcon_law
    !> below all round-off: loops over points would divide by a D of 0 before they look.
    integer, parameter :: no_volume = digits(1.0_wp) + 7
    integer, parameter :: max_part = 3
+   integer, parameter :: n_invariant = 3
 
    type, abstract :: law_t
       real(wp) :: density = 0.0_wp               !! [M/L^3]
@@ -41,6 +43,7 @@ module emcon_law
       procedure(energy_interface), deferred :: energy
       procedure :: respond => law_respond
       procedure :: hold => law_hold
+      procedure :: find_slopes => law_find_slopes
       procedure :: divide => law_divide
       procedure :: change => law_change
       procedure :: volume => law_volume
@@ -96,6 +99,16 @@ module emcon_law
       real(wp) :: stretch_33(n_lane) = 1.0_wp    !! normal to the plane, set by `hold` of sheets
       real(wp) :: tangent(n_lane, 3, 3) = 0.0_wp
    end type law_points_t
+
+   !> A function of the invariants of the strain, W or the change of volume, at points side by side.
+   type :: law_slopes_t
+      real(wp) :: start(n_lane, n_invariant) = 0.0_wp    !! the invariants at the start
+      real(wp) :: by(n_lane, n_invariant) = 0.0_wp       !! their increments
+      real(wp) :: value(n_lane) = 0.0_wp         !! at the end
+      real(wp) :: slope(n_lane, n_invariant) = 0.0_wp    !! discrete gradient
+      !> Derivative of `slope` (second index) by the invariants at the end (third).
+      real(wp) :: second(n_lane, n_invariant, n_invariant) = 0.0_wp
+   end type law_slopes_t
 
    !> Change of volume v of points side by side: `energy` is v at the end, `stress` its discrete
    !> gradient, `tangent` the derivative of that.
@@ -179,6 +192,37 @@ contains
       points%stress(l, :) = response%stress
       points%stress_33(l) = response%stress_33
    end subroutine law_hold_one
+
+   !> W by the invariants of points side by side, one after the other. Overridden like `respond`, by
+   !> emcon_law_slopes_space.inc.
+   pure subroutine law_find_slopes(self, points, with_second)
+      class(law_t), intent(in) :: self
+      type(law_slopes_t), intent(inout) :: points      !! all but the invariants is set
+      logical, intent(in) :: with_second         !! else `second` stays as it is
+      integer :: l
+
+      do l = 1, n_lane
+         call law_find_slopes_one(self, l, with_second, points)
+      end do
+   end subroutine law_find_slopes
+
+   !> The same of the point in lane `l`, whatever its strain.
+   pure subroutine law_find_slopes_one(law, l, with_second, points)
+      class(law_t), intent(in) :: law
+      integer, intent(in) :: l                   !! 1..n_lane
+      logical, intent(in) :: with_second         !! else `second` stays as it is
+      type(law_slopes_t), intent(inout) :: points      !! lane `l` is set, but for the invariants
+      type(dg_t) :: e(n_invariant), w
+      integer :: k
+
+      do k = 1, n_invariant
+         e(k) = dg_variable(k, points%start(l, k), points%by(l, k))
+      end do
+      w = law%energy(e(1), e(2), e(3))
+      points%value(l) = w%f1
+      points%slope(l, :) = w%g
+      if (with_second) points%second(l, :, :) = w%h
+   end subroutine law_find_slopes_one
 
    !> The law without what resists a change of volume: W = rest + U(v). Here: that W has no such
    !> parts.

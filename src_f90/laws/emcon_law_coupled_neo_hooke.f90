@@ -62,11 +62,12 @@ contains
    subroutine divide(self, rest)
       class(law_coupled_neo_hooke_t), intent(in) :: self
       class(law_t), allocatable, intent(out) :: rest
-      type(law_coupled_neo_hooke_t) :: other
 
-      other = self
-      other%lam = 0.0_wp
-      allocate(rest, source=other)
+      allocate(rest, source=self)
+      select type (rest)
+      class is (law_coupled_neo_hooke_t)
+         rest%lam = 0.0_wp
+      end select
    end subroutine divide
 
    !> lam/2 ln^2 J by the mean of J; what stays has no stress at rest and little more stiffness

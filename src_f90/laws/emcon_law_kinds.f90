@@ -3,13 +3,14 @@
 submodule (emcon_law_registry) emcon_law_kinds
    use emcon_law, only : law_response_plane, law_response_t
    use emcon_law_anisotropic, only : law_anisotropic_t
-   use emcon_law_coupled_neo_hooke, only : law_coupled_neo_hooke_t
+   use emcon_law_coupled_neo_hooke_space, only : law_coupled_neo_hooke_space_t
    use emcon_law_linear, only : law_linear_t
-   use emcon_law_mooney_rivlin, only : law_mooney_rivlin_t
-   use emcon_law_neo_hooke, only : law_neo_hooke_t
+   use emcon_law_linear_space, only : law_linear_space_t
+   use emcon_law_mooney_rivlin_space, only : law_mooney_rivlin_space_t
+   use emcon_law_neo_hooke_space, only : law_neo_hooke_space_t
    use emcon_law_ogden, only : law_ogden_t
    use emcon_law_thin_plane, only : thin_law
-   use emcon_law_yeoh, only : law_yeoh_t
+   use emcon_law_yeoh_space, only : law_yeoh_space_t
    implicit none
 
    !> Codes besides those of the registry.
@@ -47,15 +48,15 @@ contains
    module procedure allocate_law
       select case (code)
       case (law_linear)
-         allocate(law_linear_t :: law)
+         allocate(law_linear_space_t :: law)
       case (law_neo_hooke)
-         allocate(law_neo_hooke_t :: law)
+         allocate(law_neo_hooke_space_t :: law)
       case (law_coupled_neo_hooke)
-         allocate(law_coupled_neo_hooke_t :: law)
+         allocate(law_coupled_neo_hooke_space_t :: law)
       case (law_mooney_rivlin)
-         allocate(law_mooney_rivlin_t :: law)
+         allocate(law_mooney_rivlin_space_t :: law)
       case (law_yeoh)
-         allocate(law_yeoh_t :: law)
+         allocate(law_yeoh_space_t :: law)
       case (law_ogden)
          allocate(law_ogden_t :: law)
       case (law_anisotropic)
@@ -69,7 +70,7 @@ contains
       type(law_linear_t) :: plain
 
       select type (law)
-      type is (law_linear_t)
+      class is (law_linear_t)
          plain = law
       type is (law_anisotropic_t)
          allocate(linear, source=law)
@@ -89,7 +90,7 @@ contains
       type(law_linear_t) :: plain
 
       select type (law)
-      type is (law_linear_t)
+      class is (law_linear_t)
          plain = law
          call plain%make_thin()
          allocate(thin, source=plain)

@@ -89,11 +89,12 @@ contains
    subroutine divide(self, rest)
       class(law_linear_t), intent(in) :: self
       class(law_t), allocatable, intent(out) :: rest
-      type(law_linear_t) :: other
 
-      other = self
-      other%lam = -2.0_wp/3.0_wp*self%mu
-      allocate(rest, source=other)
+      allocate(rest, source=self)
+      select type (rest)
+      class is (law_linear_t)
+         rest%lam = -2.0_wp/3.0_wp*self%mu
+      end select
    end subroutine divide
 
    !> tr E, small or not: W is of E.

@@ -106,12 +106,14 @@ contains
    pure subroutine fill_massless(matrix, value)
       type(csr_t), intent(in) :: matrix          !! its pattern
       real(dp), intent(inout) :: value(:)
+      real(dp) :: largest
       integer :: i, k
 
+      largest = maxval(value)
       do i = 1, matrix%n_row
          k = csr_find(matrix, i, i)
          if (k > 0) then
-            if (.not. value(k) > 0.0_dp) value(k) = maxval(value)
+            if (.not. value(k) > 0.0_dp) value(k) = largest
          end if
       end do
    end subroutine fill_massless

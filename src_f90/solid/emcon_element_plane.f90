@@ -1,7 +1,7 @@
 !> One element in the plane over one step: its shape, its motion and the strains at its points.
 !>
 !> Source: docs/theory.md, eq. (6). Strains come from grad u, never from positions: a rigid offset
-!> of the scene costs no digits. Forces and tangents: emcon_element_pack_plane.
+!> of the scene costs no digits. Forces and tangents: emcon_pack_points_plane.
 module emcon_element_plane
    use emcon_element, only : element_geometry_t
    use emcon_kinds, only : wp

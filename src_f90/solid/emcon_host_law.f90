@@ -5,7 +5,7 @@
 module emcon_host_law
    use emcon_errors, only : err_analysis, err_input, error_t, raise
    use emcon_kinds, only : wp
-   use emcon_law, only : law_points_t, law_response_t, law_t, n_lane
+   use emcon_law, only : law_response_t, law_t, n_lane
    use emcon_materials, only : material_t
    use emcon_point_function, only : point_failed, point_function_t, point_gradient, point_ok, &
       point_response_t
@@ -105,16 +105,18 @@ contains
    end function host_state
 
    !> What the law has answered at the points `i`, side by side.
-   pure subroutine host_answer(self, i, points)
+   pure subroutine host_answer(self, i, energy, stress, tangent)
       type(host_points_t), intent(in) :: self
       integer, intent(in) :: i(n_lane)           !! 1 to the number of points
-      type(law_points_t), intent(inout) :: points
+      real(wp), intent(out) :: energy(n_lane)    !! at the end [M/(L T^2)]
+      real(wp), intent(out) :: stress(:, :)      !! (n_lane, n_strain) [M/(L T^2)]
+      real(wp), intent(inout) :: tangent(:, :, :)    !! (n_lane, n_strain, n_strain)
       integer :: l
 
       do l = 1, n_lane
-         points%energy(l) = self%response%energy(i(l))
-         points%stress(l, :) = self%response%gradient(:, i(l))
-         points%tangent(l, :, :) = self%response%tangent(:, :, i(l))
+         energy(l) = self%response%energy(i(l))
+         stress(l, :) = self%response%gradient(:, i(l))
+         tangent(l, :, :) = self%response%tangent(:, :, i(l))
       end do
    end subroutine host_answer
 

@@ -3,10 +3,10 @@
 !> The law answers to relaxed strains; what works on the nodes is its stress, returned by the
 !> transpose of that map. Source: docs/theory.md, eqs. (11) and (11g).
 module emcon_incompatible_plane
-   use emcon_element_pack_plane, only : element_pack_t, pack_add_point, pack_clear, &
-      pack_motion_t, pack_point, pack_point_check, pack_point_t, pack_response_t
+   use emcon_element_pack, only : element_pack_t, pack_clear, pack_motion_t, pack_response_t
    use emcon_kinds, only : wp
    use emcon_law, only : law_t, n_lane
+   use emcon_pack_points_plane, only : pack_add_point, pack_point, pack_point_check, pack_point_t
    implicit none
    private
    public :: incompatible_respond

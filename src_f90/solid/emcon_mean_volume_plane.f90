@@ -6,10 +6,10 @@
 !> exact, and there are no unknowns beside the displacements. Source: docs/theory.md, eq. (11c).
 module emcon_mean_volume_plane
    use emcon_dgrad3, only : dg_t, dg_variable
-   use emcon_element_pack_plane, only : element_pack_t, pack_add_point, pack_clear, &
-      pack_motion_t, pack_point, pack_point_check, pack_point_t, pack_response_t
+   use emcon_element_pack, only : element_pack_t, pack_clear, pack_motion_t, pack_response_t
    use emcon_kinds, only : wp
    use emcon_law, only : change_points_t, law_change_points, law_points_t, law_t, n_lane
+   use emcon_pack_points_plane, only : pack_add_point, pack_point, pack_point_check, pack_point_t
    use emcon_shape, only : max_node => max_plane_nodes
    implicit none
    private

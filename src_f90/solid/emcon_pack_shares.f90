@@ -5,7 +5,7 @@
 !> afterwards, again pack by pack. So each sum runs in the order of the packs, and no bit depends on
 !> the number of shares.
 module emcon_pack_shares
-   use emcon_element_pack_plane, only : element_pack_t, pack_response_t
+   use emcon_element_pack, only : element_pack_t, pack_response_t
    use emcon_kinds, only : wp
    use emcon_law, only : n_lane
    implicit none

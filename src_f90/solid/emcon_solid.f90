@@ -1,7 +1,7 @@
 !> All elements of a scene: reference geometry, laws, mass.
 module emcon_solid
    use emcon_element, only : element_geometry_t
-   use emcon_element_pack_plane, only : element_pack_t, pack_fill
+   use emcon_element_pack, only : element_pack_t, pack_fill
    use emcon_element_plane, only : reference_gradient
    use emcon_element_space, only : n_space, space_element_add_mass, space_element_place
    use emcon_errors, only : err_input, error_t, raise
@@ -63,7 +63,8 @@ module emcon_solid
    type :: solid_t
       integer :: n_dim = 0
       logical :: is_axial = .false.                      !! solids of revolution
-      logical :: is_single = .false.                     !! elements respond one by one
+      logical :: is_single = .false.                     !! of space or of revolution
+      logical :: has_packs = .false.                     !! else elements respond one by one
       integer :: n_element = 0
       integer :: n_node = 0
       type(solid_deck_t) :: deck
@@ -104,6 +105,7 @@ contains
       self%n_dim = size(scene%x, 1)
       self%is_axial = scene%is_axial
       self%is_single = self%n_dim == n_space .or. self%is_axial
+      self%has_packs = .not. self%is_axial
       self%n_element = n
       self%n_node = size(scene%x, 2)
       self%deck%label = scene%element%label
@@ -269,7 +271,7 @@ contains
       type(solid_t), intent(inout) :: self
       integer :: list(self%n_element), e, i, k, law, n, n_pack, pass
 
-      if (self%is_single) then
+      if (.not. self%has_packs) then
          allocate(self%pack(0))
          return
       end if

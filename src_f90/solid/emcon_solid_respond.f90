@@ -1,19 +1,26 @@
-!> What elements in the plane respond to a motion: a pack of them, or one alone; laws that a program
+!> What elements respond to a motion: a pack of them, or one alone; laws that a program
 !> gives answer first, each in one call for all its points.
 !>
 !> Source: docs/theory.md, eqs. (6) and (11).
 module emcon_solid_respond
-   use emcon_element_pack_plane, only : element_pack_t, pack_add_point, pack_clear, pack_fill, &
-      pack_motion_t, pack_point, pack_point_check, pack_point_t, pack_response_t
+   use emcon_element_pack, only : element_pack_t, pack_clear, pack_fill, pack_make_room, &
+      pack_motion_t, pack_response_t
    use emcon_element_plane, only : element_motion_t, element_point, element_response_t, &
       point_is_regular, point_motion_t
-   use emcon_element_space, only : space_motion_t
+   use emcon_element_space, only : n_space, space_motion_t, space_part_t
+   use emcon_incompatible_space, only : incompatible_space_respond
+   use emcon_law_points_space, only : law_respond_points_space
+   use emcon_mean_volume_space, only : mean_volume_space_respond
    use emcon_user_space, only : user_space_strain
    use emcon_host_law, only : host_answer, host_points_make_room, host_response_t
    use emcon_incompatible_plane, only : incompatible_respond
    use emcon_kinds, only : wp
    use emcon_law, only : n_lane
    use emcon_mean_volume_plane, only : mean_volume_respond
+   use emcon_pack_points_plane, only : pack_add_point, pack_point, pack_point_check, pack_point_t
+   use emcon_pack_points_space, only : add_point_space => pack_add_point, &
+      point_space => pack_point, point_check_space => pack_point_check, &
+      point_space_t => pack_point_t
    use emcon_point_function, only : point_gradient, point_ok
    use emcon_solid, only : solid_t
    implicit none
@@ -23,14 +30,29 @@ module emcon_solid_respond
 contains
 
    !> Response of a pack to a motion, which is that of `user` too.
-   pure subroutine solid_pack_respond(self, pack, motion, user, with_tangent, point, part)
+   pure subroutine solid_pack_respond(self, pack, motion, user, with_tangent, part)
       type(solid_t), intent(in) :: self
       type(element_pack_t), intent(in) :: pack
       type(pack_motion_t), intent(in) :: motion
       type(host_response_t), intent(in) :: user
       logical, intent(in) :: with_tangent        !! else no tangent is computed
-      type(pack_point_t), intent(inout) :: point         !! work space
       type(pack_response_t), intent(inout) :: part
+
+      if (self%n_dim == n_space) then
+         call pack_respond_space(self, pack, motion, user, with_tangent, part)
+      else
+         call pack_respond_plane(self, pack, motion, user, with_tangent, part)
+      end if
+   end subroutine solid_pack_respond
+
+   pure subroutine pack_respond_plane(self, pack, motion, user, with_tangent, part)
+      type(solid_t), intent(in) :: self
+      type(element_pack_t), intent(in) :: pack
+      type(pack_motion_t), intent(in) :: motion
+      type(host_response_t), intent(in) :: user
+      logical, intent(in) :: with_tangent        !! else no tangent is computed
+      type(pack_response_t), intent(inout) :: part
+      type(pack_point_t) :: point
       integer :: k
 
       if (allocated(pack%mode)) then
@@ -46,7 +68,7 @@ contains
          call pack_point(pack, k, motion, point)
          if (self%host%first_point(pack%element(1)) > 0) then
             call host_answer(user%points(pack%law), self%host%first_point(pack%element) - 1 + k, &
-               point%law)
+               point%law%energy, point%law%stress, point%law%tangent)
          else
             associate (law => self%law(pack%law)%law)
                call pack_point_check(law%has_volume, point, part)
@@ -55,7 +77,70 @@ contains
          end if
          call pack_add_point(pack, k, point, with_tangent, part)
       end do
-   end subroutine solid_pack_respond
+   end subroutine pack_respond_plane
+
+   pure subroutine pack_respond_space(self, pack, motion, user, with_tangent, part)
+      type(solid_t), intent(in) :: self
+      type(element_pack_t), intent(in) :: pack
+      type(pack_motion_t), intent(in) :: motion
+      type(host_response_t), intent(in) :: user
+      logical, intent(in) :: with_tangent        !! else no tangent is computed
+      type(pack_response_t), intent(inout) :: part
+      type(point_space_t) :: point
+      integer :: k
+
+      if (allocated(pack%mode) .or. self%trait%has_mean(pack%element(1))) then
+         call respond_each(self, pack, motion, with_tangent, part)
+         return
+      end if
+      call pack_clear(pack%n_node, part, with_tangent)
+      do k = 1, pack%n_gp
+         call point_space(pack, k, motion, point)
+         if (self%host%first_point(pack%element(1)) > 0) then
+            call host_answer(user%points(pack%law), self%host%first_point(pack%element) - 1 + k, &
+               point%law%energy, point%law%stress, point%law%tangent)
+         else
+            associate (law => self%law(pack%law)%law)
+               call point_check_space(law%has_volume, point, part)
+               call law_respond_points_space(law, point%law, with_tangent)
+            end associate
+         end if
+         call add_point_space(pack, k, point, with_tangent, part)
+      end do
+   end subroutine pack_respond_space
+
+   !> Elements of a pack one by one.
+   pure subroutine respond_each(self, pack, motion, with_tangent, part)
+      type(solid_t), intent(in) :: self
+      type(element_pack_t), intent(in) :: pack
+      type(pack_motion_t), intent(in) :: motion
+      logical, intent(in) :: with_tangent        !! else no tangent is computed
+      type(pack_response_t), intent(inout) :: part
+      type(space_motion_t) :: local
+      type(space_part_t) :: one
+      integer :: l, n
+
+      call pack_clear(pack%n_node, part, with_tangent)
+      n = pack%n_node
+      local%square = motion%square
+      do l = 1, pack%n
+         local%from(:, :n) = motion%from(l, :, :n)
+         local%by(:, :n) = motion%by(l, :, :n)
+         associate (geometry => self%geometry(pack%element(l)), law => self%law(pack%law), &
+               rest => self%rest(pack%law))
+            if (allocated(pack%mode)) then
+               call incompatible_space_respond(geometry, law%law, local, with_tangent, one)
+            else
+               call mean_volume_space_respond(geometry, law%law, rest%law, local, with_tangent, one)
+            end if
+         end associate
+         part%is_inverted(l) = one%is_inverted
+         part%energy(l) = one%energy
+         part%force(l, :, :n) = one%force(:, :n)
+         part%magnitude(l, :, :n) = one%magnitude(:, :n)
+         if (with_tangent) part%tangent(l, :, :n, :, :n) = one%tangent(:, :n, :, :n)
+      end do
+   end subroutine respond_each
 
    !> Response of element `e` alone.
    pure subroutine solid_element_respond(self, e, motion, user, with_tangent, part)
@@ -67,18 +152,18 @@ contains
       type(element_response_t), intent(inout) :: part
       type(element_pack_t) :: pack
       type(pack_motion_t) :: motions
-      type(pack_point_t) :: point
       type(pack_response_t) :: parts
       integer :: i, n
 
       call pack_fill(pack, [e], self%law_of(e), self%node, self%geometry)
       motions%square = motion%square
       n = pack%n_node
+      call pack_make_room(self%n_dim, n, with_tangent, motions, parts)
       do i = 1, n
          motions%from(:, :, i) = spread(motion%from(:, i) - motion%from(:, 1), 1, n_lane)
          motions%by(:, :, i) = spread(motion%by(:, i) - motion%by(:, 1), 1, n_lane)
       end do
-      call solid_pack_respond(self, pack, motions, user, with_tangent, point, parts)
+      call solid_pack_respond(self, pack, motions, user, with_tangent, parts)
       part%energy = parts%energy(1)
       part%force(:, :n) = parts%force(1, :, :n)
       part%magnitude(:, :n) = parts%magnitude(1, :, :n)

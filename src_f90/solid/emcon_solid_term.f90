@@ -4,8 +4,8 @@
 module emcon_solid_term
    use emcon_csr, only : csr_t
    use emcon_element_lists, only : element_lists
-   use emcon_element_pack_plane, only : element_pack_t, pack_gather, pack_motion_t, pack_point_t, &
-      pack_add_rounding, pack_response_t, pack_scatter
+   use emcon_element_pack, only : element_pack_t, pack_add_rounding, pack_gather, pack_make_room, &
+      pack_motion_t, pack_response_t, pack_scatter
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_host_law, only : host_law_t, host_response_t
    use emcon_kinds, only : dp, wp
@@ -117,7 +117,7 @@ contains
             response)
          if (self%user%inverted_element > 0) return
       end if
-      if (self%solid%is_single) then
+      if (.not. self%solid%has_packs) then
          call single_respond(self%solid, self%user, self%to, motion, response, value, side)
          return
       end if
@@ -161,7 +161,6 @@ contains
       type(motion_t), intent(in) :: motion       !! placed
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
-      type(pack_point_t) :: point
       type(pack_response_t) :: part
       type(pack_motion_t) :: local
       real(wp) :: largest(n_lane)
@@ -169,12 +168,12 @@ contains
 
       local%square = self%square
       part%with_sizes = response%with_sizes
+      call make_room(self, present(value), local, part)
       self%shares%inverted(share) = 0
       do k = self%shares%first(share) + 1, self%shares%first(share + 1)
          associate (pack => self%solid%pack(k), place => self%shares%place(k))
             call pack_gather(pack, motion%from, motion%by, local)
-            call solid_pack_respond(self%solid, pack, local, self%user, present(value), point, &
-               part)
+            call solid_pack_respond(self%solid, pack, local, self%user, present(value), part)
             if (any(part%is_inverted)) then
                self%shares%inverted(share) = pack%element(findloc(part%is_inverted, .true., 1))
                return
@@ -191,6 +190,17 @@ contains
          end associate
       end do
    end subroutine respond_share
+
+   !> Work space for any of the packs.
+   pure subroutine make_room(self, with_tangent, local, part)
+      type(solid_term_t), intent(in) :: self
+      logical, intent(in) :: with_tangent
+      type(pack_motion_t), intent(inout) :: local
+      type(pack_response_t), intent(inout) :: part
+
+      call pack_make_room(self%solid%n_dim, maxval([0, self%solid%pack%n_node]), with_tangent, &
+         local, part)
+   end subroutine make_room
 
    !> The nodes that share `share` sums for all shares.
    subroutine add_borders(self, share, factor, response, value, side)
@@ -312,9 +322,8 @@ contains
    subroutine tangent_times(self, motion, direction, product)
       class(solid_term_t), intent(inout) :: self
       type(motion_t), intent(in) :: motion                             !! placed
-      real(wp), intent(in), contiguous :: direction(:, :)              !! (2, n_node) [L]
-      real(wp), intent(inout), contiguous :: product(:, :)             !! (2, n_node) [M L/T^2]
-      type(pack_point_t) :: point
+      real(wp), intent(in), contiguous :: direction(:, :)              !! (n_dim, n_node) [L]
+      real(wp), intent(inout), contiguous :: product(:, :)             !! (n_dim, n_node) [M L/T^2]
       type(pack_response_t) :: part
       type(pack_motion_t) :: local
       integer :: k
@@ -324,16 +333,17 @@ contains
             self%user)
          if (self%user%inverted_element > 0) return
       end if
-      if (self%solid%is_single) then
+      if (.not. self%solid%has_packs) then
          call single_tangent_times(self%solid, self%user, motion, direction, product)
          return
       end if
       local%square = self%square
+      call make_room(self, .true., local, part)
       do k = 1, size(self%solid%pack)
          associate (pack => self%solid%pack(k))
             if (.not. touches(pack, direction)) cycle
             call pack_gather(pack, motion%from, motion%by, local)
-            call solid_pack_respond(self%solid, pack, local, self%user, .true., point, part)
+            call solid_pack_respond(self%solid, pack, local, self%user, .true., part)
             if (any(part%is_inverted)) return
             call add_image(pack, part, motion%weight, direction, product)
          end associate
@@ -411,7 +421,6 @@ contains
       type(motion_t), intent(in) :: motion       !! placed at its end
       type(fastest_t), intent(inout) :: fastest
       logical, intent(inout) :: is_bounded       !! by elements
-      type(pack_point_t) :: point
       type(pack_response_t) :: part
       type(pack_motion_t) :: local
       integer :: k, l
@@ -421,15 +430,16 @@ contains
             self%user)
          if (self%user%inverted_element > 0) return
       end if
-      if (self%solid%is_single) then
+      if (.not. self%solid%has_packs) then
          call single_find_fastest(self%solid, self%user, motion, fastest)
          return
       end if
       local%square = self%square
+      call make_room(self, .true., local, part)
       do k = 1, size(self%solid%pack)
          associate (pack => self%solid%pack(k))
             call pack_gather(pack, motion%from, motion%by, local)
-            call solid_pack_respond(self%solid, pack, local, self%user, .true., point, part)
+            call solid_pack_respond(self%solid, pack, local, self%user, .true., part)
             if (any(part%is_inverted)) return
             do l = 1, pack%n
                call compare_frequency(self%solid, pack%element(l), motion%weight, &

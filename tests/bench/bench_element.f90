@@ -1,4 +1,5 @@
-!> Time per element: forces, and forces with tangent, of every law on CPE4 and CPE3.
+!> Time per element: forces, and forces with tangent, of every law on CPE4 and CPE3, and on
+!> elements of three dimensions.
 !>
 !> Prints a table; asserts nothing. The time is the least of several runs over a block of elements
 !> at strains of some ten percent, with the way from the nodes and back to them: `respond` of
@@ -6,6 +7,7 @@
 program bench_element
    use, intrinsic :: iso_fortran_env, only : output_unit
    use emcon_csr, only : csr_t
+   use emcon_element_kind, only : find_element_kind
    use emcon_element_registry, only : element_kinds_create, find_element_row
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, int64, wp
@@ -17,7 +19,9 @@ program bench_element
    use emcon_term, only : response_begin, response_init, response_t
    implicit none
    integer, parameter :: n_side = 40, n_run = 25
-   character(len=4), parameter :: kind_name(2) = ["CPE4", "CPE3"]
+   integer, parameter :: n_cube = 6
+   character(len=6), parameter :: kind_name(9) = [character(len=6) :: "CPE4", "CPE3", "C3D8", &
+      "C3D8H", "C3D8I", "C3D4", "C3D10", "C3D20", "C3D20R"]
    !> In the order of the names that laws have for their constants.
    character(len=6), parameter :: names(14) = [character(len=6) :: "E", "nu", "C10", "D1", "C01", &
       "C20", "C30", "D2", "D3", "mu1", "alpha1", "mu2", "alpha2", "mu3"]
@@ -51,13 +55,18 @@ contains
       integer, allocatable :: slot(:)
       integer :: i, n
 
-      call make_scene(kind, i_law, scene)
+      if (kind(:3) == "C3D") then
+         call make_cubes(kind, scene)
+      else
+         call make_squares(kind, scene)
+      end if
+      call finish_scene(i_law, scene)
       call solid_term_init(term, scene, error)
       if (allocated(error)) then
          write(output_unit, "(a)") error%message
          return
       end if
-      n = 4*sum(count(scene%element%node > 0, 1)**2)
+      n = size(scene%x, 1)**2*sum(count(scene%element%node > 0, 1)**2)
       allocate(slot(n), source=[(i, i = 1, n)])
       allocate(value(n), source=0.0_dp)
       call term%begin_step(scene, 1, space, matrix, slot)
@@ -67,7 +76,8 @@ contains
       motion%evaluation%is_gradient = .false.
       call random_number(motion%u0)
       call random_number(motion%du)
-      motion%u0 = 0.06_wp*motion%u0 + 0.1_wp*scene%x
+      motion%u0 = 0.06_wp*motion%u0
+      motion%u0(:2, :) = motion%u0(:2, :) + 0.1_wp*scene%x(:2, :)
       motion%du = 0.06_wp*motion%du
       call motion_evaluate(motion)
       seconds = huge(seconds)
@@ -97,20 +107,15 @@ contains
    end subroutine time_of
 
    !> A block of square elements, or of their halves.
-   subroutine make_scene(kind, i_law, scene)
+   subroutine make_squares(kind, scene)
       character(len=*), intent(in) :: kind
-      integer, intent(in) :: i_law
       type(scene_t), intent(out) :: scene
-      type(law_row_t) :: row
       integer :: i, j, e, corner(4), n
 
       call element_kinds_create(2, scene%element%kinds)
       n = n_side**2*merge(1, 2, kind == "CPE4")
-      allocate(scene%x(2, (n_side + 1)**2), scene%element%node(4, n), scene%rigid(0))
-      allocate(scene%element%label(n), source=[(i, i = 1, n)])
+      allocate(scene%x(2, (n_side + 1)**2), scene%element%node(4, n))
       allocate(scene%element%kind(n), source=find_element_row(kind))
-      allocate(scene%element%section(n), source=1)
-      allocate(scene%material(1), scene%section(1), scene%step(1), scene%element%origin(n))
       scene%element%node = 0
       e = 0
       do j = 0, n_side
@@ -128,6 +133,39 @@ contains
             end if
          end do
       end do
+   end subroutine make_squares
+
+   !> Cubes, each with nodes of its own, or what fills the half of one.
+   subroutine make_cubes(kind, scene)
+      character(len=*), intent(in) :: kind
+      type(scene_t), intent(out) :: scene
+      real(wp), allocatable :: place(:, :)
+      integer :: e, i, n
+
+      call element_kinds_create(3, scene%element%kinds)
+      i = find_element_kind(scene%element%kinds, kind)
+      call scene%element%kinds(i)%shape%places(place)
+      n = size(place, 2)
+      allocate(scene%x(3, n*n_cube**3), scene%element%node(n, n_cube**3))
+      allocate(scene%element%kind(n_cube**3), source=i)
+      do e = 1, n_cube**3
+         scene%element%node(:, e) = [(n*(e - 1) + i, i = 1, n)]
+         scene%x(:, scene%element%node(:, e)) = place
+      end do
+   end subroutine make_cubes
+
+   !> What is left, with the constants of a law.
+   subroutine finish_scene(i_law, scene)
+      integer, intent(in) :: i_law
+      type(scene_t), intent(inout) :: scene
+      type(law_row_t) :: row
+      integer :: i, j, n
+
+      n = size(scene%element%kind)
+      allocate(scene%rigid(0), scene%material(1), scene%section(1), scene%step(1), &
+         scene%element%origin(n))
+      allocate(scene%element%label(n), source=[(i, i = 1, n)])
+      allocate(scene%element%section(n), source=1)
       scene%material(1)%name = "M"
       scene%material(1)%density = 1.0_wp
       row = law_row(i_law)
@@ -140,6 +178,6 @@ contains
       end do
       scene%section(1)%material = 1
       scene%step(1)%nlgeom = .true.
-   end subroutine make_scene
+   end subroutine finish_scene
 
 end program bench_element

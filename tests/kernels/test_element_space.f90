@@ -1,13 +1,16 @@
 !> Elements in three dimensions, distorted, with each law: what a step and a mesh ask of them.
 module test_element_space
    use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_element_pack, only : element_pack_t, pack_fill, pack_make_room, pack_motion_t, &
+      pack_response_t
    use emcon_element_space, only : space_element_init, space_element_mass, space_element_respond, &
       space_element_t, space_motion_t, space_part_t
    use emcon_errors, only : error_t
+   use emcon_host_law, only : host_response_t
    use emcon_incompatible_modes, only : modes_init
    use emcon_incompatible_space, only : incompatible_space_respond
    use emcon_kinds, only : wp
-   use emcon_law, only : law_response_plane, law_response_t, law_t
+   use emcon_law, only : law_response_plane, law_response_t, law_t, n_lane
    use emcon_law_registry, only : law_create, law_linear
    use emcon_law_space, only : law_response_space, space_response_t
    use emcon_mean_volume_space, only : mean_volume_space_respond
@@ -17,6 +20,8 @@ module test_element_space
    use emcon_shape_quadratic_tetrahedron_space, only : shape_quadratic_tetrahedron_t
    use emcon_shape_serendipity_space, only : shape_serendipity_space_t
    use emcon_shape_tetrahedron_space, only : shape_tetrahedron_t
+   use emcon_solid, only : solid_t
+   use emcon_solid_respond, only : solid_pack_respond
    use emcon_text, only : to_text
    use kind_rows, only : law_code
    use random_draws, only : signs_of
@@ -53,6 +58,9 @@ contains
          test_case_t("laws: a strain of the plane", test_plane), &
          test_case_t("identity, force and moments of a step", test_step), &
          test_case_t("tangent against differences", test_tangent), &
+         test_case_t("side by side: as one by one", test_packs), &
+         test_case_t("side by side: bits of a lane", test_lanes), &
+         test_case_t("side by side: inverted ones", test_inverted), &
          test_case_t("a turned element responds turned", test_turned), &
          test_case_t("patch: energy and work of a uniform strain", test_patch), &
          test_case_t("rank", test_rank), &
@@ -313,6 +321,165 @@ contains
          if (allocated(error)) return
       end do
    end subroutine test_step
+
+   !> Elements of one kind and law, each with a shape of its own, as a scene has them.
+   subroutine make_solid(kind, law, nlgeom, sample, solid, error)
+      integer, intent(in) :: kind, law
+      logical, intent(in) :: nlgeom
+      type(sample_t), intent(out) :: sample(n_lane)
+      type(solid_t), intent(out) :: solid
+      type(error_t), allocatable, intent(out) :: error
+      integer :: e, i
+
+      solid%n_dim = 3
+      solid%n_element = n_lane
+      allocate(solid%law(1), solid%rest(1), solid%geometry(n_lane))
+      allocate(solid%trait%has_mean(n_lane), source=name(kind) == "C3D8H")
+      allocate(solid%host%first_point(n_lane), source=0)
+      do e = 1, n_lane
+         call make_sample(kind, law, nlgeom, 0.03_wp, sample(e), error)
+         if (allocated(error)) return
+         solid%geometry(e) = sample(e)%element
+      end do
+      allocate(solid%law(1)%law, source=sample(1)%law)
+      if (allocated(sample(1)%rest)) allocate(solid%rest(1)%law, source=sample(1)%rest)
+      allocate(solid%node(m, n_lane), source=0)
+      solid%node(:sample(1)%n, :) = reshape([(i, i = 1, n_lane*sample(1)%n)], [sample(1)%n, n_lane])
+   end subroutine make_solid
+
+   !> The response of the elements `which`, element e to the motion e.
+   subroutine respond_pack(sample, solid, which, u0, du, with_tangent, part)
+      type(sample_t), intent(in) :: sample(:)
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: which(:)
+      real(wp), intent(in) :: u0(:, :, :), du(:, :, :)     !! (3, m, n_lane)
+      logical, intent(in) :: with_tangent
+      type(pack_response_t), intent(out) :: part
+      type(element_pack_t) :: pack
+      type(pack_motion_t) :: motion
+      type(host_response_t) :: none
+      integer :: i, l
+
+      call pack_fill(pack, which, 1, solid%node, solid%geometry)
+      call pack_make_room(3, m, with_tangent, motion, part)
+      motion%square = merge(1.0_wp, 0.0_wp, sample(1)%nlgeom)
+      do l = 1, n_lane
+         do i = 1, pack%n_node
+            associate (e => pack%element(l))
+               motion%from(l, :, i) = u0(:, i, e) - u0(:, 1, e)
+               motion%by(l, :, i) = du(:, i, e) - du(:, 1, e)
+            end associate
+         end do
+      end do
+      call solid_pack_respond(solid, pack, motion, none, with_tangent, part)
+   end subroutine respond_pack
+
+   !> Each lane against the element alone, as the parts of emcon_element_space give it.
+   subroutine test_packs(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample(n_lane)
+      type(solid_t) :: solid
+      type(pack_response_t) :: part
+      type(space_part_t) :: one
+      real(wp), dimension(3, m, n_lane) :: u0, du
+      real(wp) :: size_of
+      integer :: e, i
+
+      do i = 0, 2*n_law*n_kind - 1
+         call make_solid(1 + mod(i/n_law, n_kind), 1 + mod(i, n_law), i >= n_law*n_kind, sample, &
+            solid, error)
+         if (allocated(error)) return
+         do e = 1, n_lane
+            call draw(sample(e), u0(:, :, e), du(:, :, e))
+         end do
+         du(:, :, 3) = 0.0_wp
+         call respond_pack(sample, solid, [(e, e = 1, n_lane)], u0, du, .true., part)
+         do e = 1, n_lane
+            call respond(sample(e), u0(:, :, e), du(:, :, e), .true., one)
+            associate (n => sample(e)%n, what => sample(e)%what)
+               size_of = maxval(one%magnitude(:, :n))
+               call check_true(error, .not. part%is_inverted(e), what // ": is not inverted")
+               call check_near(error, part%energy(e), one%energy, tol, one%energy, what)
+               call check_near(error, part%force(e, :, :n), one%force(:, :n), tol, size_of, what)
+               call check_near(error, part%magnitude(e, :, :n), one%magnitude(:, :n), tol, &
+                  size_of, what // ": sizes")
+               call check_near(error, reshape(part%tangent(e, :, :n, :, :n), [3*n, 3*n]), &
+                  reshape(one%tangent(:, :n, :, :n), [3*n, 3*n]), tol, &
+                  maxval(abs(one%tangent)), what // ": tangent")
+            end associate
+            if (allocated(error)) return
+         end do
+      end do
+   end subroutine test_packs
+
+   !> The bits of an element are those of it alone, with and without tangent and sizes, beside
+   !> elements of any strain, those beyond the reach of series among them.
+   subroutine test_lanes(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample(n_lane)
+      type(solid_t) :: solid
+      type(pack_response_t) :: part, other
+      real(wp), dimension(3, m, n_lane) :: u0, du
+      integer :: e, i, k, l
+
+      do i = 0, n_law*n_kind - 1
+         call make_solid(1 + i/n_law, 1 + mod(i, n_law), .true., sample, solid, error)
+         if (allocated(error)) return
+         do e = 1, n_lane
+            call draw(sample(e), u0(:, :, e), du(:, :, e))
+            if (mod(e, 2) == 0) du(:, :, e) = du(:, :, e) + 3.0_wp*sample(e)%x
+         end do
+         call respond_pack(sample, solid, [(e, e = 1, n_lane)], u0, du, .true., part)
+         do e = 1, n_lane
+            l = merge(2, 1, e > 4)
+            call respond_pack(sample, solid, [(1 + mod(e - l + k + n_lane, n_lane), k = 0, 1)], &
+               u0, du, e == 5, other)
+            associate (n => sample(e)%n)
+               call check_true(error, abs(part%energy(e) - other%energy(l)) <= 0.0_wp .and. &
+                  all(abs(part%force(e, :, :n) - other%force(l, :, :n)) <= 0.0_wp), &
+                  sample(e)%what // ": bits of element " // to_text(e))
+               if (e == 5) call check_true(error, all(abs(part%tangent(e, :, :n, :, :n) &
+                  - other%tangent(l, :, :n, :, :n)) <= 0.0_wp), sample(e)%what // ": tangent")
+            end associate
+         end do
+         if (allocated(error)) return
+      end do
+   end subroutine test_lanes
+
+   !> Turned inside out along one axis, or along two, which det F does not tell: those alone.
+   subroutine test_inverted(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(sample_t) :: sample(n_lane)
+      type(solid_t) :: solid
+      type(pack_response_t) :: part
+      type(space_part_t) :: one
+      real(wp), dimension(3, m, n_lane) :: u0, du
+      integer :: e, i
+
+      do i = 0, n_law*n_kind - 1
+         call make_solid(1 + i/n_law, 1 + mod(i, n_law), .true., sample, solid, error)
+         if (allocated(error)) return
+         do e = 1, n_lane
+            call draw(sample(e), u0(:, :, e), du(:, :, e))
+         end do
+         du(1, :, 2) = -2.0_wp*sample(2)%x(1, :)
+         du(:2, :, 5) = -2.0_wp*sample(5)%x(:2, :)
+         du(3, :, 7) = huge(1.0_wp)**0.2_wp*sample(7)%x(3, :)
+         call respond_pack(sample, solid, [(e, e = 1, n_lane)], u0, du, mod(i, 2) == 0, part)
+         do e = 1, n_lane
+            call respond(sample(e), u0(:, :, e), du(:, :, e), .false., one)
+            call check_true(error, part%is_inverted(e) .eqv. one%is_inverted, sample(e)%what &
+               // ": element " // to_text(e))
+            if (e == 2 .or. e == 7) call check_true(error, part%is_inverted(e), "inside out")
+            if (one%is_inverted) cycle
+            associate (n => sample(e)%n)
+               call check_near(error, part%force(e, :, :n), one%force(:, :n), tol, &
+                  maxval(one%magnitude(:, :n)), sample(e)%what // ": beside inverted ones")
+            end associate
+         end do
+         if (allocated(error)) return
+      end do
+   end subroutine test_inverted
 
    !> Central differences over four points, of step h = eps^(0.3): an error of order h^4 = eps^(1.2)
    !> and one of eps/h = eps^(0.7).

@@ -7,14 +7,17 @@ module test_solid_parts
    use emcon_corotated_plane, only : corotated_t
    use emcon_element, only : element_geometry_t
    use emcon_element_plane, only : point_is_regular, point_motion_t
-   use emcon_element_pack_plane, only : element_pack_t, pack_gather, pack_motion_t, &
-      pack_point_check, pack_point_t, pack_response_t
+   use emcon_element_pack, only : element_pack_t, pack_gather, pack_make_room, pack_motion_t, &
+      pack_response_t
    use emcon_element_space, only : space_point_is_regular, space_point_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_law, only : n_lane
    use emcon_locking, only : bending_advice, locking_advice, locking_element, strainless_element
    use emcon_materials, only : kinematics_corotated, kinematics_linear
+   use emcon_pack_points_plane, only : pack_point_check, pack_point_t
+   use emcon_pack_points_space, only : point_check_space => pack_point_check, &
+      point_space_t => pack_point_t
    use emcon_pack_shares, only : border_keep, pack_shares_t, shares_has, shares_lay_out
    use emcon_scene, only : scene_t
    use emcon_small_range, only : small_range_init, small_range_t, small_range_widen
@@ -139,6 +142,7 @@ contains
       type(pack_shares_t) :: shares
       type(element_pack_t) :: pack(2)
       type(pack_response_t) :: part
+      type(pack_motion_t) :: motion
       real(wp) :: largest(n_lane)
       integer :: k
 
@@ -150,6 +154,7 @@ contains
          allocate(pack(k)%gradient(n_lane, 2, 3, 1))
       end do
       call shares_lay_out(shares, pack, 3, 2)
+      call pack_make_room(2, 5, .true., motion, part)
       call draw_random(part%force)
       call draw_random(part%magnitude)
       call draw_random(part%tangent(:, :, :, 1, 1))
@@ -181,6 +186,7 @@ contains
       type(corotated_pack_motion_t) :: motion
       type(element_pack_t) :: plain
       type(pack_motion_t) :: moved
+      type(pack_response_t) :: unused
       real(wp), dimension(2, 7) :: from, by
       integer :: k, i, l
 
@@ -195,6 +201,7 @@ contains
       plain%n = 2
       plain%n_node = 3
       plain%node = pack%node
+      call pack_make_room(2, 4, .false., moved, unused)
       call pack_gather(plain, from, by, moved)
       do l = 1, n_lane
          k = merge(1, 3, l == 2)

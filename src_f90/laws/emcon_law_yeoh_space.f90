@@ -1,0 +1,36 @@
+! build: lanes
+!> Yeoh's law with its points side by side in space.
+module emcon_law_yeoh_space
+   use emcon_dgrad_near_space, only : dg_t
+   use emcon_kinds, only : wp
+   use emcon_law, only : law_find_slopes_one, law_slopes_t, n_lane
+   use emcon_law_yeoh, only : law_yeoh_t
+   implicit none
+   private
+   public :: law_yeoh_space_t
+
+   type, extends(law_yeoh_t) :: law_yeoh_space_t
+   contains
+      procedure :: find_slopes
+   end type law_yeoh_space_t
+
+   logical, parameter :: is_near = .true.
+   include "../dgrad/emcon_dgrad_operators.inc"
+
+contains
+
+   pure function energy_near(self, e1, e2, e3) result(w)
+      class(law_yeoh_space_t), intent(in) :: self
+      include "emcon_law_yeoh.inc"
+   end function energy_near
+
+   pure subroutine find_slopes(self, points, with_second)
+      class(law_yeoh_space_t), intent(in) :: self
+      include "emcon_law_slopes_space.inc"
+   end subroutine find_slopes
+
+   include "../dgrad/emcon_dgrad_rules.inc"
+   include "../dgrad/emcon_dgrad_near.inc"
+   include "emcon_law_rules.inc"
+
+end module emcon_law_yeoh_space
