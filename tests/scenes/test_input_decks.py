@@ -18,6 +18,7 @@ SHORT = {
     "bouncing_bar": {"t_end": 1.2},
     "bouncing_ball": {"t_end": 0.15},
     "hertz_ball": {"t_end": 0.05},
+    "linked_rings": {"h": 0.02, "t_end": 0.3},
     "ironing": {"h_press": 0.25, "h": 0.1, "path": 0.5},
     "two_bodies": {"h": 0.02, "t_end": 0.4},
     "three_bodies": {"h": 0.02, "t_end": 0.4},
