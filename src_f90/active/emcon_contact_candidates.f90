@@ -281,7 +281,8 @@ contains
          ! What the pairs take in may hold the bodies away from their guards.
          if (.not. closes .or. (contact%slack > 0.0_wp .and. self%candidates%have_changed)) return
          if (self%candidates%has_left(id) .and. self%candidates%is_back(id)) then
-            ! At the end of what it sees, where it neither holds nor is free: the next step looks anew.
+            ! At the end of what it sees, where it neither holds nor is free: the next step looks
+            ! anew.
             if (.not. self%rules%may_cut) return
             status = step_too_far
          end if

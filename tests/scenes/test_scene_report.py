@@ -87,7 +87,7 @@ def test_what_locks_and_what_makes_a_comb_is_told(tmp_path):
 
 def plate_under_a_ball(thick):
     """A ball falls on a plate a hundred times as stiff that is clamped at two sides."""
-    scene = Scene(0.01, 0.8)
+    scene = Scene(0.01, 0.7)
     scene.ball("BALL", (0.03, 0.02, 0.52), 0.5, (2, 2), velocity=(0.0, 0.0, -1.0))
     scene.block("PLATE", (-0.9, -0.9, -thick), (1.8, 1.8, thick), (6, 6, 1), stiffness=1e4)
     return scene.hold("PLATE", lambda x, y, z: abs(x) > 0.899).deck(AUTO)
