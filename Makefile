@@ -394,6 +394,7 @@ trade: .venv/test.stamp  ## write the tables and the figure of docs/trade.md ane
 	$(BUILDING) MODE=release PRECISION=single app
 	$(PY) tests/bench/trade.py --update
 	$(PY) tests/bench/trade_knobs.py --update
+	$(PY) tests/bench/trade_kinds.py --update
 	$(PY) tests/bench/trade_friction.py --update
 	$(PY) tests/bench/trade_first.py --update
 	$(PY) tests/bench/trade_coarse.py --update

@@ -100,7 +100,7 @@ def _parser(arguments: list[str]) -> argparse.ArgumentParser:
     mesh.add_argument("--scale", metavar="F", type=_positive, default=1.0,
                       help="multiply lengths by F")
     mesh.add_argument("--refine", metavar="N", type=int, choices=range(7), default=0,
-                      help="cut each element in four, N times")
+                      help="cut each element in four, in space in eight, N times")
     many = commands.add_parser("study", help=_COMMANDS["study"])
     if "study" in arguments[:1]:
         # h5py and matplotlib take long to load; other commands do not need all of it

@@ -17,6 +17,8 @@ from .hdf5 import Array, ResultError, guarded, open_file, read
 
 #: Cells of VTK files with a node in the middle of each side: of six and of eight nodes.
 QUADRATIC = (22, 23)
+#: Those that are solids: tetrahedra and hexahedra, linear and quadratic.
+SOLIDS = (10, 12, 24, 25)
 #: Cells of VTK files that are lines of profiles, which stand behind the elements.
 LINE = 3
 
@@ -78,6 +80,11 @@ class FieldFile:
         self.cell_fields = self._names("CellData")
         if not len(self.times):
             raise ResultError(f"{self.path} has no frame; the run ended before its first")
+
+    @property
+    def n_dim(self) -> int:
+        """How many coordinates of `points` count: 3 where there are solids, else 2."""
+        return 3 if np.isin(self.types, SOLIDS).any() else 2
 
     def _names(self, group: str) -> tuple[str, ...]:
         return tuple(self._group[group]) if group in self._group else ()

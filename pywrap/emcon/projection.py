@@ -7,13 +7,14 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
+from .fields import SOLIDS
 from .results import Array
+
+__all__ = ["SOLIDS", "far_first", "outer_faces", "project"]
 
 #: Direction that the bodies are seen from [degrees]: around z from x, and up from there.
 AZIMUTH, ELEVATION = -60.0, 25.0
 
-#: Types of cells of VTK that have faces here: tetrahedra and hexahedra, linear and quadratic.
-SOLIDS = (10, 12, 24, 25)
 #: Faces of a cell by its corners, as VTK counts them, of tetrahedra (4) and hexahedra (8).
 _FACES = {4: ((0, 2, 1), (0, 1, 3), (1, 2, 3), (2, 0, 3)),
           8: ((0, 3, 2, 1), (4, 5, 6, 7), (0, 1, 5, 4), (1, 2, 6, 5), (2, 3, 7, 6), (3, 0, 4, 7))}

@@ -28,10 +28,10 @@ module emcon_scene_report
 
    !> A body so many times stiffer than the softest one hardly deforms.
    real(wp), parameter :: much_stiffer = 100.0_wp
+   !> Thinner ones, by their length, bend.
+   real(wp), parameter :: compact = 0.5_wp
    !> Waves are not resolved by increments of so many transits.
    real(wp), parameter :: many_transits = 10.0_wp
-
-   integer, parameter :: n_space = 3
 
 contains
 
@@ -313,7 +313,7 @@ contains
       type(report_rows_t), intent(inout) :: rows
       type(report_row_t) :: row
       logical :: is_elastic(size(body))
-      real(wp) :: softest
+      real(wp) :: softest, thickness
       integer :: i
 
       is_elastic = body%modulus > 0.0_wp .and. body%n_rigid == 0
@@ -330,6 +330,10 @@ contains
          ! Of the strain energy of a contact it stores no more than this.
          call row_put(row, "rebound_percent", 100.0_wp*softest/body(i)%modulus, &
             "; expected change of rebound below # %")
+         ! In bending it stores more, by the square of this and more.
+         thickness = minval(body(i)%high - body(i)%low)/maxval(body(i)%high - body(i)%low)
+         if (thickness < compact) call row_put(row, "thickness", thickness, &
+            ", more where it can bend: it is # times as thick as long")
          call rows_add(rows, row)
       end do
    end subroutine advise_rigid
@@ -371,9 +375,10 @@ contains
       call row_begin(row, "advice", "h is")
       cure = "; *CONTACT INITIATION, TYPE=MASSLESS makes them smooth on bodies at least two " // &
          "elements thick"
-      if (allocated(scene%deck%keeps_mass)) cure = "; they are smooth where bodies are ten " // &
-         "elements across, and lose the mass there"
-      if (scene%n_dim == n_space) cure = ""          ! where nothing else is to be had
+      ! What a fifth of the mass stands for, of a body whose whole outline has contacts.
+      if (allocated(scene%deck%keeps_mass)) cure = "; they are smooth where bodies are " // &
+         trim(merge("ten     ", "fourteen", scene%n_dim == n_plane)) // &
+         " elements across, and lose the mass there"
       call row_put(row, "courant_number", scene%step(k)%time%h/transit, &
          " # of the wave transit time " &
          // "of the smallest element: contact forces of nodes with mass jump up and down" // cure)

@@ -19,11 +19,11 @@ ROOT = pathlib.Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "tests" / "scenes"), str(ROOT / "tests" / "bench")]
 
 from book.common import table  # noqa: E402
-from limits import bodies, friction, impacts, long, space  # noqa: E402
+from limits import bodies, friction, impacts, long, space, space_impacts  # noqa: E402
 from limits.common import HOLDS, SILENT, run_case  # noqa: E402
 from scene_tools import PROGRAM  # noqa: E402
 
-ROWS = [*bodies.ROWS, *space.ROWS, *impacts.ROWS, *friction.ROWS, *long.ROWS]
+ROWS = [*bodies.ROWS, *space.ROWS, *impacts.ROWS, *friction.ROWS, *space_impacts.ROWS, *long.ROWS]
 PAGE = ROOT / "docs" / "stability.md"
 #: The row whose values are pairs: a table of its own.
 GRID = "grid"

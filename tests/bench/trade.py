@@ -3,7 +3,7 @@
     .venv/bin/python tests/bench/trade.py            # print the table
     .venv/bin/python tests/bench/trade.py --update   # write it and the figure into docs/
 
-Five scenes, each with one body as it is, corotated, linear, quasi-static and rigid, and with massive and
+Scenes of the plane and of space, each with one body as it is, corotated, linear, quasi-static and rigid, and with massive and
 massless surfaces of contact, one run at a time. Times are those of whole processes, as ratios to
 the first run of the scene in the same round; of three rounds the medians. Runs are kept in
 build/trade/PROGRAM: what was interrupted goes on. Needs the program (`make app`).
@@ -11,6 +11,7 @@ build/trade/PROGRAM: what was interrupted goes on. Needs the program (`make app`
 
 import argparse
 import dataclasses
+import math
 import pathlib
 import sys
 
@@ -32,6 +33,8 @@ SECTION = {"elastic": "", "corotated": ", KINEMATICS=COROTATED",
            "linear": ", KINEMATICS=LINEAR", "quasi-static": ", MASSLESS",
            "quasi-static, linear": ", KINEMATICS=LINEAR, MASSLESS"}
 KINDS = (*SECTION, "rigid")
+#: Corotated sections are of the plane.
+SPACE_KINDS = tuple(kind for kind in KINDS if kind != "corotated")
 #: A rigid body of which only its surface is left.
 PROFILE = "rigid profile"
 DRAWN = ("elastic", "linear", "quasi-static", "rigid")
@@ -43,10 +46,14 @@ STIFF = 1e4
 # ---- scenes -------------------------------------------------------------------------------------
 
 
-def rigid(body, place, held):
-    """Cards of a rigid body with a reference node of its own, held there."""
-    boundary = f"*BOUNDARY\n{NODE}, 1, 2\n{NODE}, 6\n" if held else ""
-    return (f"*NODE\n{NODE}, {place[0]}, {place[1]}\n*RIGID BODY, ELSET={body}, REF NODE={NODE}\n"
+def rigid(body, place, held, moves=()):
+    """Cards of a rigid body with a reference node of its own, held there, or that moves with the
+    velocity and the spin `moves`."""
+    axes = [(1, 2), (6, 6)] if len(place) == 2 else [(1, 6)]
+    boundary = "*BOUNDARY\n" + "".join(f"{NODE}, {a}, {b}\n" for a, b in axes) if held else ""
+    if moves:
+        boundary += "*INITIAL CONDITIONS, TYPE=VELOCITY\n" + "".join(f"{NODE}, {a}, {v}\n" for a, v in enumerate(moves, 1))
+    return (f"*NODE\n{NODE}, {', '.join(map(str, place))}\n*RIGID BODY, ELSET={body}, REF NODE={NODE}\n"
             + boundary)
 
 
@@ -88,13 +95,14 @@ def bar(kind):
     return simplified(deck, "BAR", kind)
 
 
-def drawn(scene, body, place):
-    """A plain scene, its body held as before or, where it is rigid, at its reference node."""
+def drawn(scene, body, place, moves=()):
+    """A plain scene, its body held as before or, where it is rigid, at its reference node; a body that
+    flies, alone in its scene, has the velocity and the spin `moves`."""
 
     def deck(kind):
         drawing = scene()
         is_held = bool(drawing.held)
-        if kind == "rigid":
+        if kind == "rigid" and not moves:
             drawing.held = []
         text = drawing.deck(AUTO)
         if is_held:
@@ -104,7 +112,9 @@ def drawn(scene, body, place):
             if head == "*DLOAD":                                 # of the others alone
                 lines[:] = [line for line in lines if not line.startswith(body)]
         if kind == "rigid":
-            text.insert(rigid(body, place, is_held), before="*STEP")
+            if moves:
+                text.remove("*INITIAL CONDITIONS")
+            text.insert(rigid(body, place, is_held and not moves, moves), before="*STEP")
         return simplified(text, body, kind)
 
     return deck
@@ -116,6 +126,56 @@ def ball():
     scene.block("BLOCK", (-1.5, -0.8), (3.0, 0.8), (30, 8))
     scene.pairs = [("BALL", "BLOCK")]
     return scene.hold("BLOCK", below(-0.8))
+
+
+def _turn(first, second):
+    """About the first axis, then about the second one [rad]."""
+    (c, s), (d, t) = ((math.cos(a), math.sin(a)) for a in (first, second))
+    return np.array([[d, 0, t], [0, 1, 0], [-t, 0, d]]) @ np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+
+
+#: How the cube of `space_cube` is turned, where its middle is, .02 above the plate with a corner, and how it moves.
+TURN = _turn(0.5, 0.3)
+MIDDLE = (0.03, 0.02, 0.02 + 0.5*np.abs(TURN[2]).sum())
+SPEED, SPIN = (0.2, 0.1, -1.0), (0.3, -0.2, 0.5)
+
+
+def space_ball():
+    """A ball falls askew, with a spin, on a plate that is held below."""
+    scene = Scene(0.01, 0.6)
+    scene.ball("BALL", (0.03, 0.02, 0.52), 0.5, (3, 2), velocity=(0.3, 0.1, -1.0), spin=(0, 0, 1))
+    scene.block("PLATE", (-0.9, -0.9, -0.5), (1.8, 1.8, 0.5), (7, 7, 2))
+    return scene.hold("PLATE", below(-0.5))
+
+
+def space_cube(kind="C3D8", cells=3, floor=(5, 5, 2), h=0.01):
+    """A cube that is turned about two axes falls with a corner first on a plate, and tumbles."""
+    def place(x):
+        return (x - 0.5) @ TURN.T + MIDDLE
+
+    scene = Scene(h, 0.6)
+    scene.block("CUBE", (0, 0, 0), (1, 1, 1), (cells,)*3, kind=kind, shape=place,
+                velocity=SPEED, spin=SPIN)
+    scene.block("PLATE", (-1.1, -1.1, -0.5), (2.2, 2.2, 0.5), floor, kind=kind)
+    return scene.hold("PLATE", below(-0.5))
+
+
+def space_bars(kind="C3D4", cells=2):
+    """Two free bars cross each other on their edges; no node meets a face at first."""
+    d = math.sqrt(0.5)
+
+    def lower(x):
+        along, a, b = (x - (1.0, 0.5, 0.5)).T
+        return np.stack([along, d*(a - b), d*(a + b) - d - 0.01], axis=1)
+
+    def upper(x):
+        along, a, b = (x - (1.0, 0.5, 0.5)).T
+        return np.stack([d*(b - a) + 0.03, along + 0.04, d*(a + b) + d + 0.01], axis=1)
+
+    scene = Scene(0.01, 0.6)
+    scene.block("UPPER", (0, 0, 0), (2, 1, 1), (2*cells, cells, cells), kind=kind, shape=upper,
+                velocity=(0.1, 0.05, -1.0), spin=(0, 0, 0.3))
+    return scene.block("LOWER", (0, 0, 0), (2, 1, 1), (2*cells, cells, cells), kind=kind, shape=lower)
 
 
 @dataclasses.dataclass(frozen=True)
@@ -137,6 +197,9 @@ CASES = (
     Case("disc in a bowl", drawn(bowl, "BOWL", (0, 0)), KINDS, {**NTS, "h": 0.01}),
     Case("gears, the driven one", drawn(gears, "DRIVEN", (2.06, 0)), ("elastic", "corotated", "rigid"),
          {**NTS, "h": 0.005}),
+    Case("in space: ball on a plate", drawn(space_ball, "PLATE", (0, 0, -0.25)), SPACE_KINDS, NTS),
+    Case("in space: cube on a plate, the cube", drawn(space_cube, "CUBE", MIDDLE, (*SPEED, *SPIN)),
+         ("elastic", "rigid"), NTS),
 )
 
 
@@ -153,9 +216,10 @@ def measured(deck, folder, parameters):
 def force_of(history, n=5):
     """Sum of the forces of all pairs, the mean of `n` increments at a time, and its times."""
     names = [name for name in history.dtype.names if "_force_" in name]
-    both = np.array([sum(history[name] for name in names if name.endswith(axis)) for axis in "xy"])
+    both = np.array([sum(history[name] for name in names if name.endswith(axis))
+                     for axis in "xyz" if any(name.endswith(axis) for name in names)])
     usable = (both.shape[1] - 1)//n*n
-    mean = both[:, 1:usable + 1].reshape(2, -1, n).mean(axis=2)
+    mean = both[:, 1:usable + 1].reshape(len(both), -1, n).mean(axis=2)
     return history["time"][1:usable + 1].reshape(-1, n).mean(axis=1), mean
 
 
@@ -226,6 +290,18 @@ def percent(part):
 # ---- the page -----------------------------------------------------------------------------------
 
 
+def write(name, lines):
+    """Put a table into the page; rows of scenes that were not run stay as they are."""
+    text = PAGE.read_text()
+    head, rule, *rows = lines
+    made = {}
+    old = text.split(f"<!-- {name} -->\n", 1)[1].split("<!-- end -->", 1)[0].splitlines()[2:]
+    of_new = {row.split("|")[1] for row in rows}
+    for row in [row for row in old if row.split("|")[1] not in of_new] + rows:
+        made.setdefault(row.split("|")[1], []).append(row)
+    PAGE.write_text(update(text, name, [head, rule, *(row for of in made.values() for row in of)]))
+
+
 def draw(found, path):
     """Contact force of the ring on its foundations, massive and massless surfaces."""
     pictures = axes(2)
@@ -257,7 +333,7 @@ def main():
                    "force, rms", "energy"], lines)
     print(*lines, sep="\n")
     if options.update:
-        PAGE.write_text(update(PAGE.read_text(), "simplified", lines))
+        write("simplified", lines)
 
 
 if __name__ == "__main__":

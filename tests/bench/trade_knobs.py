@@ -1,4 +1,4 @@
-"""Every knob of a run turned by itself, on five scenes: what it costs and what it changes.
+"""Every knob of a run turned by itself, on scenes of the plane and of space: what it costs and what it changes.
 
     .venv/bin/python tests/bench/trade_knobs.py [--update] [words of the names of scenes]
 
@@ -12,14 +12,13 @@ import pathlib
 import re
 
 import numpy as np
-from trade import (NTS, PAGE, PROGRAM, ball, bowl, drift, drawn, force_of, impulse_of, massive,
-                   percent)
+from trade import (NTS, PROGRAM, ball, bowl, drift, drawn, force_of, impulse_of, massive,
+                   percent, space_ball, space_bars, space_cube, write)
 
 from book.common import size, table  # isort: skip, `trade` says where
 from book.forces import switches
 from kept_runs import folder_of, name_of, run_once
 from scene_tools import DECKS, Deck
-from verification import update
 
 SINGLE = PROGRAM.parent.parent / "release-single" / "emcon"
 
@@ -51,7 +50,8 @@ def plain(scene, body):
     return lambda: knobbed(drawn(scene, body, None)("elastic"))
 
 
-#: Name, deck, parameters of the default run.
+#: Name, deck, parameters of the default run; `reference` of what it is held against: massless surfaces, and of
+#: coarse bodies in space, which would move most of their mass, what `AUTO` takes for them.
 SCENES = (
     ("ring on a foundation", from_file("ring"), {**NTS, "h": 0.02, "t_end": 4.0, "frame": 4.0}),
     ("bouncing bar", from_file("bouncing_bar"),
@@ -59,6 +59,9 @@ SCENES = (
     ("tied ring", from_file("tied_ring"), {**NTS, "h": 0.02, "t_end": 4.0, "frame": 4.0}),
     ("ball on a block", plain(ball, "BLOCK"), {**NTS, "h": 0.01}),
     ("disc in a bowl", plain(bowl, "BOWL"), {**NTS, "h": 0.01}),
+    ("in space: ball on a plate", plain(space_ball, "PLATE"), {**NTS, "h": 0.01}),
+    ("in space: cube on a plate", plain(space_cube, "PLATE"), {**NTS, "h": 0.01, "reference": "AUTO"}),
+    ("in space: bars, edge on edge", plain(space_bars, "LOWER"), {**NTS, "h": 0.01, "reference": "AUTO"}),
 )
 MORTAR = {"formulation": "MORTAR"}
 
@@ -93,6 +96,9 @@ KNOBS = (
     ("`VELOCITY UPDATE`", {"initiation": "VELOCITY UPDATE"}),
     ("`MASSLESS`", {"initiation": "MASSLESS"}),
     ("`MASSLESS`, h, half", {"initiation": "MASSLESS", "h": 0.5}),
+    ("`SIDES=ONE`", {"formulation": "'NODE TO SURFACE, SIDES=ONE'"}),
+    ("`SIDES=BOTH`", {"formulation": "'NODE TO SURFACE, SIDES=BOTH'"}),
+    ("`EDGES=NO`", {"formulation": "'NODE TO SURFACE, EDGES=NO'"}),
     ("`SEGMENT`", {"formulation": "SEGMENT"}), ("`MORTAR`", MORTAR),
     ("`MORTAR`, `STANDARD`", {**MORTAR, "multiplier": "STANDARD"}),
     ("`HERMITE`", {"smoothing": "HERMITE"}),
@@ -105,6 +111,15 @@ KNOBS = (
     ("`EXPLICIT`", EXPLICIT), ("`EXPLICIT`, `PENALTY`", EXPLICIT_PENALTY),
     ("`PRECISION=single`", {"program": SINGLE}),
 )
+#: Knobs that only the plane has, or only space.
+OF_PLANE = {"`SEGMENT`", "`MORTAR`", "`MORTAR`, `STANDARD`", "`HERMITE`"}
+OF_SPACE = {"`EDGES=NO`", "`SIDES=ONE`", "`SIDES=BOTH`"}
+
+
+def knobs_of(deck):
+    """Those that a deck has, by its dimension."""
+    others = OF_PLANE if "TYPE=C3D" in deck.text() else OF_SPACE
+    return [(knob, change) for knob, change in KNOBS if knob not in others]
 
 
 def run_of(deck, folder, parameters, change):
@@ -156,11 +171,13 @@ def lines_of(name, make, parameters, rounds):
     """Rows of a scene; the processor time is the least of the rounds, over that of the default."""
     deck, cost, kept = make(), {}, {}
     folder = folder_of("knobs")
+    parameters = dict(parameters)
+    initiation = parameters.pop("reference", "MASSLESS")
     reference, done = run_of(deck, folder / name_of(name, "reference"), parameters,
-                             {"h": 1/16, "initiation": "MASSLESS"})
+                             {"h": 1/16, "initiation": initiation})
     assert reference, done.errors
     for k in range(rounds):
-        for knob, change in KNOBS:
+        for knob, change in knobs_of(deck):
             if not pathlib.Path(change.get("program", PROGRAM)).exists():
                 continue
             if "share" in change and k > 0:              # of thousands of increments once is enough
@@ -188,7 +205,7 @@ def main():
                    "energy"], lines)
     print(*lines, sep="\n")
     if options.update:
-        PAGE.write_text(update(PAGE.read_text(), "knobs", lines))
+        write("knobs", lines)
 
 
 if __name__ == "__main__":

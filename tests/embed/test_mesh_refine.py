@@ -38,6 +38,33 @@ def test_a_block_is_the_block_with_twice_the_cells() -> None:
         assert np.allclose(*nodes, rtol=0, atol=1e-15), name
 
 
+@pytest.mark.parametrize("kind", ["C3D4", "C3D8"])
+def test_a_box_is_cut_in_eights(kind: str) -> None:
+    """Volumes, sides and their faces, nodes of sides: by places alone."""
+    size = np.array([3.0, 2.0, 1.0])
+    mesh = block((0, 0, 0), size, (2, 1, 1), kind=kind)
+    fine, built = refine(mesh, 2), block((0, 0, 0), size, (8, 4, 4), kind=kind)
+    assert np.allclose(in_order(fine.nodes), in_order(built.nodes), rtol=0, atol=4e-15)
+    x = fine.nodes[fine.rows(fine.elements[kind])]
+    edges = x[:, [1, 2, 3] if kind == "C3D4" else [1, 3, 4]] - x[:, :1]
+    volume = np.linalg.det(edges)/(6 if kind == "C3D4" else 1)
+    assert volume == pytest.approx(np.full(64*len(mesh.elements[kind]), 6.0/len(volume)), rel=1e-12)
+    for side, (axis, end) in {"LEFT": (0, 0), "RIGHT": (0, 1), "BOTTOM": (1, 0), "TOP": (1, 1),
+                              "BACK": (2, 0), "FRONT": (2, 1)}.items():
+        named = fine.surfaces[f"BLOCK_{side}"]
+        of, corners = fine.all_faces()
+        row = {tuple(face): k for k, face in enumerate(of.tolist())}
+        known = corners[[row[tuple(face)] for face in named.tolist()]]
+        known = np.where(known > 0, known, known[:, :1])
+        at = fine.nodes[fine.rows(known)]
+        assert len(named) == 16*len(mesh.surfaces[f"BLOCK_{side}"])
+        assert len(np.unique(named, axis=0)) == len(named)
+        assert np.allclose(at[..., axis], end*size[axis], rtol=0, atol=1e-15)
+        on = fine.nodes[fine.rows(fine.node_sets[f"BLOCK_{side}"])]
+        assert len(on) == np.isclose(fine.nodes[:, axis], end*size[axis], rtol=0, atol=1e-9).sum()
+        assert np.allclose(on[:, axis], end*size[axis], rtol=0, atol=1e-15)
+
+
 def triangles() -> Mesh:
     """Two triangles and a square, a loose label in between, all of their sides a surface."""
     mesh = Mesh([[0, 0], [1, 0], [1, 1], [0, 1], [2, 0], [2, 1]],

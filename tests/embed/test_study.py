@@ -295,9 +295,13 @@ def test_energy_and_momenta() -> None:
 
 
 def fields_of(mesh: object) -> SimpleNamespace:
+    """As a file of results has them, of meshes of linear elements and of quadratic ones of space."""
     cells = [row for kind in mesh.elements for row in mesh.connectivity(kind)]
-    return SimpleNamespace(points=np.column_stack([mesh.nodes, np.zeros(len(mesh.nodes))]),
-                           cells=cells)
+    n_dim = mesh.nodes.shape[1]
+    type_of = {(2, 3): 5, (2, 4): 9, (3, 4): 10, (3, 8): 12, (3, 10): 24, (3, 20): 25}
+    return SimpleNamespace(points=np.column_stack([mesh.nodes, np.zeros((len(mesh.nodes), 3 - n_dim))]),
+                           cells=cells, n_dim=n_dim,
+                           types=np.array([type_of[n_dim, len(cell)] for cell in cells]))
 
 
 def test_centre_and_inertia_of_a_rectangle() -> None:
@@ -319,12 +323,38 @@ def test_centre_and_inertia_of_a_rectangle() -> None:
 def test_triangles_and_quadrilaterals_have_one_inertia() -> None:
     quads = block((0.0, 0.0), (3.0, 2.0), (1, 1))
     corner = quads.connectivity("CPE4")[0]
-    split = SimpleNamespace(points=fields_of(quads).points,
+    split = SimpleNamespace(points=fields_of(quads).points, n_dim=2, types=np.array([5, 5]),
                             cells=[corner[[0, 1, 2]], corner[[0, 2, 3]]])
     body = np.zeros(4, dtype=int)
     one, other = (body_geometry(f, body, None, np.ones(1)) for f in (fields_of(quads), split))
     assert one.inertia == pytest.approx(13.0/12.0, rel=16*EPSILON)
     assert other.inertia == pytest.approx(13.0/12.0, rel=16*EPSILON)
+
+
+@pytest.mark.parametrize("kind", ["C3D4", "C3D8", "C3D10", "C3D20"])
+def test_inertia_of_a_box(kind: str) -> None:
+    """m (b^2 + c^2)/12 about each axis, also turned, of all kinds of elements."""
+    mesh = block((1.0, 2.0, 3.0), (3.0, 1.0, 2.0), (2, 1, 2), kind=kind)
+    fields, body = fields_of(mesh), np.zeros(len(mesh.nodes), dtype=int)
+    found = body_geometry(fields, body, None, np.array([6.0]))
+    exact = 0.5*np.diag([1.0 + 4.0, 9.0 + 4.0, 9.0 + 1.0])
+    assert found.centre[0] == pytest.approx([2.5, 2.5, 4.0], rel=64*EPSILON)
+    assert found.inertia[0] == pytest.approx(exact, abs=1e3*EPSILON)
+    turn = np.array([[0.0, -1.0, 0.0], [0.8, 0.0, -0.6], [0.6, 0.0, 0.8]])
+    turned = body_geometry(fields, body, mesh.nodes @ turn.T - mesh.nodes, np.array([6.0]))
+    assert turned.inertia[0] == pytest.approx(turn @ exact @ turn.T, abs=1e3*EPSILON)
+
+
+def test_energy_of_a_rigid_motion_in_space() -> None:
+    """1/2 m v^2 + 1/2 w I w, of a moment about the origin."""
+    mass, v, w, c = 4.0, np.array([2.0, -1.0, 3.0]), np.array([1.0, 2.0, -1.0]), np.array([5.0, 7.0, -2.0])
+    inertia = np.array([[2.0, 0.3, 0.0], [0.3, 1.0, -0.2], [0.0, -0.2, 3.0]])
+    p = mass*v
+    lx, ly, lz = inertia @ w + np.cross(c, p)
+    at = SimpleNamespace(centre=c[None], inertia=inertia[None])
+    bodies = Bodies(np.array([mass]), *(np.array([[a]]) for a in (p[0], p[1], lz, p[2], lx, ly)))
+    assert rigid_energy(bodies, 0, at)[0] == pytest.approx(0.5*mass*v @ v + 0.5*w @ inertia @ w,
+                                                           rel=64*EPSILON)
 
 
 def test_inertia_of_a_disc_of_chords() -> None:

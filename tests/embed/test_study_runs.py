@@ -22,6 +22,7 @@ import h5py
 import numpy as np
 import pytest
 from emcon.__main__ import main
+from emcon.mesh import block
 from emcon.study.deck import DeckFile, read_deck
 from emcon.study.execution import RECORD, Task, call, record_of, run_member
 from emcon.study.plan import Member
@@ -104,6 +105,36 @@ def test_a_free_fall_has_no_error(free: tuple[Path, str]) -> None:
                      "force"):
             assert float(row[f"error_closed-form_{name}"]) < 1e5*EPSILON, name
     assert "the cheapest setting is" in text and "rebound to" in text
+
+
+def box_deck() -> str:
+    """A box above another one that is held; it falls with a speed to the side, and has not landed at .2."""
+    mesh = (block((0.1, 0.05, 0.5), (0.8, 0.8, 0.6), (1, 1, 1), "UP", kind="C3D8")
+            + block((0.0, 0.0, -0.6), (1.0, 1.0, 0.6), (1, 1, 1), "LO", kind="C3D8"))
+    return ("*HEADING\nboxes\n*PARAMETER\nh = 0.05\nt_end = 0.2\n" + mesh.text()
+            + "*MATERIAL, NAME=M\n*ELASTIC\n1000., 0.3\n*DENSITY\n2.\n*SOLID SECTION, ELSET=UP, MATERIAL=M\n"
+            "*SOLID SECTION, ELSET=LO, MATERIAL=M\n*SURFACE INTERACTION, NAME=I\n*CONTACT PAIR, INTERACTION=I\n"
+            "UP_BACK, LO_FRONT\n*BOUNDARY\nLO, 1, 3\n*INITIAL CONDITIONS, TYPE=VELOCITY\nUP, 1, 0.5\nUP, 2, 0.25\n"
+            "*STEP, NLGEOM\n*DYNAMIC, DIRECT\n<h>, <t_end>\n*DLOAD\nUP, GRAV, 10., 0., 0., -1.\n"
+            "*NODE FILE\nU\n*CONTACT FILE\nCSTR\n*CONTACT PRINT, TOTALS=ONLY\nCF\n*END STEP\n")
+
+
+def test_a_free_fall_in_space_has_no_error(tmp_path: Path) -> None:
+    """Of a box of mass .768, of two meshes, against closed forms in three components."""
+    (tmp_path/"box.inp").write_text(box_deck())
+    mass = 2*0.8*0.8*0.6
+    values = {"rebound_1": [0.5, 0.25, -2.0], "position_1": [0.1, 0.05, -0.2],
+              "momentum": [0.5*mass, 0.25*mass, -2.0*mass], "impulse": [0.0, 0.0, 0.0],
+              "rigid_energy_1": 0.5*mass*(0.25 + 0.0625 + 4.0), "vibration": 0.0, "force": 0.0}
+    (tmp_path/"closed.json").write_text(json.dumps(values))
+    study(tmp_path, "--vary", "h=0.1,0.05", "--vary", "mesh=1,2", "--reference", "closed-form:closed.json",
+          "--goal", "rebound:1e-9", deck=tmp_path/"box.inp")
+    rows = table(tmp_path)
+    assert [row["status"] for row in rows] == ["done"]*4 and len({row["mesh"] for row in rows}) == 2
+    for row in rows:
+        assert float(row["rebound_1_z"]) == pytest.approx(-2.0, rel=1e5*EPSILON)
+        for name in ("rebound", "position", "momentum", "rigid_energy", "vibration", "impulse", "force"):
+            assert float(row[f"error_closed-form_{name}"]) < 1e5*EPSILON, name
 
 
 def test_members_on_two_meshes_share_nodes(free: tuple[Path, str]) -> None:

@@ -16,8 +16,10 @@ from scene_tools import DECKS, Deck, Run, emcon, number, overrides
 
 sys.path.insert(0, str(DECKS))
 
+from balls import add_ball  # noqa: E402
 from deckwriter import Part, add_grid, box  # noqa: E402
 from scenery import CONTACT_CARDS, add_disc, contact_parameters  # noqa: E402
+from space_mesh import Block  # noqa: E402
 
 PARAMETERS = f"""
 initiation = PERSISTENT
@@ -56,45 +58,84 @@ def turned(angle, about=(0.0, 0.0)):
     return place
 
 
+def element_lines(part, kind):
+    """The elements of a part, all of one kind, in lines of twelve words."""
+    lines = [f"*ELEMENT, TYPE={kind}, ELSET={part.name}"]
+    for label, nodes in part.element.items():
+        words = [str(word) for word in (label, *nodes)]
+        lines += [", ".join(words[k:k + 12]) + ("," if k + 12 < len(words) else "")
+                  for k in range(0, len(words), 12)]
+    return lines
+
+
 class Scene:
-    """Bodies, what holds and moves them, and which of them may meet."""
+    """Bodies, what holds and moves them, and which of them may meet; of as many dimensions as the
+    places of their nodes have."""
 
     def __init__(self, h, t_end, gravity=0.0):
         self.h, self.t_end, self.gravity = h, t_end, gravity
         self.part, self.cards, self.held, self.alone = {}, [], [], set()
         self.pairs = []                # (slave, master); empty: each with all that come after it
         self.n_node = self.n_element = 0
+        self.n_dim = 2
 
     # ---- bodies
 
-    def add(self, name, mesh, stiffness=100.0, density=1.0, velocity=(0, 0), spin=0.0):
-        """A body; `mesh(part, first)` fills a part with labels from `first` on."""
+    def add(self, name, mesh, stiffness=100.0, density=1.0, velocity=(0, 0, 0), spin=(0, 0, 0),
+            kind=None):
+        """A body; `mesh(part, first)` fills a part with labels from `first` on. `spin` is a number in
+        the plane; `kind` that of the elements, where their number of nodes does not say it."""
         part = Part(name)
         mesh(part, (self.n_node + 1, self.n_element + 1))
         self.n_node += len(part.node)
         self.n_element += len(part.element)
         self.part[name] = part
-        self.cards += [*part.element_lines(), f"*SURFACE, NAME={name}", f"{name},",
+        places = np.array(list(part.node.values()))
+        self.n_dim = places.shape[1]
+        is_plane = self.n_dim == 2
+        self.cards += [*(element_lines(part, kind) if kind else part.element_lines()), f"*SURFACE, NAME={name}", f"{name},",
                        f"*MATERIAL, NAME={name}", "*HYPERELASTIC, COUPLED NEO HOOKE",
                        f"{number(stiffness)}, 0.3", "*DENSITY", number(density),
-                       f"*SOLID SECTION, ELSET={name}, MATERIAL={name}", "1."]
-        middle = np.mean(list(part.node.values()), axis=0)
+                       f"*SOLID SECTION, ELSET={name}, MATERIAL={name}", *(["1."] if is_plane else [])]
+        arm = np.zeros((len(places), 3))
+        arm[:, :self.n_dim] = places - np.mean(places, axis=0)
+        speed = np.cross((0, 0, spin) if np.isscalar(spin) else spin, arm)
         lines = []
-        for label, (x, y) in part.node.items():
-            v = (velocity[0] - spin*(y - middle[1]), velocity[1] + spin*(x - middle[0]))
-            lines += [f"{label}, {axis}, {number(v[axis - 1])}" for axis in (1, 2) if v[axis - 1]]
+        for label, turning in zip(part.node, speed, strict=True):
+            v = [a + b for a, b in zip(velocity[:self.n_dim], turning[:self.n_dim], strict=True)]
+            lines += [f"{label}, {axis}, {number(a)}" for axis, a in enumerate(v, 1) if a]
         if lines:
             self.cards += ["*INITIAL CONDITIONS, TYPE=VELOCITY", *lines]
         return self
 
     def block(self, name, corner, size, cells, turn=0.0, shape=None, **more):
-        """A rectangle; turned about its middle, or with its places (x, y) mapped by `shape`."""
+        """A rectangle, turned about its middle, or with its places (x, y) mapped by `shape`; or a box, with
+        its places (n, 3) mapped by `shape`."""
+        if len(size) == 3:
+            return self.box(name, corner, size, cells, shape, **more)
         place = box(corner, size, cells)
         move = shape or turned(turn, (corner[0] + size[0]/2, corner[1] + size[1]/2))
         if turn == 0.0 and shape is None:
             return self.add(name, lambda part, first: add_grid(part, cells, place, first), **more)
         return self.add(name, lambda part, first: add_grid(
             part, cells, lambda i, j: move(*place(i, j)), first), **more)
+
+    def box(self, name, corner, size, cells, shape=None, kind="C3D8", **more):
+        mesh = Block(kind, cells, size, place=lambda x: x + np.array(corner, float))
+        x = mesh.x if shape is None else shape(mesh.x)
+
+        def fill(part, first):
+            for label, place in zip(range(first[0], first[0] + len(x)), x.tolist(), strict=True):
+                part.node[label] = tuple(place)
+            for label, nodes in enumerate(mesh.element, first[1]):
+                part.element[label] = tuple(first[0] - 1 + n for n in nodes)
+
+        return self.add(name, fill, kind=kind, **more)
+
+    def ball(self, name, centre, radius, cells, **more):
+        """n^3 bricks in the cube inside, m layers of them around it."""
+        return self.add(name, lambda part, first: add_ball(part, radius, centre, cells, first),
+                        **more)
 
     def disc(self, name, centre, radius, cells, turn=0.0, **more):
         return self.add(name, lambda part, first: add_disc(part, centre, radius, cells, first,
@@ -108,8 +149,9 @@ class Scene:
 
     # ---- supports
 
-    def hold(self, name, where, axes="1, 2", value=0.0):
+    def hold(self, name, where, axes=None, value=0.0):
         """Hold the nodes of a body where `where(x, y)`, or move them by `value` within t_end."""
+        axes = axes or f"1, {self.n_dim}"
         nodes = [label for label, p in self.part[name].node.items() if where(*p)]
         assert nodes, name
         self.held.append((nodes, axes, value))
@@ -143,10 +185,16 @@ class Scene:
         boundary = [f"{label}, {axes}" for labels, axes in still for label in labels]
         motion = [f"{label}, {axes}, {number(value)}" for labels, axes, value in moved
                   for label in labels]
-        weight = [f"{name}, GRAV, {number(self.gravity)}, 0., -1." for name in self.part]
+        down = ", ".join(["0."]*(self.n_dim - 1) + ["-1."])
+        weight = [f"{name}, GRAV, {number(self.gravity)}, {down}" for name in self.part]
+        # What is of the plane alone: integrated gaps, and how surfaces are smoothed.
+        requests, formulation = REQUESTS.strip(), "MORTAR"
+        if self.n_dim == 3:
+            requests = requests.replace(CONTACT_CARDS.strip() + "\n", "")
+            formulation = "NODE TO SURFACE"
         return Deck("\n".join([
             "*HEADING", "plain scene", "*PARAMETER", f"h = {number(self.h)}",
-            f"t_end = {number(self.t_end)}", "formulation = MORTAR", *[
+            f"t_end = {number(self.t_end)}", f"formulation = {formulation}", *[
                 line for line in PARAMETERS.strip().splitlines()
                 if not line.startswith("formulation")],
             *nodes, *self.cards, *self.contact(sides),
@@ -154,7 +202,7 @@ class Scene:
             "*AMPLITUDE, NAME=RAMP", f"0., 0., {number(self.t_end)}, 1.",
             "*STEP, NLGEOM, INC=1000000", "*DYNAMIC, DIRECT", "<h>, <t_end>",
             *(["*BOUNDARY, AMPLITUDE=RAMP", *motion] if motion else []),
-            *(["*DLOAD", *weight] if self.gravity else []), REQUESTS.strip(),
+            *(["*DLOAD", *weight] if self.gravity else []), requests,
         ]), name)
 
 
@@ -162,8 +210,8 @@ class Scene:
 
 
 def below(y):
-    """Places up to a height: what stands on the ground there."""
-    return lambda _, height: height <= y + 1e-9
+    """Places up to a height, the last coordinate: what stands on the ground there."""
+    return lambda *place: place[-1] <= y + 1e-9
 
 
 def pile():

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import overlap
 import pytest
-from contact_space_scenes import dent, impact, press, slide, stack, turned
+from contact_space_scenes import (bodies, dent, dynamic, faces, impact, pair, press, slide, stack, turned,
+                                  velocities)
 from scene_tools import EPSILON, Run, run_deck
 from space_mesh import Block
 
@@ -50,6 +51,22 @@ def check_impact(run: Run, depth: float = DEPTH) -> None:
     ("C3D8", "C3D10"), ("C3D10", "C3D10"), ("C3D20", "C3D8"), ("C3D4", "C3D20R"), ("C3D10", "C3D20")])
 def test_a_ball_bounces_off_a_plate(first: str, second: str, tmp_path: Path) -> None:
     check_impact(ran(tmp_path, impact(first, second)), CROSSING)
+
+
+def test_a_node_beside_a_slanted_rim_is_left_to_the_next_step(tmp_path: Path) -> None:
+    """A block of tetrahedra falls flat beside the rim of a free one: a node of the rim comes to see the plane past the
+    falling one at a slant, opens and closes without end. The run stopped there."""
+    one = Block("C3D10", (2, 2, 1), size=(0.8, 0.8, 0.5), place=lambda x: x + np.array([0.1, 0.05, 0.02]))
+    two = Block("C3D10", (3, 3, 1), size=(1, 1, 0.5), place=lambda x: x - np.array([0, 0, 0.5]))
+    text = (bodies([one, two], [faces(one), faces(two)], "*HYPERELASTIC, COUPLED NEO HOOKE\n100., .3\n*DENSITY\n1.\n")
+            + pair() + velocities(one, (0.1, 0., -1.0), (0., 0., 0.)) + dynamic(0.01, 0.04))
+    run = ran(tmp_path, text)
+    history = run.history
+    assert run.verdict["verdict"] == "good" and history["active"].max() > 0
+    assert np.ptp(history["total"]) <= BALANCE*history["total"].max()
+    p, impulse = moments(run, "px py pz"), np.abs(history["pair1_impulse_z"]).max()
+    assert impulse > 0.01 and np.abs(p - p[0]).max() <= BALANCE*impulse
+    assert overlap.worst(run.fields()).by_edge <= CROSSING
 
 
 @pytest.mark.parametrize(("cells", "angle"), [

@@ -8,6 +8,7 @@ import sys
 
 import numpy as np
 import pytest
+from plain_scenes import AUTO, Scene
 from scene_tools import DECKS, ROOT, Deck, emcon, run_deck
 
 from emcon import Stepper
@@ -82,6 +83,46 @@ def test_what_locks_and_what_makes_a_comb_is_told(tmp_path):
                                       + rest)
     texts = [row["text"] for row in report(tmp_path/"locks.inp")["advice"]]
     assert any("nu = 0.4999 locks" in text for text in texts)
+
+
+def plate_under_a_ball(thick):
+    """A ball falls on a plate a hundred times as stiff that is clamped at two sides."""
+    scene = Scene(0.01, 0.7)
+    scene.ball("BALL", (0.03, 0.02, 0.52), 0.5, (2, 2), velocity=(0.0, 0.0, -1.0))
+    scene.block("PLATE", (-0.9, -0.9, -thick), (1.8, 1.8, thick), (6, 6, 1), stiffness=1e4)
+    return scene.hold("PLATE", lambda x, y, z: abs(x) > 0.899).deck(AUTO)
+
+
+def test_what_can_bend_is_told_in_space(tmp_path):
+    """As a rigid body a thin plate changes the impulse by more than the strain of a contact would, a thick one by less;
+    the advice says which it is."""
+    node = 9999
+    for thick in (0.06, 1.0):
+        impulse = []
+        for is_rigid in (False, True):
+            deck = plate_under_a_ball(thick)
+            if is_rigid:
+                deck.remove("*BOUNDARY")
+                deck.insert(f"*NODE\n{node}, 0., 0., 0.\n*RIGID BODY, ELSET=PLATE, REF NODE={node}\n*BOUNDARY\n"
+                            f"{node}, 1, 6\n", before="*STEP")
+            else:
+                (advice,) = [row for row in report(deck.write(tmp_path/"plate.inp"))["advice"] if "stiffer" in row]
+            last = run_deck(deck, tmp_path, initiation="PERSISTENT").history[-1]
+            impulse.append(np.array([last[f"pair1_impulse_{axis}"] for axis in "xyz"]))
+        change = 100*np.linalg.norm(impulse[1] - impulse[0])/np.linalg.norm(impulse[0])
+        assert math.isclose(advice["rebound_percent"], 1.0, rel_tol=1e-8)
+        assert ("thickness" in advice) == (change > advice["rebound_percent"])
+        assert ("more where it can bend" in advice["text"]) == (thick < 0.5)
+
+
+def test_a_comb_in_space_has_its_cure(tmp_path):
+    deck = plate_under_a_ball(0.06).write(tmp_path/"plate.inp")
+    texts = [row["text"] for row in report(deck, "--set", "h=1e-4", "--set", "t_end=1e-3", "--set",
+                                           "initiation=PERSISTENT")["advice"]]
+    assert any("TYPE=MASSLESS makes them smooth" in text for text in texts)
+    texts = [row["text"] for row in report(deck, "--set", "h=1e-4", "--set", "t_end=1e-3", "--set",
+                                           "initiation=AUTO")["advice"]]
+    assert any("fourteen elements across" in text for text in texts)
 
 
 def test_ties_have_their_rows():

@@ -82,7 +82,7 @@ def _keyword(line: str) -> str:
 # --- finer meshes ------------------------------------------------------------------------------
 
 def refined_deck(deck: DeckFile, times: int, scratch: Path) -> str:
-    """The text of `deck` with each element cut in four, `times` times; all else stays.
+    """The text of `deck` with each element cut in four, in space in eight, `times` times; all else stays.
 
     scratch   file that may be written
 
@@ -120,7 +120,7 @@ def _pressed_faces(text: str, model: _Model, mesh: Mesh) -> dict[tuple[str, str]
         if keyword != "DLOAD" or len(words) < 2:
             continue
         target, kind = words[0].upper(), words[1].upper()
-        face = re.fullmatch(r"P([1-4])", kind)
+        face = re.fullmatch(r"P([1-6])", kind)
         if not face or (target, kind) in found:
             continue
         members = model._members("*DLOAD", words[0], model.element_set)
@@ -150,7 +150,7 @@ def _mesh_text(model: _Model, mesh: Mesh, fine: Mesh) -> str:
     text = fine.text()
     for label, x in model.node.items():
         if label not in known:
-            text += f"*NODE\n{label}, {x[0]!r}, {x[1]!r}\n"
+            text += f"*NODE\n{label}, {', '.join(map(repr, x))}\n"
     for name, members in model.node_set.items():
         loose = [label for label in dict.fromkeys(members) if label not in known]
         if loose:
@@ -195,7 +195,7 @@ def _check_line(deck: DeckFile, number: int, keyword: str, words: list[str],
         if named:
             raise StudyError(f"{where}: the values on the set {named} are those of each node, and "
                              "a finer mesh has more; name single nodes, or load by *DLOAD")
-    if keyword == "DLOAD" and words[0].isdigit() and not re.fullmatch(r"[pP][1-4]", words[1]):
+    if keyword == "DLOAD" and words[0].isdigit() and not re.fullmatch(r"[pP][1-6]", words[1]):
         raise StudyError(f"{where}: element {words[0]} is cut in parts; name an element set")
     if keyword == "INITIALCONDITIONS" and words[0].isdigit():
         raise StudyError(f"{where}: node {words[0]} is named by its label (line {number} of the "

@@ -11,8 +11,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..comparison import common_times
-from ..fields import FieldFile
+from ..fields import QUADRATIC, FieldFile
 from ..results import (Array, Bodies, ResultPaths, read_bodies, read_history, read_pairs)
+from .quadrature import points
 
 #: What is measured, and its unit.
 NAMES = {
@@ -32,7 +33,7 @@ NAMES = {
     "energy": "largest change of the total energy, over the largest energy",
     "rigid_energy": "kinetic energy of a body's translation and rotation at the last frame",
     "vibration": "kinetic energy beside that, and strain energy, of all bodies at the last frame",
-    "momentum": "px, py at the end [M L/T]",
+    "momentum": "px, py, in space pz, at the end [M L/T]",
     "angular_momentum": "about the origin, at the end [M L^2/T]",
 }
 #: Those that should be 0: they are their own error.
@@ -94,9 +95,9 @@ def _of_history(history: NDArray[np.void]) -> dict[str, Measured]:
                   for name in ("kinetic", "strain", "external_work"))
     change = float(np.abs(total - total[0]).max())
     found = {"energy": _of_rows(np.array([[change/largest if largest > 0.0 else change]]))}
-    p = np.column_stack([history["px"], history["py"]])
-    found["momentum"] = _of_rows(p[-1:], p)
-    found["angular_momentum"] = _of_rows(history["lz"][-1:, None], history["lz"][:, None])
+    for name, columns in (("momentum", ("px", "py", "pz")), ("angular_momentum", ("lx", "ly", "lz"))):
+        over_time = np.column_stack([history[c] for c in columns if c in (history.dtype.names or ())])
+        found[name] = _of_rows(over_time[-1:], over_time)
     return found
 
 
@@ -130,8 +131,9 @@ def _of_pairs(history: NDArray[np.void], windows: int) -> dict[str, Measured]:
 
 
 def pair_columns(history: NDArray[np.void], name: str) -> Array:
-    """Columns `pairN_NAME_x` and `_y` of all pairs, (n_row, n_pair, 2)."""
-    return np.array([[history[f"pair{k + 1}_{name}_{axis}"] for axis in "xy"]
+    """Columns `pairN_NAME_x`, `_y`, in space `_z`, of all pairs, (n_row, n_pair, n_dim)."""
+    axes = [axis for axis in "xyz" if f"pair1_{name}_{axis}" in (history.dtype.names or ())]
+    return np.array([[history[f"pair{k + 1}_{name}_{axis}"] for axis in axes]
                      for k in range(_n_pair(history))]).transpose(2, 0, 1)
 
 
@@ -177,7 +179,8 @@ def _of_fields(fields: FieldFile, history: NDArray[np.void],
     if body.max() + 1 != len(bodies.mass):
         return found
     start = body_geometry(fields, body, None, bodies.mass)
-    end = body_geometry(fields, body, fields["displacement"][-1][:, :2], bodies.mass)
+    end = body_geometry(fields, body, fields["displacement"][-1][:, :fields.n_dim],
+                        bodies.mass)
     found["position"] = _of_rows(end.centre - start.centre)
     row = common_times(fields.times[-1:], history["time"])[1]
     if len(row):
@@ -191,7 +194,8 @@ def _of_fields(fields: FieldFile, history: NDArray[np.void],
 
 @dataclass(frozen=True)
 class Geometry:
-    """Centre of mass (n_body, 2) [L] and moment of inertia about it (n_body) [M L^2]."""
+    """Centre of mass (n_body, n_dim) [L] and moment of inertia about it [M L^2]: (n_body), in space the
+    tensor (n_body, 3, 3)."""
 
     centre: Array
     inertia: Array
@@ -199,51 +203,47 @@ class Geometry:
 
 def body_geometry(fields: FieldFile, body: NDArray[np.int64], u: Array | None,
                   mass: Array) -> Geometry:
-    """Of each body in the positions of `u` (n_node, 2); its density is taken as uniform."""
-    place = fields.points[:, :2]
+    """Of each body in the positions of `u` (n_node, n_dim); its density is taken as uniform."""
+    n_body, n_dim = len(mass), fields.n_dim
+    place = fields.points[:, :n_dim]
     moved = place if u is None else place + u
-    area, first = np.zeros(len(mass)), np.zeros((len(mass), 2))
-    second = np.zeros(len(mass))
-    near = np.array([moved[body == k].mean(axis=0) for k in range(len(mass))])
-    for count in {len(cell) for cell in fields.cells}:
-        cells = np.array([cell for cell in fields.cells if len(cell) == count])
+    size, first = np.zeros(n_body), np.zeros((n_body, n_dim))
+    second = np.zeros((n_body, n_dim, n_dim))
+    near = np.array([moved[body == k].mean(axis=0) for k in range(n_body)])
+    for kind in np.unique(fields.types).tolist():
+        cells = np.array([_corners_first(cell, kind) for cell, of in zip(fields.cells, fields.types)
+                          if of == kind])
         owner = body[cells[:, 0]]
-        for weight, values, slopes in _points(count):
+        for weight, values, slopes in points(kind):
             jacobian = np.einsum("kd,ekc->edc", slopes, place[cells])
             share = weight*np.abs(np.linalg.det(jacobian))
             # from a point of the body: far from the origin digits would be lost
             arm = np.einsum("k,ekc->ec", values, moved[cells]) - near[owner]
-            np.add.at(area, owner, share)
+            np.add.at(size, owner, share)
             np.add.at(first, owner, share[:, None]*arm)
-            np.add.at(second, owner, share*(arm**2).sum(axis=1))
-    arm = first/area[:, None]
-    inertia = mass*(second/area - (arm**2).sum(axis=1))
-    return Geometry(near + arm, inertia)
+            np.add.at(second, owner, share[:, None, None]*arm[:, :, None]*arm[:, None, :])
+    arm = first/size[:, None]
+    spread = mass[:, None, None]*(second/size[:, None, None] - arm[:, :, None]*arm[:, None, :])
+    polar = np.trace(spread, axis1=1, axis2=2)
+    return Geometry(near + arm, polar if n_dim == 2 else polar[:, None, None]*np.eye(3) - spread)
 
 
-def _points(count: int) -> list[tuple[float, Array, Array]]:
-    """Weights, shape functions and slopes (n, 2) at points that integrate squares exactly."""
-    if count == 3:
-        slopes = np.array([[-1.0, -1.0], [1.0, 0.0], [0.0, 1.0]])
-        return [(1/6, 0.5*(1.0 - np.eye(3)[k]), slopes) for k in range(3)]
-    corner = np.array([[-1.0, -1.0], [1.0, -1.0], [1.0, 1.0], [-1.0, 1.0]])
-    found = []
-    for r, s in corner*np.sqrt(0.6):
-        for a, b, weight in ((r, s, 25/81), (r, 0.0, 20/81), (0.0, s, 20/81), (0.0, 0.0, 16/81)):
-            values = 0.25*(1 + corner[:, 0]*a)*(1 + corner[:, 1]*b)
-            slopes = 0.25*np.column_stack([corner[:, 0]*(1 + corner[:, 1]*b),
-                                           corner[:, 1]*(1 + corner[:, 0]*a)])
-            found.append((weight, values, slopes))
-    return found
+def _corners_first(cell: NDArray[np.int64], kind: int) -> NDArray[np.int64]:
+    """The nodes as VTK counts them: fields have quadratic cells of the plane along the outline."""
+    return np.concatenate([cell[::2], cell[1::2]]) if kind in QUADRATIC else cell
 
 
 def rigid_energy(bodies: Bodies, row: int, at: Geometry) -> Array:
     """Kinetic energy of translation and rotation of each body, (n_body)."""
-    p = np.column_stack([bodies.px[row], bodies.py[row]])
-    spin = bodies.lz[row] - (at.centre[:, 0]*p[:, 1] - at.centre[:, 1]*p[:, 0])
+    p = bodies.momentum[row]
     moved: Array = _per_mass(0.5*(p**2).sum(axis=1), bodies.mass)
-    turned = np.divide(0.5*spin**2, at.inertia, out=np.zeros_like(spin), where=at.inertia > 0.0)
-    return moved + turned
+    if bodies.lx is None or bodies.ly is None:
+        spin = bodies.lz[row] - (at.centre[:, 0]*p[:, 1] - at.centre[:, 1]*p[:, 0])
+        return moved + np.divide(0.5*spin**2, at.inertia, out=np.zeros_like(spin),
+                                 where=at.inertia > 0.0)
+    turn = np.stack([bodies.lx[row], bodies.ly[row], bodies.lz[row]], axis=1)
+    turn = turn - np.cross(at.centre, p)
+    return moved + 0.5*np.einsum("ki,kij,kj->k", turn, np.linalg.pinv(at.inertia), turn)
 
 
 # --- storing -----------------------------------------------------------------------------------

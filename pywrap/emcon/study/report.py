@@ -22,7 +22,7 @@ from .reference import Reference, knob_size, limits_of, sequence
 #: Measures that tables in words begin with.
 SHOWN = ("displacement", "position", "rebound", "impulse", "force", "energy")
 _MOST_COLUMNS = 6
-_MOST_COMPONENTS = 2
+_MOST_COMPONENTS = 3
 
 
 @dataclass(frozen=True)
@@ -112,7 +112,7 @@ def _values(run: Run) -> dict[str, object]:
         for k in range(n):
             for c in range(components):
                 label = name + (f"_{k + 1}" if n > 1 else "")
-                label += f"_{'xy'[c]}" if components > 1 else ""
+                label += f"_{'xyz'[c]}" if components > 1 else ""
                 found[label] = float(measured.rows[k, c])
     return found
 

@@ -16,55 +16,55 @@ WAVE = (100*0.7/(1.3*0.4))**0.5
 TRANSIT = 0.1/WAVE
 
 
-def dropped(h=0.01, t_end=0.5, velocity=(0.1, -1.0), gap=0.01, stiffness=1000.0, gravity=0.0):
-    scene = Scene(h, t_end, gravity)
+def dropped(h=0.01, t_end=0.5, velocity=(0.1, -1.0), gap=0.01, stiffness=1000.0, gravity=0.0, make=Scene):
+    scene = make(h, t_end, gravity)
     scene.disc("DISC", (0.1, 0.5 + gap), 0.5, (4, 2), velocity=velocity)
     scene.block("BLOCK", (-1, -0.5), (2, 0.5), (6, 2), stiffness=stiffness)
     return scene.hold("BLOCK", below(-0.5)).deck(AUTO)
 
 
-def stiffer(ratio):
-    return dropped(stiffness=100.0*ratio)
+def stiffer(ratio, make=Scene):
+    return dropped(stiffness=100.0*ratio, make=make)
 
 
-def against_heavier(ratio):
+def against_heavier(ratio, make=Scene):
     """A light disc hits a free one that is so many times as dense, and as stiff."""
-    scene = Scene(0.01, 0.6)
+    scene = make(0.01, 0.6)
     scene.disc("LIGHT", (0.1, 1.01), 0.5, (4, 2), velocity=(0, -1))
     scene.disc("HEAVY", (0, 0), 0.5, (4, 2), stiffness=100.0*ratio, density=ratio)
     return scene.deck(AUTO)
 
 
-def denser(ratio):
+def denser(ratio, make=Scene):
     """A light disc hits a free one that is so many times as dense, of the same stiffness."""
-    scene = Scene(0.01, 0.6)
+    scene = make(0.01, 0.6)
     scene.disc("LIGHT", (0.1, 1.01), 0.5, (4, 2), velocity=(0, -1))
     scene.disc("HEAVY", (0, 0), 0.5, (4, 2), density=ratio)
     return scene.deck(AUTO)
 
 
-def in_increments(transits):
+def in_increments(transits, make=Scene):
     """Ten increments; the disc reaches the block in the fifth."""
     h = transits*TRANSIT
-    return dropped(h=h, t_end=10*h, velocity=(0, -1), gap=4.5*h)
+    return dropped(h=h, t_end=10*h, velocity=(0, -1), gap=4.5*h, make=make)
 
 
-def at_speed(share):
+def at_speed(share, make=Scene):
     speed = share*WAVE
-    return dropped(h=0.02/speed, t_end=1.2/speed, velocity=(0, -speed), gap=0.05)
+    return dropped(h=0.02/speed, t_end=1.2/speed, velocity=(0, -speed), gap=0.05, make=make)
 
 
-def grazing(angle):
+def grazing(angle, make=Scene):
     """A disc flies along a floor that it meets at so many radians."""
-    scene = Scene(0.02, 2.0)
+    scene = make(0.02, 2.0)
     scene.disc("DISC", (-1, 0.5 + angle), 0.5, (6, 2), velocity=(1, -angle))
     scene.block("FLOOR", (-2, -0.5), (4, 0.5), (8, 1)).hold("FLOOR", below(-0.5))
     return scene.deck(AUTO)
 
 
-def from_gap(gap):
+def from_gap(gap, make=Scene):
     """A block falls flat on a floor under gravity."""
-    scene = Scene(0.005, 0.3, gravity=10.0)
+    scene = make(0.005, 0.3, gravity=10.0)
     scene.block("BLOCK", (0, gap), (1, 1), (3, 3))
     scene.block("FLOOR", (-1, -0.5), (3, 0.5), (5, 1)).hold("FLOOR", below(-0.5))
     return scene.deck(AUTO)
@@ -73,18 +73,18 @@ def from_gap(gap):
 # ---- meshes -------------------------------------------------------------------------------------
 
 
-def sizes(ratio):
+def sizes(ratio, make=Scene):
     """Edges of a block that falls, by those of the floor."""
     slaves, masters = (1, round(ratio)) if ratio >= 1 else (round(1/ratio), 1)
-    scene = Scene(0.01, 0.2)
+    scene = make(0.01, 0.2)
     scene.block("BLOCK", (0, 0.05), (1, 1), (slaves, 1), velocity=(0.1, -1))
     scene.block("FLOOR", (0, -1), (1, 1), (masters, 1)).hold("FLOOR", below(-1))
     return scene.deck(AUTO)
 
 
-def thin_column(share):
+def thin_column(share, make=Scene):
     """The floor under a disc has a column of elements that is so much thinner than the others."""
-    scene = Scene(0.01, 0.3)
+    scene = make(0.01, 0.3)
     scene.disc("DISC", (0.5 + 0.3*share, 0.51), 0.5, (4, 2), velocity=(0, -1))
     x = [-1, 0, 0.5, 0.5 + share, 1.0 + share, 2]
     scene.block("FLOOR", (0, -0.5), (5, 0.5), (5, 1), shape=lambda s, y: (
@@ -92,17 +92,17 @@ def thin_column(share):
     return scene.deck(AUTO)
 
 
-def at_once(n):
+def at_once(n, make=Scene):
     """So many nodes meet a floor in the same increment."""
-    scene = Scene(0.01, 0.1)
+    scene = make(0.01, 0.1)
     scene.block("SLAB", (0, 0.025), (0.1*(n - 1), 0.2), (n - 1, 2), velocity=(0, -1))
     scene.block("FLOOR", (-1, -1), (0.1*(n - 1) + 2, 1), (max(4, n//3), 1))
     return scene.hold("FLOOR", below(-1)).deck(AUTO)
 
 
-def stack(n):
+def stack(n, make=Scene):
     """Blocks on each other, a small gap between them, fall on a floor."""
-    scene = Scene(0.005, 0.3, gravity=10.0)
+    scene = make(0.005, 0.3, gravity=10.0)
     for k in range(n):
         scene.block(f"B{k}", (0.05*(-1)**k, 0.01 + 0.51*k), (1, 0.5), (3 + k % 2, 2), stiffness=1e4)
     scene.block("FLOOR", (-1, -0.5), (3, 0.5), (5, 1), stiffness=1e4).hold("FLOOR", below(-0.5))
