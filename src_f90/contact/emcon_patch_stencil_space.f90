@@ -18,6 +18,8 @@ module emcon_patch_stencil_space
 
    !> A triangle faces a frame if the cosine of their normals is below this.
    real(wp), parameter :: facing = -0.25_wp
+   !> How steep that is along the frame.
+   real(wp), parameter :: steepest = sqrt(1.0_wp - facing**2)/(-facing)
    !> Sides of the patch, by the shorter of the facets of both sides.
    real(wp), parameter :: patch_size = 0.07_wp
    !> Where a surface ends it goes on by strips of this part of a facet, by less where those of the
@@ -53,6 +55,7 @@ module emcon_patch_stencil_space
       real(wp), allocatable :: normal(:, :)      !! (3, n) outwards, of length 1
       real(wp), allocatable :: distance(:)       !! (n) [L]
       logical, allocatable :: is_listed(:)       !! (n) the patch looks at it
+      logical, allocatable :: is_apart(:)        !! (n) it is of another layer than the nearest
    end type near_t
 
 contains
@@ -77,6 +80,7 @@ contains
       nearest = nearest_to(sides, frame, near, x, u)
       if (nearest == 0) return
       normal = frame_normal(sides, i, frame, x, u)
+      call find_layer(sides, near, nearest, normal)
       call list_triangles(sides, near, nearest, normal)
       self%deepest = room_behind*sides%triangles%size(near%triangle(nearest)) - distances &
          *near%distance(nearest)/dot_product(near%normal(:, nearest), normal)
@@ -103,7 +107,7 @@ contains
       end associate
       near%n = size(near%triangle)
       allocate(near%corner(3, 3, near%n), near%normal(3, near%n), near%distance(near%n))
-      allocate(near%is_listed(near%n), source=.false.)
+      allocate(near%is_listed(near%n), near%is_apart(near%n), source=.false.)
       do t = 1, near%n
          do f = 1, 3
             near%corner(:, f, t) = place_of(sides, sides%triangles%split%corner(f, &
@@ -240,6 +244,41 @@ contains
       end associate
    end subroutine frame_vectors
 
+   !> Find what is of another layer than the nearest triangle. What faces `normal` rises by no more
+   !> than its slope allows over the way between them; what rises by more hangs together with the
+   !> nearest one around a hole or a step, and may be over it or below.
+   pure subroutine find_layer(sides, near, nearest, normal)
+      type(patch_sides_t), intent(in) :: sides
+      type(near_t), intent(inout) :: near
+      integer, intent(in) :: nearest
+      real(wp), intent(in) :: normal(3)
+      real(wp) :: way, height, own_way, own_height
+      integer :: t
+
+      call look_along(normal, near%corner(:, :, nearest), own_way, own_height)
+      do t = 1, near%n
+         ! What does not face it may be seen edge on.
+         if (dot_product(near%normal(:, t), normal) >= facing) cycle
+         call look_along(normal, near%corner(:, :, t), way, height)
+         near%is_apart(t) = abs(height - own_height) > steepest*(way + own_way) &
+            + as_near*sides%triangles%size(near%triangle(nearest))
+      end do
+   end subroutine find_layer
+
+   !> How far beside the line of sight from 0 a triangle is, and how far ahead there.
+   pure subroutine look_along(normal, corner, way, height)
+      real(wp), intent(in) :: normal(3), corner(3, 3)
+      real(wp), intent(out) :: way, height       !! [L]
+      type(nearest_t) :: nearest
+      real(wp) :: ahead(3)
+
+      ahead = matmul(normal, corner)
+      call nearest_update(nearest, 1, [0.0_wp, 0.0_wp, 0.0_wp], corner - spread(normal, 2, 3) &
+         *spread(ahead, 1, 3))
+      way = sqrt(nearest%square)
+      height = dot_product(nearest%weight, ahead)
+   end subroutine look_along
+
    !> List what faces `normal` and hangs together with the nearest triangle.
    pure subroutine list_triangles(sides, near, nearest, normal)
       type(patch_sides_t), intent(in) :: sides
@@ -257,7 +296,7 @@ contains
             do k = 1, 3
                other = findloc(near%triangle, sides%triangles%beyond(k, t), 1)
                if (other == 0) cycle
-               if (near%is_listed(other)) cycle
+               if (near%is_listed(other) .or. near%is_apart(other)) cycle
                if (dot_product(near%normal(:, other), normal) >= facing) cycle
                near%is_listed(other) = .true.
                n = n + 1
@@ -313,6 +352,7 @@ contains
          goes_on = other > 0
          if (goes_on) goes_on = is_facing(sides, &
             sides%frames%base(sides%frames%point(frame)), other, normal, x, u)
+         if (goes_on) goes_on = .not. any(near%triangle == other .and. near%is_apart)
       end function goes_on
 
    end subroutine make_patch

@@ -31,6 +31,7 @@ contains
          test_case_t("identity and momenta", test_identity), &
          test_case_t("derivatives against differences", test_derivatives), &
          test_case_t("a surface fades past its end", test_end), &
+         test_case_t("a node in a hole sees the wall, not the rim behind it", test_hole), &
          test_case_t("a corner first: the frame of all its faces", test_corner)]
    end subroutine collect_patch_contact
 
@@ -122,6 +123,55 @@ contains
       end do
       call check_true(error, count(contact%state%is_over) >= 9, "nodes are over it")
    end subroutine test_thin
+
+   !> A bar that leans in the hole of a plate. Along the normal of its right side are the wall of the
+   !> hole in front and, far behind, the upper side of the plate, which hangs together with the wall
+   !> around the hole and faces the bar too: a mean of both is a height of neither.
+   subroutine test_hole(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: tip(2) = [1.6_wp, -0.25_wp], s = sin(20.0_wp*acos(-1.0_wp)/180.0_wp), &
+         c = sqrt(1.0_wp - s*s)
+      type(scene_t) :: scene
+      type(patch_contact_t) :: contact
+      type(surface_t) :: all_of_it
+      type(contact_pair_t) :: pair
+      integer :: i
+
+      call space_begin(scene)
+      call add_box(scene, "C3D8", [-0.3_wp, 1.35_wp, 0.0_wp], [0.3_wp, 0.3_wp, 2.0_wp], [1, 1, 1])
+      do i = 1, 8
+         scene%x(::2, i) = tip + [c*scene%x(1, i) + s*scene%x(3, i), &
+            c*scene%x(3, i) - s*scene%x(1, i)]
+      end do
+      call add_box(scene, "C3D8", [0.0_wp, 0.0_wp, -1.0_wp], [3.0_wp, 3.0_wp, 1.0_wp], [3, 3, 1])
+      associate (kept => pack([(i, i = 1, 10)], [(i /= 6, i = 1, 10)]), element => scene%element)
+         element%kind = element%kind(kept)
+         element%node = element%node(:, kept)
+         element%label = element%label(kept)
+      end associate
+      all_of_it = skin(scene)
+      scene%surface = [all_of_it, all_of_it]
+      associate (bar => all_of_it%element == 1)
+         scene%surface(1)%element = pack(all_of_it%element, bar)
+         scene%surface(1)%face = pack(all_of_it%face, bar)
+         scene%surface(2)%element = pack(all_of_it%element, .not. bar)
+         scene%surface(2)%face = pack(all_of_it%face, .not. bar)
+      end associate
+      scene%u0 = 0.0_wp*scene%x
+      pair%slave = 1
+      pair%master = 2
+      call patch_contact_init(contact, scene, pair, error)
+      if (allocated(error)) return
+      call contact%suit_steps(.false.)
+      contact%reach = 1.0_wp
+      call contact%begin_step(scene%x, scene%u0, scene%u0)
+      call contact%measure(scene%x, scene%u0, scene%u0)
+      ! Their other frames see the walls at the bar's sides.
+      associate (seen => count(contact%state%is_over .and. &
+            abs(contact%state%gap0 - (2.0_wp - tip(1))/c) <= tol))
+         call check_true(error, seen == 2, "both lower corners see the wall: " // to_text(seen))
+      end associate
+   end subroutine test_hole
 
    !> A rough scene and a step in which it slides, turns and is bent.
    subroutine draw(name, size_of, scene, du, contact, error)
