@@ -122,7 +122,8 @@ contains
       end do
    end subroutine facet_lines
 
-   !> Put the cards into `source` in place of their lines. A facet is told by its number in its file.
+   !> Put the cards into `source` in place of their lines. A facet is told by its number in the
+   !> file.
    subroutine insert(source, card)
       type(deck_source_t), intent(inout) :: source
       type(card_lines_t), intent(inout) :: card(:)
