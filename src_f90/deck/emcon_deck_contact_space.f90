@@ -40,7 +40,7 @@ contains
          if (.not. (in_contact .or. is_tied)) cycle
          associate (surface => scene%surface(i))
             title = trim(merge("contact", "tied   ", in_contact)) // " surface " // surface%name
-            if (surface%is_profile) cycle        ! its reader has looked at it
+            if (size(surface%element) == 0) cycle      ! a shape: its reader has looked at it
             n_errors = reader%log%n_errors
             call check_free(reader, scene, adjacency, surface, title)
             if (reader%log%n_errors > n_errors) cycle

@@ -280,8 +280,9 @@ contains
       case (step_singular)
          call singular_text(terms_solid(self%system%term), scene, text)
          if (scene%step(self%state%clock%i_step)%contact%method == method_saddle_point .and. &
-            size(scene%rigid) > 0) text = text // "; by SADDLE POINT it is so where more contacts " &
-            // "hold a rigid body than it has motions: use *CONSTRAINT METHOD, TYPE=NULL SPACE"
+            size(scene%rigid) > 0) text = text // "; by SADDLE POINT it is so where more " &
+            // "contacts hold a rigid body than it has motions: use *CONSTRAINT METHOD, " &
+            // "TYPE=NULL SPACE"
       case (step_cycling)
          call cycling_text(self, scene, text)
       case (step_too_far)

@@ -76,7 +76,8 @@ contains
             " nodes of slave surface " // scene%surface(tie%slave)%name // &
             " have no partner on master surface " // scene%surface(tie%master)%name // &
             " within the position tolerance (" // tolerance_text(tie, default_text) // &
-            "), from " // to_text(minval(distance(:n))) // " to " // to_text(maxval(distance(:n))) // &
+            "), from " // to_text(minval(distance(:n))) // " to " // &
+            to_text(maxval(distance(:n))) // &
             " off; node (distance): " // joined(found, ", ", most_named) // "; " // advice
          if (any_near(partners, lonely(:n), distance(:n), edge(:n))) text = text // &
             ". Nodes that are near lie past an end of the master, or faces do not look at each " &

@@ -154,7 +154,8 @@ contains
          to_text(size(cells)) // " faces of slave surface " // scene%surface(tie%slave)%name // &
          " have less before them of master surface " // scene%surface(tie%master)%name // &
          " than all but a strip as wide as the position tolerance (" // &
-         tolerance_text(tie, default_text) // "): " // joined(found, "; ", most_named) // "; " // advice)
+         tolerance_text(tie, default_text) // "): " // &
+         joined(found, "; ", most_named) // "; " // advice)
    end subroutine raise_faces
 
    !> Append which facet of the slave `f` is.

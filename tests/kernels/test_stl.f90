@@ -1,7 +1,7 @@
 !> Files of triangles, as text and binary, and surfaces made of their triangles.
 module test_stl
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_deck_stl_file, only : stl_corners
+   use emcon_deck_stl_file_space, only : stl_corners
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_triangle_soup_space, only : soup_join, soup_t
