@@ -5,7 +5,7 @@ module emcon_deck_contact_space
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t
    use emcon_deck_reader, only : reader_t
    use emcon_diagnostics, only : add_error
-   use emcon_face_sides_space, only : face_fault, face_sides, side_t
+   use emcon_face_sides_space, only : face_fault, face_sides, last_of_side, side_t
    use emcon_interactions, only : formulation_user
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_t
@@ -40,7 +40,7 @@ contains
          if (.not. (in_contact .or. is_tied)) cycle
          associate (surface => scene%surface(i))
             title = trim(merge("contact", "tied   ", in_contact)) // " surface " // surface%name
-            if (surface%is_profile) cycle        ! its reader has looked at it
+            if (size(surface%element) == 0) cycle      ! a shape: its reader has looked at it
             n_errors = reader%log%n_errors
             call check_free(reader, scene, adjacency, surface, title)
             if (reader%log%n_errors > n_errors) cycle
@@ -70,12 +70,7 @@ contains
       back = 0
       first = 1
       do while (first <= size(side))
-         last = first
-         do while (last < size(side))
-            if (side(last + 1)%low /= side(first)%low .or. &
-               side(last + 1)%high /= side(first)%high) exit
-            last = last + 1
-         end do
+         last = last_of_side(side, first)
          if (last > first + 1) then
             n_branch = n_branch + 1
             if (branch == 0) branch = first

@@ -118,8 +118,8 @@ contains
       else if (.not. scene%surface(i)%is_profile) then
          call card_error(reader, card, "surface " // name // " is not of TYPE=" // &
             trim(merge("SEGMENTS                                  ", &
-            "PLANE, SPHERE, REVOLUTION, CYLINDER or STL", scene%n_dim == n_plane)) // "; a surface " // &
-            "of elements becomes rigid with these, by ELSET=")
+            "PLANE, SPHERE, REVOLUTION, CYLINDER or STL", scene%n_dim == n_plane)) // &
+            "; a surface of elements becomes rigid with these, by ELSET=")
       else if (size(scene%surface(i)%node) > 0) then
          node = scene%surface(i)%node
       else if (allocated(scene%surface(i)%edge)) then

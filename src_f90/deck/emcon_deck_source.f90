@@ -2,7 +2,7 @@
 !> that know their origin.
 module emcon_deck_source
    use emcon_deck_lines, only : deck_source_t
-   use emcon_deck_stl_lines, only : stl_lines_insert
+   use emcon_deck_stl_lines_space, only : stl_lines_insert
    use emcon_diagnostics, only : add_error, diagnostics_t, quoted
    use emcon_origin, only : origin_t
    use emcon_text, only : squeezed, string_t, stripped, to_text

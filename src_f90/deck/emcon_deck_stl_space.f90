@@ -35,8 +35,8 @@ contains
          call soup_join(soup, corner)
          call tell(reader, card, soup)
       else if (reader%log%n_errors == n_before .and. .not. reader%doubt%names) then
-         call card_error(reader, card, "INPUT=file is missing, or lines of nine coordinates, those " &
-            // "of the corners of a triangle")
+         call card_error(reader, card, "INPUT=file is missing, or lines of nine coordinates, " &
+            // "those of the corners of a triangle")
       end if
       if (reader%log%n_errors > n_before .or. .not. allocated(soup%point)) then
          reader%doubt%names = .true.
@@ -95,8 +95,8 @@ contains
          " without area left out")
       if (soup%turned%n > 0) call card_warning(reader, card, many(soup%turned, "facet") // &
          " turned over, as most around face the other way")
-      if (soup%is_inward) call card_warning(reader, card, "the facets of the closed surface face " // &
-         "inwards: it is a hole, and bodies are to be inside of it")
+      if (soup%is_inward) call card_warning(reader, card, "the facets of the closed surface " // &
+         "face inwards: it is a hole, and bodies are to be inside of it")
       if (soup%open%n > 0) call card_warning(reader, card, "the surface is not closed: " // &
          many(soup%open, "side") // " of one facet alone; bodies are to be on the side that its " &
          // "facets face")

@@ -87,8 +87,8 @@ contains
       kind = option_default("surface")
       call choose_option(reader, card, "TYPE", "surface", kind, is_refused)
       if (is_refused) return
-      if (has_option(card, "INPUT")) call card_error(reader, card, "INPUT= is of TYPE=STL; use " // &
-         "*INCLUDE")
+      if (has_option(card, "INPUT")) call card_error(reader, card, "INPUT= is of TYPE=STL; " // &
+         "use *INCLUDE")
       if (has_option(card, "SCALE") .and. kind /= surface_of_triangles) call card_error(reader, &
          card, "SCALE= is of TYPE=STL")
       select case (kind)

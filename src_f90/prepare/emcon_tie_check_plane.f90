@@ -8,7 +8,7 @@ module emcon_tie_check_plane
    use emcon_sort, only : find_sorted
    use emcon_text, only : joined, string_t, to_text
    use emcon_tie_partner_plane, only : default_tolerance, tie_partners_t
-   use emcon_tie_text, only : most_named, raise_shared, tie_text
+   use emcon_tie_text, only : most_named, raise_shared, tie_text, tolerance_text
    implicit none
    private
    public :: tie_check_surfaces, tie_check_partners
@@ -75,8 +75,9 @@ contains
          text = tie_text(scene, tie) // to_text(size(lonely)) // " of " // to_text(size(node)) // &
             " nodes of slave surface " // scene%surface(tie%slave)%name // &
             " have no partner on master surface " // scene%surface(tie%master)%name // &
-            " within the position tolerance (" // tolerance_text(tie) // "), from " // &
-            to_text(minval(distance(:n))) // " to " // to_text(maxval(distance(:n))) // &
+            " within the position tolerance (" // tolerance_text(tie, default_text) // &
+            "), from " // to_text(minval(distance(:n))) // " to " // &
+            to_text(maxval(distance(:n))) // &
             " off; node (distance): " // joined(found, ", ", most_named) // "; " // advice
          if (any_near(partners, lonely(:n), distance(:n), edge(:n))) text = text // &
             ". Nodes that are near lie past an end of the master, or faces do not look at each " &
@@ -131,8 +132,8 @@ contains
          scene%surface(tie%slave)%name // " and master surface " // &
          scene%surface(tie%master)%name // ": the surfaces do not meet: the nearest points " // &
          "are " // to_text(least) // " apart (node " // to_text(scene%node%label(nearest)) // &
-         "), the position tolerance is " // tolerance_text(tie) // "; move a body, or raise " // &
-         "POSITION TOLERANCE")
+         "), the position tolerance is " // tolerance_text(tie, default_text) // &
+         "; move a body, or raise POSITION TOLERANCE")
    end subroutine raise_apart
 
    !> Name the slave edges that no master edge faces over a part of their length.
@@ -158,24 +159,9 @@ contains
          to_text(size(partners%hole)) // " faces of slave surface " // &
          scene%surface(tie%slave)%name // " lie over a hole in master surface " // &
          scene%surface(tie%master)%name // " longer than the position " // &
-         "tolerance (" // tolerance_text(tie) // "); nodes of the face (length): " // &
-         joined(found, ", ", most_named) // "; " // advice)
+         "tolerance (" // tolerance_text(tie, default_text) // &
+         "); nodes of the face (length): " // joined(found, ", ", most_named) // "; " // advice)
    end subroutine raise_holes
-
-   pure function tolerance_text(tie) result(text)
-      type(tie_t), intent(in) :: tie
-      character(len=tolerance_length(tie)) :: text
-
-      text = default_text
-      if (tie%tolerance >= 0.0_wp) text = to_text(tie%tolerance)
-   end function tolerance_text
-
-   pure integer function tolerance_length(tie)
-      type(tie_t), intent(in) :: tie
-
-      tolerance_length = len(default_text)
-      if (tie%tolerance >= 0.0_wp) tolerance_length = len(to_text(tie%tolerance))
-   end function tolerance_length
 
    !> The same list, but of a long one the first `most_measured` entries are spread over all of it,
    !> after those that are named.

@@ -9,7 +9,7 @@ module emcon_tie_check_space
    use emcon_text, only : joined, string_t, to_text
    use emcon_tie_cells_space, only : tie_cells_t
    use emcon_tie_sides_space, only : tie_sides_nearest, tie_sides_t, tie_sides_tolerance
-   use emcon_tie_text, only : most_named, raise_shared, tie_text
+   use emcon_tie_text, only : most_named, raise_shared, tie_text, tolerance_text
    implicit none
    private
    public :: tie_check_sides, tie_check_nodes, tie_check_cover
@@ -66,7 +66,7 @@ contains
                scene%surface(tie%master)%name // ": the surfaces do not meet: slave node " // &
                to_text(scene%node%label(slave%node(k))) // ", the nearest one, is " // &
                to_text(distance(k)) // " from the master, the position tolerance is " // &
-               tolerance_text(tie) // "; move a body, or raise POSITION TOLERANCE")
+               tolerance_text(tie, default_text) // "; move a body, or raise POSITION TOLERANCE")
          else
             call raise_nodes(scene, tie, pack(slave%node, is_far), pack(distance, is_far), &
                size(slave%node), error)
@@ -91,8 +91,8 @@ contains
       call raise(error, err_input, tie_text(scene, tie) // to_text(size(node)) // " of " // &
          to_text(n_node) // " nodes of slave surface " // scene%surface(tie%slave)%name // &
          " are farther from master surface " // scene%surface(tie%master)%name // &
-         " than the position tolerance (" // tolerance_text(tie) // "); node (distance): " // &
-         joined(found, ", ", most_named) // "; " // advice)
+         " than the position tolerance (" // tolerance_text(tie, default_text) // &
+         "); node (distance): " // joined(found, ", ", most_named) // "; " // advice)
    end subroutine raise_nodes
 
    !> Every slave facet is covered but for a strip as wide as the tolerance, and once only.
@@ -153,8 +153,9 @@ contains
       call raise(error, err_input, tie_text(scene, tie) // to_text(n) // " of " // &
          to_text(size(cells)) // " faces of slave surface " // scene%surface(tie%slave)%name // &
          " have less before them of master surface " // scene%surface(tie%master)%name // &
-         " than all but a strip as wide as the position tolerance (" // tolerance_text(tie) // &
-         "): " // joined(found, "; ", most_named) // "; " // advice)
+         " than all but a strip as wide as the position tolerance (" // &
+         tolerance_text(tie, default_text) // "): " // &
+         joined(found, "; ", most_named) // "; " // advice)
    end subroutine raise_faces
 
    !> Append which facet of the slave `f` is.
@@ -168,20 +169,5 @@ contains
       call facets_text(sides%slave%facets, scene, f, face)
       text = text // face
    end subroutine add_face
-
-   pure function tolerance_text(tie) result(text)
-      type(tie_t), intent(in) :: tie
-      character(len=tolerance_length(tie)) :: text
-
-      text = default_text
-      if (tie%tolerance >= 0.0_wp) text = to_text(tie%tolerance)
-   end function tolerance_text
-
-   pure integer function tolerance_length(tie)
-      type(tie_t), intent(in) :: tie
-
-      tolerance_length = len(default_text)
-      if (tie%tolerance >= 0.0_wp) tolerance_length = len(to_text(tie%tolerance))
-   end function tolerance_length
 
 end module emcon_tie_check_space

@@ -2,12 +2,13 @@
 module emcon_tie_text
    use emcon_couplings, only : tie_t
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_kinds, only : wp
    use emcon_scene, only : scene_t, where_text
    use emcon_sort, only : find_sorted
    use emcon_text, only : joined, string_t, to_text
    implicit none
    private
-   public :: tie_text, raise_shared, most_named
+   public :: tie_text, tolerance_text, raise_shared, most_named
 
    !> Nodes or faces named in a message.
    integer, parameter :: most_named = 10
@@ -60,5 +61,15 @@ contains
          scene%surface(tie%master)%name // " share nodes (" // &
          joined(shared(:n), ", ", most_named) // "); a tie joins meshes without common nodes")
    end subroutine raise_shared
+
+   !> The position tolerance of a tie.
+   pure function tolerance_text(tie, default_text) result(text)
+      type(tie_t), intent(in) :: tie
+      character(len=*), intent(in) :: default_text   !! where the deck gives none
+      character(len=:), allocatable :: text
+
+      text = default_text
+      if (tie%tolerance >= 0.0_wp) text = to_text(tie%tolerance)
+   end function tolerance_text
 
 end module emcon_tie_text

@@ -5,7 +5,7 @@ module emcon_face_sides_space
    use emcon_sort, only : sort_order
    implicit none
    private
-   public :: face_fault, face_sides, side_t
+   public :: face_fault, face_sides, last_of_side, side_t
 
    integer, parameter :: n_dim = 3
    !> An area below this part of the square of the circumference is none.
@@ -45,6 +45,19 @@ contains
       end do
       side = side(sort_order(key))
    end subroutine face_sides
+
+   !> The last one of the sides of the same nodes as side `first`.
+   pure integer function last_of_side(side, first) result(last)
+      type(side_t), intent(in) :: side(:)        !! of `face_sides`
+      integer, intent(in) :: first               !! 1 to n
+
+      last = first
+      do while (last < size(side))
+         if (side(last + 1)%low /= side(first)%low .or. &
+            side(last + 1)%high /= side(first)%high) exit
+         last = last + 1
+      end do
+   end function last_of_side
 
    !> Is a face flat, or are parts of it about its middle turned over?
    pure subroutine face_fault(x, is_flat, is_folded)

@@ -1,7 +1,8 @@
-!> Triangles by their corners alone, made a surface: corners in one place become one point, triangles
-!> without area are left out, and those that face the other way than their neighbours are turned.
+!> Triangles by their corners alone, made a surface: corners in one place become one point,
+!> triangles without area are left out, and those that face the other way than their neighbours
+!> are turned.
 module emcon_triangle_soup_space
-   use emcon_face_sides_space, only : face_fault, face_sides, side_t
+   use emcon_face_sides_space, only : face_fault, face_sides, last_of_side, side_t
    use emcon_kinds, only : dp, wp
    use emcon_rotation, only : cross_product
    use emcon_sort, only : sort_order, unique_sorted
@@ -10,7 +11,8 @@ module emcon_triangle_soup_space
    public :: soup_t, soup_join, finding_t
 
    integer, parameter :: n_dim = 3, n_corner = 3
-   !> Corners nearer than this part of the largest coordinate are one: files hold about seven digits.
+   !> Corners nearer than this part of the largest coordinate are one: files hold about seven
+   !> digits.
    real(wp), parameter :: nearest_part = 1.0e-6_wp
    !> A direction in which corners of boxes and grids stand one behind the other.
    real(wp), parameter :: askew(n_dim) = [0.5377_wp, 0.6181_wp, 0.5735_wp]
@@ -153,12 +155,7 @@ contains
       call face_sides(self%facet, side)
       first = 1
       do while (first <= size(side))
-         last = first
-         do while (last < size(side))
-            if (side(last + 1)%low /= side(first)%low .or. &
-               side(last + 1)%high /= side(first)%high) exit
-            last = last + 1
-         end do
+         last = last_of_side(side, first)
          associate (f => side(first)%facet, g => side(last)%facet)
             select case (last - first)
             case (0)

@@ -1,7 +1,7 @@
 !> Files of triangles, as text and binary, and surfaces made of their triangles.
 module test_stl
    use check, only : check_equal, check_near, check_true, test_case_t
-   use emcon_deck_stl_file, only : stl_corners
+   use emcon_deck_stl_file_space, only : stl_corners
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_triangle_soup_space, only : soup_join, soup_t
@@ -36,16 +36,18 @@ contains
       real(dp), allocatable :: corner(:, :, :)
       character(len=:), allocatable :: fault
 
-      call stl_corners(new_line // " SOLID a" // achar(13) // new_line // loop("0 0 0", "1.5e0 0 0", &
-         " -2D-1" // achar(9) // "+.5 7") // "endsolid a" // new_line // "solid" // new_line // &
-         loop("1 2 3", "4 5 6", "7 8 10") // "ENDSOLID", corner, fault)
+      call stl_corners(new_line // " SOLID a" // achar(13) // new_line // loop("0 0 0", &
+         "1.5e0 0 0", " -2D-1" // achar(9) // "+.5 7") // "endsolid a" // new_line // &
+         "solid" // new_line // loop("1 2 3", "4 5 6", "7 8 10") // "ENDSOLID", corner, fault)
       call check_equal(error, fault, "", "fault")
       if (allocated(error)) return
       call check_equal(error, size(corner, 3), 2, "facets")
-      call check_true(error, all(abs(corner(:, 2, 1) - [1.5_dp, 0.0_dp, 0.0_dp]) <= 0.0_dp), "second")
+      call check_true(error, all(abs(corner(:, 2, 1) - [1.5_dp, 0.0_dp, 0.0_dp]) <= 0.0_dp), &
+         "second")
       call check_true(error, all(abs(corner(:, 3, 1) - [-0.2_dp, 0.5_dp, 7.0_dp]) <= &
          real(epsilon(1.0_wp), dp)), "third")
-      call check_true(error, all(abs(corner(:, 3, 2) - [7.0_dp, 8.0_dp, 10.0_dp]) <= 0.0_dp), "last")
+      call check_true(error, all(abs(corner(:, 3, 2) - [7.0_dp, 8.0_dp, 10.0_dp]) <= 0.0_dp), &
+         "last")
    end subroutine test_text
 
    subroutine test_text_faults(error)
@@ -59,7 +61,8 @@ contains
          "line 5: expected three numbers")
       call expect("solid" // new_line // loop("0 0 0", "1 0 0", "0 1 0"), "line 8: the file ends")
       call expect("solid" // new_line // "endsolid", "no facet")
-      call expect("solid" // new_line // "endsolid" // new_line // "facet", "line 3: expected 'solid'")
+      call expect("solid" // new_line // "endsolid" // new_line // "facet", &
+         "line 3: expected 'solid'")
       call expect("", "byte 0")
 
    contains
@@ -88,8 +91,8 @@ contains
       call check_equal(error, fault, "", "fault")
       if (allocated(error)) return
       call check_true(error, all(abs(corner(:, :, 1) - 1.0_dp) <= 0.0_dp), "ones")
-      call stl_corners(head // repeat(achar(0), 12) // repeat(one, 8) // not_a_number // "ab", corner, &
-         fault)
+      call stl_corners(head // repeat(achar(0), 12) // repeat(one, 8) // not_a_number // "ab", &
+         corner, fault)
       call check_true(error, index(fault, "byte 129: a coordinate of facet 1") > 0, fault)
       call stl_corners(head // repeat(achar(0), 12) // repeat(one, 9) // "a", corner, fault)
       call check_true(error, index(fault, "has 134 bytes, but this one has 133") > 0, fault)
@@ -106,12 +109,13 @@ contains
       call triangles(corner)
       call soup_join(soup, corner)
       call check_equal(error, size(soup%point, 2), 4, "points")
-      call check_equal(error, soup%turned%n + soup%flat%n + soup%open%n + soup%branch%n, 0, "odd ones")
+      call check_equal(error, soup%turned%n + soup%flat%n + soup%open%n + soup%branch%n, 0, &
+         "odd ones")
       call check_true(error, .not. soup%is_inward, "faces outwards")
       if (allocated(error)) return
       do f = 1, 4
-         call check_true(error, all(abs(soup%point(:, soup%facet(:, f)) - corner(:, :, f)) <= 0.0_wp), &
-            "corners in their order")
+         call check_true(error, all(abs(soup%point(:, soup%facet(:, f)) - corner(:, :, f)) <= &
+            0.0_wp), "corners in their order")
       end do
       call soup_join(soup, corner(:, [1, 3, 2], :))
       call check_true(error, soup%is_inward, "faces inwards")

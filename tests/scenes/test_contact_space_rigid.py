@@ -107,6 +107,15 @@ def test_a_box_is_dropped(below: str, cells: int, way: str, tmp_path: Path) -> N
         assert np.abs(w).max() <= 1.0e-9
 
 
+def test_redundant_contacts_by_saddle_point(tmp_path: Path) -> None:
+    """Four corners on one plate, three motions: the run stops, and says which method has a solution."""
+    one, two = box(1, WAYS["face"], 0.03), plate(2, 2.0)
+    method = "*CONSTRAINT METHOD, TYPE=SADDLE POINT\n"
+    (tmp_path/"deck.inp").write_text(scene(one, two, rigid(1, one, v=(0, 0, -1)), dynamic(0.02, 0.1, method)))
+    run = run_deck(tmp_path/"deck.inp", tmp_path, 3)
+    assert "use *CONSTRAINT METHOD, TYPE=NULL SPACE" in run.errors
+
+
 def test_a_box_tumbles_by_eulers_equations(tmp_path: Path) -> None:
     """Above a plate that it hits later: places by a fine integration, of second order; then balances."""
     size, spin, until = np.array([1.0, 0.7, 0.4]), np.array([2.0, 3.0, 1.0]), 0.4

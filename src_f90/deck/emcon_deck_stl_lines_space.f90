@@ -1,11 +1,11 @@
 !> *SURFACE, TYPE=STL, INPUT=file: the facets of the file become data lines of the card, so that
 !> what comes after knows lines alone, and a restart file carries them.
-module emcon_deck_stl_lines
+module emcon_deck_stl_lines_space
    use emcon_deck_lines, only : deck_source_t
-   use emcon_deck_stl_file, only : stl_corners
+   use emcon_deck_stl_file_space, only : stl_corners
    use emcon_deck_text, only : gather_keyword, keyword_of, option_place, option_t, option_value, &
       split_keyword
-   use emcon_diagnostics, only : add_error, diagnostics_t, quoted
+   use emcon_diagnostics, only : add_error, diagnostics_t
    use emcon_kinds, only : dp
    use emcon_origin, only : origin_t
    use emcon_text, only : string_t, stripped
@@ -76,7 +76,7 @@ contains
          if (fault == "") call stl_corners(bytes, corner, fault)
          if (fault /= "") then
             call add_error(log, origin_t(from, source%number(card%first)), &
-               "*SURFACE, TYPE=STL: " // quoted(path) // ": " // fault)
+               "*SURFACE, TYPE=STL: '" // path // "': " // fault)
             source%is_whole = .false.
             return
          end if
@@ -122,7 +122,8 @@ contains
       end do
    end subroutine facet_lines
 
-   !> Put the cards into `source` in place of their lines. A facet is told by its number in its file.
+   !> Put the cards into `source` in place of their lines. A facet is told by its number in the
+   !> file.
    subroutine insert(source, card)
       type(deck_source_t), intent(inout) :: source
       type(card_lines_t), intent(inout) :: card(:)
@@ -160,4 +161,4 @@ contains
       call move_alloc(new%number, source%number)
    end subroutine insert
 
-end module emcon_deck_stl_lines
+end module emcon_deck_stl_lines_space

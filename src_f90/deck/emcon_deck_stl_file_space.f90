@@ -1,6 +1,6 @@
 !> Files of STL: triangles by their corners, as text or binary. What is beside the corners, normals
 !> and attributes, follows from them or means nothing here.
-module emcon_deck_stl_file
+module emcon_deck_stl_file_space
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use, intrinsic :: iso_fortran_env, only : int32, real32
    use emcon_diagnostics, only : quoted
@@ -209,4 +209,4 @@ contains
       text = trim(digits)
    end function whole
 
-end module emcon_deck_stl_file
+end module emcon_deck_stl_file_space
