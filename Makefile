@@ -417,6 +417,8 @@ SEEDS ?= 1 500
 soak-scenes: .venv/test.stamp  ## drawn scenes, SEEDS="1 500": verdicts beside a judge by fields
 	$(BUILDING) app
 	@$(PY) tests/soak/scene_table.py --seeds $(SEEDS)
+	@$(PY) tests/soak/space_scenes.py
+	@$(PY) tests/soak/space_crowds.py
 
 sanitize: .venv/test.stamp  ## build and run under the address and undefined-behaviour sanitizers
 	$(BUILDING) MODE=sanitize PRECISION=double app lib kernels

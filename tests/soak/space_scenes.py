@@ -11,6 +11,7 @@ import argparse
 import pathlib
 import random
 import re
+import signal
 import subprocess
 import sys
 
@@ -23,8 +24,8 @@ from contact_space_scenes import ball, bodies, dynamic, faces, pair, straight, v
 from scene_tools import CRASH, PROGRAM, Run  # noqa: E402
 from space_mesh import KINDS, Block  # noqa: E402
 
-#: Seconds that a run may take.
-PATIENCE = 60.0
+#: Seconds of a processor that a run may take.
+PATIENCE = 60
 #: Energy and momenta, of the largest of each.
 BALANCE = 1.0e-10
 #: What a program may leave out of an overlap, by the edge: it looks at facets, the judge too, by another way.
@@ -72,7 +73,7 @@ def scene(seed):
             + dynamic(chance.choice([0.01, 0.02, 0.04]), 0.6, chance.choice(WAYS)))
 
 
-def judge(run):
+def judge(run, _deck):
     """What is wrong with a run that is called good."""
     history, found = run.history, []
     if np.ptp(history["total"]) > BALANCE*history["total"].max():
@@ -88,19 +89,20 @@ def judge(run):
     return found
 
 
-def main():
+def run_scenes(scene, judge, seeds, folder):
+    """Run what is drawn, count the verdicts, and say what is wrong; the exit code."""
     parser = argparse.ArgumentParser()
-    parser.add_argument("--seeds", type=int, nargs=2, default=(1, 100))
-    parser.add_argument("--folder", type=pathlib.Path, default=pathlib.Path("build/soak-space"))
+    parser.add_argument("--seeds", type=int, nargs=2, default=seeds)
+    parser.add_argument("--folder", type=pathlib.Path, default=pathlib.Path(folder))
     chosen = parser.parse_args()
     chosen.folder.mkdir(parents=True, exist_ok=True)
     count, wrong, cuts, newton, steps = {}, 0, 0, 0, 0
     for seed in range(chosen.seeds[0], chosen.seeds[1] + 1):
         deck = chosen.folder/f"scene{seed}.inp"
         deck.write_text(scene(seed))
-        try:
-            done = subprocess.run([PROGRAM, deck, "--quiet"], capture_output=True, text=True, timeout=PATIENCE, check=False)
-        except subprocess.TimeoutExpired:
+        done = subprocess.run(["sh", "-c", f'ulimit -t {PATIENCE}; exec "$@"', "sh", PROGRAM, deck, "--quiet"],
+                              capture_output=True, text=True, check=False)
+        if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):
             word, why = "time limit", []
         else:
             said = done.stdout + done.stderr
@@ -113,7 +115,7 @@ def main():
                 cuts, newton = cuts + run.verdict["cuts"], newton + run.verdict["newton"]
                 steps += run.verdict["increments"]
                 if word == "good":
-                    why = judge(run)
+                    why = judge(run, deck.read_text())
                     wrong += bool(why)
         count[word] = count.get(word, 0) + 1
         if word != "good" or why:
@@ -123,4 +125,4 @@ def main():
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(run_scenes(scene, judge, (1, 100), "build/soak-space"))

@@ -9,9 +9,11 @@ from drawn_scenes import draw_case
 from field_check import faults
 from random_scenes import SCENES, UNGUARDED, Outcome, judge
 from random_space import FAULTS, fuzz_space
-from scene_tools import DECKS, PROGRAM, Run
+from scene_tools import DECKS, PROGRAM, Run, run_deck
 from scene_table import judge_seed, table
 from soak import FUZZERS, soak
+from space_crowds import judge as judge_crowd
+from space_crowds import scene
 
 CASES = {"decks": 25, "crossed": 3, "restart": 12, "calls": 4, "kill": 1, "scenes": 12, "space": 10, "words": 20, "damaged": 20}
 
@@ -98,3 +100,16 @@ def test_the_judge_of_fields_sees_a_pull(tmp_path):
     assert faults(case, fields, cut) == {}
     fields._data["contact_pressure"] = 0.3*fields["contact_pressure"]
     assert set(faults(case, fields, cut)) == {"push"}
+
+
+@pytest.mark.parametrize("seed", [1, 15])
+def test_crowds_in_space(seed, tmp_path):
+    """Bodies that fly and bodies that rest, right by a judge that sees what is moved."""
+    deck = tmp_path / "scene.inp"
+    deck.write_text(scene(seed))
+    run = run_deck(deck, tmp_path)
+    assert run.verdict["verdict"] == "good" and judge_crowd(run, scene(seed)) == []
+    run.fields()["displacement"][1] += 0.01*run.fields().x
+    if "*STATIC" in scene(seed):
+        run.fields()["reaction_force"][-1] *= 1.01
+    assert judge_crowd(run, scene(seed)) != []

@@ -1,0 +1,258 @@
+"""Scenes of two to five bodies in space, drawn by a seed, beside what is right.
+
+    .venv/bin/python tests/soak/space_crowds.py [--seeds 1 200] [--folder build/soak-crowds]
+
+Elastic and rigid bodies of all kinds of elements fly into each other, some of them onto a wall, a ball or a plate that is
+held; each fifth scene is one of statics: bodies on each other that contact alone holds, with planes of symmetry. Options
+are those that nobody chose. Energy is that of the history, momentum and weight are summed here from positions and
+densities, overlap is that of `overlap.py`. The exit code is 1 where a run is called good and one of these says otherwise.
+"""
+
+import pathlib
+import random
+import sys
+
+import numpy as np
+
+sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[1]), str(pathlib.Path(__file__).resolve().parents[1]/"scenes")]
+
+import overlap  # noqa: E402
+from contact_space_scenes import RUBBER, ball, bodies, faces, straight  # noqa: E402
+from space_mesh import Block  # noqa: E402
+from space_scenes import BALANCE, UNSEEN, rotation, run_scenes  # noqa: E402
+from wall_space_scenes import REFERENCE, plane, sphere, wall  # noqa: E402
+
+KINDS = ["C3D4", "C3D8", "C3D10", "C3D20"]
+GRAVITY = 2.0
+#: Of the forces in statics, which Newton's method leaves.
+STATIC_BALANCE = 1.0e-7
+
+
+def block(chance, is_ball, size):
+    kind = chance.choice(KINDS)
+    most = 2 if kind in ("C3D10", "C3D20") else 3
+    if is_ball:
+        return Block(kind, (chance.randint(1, most),)*3, size=(2.0, 2.0, 2.0))
+    return Block(kind, tuple(chance.randint(1, most) for _ in range(3)), size=size)
+
+
+def flying(chance, draw, is_plain):
+    """A body about the origin."""
+    is_ball = not is_plain and chance.random() < 0.4
+    size = (1.0, 1.0, 1.0) if is_plain else tuple(chance.uniform(0.6, 1.6) for _ in range(3))
+    own = block(chance, is_ball, size)
+    x = ball(own.x)*chance.uniform(0.4, 0.8) if is_ball else own.x - 0.5*np.array(size)
+    own.x = x if is_plain else x @ rotation(draw).T
+    return straight(own)
+
+
+def reference(i, own, lines=""):
+    node = REFERENCE + i
+    return (f"*NODE\n{node}, {', '.join(map(repr, own.x.mean(0).tolist()))}\n*RIGID BODY, ELSET=B{i}, REF NODE={node}\n"
+            + lines)
+
+
+def starts(all_blocks, rigid, v, w):
+    """Velocities of all bodies."""
+    text, first = "", 0
+    for i, own in enumerate(all_blocks, 1):
+        if i in rigid:
+            rows = [(REFERENCE + i, np.concatenate([v[i - 1], w[i - 1]]))]
+        else:
+            rows = [(first + k, s) for k, s in enumerate(v[i - 1] + np.cross(w[i - 1], own.x - own.x.mean(0)), 1)]
+        text += "".join(f"{node}, {a}, {float(s)!r}\n" for node, row in rows for a, s in enumerate(row, 1) if s)
+        first += len(own.x)
+    return "*INITIAL CONDITIONS, TYPE=VELOCITY\n" + text if text else ""
+
+
+def contact(has_wall, all_blocks):
+    """Everything with everything, and all bodies with a wall."""
+    text = "*SURFACE INTERACTION, NAME=I\n"
+    if not has_wall:
+        return text + "*CONTACT\n*CONTACT INCLUSIONS, ALL EXTERIOR\n*CONTACT PROPERTY ASSIGNMENT\n, , I\n"
+    first, lines = 0, ""
+    for own in all_blocks:
+        lines += "".join(f"{first + e}, S{f}\n" for e, f in own.outer_faces())
+        first += len(own.element)
+    return f"{text}*SURFACE, NAME=ALL\n{lines}*CONTACT PAIR, INTERACTION=I\nALL, ALL\nALL, W\n"
+
+
+def held_plate(own):
+    foot = "".join(f"{k}\n" for k in own.on(2, 0))
+    return f"*NSET, NSET=FOOT\n{foot}*BOUNDARY\nFOOT, 1, 3\n"
+
+
+def dynamics(seed):
+    chance, draw = random.Random(f"crowd {seed}"), np.random.default_rng(seed)
+    is_plain = seed % 3 == 0
+    floor = chance.choice(["", "", "plane", "sphere", "plate"])
+    n, gap = chance.randint(2, 5), chance.choice([0.0, 0.01, 0.03]) if is_plain else chance.uniform(0.005, 0.05)
+    all_blocks, v, w = [], [], []
+    for i in range(n):
+        own = flying(chance, draw, is_plain)
+        way = np.array([0.0, 0.0, 1.0])
+        if floor == "plate" and i == 0:
+            own = Block(chance.choice(KINDS), (2, 2, 1), size=(3.0, 3.0, 0.6))
+            straight(own).x -= np.array([1.5, 1.5, 0.6])
+        elif not is_plain:
+            way = draw.normal(size=3) + (np.array([0.0, 0.0, 3.0]) if floor else 0.0)
+            way /= np.linalg.norm(way)
+        if i > 0 or floor in ("plane", "sphere"):
+            if not (is_plain and chance.random() < 0.5):
+                own.x += np.append(draw.uniform(-0.3, 0.3, 2), 0.0)
+            top = max((b.x @ way).max() for b in all_blocks) if all_blocks else 0.0
+            own.x += way*(top + gap - (own.x @ way).min())
+            if floor:
+                own.x[:, 2] += max(0.0, gap - own.x[:, 2].min())
+        all_blocks.append(own)
+        rests = (i == 0 and not floor) or (floor == "plate" and i == 0)
+        v.append(np.zeros(3) if rests else -way*chance.uniform(0.5, 1.0))
+        w.append(np.zeros(3) if is_plain or rests else draw.normal(size=3)*chance.choice([0.0, 0.5]))
+    rigid = {i for i in range(1, n + 1) if chance.random() < 0.25 and not (floor == "plate" and i == 1)}
+    text = bodies(all_blocks, [faces(b) for b in all_blocks])
+    text += "".join(reference(i, all_blocks[i - 1]) for i in sorted(rigid))
+    if floor in ("plane", "sphere"):
+        text += wall(plane() if floor == "plane" else sphere(2.0, (0.0, 0.0, -2.0)))
+        text += f"*BOUNDARY\n{REFERENCE}, ENCASTRE\n"
+    elif floor:
+        text += held_plate(all_blocks[0])
+    text += contact(floor in ("plane", "sphere"), all_blocks) + starts(all_blocks, rigid, v, w)
+    text += f"*STEP, NLGEOM, INC=10000\n*DYNAMIC\n{chance.choice([0.01, 0.02, 0.04])}, 0.6\n"
+    if floor and chance.random() < 0.5:
+        text += "*DLOAD\n" + "".join(f"B{i}, GRAV, {GRAVITY}, 0., 0., -1.\n" for i in range(1, n + 1))
+    return text + "*NODE FILE\nU\n*END STEP\n"
+
+
+def statics(seed):
+    """Bodies on each other, each with two planes of symmetry."""
+    chance = random.Random(f"crowd {seed}")
+    floor, n = chance.choice(["plane", "support"]), chance.randint(2, 5)
+    all_blocks, z, held, first, rigid = [], 0.0, "", 0, set()
+    load = chance.choice(["gravity", "pressure", "driven"])
+    for i in range(n):
+        is_ball = 0 < i < n - 1 and chance.random() < 0.4
+        size = tuple(chance.uniform(0.6, 1.6) for _ in range(3))
+        own = block(chance, is_ball, size)
+        if is_ball:                                  # a quarter of it
+            own.x = ball(own.x*[0.5, 0.5, 1.0] + [1.0, 1.0, 0.0])
+            straight(own)
+        gap = chance.choice([0.0, 0.0, 0.01]) if i > 0 or floor == "plane" else 0.0
+        own.x[:, 2] += z + gap - own.x[:, 2].min()
+        z = own.x[:, 2].max()
+        all_blocks.append(own)
+        if 0 < i < n - 1 and not is_ball and chance.random() < 0.2:
+            rigid.add(i + 1)
+            held += f"{REFERENCE + i + 1}, 1, 2\n{REFERENCE + i + 1}, 4, 6\n"
+        else:
+            held += "".join(f"{first + k}, {a + 1}\n" for a in (0, 1) for k in own.on(a, 0))
+        if i == 0 and floor == "support":
+            held += "".join(f"{first + k}, 3\n" for k in own.on(2, 0))
+        if i == n - 1 and load == "driven":
+            driven = [first + k for k in own.on(2, 1)]
+        first += len(own.x)
+    text = bodies(all_blocks, [faces(b) for b in all_blocks], "*HYPERELASTIC, NEO HOOKE\n200., 2e-3\n*DENSITY\n1.\n")
+    text += "*SURFACE, NAME=TOP\n" + "".join(
+        f"{sum(len(b.element) for b in all_blocks[:-1]) + e}, S{f}\n" for e, f in faces(all_blocks[-1], 2, 1))
+    text += "".join(reference(i, all_blocks[i - 1]) for i in sorted(rigid))
+    if floor == "plane":
+        text += wall(plane())
+        held += f"{REFERENCE}, ENCASTRE\n"
+    text += contact(floor == "plane", all_blocks) + f"*BOUNDARY\n{held}*STEP, NLGEOM\n*STATIC\n0.25, 1.\n"
+    if load == "gravity":
+        text += "*DLOAD\n" + "".join(f"B{i}, GRAV, {GRAVITY}, 0., 0., -1.\n" for i in range(1, n + 1))
+    elif load == "pressure":
+        text += "*DSLOAD\nTOP, P, 10.\n"
+    else:
+        text += "*BOUNDARY\n" + "".join(f"{k}, 3, 3, -0.08\n" for k in driven)
+    return text + "*NODE FILE\nU, RF\n*END STEP\n"
+
+
+def scene(seed):
+    return statics(seed) if seed % 5 == 0 else dynamics(seed)
+
+
+# ---- what is right --------------------------------------------------------------------------------
+
+
+def masses(fields, density=1.0):
+    """Of nodes, by linear tetrahedra and trilinear cubes of the corners: the mass of a body whose edges are straight, and
+    by its middle the first moment, as any element of it has them; elements of more nodes share theirs out as the
+    integrals of their own shape functions."""
+    mass = np.zeros(len(fields.x))
+    for cell in fields.cells:
+        nodes = np.asarray(cell)
+        mass[nodes] += density*integrals(fields.x[nodes])
+    return mass
+
+
+def integrals(x):
+    """Integrals of the shape functions of an element over its volume."""
+    if len(x) in (4, 10):
+        volume = np.linalg.det(x[1:4] - x[0])/6.0
+        return volume*np.array([0.25]*4) if len(x) == 4 else volume*np.array([-0.05]*4 + [0.2]*6)
+    point, weight = np.polynomial.legendre.leggauss(3)
+    total = np.zeros(len(x))
+    for i, j, k in np.ndindex(3, 3, 3):
+        n, d = cube_shapes(np.array([point[i], point[j], point[k]]), len(x))
+        total += weight[i]*weight[j]*weight[k]*np.linalg.det(d @ x)*n
+    return total
+
+
+CORNERS = np.array([[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1], [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]])
+EDGES = [(0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7)]
+
+
+def cube_shapes(r, n_node):
+    """Shape functions and their derivatives (3, n) of cubes of 8 or 20 nodes."""
+    at = np.vstack([CORNERS, [(CORNERS[a] + CORNERS[b])/2 for a, b in EDGES]])[:n_node]
+    n, d = np.zeros(n_node), np.zeros((3, n_node))
+    for k, c in enumerate(at):
+        part = np.where(c == 0, 1 - r**2, (1 + r*c)/2)
+        slope = np.where(c == 0, -2*r, c/2)
+        n[k] = part.prod()
+        d[:, k] = [slope[a]*part[(a + 1) % 3]*part[(a + 2) % 3] for a in range(3)]
+    for k in range(8, n_node):                       # corners less half of the edges that meet there
+        for c in EDGES[k - 8]:
+            n[c] -= n[k]/2
+            d[:, c] -= d[:, k]/2
+    return n, d
+
+
+def judge(run, deck):
+    """What is wrong with a run that is called good."""
+    history, fields, found = run.history, run.fields(), []
+    deepest = overlap.worst(fields)
+    if deepest.by_edge > run.verdict["penetration"] + UNSEEN:
+        found.append(f"overlap {deepest.by_edge:.3g}, told {run.verdict['penetration']:.3g}")
+    if "*STATIC" in deck:
+        return found + judge_rest(fields, deck)
+    stored = history["kinetic"] + history["strain"] - history["external_work"]
+    if np.ptp(stored) > BALANCE*(history["kinetic"] + history["strain"]).max():
+        found.append(f"energy {np.ptp(stored)/(history['kinetic'] + history['strain']).max():.1e}")
+    if "*BOUNDARY" in deck:
+        return found
+    step = np.diff(fields.time)[:, None]
+    u = fields["displacement"]
+    mass = masses(fields)
+    p = np.einsum("n,tnk->tk", mass, np.diff(u, axis=0))/step
+    size = (np.einsum("n,tn->t", np.abs(mass), np.linalg.norm(np.diff(u, axis=0), axis=2))/step[:, 0]).max()
+    if np.abs(p - p[0]).max() > BALANCE*size:
+        found.append(f"momentum {np.abs(p - p[0]).max()/size:.1e}")
+    return found
+
+
+def judge_rest(fields, deck):
+    """What supports bear along z is the load."""
+    reaction = fields["reaction_force"][-1, :, 2]
+    if "GRAV" in deck:
+        load = -GRAVITY*masses(fields).sum()
+    elif "DSLOAD" in deck:
+        return []                                    # the face follows
+    else:
+        load = 0.0
+    miss = abs(reaction.sum() + load)
+    return [f"weight {miss:.2g}"] if miss > STATIC_BALANCE*np.abs(reaction).sum() else []
+
+
+if __name__ == "__main__":
+    sys.exit(run_scenes(scene, judge, (1, 200), "build/soak-crowds"))
