@@ -7,7 +7,7 @@ module emcon_patch_gap_space
       frame_vertex_t, n_frame_var
    use emcon_kinds, only : wp
    use emcon_patch_moments_space, only : patch_misses, patch_moment_slopes, patch_moments
-   use emcon_polygon_clip, only : barycentric
+   use emcon_polygon_clip_space, only : barycentric
    implicit none
    private
    public :: patch_t, patch_gap_t, patch_gap, patch_look_t, patch_look

@@ -5,8 +5,8 @@
 !> Source: docs/theory.md, eqs. (45) and (49).
 module emcon_patch_moments_space
    use emcon_kinds, only : wp
-   use emcon_polygon_clip, only : most_corners, polygon_clip, polygon_inside, polygon_misses, &
-      square_sides
+   use emcon_polygon_clip_space, only : most_corners, polygon_clip, polygon_inside, &
+      polygon_misses, square_sides
    implicit none
    private
    public :: patch_moments, patch_moment_slopes, patch_misses

@@ -9,7 +9,7 @@ module emcon_tie_cells_space
    use emcon_facets, only : facets_length
    use emcon_gauss, only : gauss_points
    use emcon_kinds, only : wp
-   use emcon_polygon_clip, only : barycentric, most_corners, polygon_clip, polygon_misses, &
+   use emcon_polygon_clip_space, only : barycentric, most_corners, polygon_clip, polygon_misses, &
       triangle_sides
    use emcon_rotation, only : cross_product
    use emcon_tie_shapes_space, only : most_nodes, tie_shapes

@@ -35,7 +35,7 @@ contains
       real(wp), intent(in) :: w(:, :)            !! (n, n) none of whose x.W x is below 0 [T^2/M]
       real(wp), intent(in) :: free(:)            !! (n) gaps without pushes, b [L]
       real(wp), intent(out) :: push(:)           !! (n) lam [M L/T^2]
-      logical, intent(out) :: is_solved
+      logical, intent(out) :: is_solved          !! else `push` is 0
       integer, intent(out) :: n_step             !! pushes that were added or taken away
       type(pushing_t) :: set
       real(wp) :: gap(size(free)), room(size(free))

@@ -2,7 +2,7 @@
 !>
 !> The convex polygon is the set of places y at which all of its sides, s(1) + s(2) y1 + s(3) y2,
 !> are 0 or more. Source: Sutherland and Hodgman (1974).
-module emcon_polygon_clip
+module emcon_polygon_clip_space
    use emcon_kinds, only : wp
    implicit none
    private
@@ -21,8 +21,8 @@ contains
 
    !> How far inside a side a place is.
    pure real(wp) function polygon_inside(side, y) result(inside)
-      real(wp), intent(in) :: side(3)
-      real(wp), intent(in) :: y(2)
+      real(wp), intent(in) :: side(3)            !! s of the side
+      real(wp), intent(in) :: y(2)               !! the place
 
       inside = side(1) + (side(2)*y(1) + side(3)*y(2))
    end function polygon_inside
@@ -105,4 +105,4 @@ contains
 
    end function barycentric
 
-end module emcon_polygon_clip
+end module emcon_polygon_clip_space
