@@ -103,6 +103,7 @@ program main
    use test_links, only : collect_links
    use test_loads, only : collect_loads
    use test_pressure_law, only : collect_pressure_law
+   use test_push_problem, only : collect_push_problem
    use test_press_face, only : collect_press_face
    use test_march, only : collect_march
    use test_march_check, only : collect_march_check
@@ -346,6 +347,7 @@ program main
    call run("linear_rows", collect_linear_rows)
    call run("loads", collect_loads)
    call run("pressure_law", collect_pressure_law)
+   call run("push_problem", collect_push_problem)
    call run("press_face", collect_press_face)
    call run("rigid_motion", collect_rigid_motion)
    call run("rigidity", collect_rigidity)
