@@ -280,12 +280,7 @@ contains
          call look_at_open(self, contact, i, id, closes, status)
          ! What the pairs take in may hold the bodies away from their guards.
          if (.not. closes .or. (contact%slack > 0.0_wp .and. self%candidates%have_changed)) return
-         if (self%candidates%has_left(id) .and. self%candidates%is_back(id)) then
-            ! At the end of what it sees, where it neither holds nor is free: the next step looks
-            ! anew.
-            if (.not. self%rules%may_cut) return
-            status = step_too_far
-         end if
+         if (self%candidates%has_left(id) .and. self%candidates%is_back(id)) status = step_too_far
          self%candidates%is_back(id) = self%candidates%has_left(id)
          if (self%friction%is_on) call friction_close(self%friction, system, pair, i, motion, &
             contact%state(i)%gap1 - gap_to_hold(self, contact%state(i), id), &
