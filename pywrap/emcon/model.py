@@ -200,8 +200,9 @@ class Model(Source):
     def surface(self, name: str, *, faces: ArrayLike | Sequence[tuple[Any, int]] | None = None,
                 elements: Where | None = None, nodes: Where | None = None,
                 edges: ArrayLike | None = None,
-                segments: Sequence[tuple[Any, ...]] | None = None) -> Model:
-        """`*SURFACE`: made of faces, of the free faces of elements, of nodes, of edges, or a profile.
+                segments: Sequence[tuple[Any, ...]] | None = None,
+                stl: str | os.PathLike[str] | None = None, scale: Number | None = None) -> Model:
+        """`*SURFACE`: of faces, of free faces of elements, of nodes, of edges, a profile, a file.
 
         faces      (k, 2): element (or element set) and face 1..4; face i of an element goes from
                    corner i to the next; in space 1..6, as docs/deck.md counts them
@@ -210,13 +211,19 @@ class Model(Source):
         edges      (k, 2): first and last node of each edge
         segments   ("START", x, y), then ("LINE", x, y) or ("CIRCL", x, y, xc, yc): lines and arcs
                    for `rigid_body(profile=)`, the body to the right [L]
+        stl        file of triangles in space, text or binary, beside the deck; for
+                   `rigid_body(profile=)`; its lengths are `scale` (default 1) of the model's
         """
         given = [kind for kind, value in (("faces", faces), ("elements", elements),
-                                          ("nodes", nodes), ("edges", edges), ("segments", segments))
+                                          ("nodes", nodes), ("edges", edges),
+                                          ("segments", segments), ("stl", stl))
                  if value is not None]
         if len(given) != 1:
-            raise InputError(f"surface {name} is made of faces, elements, nodes, edges or segments, "
-                             f"one of them, not {len(given)}")
+            raise InputError(f"surface {name} is made of faces, elements, nodes, edges, segments "
+                             f"or a file, one of them, not {len(given)}")
+        if stl is not None:
+            return self._card("SURFACE", {"NAME": name, "TYPE": "STL", "INPUT": os.fspath(stl),
+                                          "SCALE": scale})
         what = f"surface {name}"
         rows: Sequence[Sequence[object]] = ()
         data = ""
@@ -440,15 +447,32 @@ class Model(Source):
         return self
 
     def tie(self, name: str, slave: str, master: str, *,
-            position_tolerance: Number | None = None, multiplier: str | None = None) -> Model:
-        """`*TIE` of two surfaces.
+            position_tolerance: Number | None = None, multiplier: str | None = None,
+            translation: Sequence[Number] | None = None, reference: int | str | None = None,
+            cyclic_symmetry: bool = False) -> Model:
+        """`*TIE` of two surfaces, of a cell that repeats itself or of a sector.
 
         position_tolerance   how far apart they may be [L]; default a tenth of an edge
         multiplier           DUAL (default) or STANDARD
+        translation          (2,) or (3,) from the slave to where it lies on the master [L]
+        reference            node whose displacement adds to the translation
+        cyclic_symmetry      the slave turned by a sector lies on the master: see `sectors`
         """
         return self._card("TIE", {"NAME": name, "POSITION TOLERANCE": position_tolerance,
                                   "MULTIPLIER": multiplier, "ADJUST": "YES",
-                                  "TYPE": "SURFACE TO SURFACE"}, [(slave, master)])
+                                  "TYPE": "SURFACE TO SURFACE",
+                                  "TRANSLATION": translation is not None, "REF NODE": reference,
+                                  "CYCLIC SYMMETRY": cyclic_symmetry},
+                          [(slave, master, *(translation or ()))])
+
+    def sectors(self, n: int, a: Sequence[Number], b: Sequence[Number], *,
+                tie: str | None = None) -> Model:
+        """`*CYCLIC SYMMETRY MODEL`: the model is one of n equal sectors of a full turn.
+
+        a, b   two points of the axis, (2,) or (3,) [L]
+        tie    that of the two cuts; needed where there are several ties
+        """
+        return self._card("CYCLIC SYMMETRY MODEL", {"N": n, "TIE": tie}, [(*a, *b)])
 
     def equation(self, terms: Sequence[tuple[str | int, int, Number]]) -> Model:
         """`*EQUATION`: the sum of coefficient times displacement over the terms is 0.

@@ -51,7 +51,7 @@ contains
             // "'solid', and else it has a header of " // to_text(header_bytes) // " bytes"
       else
          fault = "byte " // to_text(title_bytes + 1) // ": a count of facets with which a " &
-            // "binary file has " // whole(n_needed) // " bytes, but this one has " // &
+            // "binary file has " // trim(whole(n_needed)) // " bytes, but this one has " // &
             to_text(len(bytes))
       end if
       if (fault == "") then
@@ -202,11 +202,9 @@ contains
 
    pure function whole(number) result(text)
       integer(int64), intent(in) :: number
-      character(len=:), allocatable :: text
-      character(len=24) :: digits
+      character(len=24) :: text
 
-      write(digits, "(i0)") number
-      text = trim(digits)
+      write(text, "(i0)") number
    end function whole
 
 end module emcon_deck_stl_file_space

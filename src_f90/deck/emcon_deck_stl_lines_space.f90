@@ -70,8 +70,8 @@ contains
       end do
       allocate(card%facet(0))
       associate (from => source%file(card%first))
-         path = beside(source%file_name(from)%text, from <= n_memory, &
-            option(option_place(option, "INPUT"))%value)
+         call find_beside(source%file_name(from)%text, from <= n_memory, &
+            option(option_place(option, "INPUT"))%value, path)
          call text_file_read(path, bytes, fault)
          if (fault == "") call stl_corners(bytes, corner, fault)
          if (fault /= "") then
@@ -88,10 +88,10 @@ contains
    end subroutine read_file
 
    !> A file is sought beside the one that names it, from a text in memory in the working directory.
-   pure function beside(file, is_memory, typed) result(path)
+   pure subroutine find_beside(file, is_memory, typed, path)
       character(len=*), intent(in) :: file, typed
       logical, intent(in) :: is_memory
-      character(len=:), allocatable :: path
+      character(len=:), allocatable, intent(out) :: path
 
       path = stripped(typed, " " // achar(9))
       if (len(path) > 1) then
@@ -100,7 +100,7 @@ contains
       end if
       if (index(path, "/") /= 1 .and. .not. is_memory .and. path /= "") &
          path = file(:index(file, "/", back=.true.)) // path
-   end function beside
+   end subroutine find_beside
 
    !> The nine coordinates of each facet, to all their digits.
    subroutine facet_lines(corner, line)

@@ -86,31 +86,31 @@ contains
          call card_error(reader, card, "no facet has an area")
       else if (soup%branch%n > 0) then
          call card_error(reader, card, "the surface branches: more than two facets meet in " // &
-            many(soup%branch, "side"))
+            trim(many(soup%branch, "side")))
       else if (soup%twisted%n > 0) then
          call card_error(reader, card, "the surface has no outside: going around, facet " // &
             to_text(soup%twisted%first) // " faces both ways")
       end if
-      if (soup%flat%n > 0) call card_warning(reader, card, many(soup%flat, "facet") // &
+      if (soup%flat%n > 0) call card_warning(reader, card, trim(many(soup%flat, "facet")) // &
          " without area left out")
-      if (soup%turned%n > 0) call card_warning(reader, card, many(soup%turned, "facet") // &
+      if (soup%turned%n > 0) call card_warning(reader, card, trim(many(soup%turned, "facet")) // &
          " turned over, as most around face the other way")
       if (soup%is_inward) call card_warning(reader, card, "the facets of the closed surface " // &
          "face inwards: it is a hole, and bodies are to be inside of it")
       if (soup%open%n > 0) call card_warning(reader, card, "the surface is not closed: " // &
-         many(soup%open, "side") // " of one facet alone; bodies are to be on the side that its " &
-         // "facets face")
+         trim(many(soup%open, "side")) // " of one facet alone; bodies are to be on the side " &
+         // "that its facets face")
    end subroutine tell
 
    !> "3 facets (the first: facet 7)".
    pure function many(finding, what) result(text)
       type(finding_t), intent(in) :: finding
       character(len=*), intent(in) :: what
-      character(len=:), allocatable :: text
+      character(len=80) :: text
 
       text = to_text(finding%n) // " " // what
-      if (finding%n > 1) text = text // "s"
-      text = text // " (the first: facet " // to_text(finding%first) // ")"
+      if (finding%n > 1) text = trim(text) // "s"
+      text = trim(text) // " (the first: facet " // to_text(finding%first) // ")"
    end function many
 
 end module emcon_deck_stl_space

@@ -75,7 +75,7 @@ contains
          text = tie_text(scene, tie) // to_text(size(lonely)) // " of " // to_text(size(node)) // &
             " nodes of slave surface " // scene%surface(tie%slave)%name // &
             " have no partner on master surface " // scene%surface(tie%master)%name // &
-            " within the position tolerance (" // tolerance_text(tie, default_text) // &
+            " within the position tolerance (" // trim(tolerance_text(tie, default_text)) // &
             "), from " // to_text(minval(distance(:n))) // " to " // &
             to_text(maxval(distance(:n))) // &
             " off; node (distance): " // joined(found, ", ", most_named) // "; " // advice
@@ -132,7 +132,7 @@ contains
          scene%surface(tie%slave)%name // " and master surface " // &
          scene%surface(tie%master)%name // ": the surfaces do not meet: the nearest points " // &
          "are " // to_text(least) // " apart (node " // to_text(scene%node%label(nearest)) // &
-         "), the position tolerance is " // tolerance_text(tie, default_text) // &
+         "), the position tolerance is " // trim(tolerance_text(tie, default_text)) // &
          "; move a body, or raise POSITION TOLERANCE")
    end subroutine raise_apart
 
@@ -159,7 +159,7 @@ contains
          to_text(size(partners%hole)) // " faces of slave surface " // &
          scene%surface(tie%slave)%name // " lie over a hole in master surface " // &
          scene%surface(tie%master)%name // " longer than the position " // &
-         "tolerance (" // tolerance_text(tie, default_text) // &
+         "tolerance (" // trim(tolerance_text(tie, default_text)) // &
          "); nodes of the face (length): " // joined(found, ", ", most_named) // "; " // advice)
    end subroutine raise_holes
 

@@ -66,7 +66,8 @@ contains
                scene%surface(tie%master)%name // ": the surfaces do not meet: slave node " // &
                to_text(scene%node%label(slave%node(k))) // ", the nearest one, is " // &
                to_text(distance(k)) // " from the master, the position tolerance is " // &
-               tolerance_text(tie, default_text) // "; move a body, or raise POSITION TOLERANCE")
+               trim(tolerance_text(tie, default_text)) &
+               // "; move a body, or raise POSITION TOLERANCE")
          else
             call raise_nodes(scene, tie, pack(slave%node, is_far), pack(distance, is_far), &
                size(slave%node), error)
@@ -91,7 +92,7 @@ contains
       call raise(error, err_input, tie_text(scene, tie) // to_text(size(node)) // " of " // &
          to_text(n_node) // " nodes of slave surface " // scene%surface(tie%slave)%name // &
          " are farther from master surface " // scene%surface(tie%master)%name // &
-         " than the position tolerance (" // tolerance_text(tie, default_text) // &
+         " than the position tolerance (" // trim(tolerance_text(tie, default_text)) // &
          "); node (distance): " // joined(found, ", ", most_named) // "; " // advice)
    end subroutine raise_nodes
 
@@ -154,7 +155,7 @@ contains
          to_text(size(cells)) // " faces of slave surface " // scene%surface(tie%slave)%name // &
          " have less before them of master surface " // scene%surface(tie%master)%name // &
          " than all but a strip as wide as the position tolerance (" // &
-         tolerance_text(tie, default_text) // "): " // &
+         trim(tolerance_text(tie, default_text)) // "): " // &
          joined(found, "; ", most_named) // "; " // advice)
    end subroutine raise_faces
 

@@ -24,11 +24,11 @@ contains
       text = where_text(scene, tie%origin) // ": error: tie " // tie%name // ": "
    end function tie_text
 
-   pure integer function tie_length(scene, tie)
+   pure integer function tie_length(scene, tie) result(length)
       type(scene_t), intent(in) :: scene
       type(tie_t), intent(in) :: tie
 
-      tie_length = len(where_text(scene, tie%origin)) + len(": error: tie : ") + len(tie%name)
+      length = len(where_text(scene, tie%origin)) + len(": error: tie : ") + len(tie%name)
    end function tie_length
 
    !> An error if one of the surfaces has no facets, or if they have nodes in common.
@@ -66,7 +66,7 @@ contains
    pure function tolerance_text(tie, default_text) result(text)
       type(tie_t), intent(in) :: tie
       character(len=*), intent(in) :: default_text   !! where the deck gives none
-      character(len=:), allocatable :: text
+      character(len=len(default_text) + 32) :: text      ! of a number the longest
 
       text = default_text
       if (tie%tolerance >= 0.0_wp) text = to_text(tie%tolerance)

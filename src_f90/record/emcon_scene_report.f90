@@ -164,7 +164,7 @@ contains
          is_dynamic = any(step_is_dynamic(scene%step))
          call choose("contact", size(system%contact) > 0, "no *CONTACT PAIR, no *CONTACT")
          call choose("guards", any([(system%contact(k)%contact%slack > 0.0_wp, k = 1, &
-            size(system%contact))]), no_guards(scene))
+            size(system%contact))]), trim(no_guards(scene)))
          call add_first_contact(stepper, rows)
          call choose("ties and equations", system%space%linear%n > 0, &
             "no *TIE, no *EQUATION, no *RIGID BODY")
@@ -198,7 +198,7 @@ contains
    !> Why no pair has guards.
    pure function no_guards(scene) result(text)
       type(scene_t), intent(in) :: scene
-      character(len=:), allocatable :: text
+      character(len=40) :: text
       logical :: has_one_side(size(scene%pair))
       integer :: k
 

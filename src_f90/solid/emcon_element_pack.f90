@@ -87,12 +87,14 @@ contains
       integer, intent(in) :: n_dim               !! > 0
       integer, intent(in) :: n_most              !! nodes, >= 0
       logical, intent(in) :: with_tangent        !! else there is none for a tangent
-      type(pack_motion_t), intent(inout) :: motion         !! not allocated before
-      type(pack_response_t), intent(inout) :: response     !! not allocated before
+      type(pack_motion_t), intent(inout) :: motion         !! what it has already stays
+      type(pack_response_t), intent(inout) :: response     !! so does what this has
 
-      allocate(motion%from(n_lane, n_dim, n_most), motion%by(n_lane, n_dim, n_most), &
-         response%force(n_lane, n_dim, n_most), response%magnitude(n_lane, n_dim, n_most))
-      if (with_tangent) allocate(response%tangent(n_lane, n_dim, n_most, n_dim, n_most))
+      if (.not. allocated(motion%from)) allocate(motion%from(n_lane, n_dim, n_most), &
+         motion%by(n_lane, n_dim, n_most), response%force(n_lane, n_dim, n_most), &
+         response%magnitude(n_lane, n_dim, n_most))
+      if (with_tangent .and. .not. allocated(response%tangent)) &
+         allocate(response%tangent(n_lane, n_dim, n_most, n_dim, n_most))
    end subroutine pack_make_room
 
    !> The motion of the nodes of each element.

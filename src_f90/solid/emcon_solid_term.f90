@@ -27,6 +27,12 @@ module emcon_solid_term
    private
    public :: solid_term_t, solid_term_init
 
+   !> Work space of a thread, made once.
+   type :: pack_room_t
+      type(pack_motion_t) :: motion
+      type(pack_response_t) :: response
+   end type pack_room_t
+
    type, extends(term_t) :: solid_term_t
       type(solid_t) :: solid
       real(wp) :: square = 1.0_wp                !! part of squares in strains; 0: small strains
@@ -35,6 +41,7 @@ module emcon_solid_term
       type(element_slots_t), private :: to       !! places of element matrices
       type(host_response_t), private :: user    !! what given laws answer
       type(pack_shares_t), private :: shares    !! of the threads
+      type(pack_room_t), allocatable, private :: room(:)   !! (>= n_share)
    contains
       procedure :: lay_out
       procedure :: begin_step
@@ -122,6 +129,10 @@ contains
          return
       end if
       call shares_lay_out(self%shares, self%solid%pack, size(motion%by, 2), response%n_thread)
+      if (allocated(self%room)) then
+         if (size(self%room) < self%shares%n) deallocate(self%room)
+      end if
+      if (.not. allocated(self%room)) allocate(self%room(self%shares%n))
       if (self%shares%n == 1) then               ! a team of one asks the system for each barrier
          call respond_share(self, 1, motion, response, value, side)
       else
@@ -161,17 +172,16 @@ contains
       type(motion_t), intent(in) :: motion       !! placed
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
-      type(pack_response_t) :: part
-      type(pack_motion_t) :: local
       real(wp) :: largest(n_lane)
       integer :: k, l
 
-      local%square = self%square
-      part%with_sizes = response%with_sizes
-      call make_room(self, present(value), local, part)
+      call make_room(self, present(value), self%room(share)%motion, self%room(share)%response)
+      self%room(share)%motion%square = self%square
+      self%room(share)%response%with_sizes = response%with_sizes
       self%shares%inverted(share) = 0
       do k = self%shares%first(share) + 1, self%shares%first(share + 1)
-         associate (pack => self%solid%pack(k), place => self%shares%place(k))
+         associate (pack => self%solid%pack(k), place => self%shares%place(k), &
+               local => self%room(share)%motion, part => self%room(share)%response)
             call pack_gather(pack, motion%from, motion%by, local)
             call solid_pack_respond(self%solid, pack, local, self%user, present(value), part)
             if (any(part%is_inverted)) then
@@ -197,9 +207,13 @@ contains
       logical, intent(in) :: with_tangent
       type(pack_motion_t), intent(inout) :: local
       type(pack_response_t), intent(inout) :: part
+      integer :: k, n_most
 
-      call pack_make_room(self%solid%n_dim, maxval([0, self%solid%pack%n_node]), with_tangent, &
-         local, part)
+      n_most = 0
+      do k = 1, size(self%solid%pack)
+         n_most = max(n_most, self%solid%pack(k)%n_node)
+      end do
+      call pack_make_room(self%solid%n_dim, n_most, with_tangent, local, part)
    end subroutine make_room
 
    !> The nodes that share `share` sums for all shares.

@@ -82,7 +82,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer, parameter :: status(2) = [step_cycling, step_too_far]
       character(len=*), parameter :: told(2) = [character(len=50) :: &
-         "does not settle: it is another one in each try", "where it began"]
+         "does not settle: it is another one in each try", "slides too far for one increment"]
       type(stepper_t) :: stepper
       character(len=:), allocatable :: text
       integer :: i, k

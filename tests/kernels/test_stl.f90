@@ -187,7 +187,7 @@ contains
    !> A facet of a text.
    pure function loop(a, b, c) result(text)
       character(len=*), intent(in) :: a, b, c
-      character(len=:), allocatable :: text
+      character(len=71 + len(a) + len(b) + len(c)) :: text
 
       text = "facet normal 0 0 1" // new_line // "Outer Loop" // new_line // "vertex " // a // &
          new_line // "vertex " // b // new_line // "vertex " // c // new_line // "endloop" // &

@@ -138,7 +138,7 @@ def test_a_held_body_is_a_clamp(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("cards", "text"), [
-    (f"*BOUNDARY\n{REFERENCE}, 4\n", "degrees of freedom 4 to 6 are all held at 0 by one line"),
+    (f"*BOUNDARY\n{REFERENCE}, 4\n", "prescribe degrees of freedom 4 to 6 of a rigid body by one line"),
     (f"*BOUNDARY\n{REFERENCE}, 4, 6, 0.5\n", "driven rotations are not in this version"),
     (f"*BOUNDARY\n{REFERENCE}, XSYMM\n", "single axes"),
     (f"*CLOAD\n{REFERENCE}, 6, 1.\n", "degree of freedom 6 does not exist"),
