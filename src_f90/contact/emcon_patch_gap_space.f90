@@ -1,4 +1,4 @@
-!> The mean height of a surface of triangles over a small one, the patch, that moves with a node.
+!> The mean height of a surface of triangles over a small square, the patch, that moves with a node.
 !>
 !> The field over the frame of the patch is continuous, so its integral is smooth while the patch
 !> slides over sides and corners of the triangles. Source: docs/theory.md, eqs. (43) to (49).
@@ -16,10 +16,10 @@ module emcon_patch_gap_space
    real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
    !> A vertex whose triangles cover so much of the patch at both ends together has half its weight.
    real(wp), parameter :: some = 0.1_wp
-   !> Corners of the patch, in its own coordinates.
+   !> Three corners of the patch, in its own coordinates; affine functions are those of these.
    real(wp), parameter :: patch_corner(2, 3) = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, &
       1.0_wp], [2, 3])
-   real(wp), parameter :: centre = 1.0_wp/3.0_wp
+   real(wp), parameter :: centre = 0.5_wp
 
    !> The triangles that a patch may see in a step.
    type :: patch_t

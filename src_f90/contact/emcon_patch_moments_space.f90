@@ -1,17 +1,21 @@
 !> What a triangle covers of a small one, the patch: moments of the common polygon, and how they
 !> change with the corners.
 !>
-!> Places are given by coordinates y in which the patch is 0 <= y1, y2, y1 + y2 <= 1.
+!> Places are given by coordinates y in which the patch is the square 0 <= y1, y2 <= 1. Moments are
+!> those with 1 - y1 - y2, y1 and y2. What triangles cover of the triangle 0 <= y1, y2,
+!> y1 + y2 <= 1 is clipped here as well.
 !> Source: docs/theory.md, eqs. (45) and (49).
 module emcon_patch_moments_space
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: patch_moments, patch_moment_slopes, patch_misses, patch_clip, most_corners
-   public :: barycentric
+   public :: patch_moments, patch_moment_slopes, patch_misses
+   public :: triangle_clip, triangle_misses, most_corners, barycentric
 
-   !> Corners of what three half planes leave of a triangle, at most.
-   integer, parameter :: most_corners = 6
+   !> Corners of what four half planes leave of a triangle, at most.
+   integer, parameter :: most_corners = 7
+   !> Half planes that a triangle and a square are made of, as `inside` numbers them.
+   integer, parameter :: of_triangle(3) = [1, 2, 3], of_square(4) = [1, 2, 4, 5]
    !> A side of a triangle that lies on one of the patch is half in it, half not: the patch is taken
    !> this much wider and narrower.
    real(wp), parameter :: wider = 1.0e-10_wp
@@ -24,11 +28,11 @@ contains
    pure logical function patch_misses(corner)
       real(wp), intent(in) :: corner(2, 3)       !! of the triangle
 
-      patch_misses = any(maxval(corner, 2) <= 0.0_wp) .or. minval(sum(corner, 1)) >= 1.0_wp
+      patch_misses = any(maxval(corner, 2) <= 0.0_wp) .or. any(minval(corner, 2) >= 1.0_wp)
    end function patch_misses
 
-   !> Moments of the common polygon with the patch' barycentric coordinates, by the area of the
-   !> patch; exactly 0 where there is none. Their sum is the part of the patch that is covered.
+   !> Moments of the common polygon, by the area of the patch; exactly 0 where there is none. Their
+   !> sum is the part of the patch that is covered.
    pure function patch_moments(corner) result(moment)
       real(wp), intent(in) :: corner(2, 3)       !! of the triangle, counter-clockwise
       real(wp) :: moment(3)
@@ -37,18 +41,36 @@ contains
 
       moment = 0.0_wp
       if (patch_misses(corner)) return
-      call patch_clip(corner, polygon, n)
+      call clip(of_square, corner, polygon, n)
       do k = 2, n - 1
          associate (a => polygon(:, k) - polygon(:, 1), b => polygon(:, k + 1) - polygon(:, 1))
-            area = a(1)*b(2) - a(2)*b(1)         ! twice it, by that of the patch, 1/2
+            area = 0.5_wp*(a(1)*b(2) - a(2)*b(1))
          end associate
          centre = (polygon(:, 1) + polygon(:, k) + polygon(:, k + 1))/3.0_wp
          moment = moment + area*[1.0_wp - sum(centre), centre]
       end do
    end function patch_moments
 
-   !> The common polygon of a triangle and the patch, in turn as the corners of the triangle.
-   pure subroutine patch_clip(corner, polygon, n)
+   !> The common polygon of a triangle and that with the corners (0, 0), (1, 0), (0, 1), in turn as
+   !> the corners of the triangle.
+   pure subroutine triangle_clip(corner, polygon, n)
+      real(wp), intent(in) :: corner(2, 3)       !! of the triangle
+      real(wp), intent(out) :: polygon(2, most_corners)      !! places
+      integer, intent(out) :: n                  !! corners that it has; fewer than 3: no area
+
+      call clip(of_triangle, corner, polygon, n)
+   end subroutine triangle_clip
+
+   !> Have they no area in common, as one side of either shows?
+   pure logical function triangle_misses(corner)
+      real(wp), intent(in) :: corner(2, 3)       !! of the triangle
+
+      triangle_misses = any(maxval(corner, 2) <= 0.0_wp) .or. minval(sum(corner, 1)) >= 1.0_wp
+   end function triangle_misses
+
+   !> What half planes leave of a triangle.
+   pure subroutine clip(side, corner, polygon, n)
+      integer, intent(in) :: side(:)             !! of `inside`
       real(wp), intent(in) :: corner(2, 3)       !! of the triangle
       real(wp), intent(out) :: polygon(2, most_corners)      !! places
       integer, intent(out) :: n                  !! corners that it has; fewer than 3: no area
@@ -56,24 +78,27 @@ contains
 
       polygon(:, :3) = corner
       n = 3
-      do k = 1, 3
-         call cut(k, polygon, n)
+      do k = 1, size(side)
+         call cut(side(k), polygon, n)
       end do
-   end subroutine patch_clip
+   end subroutine clip
 
-   !> How far inside the `k`th side of the patch a place is.
+   !> How far inside the `k`th half plane a place is.
    pure real(wp) function inside(k, y)
       integer, intent(in) :: k
       real(wp), intent(in) :: y(2)
 
-      if (k < 3) then
+      select case (k)
+      case (1, 2)
          inside = y(k)
-      else
+      case (3)
          inside = 1.0_wp - (y(1) + y(2))
-      end if
+      case default
+         inside = 1.0_wp - y(k - 3)
+      end select
    end function inside
 
-   !> Cut off of a polygon what is outside of the `k`th side of the patch.
+   !> Cut off of a polygon what is outside of the `k`th half plane.
    pure subroutine cut(k, polygon, n)
       integer, intent(in) :: k
       real(wp), intent(inout) :: polygon(2, most_corners)
@@ -116,8 +141,8 @@ contains
                do i = 1, 2
                   t = low + (high - low)*gauss(i)
                   y = a + t*along
-                  ! Two for the area of the patch, half for the pass, half for the point of Gauss.
-                  at = (0.5_wp*(high - low))*[1.0_wp - sum(y), y]
+                  ! Half for the pass, half for the point of Gauss.
+                  at = (0.25_wp*(high - low))*[1.0_wp - sum(y), y]
                   call add(slope(:, :, k), (1.0_wp - t)*at, along)
                   call add(slope(:, :, next), t*at, along)
                end do
@@ -147,9 +172,9 @@ contains
 
       low = 0.0_wp
       high = 1.0_wp
-      do k = 1, 3
-         here = inside(k, from) + by
-         there = inside(k, from + along) + by
+      do k = 1, size(of_square)
+         here = inside(of_square(k), from) + by
+         there = inside(of_square(k), from + along) + by
          if (max(here, there) <= 0.0_wp) high = low
          if ((here > 0.0_wp) .eqv. (there > 0.0_wp)) cycle
          t = here/(here - there)

@@ -18,8 +18,8 @@ module emcon_patch_sides_space
    public :: point_frames_t, point_frames_init, patch_triangles_t, patch_triangles_init, &
       patch_sides_t, sides_point, frame_normal
 
-   !> The second vector of a frame is turned by 60 degrees: the patch is an equilateral triangle.
-   real(wp), parameter :: turn(2) = [0.5_wp, 0.5_wp*sqrt(3.0_wp)]
+   !> A ring of no direction: its fourth moment is less than this part of that of distances.
+   real(wp), parameter :: round = 1.0e-6_wp
    !> A mean normal shorter than this, by the area, is none.
    real(wp), parameter :: blunt = 1.0e-2_wp
 
@@ -213,12 +213,28 @@ contains
       do k = 1, size(from, 2)
          flat(:, k) = [dot_product(first, from(:, k)), dot_product(second, from(:, k))]
       end do
+      flat = matmul(ring_axes(flat), flat)
       square = matmul(flat, transpose(flat))
       inverse = reshape([square(2, 2), -square(2, 1), -square(1, 2), square(1, 1)], [2, 2]) &
          /(square(1, 1)*square(2, 2) - square(1, 2)*square(2, 1))
       weight = matmul(inverse, flat)
-      weight(2, :) = turn(1)*weight(1, :) + turn(2)*weight(2, :)
    end function frame_weights
+
+   !> The turn to axes that a ring of points has by its shape, whatever its numbers are: those of
+   !> its fourth moment, which fix the square patch. Mirrored rings have mirrored patches.
+   pure function ring_axes(flat) result(turn)
+      real(wp), intent(in) :: flat(:, :)         !! (2, n) [L]
+      real(wp) :: turn(2, 2)
+      complex(wp) :: moment, axis
+
+      associate (place => cmplx(flat(1, :), flat(2, :), wp))
+         moment = sum(place**4)
+         axis = 1.0_wp
+         if (abs(moment) > round*sum(abs(place)**4)) &
+            axis = exp(cmplx(0.0_wp, 0.25_wp*atan2(aimag(moment), real(moment)), wp))
+      end associate
+      turn = reshape([real(axis), -aimag(axis), aimag(axis), real(axis)], [2, 2])
+   end function ring_axes
 
    !> The unit normal of frame `k`, at x + u.
    pure function frame_normal(self, k, node, x, u) result(normal)

@@ -19,7 +19,7 @@ module emcon_patch_stencil_space
    !> A triangle faces a frame if the cosine of their normals is below this.
    real(wp), parameter :: facing = -0.25_wp
    !> Sides of the patch, by the shorter of the facets of both sides.
-   real(wp), parameter :: patch_size = 0.1_wp
+   real(wp), parameter :: patch_size = 0.07_wp
    !> Where a surface ends it goes on by strips of this part of a facet, by less where those of the
    !> slave are smaller, and fades on the last one.
    real(wp), parameter :: flange = 0.2_wp

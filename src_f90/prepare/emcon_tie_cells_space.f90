@@ -9,7 +9,7 @@ module emcon_tie_cells_space
    use emcon_facets, only : facets_length
    use emcon_gauss, only : gauss_points
    use emcon_kinds, only : wp
-   use emcon_patch_moments_space, only : barycentric, most_corners, patch_clip, patch_misses
+   use emcon_patch_moments_space, only : barycentric, most_corners, triangle_clip, triangle_misses
    use emcon_rotation, only : cross_product
    use emcon_tie_shapes_space, only : most_nodes, tie_shapes
    use emcon_tie_sides_space, only : tie_sides_reach, tie_sides_t, triangle_at
@@ -89,8 +89,8 @@ contains
       across = cross_product(other(:, 2) - other(:, 1), other(:, 3) - other(:, 1))
       if (dot_product(across, normal) > facing*norm2(across)*norm2(normal)) return
       call project(corner, normal, other, place, height)
-      if (patch_misses(place)) return
-      call patch_clip(place, polygon, n)
+      if (triangle_misses(place)) return
+      call triangle_clip(place, polygon, n)
       if (n < 3) return
       length = max(facets_length(sides%slave%facets, sides%slave%split%facet(s)), &
          facets_length(sides%master%facets, sides%master%split%facet(t)))
