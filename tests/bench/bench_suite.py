@@ -106,7 +106,7 @@ def run(deck):
     """Why EMCON does not run a deck to its end, None if it does; files are beside the deck."""
     done = emcon(deck, "--quiet", timeout=calculix_suite.MOST)
     if done.returncode == 2:
-        told = re.search(r"(?:error|emcon): (.*)", done.stderr)
+        told = re.search(r"(?:error|emcon): (?:\S+: error: )?(.*)", done.stderr)
         return told[1].split("; supported:")[0]
     if not deck.with_suffix(".json").exists():
         return "*NO ANALYSIS: the deck is read and checked, as it asks"

@@ -21,7 +21,7 @@ def asked(text):
     """The deck, with a request for displacements if it has none."""
     if re.search(r"(?im)^\*NODE (PRINT|FILE)", text):
         return text
-    return re.sub(r"(?im)^\*END STEP", "*NODE FILE\nU\n*END STEP", text)
+    return re.sub(r"(?im)^\*END STEP", "*NODE FILE\nU\n*END STEP", text, count=1)
 
 
 def static(text):
