@@ -4,6 +4,7 @@
 !> Source: docs/theory.md, section 15.
 module emcon_patch_sides_space
    use emcon_csr, only : csr_list_users
+   use emcon_element_kind, only : max_face_nodes
    use emcon_facet_groups, only : facet_groups_init, facet_groups_t, find_turns, group_angle, &
       ridge_angle
    use emcon_facet_split, only : facet_split_centre, facet_split_init, &
@@ -16,7 +17,7 @@ module emcon_patch_sides_space
    implicit none
    private
    public :: point_frames_t, point_frames_init, patch_triangles_t, patch_triangles_init, &
-      patch_sides_t, sides_point, frame_normal
+      patch_sides_t, sides_point, sides_place, frame_normal
 
    !> A ring of no direction: its fourth moment is less than this part of that of distances.
    real(wp), parameter :: round = 1.0e-6_wp
@@ -84,6 +85,23 @@ contains
          weight(:n) = facet_split_centre(n)
       end associate
    end subroutine sides_point
+
+   !> A point of the master, from `node`.
+   pure function sides_place(self, point, node, x, u) result(place)
+      type(patch_sides_t), intent(in) :: self
+      integer, intent(in) :: point               !! of the split
+      integer, intent(in) :: node                !! of the scene
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      real(wp) :: place(3)
+      integer :: k, n, part(max_face_nodes)
+      real(wp) :: weight(max_face_nodes)
+
+      call sides_point(self, point, n, part, weight)
+      place = 0.0_wp
+      do k = 1, n
+         place = place + weight(k)*((x(:, part(k)) - x(:, node)) + (u(:, part(k)) - u(:, node)))
+      end do
+   end function sides_place
 
    !> The frames at all contact points of a surface: at a node of each smooth group of its facets
    !> there, and of all of them where there are several; at a centre of its facet.

@@ -8,28 +8,23 @@ module emcon_patch_stencil_space
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : nearest_t, nearest_update
    use emcon_patch_gap_space, only : patch_t
-   use emcon_patch_sides_space, only : patch_sides_t, sides_point
+   use emcon_patch_near_space, only : patch_near_faces, patch_near_find, patch_near_nearest, &
+      patch_near_list, patch_near_t, room_behind
+   use emcon_patch_sides_space, only : frame_normal, patch_sides_t, sides_place, sides_point
    use emcon_rotation, only : cross_product
    use emcon_sort, only : unique_sorted
-   use emcon_touch_rule_space, only : touch_rule_space_is_through
    implicit none
    private
    public :: patch_stencil_t, patch_stencil_choose, patch_stencil_gather, patch_stencil_height
 
-   !> A triangle faces a frame if the cosine of their normals is below this.
-   real(wp), parameter :: facing = -0.25_wp
-   !> How steep that is along the frame.
-   real(wp), parameter :: steepest = sqrt(1.0_wp - facing**2)/(-facing)
    !> Sides of the patch, by the shorter of the facets of both sides.
    real(wp), parameter :: patch_size = 0.07_wp
    !> Where a surface ends it goes on by strips of this part of a facet, by less where those of the
    !> slave are smaller, and fades on the last one.
    real(wp), parameter :: flange = 0.2_wp
    integer, parameter :: n_strip = 2
-   !> A node is behind a triangle by no more than so many of its distances, and this by the facet.
-   real(wp), parameter :: distances = 2.0_wp, room_behind = 0.2_wp
-   !> Triangles at distances that differ by less than this, per facet, are as near.
-   real(wp), parameter :: as_near = 1.0e-6_wp
+   !> A node is behind a triangle by no more than so many of its distances, and `room_behind`.
+   real(wp), parameter :: distances = 2.0_wp
 
    !> The patch of one frame for a step, and its vertices as sums of nodes.
    type :: patch_stencil_t
@@ -47,17 +42,6 @@ module emcon_patch_stencil_space
       real(wp), allocatable :: weight(:, :)
    end type patch_stencil_t
 
-   !> Triangles that are near, seen from the slave node.
-   type :: near_t
-      integer :: n = 0
-      integer, allocatable :: triangle(:)        !! (n)
-      real(wp), allocatable :: corner(:, :, :)   !! (3, 3, n) from the slave node [L]
-      real(wp), allocatable :: normal(:, :)      !! (3, n) outwards, of length 1
-      real(wp), allocatable :: distance(:)       !! (n) [L]
-      logical, allocatable :: is_listed(:)       !! (n) the patch looks at it
-      logical, allocatable :: is_apart(:)        !! (n) it is of another layer than the nearest
-   end type near_t
-
 contains
 
    !> Choose the stencil of frame `frame` of the slave at x + u, where the facets `facet` of the
@@ -69,19 +53,18 @@ contains
       integer, intent(in) :: frame               !! 1 to the number of all frames
       integer, intent(in) :: facet(:)            !! ascending
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      type(near_t) :: near
+      type(patch_near_t) :: near
       real(wp) :: normal(3)
       integer :: i, nearest
 
       self%triangle = 0
       if (size(facet) == 0) return
       i = sides%frames%point(frame)
-      call look_around(sides, i, facet, x, u, near)
-      nearest = nearest_to(sides, frame, near, x, u)
+      call patch_near_find(near, sides, i, facet, x, u)
+      nearest = patch_near_nearest(near, sides, frame, x, u)
       if (nearest == 0) return
-      normal = frame_normal(sides, i, frame, x, u)
-      call find_layer(sides, near, nearest, normal)
-      call list_triangles(sides, near, nearest, normal)
+      normal = frame_normal(sides%frames, frame, sides%frames%base(i), x, u)
+      call patch_near_list(near, sides, nearest, normal)
       self%deepest = room_behind*sides%triangles%size(near%triangle(nearest)) - distances &
          *near%distance(nearest)/dot_product(near%normal(:, nearest), normal)
       self%triangle = near%triangle(nearest)
@@ -90,228 +73,12 @@ contains
       call make_patch(self, sides, frame, near, normal, x, u)
    end subroutine patch_stencil_choose
 
-   !> Where the triangles of facets are, from contact point `i` of the slave. Those that it is on
-   !> the other side of face nothing.
-   pure subroutine look_around(sides, i, facet, x, u, near)
-      type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: i, facet(:)
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      type(near_t), intent(out) :: near
-      type(nearest_t) :: nearest
-      real(wp) :: origin(3)
-      integer :: f, t
-
-      origin = point_origin(sides, i, x, u)
-      associate (start => sides%triangles%split%start)
-         near%triangle = [((t, t = start(facet(f)), start(facet(f) + 1) - 1), f = 1, size(facet))]
-      end associate
-      near%n = size(near%triangle)
-      allocate(near%corner(3, 3, near%n), near%normal(3, near%n), near%distance(near%n))
-      allocate(near%is_listed(near%n), near%is_apart(near%n), source=.false.)
-      do t = 1, near%n
-         do f = 1, 3
-            near%corner(:, f, t) = place_of(sides, sides%triangles%split%corner(f, &
-               near%triangle(t)), sides%frames%base(i), x, u) - origin
-         end do
-         associate (c => near%corner(:, :, t), n => near%normal(:, t))
-            n = cross_product(c(:, 2) - c(:, 1), c(:, 3) - c(:, 1))
-            call nearest_update(nearest, t, [0.0_wp, 0.0_wp, 0.0_wp], c)
-            near%distance(t) = sqrt(nearest%square)
-            if (dot_product(n, n) > 0.0_wp) n = n/sqrt(dot_product(n, n))
-            if (touch_rule_space_is_through(sides%rule, i, sides%triangles%split%facet( &
-               near%triangle(t)), n, -matmul(c, nearest%weight))) n = 0.0_wp
-            nearest = nearest_t()
-         end associate
-      end do
-   end subroutine look_around
-
-   !> Contact point `i` of the slave, from its base.
-   pure function point_origin(sides, i, x, u) result(origin)
-      type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      real(wp) :: origin(3)
-      integer :: k
-
-      origin = 0.0_wp
-      associate (frames => sides%frames, base => sides%frames%base(i))
-         if (i <= size(sides%slave%node) .or. frames%start(i + 1) == frames%start(i)) return
-         do k = frames%ring_start(frames%start(i)), frames%ring_start(frames%start(i) + 1) - 1
-            associate (other => frames%ring(k))
-               origin = origin + frames%weight(3, k)*((x(:, other) - x(:, base)) &
-                  + (u(:, other) - u(:, base)))
-            end associate
-         end do
-      end associate
-   end function point_origin
-
-   !> A point of the master, from `node`.
-   pure function place_of(sides, point, node, x, u) result(place)
-      type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: point, node
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      real(wp) :: place(3)
-      integer :: k, n, part(max_face_nodes)
-      real(wp) :: weight(max_face_nodes)
-
-      call sides_point(sides, point, n, part, weight)
-      place = 0.0_wp
-      do k = 1, n
-         place = place + weight(k)*((x(:, part(k)) - x(:, node)) + (u(:, part(k)) - u(:, node)))
-      end do
-   end function place_of
-
-   !> The nearest triangle that faces a frame more than any other frame of its node; of those as
-   !> near the one that faces it most. 0: there is none.
-   pure integer function nearest_to(sides, frame, near, x, u) result(nearest)
-      type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: frame
-      type(near_t), intent(in) :: near
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      real(wp) :: best, least
-      integer :: g, t
-
-      nearest = 0
-      best = 0.0_wp
-      least = huge(least)
-      associate (i => sides%frames%point(frame))
-         associate (first => sides%frames%start(i), last => sides%frames%start(i + 1) - 1)
-            associate (cosine => matmul(transpose(near%normal), reshape([(frame_normal(sides, i, &
-                  g, x, u), g = first, last)], [3, last - first + 1])))
-               do t = 1, near%n
-                  if (minloc(cosine(t, :), 1) /= frame - first + 1) cycle
-                  associate (own => cosine(t, frame - first + 1), &
-                        room => as_near*sides%triangles%size(near%triangle(t)))
-                     if (own >= facing) cycle
-                     if (is_hidden(t, room_behind*min(sides%frames%size(i), &
-                        sides%triangles%size(near%triangle(t))))) cycle
-                     if (near%distance(t) > least + room) cycle
-                     if (near%distance(t) > least - room .and. own >= best - as_near) cycle
-                     least = near%distance(t)
-                     best = own
-                     nearest = t
-                  end associate
-               end do
-            end associate
-         end associate
-      end associate
-
-   contains
-
-      !> Is the node behind a triangle, but nearer to another by more than `room`? Then that is in
-      !> front of it.
-      pure logical function is_hidden(t, room)
-         integer, intent(in) :: t
-         real(wp), intent(in) :: room            !! [L]
-
-         is_hidden = dot_product(near%corner(:, 1, t), near%normal(:, t)) > 0.0_wp .and. &
-            near%distance(t) > minval(near%distance) + room
-      end function is_hidden
-
-   end function nearest_to
-
-   !> The normal of a frame, outwards.
-   pure function frame_normal(sides, i, frame, x, u) result(normal)
-      type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: i, frame
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      real(wp) :: normal(3)
-      real(wp) :: a(3), b(3)
-
-      call frame_vectors(sides, i, frame, x, u, a, b)
-      normal = cross_product(a, b)
-      normal = normal/max(sqrt(dot_product(normal, normal)), tiny(1.0_wp))
-   end function frame_normal
-
-   pure subroutine frame_vectors(sides, i, frame, x, u, a, b)
-      type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: i, frame
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      real(wp), intent(out) :: a(3), b(3)
-      real(wp) :: d(3)
-      integer :: k
-
-      a = 0.0_wp
-      b = 0.0_wp
-      associate (frames => sides%frames, node => sides%frames%base(i))
-         do k = frames%ring_start(frame), frames%ring_start(frame + 1) - 1
-            associate (other => frames%ring(k))
-               d = (x(:, other) - x(:, node)) + (u(:, other) - u(:, node))
-               a = a + frames%weight(1, k)*d
-               b = b + frames%weight(2, k)*d
-            end associate
-         end do
-      end associate
-   end subroutine frame_vectors
-
-   !> Find what is of another layer than the nearest triangle. What faces `normal` rises by no more
-   !> than its slope allows over the way between them; what rises by more hangs together with the
-   !> nearest one around a hole or a step, and may be over it or below.
-   pure subroutine find_layer(sides, near, nearest, normal)
-      type(patch_sides_t), intent(in) :: sides
-      type(near_t), intent(inout) :: near
-      integer, intent(in) :: nearest
-      real(wp), intent(in) :: normal(3)
-      real(wp) :: way, height, own_way, own_height
-      integer :: t
-
-      call look_along(normal, near%corner(:, :, nearest), own_way, own_height)
-      do t = 1, near%n
-         ! What does not face it may be seen edge on.
-         if (dot_product(near%normal(:, t), normal) >= facing) cycle
-         call look_along(normal, near%corner(:, :, t), way, height)
-         near%is_apart(t) = abs(height - own_height) > steepest*(way + own_way) &
-            + as_near*sides%triangles%size(near%triangle(nearest))
-      end do
-   end subroutine find_layer
-
-   !> How far beside the line of sight from 0 a triangle is, and how far ahead there.
-   pure subroutine look_along(normal, corner, way, height)
-      real(wp), intent(in) :: normal(3), corner(3, 3)
-      real(wp), intent(out) :: way, height       !! [L]
-      type(nearest_t) :: nearest
-      real(wp) :: ahead(3)
-
-      ahead = matmul(normal, corner)
-      call nearest_update(nearest, 1, [0.0_wp, 0.0_wp, 0.0_wp], corner - spread(normal, 2, 3) &
-         *spread(ahead, 1, 3))
-      way = sqrt(nearest%square)
-      height = dot_product(nearest%weight, ahead)
-   end subroutine look_along
-
-   !> List what faces `normal` and hangs together with the nearest triangle.
-   pure subroutine list_triangles(sides, near, nearest, normal)
-      type(patch_sides_t), intent(in) :: sides
-      type(near_t), intent(inout) :: near
-      integer, intent(in) :: nearest
-      real(wp), intent(in) :: normal(3)
-      integer :: waiting(near%n), k, n, other
-
-      near%is_listed(nearest) = .true.
-      waiting(1) = nearest
-      n = 1
-      do while (n > 0)
-         associate (t => near%triangle(waiting(n)))
-            n = n - 1
-            do k = 1, 3
-               other = findloc(near%triangle, sides%triangles%beyond(k, t), 1)
-               if (other == 0) cycle
-               if (near%is_listed(other) .or. near%is_apart(other)) cycle
-               if (dot_product(near%normal(:, other), normal) >= facing) cycle
-               near%is_listed(other) = .true.
-               n = n + 1
-               waiting(n) = other
-            end do
-         end associate
-      end do
-   end subroutine list_triangles
-
    !> The vertices and triangles of the patch with their nodes.
    pure subroutine make_patch(self, sides, frame, near, normal, x, u)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: frame
-      type(near_t), intent(in) :: near
+      type(patch_near_t), intent(in) :: near
       real(wp), intent(in) :: normal(3)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       logical :: ends(3, near%n)                 !! the list ends at the side of a triangle
@@ -350,28 +117,12 @@ contains
          integer, intent(in) :: other            !! 0: none
 
          goes_on = other > 0
-         if (goes_on) goes_on = is_facing(sides, &
+         if (goes_on) goes_on = patch_near_faces(sides, &
             sides%frames%base(sides%frames%point(frame)), other, normal, x, u)
          if (goes_on) goes_on = .not. any(near%triangle == other .and. near%is_apart)
       end function goes_on
 
    end subroutine make_patch
-
-   !> Does a triangle face what looks along `normal`?
-   pure logical function is_facing(sides, node, triangle, normal, x, u)
-      type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: node, triangle
-      real(wp), intent(in) :: normal(3)
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      real(wp) :: corner(3, 3), own(3)
-      integer :: k
-
-      do k = 1, 3
-         corner(:, k) = place_of(sides, sides%triangles%split%corner(k, triangle), node, x, u)
-      end do
-      own = cross_product(corner(:, 2) - corner(:, 1), corner(:, 3) - corner(:, 1))
-      is_facing = dot_product(own, normal) < facing*sqrt(dot_product(own, own))
-   end function is_facing
 
    !> Room for a patch of some triangles with flanges at some sides; its frame.
    pure subroutine begin_patch(self, sides, frame, n_triangle, n_end)
@@ -575,7 +326,7 @@ contains
       associate (triangles => sides%triangles)
          do i = triangles%around_start(point), triangles%around_start(point + 1) - 1
             associate (t => triangles%around(i))
-               if (.not. is_facing(sides, node, t, normal, x, u)) cycle
+               if (.not. patch_near_faces(sides, node, t, normal, x, u)) cycle
                do side = 1, 3
                   k = 1 + mod(side, 3)
                   if (triangles%split%corner(side, t) == point) then
@@ -604,7 +355,7 @@ contains
          integer, intent(in) :: beyond           !! 0: none
 
          is_end = beyond == 0
-         if (.not. is_end) is_end = .not. is_facing(sides, node, beyond, normal, x, u)
+         if (.not. is_end) is_end = .not. patch_near_faces(sides, node, beyond, normal, x, u)
       end function is_end
 
    end subroutine find_inner
@@ -646,7 +397,7 @@ contains
       integer :: k
 
       do k = 1, 3
-         corner(:, k) = place_of(sides, sides%triangles%split%corner(k, self%triangle), &
+         corner(:, k) = sides_place(sides, sides%triangles%split%corner(k, self%triangle), &
             self%node(1), x, u)
       end do
       call nearest_update(nearest, self%triangle, [0.0_wp, 0.0_wp, 0.0_wp], corner)

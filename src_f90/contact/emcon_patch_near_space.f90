@@ -1,0 +1,221 @@
+!> The triangles of the master that are near a slave point: the nearest one that a frame is to see,
+!> and what hangs together with it. Source: docs/theory.md, section 15.
+module emcon_patch_near_space
+   use emcon_kinds, only : wp
+   use emcon_nearest_space, only : nearest_t, nearest_update
+   use emcon_patch_sides_space, only : frame_normal, patch_sides_t, sides_place
+   use emcon_rotation, only : cross_product
+   use emcon_touch_rule_space, only : touch_rule_space_is_through
+   implicit none
+   private
+   public :: patch_near_t, patch_near_find, patch_near_nearest, patch_near_list, patch_near_faces
+
+   !> A triangle faces a frame if the cosine of their normals is below this.
+   real(wp), parameter :: facing = -0.25_wp
+   !> How steep that is along the frame.
+   real(wp), parameter :: steepest = sqrt(1.0_wp - facing**2)/(-facing)
+   !> Triangles at distances that differ by less than this, per facet, are as near.
+   real(wp), parameter :: as_near = 1.0e-6_wp
+   !> What is behind a triangle by more than this, per facet, is in front of another one.
+   real(wp), parameter, public :: room_behind = 0.2_wp
+
+   !> Triangles that are near, seen from the contact point.
+   type :: patch_near_t
+      integer :: n = 0
+      integer, allocatable :: triangle(:)        !! (n)
+      real(wp), allocatable :: corner(:, :, :)   !! (3, 3, n) from the contact point [L]
+      real(wp), allocatable :: normal(:, :)      !! (3, n) outwards, of length 1
+      real(wp), allocatable :: distance(:)       !! (n) [L]
+      logical, allocatable :: is_listed(:)       !! (n) the patch looks at it
+      logical, allocatable :: is_apart(:)        !! (n) it is of another layer than the nearest
+   end type patch_near_t
+
+contains
+
+   !> Where the triangles of facets are, from contact point `i` of the slave. Those that it is on
+   !> the other side of face nothing.
+   pure subroutine patch_near_find(near, sides, i, facet, x, u)
+      type(patch_near_t), intent(out) :: near
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: i                   !! 1 to the number of contact points
+      integer, intent(in) :: facet(:)            !! of the master
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      type(nearest_t) :: nearest
+      real(wp) :: origin(3)
+      integer :: f, t
+
+      origin = point_origin(sides, i, x, u)
+      associate (start => sides%triangles%split%start)
+         near%triangle = [((t, t = start(facet(f)), start(facet(f) + 1) - 1), f = 1, size(facet))]
+      end associate
+      near%n = size(near%triangle)
+      allocate(near%corner(3, 3, near%n), near%normal(3, near%n), near%distance(near%n))
+      allocate(near%is_listed(near%n), near%is_apart(near%n), source=.false.)
+      do t = 1, near%n
+         do f = 1, 3
+            near%corner(:, f, t) = sides_place(sides, sides%triangles%split%corner(f, &
+               near%triangle(t)), sides%frames%base(i), x, u) - origin
+         end do
+         associate (c => near%corner(:, :, t), n => near%normal(:, t))
+            n = cross_product(c(:, 2) - c(:, 1), c(:, 3) - c(:, 1))
+            call nearest_update(nearest, t, [0.0_wp, 0.0_wp, 0.0_wp], c)
+            near%distance(t) = sqrt(nearest%square)
+            if (dot_product(n, n) > 0.0_wp) n = n/sqrt(dot_product(n, n))
+            if (touch_rule_space_is_through(sides%rule, i, sides%triangles%split%facet( &
+               near%triangle(t)), n, -matmul(c, nearest%weight))) n = 0.0_wp
+            nearest = nearest_t()
+         end associate
+      end do
+   end subroutine patch_near_find
+
+   !> Contact point `i` of the slave, from its base.
+   pure function point_origin(sides, i, x, u) result(origin)
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
+      real(wp) :: origin(3)
+      integer :: k
+
+      origin = 0.0_wp
+      associate (frames => sides%frames, base => sides%frames%base(i))
+         if (i <= size(sides%slave%node) .or. frames%start(i + 1) == frames%start(i)) return
+         do k = frames%ring_start(frames%start(i)), frames%ring_start(frames%start(i) + 1) - 1
+            associate (other => frames%ring(k))
+               origin = origin + frames%weight(3, k)*((x(:, other) - x(:, base)) &
+                  + (u(:, other) - u(:, base)))
+            end associate
+         end do
+      end associate
+   end function point_origin
+
+   !> The nearest triangle that faces a frame more than any other frame of its node; of those as
+   !> near the one that faces it most. 0: there is none.
+   pure integer function patch_near_nearest(near, sides, frame, x, u) result(nearest)
+      type(patch_near_t), intent(in) :: near
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: frame               !! 1 to the number of all frames
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      real(wp) :: best, least
+      integer :: g, t
+
+      nearest = 0
+      best = 0.0_wp
+      least = huge(least)
+      associate (i => sides%frames%point(frame))
+         associate (first => sides%frames%start(i), last => sides%frames%start(i + 1) - 1)
+            associate (cosine => matmul(transpose(near%normal), reshape([(frame_normal( &
+                  sides%frames, g, sides%frames%base(i), x, u), g = first, last)], &
+                  [3, last - first + 1])))
+               do t = 1, near%n
+                  if (minloc(cosine(t, :), 1) /= frame - first + 1) cycle
+                  associate (own => cosine(t, frame - first + 1), &
+                        room => as_near*sides%triangles%size(near%triangle(t)))
+                     if (own >= facing) cycle
+                     if (is_hidden(t, room_behind*min(sides%frames%size(i), &
+                        sides%triangles%size(near%triangle(t))))) cycle
+                     if (near%distance(t) > least + room) cycle
+                     if (near%distance(t) > least - room .and. own >= best - as_near) cycle
+                     least = near%distance(t)
+                     best = own
+                     nearest = t
+                  end associate
+               end do
+            end associate
+         end associate
+      end associate
+
+   contains
+
+      !> Is the node behind a triangle, but nearer to another by more than `room`? Then that is in
+      !> front of it.
+      pure logical function is_hidden(t, room)
+         integer, intent(in) :: t
+         real(wp), intent(in) :: room            !! [L]
+
+         is_hidden = dot_product(near%corner(:, 1, t), near%normal(:, t)) > 0.0_wp .and. &
+            near%distance(t) > minval(near%distance) + room
+      end function is_hidden
+
+   end function patch_near_nearest
+
+   !> Find what is of another layer than the nearest triangle. What faces `normal` rises by no more
+   !> than its slope allows over the way between them; what rises by more hangs together with the
+   !> nearest one around a hole or a step, and may be over it or below.
+   pure subroutine find_layer(sides, near, nearest, normal)
+      type(patch_sides_t), intent(in) :: sides
+      type(patch_near_t), intent(inout) :: near
+      integer, intent(in) :: nearest
+      real(wp), intent(in) :: normal(3)
+      real(wp) :: way, height, own_way, own_height
+      integer :: t
+
+      call look_along(normal, near%corner(:, :, nearest), own_way, own_height)
+      do t = 1, near%n
+         ! What does not face it may be seen edge on.
+         if (dot_product(near%normal(:, t), normal) >= facing) cycle
+         call look_along(normal, near%corner(:, :, t), way, height)
+         near%is_apart(t) = abs(height - own_height) > steepest*(way + own_way) &
+            + as_near*sides%triangles%size(near%triangle(nearest))
+      end do
+   end subroutine find_layer
+
+   !> How far beside the line of sight from 0 a triangle is, and how far ahead there.
+   pure subroutine look_along(normal, corner, way, height)
+      real(wp), intent(in) :: normal(3), corner(3, 3)
+      real(wp), intent(out) :: way, height       !! [L]
+      type(nearest_t) :: nearest
+      real(wp) :: ahead(3)
+
+      ahead = matmul(normal, corner)
+      call nearest_update(nearest, 1, [0.0_wp, 0.0_wp, 0.0_wp], corner - spread(normal, 2, 3) &
+         *spread(ahead, 1, 3))
+      way = sqrt(nearest%square)
+      height = dot_product(nearest%weight, ahead)
+   end subroutine look_along
+
+   !> List what faces `normal` and hangs together with the nearest triangle.
+   pure subroutine patch_near_list(near, sides, nearest, normal)
+      type(patch_near_t), intent(inout) :: near
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: nearest             !! 1 to near%n
+      real(wp), intent(in) :: normal(3)          !! of the frame, of length 1
+      integer :: waiting(near%n), k, n, other
+
+      call find_layer(sides, near, nearest, normal)
+      near%is_listed(nearest) = .true.
+      waiting(1) = nearest
+      n = 1
+      do while (n > 0)
+         associate (t => near%triangle(waiting(n)))
+            n = n - 1
+            do k = 1, 3
+               other = findloc(near%triangle, sides%triangles%beyond(k, t), 1)
+               if (other == 0) cycle
+               if (near%is_listed(other) .or. near%is_apart(other)) cycle
+               if (dot_product(near%normal(:, other), normal) >= facing) cycle
+               near%is_listed(other) = .true.
+               n = n + 1
+               waiting(n) = other
+            end do
+         end associate
+      end do
+   end subroutine patch_near_list
+
+   !> Does a triangle face what looks along `normal`?
+   pure logical function patch_near_faces(sides, node, triangle, normal, x, u) result(faces)
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: node                !! of the scene, that places are counted from
+      integer, intent(in) :: triangle            !! of the master
+      real(wp), intent(in) :: normal(3)          !! of the frame
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      real(wp) :: corner(3, 3), own(3)
+      integer :: k
+
+      do k = 1, 3
+         corner(:, k) = sides_place(sides, sides%triangles%split%corner(k, triangle), node, x, u)
+      end do
+      own = cross_product(corner(:, 2) - corner(:, 1), corner(:, 3) - corner(:, 1))
+      faces = dot_product(own, normal) < facing*sqrt(dot_product(own, own))
+   end function patch_near_faces
+
+end module emcon_patch_near_space
