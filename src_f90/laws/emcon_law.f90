@@ -212,13 +212,14 @@ contains
       integer, intent(in) :: l                   !! 1..n_lane
       logical, intent(in) :: with_second         !! else `second` stays as it is
       type(law_slopes_t), intent(inout) :: points      !! lane `l` is set, but for the invariants
+      integer, parameter :: first = 1, second = 2, third = n_invariant
       type(dg_t) :: e(n_invariant), w
       integer :: k
 
       do k = 1, n_invariant
          e(k) = dg_variable(k, points%start(l, k), points%by(l, k))
       end do
-      w = law%energy(e(1), e(2), e(3))
+      w = law%energy(e(first), e(second), e(third))
       points%value(l) = w%f1
       points%slope(l, :) = w%g
       if (with_second) points%second(l, :, :) = w%h

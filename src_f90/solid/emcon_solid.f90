@@ -64,7 +64,6 @@ module emcon_solid
       integer :: n_dim = 0
       logical :: is_axial = .false.                      !! solids of revolution
       logical :: is_single = .false.                     !! of space or of revolution
-      logical :: has_packs = .false.                     !! else elements respond one by one
       integer :: n_element = 0
       integer :: n_node = 0
       type(solid_deck_t) :: deck
@@ -105,7 +104,6 @@ contains
       self%n_dim = size(scene%x, 1)
       self%is_axial = scene%is_axial
       self%is_single = self%n_dim == n_space .or. self%is_axial
-      self%has_packs = .not. self%is_axial
       self%n_element = n
       self%n_node = size(scene%x, 2)
       self%deck%label = scene%element%label
@@ -271,7 +269,7 @@ contains
       type(solid_t), intent(inout) :: self
       integer :: list(self%n_element), e, i, k, law, n, n_pack, pass
 
-      if (.not. self%has_packs) then
+      if (self%is_axial) then                    ! these respond one by one
          allocate(self%pack(0))
          return
       end if

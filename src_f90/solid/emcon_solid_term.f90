@@ -117,7 +117,7 @@ contains
             response)
          if (self%user%inverted_element > 0) return
       end if
-      if (.not. self%solid%has_packs) then
+      if (size(self%solid%pack) == 0) then
          call single_respond(self%solid, self%user, self%to, motion, response, value, side)
          return
       end if
@@ -333,7 +333,7 @@ contains
             self%user)
          if (self%user%inverted_element > 0) return
       end if
-      if (.not. self%solid%has_packs) then
+      if (size(self%solid%pack) == 0) then
          call single_tangent_times(self%solid, self%user, motion, direction, product)
          return
       end if
@@ -430,7 +430,7 @@ contains
             self%user)
          if (self%user%inverted_element > 0) return
       end if
-      if (.not. self%solid%has_packs) then
+      if (size(self%solid%pack) == 0) then
          call single_find_fastest(self%solid, self%user, motion, fastest)
          return
       end if
