@@ -5,12 +5,14 @@
 !> laws: the third is cubic, and its discrete gradient that of emcon_law_space. Source:
 !> docs/theory.md, eq. (10a).
 module emcon_law_points_space
+   use emcon_dgrad3, only : dg_t, dg_variable
    use emcon_kinds, only : wp
    use emcon_law, only : law_slopes_t, law_t, n_invariant, n_lane
    use emcon_law_space, only : law_stress_space, n_strain, space_response_t
    implicit none
    private
    public :: law_points_space_t, law_respond_points_space
+   public :: change_points_space_t, law_change_points_space
 
    !> Points side by side; components 11, 22, 33, 12, 23, 13, strains have twice the last three.
    type :: law_points_space_t
@@ -20,6 +22,14 @@ module emcon_law_points_space
       real(wp) :: stress(n_lane, n_strain) = 0.0_wp        !! S_alg: S_alg.(E1 - E0) = W1 - W0
       real(wp) :: tangent(n_lane, n_strain, n_strain) = 0.0_wp   !! derivative of S_alg by E1
    end type law_points_space_t
+
+   !> Change of volume v: `energy` is v at the end, `stress` its discrete gradient, `tangent` the
+   !> derivative of that.
+   type, extends(law_points_space_t) :: change_points_space_t
+      real(wp) :: start(n_lane) = 0.0_wp         !! v at the start
+      real(wp) :: by(n_lane) = 0.0_wp            !! its increment, to relative accuracy
+      real(wp) :: at_end(n_lane, n_strain) = 0.0_wp        !! gradient at the end
+   end type change_points_space_t
 
    !> Tensors of strain over a step, with the gradients of their invariants.
    type :: path_t
@@ -50,7 +60,36 @@ contains
       if (with_tangent) call find_tangent(w, path, points%tangent)
    end subroutine law_respond_points_space
 
-   !> The same of laws that are no functions of the invariants alone, one by one.
+   !> The change of volume of points side by side, with its gradients.
+   pure subroutine law_change_points_space(law, with_tangent, points)
+      class(law_t), intent(in) :: law
+      logical, intent(in) :: with_tangent        !! else the tangent stays as it is
+      type(change_points_space_t), intent(inout) :: points     !! all but the strains is set
+      type(law_slopes_t) :: w
+      type(path_t) :: path
+      type(dg_t) :: v
+      real(wp) :: slope(n_lane, n_invariant), last(n_lane, n_strain, 2:n_invariant)
+      integer :: l
+
+      call find_path(points%strain, points%dstrain, path, w%start, w%by)
+      do l = 1, n_lane
+         v = law%change(dg_variable(1, w%start(l, 1), w%by(l, 1)), &
+            dg_variable(2, w%start(l, 2), w%by(l, 2)), dg_variable(3, w%start(l, 3), w%by(l, 3)))
+         points%start(l) = v%f0
+         points%by(l) = v%df
+         points%energy(l) = v%f1
+         w%slope(l, :) = v%g
+         slope(l, :) = v%c
+         w%second(l, :, :) = v%h
+      end do
+      call find_stress(w%slope, path%n, points%stress)
+      call find_complement(path%last, last(:, :, 2))
+      call find_cofactor(path%last, last(:, :, 3))
+      call find_stress(slope, last, points%at_end)
+      if (with_tangent) call find_tangent(w, path, points%tangent)
+   end subroutine law_change_points_space
+
+   !> Response of laws that are no functions of the invariants alone, one by one.
    pure subroutine respond_each(law, points, with_tangent)
       class(law_t), intent(in) :: law
       type(law_points_space_t), intent(inout) :: points

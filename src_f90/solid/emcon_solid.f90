@@ -269,7 +269,7 @@ contains
       type(solid_t), intent(inout) :: self
       integer :: list(self%n_element), e, i, k, law, n, n_pack, pass
 
-      if (self%is_axial) then
+      if (self%is_axial) then                    ! these respond one by one
          allocate(self%pack(0))
          return
       end if

@@ -7,10 +7,10 @@ module emcon_solid_respond
       pack_motion_t, pack_response_t
    use emcon_element_plane, only : element_motion_t, element_point, element_response_t, &
       point_is_regular, point_motion_t
-   use emcon_element_space, only : n_space, space_motion_t, space_part_t
-   use emcon_incompatible_space, only : incompatible_space_respond
+   use emcon_element_space, only : n_space, space_motion_t
+   use emcon_incompatible_pack_space, only : incompatible_respond_space => incompatible_respond
    use emcon_law_points_space, only : law_respond_points_space
-   use emcon_mean_volume_space, only : mean_volume_space_respond
+   use emcon_mean_volume_pack_space, only : mean_volume_respond_space => mean_volume_respond
    use emcon_user_space, only : user_space_strain
    use emcon_host_law, only : host_answer, host_points_make_room, host_response_t
    use emcon_incompatible_plane, only : incompatible_respond
@@ -89,8 +89,12 @@ contains
       type(point_space_t) :: point
       integer :: k
 
-      if (allocated(pack%mode) .or. self%trait%has_mean(pack%element(1))) then
-         call respond_each(self, pack, motion, with_tangent, part)
+      if (allocated(pack%mode)) then
+         call incompatible_respond_space(pack, self%law(pack%law)%law, motion, with_tangent, part)
+         return
+      else if (self%trait%has_mean(pack%element(1))) then
+         call mean_volume_respond_space(pack, self%law(pack%law)%law, self%rest(pack%law)%law, &
+            motion, with_tangent, part)
          return
       end if
       call pack_clear(pack%n_node, part, with_tangent)
@@ -108,39 +112,6 @@ contains
          call add_point_space(pack, k, point, with_tangent, part)
       end do
    end subroutine pack_respond_space
-
-   !> Elements of a pack one by one.
-   pure subroutine respond_each(self, pack, motion, with_tangent, part)
-      type(solid_t), intent(in) :: self
-      type(element_pack_t), intent(in) :: pack
-      type(pack_motion_t), intent(in) :: motion
-      logical, intent(in) :: with_tangent        !! else no tangent is computed
-      type(pack_response_t), intent(inout) :: part
-      type(space_motion_t) :: local
-      type(space_part_t) :: one
-      integer :: l, n
-
-      call pack_clear(pack%n_node, part, with_tangent)
-      n = pack%n_node
-      local%square = motion%square
-      do l = 1, pack%n
-         local%from(:, :n) = motion%from(l, :, :n)
-         local%by(:, :n) = motion%by(l, :, :n)
-         associate (geometry => self%geometry(pack%element(l)), law => self%law(pack%law), &
-               rest => self%rest(pack%law))
-            if (allocated(pack%mode)) then
-               call incompatible_space_respond(geometry, law%law, local, with_tangent, one)
-            else
-               call mean_volume_space_respond(geometry, law%law, rest%law, local, with_tangent, one)
-            end if
-         end associate
-         part%is_inverted(l) = one%is_inverted
-         part%energy(l) = one%energy
-         part%force(l, :, :n) = one%force(:, :n)
-         part%magnitude(l, :, :n) = one%magnitude(:, :n)
-         if (with_tangent) part%tangent(l, :, :n, :, :n) = one%tangent(:, :n, :, :n)
-      end do
-   end subroutine respond_each
 
    !> Response of element `e` alone.
    pure subroutine solid_element_respond(self, e, motion, user, with_tangent, part)
