@@ -299,7 +299,7 @@ contains
          character(len=*), intent(in) :: instead     !! what to do
 
          if (has) call data_error(reader, data, "the surface interaction " // quoted(name) // &
-            " has " // what // ", which general contact has not: " // trim(instead))
+            " has " // what // ", which general contact does not have: " // trim(instead))
       end subroutine refuse
 
    end subroutine check_properties

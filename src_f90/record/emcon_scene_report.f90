@@ -211,7 +211,7 @@ contains
          else if (any([(allocated(scene%surface(pair(k)%master)%wall), k = 1, size(pair))])) then
             text = "walls have no nodes"
          else if (any(pair%interaction%pressure%kind /= pressure_hard)) then
-            text = "contact gives way under its pressure"
+            text = "contact has a pressure by overclosure"
          else
             text = "GUARD=NO, or no node needs one"
          end if

@@ -22,7 +22,8 @@ module emcon_overlap_query
    type :: overlap_t
       real(wp) :: depth = 0.0_wp                 !! per length of the facet; 0: none
       real(wp) :: length = 0.0_wp                !! of the facet [L]
-      integer :: node = 0                        !! that is behind, or the nearest on its facet
+      integer :: node = 0                        !! that is behind, or the nearest on its facet:
+      logical :: is_beside = .false.             !! a point beside it is, of an edge or a face
       integer :: facet(max_face_nodes) = 0       !! nodes of the facet that it is behind; 0: no more
       !> The deepest one of facets as they are, where they stand for curves.
       real(wp) :: of_facets = 0.0_wp
@@ -124,6 +125,7 @@ contains
          text = "a point of an analytical surface"
          if (body(self%node) > 0) text = "node " // to_text(label(self%node)) // " of body " // &
             to_text(body(self%node))
+         if (self%is_beside) text = "a point beside " // text
          text = text // " is " // to_text(self%depth*self%length, 3) // " behind "
          if (body(facet(1)) == 0) then
             text = text // "an analytical surface"

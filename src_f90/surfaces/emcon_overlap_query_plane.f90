@@ -406,6 +406,7 @@ contains
          if (self%is_passing .and. depth < min(passing*length, passing_thin*thickness)) return
          overlap%depth = depth/length
          overlap%node = edge(merge(1, 2, share < 0.5_wp), e)
+         overlap%is_beside = share > 0.0_wp .and. share < 1.0_wp
          overlap%length = length
          overlap%facet(:size(edge, 1)) = edge(:, nearest%edge)
       end associate

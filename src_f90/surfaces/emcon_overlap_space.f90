@@ -18,7 +18,8 @@ module emcon_overlap_space
 
    !> A place that is inside.
    type :: place_t
-      integer :: node = 0                        !! of the scene, it or the nearest on its facet
+      integer :: node = 0                        !! of the scene, it or the nearest on its facet:
+      logical :: is_beside = .false.             !! it is not the node itself
       real(wp) :: at(3) = 0.0_wp                 !! [L]
       type(nearest_t) :: nearest
       real(wp) :: ratio = 0.0_wp                 !! depth per length of the facet; 0: not deeper
@@ -94,7 +95,8 @@ contains
          associate (point => inside%point(i), before => inside%before)
             near = inside%near(point)
             if (near == 0 .and. before(point) > 0) near = inside%near(before(point))
-            call judge(node_of(a, point), a%at(:, point), [point, point], near)
+            call judge(place_t(node_of(a, point), point > a%split%n_node, a%at(:, point)), &
+               [point, point], near)
             inside%near(point) = near
          end associate
       end do
@@ -103,8 +105,8 @@ contains
             associate (p => a%edge(1, middle%edge), q => a%edge(2, middle%edge))
                near = middle%near
                if (near == 0) near = inside%near(p)
-               call judge(node_of(a, merge(p, q, middle%share < 0.5_wp)), &
-                  a%at(:, p) + middle%share*(a%at(:, q) - a%at(:, p)), [p, q], near)
+               call judge(place_t(node_of(a, merge(p, q, middle%share < 0.5_wp)), .true., &
+                  a%at(:, p) + middle%share*(a%at(:, q) - a%at(:, p))), [p, q], near)
             end associate
          end associate
       end do
@@ -112,20 +114,20 @@ contains
 
    contains
 
-      subroutine judge(node, at, own, near)
-         integer, intent(in) :: node, own(2)
-         real(wp), intent(in) :: at(3)
+      subroutine judge(point, own, near)
+         type(place_t), intent(in) :: point
+         integer, intent(in) :: own(2)
          integer, intent(inout) :: near          !! in: about the nearest triangle; out: it is
          type(place_t) :: new
 
-         new = place_t(node, at)
+         new = point
          if (inside%is_own) then
-            call inside_nearest_own(inside, b, at, own, near, new%nearest)
+            call inside_nearest_own(inside, b, new%at, own, near, new%nearest)
          else
-            call inside_nearest(inside, b, at, near, new%nearest)
+            call inside_nearest(inside, b, new%at, near, new%nearest)
          end if
          near = new%nearest%triangle
-         new%ratio = depth_of(b, inside%pad, at, new%nearest) &
+         new%ratio = depth_of(b, inside%pad, new%at, new%nearest) &
             /b%length(b%split%facet(new%nearest%triangle))
          if (.not. new%ratio > least) return
          n = n + 1
@@ -188,6 +190,7 @@ contains
          overlap%depth = place%ratio
          overlap%length = b%length(f)
          overlap%node = place%node
+         overlap%is_beside = place%is_beside
          overlap%facet = 0
          associate (own => b%facets%facet(:, f))
             overlap%facet(:size(own)) = own

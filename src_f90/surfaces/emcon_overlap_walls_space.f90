@@ -91,6 +91,7 @@ contains
                   overlap%depth = -spot%distance/length
                   overlap%length = length
                   overlap%node = node
+                  overlap%is_beside = .false.
                   overlap%facet = 0
                   overlap%facet(1) = wall%node(1)
                end associate
