@@ -13,8 +13,8 @@ module emcon_inside_space
    use emcon_triangles_space, only : cross_product, triangle_at, triangles_t
    implicit none
    private
-   public :: inside_t, middle_t, inside_find, inside_own, inside_confirm, inside_nearest, &
-      inside_nearest_own
+   public :: inside_t, middle_t, inside_find, inside_own, inside_has, inside_confirm, &
+      inside_nearest, inside_nearest_own
 
    !> Where a point is; `is_asked` while what hangs on it is gathered.
    integer, parameter :: is_unknown = 0, is_out = 1, is_in = 2, is_asked = 3
@@ -321,6 +321,14 @@ contains
          end associate
       end do
    end subroutine add_whole_edges
+
+   !> Does a point of `a` count as inside?
+   elemental logical function inside_has(self, point) result(has)
+      type(inside_t), intent(in) :: self
+      integer, intent(in) :: point               !! of the split of a
+
+      has = self%state(point) == is_in
+   end function inside_has
 
    !> Give `state` to all points that hang on the first `n` of the queue, and put them into it.
    pure subroutine hand_on(self, a, state, n, meets_out)

@@ -3,12 +3,12 @@
 !>
 !> Source: docs/theory.md, section 4.15.
 module emcon_overlap_space
-   use emcon_inside_space, only : inside_confirm, inside_find, inside_nearest, &
+   use emcon_inside_space, only : inside_confirm, inside_find, inside_has, inside_nearest, &
       inside_nearest_own, inside_own, inside_t
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : nearest_height, nearest_t
    use emcon_overlap_query, only : overlap_t, passing, passing_thin
-   use emcon_triangles_space, only : triangle_at, triangles_t
+   use emcon_triangles_space, only : cross_product, triangle_at, triangles_t
    implicit none
    private
    public :: overlap_space_find, overlap_space_own
@@ -88,6 +88,7 @@ contains
       integer :: i, n, near
 
       n = size(inside%point) + inside%n_middle
+      if (n > 0) n = n + a%facets%n_facet
       allocate(spare(n), place(0))
       n = 0
       if (size(spare) == 0) return
@@ -110,6 +111,13 @@ contains
             end associate
          end associate
       end do
+      if (b%is_closed .and. .not. inside%is_own) then
+         do i = 1, a%facets%n_facet
+            if (.not. may_hide(inside, a, b, i)) cycle
+            near = 0
+            call judge(place_t(a%facets%facet(1, i), .true., behind_facet(a, i)), [0, 0], near)
+         end do
+      end if
       place = spare(:n)
 
    contains
@@ -135,6 +143,56 @@ contains
       end subroutine judge
 
    end subroutine find_places
+
+   !> May what is behind facet `f` be inside: does some point of it count as inside, and do the
+   !> triangles nearest to all of these look as it does? They may lie on the other outline, where
+   !> bodies touch, and look at each other, and where they are in each other with faces in one plane.
+   pure logical function may_hide(inside, a, b, f) result(may)
+      type(inside_t), intent(in) :: inside
+      type(triangles_t), intent(in) :: a, b
+      integer, intent(in) :: f
+      integer :: t
+
+      may = .false.
+      do t = a%split%start(f), a%split%start(f + 1) - 1
+         associate (point => a%split%corner(1, t))
+            if (.not. inside_has(inside, point)) cycle
+            may = inside%near(point) > 0
+            if (may) may = dot_product(normal_of(a, t), normal_of(b, inside%near(point))) > 0.0_wp
+            if (.not. may) return
+         end associate
+      end do
+   end function may_hide
+
+   !> Outwards, of twice the area of triangle `t` [L^2].
+   pure function normal_of(a, t) result(normal)
+      type(triangles_t), intent(in) :: a
+      integer, intent(in) :: t
+      real(wp) :: normal(3)
+
+      associate (c => triangle_at(a, t))
+         normal = cross_product(c(:, 2) - c(:, 1), c(:, 3) - c(:, 1))
+      end associate
+   end function normal_of
+
+   !> Half of its thickness behind the middle of facet `f`.
+   pure function behind_facet(a, f) result(at)
+      type(triangles_t), intent(in) :: a
+      integer, intent(in) :: f
+      real(wp) :: at(3)
+      real(wp) :: normal(3)
+      integer :: t
+
+      at = 0.0_wp
+      normal = 0.0_wp
+      associate (first => a%split%start(f), last => a%split%start(f + 1) - 1)
+         do t = first, last
+            at = at + sum(triangle_at(a, t), 2)/(3*(last - first + 1))
+            normal = normal + normal_of(a, t)
+         end do
+      end associate
+      at = at - (0.5_wp*a%thickness(f)/max(sqrt(dot_product(normal, normal)), tiny(1.0_wp)))*normal
+   end function behind_facet
 
    !> How deep a point that counts as inside is: it was moved by very little, and may stand in front
    !> of the nearest facet, or beside it. At the rim of an outline that is not closed there is no

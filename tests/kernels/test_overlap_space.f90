@@ -27,6 +27,7 @@ contains
          test_case_t("bars that cross, no node in either", test_bars), &
          test_case_t("boxes that touch exactly", test_touch), &
          test_case_t("like boxes, one into the other", test_like), &
+         test_case_t("boxes in one place, and flush", test_flush), &
          test_case_t("one body all within another", test_within), &
          test_case_t("a body in the hole of another", test_hole), &
          test_case_t("a surface that is not closed", test_open), &
@@ -170,6 +171,30 @@ contains
          end do
       end do
    end subroutine test_like
+
+   !> Unit boxes of one and of eight hexahedra that have sides, or all of their nodes, in one place:
+   !> the deepest point is no node, and half the thickness (here 1) of an element behind a face.
+   subroutine test_flush(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: low(3) = [0.0_wp, 0.0_wp, 0.0_wp], high(3) = [1.0_wp, 1.0_wp, 1.0_wp], &
+         shift(3, 4) = reshape([0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, -0.5_wp, &
+         0.0_wp, -0.5_wp, -0.5_wp, 0.0_wp, 0.0_wp, -0.9_wp], [3, 4])
+      real(wp), parameter :: deep(4) = [0.5_wp, 0.5_wp, 0.5_wp, 0.1_wp]
+      type(shape_surface_t) :: one, other
+      real(wp) :: depth(2)
+      integer :: n, k
+
+      do n = 1, 2
+         do k = 1, size(deep)
+            call make_box(one, [n, n, n], low, high)
+            call make_box(other, [n, n, n], low + shift(:, k), high + shift(:, k))
+            call look(one, other, depth)
+            call check_true(error, minval(depth) >= deep(k)/2, "boxes of " // to_text(n) // &
+               " elements a side, place " // to_text(k))
+            call check_true(error, maxval(depth) <= (1.0_wp + tol)*deep(k), "no deeper than they are")
+         end do
+      end do
+   end subroutine test_flush
 
    !> Nothing crosses: a ray tells. The deepest node is in the middle.
    subroutine test_within(error)
