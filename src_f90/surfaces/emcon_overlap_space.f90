@@ -89,9 +89,8 @@ contains
 
       n = size(inside%point) + inside%n_middle
       if (n > 0) n = n + a%facets%n_facet
-      allocate(spare(n), place(0))
+      allocate(spare(n))
       n = 0
-      if (size(spare) == 0) return
       do i = 1, size(inside%point)
          associate (point => inside%point(i), before => inside%before)
             near = inside%near(point)
@@ -111,13 +110,11 @@ contains
             end associate
          end associate
       end do
-      if (b%is_closed .and. .not. inside%is_own) then
-         do i = 1, a%facets%n_facet
-            if (.not. may_hide(inside, a, b, i)) cycle
-            near = 0
-            call judge(place_t(a%facets%facet(1, i), .true., behind_facet(a, i)), [0, 0], near)
-         end do
-      end if
+      do i = 1, merge(a%facets%n_facet, 0, size(spare) > 0)
+         if (.not. may_hide(inside, a, b, i)) cycle
+         near = 0
+         call judge(place_t(a%facets%facet(1, i), .true., behind_facet(a, i)), [0, 0], near)
+      end do
       place = spare(:n)
 
    contains
@@ -135,8 +132,7 @@ contains
             call inside_nearest(inside, b, new%at, near, new%nearest)
          end if
          near = new%nearest%triangle
-         new%ratio = depth_of(b, inside%pad, new%at, new%nearest) &
-            /b%length(b%split%facet(new%nearest%triangle))
+         new%ratio = depth_of(b, inside%pad, new%at, new%nearest)/b%length(b%split%facet(near))
          if (.not. new%ratio > least) return
          n = n + 1
          spare(n) = new
@@ -144,9 +140,9 @@ contains
 
    end subroutine find_places
 
-   !> May what is behind facet `f` be inside: does some point of it count as inside, and do the
-   !> triangles nearest to all of these look as it does? They may lie on the other outline, where
-   !> bodies touch, and look at each other, and where they are in each other with faces in one plane.
+   !> May what is behind facet `f` be inside: does a point of it count as inside, and do the
+   !> triangles nearest to all of these look as it does? Points on the other outline may count where
+   !> bodies touch, and faces look at each other, and where bodies share a place, and do not.
    pure logical function may_hide(inside, a, b, f) result(may)
       type(inside_t), intent(in) :: inside
       type(triangles_t), intent(in) :: a, b
@@ -154,6 +150,7 @@ contains
       integer :: t
 
       may = .false.
+      if (inside%is_own .or. .not. b%is_closed) return
       do t = a%split%start(f), a%split%start(f + 1) - 1
          associate (point => a%split%corner(1, t))
             if (.not. inside_has(inside, point)) cycle
