@@ -297,17 +297,25 @@ def fuzz_calls(chance, folder):
 # ---- kill ---------------------------------------------------------------------------------------
 
 
+#: Decks that are killed: a line of each, the restarts written in its place, and parameters that make it short.
+KILLED = {
+    "ring": ("*RESTART, WRITE, FREQUENCY=50", "*RESTART, WRITE, FREQUENCY=3", {"h": 0.05, "t_end": 1.0, "frame": 0.2}),
+    "bouncing_ball": ("*END STEP", "*RESTART, WRITE, FREQUENCY=3\n*END STEP", {"t_end": 0.1, "frame": 0.02}),
+}
+
+
 def fuzz_kill(chance, folder):
     """Killed any number of times, a run ends as if nothing had been."""
+    name = chance.choice(sorted(KILLED))
+    line, restarts, parameters = KILLED[name]
     whole = folder.parent / "whole"
-    deck = Deck.read(DECKS / "ring.inp")
-    deck.replace("*RESTART, WRITE, FREQUENCY=50", "*RESTART, WRITE, FREQUENCY=3")
-    parameters = {"h": 0.05, "t_end": 1.0, "frame": 0.2}
-    if not (whole / "ring.log").exists():
+    deck = Deck.read(DECKS / f"{name}.inp")
+    deck.replace(line, restarts)
+    if not (whole / f"{name}.log").exists():
         run_deck(deck, whole, **parameters)
-    for name, value in parameters.items():
-        deck.set_parameter(name, value)
-    path, run = deck.write(folder / "ring.inp"), Run(folder / "ring")
+    for parameter, value in parameters.items():
+        deck.set_parameter(parameter, value)
+    path, run = deck.write(folder / f"{name}.inp"), Run(folder / name)
     for k in range(20):
         goes_on = run.file(".rst.h5").exists()
         order = ["restart", run.file(".rst.h5")] if goes_on else [path]
@@ -320,7 +328,7 @@ def fuzz_kill(chance, folder):
         assert process.returncode in (0, -signal.SIGKILL), err
         if process.returncode == 0:
             break
-    assert run.digits() == Run(whole / "ring").digits()
+    assert run.digits() == Run(whole / name).digits()
 
 
 # ---- driver -------------------------------------------------------------------------------------
