@@ -211,14 +211,15 @@ def test_forces_that_are_a_comb(tmp_path, initiation, told):
     assert (run.verdict["force_scatter"] > 0.5) == told
 
 
-def test_a_node_inside_is_named(tmp_path):
-    """A plate of 3 falls by 0.125 onto a block of 1/2, 0.1 below, whose corners nobody holds."""
+def test_a_side_inside_is_named(tmp_path):
+    """A plate of 3 falls by 0.125 onto a block of 1/2, 0.1 below, whose corners nobody holds: inside is the middle of
+    its side, no node."""
     deck = blocks(f"{THROWN}*STEP, NLGEOM\n*DYNAMIC, DIRECT\n0.025, 0.125", gap=0.1)
     deck.replace("*CONTACT PAIR, INTERACTION=I", "*CONTACT PAIR, INTERACTION=I, SIDES=ONE, GUARD=NO")
     deck.move_nodes(lambda label, x, y: (3*x - 1, y) if label > 4 else (0.5*x, y))
     found = run_deck(deck, tmp_path).verdict
     assert found["penetration"] == pytest.approx(0.025/0.5, rel=1e-9)
-    assert re.fullmatch(r"bodies overlap by 0.05 of an edge at time 0.125, node [56] of body 2 is "
+    assert re.fullmatch(r"bodies overlap by 0.05 of an edge at time 0.125, a point beside node [56] of body 2 is "
                         r"0.025 behind the edge from node 3 to 4 of body 1", found["reasons"][0])
 
 
