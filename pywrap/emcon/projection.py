@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from .fields import SOLIDS
 from .results import Array
 
-__all__ = ["SOLIDS", "far_first", "outer_faces", "project"]
+__all__ = ["SOLIDS", "far_first", "is_seen", "outer_faces", "project"]
 
 #: Direction that the bodies are seen from [degrees]: around z from x, and up from there.
 AZIMUTH, ELEVATION = -60.0, 25.0
@@ -64,3 +64,10 @@ def project(points: Array) -> tuple[Array, Array]:
 def far_first(faces: Sequence[NDArray[np.int64]], near: Array) -> NDArray[np.int64]:
     """Numbers of the faces, the farthest first: what is drawn later covers what is behind."""
     return np.argsort([near[face].mean() for face in faces], kind="stable")
+
+
+def is_seen(seen: Array, faces: Sequence[NDArray[np.int64]]) -> NDArray[np.bool_]:
+    """Per face: its right-hand normal points to the eye; `seen` has places on paper (n, 2)."""
+    corner = seen[np.asarray(faces)]
+    one, other = corner[:, 2] - corner[:, 0], corner[:, 3] - corner[:, 1]
+    return np.asarray(one[:, 0]*other[:, 1] - one[:, 1]*other[:, 0] > 0.0)

@@ -394,7 +394,8 @@ class Results:
     def surfaces(self) -> FieldFile:
         """The faces of contact in space over time: `surfaces.cell("contact_pressure", -1)`.
 
-        Its points are nodes of `fields`, numbered by `surfaces.point("node", 0)`.
+        Its points are nodes of `fields`, numbered by `surfaces.point("node", 0)`; -1 are points of
+        walls.
         """
         self._check()
         if self._surfaces is None:

@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from .projection import SOLIDS, far_first, outer_faces, project
+from .projection import SOLIDS, far_first, is_seen, outer_faces, project
 from .results import Array, FieldFile, ResultError
 
 #: A body that moves less than this fraction of the largest displacement counts as support.
@@ -211,11 +212,32 @@ def _side_values(file: FieldFile, name: str, frame: int, sides: NDArray[np.int64
     return np.where(is_nothing, np.nan, ends)
 
 
+def _surfaces_of(file: FieldFile) -> Path:
+    """Where the faces of contact in space are, if they are."""
+    return file.path.with_name(file.path.name.removesuffix(".vtkhdf") + ".surfaces.vtkhdf")
+
+
+def _walls(file: FieldFile, frames: Sequence[int]) -> tuple[list[NDArray[np.int64]], list[Array]]:
+    """The faces of walls, numbers of their points in turn, and these points (n_point, 3) per frame
+    [L]."""
+    path = _surfaces_of(file)
+    if not path.is_file():
+        return [], []
+    with FieldFile(path) as surfaces:
+        if max(frames) >= len(surfaces.times):
+            return [], []
+        is_wall = surfaces.point("node", 0) < 0
+        number = np.cumsum(is_wall) - 1
+        cells = [number[cell] for cell in surfaces.cells if is_wall[cell].all()]
+        return cells, [(surfaces.points + surfaces.point("displacement", k))[is_wall]
+                       for k in frames]
+
+
 def _face_values(file: FieldFile, name: str, frames: Sequence[int],
                  faces: Sequence[NDArray[np.int64]]) -> list[Array]:
     """A field of surfaces per face (n_face), NaN where it is nothing: as the file of the faces has
     it, or else the mean over the nodes."""
-    path = file.path.with_name(file.path.name.removesuffix(".vtkhdf") + ".surfaces.vtkhdf")
+    path = _surfaces_of(file)
     found: list[Array] = []
     if path.is_file():
         with FieldFile(path) as surfaces:
@@ -283,6 +305,7 @@ def read_scene(file: FieldFile, frames: Sequence[int], name: str = "von_mises") 
                   else 0.0, notes=notes)
     if in_space:
         _see(scene, place, of_faces=name in OF_SIDES)
+        _see_walls(scene, place, *_walls(file, frames))
     return scene
 
 
@@ -311,3 +334,23 @@ def _see(scene: Scene, place: Sequence[Array], of_faces: bool) -> None:
     seen = [project(points) for points in place]
     scene.position = [on_paper for on_paper, _ in seen]
     scene.order = [far_first(scene.cells, near) for _, near in seen]
+
+
+def _see_walls(scene: Scene, place: Sequence[Array], walls: Sequence[NDArray[np.int64]],
+               points: Sequence[Array]) -> None:
+    """Put the faces of walls behind those of bodies, as supports without colour; of each frame
+    those that face the eye are drawn."""
+    if not walls:
+        return
+    n_node, n_face = len(scene.is_support), len(scene.cells)
+    scene.cells = [*scene.cells, *(cell + n_node for cell in walls)]
+    scene.is_support = np.concatenate([scene.is_support, np.ones(len(points[0]), dtype=bool)])
+    if scene.values is not None:
+        none = np.full(len(walls), np.nan)
+        scene.values = [np.concatenate([values, none]) for values in scene.values]
+    scene.order = []
+    for k, (bodies, wall) in enumerate(zip(place, points, strict=True)):
+        scene.position[k], near = project(np.concatenate([bodies, wall]))
+        order = far_first(scene.cells, near)
+        seen = np.concatenate([np.ones(n_face, dtype=bool), is_seen(scene.position[k], scene.cells[n_face:])])
+        scene.order.append(order[seen[order]])

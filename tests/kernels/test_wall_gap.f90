@@ -9,6 +9,7 @@ module test_wall_gap
    use emcon_wall, only : wall_drawn, wall_flat, wall_round, wall_t, wall_turned
    use emcon_wall_distance_space, only : wall_find, wall_spot_t
    use emcon_wall_gap_space, only : dg_t, wall_gap
+   use emcon_wall_shape_space, only : wall_shape_make, wall_shape_t
    use random_draws, only : draw_random
    implicit none
    private
@@ -33,7 +34,8 @@ contains
          test_case_t("momenta", test_momenta), &
          test_case_t("no moment about an axis of revolution", test_axis), &
          test_case_t("derivatives against differences", test_derivatives), &
-         test_case_t("a node on the axis", test_on_axis)]
+         test_case_t("a node on the axis", test_on_axis), &
+         test_case_t("faces that show it lie on it, and face out", test_faces)]
    end subroutine collect_wall_gap
 
    !> Shape `number`.
@@ -356,5 +358,40 @@ contains
             "second derivatives by component " // to_text(a))
       end do
    end subroutine test_on_axis
+
+   !> Corners of faces, and which way these face.
+   subroutine test_faces(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: middle(3) = [0.2_wp, -0.1_wp, 0.3_wp], reach = 2.0_wp
+      type(wall_t) :: wall
+      type(wall_shape_t) :: shape
+      type(wall_spot_t) :: spot
+      real(wp) :: at(3, 4), one(3), other(3), normal(3)
+      integer :: number, k
+
+      at = 0.0_wp
+      do k = 1, 3
+         at(k, 1 + k) = unit
+      end do
+      do number = 1, n_shape
+         call make_wall(number, wall)
+         call wall_shape_make(shape, wall, middle, reach)
+         do k = 1, size(shape%point, 2)
+            spot = wall_find(wall, at, shape%point(:, k))
+            call check_near(error, spot%distance, 0.0_wp, tol, 1.0_wp, "on shape " // to_text(number))
+         end do
+         do k = 1, size(shape%cell, 2)
+            associate (x => shape%point(:, shape%cell(:, k)))
+               one = x(:, 3) - x(:, 1)
+               other = x(:, 4) - x(:, 2)
+               normal = [one(2)*other(3) - one(3)*other(2), one(3)*other(1) - one(1)*other(3), &
+                  one(1)*other(2) - one(2)*other(1)]
+               spot = wall_find(wall, at, 0.25_wp*sum(x, 2))
+               call check_true(error, dot_product(normal, spot%normal) > 0.9_wp*norm2(normal), &
+                  "faces out, shape " // to_text(number))
+            end associate
+         end do
+      end do
+   end subroutine test_faces
 
 end module test_wall_gap

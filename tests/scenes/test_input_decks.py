@@ -17,6 +17,7 @@ SHORT = {
     "spinning_ring": {"t_end": 1},
     "bouncing_bar": {"t_end": 1.2},
     "bouncing_ball": {"t_end": 0.15},
+    "ball_in_bowl": {"t_end": 0.4},
     "hertz_ball": {"t_end": 0.05},
     "caught_ring": {"t_end": 0.1},
     "linked_rings": {"h": 0.02, "t_end": 0.3},
@@ -127,6 +128,16 @@ def test_caught_ring(tmp_path):
     assert run.history["active"].max() > 1 and np.ptp(momenta[:, 2]) > 0.02*np.abs(momenta).max()
     assert np.abs(momenta[:, [0, 1, 5]]).max() <= 1e-12*np.abs(momenta).max()
     np.testing.assert_allclose(run.history["total"], run.history["total"][0], rtol=1e-12)
+
+
+def test_ball_in_bowl(tmp_path):
+    """Nothing has a moment about the vertical axis through the centre of the bowl."""
+    run = run_deck(DECKS/"ball_in_bowl.inp", tmp_path, t_end=2)
+    history = run.history
+    energy = history["kinetic"].max()
+    assert np.abs(history["pair3_impulse_x"]).max() > 0.1*np.abs(history["px"]).max()
+    assert np.abs(history["total"]).max() <= 1e-11*energy
+    assert np.abs(history["lz"]).max() <= 1e-11*np.abs(history["lx"]).max()
 
 
 def euler_turns_over(inertia, spin):

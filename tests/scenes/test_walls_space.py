@@ -7,6 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contact_space_scenes import RUBBER, ball, bodies, dynamic, faces, straight, turned, velocities
+from emcon.fields import FieldFile
+from emcon.scene import read_scene
 from scene_tools import EPSILON, Run, emcon, run_deck
 from space_mesh import Block
 from wall_space_scenes import FIXED, REFERENCE, cube, falling, pair, plane, sphere, wall
@@ -143,6 +145,31 @@ def test_a_driven_wall(tmp_path: Path) -> None:
     assert history["external_work"][-1] == pytest.approx(work, rel=1.0e-11)
     # A bounce: nearly twice the speed of the wall.
     assert history["pz"][-1] > 1.2
+
+
+def test_walls_are_seen(tmp_path: Path) -> None:
+    """As faces on the shape in the file of surfaces, which move with it; the picture has those that face the eye."""
+    run = ran(tmp_path, falling(rubber_ball((0., 0., 0.)), sphere(2.1, inside=True), (0.5, 0.25, -1.), until=0.1))
+    seen = FieldFile(run.file(".surfaces.vtkhdf"))
+    of_wall = seen.point("node", 0) < 0
+    assert np.linalg.norm(seen.points[of_wall], axis=1) == pytest.approx(2.1, rel=8*EPSILON)
+    cells = [cell for cell in seen.cells if of_wall[cell].any()]
+    assert len(cells) == 6*8*8 and all(of_wall[cell].all() for cell in cells)
+    assert np.isnan(seen.cell("contact_pressure", -1)[-len(cells):]).all()
+    assert set(seen.cell("surface", 0)[-len(cells):]) == {2}
+    scene = read_scene(FieldFile(run.file(".vtkhdf")), [0, -1])
+    drawn = [len(order) for order in scene.order]
+    outer = len(seen.cells) - len(cells)
+    assert drawn[0] == drawn[1] and outer + 0.4*len(cells) < drawn[0] < outer + 0.6*len(cells)
+
+    (tmp_path/"driven").mkdir()
+    run = ran(tmp_path/"driven", "*AMPLITUDE, NAME=RAMP\n0., 0., 1., .8\n" + falling(
+        cube(), plane(), (0., 0., 0.), until=0.1, support=f"{REFERENCE}, 1, 2\n{REFERENCE}, 4, 6\n",
+        more=f"*BOUNDARY, AMPLITUDE=RAMP\n{REFERENCE}, 3, 3, 1.\n"))
+    seen = FieldFile(run.file(".surfaces.vtkhdf"))
+    of_wall = seen.point("node", 0) < 0
+    assert (seen.points[of_wall, 2] == 0).all() and np.ptp(seen.points[of_wall, :2], axis=0).min() > 2
+    assert seen.point("displacement", -1)[of_wall, 2] == pytest.approx(0.08, rel=1e-12)
 
 
 def on_sphere(angle: float, radius: float, size: float, inside: bool = False) -> Block:
