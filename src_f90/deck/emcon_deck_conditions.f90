@@ -151,13 +151,22 @@ contains
       integer, intent(in) :: n_dim                 !! displacements of a node
       type(step_t), intent(inout) :: step
       logical :: holds(self%n_load), is_turn(self%n_prescribed), is_dropped(self%n_prescribed)
+      type(prescribed_t), allocatable :: angle(:)
+      integer, allocatable :: node(:)
+      logical, allocatable :: is_first(:)
+      integer :: k
 
       is_dropped = self%prescribed_dropped(:self%n_prescribed)
       is_turn = self%prescribed(:self%n_prescribed)%dof > n_dim
       step%prescribed = pack(self%prescribed(:self%n_prescribed), .not. (is_dropped .or. is_turn))
+      angle = pack(self%prescribed(:self%n_prescribed), is_turn .and. .not. is_dropped)
+      is_first = [(all(angle(:k - 1)%node /= angle(k)%node), k = 1, size(angle))]
+      node = pack(angle%node, is_first)
       if (allocated(step%turn)) deallocate(step%turn)
-      allocate(step%turn(count(is_turn .and. .not. is_dropped)))
-      step%turn%angle = pack(self%prescribed(:self%n_prescribed), is_turn .and. .not. is_dropped)
+      allocate(step%turn(size(node)))
+      do k = 1, size(node)
+         step%turn(k)%angle = pack(angle, angle%node == node(k))
+      end do
       holds = .not. self%load_dropped(:self%n_load)
       if (step%scheme%loads_ramp) then
          holds = holds .or. self%load(:self%n_load)%value_start /= 0.0_wp

@@ -13,6 +13,7 @@ module emcon_deck_loads
    use emcon_diagnostics, only : label_list, quoted, suggestion
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find
+   use emcon_rotation, only : n_turn
    use emcon_scene, only : scene_t
    use emcon_steps, only : by_node, load_moment, load_point, load_t, prescribed_t
    use emcon_text, only : to_text
@@ -93,7 +94,6 @@ contains
          call read_boundary_line(reader, data, scene%n_dim, is_held, new%value)
          if (data%ok) call get_nodes(reader, data, 1, scene, item)
          if (data%ok) call check_rigid(reader, data, scene, is_held, item)
-         if (data%ok) call check_turns(reader, data, scene, is_held, item, new%value)
          if (data%ok) call check_value(reader, data, scene, is_held, item, new)
          reader%doubt%prescribed = reader%doubt%prescribed .or. .not. data%ok
          if (.not. data%ok) cycle
@@ -103,9 +103,10 @@ contains
             do dof = 1, scene%n_dim
                if (is_held(dof)) call put(dof)
             end do
-            if (is_held(last_freedom) .and. any(scene%rigid%reference == item(i))) then
-               call put(scene%n_dim + 1)
-            end if
+            if (.not. any(scene%rigid%reference == item(i))) cycle
+            do dof = 1, n_turn(scene%n_dim)
+               if (is_held(last_freedom - n_turn(scene%n_dim) + dof)) call put(scene%n_dim + dof)
+            end do
          end do
          if (any(is_other)) call data_warning(reader, data, "node " // &
             label_list(pack(scene%node%label(item), is_other)) // " was prescribed otherwise " &
@@ -147,28 +148,6 @@ contains
          end associate
       end do
    end subroutine check_rigid
-
-   !> In space a reference node turns about all axes or about none.
-   subroutine check_turns(reader, data, scene, is_held, item, value)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
-      type(scene_t), intent(in) :: scene
-      logical, intent(in) :: is_held(:)            !! (last_freedom)
-      integer, intent(in) :: item(:)               !! nodes
-      real(wp), intent(in) :: value
-      integer :: i
-
-      if (scene%n_dim == n_plane .or. .not. any(is_held(scene%n_dim + 1:))) return
-      if (all(is_held(scene%n_dim + 1:)) .and. .not. abs(value) > 0.0_wp) return
-      do i = 1, size(item)
-         if (.not. any(scene%rigid%reference == item(i))) cycle
-         call data_error(reader, data, "reference node " // to_text(scene%node%label(item(i))) &
-            // ": in three dimensions prescribe degrees of freedom 4 to 6 of a rigid body by one " &
-            // "line, all 0, or none of them; single axes and driven rotations are not in this " &
-            // "version")
-         return
-      end do
-   end subroutine check_turns
 
    subroutine check_boundary_options(reader, card)
       type(reader_t), intent(inout) :: reader
@@ -257,17 +236,17 @@ contains
       integer :: i
 
       if (new%value == 0.0_wp) return
-      if (any(is_held(scene%n_dim + 1:last_freedom - 1))) then
-         if (scene%n_dim == n_plane) call data_error(reader, data, "the model is plane: degrees " &
-            // "of freedom 3 to 5 are 0, not " // to_text(new%value))
-         if (scene%n_dim /= n_plane) call data_error(reader, data, "nodes do not turn: degrees " &
-            // "of freedom 4 and 5 are 0, not " // to_text(new%value))
-      else if (is_held(last_freedom) .and. .not. reader%doubt%rigid) then
+      if (any(is_held(scene%n_dim + 1:last_freedom - n_turn(scene%n_dim)))) then
+         call data_error(reader, data, "the model is plane: degrees of freedom 3 to 5 are 0, not " &
+            // to_text(new%value))
+      else if (any(is_held(last_freedom - n_turn(scene%n_dim) + 1:)) .and. .not. &
+         reader%doubt%rigid) then
          do i = 1, size(item)
             if (any(scene%rigid%reference == item(i))) cycle
             call data_error(reader, data, "node " // to_text(scene%node%label(item(i))) // &
-               " cannot turn by " // to_text(new%value) // ": degree of freedom 6 is that of the " &
-               // "reference node of a *RIGID BODY")
+               " cannot turn by " // to_text(new%value) // ": degree" // trim(merge( &
+               " of freedom 6 is that  ", "s of freedom 4 to 6 are", scene%n_dim == n_plane)) // &
+               " of the reference node of a *RIGID BODY")
             return
          end do
       end if

@@ -10,6 +10,7 @@ module emcon_deck_rigid
    use emcon_name_index, only : name_index_find
    use emcon_origin, only : origin_t
    use emcon_rigid_bodies, only : rigid_body_t, rigid_frame_choose
+   use emcon_rotation, only : n_turn
    use emcon_scene, only : scene_t
    use emcon_sort, only : unique_sorted
    use emcon_steps, only : prescribed_find, prescribed_t
@@ -212,39 +213,44 @@ contains
       do i_step = 1, size(scene%step)
          do i = 1, size(scene%step(i_step)%turn)
             associate (turn => scene%step(i_step)%turn(i))
-               turn%rigid = findloc(scene%rigid%reference, turn%angle%node, 1)
+               turn%rigid = findloc(scene%rigid%reference, turn%angle(1)%node, 1)
                if (turn%rigid == 0) cycle
                turn%is_about = all([(prescribed_find(scene%step(i_step)%prescribed, &
-                  turn%angle%node, a), a = 1, scene%n_dim)] > 0)
-               if (.not. turn%is_about) call add_arms(scene, turn%angle%origin, turn%rigid)
+                  turn%angle(1)%node, a), a = 1, scene%n_dim)] > 0)
+               if (.not. turn%is_about) call add_arms(scene, turn%angle(1)%origin, turn%rigid)
                call prescribe_turn(scene, i_step, i)
             end associate
-            if (scene%n_dim /= n_plane) call check_hold(reader, scene, i_step, i)
+            if (scene%n_dim /= n_plane) call check_turn(reader, scene, i_step, i)
          end do
       end do
    end subroutine read_turns
 
-   !> In space a body that has turned is held as it is, by FIXED: the rotation 0 is that of the
-   !> start.
-   subroutine check_hold(reader, scene, i_step, i)
+   !> In space a body turns about all axes as it is told, or about none. One that has turned freely
+   !> is held as it is, by FIXED: rotations are those from the start.
+   subroutine check_turn(reader, scene, i_step, i)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
       integer, intent(in) :: i_step, i             !! turn `i` of that step
       integer :: k
 
-      associate (angle => scene%step(i_step)%turn(i)%angle)
-         if (angle%is_frozen .or. i_step == 1) return
-         associate (earlier => scene%step(i_step - 1)%turn%angle)
-            k = findloc(earlier%node, angle%node, 1)
+      associate (turn => scene%step(i_step)%turn(i))
+         if (size(turn%angle) < n_turn(scene%n_dim) .or. (any(turn%angle%is_frozen) .and. &
+            .not. all(turn%angle%is_frozen))) call add_error(reader%log, turn%angle(1)%origin, &
+            "*BOUNDARY: reference node " // to_text(scene%node%label(turn%angle(1)%node)) // &
+            ": in three dimensions degrees of freedom 4 to 6 of a rigid body are all prescribed, " &
+            // "or all FIXED, or none; supports of single axes are not in this version")
+         if (all(turn%angle%is_frozen) .or. i_step == 1) return
+         associate (earlier => scene%step(i_step - 1)%turn)
+            k = findloc(earlier%rigid, turn%rigid, 1)
             if (k > 0) then
-               if (.not. earlier(k)%is_frozen) return
+               if (.not. any(earlier(k)%angle%is_frozen)) return
             end if
          end associate
-         call add_error(reader%log, angle%origin, "*BOUNDARY: rigid body " // &
-            scene%rigid(scene%step(i_step)%turn(i)%rigid)%name // " may have turned before step " &
+         call add_error(reader%log, turn%angle(1)%origin, "*BOUNDARY: rigid body " // &
+            scene%rigid(turn%rigid)%name // " may have turned before step " &
             // to_text(i_step) // ": in three dimensions FIXED holds it as it is then")
       end associate
-   end subroutine check_hold
+   end subroutine check_turn
 
    !> Nodes at the ends of the arms of rigid body `b`, behind all others, if it has none.
    subroutine add_arms(scene, origin, b)
@@ -290,7 +296,7 @@ contains
          do k = 1, scene%n_dim
             do a = 1, scene%n_dim
                n = n + 1
-               new(n)%origin = turn%angle%origin
+               new(n)%origin = turn%angle(1)%origin
                if (turn%is_about) then
                   new(n)%node = scene%rigid(turn%rigid)%frame(k + 1)
                else

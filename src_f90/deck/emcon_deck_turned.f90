@@ -53,7 +53,7 @@ contains
       integer :: k, other
 
       do k = 1, size(step%turn)
-         associate (angle => step%turn(k)%angle)
+         associate (angle => step%turn(k)%angle(1))
             call check_node(reader, scene, mark, "*BOUNDARY", angle%origin, angle%node, is_told)
          end associate
       end do

@@ -34,7 +34,7 @@ contains
 
       associate (step => scene%step(k))
          allocate(used, source=[step%load%amplitude, &
-            step%prescribed%amplitude, step%turn%angle%amplitude, &
+            step%prescribed%amplitude, (step%turn(i)%angle%amplitude, i = 1, size(step%turn)), &
             merge(step%contact%overclosure_amplitude, 0, step%contact%resolves_overclosure)])
          allocate(time(0))
          do i = 1, size(scene%amplitude)

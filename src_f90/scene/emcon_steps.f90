@@ -51,7 +51,8 @@ module emcon_steps
    !> The rotation of a rigid body that is prescribed.
    type :: turn_t
       integer :: rigid = 0                           !! index into `scene_t%rigid`
-      type(prescribed_t) :: angle                    !! of the reference node; value in radians
+      !> (n_turn) of the reference node, values in radians; in space those of a rotation vector
+      type(prescribed_t), allocatable :: angle(:)
       !> That node is prescribed too, in all directions
       logical :: is_about = .true.
    end type turn_t

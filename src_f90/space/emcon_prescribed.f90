@@ -3,10 +3,10 @@ module emcon_prescribed
    use emcon_amplitudes, only : amplitude_t, find_amplitude_value
    use emcon_evaluation, only : instant_t
    use emcon_kinds, only : wp
-   use emcon_rotation, only : n_turn
    use emcon_scene, only : scene_t
    use emcon_steps, only : prescribed_find, prescribed_t, step_t
    use emcon_turn_plane, only : turn_arm, turn_of, turned_by
+   use emcon_turn_space, only : turn_arm_space
    implicit none
    private
    public :: amplitude_at, prescribed_way, prescribed_motion, ramp_at, ramp_turn
@@ -47,8 +47,7 @@ contains
       real(wp), intent(in), contiguous :: u_start(:, :)  !! (n_dim, n_node) [L]
       real(wp), intent(out) :: u                 !! [L]
       real(wp), intent(out) :: v                 !! [L/T]
-      real(wp) :: arm(size(u_start, 1)), start(size(u_start, 1)), w(size(u_start, 1)), &
-         rate(size(u_start, 1)), begun, angle, spin
+      real(wp), dimension(size(u_start, 1)) :: arm, start, w, rate
       integer :: node
 
       if (prescribed%turn == 0) then
@@ -61,22 +60,64 @@ contains
             node = prescribed%node
             if (.not. turn%is_about) node = body%frame(findloc(body%arm, node, 1) + 1)
          end associate
-         arm = scene%x(:, node) - scene%x(:, turn%angle%node)
-         start = u_start(:, node) - u_start(:, turn%angle%node)
+         arm = scene%x(:, node) - scene%x(:, turn%angle(1)%node)
+         start = u_start(:, node) - u_start(:, turn%angle(1)%node)
          u = 0.0_wp
          v = 0.0_wp
          if (turn%is_about) call given_motion(scene, step, step%prescribed(prescribed_find( &
-            step%prescribed, turn%angle%node, a)), instant, u_start(a, turn%angle%node), u, v)
-         if (turn%angle%is_frozen) u = u + start(a)
-         if (turn%angle%is_frozen .or. n_turn(size(arm)) > 1) return    ! in space: as at the start
-         begun = turned_by(arm, arm + start)
-         begun = begun + turn_of*anint((turn%angle%before - begun)/turn_of)
-         call given_motion(scene, step, turn%angle, instant, begun, angle, spin)
-         call turn_arm(arm, angle, w, rate)
+            step%prescribed, turn%angle(1)%node, a)), instant, u_start(a, turn%angle(1)%node), u, v)
+         if (turn%angle(1)%is_frozen) then
+            u = u + start(a)
+            return
+         end if
+         if (size(turn%angle) == 1) then
+            call given_turn(scene, step, turn%angle(1), instant, arm, start, w, rate)
+         else
+            call given_turn_space(scene, step, turn%angle, instant, arm, w, rate)
+         end if
          u = u + w(a)
-         v = v + spin*rate(a)
+         v = v + rate(a)
       end associate
    end subroutine prescribed_motion
+
+   !> How an arm of a body turns in the plane, from where the step finds it.
+   pure subroutine given_turn(scene, step, prescribed, instant, arm, start, w, v)
+      type(scene_t), intent(in) :: scene
+      type(step_t), intent(in) :: step
+      type(prescribed_t), intent(in) :: prescribed       !! the angle
+      type(instant_t), intent(in) :: instant
+      real(wp), intent(in) :: arm(:), start(:)   !! (2) and how its end has moved before [L]
+      real(wp), intent(out) :: w(:)              !! (2) [L]
+      real(wp), intent(out) :: v(:)              !! (2) [L/T]
+      real(wp) :: begun, angle, spin
+
+      begun = turned_by(arm, arm + start)
+      begun = begun + turn_of*anint((prescribed%before - begun)/turn_of)
+      call given_motion(scene, step, prescribed, instant, begun, angle, spin)
+      call turn_arm(arm, angle, w, v)
+      v = spin*v
+   end subroutine given_turn
+
+   !> The same in space, by the components of a rotation vector.
+   pure subroutine given_turn_space(scene, step, prescribed, instant, arm, w, v)
+      type(scene_t), intent(in) :: scene
+      type(step_t), intent(in) :: step
+      type(prescribed_t), intent(in) :: prescribed(:)    !! (3)
+      type(instant_t), intent(in) :: instant
+      real(wp), intent(in) :: arm(:)             !! (3) [L]
+      real(wp), intent(out) :: w(:)              !! (3) [L]
+      real(wp), intent(out) :: v(:)              !! (3) [L/T]
+      real(wp), dimension(size(prescribed)) :: angle, rate
+      integer :: k
+
+      do k = 1, size(prescribed)
+         associate (own => prescribed(k))
+            call given_motion(scene, step, own, instant, own%before, angle(own%dof - size(arm)), &
+               rate(own%dof - size(arm)))
+         end associate
+      end do
+      call turn_arm_space(arm, angle, rate, w, v)
+   end subroutine given_turn_space
 
    !> What an amplitude, or the run of a step from `start`, gives.
    pure subroutine given_motion(scene, step, prescribed, instant, start, u, v)

@@ -137,10 +137,33 @@ def test_a_held_body_is_a_clamp(tmp_path: Path) -> None:
     assert "free to rotate about x, rotate about y, rotate about z" in done.stderr
 
 
+@pytest.mark.parametrize("kind", ["DYNAMIC", "STATIC"])
+def test_a_driven_turn(kind: str, tmp_path: Path) -> None:
+    """By the components of a rotation vector, in statics in a second step on to another, beside driven displacements:
+    every node is where it is to be."""
+    way = np.array([0.3, 0.0, -0.1])
+    turns = np.array([[0.5, -9.0, 2.0], [0.8, -7.0, 0.0]])[:1 if kind == "DYNAMIC" else 2]
+    mesh = Block("C3D8", (1, 1, 2), SIZE)
+    text = ("*AMPLITUDE, NAME=RAMP\n0., 0., 1., 1.\n" + mesh.deck(
+        "", f"*NODE\n{REFERENCE}, {', '.join(map(repr, CENTRE))}\n*RIGID BODY, ELSET=ALL, REF NODE={REFERENCE}\n",
+        DENSITY))
+    for k, vector in enumerate(turns, 1):
+        text += (f"*STEP, NLGEOM\n*{kind}, DIRECT\n.05, 1.\n*BOUNDARY{', AMPLITUDE=RAMP' if kind == 'DYNAMIC' else ''}\n"
+                 + "".join(f"{REFERENCE}, {a}, {a}, {v!r}\n" for a, v in enumerate([*(k*way).tolist(), *vector.tolist()], 1))
+                 + "*NODE FILE\nU\n*END STEP\n")
+    fields = run(text, tmp_path).fields()
+    assert len(fields.time) == 1 + 20*len(turns)
+    for t, u in zip(fields.time, fields["displacement"], strict=True):
+        vector = [np.interp(t, range(len(turns) + 1), [0.0, *turns[:, a]]) for a in range(3)]
+        place = CENTRE + Rotation.from_rotvec(vector).apply(mesh.x - CENTRE) + t*way
+        assert np.abs(mesh.x + u[:len(mesh.x)] - place).max() <= 1.0e-13
+
+
 @pytest.mark.parametrize(("cards", "text"), [
-    (f"*BOUNDARY\n{REFERENCE}, 4\n", "prescribe degrees of freedom 4 to 6 of a rigid body by one line"),
-    (f"*BOUNDARY\n{REFERENCE}, 4, 6, 0.5\n", "driven rotations are not in this version"),
+    (f"*BOUNDARY\n{REFERENCE}, 4\n", "degrees of freedom 4 to 6 of a rigid body are all prescribed"),
+    (f"*BOUNDARY, FIXED\n{REFERENCE}, 4\n*BOUNDARY\n{REFERENCE}, 5, 6\n", "or all FIXED"),
     (f"*BOUNDARY\n{REFERENCE}, XSYMM\n", "single axes"),
+    ("*BOUNDARY\n1, 5, 5, .1\n", "degrees of freedom 4 to 6 are of the reference node"),
     (f"*CLOAD\n{REFERENCE}, 6, 1.\n", "degree of freedom 6 does not exist"),
     ("*BOUNDARY\n1, 1, 3\n", "prescribe that node"),
     ("*NODE FILE\nUR\n", "rotation of rigid bodies in three dimensions is not in this version")])

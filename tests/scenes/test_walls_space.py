@@ -147,6 +147,27 @@ def test_a_driven_wall(tmp_path: Path) -> None:
     assert history["pz"][-1] > 1.2
 
 
+def test_a_paddle(tmp_path: Path) -> None:
+    """A plane that turns about an edge of the cube's floor and throws it: all work is in the ledger."""
+    run = ran(tmp_path, "*AMPLITUDE, NAME=RAMP\n0., 0., 1., 1.\n" + falling(
+        cube(), plane((-0.5, 0., 0.)), (0., 0., 0.), support=f"{REFERENCE}, 1, 4\n{REFERENCE}, 6\n",
+        more=f"*BOUNDARY, AMPLITUDE=RAMP\n{REFERENCE}, 5, 5, -1.2\n").replace(
+            f"*NODE\n{REFERENCE}, 0.0, 0.0, -3.0\n", f"*NODE\n{REFERENCE}, -0.5, 0., 0.\n"))
+    history = run.history
+    energy = history["kinetic"] + history["strain"]
+    assert run.verdict["verdict"] == "good", run.log[-600:]
+    assert np.abs(history["external_work"] - energy).max() <= BALANCE*energy.max()
+    # Pushed by a plane whose normal turns from z to -x.
+    assert history["pz"][-1] > 0.4 and history["px"][-1] < -0.05
+    seen = FieldFile(run.file(".surfaces.vtkhdf"))
+    of_wall = seen.point("node", 0) < 0
+    place = (seen.points + seen.point("displacement", -1))[of_wall] - [-0.5, 0., 0.]
+    angle = 1.2*seen.times[-1]
+    assert np.abs(place @ [-np.sin(angle), 0., np.cos(angle)]).max() <= 1.0e-13
+    body = (run.fields().x + run.fields()["displacement"][-1])[:27] - [-0.5, 0., 0.]
+    assert (body @ [-np.sin(angle), 0., np.cos(angle)]).min() >= -1.0e-13
+
+
 def test_walls_are_seen(tmp_path: Path) -> None:
     """As faces on the shape in the file of surfaces, which move with it; the picture has those that face the eye."""
     run = ran(tmp_path, falling(rubber_ball((0., 0., 0.)), sphere(2.1, inside=True), (0.5, 0.25, -1.), until=0.1))
