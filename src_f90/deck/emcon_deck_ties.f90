@@ -86,8 +86,11 @@ contains
       call need_name(reader, card, "NAME", tie%name)
       call option_real(reader, card, "POSITION TOLERANCE", tie%tolerance)
       call choose_option(reader, card, "MULTIPLIER", "tie multiplier", tie%multiplier)
-      call option_word(reader, card, "ADJUST", "YES", word, "NO", "slave nodes are always put " // &
-         "onto the master surface: across a gap angular momentum would be lost")
+      call option_word(reader, card, "ADJUST", "YES, NO", word)
+      tie%is_adjusted = word /= "NO"
+      if (.not. tie%is_adjusted .and. (has_option(card, "TRANSLATION") .or. is_cyclic(card))) &
+         call card_error(reader, card, "ADJUST=NO is for surfaces that meet as they are: with " // &
+         "TRANSLATION and CYCLIC SYMMETRY slave nodes are moved")
       call option_word(reader, card, "TYPE", "SURFACE TO SURFACE", word, "NODE TO SURFACE", &
          "ties are integrated over faces, so that a uniform stress passes through")
       call option_word(reader, card, "CYCLIC SYMMETRY", "YES, NO", word)

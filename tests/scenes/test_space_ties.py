@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -238,3 +239,39 @@ def test_contact_of_tied_slave_nodes(pair: str, tmp_path: Path) -> None:
     assert done.verdict["verdict"] == "good"
     assert np.ptp(history["total"]) < 1e-12*history["total"][0]
     assert np.ptp(history["px"]) < 1e-12*history["px"][0]
+
+
+@pytest.mark.parametrize(("step", "part"), [
+    ("*DYNAMIC, DIRECT\n.05, .4\n", 1e-12), ("*DYNAMIC, DIRECT\n.05, .4\n*CONSTRAINT METHOD, TYPE=SADDLE POINT\n", 1e-12),
+    ("*DYNAMIC, EXPLICIT, DIRECT\n.002, .4\n", 1e-3)])
+def test_surfaces_that_stay_apart(step: str, part: float, tmp_path: Path) -> None:
+    """Polygons in polygons, not adjusted: angular momentum is lost, as much as the warning says; nothing else is."""
+    cells = [(4, 2), (6, 3)]
+    text, x = quarter_shells(cells, ["C3D8", "C3D8"])
+    text = text.replace("*TIE, NAME=T", "*TIE, NAME=T, ADJUST=NO")
+    done = run(text + flight(x).replace("*DYNAMIC, DIRECT\n.05, 1.0\n", step), tmp_path)
+    fields, element, first = done.fields(), [], 0
+    np.testing.assert_allclose(fields.x, x, rtol=0, atol=1e-15, err_msg="nothing is moved")
+    apart = float(re.search(r"its surfaces stay apart by up to (\S+),", done.log)[1])
+    assert 0.0 < apart < 1.3*(1 - np.cos(np.pi/16)), "less than the sagitta of the coarser polygon"
+    for i, n in enumerate(cells):
+        block = Block("C3D8", (1, *n))
+        element += [[first + k for k in nodes] for nodes in block.element]
+        first += len(block.x)
+    start, end = (momenta(element, x, x + fields["displacement"][i], fields["velocity"][i]) for i in (0, -1))
+    if "EXPLICIT" in step:                       # its masses are at the nodes
+        start, end = (np.array([done.history[k][i] for k in ("px", "py", "pz", "lx", "ly", "lz")]) for i in (0, -1))
+    np.testing.assert_allclose(end[:3], start[:3], rtol=0, atol=1e-13*np.abs(start).max())
+    told = next(w for w in done.verdict["warnings"] if "ADJUST=NO" in w)
+    lost = float(re.search(r"has changed by ([-+.\dE]+),", told)[1])
+    # Three digits are printed.
+    assert lost == pytest.approx(np.linalg.norm(end[3:] - start[3:]), rel=5e-3)
+    assert lost > 1e-3*np.linalg.norm(start[3:])
+    assert np.ptp(done.history["total"]) < part*done.history["total"][0]
+
+
+def test_no_gap_loses_nothing(tmp_path: Path) -> None:
+    """Surfaces that meet exactly have no couple to tell, adjusted or not."""
+    blocks = [box("C3D8", (2,)*3, (0, 0, 0), (1, 1, .5)), box("C3D8", (3,)*3, (0, 0, .5), (1, 1, 1))]
+    text, x = tied(blocks, [(1, 0, 2)], RUBBER, ", ADJUST=NO")
+    check_flight(run(text + flight(x, steps=6), tmp_path), blocks)

@@ -21,7 +21,7 @@ def asked(text):
     """The deck, with a request for displacements if it has none."""
     if re.search(r"(?im)^\*NODE (PRINT|FILE)", text):
         return text
-    return re.sub(r"(?im)^\*END STEP", "*NODE FILE\nU\n*END STEP", text, count=1)
+    return re.sub(r"(?im)^\*END STEP", "*NODE FILE\nU\n*END STEP", text)
 
 
 def static(text):
@@ -92,7 +92,5 @@ REMARKS = {
     "cubef2f1": ("a penalty of CalculiX against a tie", []),
     "cubef2f2": ("a penalty of CalculiX against a tie", []),
     "cubef2f3": ("CalculiX ties nodes to faces here, which is 2.5e-02 off its own tied faces of `cubef2f1`", []),
-    "beamptied1noadjust": ("tied nodes are put onto the other surface; both with ADJUST=YES", [
-        (put("ADJUST=NO", "ADJUST=YES"),)*2]),
     **{name: (STEPS, [(static, static)]) for name in ("beamptied3", "beamptied4", "beamptied7")},
 }
