@@ -197,6 +197,39 @@ def test_slave_of_nodes(cells, is_exact, tmp_path: Path) -> None:
     check_flight(run(as_nodes(text.replace("*TIE", labels + "*TIE", 1)) + flight(x, steps=6), tmp_path/"flight"), blocks)
 
 
+def by_nodes(blocks: list[Block], text: str, sides: str) -> str:
+    """The sides of the first tie, S or M or both, as surfaces of nodes."""
+    first = np.cumsum([0] + [len(b.x) for b in blocks])
+    for side, b, end in (("S", 1, 0), ("M", 0, 1)):
+        if side in sides:
+            labels = "".join(f"{first[b] + k}\n" for k in blocks[b].on(2, end))
+            text = text.replace("*TIE, NAME=T", f"*NSET, NSET=NODES{side}\n{labels}*SURFACE, NAME=N{side}, TYPE=NODE\nNODES{side}\n*TIE, NAME=T")
+            text = text.replace(f"T1{side}, T1M" if side == "S" else ", T1M", f"N{side}, T1M" if side == "S" else ", NM")
+    return text
+
+
+@pytest.mark.parametrize(("sides", "kinds"), [("SM", ("C3D8", "C3D8")), ("SM", ("C3D20", "C3D10")), ("M", ("C3D10", "C3D8"))])
+def test_faces_that_nodes_make_up(sides, kinds, tmp_path: Path) -> None:
+    """A master of nodes is their faces, and so is a slave of nodes beside it: a uniform stress passes between unlike meshes."""
+    blocks = [box(kinds[0], (2,)*3, (0, 0, 0), (1, 1, .5)), box(kinds[1], (3,)*3, (0, 0, .5), (1, 1, 1))]
+    text, x = tied(blocks, [(1, 0, 2)])
+    text = by_nodes(blocks, text, sides)
+    assert text.count("TYPE=NODE") == len(sides)
+    done = run(text + stretch(x), tmp_path)
+    check_stretched(done, x)
+    assert done.errors.count("free faces whose nodes are all in it") == len(sides)
+
+
+def test_nodes_that_make_up_no_face(tmp_path: Path) -> None:
+    blocks = [box("C3D8", (2,)*3, (0, 0, 0), (1, 1, .5)), box("C3D8", (3,)*3, (0, 0, .5), (1, 1, 1))]
+    text, x = tied(blocks, [(1, 0, 2)])
+    text = by_nodes(blocks, text, "M")
+    nodes = re.search(r"(?s)NSET=NODESM\n(.*?)\*", text)[1]
+    one, *_ = nodes.splitlines()
+    errors = run(text.replace(f"NSET=NODESM\n{nodes}", f"NSET=NODESM\n{one}\n") + stretch(x), tmp_path, code=2).errors
+    assert "the master surface 'NM' has TYPE=NODE" in errors
+
+
 def two_sides(upper: Block, slave: tuple[int, int] = (2, 0), master: tuple[int, int] = (2, 1), options: str = "") -> str:
     """A block of unlike mesh near another, and ends of axes that are slave and master."""
     lower = box("C3D8", (2,)*3, (0, 0, 0), (1, 1, .5))
