@@ -107,7 +107,7 @@ def run(deck):
     done = emcon(deck, "--quiet", timeout=calculix_suite.MOST)
     if done.returncode == 2:
         told = re.search(r"(?:error|emcon): (?:\S+: error: )?(.*)", done.stderr)
-        return told[1].split("; supported:")[0]
+        return told[1].replace(f"{deck.parent}/", "").split("; supported:")[0]
     if not deck.with_suffix(".json").exists():
         return "*NO ANALYSIS: the deck is read and checked, as it asks"
     verdict = json.loads(deck.with_suffix(".json").read_text())
