@@ -449,7 +449,7 @@ class Model(Source):
     def tie(self, name: str, slave: str, master: str, *,
             position_tolerance: Number | None = None, multiplier: str | None = None,
             translation: Sequence[Number] | None = None, reference: int | str | None = None,
-            cyclic_symmetry: bool = False) -> Model:
+            cyclic_symmetry: bool = False, adjust: bool = True) -> Model:
         """`*TIE` of two surfaces, of a cell that repeats itself or of a sector.
 
         position_tolerance   how far apart they may be [L]; default a tenth of an edge
@@ -457,9 +457,10 @@ class Model(Source):
         translation          (2,) or (3,) from the slave to where it lies on the master [L]
         reference            node whose displacement adds to the translation
         cyclic_symmetry      the slave turned by a sector lies on the master: see `sectors`
+        adjust               False: slave nodes stay where they are, across gaps angular momentum is lost
         """
         return self._card("TIE", {"NAME": name, "POSITION TOLERANCE": position_tolerance,
-                                  "MULTIPLIER": multiplier, "ADJUST": "YES",
+                                  "MULTIPLIER": multiplier, "ADJUST": "YES" if adjust else "NO",
                                   "TYPE": "SURFACE TO SURFACE",
                                   "TRANSLATION": translation is not None, "REF NODE": reference,
                                   "CYCLIC SYMMETRY": cyclic_symmetry},

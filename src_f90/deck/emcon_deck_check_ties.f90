@@ -4,7 +4,7 @@ module emcon_deck_check_ties
    use emcon_deck_check_sides, only : advise_tie
    use emcon_deck_check_surfaces, only : find_common_edges
    use emcon_deck_dimension, only : n_space
-   use emcon_deck_reader, only : reader_t
+   use emcon_deck_reader, only : n_cards, reader_t
    use emcon_diagnostics, only : add_error, add_warning, label_list
    use emcon_kinds, only : wp
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
@@ -65,6 +65,8 @@ contains
       call surface_nodes(scene, scene%surface(tie%slave), slave)
       call surface_nodes(scene, scene%surface(tie%master), master)
       is_common = [(find_sorted(master, slave(i)) > 0, i = 1, size(slave))]
+      ! A sector whose card was not read is not known to have an axis.
+      if (n_cards(reader, "CYCLICSYMMETRYMODEL") > 0 .and. reader%log%n_errors > 0) return
       if (tie_map_is_given(tie%map)) is_common = is_common .and. .not. &
          [(is_on_axis(scene, tie%map, slave(i)), i = 1, size(slave))]
       if (any(is_common)) call add_error(reader%log, tie%origin, title(scene, tie) &

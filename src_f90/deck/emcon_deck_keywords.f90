@@ -99,7 +99,8 @@ module emcon_deck_keywords
       keyword_t("TIE", in_model, "NAME=,POSITIONTOLERANCE=,MULTIPLIER=,ADJUST=,TYPE=," &
          // "CYCLICSYMMETRY?,TRANSLATION,REFNODE=,~NOROTATION,~NOTHICKNESS,!MULTISTAGE," &
          // "!TIEDNSET,!CONSTRAINTRATIO"), &
-      keyword_t("CYCLIC SYMMETRY MODEL", in_model, "N=,TIE=,~NGRAPH,~ELSET,!CHECK:YES"), &
+      keyword_t("CYCLIC SYMMETRY MODEL", in_model, "N=,TIE=,~NGRAPH,~ELSET,!CHECK:YES," &
+         // "!CONTACT,!MATRIX"), &
       keyword_t("EQUATION", in_both, "REMOVE,REMOVEALL,!INPUT"), &
       keyword_t("TRANSFORM", in_model, "NSET=,TYPE="), &
       keyword_t("CONTACT INTERFERENCE", in_step, "SHRINK,AMPLITUDE=,TYPE=,~OP:NEW"), &
@@ -330,6 +331,8 @@ contains
          reason = " (motions are those in space)"
       case ("MULTISTAGE")
          reason = " (rings of unlike sectors are not joined)"
+      case ("CONTACT")
+         reason = " (a sector is tied to the next one, or free of it)"
       case ("TAUMAX")
          reason = " (nothing but the coefficient bounds friction)"
       case ("SHEARTRACTIONSLOPE")

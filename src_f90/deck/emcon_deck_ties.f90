@@ -4,6 +4,7 @@ module emcon_deck_ties
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, data_warning, &
       get_real, next_line
    use emcon_deck_dimension, only : n_space
+   use emcon_deck_faces_of_nodes, only : faces_of_nodes
    use emcon_deck_labels, only : find_label
    use emcon_deck_options, only : choose_option
    use emcon_deck_reader, only : card_error, card_t, has_option, line_origin, n_lines, need_name, &
@@ -16,6 +17,8 @@ module emcon_deck_ties
    use emcon_mesh, only : surface_t
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    use emcon_scene, only : scene_t, where_text
+   use emcon_sort, only : unique_sorted
+   use emcon_surface_nodes, only : surface_nodes
    use emcon_text, only : to_text
    use emcon_tie_maps, only : tie_map_t, tie_map_translate
    implicit none
@@ -86,8 +89,11 @@ contains
       call need_name(reader, card, "NAME", tie%name)
       call option_real(reader, card, "POSITION TOLERANCE", tie%tolerance)
       call choose_option(reader, card, "MULTIPLIER", "tie multiplier", tie%multiplier)
-      call option_word(reader, card, "ADJUST", "YES", word, "NO", "slave nodes are always put " // &
-         "onto the master surface: across a gap angular momentum would be lost")
+      call option_word(reader, card, "ADJUST", "YES, NO", word)
+      tie%is_adjusted = word /= "NO"
+      if (.not. tie%is_adjusted .and. (has_option(card, "TRANSLATION") .or. is_cyclic(card))) &
+         call card_error(reader, card, "ADJUST=NO is for surfaces that meet as they are: with " // &
+         "TRANSLATION and CYCLIC SYMMETRY slave nodes are moved")
       call option_word(reader, card, "TYPE", "SURFACE TO SURFACE", word, "NODE TO SURFACE", &
          "ties are integrated over faces, so that a uniform stress passes through")
       call option_word(reader, card, "CYCLIC SYMMETRY", "YES, NO", word)
@@ -146,7 +152,7 @@ contains
    subroutine read_tie_lines(reader, card, scene, common, tie_of, tie, n)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
-      type(scene_t), intent(in) :: scene
+      type(scene_t), intent(inout) :: scene
       type(tie_t), intent(in) :: common
       type(name_index_t), intent(inout) :: tie_of    !! ties by their surfaces, the lower one first
       type(tie_t), intent(inout) :: tie(:)
@@ -163,6 +169,7 @@ contains
          if (has_option(card, "TRANSLATION")) call read_translation(reader, data, tie(n)%map)
          call get_surfaces(reader, data, scene, tie(n)%slave, tie(n)%master)
          if (tie(n)%slave > 0 .and. tie(n)%master > 0) then
+            call find_faces(reader, data, scene, tie(n))
             call check_sides(reader, data, scene, tie(n))
             if (data%ok) call check_repeated(reader, data, scene, tie(:n), tie_of)
          end if
@@ -194,6 +201,42 @@ contains
       if (data%ok) call tie_map_translate(map, translation)
       data%n = n_side
    end subroutine read_translation
+
+   !> A master of nodes in space is the faces that these make up, if there are any; so is a slave
+   !> of nodes beside it, if its faces have all of them.
+   subroutine find_faces(reader, data, scene, tie)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(in) :: data
+      type(scene_t), intent(inout) :: scene
+      type(tie_t), intent(inout) :: tie
+
+      if (reader%n_dim /= n_space .or. tie%slave == tie%master) return
+      if (.not. has_nodes(scene%surface(tie%master))) return
+      call take_faces(reader, data, scene, .false., tie%master)
+      if (has_nodes(scene%surface(tie%slave)) .and. .not. has_nodes(scene%surface(tie%master))) &
+         call take_faces(reader, data, scene, .true., tie%slave)
+   end subroutine find_faces
+
+   !> The surface that the nodes of surface `i` make up in its place, if there is one.
+   subroutine take_faces(reader, data, scene, needs_all, i)
+      type(reader_t), intent(inout) :: reader
+      type(data_t), intent(in) :: data
+      type(scene_t), intent(inout) :: scene
+      logical, intent(in) :: needs_all           !! every node is to be on a face
+      integer, intent(inout) :: i
+      type(surface_t) :: surface
+      integer, allocatable :: node(:)
+
+      surface = faces_of_nodes(scene, scene%surface(i))
+      if (size(surface%element) == 0) return
+      call surface_nodes(scene, surface, node)
+      if (needs_all .and. size(node) < size(unique_sorted(scene%surface(i)%node))) return
+      scene%surface = [scene%surface, surface]
+      i = size(scene%surface)
+      call data_warning(reader, data, "surface " // quoted(surface%name) // " has TYPE=NODE: " // &
+         "it is taken as the " // to_text(size(surface%element)) // " free faces whose nodes " // &
+         "are all in it")
+   end subroutine take_faces
 
    !> The sides of a tie are two surfaces of element faces; in space the slave may be one of nodes.
    subroutine check_sides(reader, data, scene, tie)

@@ -23,6 +23,7 @@ module emcon_march_commit
    use emcon_pair_sums, only : pair_sums_add, pair_sums_begin, pair_sums_jump
    use emcon_evaluation, only : evaluation_contact_place, evaluation_has_inertia
    use emcon_active_set, only : active_set_brought
+   use emcon_rotation, only : add_moments
    use emcon_scene, only : scene_t
    use emcon_penalty, only : penalty_depth, penalty_keep, penalty_stored
    use emcon_stand_off, only : stand_off_add
@@ -30,6 +31,7 @@ module emcon_march_commit
    use emcon_term, only : role_external, role_inertia, role_internal
    use emcon_term_registry, only : terms_dissipation, terms_stabilization
    use emcon_text, only : note_add, notes_t, to_text
+   use emcon_tie_couple, only : tie_couple_add, tie_couple_of
    use emcon_rigid_rotation, only : rigid_rotation_measure
    implicit none
    private
@@ -49,6 +51,7 @@ contains
       if (.not. increment%done > 0.0_wp) call pair_sums_begin(self%state%sums%sum)
       associate (state => self%state, system => self%system, set => self%active%set)
          system%response%residual = system%response%residual - self%newton%contact
+         call book_ties(self, scene, h)
          call gather_dependent(system%space%numbering, system%response%residual)
          call book_stabilization(self, increment)
          system%response%residual = merge(0.0_wp, system%response%residual, &
@@ -94,6 +97,43 @@ contains
          self%state%base, is_due)
       if (is_due) self%system%phases%n_factorisation = self%system%phases%n_factorisation + 1
    end subroutine march_commit
+
+   !> What ties do to the angular momentum whose surfaces stay apart. Explicit steps have two
+   !> pushes, one at each end.
+   subroutine book_ties(self, scene, h)
+      type(march_t), intent(inout) :: self       !! the residual is not yet gathered
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: h                  !! > 0 [T]
+      real(wp), dimension(size(scene%x, 1), size(scene%x, 2)) :: place, force, other
+      real(wp) :: couple(size(self%ledger%angular))
+
+      if (all(scene%tie%is_adjusted)) return
+      associate (motion => self%motion, numbering => self%system%space%numbering)
+         place = scene%x + self%state%u + 0.5_wp*motion%du
+         couple = tie_couple_of(numbering, place, self%system%response%residual) &
+            /(1.0_wp + motion%evaluation%start_weight)
+         if (self%explicit%is_on) couple = 0.5_wp*(couple + tie_couple_of(numbering, place, &
+            self%explicit%residual))
+         if (self%active%set%n_permanent > 0) then
+            call constraints_force(self%active%set, 1, force)
+            call constraints_force(self%active%set, self%active%set%n_permanent + 1, other)
+            call add_couple(place, force - other, couple)
+         end if
+         call tie_couple_add(self%ledger%tie_couple, couple, &
+            merge(h, 0.0_wp, evaluation_has_inertia(motion%evaluation)), self%ledger%angular)
+      end associate
+   end subroutine book_ties
+
+   !> Add the moments of forces on nodes.
+   pure subroutine add_couple(place, force, couple)
+      real(wp), intent(in) :: place(:, :), force(:, :)   !! (n_dim, n_node) [L], [M L/T^2]
+      real(wp), intent(inout) :: couple(:)               !! (turns) [M L^2/T^2]
+      integer :: i
+
+      do i = 1, size(place, 2)
+         call add_moments(place(:, i), force(:, i), couple)
+      end do
+   end subroutine add_couple
 
    !> Does a guard hold a node, one of corners or the other side of a pair?
    pure logical function guards_act(system, set)

@@ -205,9 +205,27 @@ contains
          increment%work_scale)
       if (.not. march_is_done(march)) return
       call follow_bending(self, scene, march)
+      call warn_of_gaps(self, march%ledger)
       call warn_of_snap(self, scene, march)
       call warn_of_distance(self, march, terms_solid(march%system%term))
    end subroutine verdict_update
+
+   !> Ties whose surfaces stay apart: what their couple was, and did to the angular momentum.
+   subroutine warn_of_gaps(self, ledger)
+      type(verdict_t), intent(inout) :: self
+      type(ledger_t), intent(in) :: ledger
+      character(len=:), allocatable :: text
+
+      associate (couple => ledger%tie_couple)
+         if (.not. couple%largest > 0.0_wp) return
+         text = "ties with ADJUST=NO exert couples across their gaps, of " // &
+            to_text(couple%largest, 3) // " at most"
+         if (norm2(couple%impulse) > 0.0_wp) text = text // ": the angular momentum has changed " &
+            // "by " // to_text(norm2(couple%impulse), 3) // ", and is " // &
+            to_text(couple%angular, 3) // " at most; ADJUST=YES closes them"
+         call add_warning(self, text)
+      end associate
+   end subroutine warn_of_gaps
 
    !> What STABILIZE holds on its way at the end of a step is not at rest there. What springs back
    !> is, once its forces, as the root of what it stores, are small by what they were.

@@ -14,7 +14,7 @@ module emcon_tie_moves
    use emcon_text, only : note_add, notes_t, to_text
    implicit none
    private
-   public :: ties_move_nodes
+   public :: ties_move_nodes, ties_note_gaps
 
    !> A node that would move by less than this part of the largest coordinate stays where it is.
    real(wp), parameter :: rounding = 64.0_wp*epsilon(1.0_wp)
@@ -39,7 +39,7 @@ contains
 
       if (size(scene%tie) == 0) return
       call linear_rows_init(linear, scene)
-      linear%is_used = linear%tie > 0
+      linear%is_used = are_adjusted(scene, linear)
       allocate(is_alive(size(scene%x, 1), size(scene%x, 2)), source=.true.)
       call numbering_init(numbering, is_alive, nothing, linear)
       allocate(move, source=0.0_wp*scene%x)
@@ -53,6 +53,43 @@ contains
       call check_elements(scene, move, error)
       if (.not. allocated(error)) scene%x = scene%x + move
    end subroutine ties_move_nodes
+
+   !> Which rows are those of ties whose slave nodes are moved?
+   pure function are_adjusted(scene, linear)
+      type(scene_t), intent(in) :: scene
+      type(linear_rows_t), intent(in) :: linear
+      logical :: are_adjusted(linear%n)
+      integer :: k
+
+      are_adjusted = linear%tie > 0
+      do k = 1, linear%n
+         if (are_adjusted(k)) are_adjusted(k) = scene%tie(linear%tie(k))%is_adjusted
+      end do
+   end function are_adjusted
+
+   !> Tell how far apart the surfaces of ties stay whose slave nodes are not moved.
+   subroutine ties_note_gaps(scene, notes)
+      type(scene_t), intent(in) :: scene
+      type(notes_t), intent(inout) :: notes
+      integer :: t, k
+      real(wp) :: gap(size(scene%x, 1)), largest
+
+      do t = 1, size(scene%tie)
+         if (scene%tie(t)%is_adjusted) cycle
+         associate (rows => scene%tie(t)%rows)
+            largest = 0.0_wp
+            do k = 1, size(rows%slave)
+               associate (at => rows%start(k) + 1, to => rows%start(k + 1))
+                  gap = matmul(scene%x(:, rows%node(at:to)), rows%weight(at:to))/rows%weight(at)
+               end associate
+               largest = max(largest, norm2(gap))
+            end do
+         end associate
+         call note_add(notes, "*TIE " // scene%tie(t)%name // ": its surfaces stay apart by up " &
+            // "to " // to_text(largest) // ", as ADJUST=NO asks for: across that the tie " // &
+            "exerts a couple")
+      end do
+   end subroutine ties_note_gaps
 
    !> x_d - (T x)_d of the dependent freedoms, from differences of places.
    pure subroutine find_moves(numbering, x, move)

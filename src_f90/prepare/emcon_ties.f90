@@ -11,7 +11,7 @@ module emcon_ties
    use emcon_tie_images, only : tie_images_add, tie_images_settle, tie_images_t, tie_images_take
    use emcon_tie_maps, only : tie_map_is_given
    use emcon_tie_meetings, only : check_repeated, count_ties, find_held, uncover_exterior
-   use emcon_tie_moves, only : ties_move_nodes
+   use emcon_tie_moves, only : ties_move_nodes, ties_note_gaps
    use emcon_tie_space, only : tie_measure_space
    use emcon_ties_plane, only : ties_prepare_plane
    implicit none
@@ -32,6 +32,7 @@ contains
 
       if (.not. any(tie_map_is_given(scene%tie%map))) then
          call prepare(scene, notes, error)
+         if (.not. allocated(error)) call ties_note_gaps(scene, notes)
          return
       end if
       whole = scene
@@ -40,6 +41,7 @@ contains
       if (.not. allocated(error)) call tie_images_settle(images, whole, notes, error)
       if (allocated(error)) return
       call tie_images_take(images, whole, scene)
+      call ties_note_gaps(scene, notes)
       call uncover_exterior(scene)
    end subroutine ties_prepare
 

@@ -35,6 +35,7 @@ module emcon_couplings
       integer :: master = 0
       real(wp) :: tolerance = -1.0_wp                !! POSITION TOLERANCE [L]; < 0: not given
       integer :: multiplier = multiplier_dual
+      logical :: is_adjusted = .true.                !! slave nodes are moved onto the master
       type(tie_map_t) :: map                         !! of a cell that repeats itself, or a sector
       type(tie_rows_t) :: rows                       !! frozen before the first step
    end type tie_t

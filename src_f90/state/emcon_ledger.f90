@@ -7,6 +7,7 @@ module emcon_ledger
    use emcon_state, only : state_t
    use emcon_system, only : mass_times, system_t
    use emcon_term_registry, only : terms_mass
+   use emcon_tie_couple, only : tie_couple_t
    implicit none
    private
    public :: ledger_t, ledger_init, ledger_measure, ledger_momenta, body_momenta, body_masses
@@ -34,6 +35,7 @@ module emcon_ledger
       real(wp) :: total = 0.0_wp
       real(wp), allocatable :: momentum(:)       !! (n_dim) [M L/T]
       real(wp), allocatable :: angular(:)        !! (1 or 3) about the origin [M L^2/T]
+      type(tie_couple_t) :: tie_couple           !! of ties whose surfaces stay apart
       real(wp), allocatable, private :: work(:, :)   !! (n_dim, n_node) momentum of each node
    end type ledger_t
 

@@ -374,6 +374,13 @@ contains
       else
          ledger%restitution = 0.0_wp
       end if
+      if (restart_offers(restart, "tie_couple", allocated(ledger%tie_couple%impulse))) then
+         if (.not. allocated(ledger%tie_couple%impulse)) allocate(ledger%tie_couple%impulse, &
+            mold=ledger%angular)
+         call restart_exchange(restart, "tie_couple", ledger%tie_couple%largest)
+         call restart_exchange(restart, "tie_couple", ledger%tie_couple%angular)
+         call restart_exchange(restart, "tie_couple", ledger%tie_couple%impulse)
+      end if
       if (restart_offers(restart, "decay", is_written=abs(ledger%decay) > 0.0_wp)) then
          call restart_exchange(restart, "decay", ledger%decay)
       else

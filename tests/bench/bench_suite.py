@@ -24,7 +24,7 @@ import numpy as np
 sys.path.insert(0, str(pathlib.Path(__file__).resolve().parents[1]))
 
 from book.common import table  # noqa: E402
-from peers import calculix, calculix_suite  # noqa: E402
+from peers import calculix, calculix_suite, contact_decks  # noqa: E402
 from scene_tools import Fields, emcon  # noqa: E402
 from timing import usage  # noqa: E402
 from verification import DOCS, update  # noqa: E402
@@ -98,6 +98,8 @@ WHY = {
                      "as thick as each point likes: tests/scenes/test_suite.py has the brick's "
                      "digits", None, None),
 }
+#: Of contact and ties, where bench_contact_decks.py has the causes.
+ELSEWHERE = "[the next section](#decks-of-contact-and-ties) tells why"
 #: Times are printed with seven digits.
 SAME_TIME = 1e-6
 
@@ -107,7 +109,7 @@ def run(deck):
     done = emcon(deck, "--quiet", timeout=calculix_suite.MOST)
     if done.returncode == 2:
         told = re.search(r"(?:error|emcon): (?:\S+: error: )?(.*)", done.stderr)
-        return told[1].split("; supported:")[0]
+        return told[1].replace(f"{deck.parent}/", "").split("; supported:")[0]
     if not deck.with_suffix(".json").exists():
         return "*NO ANALYSIS: the deck is read and checked, as it asks"
     verdict = json.loads(deck.with_suffix(".json").read_text())
@@ -178,7 +180,8 @@ def compare(name, text, program):
     count, largest, part, digit = told
     note = ""
     if part > digit:
-        note, *edits = WHY.get(name, ("**more than is printed**", None, None))
+        cause = ELSEWHERE if contact_decks.is_one(text) else "**more than is printed**"
+        note, *edits = WHY.get(name, (cause, None, None))
         if any(edits):
             again = by_both(name, text, program, edits)
             note += f": {again}" if isinstance(again, str) else f": {again[2]:.1e}"

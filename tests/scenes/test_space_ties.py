@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -196,6 +197,39 @@ def test_slave_of_nodes(cells, is_exact, tmp_path: Path) -> None:
     check_flight(run(as_nodes(text.replace("*TIE", labels + "*TIE", 1)) + flight(x, steps=6), tmp_path/"flight"), blocks)
 
 
+def by_nodes(blocks: list[Block], text: str, sides: str) -> str:
+    """The sides of the first tie, S or M or both, as surfaces of nodes."""
+    first = np.cumsum([0] + [len(b.x) for b in blocks])
+    for side, b, end in (("S", 1, 0), ("M", 0, 1)):
+        if side in sides:
+            labels = "".join(f"{first[b] + k}\n" for k in blocks[b].on(2, end))
+            text = text.replace("*TIE, NAME=T", f"*NSET, NSET=NODES{side}\n{labels}*SURFACE, NAME=N{side}, TYPE=NODE\nNODES{side}\n*TIE, NAME=T")
+            text = text.replace(f"T1{side}, T1M" if side == "S" else ", T1M", f"N{side}, T1M" if side == "S" else ", NM")
+    return text
+
+
+@pytest.mark.parametrize(("sides", "kinds"), [("SM", ("C3D8", "C3D8")), ("SM", ("C3D20", "C3D10")), ("M", ("C3D10", "C3D8"))])
+def test_faces_that_nodes_make_up(sides, kinds, tmp_path: Path) -> None:
+    """A master of nodes is their faces, and so is a slave of nodes beside it: a uniform stress passes between unlike meshes."""
+    blocks = [box(kinds[0], (2,)*3, (0, 0, 0), (1, 1, .5)), box(kinds[1], (3,)*3, (0, 0, .5), (1, 1, 1))]
+    text, x = tied(blocks, [(1, 0, 2)])
+    text = by_nodes(blocks, text, sides)
+    assert text.count("TYPE=NODE") == len(sides)
+    done = run(text + stretch(x), tmp_path)
+    check_stretched(done, x)
+    assert done.errors.count("free faces whose nodes are all in it") == len(sides)
+
+
+def test_nodes_that_make_up_no_face(tmp_path: Path) -> None:
+    blocks = [box("C3D8", (2,)*3, (0, 0, 0), (1, 1, .5)), box("C3D8", (3,)*3, (0, 0, .5), (1, 1, 1))]
+    text, x = tied(blocks, [(1, 0, 2)])
+    text = by_nodes(blocks, text, "M")
+    nodes = re.search(r"(?s)NSET=NODESM\n(.*?)\*", text)[1]
+    one, *_ = nodes.splitlines()
+    errors = run(text.replace(f"NSET=NODESM\n{nodes}", f"NSET=NODESM\n{one}\n") + stretch(x), tmp_path, code=2).errors
+    assert "the master surface 'NM' has TYPE=NODE" in errors
+
+
 def two_sides(upper: Block, slave: tuple[int, int] = (2, 0), master: tuple[int, int] = (2, 1), options: str = "") -> str:
     """A block of unlike mesh near another, and ends of axes that are slave and master."""
     lower = box("C3D8", (2,)*3, (0, 0, 0), (1, 1, .5))
@@ -238,3 +272,39 @@ def test_contact_of_tied_slave_nodes(pair: str, tmp_path: Path) -> None:
     assert done.verdict["verdict"] == "good"
     assert np.ptp(history["total"]) < 1e-12*history["total"][0]
     assert np.ptp(history["px"]) < 1e-12*history["px"][0]
+
+
+@pytest.mark.parametrize(("step", "part"), [
+    ("*DYNAMIC, DIRECT\n.05, .4\n", 1e-12), ("*DYNAMIC, DIRECT\n.05, .4\n*CONSTRAINT METHOD, TYPE=SADDLE POINT\n", 1e-12),
+    ("*DYNAMIC, EXPLICIT, DIRECT\n.002, .4\n", 1e-3)])
+def test_surfaces_that_stay_apart(step: str, part: float, tmp_path: Path) -> None:
+    """Polygons in polygons, not adjusted: angular momentum is lost, as much as the warning says; nothing else is."""
+    cells = [(4, 2), (6, 3)]
+    text, x = quarter_shells(cells, ["C3D8", "C3D8"])
+    text = text.replace("*TIE, NAME=T", "*TIE, NAME=T, ADJUST=NO")
+    done = run(text + flight(x).replace("*DYNAMIC, DIRECT\n.05, 1.0\n", step), tmp_path)
+    fields, element, first = done.fields(), [], 0
+    np.testing.assert_allclose(fields.x, x, rtol=0, atol=1e-15, err_msg="nothing is moved")
+    apart = float(re.search(r"its surfaces stay apart by up to (\S+),", done.log)[1])
+    assert 0.0 < apart < 1.3*(1 - np.cos(np.pi/16)), "less than the sagitta of the coarser polygon"
+    for i, n in enumerate(cells):
+        block = Block("C3D8", (1, *n))
+        element += [[first + k for k in nodes] for nodes in block.element]
+        first += len(block.x)
+    start, end = (momenta(element, x, x + fields["displacement"][i], fields["velocity"][i]) for i in (0, -1))
+    if "EXPLICIT" in step:                       # its masses are at the nodes
+        start, end = (np.array([done.history[k][i] for k in ("px", "py", "pz", "lx", "ly", "lz")]) for i in (0, -1))
+    np.testing.assert_allclose(end[:3], start[:3], rtol=0, atol=1e-13*np.abs(start).max())
+    told = next(w for w in done.verdict["warnings"] if "ADJUST=NO" in w)
+    lost = float(re.search(r"has changed by ([-+.\dE]+),", told)[1])
+    # Three digits are printed.
+    assert lost == pytest.approx(np.linalg.norm(end[3:] - start[3:]), rel=5e-3)
+    assert lost > 1e-3*np.linalg.norm(start[3:])
+    assert np.ptp(done.history["total"]) < part*done.history["total"][0]
+
+
+def test_no_gap_loses_nothing(tmp_path: Path) -> None:
+    """Surfaces that meet exactly have no couple to tell, adjusted or not."""
+    blocks = [box("C3D8", (2,)*3, (0, 0, 0), (1, 1, .5)), box("C3D8", (3,)*3, (0, 0, .5), (1, 1, 1))]
+    text, x = tied(blocks, [(1, 0, 2)], RUBBER, ", ADJUST=NO")
+    check_flight(run(text + flight(x, steps=6), tmp_path), blocks)

@@ -9,11 +9,11 @@ import re
 
 from peers.refined import refined
 
-PAIR = re.compile(r"(?im)^\*(?:CONTACT PAIR|TIE(?!.*(?:CYCLIC|MULTISTAGE)))")
+PAIR = re.compile(r"(?im)^\*(?:CONTACT PAIR|TIE\s*,)")
 
 
 def is_one(text):
-    """Has the deck contact or ties that are none of a sector?"""
+    """Has the deck contact or ties?"""
     return bool(PAIR.search(text))
 
 
@@ -21,7 +21,7 @@ def asked(text):
     """The deck, with a request for displacements if it has none."""
     if re.search(r"(?im)^\*NODE (PRINT|FILE)", text):
         return text
-    return re.sub(r"(?im)^\*END STEP", "*NODE FILE\nU\n*END STEP", text, count=1)
+    return re.sub(r"(?im)^\*END STEP", "*NODE FILE\nU\n*END STEP", text)
 
 
 def static(text):
@@ -29,6 +29,21 @@ def static(text):
     head, *steps = re.split(r"(?im)^(?=\*STEP)", text)
     kept = [step for step in steps if not re.search(r"(?im)^\*FREQUENCY", step)]
     return head + "".join(kept) if kept else None
+
+
+def spun(node, square="1.E6"):
+    """One static step in place of all: the sector spins about the axis x, `node` is held."""
+    def edit(text):
+        head = re.split(r"(?im)^(?=\*STEP)", text)[0]
+        head = re.sub(r"(?im)^\*(?:INITIAL CONDITIONS|COUPLING|DISTRIBUTING|DESIGN ?VARIABLES|EXPANSION).*\n(?:[^*].*\n)*", "", head)
+        return (f"{head}*STEP\n*STATIC\n*BOUNDARY\n{node},1,3\n*DLOAD\nEall,CENTRIF,{square},0.,0.,0.,1.,0.,0.\n"
+                "*NODE PRINT,NSET=Nall\nU\n*END STEP\n")
+    return edit
+
+
+def tie_instead(text):
+    """The surfaces in contact are tied."""
+    return re.sub(r"(?im)^\*CONTACT PAIR.*", "*TIE, NAME=INSTEAD", text)
 
 
 def put(old, new):
@@ -59,13 +74,18 @@ def split(counts, mine=None, theirs=None):
 
 AREA = ("one node of a corner is the slave: CalculiX gives it a quarter of all faces of its element there, "
         "EMCON of the one that faces the master; with three times the pressure")
-FACES = ("CalculiX integrates over faces of the slave, against the curved faces of the master; EMCON takes points, against "
-         "faces made of triangles; both with each element split into n x n x n")
+POINTS = ("CalculiX integrates over faces of the slave, against the curved faces of the master; EMCON takes points, against "
+          "faces made of triangles")
+FACES = f"{POINTS}; both with each element split into n x n x n"
 RIM = ("the area of a point is that of all faces around it: along the corner that the flat part of the punch ends at, "
        "faces that rise from the other body count, half a face in width; at a hundredth of the stiffness, each element "
        "split into n x n x n")
 SHRINK = "an overlap at the start, which CalculiX lets out over the step; with *CONTACT INTERFERENCE, SHRINK"
 STEPS = "without the steps of *FREQUENCY"
+SPUN = "in place of its steps a static one in which the sector spins"
+DIGITS = "; the two sides of the cut are 5e-6 off each other in the deck"
+UNLIKE = "; unlike meshes at the cut, of which CalculiX ties nodes, EMCON means over faces"
+TIED = "with *TIE in place of the contact"
 MORTAR = "mortar is not in space, by nodes"
 ONE_SIDE = ("unlike meshes: points of one side alone press, by a pressure by the overclosure; CalculiX integrates over "
             "the faces of this side")
@@ -92,7 +112,11 @@ REMARKS = {
     "cubef2f1": ("a penalty of CalculiX against a tie", []),
     "cubef2f2": ("a penalty of CalculiX against a tie", []),
     "cubef2f3": ("CalculiX ties nodes to faces here, which is 2.5e-02 off its own tied faces of `cubef2f1`", []),
-    "beamptied1noadjust": ("tied nodes are put onto the other surface; both with ADJUST=YES", [
-        (put("ADJUST=NO", "ADJUST=YES"),)*2]),
-    **{name: (STEPS, [(static, static)]) for name in ("beamptied3", "beamptied4", "beamptied7")},
+    **{name: (STEPS, [(static, static)]) for name in ("beamptied3", "beamptied4", "beamptied7", "ringfcontact5")},
+    "ringfcontact2": (f"{POINTS}; {STEPS}", [(static, chain(static, put("(INTERACTION=SI1)", r"\1,ADJUST=1.E-6")))]),
+    **{name: (SPUN + DIGITS, [(spun(20), spun(20))]) for name in (
+        "segment", "segmentnum", "segmentface", "segmentlintemp", "segmenttemp", "segdyn", "segststate", "coupling13",
+        "coupling14")},
+    **{name: (SPUN + UNLIKE, [(spun(20), spun(20))]) for name in ("segmenttet", "segmenttetsms", "fullseg")},
+    **{name: (f"{POINTS}; {TIED}", [(tie_instead, tie_instead)]) for name in ("scheibe2f2f", "scheibe2n2f")},
 }
