@@ -33,7 +33,7 @@ module emcon_patch_near_space
 contains
 
    !> Where the triangles of facets are, from contact point `i` of the slave. Those that it is on
-   !> the other side of face nothing.
+   !> the other side of face nothing, nor do planes of symmetry that it rests along the axis of.
    pure subroutine patch_near_find(near, sides, i, facet, x, u)
       type(patch_near_t), intent(out) :: near
       type(patch_sides_t), intent(in) :: sides
@@ -61,6 +61,7 @@ contains
             call nearest_update(nearest, t, [0.0_wp, 0.0_wp, 0.0_wp], c)
             near%distance(t) = sqrt(nearest%square)
             if (dot_product(n, n) > 0.0_wp) n = n/sqrt(dot_product(n, n))
+            if (is_mirror(sides, i, near%triangle(t))) n = 0.0_wp
             if (touch_rule_space_is_through(sides%rule, i, sides%triangles%split%facet( &
                near%triangle(t)), n, -matmul(c, nearest%weight))) n = 0.0_wp
             nearest = nearest_t()
@@ -202,20 +203,35 @@ contains
    end subroutine patch_near_list
 
    !> Does a triangle face what looks along `normal`?
-   pure logical function patch_near_faces(sides, node, triangle, normal, x, u) result(faces)
+   pure logical function patch_near_faces(sides, i, triangle, normal, x, u) result(faces)
       type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: node                !! of the scene, that places are counted from
+      integer, intent(in) :: i                   !! 1 to the number of contact points
       integer, intent(in) :: triangle            !! of the master
       real(wp), intent(in) :: normal(3)          !! of the frame
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       real(wp) :: corner(3, 3), own(3)
       integer :: k
 
+      faces = .not. is_mirror(sides, i, triangle)
+      if (.not. faces) return
       do k = 1, 3
-         corner(:, k) = sides_place(sides, sides%triangles%split%corner(k, triangle), node, x, u)
+         corner(:, k) = sides_place(sides, sides%triangles%split%corner(k, triangle), &
+            sides%frames%base(i), x, u)
       end do
       own = cross_product(corner(:, 2) - corner(:, 1), corner(:, 3) - corner(:, 1))
       faces = dot_product(own, normal) < facing*sqrt(dot_product(own, own))
    end function patch_near_faces
+
+   !> Is a triangle in a plane of symmetry along whose axis a contact point rests? Neither comes
+   !> nearer to the other.
+   pure logical function is_mirror(sides, i, triangle)
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: i, triangle
+
+      associate (axis => sides%mirror(sides%triangles%split%facet(triangle)))
+         is_mirror = axis > 0
+         if (is_mirror) is_mirror = sides%rests(axis, i)
+      end associate
+   end function is_mirror
 
 end module emcon_patch_near_space

@@ -30,6 +30,7 @@ module emcon_patch_stencil_space
    type :: patch_stencil_t
       integer :: triangle = 0                    !! nearest of the master; 0: none near
       type(patch_t) :: patch
+      integer :: slave = 0                       !! contact point
       real(wp) :: size = 0.0_wp                  !! length of its facet [L]
       real(wp) :: deepest = 0.0_wp               !! farther behind is another side of the body [L]
       integer :: n_node = 0
@@ -60,6 +61,7 @@ contains
       self%triangle = 0
       if (size(facet) == 0) return
       i = sides%frames%point(frame)
+      self%slave = i
       call patch_near_find(near, sides, i, facet, x, u)
       nearest = patch_near_nearest(near, sides, frame, x, u)
       if (nearest == 0) return
@@ -117,8 +119,7 @@ contains
          integer, intent(in) :: other            !! 0: none
 
          goes_on = other > 0
-         if (goes_on) goes_on = patch_near_faces(sides, &
-            sides%frames%base(sides%frames%point(frame)), other, normal, x, u)
+         if (goes_on) goes_on = patch_near_faces(sides, self%slave, other, normal, x, u)
          if (goes_on) goes_on = .not. any(near%triangle == other .and. near%is_apart)
       end function goes_on
 
@@ -298,7 +299,7 @@ contains
       k = vertex_of(self, -point)
       vertex = [(k + i - 1, i = 1, n_strip)]
       if (k > 0) return
-      call find_inner(sides, self%node(1), point, normal, x, u, inner)
+      call find_inner(sides, self%slave, point, normal, x, u, inner)
       ! Of a facet much larger than the patch strips are no wider than of a small one: where they
       ! fade, heights are those at their inner side, which a slanted frame sees far off the plane.
       strip = flange*self%patch%length/(patch_size*self%size)
@@ -313,9 +314,9 @@ contains
 
    !> The neighbours of a point at the end of a list that are not at its end; where there are none
    !> those that are.
-   pure subroutine find_inner(sides, node, point, normal, x, u, inner)
+   pure subroutine find_inner(sides, slave, point, normal, x, u, inner)
       type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: node, point
+      integer, intent(in) :: slave, point
       real(wp), intent(in) :: normal(3)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       integer, allocatable, intent(out) :: inner(:)
@@ -326,7 +327,7 @@ contains
       associate (triangles => sides%triangles)
          do i = triangles%around_start(point), triangles%around_start(point + 1) - 1
             associate (t => triangles%around(i))
-               if (.not. patch_near_faces(sides, node, t, normal, x, u)) cycle
+               if (.not. patch_near_faces(sides, slave, t, normal, x, u)) cycle
                do side = 1, 3
                   k = 1 + mod(side, 3)
                   if (triangles%split%corner(side, t) == point) then
@@ -355,7 +356,7 @@ contains
          integer, intent(in) :: beyond           !! 0: none
 
          is_end = beyond == 0
-         if (.not. is_end) is_end = .not. patch_near_faces(sides, node, beyond, normal, x, u)
+         if (.not. is_end) is_end = .not. patch_near_faces(sides, slave, beyond, normal, x, u)
       end function is_end
 
    end subroutine find_inner
