@@ -279,7 +279,8 @@ contains
          do k = 1, 3
             associate (triangle => near%triangle(t))
                if (sides%triangles%is_ridge(k, triangle)) cycle
-               if (patch_near_goes_on(near, sides, sides%triangles%beyond(k, triangle), x, u)) cycle
+               if (patch_near_goes_on(near, sides, sides%triangles%beyond(k, triangle), x, &
+                  u)) cycle
                associate (corner => sides%triangles%split%corner(:, triangle))
                   if (is_shared(corner(k)) .or. is_shared(corner(1 + mod(k, 3)))) &
                      where (part == part(t)) fades = .true.
