@@ -123,7 +123,10 @@ contains
       do k = 1, size(redundant)
          if (redundant(k) > self%set%n) cycle
          id = self%set%id(redundant(k))
-         if (redundant(k) <= self%set%n_permanent) self%candidates%takes_part(id) = .false.
+         if (redundant(k) <= self%set%n_permanent) then
+            self%candidates%takes_part(id) = .false.
+            self%is_left_out(id) = .true.
+         end if
          if (is_bound(self%set, redundant(k))) call exclude(self, id)
          self%is_active(id) = .false.
       end do

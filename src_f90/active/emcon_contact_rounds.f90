@@ -77,7 +77,8 @@ contains
       self%lam = self%start%lam0
       if (self%friction%is_on) self%friction%tau = self%friction%tau0
       call active_set_select(self, system, motion)
-      self%candidates%takes_part(self%set%id(:self%set%n)) = .true.
+      self%candidates%takes_part(self%set%id(:self%set%n)) = &
+         .not. self%is_left_out(self%set%id(:self%set%n))
    end subroutine begin_again
 
    !> Is the motion that was found without contacts a solution of the step?

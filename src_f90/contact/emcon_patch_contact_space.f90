@@ -17,6 +17,7 @@ module emcon_patch_contact_space
    use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach, &
       pair_has_order
    use emcon_kinds, only : wp
+   use emcon_mirror_faces_space, only : always_rests, mirror_axes
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
    use emcon_patch_gap_space, only : patch_gap, patch_gap_t, patch_look, patch_look_t
    use emcon_patch_sides_space, only : frame_normal, point_frames_init, patch_sides_t, &
@@ -81,7 +82,8 @@ contains
       associate (sides => self%sides)
          call slave_faces_init(sides%slave, scene, scene%surface(pair%slave), is_meant, error)
          if (allocated(error)) return
-         call point_frames_init(sides%frames, sides%slave, scene%x, is_meant)
+         call point_frames_init(sides%frames, sides%slave, scene%x, is_meant, &
+            mirror_axes(sides%slave, scene) > 0)
          if (sides%frames%n == 0) then
             call raise(error, err_input, where_text(scene, scene%surface(pair%slave)%origin) &
                // ": surface " // scene%surface(pair%slave)%name // " has no face with a " // &
@@ -92,6 +94,8 @@ contains
          call facets_init(sides%master, scene, scene%surface(pair%master), error)
          if (allocated(error)) return
          call patch_triangles_init(sides%triangles, sides%master, scene%x)
+         sides%mirror = mirror_axes(sides%master, scene)
+         sides%rests = rests_of_points(sides, always_rests(scene))
          if (pair%slave == pair%master) call touch_rule_space_init(sides%rule, sides%slave, &
             sides%frames%middle, scene)
          associate (n => sides%frames%n, m => sides%rule%n_class)
@@ -117,6 +121,21 @@ contains
       self%max_penetration_at_start = deepest_start
       call contact_laws_of_surface(pair%interaction, self%laws)
    end subroutine patch_contact_init
+
+   !> Where contact points rest, as all nodes do that they are made of.
+   pure function rests_of_points(sides, rests) result(of_point)
+      type(patch_sides_t), intent(in) :: sides
+      logical, intent(in) :: rests(:, :)         !! (3, n_node of the scene)
+      logical, allocatable :: of_point(:, :)
+      integer, allocatable :: item(:, :)
+      integer :: i
+
+      allocate(item, source=point_items(sides))
+      allocate(of_point(size(rests, 1), size(item, 2)))
+      do i = 1, size(item, 2)
+         of_point(:, i) = all(rests(:, pack(item(:, i), item(:, i) > 0)), 2)
+      end do
+   end function rests_of_points
 
    !> The nodes that contact points are made of.
    pure function point_items(sides) result(item)

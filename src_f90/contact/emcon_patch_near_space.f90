@@ -8,7 +8,8 @@ module emcon_patch_near_space
    use emcon_touch_rule_space, only : touch_rule_space_is_through
    implicit none
    private
-   public :: patch_near_t, patch_near_find, patch_near_nearest, patch_near_list, patch_near_faces
+   public :: patch_near_t, patch_near_find, patch_near_nearest, patch_near_list, &
+      patch_near_goes_on
 
    !> A triangle faces a frame if the cosine of their normals is below this.
    real(wp), parameter :: facing = -0.25_wp
@@ -22,18 +23,21 @@ module emcon_patch_near_space
    !> Triangles that are near, seen from the contact point.
    type :: patch_near_t
       integer :: n = 0
+      integer :: point = 0                       !! of the slave, that looks
+      real(wp) :: along(3) = 0.0_wp              !! normal of its frame, of which the list is
       integer, allocatable :: triangle(:)        !! (n)
       real(wp), allocatable :: corner(:, :, :)   !! (3, 3, n) from the contact point [L]
       real(wp), allocatable :: normal(:, :)      !! (3, n) outwards, of length 1
       real(wp), allocatable :: distance(:)       !! (n) [L]
       logical, allocatable :: is_listed(:)       !! (n) the patch looks at it
-      logical, allocatable :: is_apart(:)        !! (n) it is of another layer than the nearest
+      logical, allocatable :: is_apart(:)        !! (n) it is of another layer than the nearest,
+                                                 !! or fades where it meets that
    end type patch_near_t
 
 contains
 
    !> Where the triangles of facets are, from contact point `i` of the slave. Those that it is on
-   !> the other side of face nothing.
+   !> the other side of face nothing, nor do planes of symmetry that it rests along the axis of.
    pure subroutine patch_near_find(near, sides, i, facet, x, u)
       type(patch_near_t), intent(out) :: near
       type(patch_sides_t), intent(in) :: sides
@@ -44,6 +48,7 @@ contains
       real(wp) :: origin(3)
       integer :: f, t
 
+      near%point = i
       origin = point_origin(sides, i, x, u)
       associate (start => sides%triangles%split%start)
          near%triangle = [((t, t = start(facet(f)), start(facet(f) + 1) - 1), f = 1, size(facet))]
@@ -61,6 +66,7 @@ contains
             call nearest_update(nearest, t, [0.0_wp, 0.0_wp, 0.0_wp], c)
             near%distance(t) = sqrt(nearest%square)
             if (dot_product(n, n) > 0.0_wp) n = n/sqrt(dot_product(n, n))
+            if (is_mirror(sides, i, near%triangle(t))) n = 0.0_wp
             if (touch_rule_space_is_through(sides%rule, i, sides%triangles%split%facet( &
                near%triangle(t)), n, -matmul(c, nearest%weight))) n = 0.0_wp
             nearest = nearest_t()
@@ -173,15 +179,38 @@ contains
       height = dot_product(nearest%weight, ahead)
    end subroutine look_along
 
-   !> List what faces `normal` and hangs together with the nearest triangle.
-   pure subroutine patch_near_list(near, sides, nearest, normal)
+   !> List what faces `normal` and hangs together with the nearest triangle. What lies beyond a ridge
+   !> and fades right there is left out, so that the field on this side of it does not fade as well.
+   pure subroutine patch_near_list(near, sides, nearest, normal, x, u)
       type(patch_near_t), intent(inout) :: near
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: nearest             !! 1 to near%n
       real(wp), intent(in) :: normal(3)          !! of the frame, of length 1
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      integer :: part(near%n)
+      logical :: fades(near%n)
+
+      near%along = normal
+      call find_layer(sides, near, nearest, normal)
+      do
+         call spread_list(near, sides, nearest)
+         call find_parts(near, sides, part)
+         if (maxval(part) <= 1) exit
+         call find_fading(near, sides, part, x, u, fades)
+         fades = fades .and. part /= part(nearest)
+         if (.not. any(fades)) exit
+         near%is_apart = near%is_apart .or. fades
+      end do
+   end subroutine patch_near_list
+
+   !> From the nearest triangle to those beyond its sides, and so on.
+   pure subroutine spread_list(near, sides, nearest)
+      type(patch_near_t), intent(inout) :: near
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: nearest
       integer :: waiting(near%n), k, n, other
 
-      call find_layer(sides, near, nearest, normal)
+      near%is_listed = .false.
       near%is_listed(nearest) = .true.
       waiting(1) = nearest
       n = 1
@@ -192,30 +221,132 @@ contains
                other = findloc(near%triangle, sides%triangles%beyond(k, t), 1)
                if (other == 0) cycle
                if (near%is_listed(other) .or. near%is_apart(other)) cycle
-               if (dot_product(near%normal(:, other), normal) >= facing) cycle
+               if (dot_product(near%normal(:, other), near%along) >= facing) cycle
                near%is_listed(other) = .true.
                n = n + 1
                waiting(n) = other
             end do
          end associate
       end do
-   end subroutine patch_near_list
+   end subroutine spread_list
 
-   !> Does a triangle face what looks along `normal`?
-   pure logical function patch_near_faces(sides, node, triangle, normal, x, u) result(faces)
+   !> Number the parts of the list that hang together without a ridge; 0: not listed.
+   pure subroutine find_parts(near, sides, part)
+      type(patch_near_t), intent(in) :: near
       type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: node                !! of the scene, that places are counted from
+      integer, intent(out) :: part(:)            !! (n)
+      integer :: waiting(near%n), first, k, n, n_part, other
+
+      part = 0
+      n_part = 0
+      do first = 1, near%n
+         if (.not. near%is_listed(first) .or. part(first) > 0) cycle
+         n_part = n_part + 1
+         part(first) = n_part
+         waiting(1) = first
+         n = 1
+         do while (n > 0)
+            associate (t => near%triangle(waiting(n)))
+               n = n - 1
+               do k = 1, 3
+                  if (sides%triangles%is_ridge(k, t)) cycle
+                  other = findloc(near%triangle, sides%triangles%beyond(k, t), 1)
+                  if (other == 0) cycle
+                  if (.not. near%is_listed(other) .or. part(other) > 0) cycle
+                  part(other) = n_part
+                  n = n + 1
+                  waiting(n) = other
+               end do
+            end associate
+         end do
+      end do
+   end subroutine find_parts
+
+   !> Which triangles are of a part that ends, without a ridge, at a point that it shares with
+   !> another part.
+   pure subroutine find_fading(near, sides, part, x, u, fades)
+      type(patch_near_t), intent(in) :: near
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: part(:)             !! (n)
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)
+      logical, intent(out) :: fades(:)           !! (n)
+      integer :: k, t
+
+      fades = .false.
+      do t = 1, near%n
+         if (part(t) == 0) cycle
+         if (fades(t)) cycle
+         do k = 1, 3
+            associate (triangle => near%triangle(t))
+               if (sides%triangles%is_ridge(k, triangle)) cycle
+               if (patch_near_goes_on(near, sides, sides%triangles%beyond(k, triangle), x, &
+                  u)) cycle
+               associate (corner => sides%triangles%split%corner(:, triangle))
+                  if (is_shared(corner(k)) .or. is_shared(corner(1 + mod(k, 3)))) &
+                     where (part == part(t)) fades = .true.
+               end associate
+            end associate
+         end do
+      end do
+
+   contains
+
+      !> Is a point of another part, too?
+      pure logical function is_shared(point)
+         integer, intent(in) :: point
+         integer :: s
+
+         is_shared = .false.
+         do s = 1, near%n
+            if (part(s) == 0 .or. part(s) == part(t)) cycle
+            is_shared = is_shared .or. any(sides%triangles%split%corner(:, near%triangle(s)) &
+               == point)
+         end do
+      end function is_shared
+
+   end subroutine find_fading
+
+   !> Is a triangle listed, or would it be if it were nearer?
+   pure logical function patch_near_goes_on(near, sides, other, x, u) result(goes_on)
+      type(patch_near_t), intent(in) :: near
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: other               !! of the master; 0: none
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+
+      goes_on = other > 0
+      if (goes_on) goes_on = faces(near, sides, other, x, u)
+      if (goes_on) goes_on = .not. any(near%triangle == other .and. near%is_apart)
+   end function patch_near_goes_on
+
+   !> Does a triangle face the frame?
+   pure logical function faces(near, sides, triangle, x, u)
+      type(patch_near_t), intent(in) :: near
+      type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: triangle            !! of the master
-      real(wp), intent(in) :: normal(3)          !! of the frame
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       real(wp) :: corner(3, 3), own(3)
       integer :: k
 
+      faces = .not. is_mirror(sides, near%point, triangle)
+      if (.not. faces) return
       do k = 1, 3
-         corner(:, k) = sides_place(sides, sides%triangles%split%corner(k, triangle), node, x, u)
+         corner(:, k) = sides_place(sides, sides%triangles%split%corner(k, triangle), &
+            sides%frames%base(near%point), x, u)
       end do
       own = cross_product(corner(:, 2) - corner(:, 1), corner(:, 3) - corner(:, 1))
-      faces = dot_product(own, normal) < facing*sqrt(dot_product(own, own))
-   end function patch_near_faces
+      faces = dot_product(own, near%along) < facing*sqrt(dot_product(own, own))
+   end function faces
+
+   !> Is a triangle in a plane of symmetry along whose axis a contact point rests? Neither comes
+   !> nearer to the other.
+   pure logical function is_mirror(sides, i, triangle)
+      type(patch_sides_t), intent(in) :: sides
+      integer, intent(in) :: i, triangle
+
+      associate (axis => sides%mirror(sides%triangles%split%facet(triangle)))
+         is_mirror = axis > 0
+         if (is_mirror) is_mirror = sides%rests(axis, i)
+      end associate
+   end function is_mirror
 
 end module emcon_patch_near_space

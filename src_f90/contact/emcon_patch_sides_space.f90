@@ -58,6 +58,9 @@ module emcon_patch_sides_space
       type(point_frames_t) :: frames             !! of the slave
       type(patch_triangles_t) :: triangles             !! of the master
       type(touch_rule_space_t) :: rule           !! what may touch where both are one
+      integer, allocatable :: mirror(:)          !! (n_facet of the master) axis along which it
+                                                 !! rests in a plane of symmetry; 0: none
+      logical, allocatable :: rests(:, :)        !! (3, n_point) where contact points do
    end type patch_sides_t
 
 contains
@@ -104,12 +107,14 @@ contains
    end function sides_place
 
    !> The frames at all contact points of a surface: at a node of each smooth group of its facets
-   !> there, and of all of them where there are several; at a centre of its facet.
-   pure subroutine point_frames_init(self, facets, x, is_meant)
+   !> there, and of all of them where there are several; at a centre of its facet. Facets in a plane
+   !> of symmetry make no corner with others.
+   pure subroutine point_frames_init(self, facets, x, is_meant, is_mirror)
       type(point_frames_t), intent(out) :: self
       type(facets_t), intent(in) :: facets       !! in space
       real(wp), intent(in) :: x(:, :)            !! (3, n_node of the scene) reference [L]
       logical, intent(in) :: is_meant(:)         !! (n_node) it needs frames
+      logical, intent(in) :: is_mirror(:)        !! (n_facet) in a plane of symmetry
       type(facet_groups_t) :: groups
       real(wp), allocatable :: still(:, :)
       integer :: g, i
@@ -128,7 +133,7 @@ contains
       do i = 1, size(self%base)
          self%start(i + 1) = self%start(i)
          if (i <= size(facets%node)) then
-            if (is_meant(i)) call add_node(self, facets, groups, x, still, i)
+            if (is_meant(i)) call add_node(self, facets, groups, x, still, is_mirror, i)
          else
             call add_centre(self, facets, x, still, i, self%middle(i - size(facets%node)))
          end if
@@ -138,24 +143,29 @@ contains
    end subroutine point_frames_init
 
    !> The frames of node `i`.
-   pure subroutine add_node(self, facets, groups, x, still, i)
+   pure subroutine add_node(self, facets, groups, x, still, is_mirror, i)
       type(point_frames_t), intent(inout) :: self
       type(facets_t), intent(in) :: facets
       type(facet_groups_t), intent(in) :: groups
       real(wp), intent(in) :: x(:, :), still(:, :)
+      logical, intent(in) :: is_mirror(:)
       integer, intent(in) :: i
-      integer :: g
+      integer, allocatable :: corner(:), ring(:)
+      integer :: g, n
 
-      associate (first => groups%node_start(i), last => groups%node_start(i + 1) - 1)
-         do g = first, last
-            call add_frame(self, facets, x, still, i, groups%facet(groups%start(g): &
-               groups%start(g + 1) - 1), groups%ring(groups%ring_start(g): &
-               groups%ring_start(g + 1) - 1))
-         end do
-         if (last > first) call add_frame(self, facets, x, still, i, &
-            groups%facet(groups%start(first):groups%start(last + 1) - 1), &
-            unique_sorted(groups%ring(groups%ring_start(first):groups%ring_start(last + 1) - 1)))
-      end associate
+      n = 0
+      allocate(corner(0), ring(0))
+      do g = groups%node_start(i), groups%node_start(i + 1) - 1
+         associate (own => groups%facet(groups%start(g):groups%start(g + 1) - 1), &
+               around => groups%ring(groups%ring_start(g):groups%ring_start(g + 1) - 1))
+            call add_frame(self, facets, x, still, i, own, around)
+            if (all(is_mirror(own))) cycle
+            n = n + 1
+            corner = [corner, own]
+            ring = [ring, around]
+         end associate
+      end do
+      if (n > 1) call add_frame(self, facets, x, still, i, corner, unique_sorted(ring))
       associate (around => facets%around(facets%around_start(i):facets%around_start(i + 1) - 1))
          if (size(around) == 0) return
          self%size(i) = sum([(facets_length(facets, around(g)), g = 1, size(around))]) &

@@ -8,8 +8,8 @@ module emcon_patch_stencil_space
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : nearest_t, nearest_update
    use emcon_patch_gap_space, only : patch_t
-   use emcon_patch_near_space, only : patch_near_faces, patch_near_find, patch_near_nearest, &
-      patch_near_list, patch_near_t, room_behind
+   use emcon_patch_near_space, only : patch_near_find, patch_near_goes_on, patch_near_list, &
+      patch_near_nearest, patch_near_t, room_behind
    use emcon_patch_sides_space, only : frame_normal, patch_sides_t, sides_place, sides_point
    use emcon_rotation, only : cross_product
    use emcon_sort, only : unique_sorted
@@ -64,22 +64,21 @@ contains
       nearest = patch_near_nearest(near, sides, frame, x, u)
       if (nearest == 0) return
       normal = frame_normal(sides%frames, frame, sides%frames%base(i), x, u)
-      call patch_near_list(near, sides, nearest, normal)
+      call patch_near_list(near, sides, nearest, normal, x, u)
       self%deepest = room_behind*sides%triangles%size(near%triangle(nearest)) - distances &
          *near%distance(nearest)/dot_product(near%normal(:, nearest), normal)
       self%triangle = near%triangle(nearest)
       self%size = sides%triangles%size(self%triangle)
       self%patch%length = patch_size*min(self%size, sides%frames%size(i))
-      call make_patch(self, sides, frame, near, normal, x, u)
+      call make_patch(self, sides, frame, near, x, u)
    end subroutine patch_stencil_choose
 
    !> The vertices and triangles of the patch with their nodes.
-   pure subroutine make_patch(self, sides, frame, near, normal, x, u)
+   pure subroutine make_patch(self, sides, frame, near, x, u)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: frame
       type(patch_near_t), intent(in) :: near
-      real(wp), intent(in) :: normal(3)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       logical :: ends(3, near%n)                 !! the list ends at the side of a triangle
       integer :: k, t
@@ -88,7 +87,8 @@ contains
       do t = 1, near%n
          if (.not. near%is_listed(t)) cycle
          do k = 1, 3
-            ends(k, t) = .not. goes_on(sides%triangles%beyond(k, near%triangle(t)))
+            ends(k, t) = .not. patch_near_goes_on(near, sides, &
+               sides%triangles%beyond(k, near%triangle(t)), x, u)
          end do
       end do
       call begin_patch(self, sides, frame, count(near%is_listed), count(ends))
@@ -101,7 +101,7 @@ contains
             associate (from => sides%triangles%split%corner(k, near%triangle(t)), &
                   to => sides%triangles%split%corner(1 + mod(k, 3), near%triangle(t)))
                if (sides%triangles%is_ridge(k, near%triangle(t))) then
-                  call add_flange(self, sides, [from, to], normal, x, u)
+                  call add_flange(self, sides, near, [from, to], x, u)
                else
                   self%patch%chi(vertex_of(self, from)) = 0.0_wp
                   self%patch%chi(vertex_of(self, to)) = 0.0_wp
@@ -109,19 +109,6 @@ contains
             end associate
          end do
       end do
-
-   contains
-
-      !> Is a triangle listed, or would it be if it were nearer?
-      pure logical function goes_on(other)
-         integer, intent(in) :: other            !! 0: none
-
-         goes_on = other > 0
-         if (goes_on) goes_on = patch_near_faces(sides, &
-            sides%frames%base(sides%frames%point(frame)), other, normal, x, u)
-         if (goes_on) goes_on = .not. any(near%triangle == other .and. near%is_apart)
-      end function goes_on
-
    end subroutine make_patch
 
    !> Room for a patch of some triangles with flanges at some sides; its frame.
@@ -265,18 +252,18 @@ contains
 
    !> Add two strips beyond a side of the master: on the first the field goes on, so that a patch at
    !> the end is covered, on the second it fades.
-   pure subroutine add_flange(self, sides, side, normal, x, u)
+   pure subroutine add_flange(self, sides, near, side, x, u)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
+      type(patch_near_t), intent(in) :: near
       integer, intent(in) :: side(2)             !! points, as the master runs
-      real(wp), intent(in) :: normal(3)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       integer :: from(0:n_strip), to(0:n_strip), k
 
       from(0) = vertex_of(self, side(1))
       to(0) = vertex_of(self, side(2))
-      call add_outer(self, sides, side(1), normal, x, u, from(1:))
-      call add_outer(self, sides, side(2), normal, x, u, to(1:))
+      call add_outer(self, sides, near, side(1), x, u, from(1:))
+      call add_outer(self, sides, near, side(2), x, u, to(1:))
       do k = 1, n_strip
          call append(self%patch, [to(k - 1), from(k), from(k - 1)])
          call append(self%patch, [to(k - 1), to(k), from(k)])
@@ -284,11 +271,11 @@ contains
    end subroutine add_flange
 
    !> The vertices of flanges at a point, one for each strip: away from the points inside.
-   pure subroutine add_outer(self, sides, point, normal, x, u, vertex)
+   pure subroutine add_outer(self, sides, near, point, x, u, vertex)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
+      type(patch_near_t), intent(in) :: near
       integer, intent(in) :: point
-      real(wp), intent(in) :: normal(3)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       integer, intent(out) :: vertex(n_strip)
       integer, allocatable :: inner(:)
@@ -298,7 +285,7 @@ contains
       k = vertex_of(self, -point)
       vertex = [(k + i - 1, i = 1, n_strip)]
       if (k > 0) return
-      call find_inner(sides, self%node(1), point, normal, x, u, inner)
+      call find_inner(sides, near, point, x, u, inner)
       ! Of a facet much larger than the patch strips are no wider than of a small one: where they
       ! fade, heights are those at their inner side, which a slanted frame sees far off the plane.
       strip = flange*self%patch%length/(patch_size*self%size)
@@ -313,10 +300,10 @@ contains
 
    !> The neighbours of a point at the end of a list that are not at its end; where there are none
    !> those that are.
-   pure subroutine find_inner(sides, node, point, normal, x, u, inner)
+   pure subroutine find_inner(sides, near, point, x, u, inner)
       type(patch_sides_t), intent(in) :: sides
-      integer, intent(in) :: node, point
-      real(wp), intent(in) :: normal(3)
+      type(patch_near_t), intent(in) :: near
+      integer, intent(in) :: point
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       integer, allocatable, intent(out) :: inner(:)
       integer, allocatable :: at_end(:)
@@ -326,7 +313,7 @@ contains
       associate (triangles => sides%triangles)
          do i = triangles%around_start(point), triangles%around_start(point + 1) - 1
             associate (t => triangles%around(i))
-               if (.not. patch_near_faces(sides, node, t, normal, x, u)) cycle
+               if (.not. patch_near_goes_on(near, sides, t, x, u)) cycle
                do side = 1, 3
                   k = 1 + mod(side, 3)
                   if (triangles%split%corner(side, t) == point) then
@@ -354,8 +341,7 @@ contains
       pure logical function is_end(beyond)
          integer, intent(in) :: beyond           !! 0: none
 
-         is_end = beyond == 0
-         if (.not. is_end) is_end = .not. patch_near_faces(sides, node, beyond, normal, x, u)
+         is_end = .not. patch_near_goes_on(near, sides, beyond, x, u)
       end function is_end
 
    end subroutine find_inner

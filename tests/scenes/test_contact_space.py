@@ -283,3 +283,23 @@ def test_cubes_on_an_edge_come_to_an_end(angle: float, tmp_path: Path) -> None:
     history = run.history
     assert history["time"][-1] == pytest.approx(0.6)
     assert np.ptp(history["total"]) <= BALANCE*history["total"].max()
+
+
+@pytest.mark.parametrize(("to", "at", "h"), [((0.424, 0.483, -0.699), (-0.027, -0.467), 0.02),
+                                             ((-0.405, 0.603, -0.769), (-0.077, 0.133), 0.01)])
+def test_corner_first_on_one_element(to: tuple[float, float, float], at: tuple[float, float], h: float,
+                                     tmp_path: Path) -> None:
+    """The frame of a corner looks at the side of the other body, too, at the limit of what faces it: where that is left to
+    fade, the top does not. The corner fell through by .06 of the face."""
+    way = np.array(to)/np.linalg.norm(to)
+    about, c = np.cross(way, [0, 0, -1]), -way[2]
+    cross = np.array([[0, -about[2], about[1]], [about[2], 0, -about[0]], [-about[1], about[0], 0]])
+    turn = np.eye(3) + cross + cross @ cross/(1 + c)
+    one = Block("C3D4", (2, 2, 2), place=lambda x: (x - 0.5)*1.5 @ turn.T)
+    one.x += np.array([*at, 0.01 - one.x[:, 2].min()])
+    two = Block("C3D8", (1, 1, 1), place=lambda x: x - np.array([0.5, 0.5, 1.0]))
+    run = ran(tmp_path, bodies([one, two], [faces(one), faces(two)]) + pair() + velocities(one, (0., 0., -2.), (0., 0., 0.))
+              + dynamic(h, 0.4))
+    assert run.verdict["verdict"] == "good"
+    assert run.verdict["penetration"] < 1e-6
+    assert overlap.worst(run.fields()).by_edge < 1e-6

@@ -16,10 +16,9 @@ import numpy as np
 
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[1]), str(pathlib.Path(__file__).resolve().parents[1]/"scenes")]
 
-import overlap  # noqa: E402
 from contact_space_scenes import RUBBER, ball, bodies, faces, straight  # noqa: E402
 from space_mesh import Block  # noqa: E402
-from space_scenes import BALANCE, UNSEEN, rotation, run_scenes  # noqa: E402
+from space_scenes import BALANCE, UNSEEN, deepest_overlap, rotation, run_scenes  # noqa: E402
 from wall_space_scenes import REFERENCE, plane, sphere, wall  # noqa: E402
 
 KINDS = ["C3D4", "C3D8", "C3D10", "C3D20"]
@@ -221,7 +220,7 @@ def cube_shapes(r, n_node):
 def judge(run, deck):
     """What is wrong with a run that is called good."""
     history, fields, found = run.history, run.fields(), []
-    deepest = overlap.worst(fields)
+    deepest = deepest_overlap(run)
     if deepest.by_edge > run.verdict["penetration"] + UNSEEN:
         found.append(f"overlap {deepest.by_edge:.3g}, told {run.verdict['penetration']:.3g}")
     if "*STATIC" in deck:

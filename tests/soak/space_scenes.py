@@ -73,6 +73,15 @@ def scene(seed):
             + dynamic(chance.choice([0.01, 0.02, 0.04]), 0.6, chance.choice(WAYS)))
 
 
+def deepest_overlap(run):
+    """At the ends of increments, and on the straight ways between of those that were not cut: the parts of others, which no
+    file has, are not on these."""
+    fields, bodies = run.fields(), overlap.bodies_of(run.fields())
+    x = fields.x + fields["displacement"]
+    cut = [i for i in range(1, len(x)) if run.history["cuts"][i] > 0]
+    return max(bodies.worst(x[a:b], fields.time[a:b]) for a, b in zip([0, *cut], [*cut, len(x)], strict=True))
+
+
 def judge(run, _deck):
     """What is wrong with a run that is called good."""
     history, found = run.history, []
@@ -83,7 +92,7 @@ def judge(run, _deck):
     if np.abs(p - p[:, :1]).max() > BALANCE*np.abs(p).max() or np.abs(angular - angular[:, :1]).max() > BALANCE*max(
             np.abs(angular).max(), np.abs(p).max()):
         found.append("momentum")
-    deepest = overlap.worst(run.fields())
+    deepest = deepest_overlap(run)
     if deepest.by_edge > run.verdict["penetration"] + UNSEEN:
         found.append(f"overlap {deepest.by_edge:.3g}, told {run.verdict['penetration']:.3g}")
     return found
