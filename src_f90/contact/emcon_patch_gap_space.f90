@@ -12,7 +12,8 @@ module emcon_patch_gap_space
    use emcon_polygon_clip_space, only : barycentric
    implicit none
    private
-   public :: patch_t, patch_gap_t, patch_gap, patch_look_t, patch_look, patch_basis
+   public :: patch_t, patch_gap_t, patch_gap, patch_look_t, patch_look, &
+      patch_basis_t, patch_basis
 
    !> Remainders below so many epsilons of what they are the difference of are round-off.
    real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
@@ -42,6 +43,15 @@ module emcon_patch_gap_space
       real(wp) :: ahead = 0.0_wp                 !! height at the start of what is over it at the
                                                  !! end, the least; huge: nothing is [L]
    end type patch_look_t
+
+   !> The same of a patch of a slave facet, weight by weight.
+   type :: patch_basis_t
+      real(wp) :: height(3, 0:1) = 0.0_wp        !! integral of chi times height [L^3]
+      real(wp) :: cover(3, 0:1) = 0.0_wp         !! that of chi [L^2]
+      real(wp) :: area(0:1) = 0.0_wp             !! of all of it [L^2]
+      real(wp) :: way = 0.0_wp                   !! as above
+      real(wp) :: ahead = 0.0_wp                 !! as above
+   end type patch_basis_t
 
    !> The integral of chi (height - target) over the patch by its area, over a step.
    type :: patch_gap_t
@@ -96,40 +106,50 @@ contains
       type(patch_t), intent(in) :: patch
       real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
       type(patch_look_t) :: look
-      real(wp), dimension(3, patch%n_vertex) :: from, to
+      real(wp) :: place(3, patch%n_vertex, 0:1)
 
-      call place_vertices(patch, x, from)
-      call place_vertices(patch, x + dx, to)
-      call find_means(patch, from, look%height(0), look%cover(0))
-      call find_means(patch, to, look%height(1), look%cover(1))
-      look%way = patch%unit*patch%length*sqrt(maxval(sum((to(:2, :) - from(:2, :))**2, 1)))
-      look%ahead = height_ahead(patch, from, to)
+      call place_vertices(patch, x, place(:, :, 0))
+      call place_vertices(patch, x + dx, place(:, :, 1))
+      call find_means(patch, place(:, :, 0), look%height(0), look%cover(0))
+      call find_means(patch, place(:, :, 1), look%height(1), look%cover(1))
+      look%way = longest_way(patch, place)
+      look%ahead = height_ahead(patch, place(:, :, 0), place(:, :, 1))
    end function patch_look
 
-   !> The integrals at both ends of a step of chi times height, and of chi, over the area of a patch
-   !> with each of the weights that are 1 at one of the `unit_corner` and 0 at the others.
-   pure subroutine patch_basis(patch, x, dx, height, cover)
+   !> What a patch of a slave facet sees at both ends of a step, with each of the weights that are 1
+   !> at one of the `unit_corner` and 0 at the others.
+   pure function patch_basis(patch, x, dx) result(basis)
       type(patch_t), intent(in) :: patch
       real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
-      real(wp), intent(out) :: height(3, 0:1)    !! [L^3]
-      real(wp), intent(out) :: cover(3, 0:1)     !! [L^2]
+      type(patch_basis_t) :: basis
       type(patch_t) :: part
-      real(wp) :: place(3, patch%n_vertex)
+      real(wp) :: place(3, patch%n_vertex, 0:1)
       integer :: end, i
 
       part = patch
       do end = 0, 1
-         call place_vertices(patch, x + end*dx, place)
+         call place_vertices(patch, x + end*dx, place(:, :, end))
          do i = 1, 3
             part%area%weight = merge(1.0_wp, 0.0_wp, [1, 2, 3] == i)
-            call find_means(part, place, height(i, end), cover(i, end))
+            call find_means(part, place(:, :, end), basis%height(i, end), basis%cover(i, end))
          end do
          associate (size_of => frame_size(x(:, :3) + end*dx(:, :3)))
-            height(:, end) = size_of*height(:, end)
-            cover(:, end) = size_of*cover(:, end)
+            basis%height(:, end) = size_of*basis%height(:, end)
+            basis%cover(:, end) = size_of*basis%cover(:, end)
+            basis%area(end) = 0.5_wp*size_of
          end associate
       end do
-   end subroutine patch_basis
+      basis%way = longest_way(patch, place)
+      basis%ahead = height_ahead(patch, place(:, :, 0), place(:, :, 1))
+   end function patch_basis
+
+   !> How far vertices go along a patch, at most [L].
+   pure real(wp) function longest_way(patch, place) result(way)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: place(:, :, 0:)    !! (3, n_vertex, 0:1)
+
+      way = patch%unit*patch%length*sqrt(maxval(sum((place(:2, :, 1) - place(:2, :, 0))**2, 1)))
+   end function longest_way
 
    !> The integral of chi times height over the patch by its area, and what of it is covered.
    pure subroutine find_means(patch, place, height, cover)

@@ -78,7 +78,7 @@ contains
 
       origin = 0.0_wp
       associate (frames => sides%frames, base => sides%frames%base(i))
-         if (i <= size(sides%slave%node) .or. frames%start(i + 1) == frames%start(i)) return
+         if (i <= frames%n_node .or. frames%start(i + 1) == frames%start(i)) return
          do k = frames%ring_start(frames%start(i)), frames%ring_start(frames%start(i) + 1) - 1
             associate (other => frames%ring(k))
                origin = origin + frames%weight(3, k)*((x(:, other) - x(:, base)) &

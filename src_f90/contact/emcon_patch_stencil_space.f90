@@ -8,6 +8,7 @@ module emcon_patch_stencil_space
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : nearest_t, nearest_update
    use emcon_patch_gap_space, only : patch_t
+   use emcon_patch_moments_space, only : patch_triangle
    use emcon_patch_near_space, only : patch_near_faces, patch_near_find, patch_near_nearest, &
       patch_near_list, patch_near_t, room_behind
    use emcon_patch_sides_space, only : frame_normal, patch_sides_t, sides_place, sides_point
@@ -22,7 +23,9 @@ module emcon_patch_stencil_space
    !> Where a surface ends it goes on by strips of this part of a facet, by less where those of the
    !> slave are smaller, and fades on the last one.
    real(wp), parameter :: flange = 0.2_wp
-   integer, parameter :: n_strip = 2
+   integer, parameter :: most_strips = 2
+   !> Beside triangles of slave facets it fades at once, over this part of a facet.
+   real(wp), parameter :: narrow_flange = 0.05_wp
    !> A node is behind a triangle by no more than so many of its distances, and `room_behind`.
    real(wp), parameter :: distances = 2.0_wp
 
@@ -32,6 +35,8 @@ module emcon_patch_stencil_space
       type(patch_t) :: patch
       real(wp) :: size = 0.0_wp                  !! length of its facet [L]
       real(wp) :: deepest = 0.0_wp               !! farther behind is another side of the body [L]
+      integer :: n_strip = most_strips           !! where the surface ends:
+      real(wp) :: strip = flange                 !! each so wide, by the facet
       integer :: n_node = 0
       integer :: n_slave = 0                     !! nodes 1..n_slave are of the frame
       integer :: n_origin = 0                    !! of these that its point is a sum of; 0: is one
@@ -70,6 +75,17 @@ contains
       self%triangle = near%triangle(nearest)
       self%size = sides%triangles%size(self%triangle)
       self%patch%length = patch_size*min(self%size, sides%frames%size(i))
+      ! Of a facet much larger than the patch strips are no wider than of a small one: where they
+      ! fade, heights are those at their inner side, which a slanted frame sees far off the plane.
+      self%strip = flange*self%patch%length/(patch_size*self%size)
+      if (sides%frames%of_triangles) then
+         self%patch%length = 1.0_wp
+         self%patch%unit = sides%frames%size(i)
+         self%patch%area = patch_triangle()
+         self%patch%is_integral = .true.
+         self%n_strip = 1
+         self%strip = narrow_flange
+      end if
       call make_patch(self, sides, frame, near, normal, x, u)
    end subroutine patch_stencil_choose
 
@@ -117,6 +133,11 @@ contains
          integer, intent(in) :: other            !! 0: none
 
          goes_on = other > 0
+         if (goes_on .and. sides%frames%of_triangles) then
+            ! A triangle sees what is beside the list.
+            goes_on = any(near%triangle == other .and. near%is_listed)
+            return
+         end if
          if (goes_on) goes_on = patch_near_faces(sides, &
             sides%frames%base(sides%frames%point(frame)), other, normal, x, u)
          if (goes_on) goes_on = .not. any(near%triangle == other .and. near%is_apart)
@@ -133,8 +154,8 @@ contains
 
       self%patch%n_triangle = 0
       self%patch%n_vertex = 0
-      associate (most => n_triangle + 2*n_strip*n_end, most_points => &
-            3*n_triangle + 2*n_strip*n_end)
+      associate (most => n_triangle + 2*self%n_strip*n_end, most_points => &
+            3*n_triangle + 2*self%n_strip*n_end)
          call make_room(self%patch, self%point, most, most_points)
          if (allocated(self%weight)) then
             if (size(self%weight, 2) < 2 + most_points) deallocate(self%weight, self%node)
@@ -152,7 +173,7 @@ contains
          end do
          self%n_slave = self%n_node
          self%n_origin = 0
-         if (sides%frames%point(frame) <= size(sides%slave%node)) return
+         if (sides%frames%point(frame) <= frames%n_node) return
          self%n_origin = self%n_slave
          do k = frames%ring_start(frame), frames%ring_start(frame + 1) - 1
             self%origin(findloc(self%node(:self%n_slave), frames%ring(k), 1)) = frames%weight(3, k)
@@ -271,13 +292,13 @@ contains
       integer, intent(in) :: side(2)             !! points, as the master runs
       real(wp), intent(in) :: normal(3)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      integer :: from(0:n_strip), to(0:n_strip), k
+      integer :: from(0:self%n_strip), to(0:self%n_strip), k
 
       from(0) = vertex_of(self, side(1))
       to(0) = vertex_of(self, side(2))
       call add_outer(self, sides, side(1), normal, x, u, from(1:))
       call add_outer(self, sides, side(2), normal, x, u, to(1:))
-      do k = 1, n_strip
+      do k = 1, self%n_strip
          call append(self%patch, [to(k - 1), from(k), from(k - 1)])
          call append(self%patch, [to(k - 1), to(k), from(k)])
       end do
@@ -290,23 +311,19 @@ contains
       integer, intent(in) :: point
       real(wp), intent(in) :: normal(3)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      integer, intent(out) :: vertex(n_strip)
+      integer, intent(out) :: vertex(:)          !! (n_strip)
       integer, allocatable :: inner(:)
-      real(wp) :: strip
       integer :: i, k
 
       k = vertex_of(self, -point)
-      vertex = [(k + i - 1, i = 1, n_strip)]
+      vertex = [(k + i - 1, i = 1, self%n_strip)]
       if (k > 0) return
       call find_inner(sides, self%node(1), point, normal, x, u, inner)
-      ! Of a facet much larger than the patch strips are no wider than of a small one: where they
-      ! fade, heights are those at their inner side, which a slanted frame sees far off the plane.
-      strip = flange*self%patch%length/(patch_size*self%size)
-      do i = 1, n_strip
-         call begin_vertex(self, -point, merge(1.0_wp, 0.0_wp, i < n_strip), vertex(i))
-         call add_point(self, sides, point, vertex(i), 1.0_wp + i*strip)
+      do i = 1, self%n_strip
+         call begin_vertex(self, -point, merge(1.0_wp, 0.0_wp, i < self%n_strip), vertex(i))
+         call add_point(self, sides, point, vertex(i), 1.0_wp + i*self%strip)
          do k = 1, size(inner)
-            call add_point(self, sides, inner(k), vertex(i), -i*strip/real(size(inner), wp))
+            call add_point(self, sides, inner(k), vertex(i), -i*self%strip/real(size(inner), wp))
          end do
       end do
    end subroutine add_outer

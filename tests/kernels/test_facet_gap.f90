@@ -4,7 +4,8 @@ module test_facet_gap
    use check, only : check_near, check_true, test_case_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_patch_gap_space, only : patch_basis, patch_gap, patch_gap_t, patch_t
+   use emcon_patch_gap_space, only : patch_basis, patch_basis_t, patch_gap, &
+      patch_gap_t, patch_t
    use emcon_patch_moments_space, only : patch_triangle
    use emcon_text, only : to_text
    use patch_scenes, only : make_grid, moment_of, n_point, n_side, n_vertex, rough, size_of, &
@@ -76,7 +77,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(patch_t) :: patch
       type(patch_gap_t) :: gap
-      real(wp) :: x(3, n_point), area, height(3), basis(3, 0:1), cover(3, 0:1), corner(3)
+      real(wp) :: x(3, n_point), area, height(3), corner(3)
+      type(patch_basis_t) :: basis
       integer :: i
 
       call make_facet(patch, x)
@@ -94,17 +96,18 @@ contains
       call patch_gap(patch, x, 0.0_wp*x, 0.0_wp, .true., gap)
       call check_near(error, gap%f1, area/12.0_wp*(dot_product(dual, height) &
          + sum(dual)*sum(height)), tol, 1.0_wp, "the integral")
-      call patch_basis(patch, x, 0.0_wp*x, basis, cover)
-      call check_near(error, basis(:, 1), area/12.0_wp*(height + sum(height)), tol, 1.0_wp, &
+      basis = patch_basis(patch, x, 0.0_wp*x)
+      call check_near(error, basis%height(:, 1), area/12.0_wp*(height + sum(height)), tol, 1.0_wp, &
          "of each weight")
-      call check_near(error, cover(:, 0), spread(area/3.0_wp, 1, 3), tol, 1.0_wp, "what is covered")
+      call check_near(error, basis%cover(:, 0), spread(area/3.0_wp, 1, 3), tol, 1.0_wp, "what is covered")
    end subroutine test_plane
 
    !> The surface ends in a line through the middle of two sides.
    subroutine test_cover(error)
       type(error_t), allocatable, intent(out) :: error
       type(patch_t) :: patch
-      real(wp) :: x(3, n_point), basis(3, 0:1), cover(3, 0:1)
+      real(wp) :: x(3, n_point)
+      type(patch_basis_t) :: basis
 
       call make_facet(patch, x)
       patch%n_triangle = n_side**2
@@ -112,12 +115,12 @@ contains
       x(:, 2) = x(:, 1) + [2.0_wp, 0.0_wp, 0.0_wp]
       x(:, 3) = x(:, 1) + [1.0_wp, 2.0_wp, 0.0_wp]
       x(3, 4:) = 0.5_wp
-      call patch_basis(patch, x, 0.0_wp*x, basis, cover)
-      call check_near(error, cover(:, 1), [7.0_wp, 7.0_wp, 4.0_wp]/12.0_wp, tol, 1.0_wp, "covered")
-      call check_near(error, basis(:, 1), 0.5_wp*cover(:, 1), tol, 1.0_wp, "integrals")
+      basis = patch_basis(patch, x, 0.0_wp*x)
+      call check_near(error, basis%cover(:, 1), [7.0_wp, 7.0_wp, 4.0_wp]/12.0_wp, tol, 1.0_wp, "covered")
+      call check_near(error, basis%height(:, 1), 0.5_wp*basis%cover(:, 1), tol, 1.0_wp, "integrals")
       x(2, :3) = x(2, :3) + 1.0_wp
-      call patch_basis(patch, x, 0.0_wp*x, basis, cover)
-      call check_near(error, [basis, cover], spread(0.0_wp, 1, 12), 0.0_wp, 1.0_wp, "none of it")
+      basis = patch_basis(patch, x, 0.0_wp*x)
+      call check_near(error, [basis%height, basis%cover], spread(0.0_wp, 1, 12), 0.0_wp, 1.0_wp, "none of it")
    end subroutine test_cover
 
    subroutine test_identity(error)

@@ -1,0 +1,435 @@
+!> Mortar contact in space: gaps between slave facets and what of the master they face, integrated
+!> with one weight for each vertex of the slave facets.
+!>
+!> Each triangle of the slave facets has a stencil of its own, that of a patch as large as it is.
+!> Source: docs/theory.md, section 15.
+module emcon_mortar_space
+   use emcon_condition_nodes, only : condition_resize, nodes_append
+   use emcon_constraint, only : condition_t
+   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
+   use emcon_contact_law_registry, only : contact_laws_of_surface
+   use emcon_errors, only : error_t
+   use emcon_facet_frames_space, only : facet_frames_init, facet_weights_init, facet_weights_t
+   use emcon_facet_groups, only : facet_groups_init, facet_groups_t, group_angle
+   use emcon_facet_split, only : facet_split_init, facet_split_t
+   use emcon_facets, only : facets_init, facets_length
+   use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach, &
+      multiplier_dual
+   use emcon_kinds, only : wp
+   use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
+   use emcon_patch_gap_space, only : patch_basis, patch_basis_t, patch_gap, patch_gap_t, &
+      patch_t
+   use emcon_patch_sides_space, only : patch_sides_t, patch_triangles_init
+   use emcon_patch_spread_space, only : patch_spread, patch_uses
+   use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
+      patch_stencil_t
+   use emcon_scene, only : scene_t
+   implicit none
+   private
+   public :: mortar_space_t, mortar_space_init
+
+   !> A node is let go where less than this part of its surface is covered.
+   real(wp), parameter :: least_cover = 0.02_wp
+   !> So far, per facet, a mean gap may be closed where contact begins.
+   real(wp), parameter :: max_penetration_mean = 0.2_wp
+
+   type, extends(contact_t) :: mortar_space_t
+      type(patch_sides_t) :: sides
+      type(facet_split_t) :: split                    !! of the slave
+      type(facet_weights_t) :: weights
+      type(near_list_t) :: near
+      real(wp) :: chosen_reach = 0.0_wp               !! of the stencils [L]
+      logical :: is_dual = .true.                     !! multiplier basis
+      integer, allocatable :: start(:)                !! (n_constraint + 1) triangles of each:
+      integer, allocatable :: triangle(:)             !! start(i) to start(i + 1) - 1
+      integer, allocatable :: vertex(:)               !! the same: which vertex of its facet it is
+      type(patch_stencil_t), allocatable :: stencil(:)   !! (n_triangle)
+      type(patch_basis_t), allocatable :: basis(:)    !! (n_triangle) as last measured
+      real(wp), allocatable :: weight(:, :)           !! (3, size of `triangle`) in the step
+      real(wp), allocatable :: whole(:)               !! (n_constraint) reference area [L^2]
+      real(wp), allocatable :: scale(:)               !! (n_constraint) covered at the start [L^2]
+      real(wp), allocatable :: cover(:)               !! (n_constraint) covered at the end [L^2]
+   contains
+      procedure :: configure => mortar_configure
+      procedure :: begin_points => mortar_begin_step
+      procedure :: measure_points => mortar_measure
+      procedure :: evaluate_points => mortar_evaluate
+      procedure :: area_points => mortar_area
+      procedure :: own_area => mortar_own_area
+      procedure :: share => mortar_share
+      procedure :: mean_gap => mortar_mean_gap
+   end type mortar_space_t
+
+contains
+
+   !> Set up the pair `pair` of `scene`.
+   subroutine mortar_space_init(self, scene, pair, error)
+      type(mortar_space_t), intent(out) :: self
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: depth
+      integer :: f
+
+      associate (sides => self%sides)
+         call facets_init(sides%slave, scene, scene%surface(pair%slave), error)
+         if (allocated(error)) return
+         allocate(sides%master)
+         call facets_init(sides%master, scene, scene%surface(pair%master), error)
+         if (allocated(error)) return
+         call facet_split_init(self%split, sides%slave)
+         call facet_frames_init(sides%frames, sides%slave, self%split)
+         call facet_weights_init(self%weights, sides%slave, self%split, scene%x)
+         call patch_triangles_init(sides%triangles, sides%master, scene%x)
+         ! What a triangle sees ends beside it, where nothing is over it.
+         depth = pair%interaction%offset + interaction_reach(pair%interaction) &
+            + maxval([(facets_length(sides%slave, f), f = 1, sides%slave%n_facet), &
+            (facets_length(sides%master, f), f = 1, sides%master%n_facet)])
+         call near_list_init(self%near, sides%slave%facet, sides%master%facet, scene%x, scene%u0, &
+            depth)
+         self%max_gap_on_entry = depth
+      end associate
+      call list_vertices(self, scene%x)
+      call make_room(self)
+      self%may_leave = .true.
+      self%offset = pair%interaction%offset
+      self%max_penetration_at_start = max_penetration_mean
+      call contact_laws_of_surface(pair%interaction, self%laws)
+   end subroutine mortar_space_init
+
+   !> The constraints: one for each smooth group of slave facets at a vertex.
+   pure subroutine list_vertices(self, x)
+      type(mortar_space_t), intent(inout) :: self
+      real(wp), intent(in) :: x(:, :)            !! (3, n_node) reference positions [L]
+      type(facet_groups_t) :: groups
+      integer :: f, g, i, k, m, t
+
+      associate (slave => self%sides%slave)
+         call facet_groups_init(groups, slave, x, group_angle)
+         allocate(self%node(0), self%triangle(0), self%vertex(0))
+         self%start = [1]
+         do i = 1, size(slave%node)
+            do g = groups%node_start(i), groups%node_start(i + 1) - 1
+               do k = groups%start(g), groups%start(g + 1) - 1
+                  f = groups%facet(k)
+                  m = findloc(self%weights%node(:self%weights%n(f), f), i, 1)
+                  if (m == 0) exit               ! between vertices
+                  associate (part => [(t, t = self%split%start(f), self%split%start(f + 1) - 1)])
+                     self%triangle = [self%triangle, part]
+                     self%vertex = [self%vertex, spread(m, 1, size(part))]
+                  end associate
+               end do
+               if (size(self%triangle) < self%start(size(self%start))) cycle
+               self%node = [self%node, slave%node(i)]
+               self%start = [self%start, size(self%triangle) + 1]
+            end do
+         end do
+      end associate
+      self%n_constraint = size(self%node)
+   end subroutine list_vertices
+
+   !> Room for what a step knows, and sizes in the reference.
+   pure subroutine make_room(self)
+      type(mortar_space_t), intent(inout) :: self
+      integer :: i, k
+
+      associate (n => self%n_constraint, n_triangle => size(self%split%facet))
+         allocate(self%stencil(n_triangle), self%basis(n_triangle), self%state(n))
+         allocate(self%duplicate(n), source=0)
+         allocate(self%weight(3, size(self%triangle)), self%whole(n), self%cover(n), &
+            self%sagitta(n), source=0.0_wp)
+      end associate
+      associate (frames => self%sides%frames)
+         do i = 1, self%n_constraint
+            do k = self%start(i), self%start(i + 1) - 1
+               associate (t => self%triangle(k))
+                  self%whole(i) = self%whole(i) + frames%area(t) &
+                     *sum(self%weights%linear(:, self%vertex(k), t))/3.0_wp
+                  self%state(i)%size = self%state(i)%size + frames%size(t) &
+                     /real(self%start(i + 1) - self%start(i), wp)
+               end associate
+            end do
+         end do
+      end associate
+      self%scale = self%whole
+      self%thickness = sqrt(self%whole)
+   end subroutine make_room
+
+   pure subroutine mortar_configure(self, x, options)
+      class(mortar_space_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)   !! (3, n_node) reference positions [L]
+      type(contact_options_t), intent(in) :: options
+
+      self%is_dual = options%multiplier == multiplier_dual
+   end subroutine mortar_configure
+
+   !> Choose for each triangle what it may see in the step, and the multipliers.
+   pure subroutine mortar_begin_step(self, x, u0, du)
+      class(mortar_space_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      integer, allocatable :: facet(:)
+      integer :: k, t
+
+      call near_list_update(self%near, x, u0, du, self%reach)
+      call self%has_looked(self%near%clearance)
+      self%chosen_reach = self%reach
+      associate (list => self%near%candidates)
+         do t = 1, size(self%stencil)
+            associate (f => self%split%facet(t))
+               associate (of => list%facet(list%start(f):list%start(f + 1) - 1))
+                  facet = pack(of, [(near_list_within(self%near, f, of(k), x, u0, self%reach), &
+                     k = 1, size(of))])
+               end associate
+            end associate
+            call patch_stencil_choose(self%stencil(t), self%sides, t, facet, x, u0)
+         end do
+      end associate
+      call choose_weights(self, x, u0)
+   end subroutine mortar_begin_step
+
+   !> The multipliers of the step: dual ones where the facet is covered as the step begins, and by
+   !> the third power of what is covered of it, docs/theory.md, eq. (62), else linear ones.
+   pure subroutine choose_weights(self, x, u0)
+      class(mortar_space_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
+      real(wp) :: theta(self%sides%slave%n_facet), area(self%sides%slave%n_facet)
+      type(patch_basis_t) :: basis
+      integer :: i, t
+
+      theta = 0.0_wp
+      if (self%is_dual) then
+         area = 0.0_wp
+         do t = 1, size(self%stencil)
+            associate (f => self%split%facet(t))
+               call look(self, t, x, u0, 0.0_wp*u0, basis)
+               theta(f) = theta(f) + sum(basis%cover(:, 0))
+               area(f) = area(f) + basis%area(0)
+            end associate
+         end do
+         where (area > 0.0_wp) theta = min(theta/area, 1.0_wp)**3
+      end if
+      do i = 1, size(self%triangle)
+         associate (t => self%triangle(i), m => self%vertex(i))
+            self%weight(:, i) = self%weights%linear(:, m, t) &
+               + theta(self%split%facet(t))*self%weights%skew(:, m, t)
+         end associate
+      end do
+   end subroutine choose_weights
+
+   !> What triangle `t` sees.
+   pure subroutine look(self, t, x, u0, du, basis)
+      class(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: t
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      type(patch_basis_t), intent(out) :: basis
+      real(wp), dimension(3, 3 + self%stencil(t)%patch%n_vertex) :: at, way
+
+      if (self%stencil(t)%triangle == 0) return
+      call patch_stencil_gather(self%stencil(t), x, u0, du, at, way)
+      basis = patch_basis(self%stencil(t)%patch, at, way)
+   end subroutine look
+
+   !> Mean gaps at both ends of the step; 0 where nothing is covered.
+   pure subroutine mortar_measure(self, x, u0, du)
+      class(mortar_space_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      integer :: i, t
+
+      do t = 1, size(self%stencil)
+         call look(self, t, x, u0, du, self%basis(t))
+      end do
+      do i = 1, self%n_constraint
+         call measure_vertex(self, i)
+      end do
+   end subroutine mortar_measure
+
+   !> The gap of constraint `i`, from what its triangles see.
+   pure subroutine measure_vertex(self, i)
+      type(mortar_space_t), intent(inout) :: self
+      integer, intent(in) :: i
+      real(wp) :: gap(0:1), area(0:1), least, ahead, size_of, way, deepest
+      integer :: k
+
+      gap = 0.0_wp
+      area = 0.0_wp
+      ahead = huge(ahead)
+      size_of = huge(size_of)
+      deepest = 0.0_wp
+      way = 0.0_wp
+      do k = self%start(i), self%start(i + 1) - 1
+         associate (basis => self%basis(self%triangle(k)), stencil => self%stencil( &
+               self%triangle(k)))
+            if (stencil%triangle == 0) cycle
+            gap = gap + matmul(self%weight(:, k), basis%height)
+            area = area + matmul(self%weight(:, k), basis%cover)
+            ahead = min(ahead, basis%ahead)
+            way = max(way, basis%way)
+            size_of = min(size_of, stencil%size)
+            deepest = max(deepest, stencil%deepest)
+         end associate
+      end do
+      associate (state => self%state(i))
+         ! What stores energy is followed as long as there is any to give back.
+         least = least_cover*self%whole(i)
+         self%scale(i) = max(area(0), least)
+         if (self%step%is_penalty) least = tiny(least)
+         self%cover(i) = max(area(1), 0.0_wp)
+         state = gap_state_t(size=state%size, other_size=size_of)
+         state%is_near = maxval(area) > 0.0_wp
+         state%is_covered = way <= self%chosen_reach
+         state%is_over = area(1) >= least .or. (self%step%is_penalty .and. area(0) >= least)
+         state%is_leaving = .not. state%is_over
+         state%is_arriving = area(0) < least
+         if (area(0) > 0.0_wp) state%gap0 = gap(0)/area(0) - self%offset
+         if (area(1) >= least) state%gap1 = gap(1)/area(1) - self%offset
+         if (state%is_arriving) state%was_open = &
+            ahead - self%offset >= -max_penetration_on_entry*state%size
+         if (state%gap0 < -deepest - self%offset) state = gap_state_t(size=state%size)
+      end associate
+   end subroutine measure_vertex
+
+   pure subroutine mortar_evaluate(self, wanted, x, u0, du, target, item)
+      class(mortar_space_t), intent(inout) :: self
+      integer, intent(in) :: wanted(:)           !! (n) numbers of constraints, ascending
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      real(wp), intent(in) :: target(:)          !! (n) [L]
+      type(condition_t), intent(inout) :: item(:)   !! (n)
+      integer :: k
+
+      do k = 1, size(wanted)
+         call evaluate_vertex(self, wanted(k), x, u0, du, target(k) + self%offset, item(k))
+      end do
+   end subroutine mortar_evaluate
+
+   !> The condition of constraint `i`: the sum over its triangles.
+   pure subroutine evaluate_vertex(self, i, x, u0, du, target, item)
+      type(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in) :: target             !! height to hold [L]
+      type(condition_t), intent(inout) :: item
+      type(patch_gap_t) :: gap(self%start(i + 1) - self%start(i))
+      integer :: k, n
+
+      do k = 1, size(gap)
+         associate (stencil => self%stencil(self%triangle(self%start(i) + k - 1)))
+            if (stencil%triangle > 0) call find_gap(stencil, self%weight(:, self%start(i) + k &
+               - 1), x, u0, du, target, item%leaves_second, gap(k))
+         end associate
+      end do
+      call begin_condition(self, i, gap, item)
+      n = item%n_node
+      do k = 1, size(gap)
+         if (gap(k)%n_vertex == 0) cycle
+         associate (stencil => self%stencil(self%triangle(self%start(i) + k - 1)))
+            associate (is_used => patch_uses(stencil, gap(k)))
+               call patch_spread(stencil, gap(k), is_used, 1.0_wp/self%scale(i), places(pack( &
+                  stencil%node(:stencil%n_node), is_used), item%node(:n)), item)
+            end associate
+         end associate
+      end do
+   end subroutine evaluate_vertex
+
+   !> The gap of a triangle with a weight.
+   pure subroutine find_gap(stencil, weight, x, u0, du, target, leaves_second, gap)
+      type(patch_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: weight(3)
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in) :: target             !! [L]
+      logical, intent(in) :: leaves_second
+      type(patch_gap_t), intent(out) :: gap
+      real(wp), dimension(3, 3 + stencil%patch%n_vertex) :: at, way
+      type(patch_t) :: patch
+
+      patch = stencil%patch
+      patch%area%weight = weight
+      call patch_stencil_gather(stencil, x, u0, du, at, way)
+      call patch_gap(patch, at, way, target, leaves_second, gap)
+   end subroutine find_gap
+
+   !> The nodes of the condition of constraint `i`, its own first, then others of the slave, and no
+   !> derivatives yet.
+   pure subroutine begin_condition(self, i, gap, item)
+      type(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: i
+      type(patch_gap_t), intent(in) :: gap(:)    !! of its triangles
+      type(condition_t), intent(inout) :: item
+      integer, allocatable :: list(:)
+      integer :: k, m, n, pass
+
+      associate (triangle => self%triangle(self%start(i):self%start(i + 1) - 1))
+         allocate(list(1 + sum(self%stencil(triangle)%n_node)))
+         list(1) = self%node(i)
+         n = 1
+         do pass = 1, 2
+            do k = 1, size(triangle)
+               if (gap(k)%n_vertex == 0) cycle
+               associate (stencil => self%stencil(triangle(k)))
+                  associate (is_slave => [(m <= stencil%n_slave, m = 1, stencil%n_node)], &
+                        is_used => patch_uses(stencil, gap(k)))
+                     call nodes_append(pack(stencil%node(:stencil%n_node), is_used .and. &
+                        (is_slave .eqv. pass == 1)), list, n)
+                  end associate
+               end associate
+            end do
+            if (pass == 1) item%n_slave = n
+         end do
+      end associate
+      call condition_resize(item, n, self%sides%slave%n_dim)
+      item%node(:n) = list(:n)
+      item%size = self%state(i)%size
+      item%is_mean = .true.
+      item%gap0 = 0.0_wp
+      item%gap1 = 0.0_wp
+      item%dgap = 0.0_wp
+      item%g = 0.0_wp
+      item%c = 0.0_wp
+      if (.not. item%leaves_second) item%h = 0.0_wp
+   end subroutine begin_condition
+
+   !> Where nodes are in a list.
+   pure function places(node, list) result(place)
+      integer, intent(in) :: node(:), list(:)
+      integer :: place(size(node))
+      integer :: k
+
+      place = [(findloc(list, node(k), 1), k = 1, size(node))]
+   end function places
+
+   !> The multipliers are forces by the scale of their constraints.
+   pure subroutine mortar_area(self, x, u, area, length)
+      class(mortar_space_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
+      real(wp), intent(out) :: length(:)         !! (n_constraint) by the thickness [L]
+
+      area = self%scale
+      length = self%cover/self%thickness
+   end subroutine mortar_area
+
+   pure subroutine mortar_own_area(self, x, area)
+      class(mortar_space_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :)    !! (3, n_node) [L]
+      real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
+
+      area = self%whole
+   end subroutine mortar_own_area
+
+   !> Integrals of gaps are functions of the positions alone; their means know what was covered.
+   pure real(wp) function mortar_share(self, i) result(share)
+      class(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+
+      share = self%scale(i)/self%whole(i)
+   end function mortar_share
+
+   pure real(wp) function mortar_mean_gap(self, i, gap) result(mean_gap)
+      class(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in) :: gap                !! integral by what was covered at the start [L]
+
+      mean_gap = 0.0_wp
+      if (self%cover(i) > 0.0_wp) mean_gap = gap*self%scale(i)/self%cover(i)
+   end function mortar_mean_gap
+
+end module emcon_mortar_space
