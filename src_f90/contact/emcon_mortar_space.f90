@@ -23,6 +23,7 @@ module emcon_mortar_space
    use emcon_patch_spread_space, only : patch_spread, patch_uses
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
       patch_stencil_t
+   use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
    use emcon_scene, only : scene_t
    implicit none
    private
@@ -38,7 +39,9 @@ module emcon_mortar_space
       type(facet_split_t) :: split                    !! of the slave
       type(facet_weights_t) :: weights
       type(near_list_t) :: near
-      real(wp) :: chosen_reach = 0.0_wp               !! of the stencils [L]
+      real(wp) :: beyond = 0.0_wp                     !! of its reach what is beside stencils [L]
+      type(position_memo_t) :: memo                   !! of the nodes as stencils were chosen:
+      real(wp) :: chosen_reach = 0.0_wp               !! among facets up to there [L]
       logical :: is_dual = .true.                     !! multiplier basis
       integer, allocatable :: start(:)                !! (n_constraint + 1) triangles of each:
       integer, allocatable :: triangle(:)             !! start(i) to start(i + 1) - 1
@@ -68,7 +71,6 @@ contains
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       type(error_t), allocatable, intent(out) :: error
-      real(wp) :: depth
       integer :: f
 
       associate (sides => self%sides)
@@ -81,13 +83,11 @@ contains
          call facet_frames_init(sides%frames, sides%slave, self%split)
          call facet_weights_init(self%weights, sides%slave, self%split, scene%x)
          call patch_triangles_init(sides%triangles, sides%master, scene%x)
-         ! What a triangle sees ends beside it, where nothing is over it.
-         depth = pair%interaction%offset + interaction_reach(pair%interaction) &
-            + maxval([(facets_length(sides%slave, f), f = 1, sides%slave%n_facet), &
-            (facets_length(sides%master, f), f = 1, sides%master%n_facet)])
+         ! Lists end beside what a triangle sees: all that meets with that is listed.
+         self%beyond = maxval([0.0_wp, (facets_length(sides%master, f), &
+            f = 1, sides%master%n_facet)])
          call near_list_init(self%near, sides%slave%facet, sides%master%facet, scene%x, scene%u0, &
-            depth)
-         self%max_gap_on_entry = depth
+            self%beyond + pair%interaction%offset + interaction_reach(pair%interaction))
       end associate
       call list_vertices(self, scene%x)
       call make_room(self)
@@ -167,25 +167,43 @@ contains
    pure subroutine mortar_begin_step(self, x, u0, du)
       class(mortar_space_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
-      integer, allocatable :: facet(:)
-      integer :: k, t
+      integer :: f
 
       call near_list_update(self%near, x, u0, du, self%reach)
       call self%has_looked(self%near%clearance)
+      if (abs(self%chosen_reach - self%reach) <= 0.0_wp) then
+         if (position_memo_holds(self%memo, self%near%node, x, u0)) return
+      end if
+      call position_memo_take(self%memo, self%near%node, x, u0)
       self%chosen_reach = self%reach
-      associate (list => self%near%candidates)
-         do t = 1, size(self%stencil)
-            associate (f => self%split%facet(t))
-               associate (of => list%facet(list%start(f):list%start(f + 1) - 1))
-                  facet = pack(of, [(near_list_within(self%near, f, of(k), x, u0, self%reach), &
-                     k = 1, size(of))])
-               end associate
-            end associate
-            call patch_stencil_choose(self%stencil(t), self%sides, t, facet, x, u0)
-         end do
-      end associate
+      do f = 1, self%sides%slave%n_facet
+         call choose_stencils(self, f, x, u0)
+      end do
       call choose_weights(self, x, u0)
    end subroutine mortar_begin_step
+
+   !> The stencils of the triangles of slave facet `f`; none of them where nothing comes near.
+   pure subroutine choose_stencils(self, f, x, u0)
+      type(mortar_space_t), intent(inout) :: self
+      integer, intent(in) :: f
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
+      integer :: k, t
+
+      self%stencil(self%split%start(f):self%split%start(f + 1) - 1)%triangle = 0
+      associate (list => self%near%candidates)
+         associate (of => list%facet(list%start(f):list%start(f + 1) - 1))
+            associate (is_near => [(near_list_within(self%near, f, of(k), x, u0, self%reach), &
+                  k = 1, size(of))], is_beside => [(.not. near_list_within(self%near, f, of(k), &
+                  x, u0, self%reach - self%beyond), k = 1, size(of))])
+               if (all(is_beside)) return
+               do t = self%split%start(f), self%split%start(f + 1) - 1
+                  call patch_stencil_choose(self%stencil(t), self%sides, t, pack(of, is_near), x, &
+                     u0, pack(is_beside, is_near))
+               end do
+            end associate
+         end associate
+      end associate
+   end subroutine choose_stencils
 
    !> The multipliers of the step: dual ones where the facet is covered as the step begins, and by
    !> the third power of what is covered of it, docs/theory.md, eq. (62), else linear ones.
@@ -276,7 +294,7 @@ contains
          self%cover(i) = max(area(1), 0.0_wp)
          state = gap_state_t(size=state%size, other_size=size_of)
          state%is_near = maxval(area) > 0.0_wp
-         state%is_covered = way <= self%chosen_reach
+         state%is_covered = way <= self%chosen_reach - self%beyond
          state%is_over = area(1) >= least .or. (self%step%is_penalty .and. area(0) >= least)
          state%is_leaving = .not. state%is_over
          state%is_arriving = area(0) < least

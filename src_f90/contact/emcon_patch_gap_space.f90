@@ -8,7 +8,7 @@ module emcon_patch_gap_space
       frame_size, frame_vertex, frame_vertex_t, n_frame_var
    use emcon_kinds, only : wp
    use emcon_patch_moments_space, only : patch_area_t, patch_misses, patch_moment_slopes, &
-      patch_moments
+      patch_moments, patch_products
    use emcon_polygon_clip_space, only : barycentric
    implicit none
    private
@@ -122,21 +122,25 @@ contains
       type(patch_t), intent(in) :: patch
       real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
       type(patch_basis_t) :: basis
-      type(patch_t) :: part
-      real(wp) :: place(3, patch%n_vertex, 0:1)
-      integer :: end, i
+      real(wp) :: place(3, patch%n_vertex, 0:1), products(3, 3), share(3)
+      integer :: end, k, v
 
-      part = patch
       do end = 0, 1
          call place_vertices(patch, x + end*dx, place(:, :, end))
-         do i = 1, 3
-            part%area%weight = merge(1.0_wp, 0.0_wp, [1, 2, 3] == i)
-            call find_means(part, place(:, :, end), basis%height(i, end), basis%cover(i, end))
-         end do
-         associate (size_of => frame_size(x(:, :3) + end*dx(:, :3)))
-            basis%height(:, end) = size_of*basis%height(:, end)
-            basis%cover(:, end) = size_of*basis%cover(:, end)
+         associate (size_of => frame_size(x(:, :3) + end*dx(:, :3)), height => &
+               basis%height(:, end), cover => basis%cover(:, end), p => place(:, :, end))
             basis%area(end) = 0.5_wp*size_of
+            do k = 1, patch%n_triangle
+               associate (t => patch%triangle(:, k))
+                  if (patch_misses(patch%area, p(:2, t))) cycle
+                  products = size_of*patch_products(patch%area, p(:2, t))
+                  do v = 1, 3
+                     share = barycentric(p(:2, t), unit_corner(:, v))*patch%chi(t)
+                     height = height + products(:, v)*dot_product(share, p(3, t))
+                     cover = cover + products(:, v)*sum(share)
+                  end do
+               end associate
+            end do
          end associate
       end do
       basis%way = longest_way(patch, place)

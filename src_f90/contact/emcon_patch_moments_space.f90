@@ -10,7 +10,8 @@ module emcon_patch_moments_space
       polygon_misses, square_sides, triangle_sides
    implicit none
    private
-   public :: patch_area_t, patch_triangle, patch_moments, patch_moment_slopes, patch_misses
+   public :: patch_area_t, patch_triangle, patch_moments, patch_products, &
+      patch_moment_slopes, patch_misses
 
    !> A side of a triangle that lies on one of the patch is half in it, half not: the patch is taken
    !> this much wider and narrower.
@@ -79,6 +80,33 @@ contains
          moment = moment + part*(mean*[1.0_wp - sum(middle), middle] + spread_of)
       end do
    end subroutine patch_moments
+
+   !> Moments of the common polygon with the products of these functions; weights have no part in it.
+   pure function patch_products(area, corner) result(product)
+      type(patch_area_t), intent(in) :: area
+      real(wp), intent(in) :: corner(2, 3)       !! of the triangle, counter-clockwise
+      real(wp) :: product(3, 3)
+      real(wp) :: polygon(2, most_corners), value(3, most_corners), total(3), part
+      integer :: i, j, k, n
+
+      product = 0.0_wp
+      if (patch_misses(area, corner)) return
+      call polygon_clip(area%side(:, :area%n_side), corner, polygon, n)
+      value(2:, :n) = polygon(:, :n)
+      value(1, :n) = 1.0_wp - polygon(1, :n) - polygon(2, :n)
+      do k = 2, n - 1
+         associate (a => polygon(:, k) - polygon(:, 1), b => polygon(:, k + 1) - polygon(:, 1))
+            part = (a(1)*b(2) - a(2)*b(1))/24.0_wp
+         end associate
+         total = value(:, 1) + value(:, k) + value(:, k + 1)
+         do j = 1, 3
+            do i = 1, 3
+               product(i, j) = product(i, j) + part*(total(i)*total(j) + value(i, 1)*value(j, 1) &
+                  + value(i, k)*value(j, k) + value(i, k + 1)*value(j, k + 1))
+            end do
+         end do
+      end do
+   end function patch_products
 
    !> How moments change with the corners: what each side sweeps of the patch.
    pure subroutine patch_moment_slopes(area, corner, slope, bare)

@@ -52,12 +52,14 @@ contains
    !> Choose the stencil of frame `frame` of the slave at x + u, where the facets `facet` of the
    !> master are near its node: the nearest triangle that faces this frame more than any other of
    !> the node, and what hangs together with that and faces the frame too.
-   pure subroutine patch_stencil_choose(self, sides, frame, facet, x, u)
+   pure subroutine patch_stencil_choose(self, sides, frame, facet, x, u, is_beside)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: frame               !! 1 to the number of all frames
       integer, intent(in) :: facet(:)            !! ascending
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      !> (as `facet`) the patch cannot see it in the step; none of them
+      logical, intent(in), optional :: is_beside(:)
       type(patch_near_t) :: near
       real(wp) :: normal(3)
       integer :: i, nearest
@@ -65,7 +67,7 @@ contains
       self%triangle = 0
       if (size(facet) == 0) return
       i = sides%frames%point(frame)
-      call patch_near_find(near, sides, i, facet, x, u)
+      call patch_near_find(near, sides, i, facet, x, u, is_beside)
       nearest = patch_near_nearest(near, sides, frame, x, u)
       if (nearest == 0) return
       normal = frame_normal(sides%frames, frame, sides%frames%base(i), x, u)
@@ -98,8 +100,10 @@ contains
       real(wp), intent(in) :: normal(3)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       logical :: ends(3, near%n)                 !! the list ends at the side of a triangle
+      logical :: is_seen(near%n)
       integer :: k, t
 
+      is_seen = near%is_listed .and. .not. near%is_beside
       ends = .false.
       do t = 1, near%n
          if (.not. near%is_listed(t)) cycle
@@ -107,20 +111,20 @@ contains
             ends(k, t) = .not. goes_on(sides%triangles%beyond(k, near%triangle(t)))
          end do
       end do
-      call begin_patch(self, sides, frame, count(near%is_listed), count(ends))
+      call begin_patch(self, sides, frame, count(is_seen), count(ends))
       do t = 1, near%n
-         if (near%is_listed(t)) call add_triangle(self, sides, near%triangle(t))
+         if (is_seen(t)) call add_triangle(self, sides, near%triangle(t))
       end do
       do t = 1, near%n
          do k = 1, 3
             if (.not. ends(k, t)) cycle
             associate (from => sides%triangles%split%corner(k, near%triangle(t)), &
                   to => sides%triangles%split%corner(1 + mod(k, 3), near%triangle(t)))
-               if (sides%triangles%is_ridge(k, near%triangle(t))) then
+               if (.not. sides%triangles%is_ridge(k, near%triangle(t))) then
+                  call fade(self, from)
+                  call fade(self, to)
+               else if (is_seen(t)) then
                   call add_flange(self, sides, [from, to], normal, x, u)
-               else
-                  self%patch%chi(vertex_of(self, from)) = 0.0_wp
-                  self%patch%chi(vertex_of(self, to)) = 0.0_wp
                end if
             end associate
          end do
@@ -144,6 +148,16 @@ contains
       end function goes_on
 
    end subroutine make_patch
+
+   !> What is seen ends at a point.
+   pure subroutine fade(self, point)
+      type(patch_stencil_t), intent(inout) :: self
+      integer, intent(in) :: point
+
+      associate (vertex => vertex_of(self, point))
+         if (vertex > 0) self%patch%chi(vertex) = 0.0_wp
+      end associate
+   end subroutine fade
 
    !> Room for a patch of some triangles with flanges at some sides; its frame.
    pure subroutine begin_patch(self, sides, frame, n_triangle, n_end)
