@@ -4,7 +4,8 @@
 !> Each triangle of the slave facets has a stencil of its own, that of a patch as large as it is.
 !> Source: docs/theory.md, section 15.
 module emcon_mortar_space
-   use emcon_condition_nodes, only : condition_resize, nodes_append
+   use emcon_condition_nodes, only : nodes_append
+   use emcon_condition_product, only : condition_add_cubed, condition_start
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
    use emcon_contact_law_registry, only : contact_laws_of_surface
@@ -34,6 +35,17 @@ module emcon_mortar_space
    !> So far, per facet, a mean gap may be closed where contact begins.
    real(wp), parameter :: max_penetration_mean = 0.2_wp
 
+   !> Covered but for round-off: the dual multipliers are as they are.
+   real(wp), parameter :: whole_cover = 256.0_wp*epsilon(1.0_wp)
+
+   !> What a triangle gives to a constraint.
+   type :: facet_part_t
+      type(patch_basis_t) :: basis
+      logical :: is_blended = .false.                 !! of linear and dual multipliers
+      !> With the linear multiplier, or all of it; with what the dual one has more; the cover
+      type(patch_gap_t) :: gap(3)
+   end type facet_part_t
+
    type, extends(contact_t) :: mortar_space_t
       type(patch_sides_t) :: sides
       type(facet_split_t) :: split                    !! of the slave
@@ -48,7 +60,8 @@ module emcon_mortar_space
       integer, allocatable :: vertex(:)               !! the same: which vertex of its facet it is
       type(patch_stencil_t), allocatable :: stencil(:)   !! (n_triangle)
       type(patch_basis_t), allocatable :: basis(:)    !! (n_triangle) as last measured
-      real(wp), allocatable :: weight(:, :)           !! (3, size of `triangle`) in the step
+      !> (0:1, n_facet) how dual the multipliers of slave facets are at start and end
+      real(wp), allocatable :: theta(:, :)
       real(wp), allocatable :: whole(:)               !! (n_constraint) reference area [L^2]
       real(wp), allocatable :: scale(:)               !! (n_constraint) covered at the start [L^2]
       real(wp), allocatable :: cover(:)               !! (n_constraint) covered at the end [L^2]
@@ -136,7 +149,7 @@ contains
       associate (n => self%n_constraint, n_triangle => size(self%split%facet))
          allocate(self%stencil(n_triangle), self%basis(n_triangle), self%state(n))
          allocate(self%duplicate(n), source=0)
-         allocate(self%weight(3, size(self%triangle)), self%whole(n), self%cover(n), &
+         allocate(self%theta(0:1, self%sides%slave%n_facet), self%whole(n), self%cover(n), &
             self%sagitta(n), source=0.0_wp)
       end associate
       associate (frames => self%sides%frames)
@@ -179,7 +192,6 @@ contains
       do f = 1, self%sides%slave%n_facet
          call choose_stencils(self, f, x, u0)
       end do
-      call choose_weights(self, x, u0)
    end subroutine mortar_begin_step
 
    !> The stencils of the triangles of slave facet `f`; none of them where nothing comes near.
@@ -205,35 +217,6 @@ contains
       end associate
    end subroutine choose_stencils
 
-   !> The multipliers of the step: dual ones where the facet is covered as the step begins, and by
-   !> the third power of what is covered of it, docs/theory.md, eq. (62), else linear ones.
-   pure subroutine choose_weights(self, x, u0)
-      class(mortar_space_t), intent(inout) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
-      real(wp) :: theta(self%sides%slave%n_facet), area(self%sides%slave%n_facet)
-      type(patch_basis_t) :: basis
-      integer :: i, t
-
-      theta = 0.0_wp
-      if (self%is_dual) then
-         area = 0.0_wp
-         do t = 1, size(self%stencil)
-            associate (f => self%split%facet(t))
-               call look(self, t, x, u0, 0.0_wp*u0, basis)
-               theta(f) = theta(f) + sum(basis%cover(:, 0))
-               area(f) = area(f) + basis%area(0)
-            end associate
-         end do
-         where (area > 0.0_wp) theta = min(theta/area, 1.0_wp)**3
-      end if
-      do i = 1, size(self%triangle)
-         associate (t => self%triangle(i), m => self%vertex(i))
-            self%weight(:, i) = self%weights%linear(:, m, t) &
-               + theta(self%split%facet(t))*self%weights%skew(:, m, t)
-         end associate
-      end do
-   end subroutine choose_weights
-
    !> What triangle `t` sees.
    pure subroutine look(self, t, x, u0, du, basis)
       class(mortar_space_t), intent(in) :: self
@@ -251,22 +234,41 @@ contains
    pure subroutine mortar_measure(self, x, u0, du)
       class(mortar_space_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
-      integer :: i, t
+      integer :: f, i, t
 
       do t = 1, size(self%stencil)
          call look(self, t, x, u0, du, self%basis(t))
+      end do
+      do f = 1, self%sides%slave%n_facet
+         self%theta(:, f) = 0.0_wp
+         if (self%is_dual) self%theta(:, f) = covered(self%basis(self%split%start(f): &
+            self%split%start(f + 1) - 1))**3
       end do
       do i = 1, self%n_constraint
          call measure_vertex(self, i)
       end do
    end subroutine mortar_measure
 
+   !> What of a slave facet is covered at both ends of the step, each of its triangles a part of it
+   !> as large as the others: 0 to 1.
+   pure function covered(basis) result(part)
+      type(patch_basis_t), intent(in) :: basis(:)     !! of its triangles
+      real(wp) :: part(0:1)
+      integer :: k
+
+      part = 0.0_wp
+      do k = 1, size(basis)
+         if (all(basis(k)%area > 0.0_wp)) part = part + sum(basis(k)%cover, 1)/basis(k)%area
+      end do
+      part = part/real(size(basis), wp)
+   end function covered
+
    !> The gap of constraint `i`, from what its triangles see.
    pure subroutine measure_vertex(self, i)
       type(mortar_space_t), intent(inout) :: self
       integer, intent(in) :: i
-      real(wp) :: gap(0:1), area(0:1), least, ahead, size_of, way, deepest
-      integer :: k
+      real(wp) :: gap(0:1), area(0:1), least, ahead, size_of, way, deepest, weight(3)
+      integer :: end, k
 
       gap = 0.0_wp
       area = 0.0_wp
@@ -278,8 +280,11 @@ contains
          associate (basis => self%basis(self%triangle(k)), stencil => self%stencil( &
                self%triangle(k)))
             if (stencil%triangle == 0) cycle
-            gap = gap + matmul(self%weight(:, k), basis%height)
-            area = area + matmul(self%weight(:, k), basis%cover)
+            do end = 0, 1
+               weight = weight_of(self, k, self%theta(end, self%split%facet(self%triangle(k))))
+               gap(end) = gap(end) + dot_product(weight, basis%height(:, end))
+               area(end) = area(end) + dot_product(weight, basis%cover(:, end))
+            end do
             ahead = min(ahead, basis%ahead)
             way = max(way, basis%way)
             size_of = min(size_of, stencil%size)
@@ -306,6 +311,19 @@ contains
       end associate
    end subroutine measure_vertex
 
+   !> The multiplier of place `k` of `triangle` at the corners of that: the dual one if theta is 1,
+   !> the linear one if it is 0.
+   pure function weight_of(self, k, theta) result(weight)
+      class(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: k
+      real(wp), intent(in) :: theta
+      real(wp) :: weight(3)
+
+      associate (t => self%triangle(k), m => self%vertex(k))
+         weight = self%weights%linear(:, m, t) + theta*self%weights%skew(:, m, t)
+      end associate
+   end function weight_of
+
    pure subroutine mortar_evaluate(self, wanted, x, u0, du, target, item)
       class(mortar_space_t), intent(inout) :: self
       integer, intent(in) :: wanted(:)           !! (n) numbers of constraints, ascending
@@ -319,39 +337,99 @@ contains
       end do
    end subroutine mortar_evaluate
 
-   !> The condition of constraint `i`: the sum over its triangles.
+   !> The condition of constraint `i`: the sum over its facets, docs/theory.md, eq. (62).
    pure subroutine evaluate_vertex(self, i, x, u0, du, target, item)
       type(mortar_space_t), intent(in) :: self
       integer, intent(in) :: i
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       real(wp), intent(in) :: target             !! height to hold [L]
       type(condition_t), intent(inout) :: item
-      type(patch_gap_t) :: gap(self%start(i + 1) - self%start(i))
-      integer :: k, n
+      type(condition_t) :: cover, skew
+      type(facet_part_t) :: part(self%start(i + 1) - self%start(i))
+      integer :: first, k, last
 
-      do k = 1, size(gap)
-         associate (stencil => self%stencil(self%triangle(self%start(i) + k - 1)))
-            if (stencil%triangle > 0) call find_gap(stencil, self%weight(:, self%start(i) + k &
-               - 1), x, u0, du, target, item%leaves_second, gap(k))
+      do k = 1, size(part)
+         associate (place => self%start(i) + k - 1)
+            if (self%stencil(self%triangle(place))%triangle > 0) call look(self, &
+               self%triangle(place), x, u0, du, part(k)%basis)
          end associate
       end do
-      call begin_condition(self, i, gap, item)
-      n = item%n_node
-      do k = 1, size(gap)
-         if (gap(k)%n_vertex == 0) cycle
-         associate (stencil => self%stencil(self%triangle(self%start(i) + k - 1)))
-            associate (is_used => patch_uses(stencil, gap(k)))
-               call patch_spread(stencil, gap(k), is_used, 1.0_wp/self%scale(i), places(pack( &
-                  stencil%node(:stencil%n_node), is_used), item%node(:n)), item)
-            end associate
-         end associate
+      first = 1
+      do while (first <= size(part))
+         last = last_of_facet(first)
+         call find_parts(self, self%start(i) + first - 1, x, u0, du, target, item%leaves_second, &
+            part(first:last))
+         first = last + 1
       end do
+      call begin_condition(self, i, part, item)
+      cover%leaves_second = item%leaves_second
+      skew%leaves_second = item%leaves_second
+      first = 1
+      do while (first <= size(part))
+         last = last_of_facet(first)
+         associate (of => part(first:last), node => item%node(:item%n_node), n_dim => &
+               size(item%g, 1))
+            call add_parts(self, self%start(i) + first - 1, of, 1.0_wp/self%scale(i), item, 1)
+            if (any(of%is_blended)) then
+               call condition_start(skew, node, n_dim)
+               call add_parts(self, self%start(i) + first - 1, of, 1.0_wp/self%scale(i), skew, 2)
+               call condition_start(cover, node, n_dim)
+               call add_parts(self, self%start(i) + first - 1, of, 2.0_wp/real(size(of), wp), &
+                  cover, 3)
+               call condition_add_cubed(item, cover, skew)
+            end if
+         end associate
+         first = last + 1
+      end do
+
+   contains
+
+      !> The last triangle of the facet that the triangle at place `k` is of.
+      pure integer function last_of_facet(k) result(last)
+         integer, intent(in) :: k
+
+         associate (f => self%split%facet(self%triangle(self%start(i) + k - 1)))
+            last = k + self%split%start(f + 1) - self%split%start(f) - 1
+         end associate
+      end function last_of_facet
+
    end subroutine evaluate_vertex
 
-   !> The gap of a triangle with a weight.
-   pure subroutine find_gap(stencil, weight, x, u0, du, target, leaves_second, gap)
+   !> What the triangles of a facet give to a constraint, those from place `first` on of
+   !> `triangle`. Where all or nothing of the facet is covered its multipliers stay as they are.
+   pure subroutine find_parts(self, first, x, u0, du, target, leaves_second, part)
+      type(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: first
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in) :: target             !! [L]
+      logical, intent(in) :: leaves_second
+      type(facet_part_t), intent(inout) :: part(:)
+      real(wp) :: cover(0:1), theta
+      integer :: k
+
+      cover = covered(part%basis)
+      theta = merge(1.0_wp, 0.0_wp, self%is_dual .and. all(abs(cover - 1.0_wp) <= whole_cover))
+      part%is_blended = self%is_dual .and. any(cover > 0.0_wp) .and. .not. theta > 0.0_wp
+      do k = 1, size(part)
+         associate (stencil => self%stencil(self%triangle(first + k - 1)), t => &
+               self%triangle(first + k - 1), m => self%vertex(first + k - 1), gap => part(k)%gap)
+            if (stencil%triangle == 0) cycle
+            call find_gap(stencil, weight_of(self, first + k - 1, theta), .false., x, u0, du, &
+               target, leaves_second, gap(1))
+            if (.not. part(k)%is_blended) cycle
+            call find_gap(stencil, self%weights%skew(:, m, t), .false., x, u0, du, target, &
+               leaves_second, gap(2))
+            call find_gap(stencil, [1.0_wp, 1.0_wp, 1.0_wp], .true., x, u0, du, 0.0_wp, &
+               leaves_second, gap(3))
+         end associate
+      end do
+   end subroutine find_parts
+
+   !> The gap of a triangle with a weight, or what of it is covered, of an area of 1/2.
+   pure subroutine find_gap(stencil, weight, of_cover, x, u0, du, target, leaves_second, gap)
       type(patch_stencil_t), intent(in) :: stencil
       real(wp), intent(in) :: weight(3)
+      logical, intent(in) :: of_cover
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       real(wp), intent(in) :: target             !! [L]
       logical, intent(in) :: leaves_second
@@ -361,16 +439,42 @@ contains
 
       patch = stencil%patch
       patch%area%weight = weight
+      patch%of_cover = of_cover
+      patch%is_integral = .not. of_cover
       call patch_stencil_gather(stencil, x, u0, du, at, way)
       call patch_gap(patch, at, way, target, leaves_second, gap)
    end subroutine find_gap
 
+   !> Add the gaps `which` of the triangles of a facet to a condition.
+   pure subroutine add_parts(self, first, part, factor, item, which)
+      type(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: first               !! place in `triangle`
+      type(facet_part_t), intent(in) :: part(:)
+      real(wp), intent(in) :: factor
+      type(condition_t), intent(inout) :: item
+      integer, intent(in) :: which               !! 1 to 3
+      integer :: j, k
+
+      do k = 1, size(part)
+         associate (stencil => self%stencil(self%triangle(first + k - 1)), gap => &
+               part(k)%gap(which))
+            if (gap%n_vertex == 0) cycle
+            associate (is_used => patch_uses(stencil, gap))
+               associate (node => pack(stencil%node(:stencil%n_node), is_used))
+                  call patch_spread(stencil, gap, is_used, factor, [(findloc( &
+                     item%node(:item%n_node), node(j), 1), j = 1, size(node))], item)
+               end associate
+            end associate
+         end associate
+      end do
+   end subroutine add_parts
+
    !> The nodes of the condition of constraint `i`, its own first, then others of the slave, and no
    !> derivatives yet.
-   pure subroutine begin_condition(self, i, gap, item)
+   pure subroutine begin_condition(self, i, part, item)
       type(mortar_space_t), intent(in) :: self
       integer, intent(in) :: i
-      type(patch_gap_t), intent(in) :: gap(:)    !! of its triangles
+      type(facet_part_t), intent(in) :: part(:)  !! of its triangles
       type(condition_t), intent(inout) :: item
       integer, allocatable :: list(:)
       integer :: k, m, n, pass
@@ -381,10 +485,10 @@ contains
          n = 1
          do pass = 1, 2
             do k = 1, size(triangle)
-               if (gap(k)%n_vertex == 0) cycle
+               if (part(k)%gap(1)%n_vertex == 0) cycle
                associate (stencil => self%stencil(triangle(k)))
                   associate (is_slave => [(m <= stencil%n_slave, m = 1, stencil%n_node)], &
-                        is_used => patch_uses(stencil, gap(k)))
+                        is_used => patch_uses(stencil, part(k)%gap(1)))
                      call nodes_append(pack(stencil%node(:stencil%n_node), is_used .and. &
                         (is_slave .eqv. pass == 1)), list, n)
                   end associate
@@ -393,26 +497,10 @@ contains
             if (pass == 1) item%n_slave = n
          end do
       end associate
-      call condition_resize(item, n, self%sides%slave%n_dim)
-      item%node(:n) = list(:n)
+      call condition_start(item, list(:n), self%sides%slave%n_dim)
       item%size = self%state(i)%size
       item%is_mean = .true.
-      item%gap0 = 0.0_wp
-      item%gap1 = 0.0_wp
-      item%dgap = 0.0_wp
-      item%g = 0.0_wp
-      item%c = 0.0_wp
-      if (.not. item%leaves_second) item%h = 0.0_wp
    end subroutine begin_condition
-
-   !> Where nodes are in a list.
-   pure function places(node, list) result(place)
-      integer, intent(in) :: node(:), list(:)
-      integer :: place(size(node))
-      integer :: k
-
-      place = [(findloc(list, node(k), 1), k = 1, size(node))]
-   end function places
 
    !> The multipliers are forces by the scale of their constraints.
    pure subroutine mortar_area(self, x, u, area, length)

@@ -33,6 +33,7 @@ module emcon_patch_gap_space
       real(wp) :: unit = 1.0_wp                  !! length of these vectors, about [L]
       type(patch_area_t) :: area
       logical :: is_integral = .false.           !! of heights over its area, not by it
+      logical :: of_cover = .false.              !! of 1 in the place of heights: what is covered
    end type patch_t
 
    !> What a patch sees at both ends of a step.
@@ -306,16 +307,22 @@ contains
       logical, intent(in) :: leaves_second
       type(patch_gap_t), intent(inout) :: gap
       real(wp), dimension(3, size(at)) :: by, end_by
-      real(wp) :: chi(size(at))
+      real(wp), dimension(size(at)) :: chi, flat !! of heights, and of 1
       real(wp) :: change(3*size(at), 3*size(at))
       type(closing_t) :: closing
       integer :: k
 
       chi = patch%chi(gap%vertex(:gap%n_vertex))
+      flat = 0.0_wp
+      if (patch%of_cover) then
+         flat = chi
+         chi = 0.0_wp
+      end if
       by = 0.0_wp
       end_by = 0.0_wp
       do k = 1, size(field)
-         call form_field(chi(field(k)%vertex), target, at(field(k)%vertex), field(k))
+         call form_field(chi(field(k)%vertex), flat(field(k)%vertex), target, &
+            at(field(k)%vertex), field(k))
          associate (f => field(k), v => field(k)%vertex)
             gap%f0 = gap%f0 + dot_product(f%moment(:, 0), f%value(:, 0))
             gap%f1 = gap%f1 + dot_product(f%moment(:, 1), f%value(:, 1))
@@ -368,8 +375,9 @@ contains
    end subroutine close_sum
 
    !> The field of a triangle at both ends.
-   pure subroutine form_field(chi, target, at, field)
-      real(wp), intent(in) :: chi(3), target     !! [L]
+   pure subroutine form_field(chi, flat, target, at, field)
+      real(wp), intent(in) :: chi(3), flat(3)    !! of heights, and of 1
+      real(wp), intent(in) :: target             !! [L]
       type(frame_vertex_t), intent(in) :: at(3)  !! its corners
       type(field_t), intent(inout) :: field
       real(wp) :: corner(2, 3, 0:1), p(3)
@@ -380,7 +388,7 @@ contains
       end do
       do end = 0, 1
          do j = 1, 3
-            p(j) = chi(j)*(at(j)%f(at_height, end) - target)
+            p(j) = chi(j)*(at(j)%f(at_height, end) - target) + flat(j)
          end do
          do v = 1, 3
             field%value(v, end) = dot_product(p, barycentric(corner(:, :, end), unit_corner(:, v)))
