@@ -7,6 +7,7 @@ submodule (emcon_contact_registry) emcon_contact_kinds
       formulation_segment, formulation_user
    use emcon_midside_plane, only : midside_init
    use emcon_mortar, only : mortar_init, mortar_t
+   use emcon_mortar_space, only : mortar_space_init, mortar_space_t
    use emcon_nts, only : nts_init, nts_t
    use emcon_patch_contact_space, only : patch_contact_init, patch_contact_t
    use emcon_scene, only : where_text
@@ -23,6 +24,7 @@ contains
 
    module procedure new_contact
       type(mortar_t), allocatable :: mortar
+      type(mortar_space_t), allocatable :: mortar_space
       type(nts_t), allocatable :: nts
       type(segment_t), allocatable :: segment
       type(patch_contact_t), allocatable :: patch
@@ -45,7 +47,12 @@ contains
          call move_alloc(wall, contact)
          return
       end if
-      if (scene%n_dim == n_space) then
+      if (scene%n_dim == n_space .and. pair%formulation == formulation_mortar) then
+         allocate(mortar_space)
+         call mortar_space_init(mortar_space, scene, pair, error)
+         call move_alloc(mortar_space, contact)
+         return
+      else if (scene%n_dim == n_space) then
          allocate(patch)
          call patch_contact_init(patch, scene, pair, error)
          call move_alloc(patch, contact)

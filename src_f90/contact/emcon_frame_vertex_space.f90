@@ -2,13 +2,13 @@
 !>
 !> Source: docs/theory.md, section 2 and eq. (43).
 module emcon_frame_vertex_space
-   use emcon_dgrad9, only : dg_affine, dg_height, dg_t, difference, difference_t
+   use emcon_dgrad9, only : dg_affine, dg_area, dg_height, dg_t, difference, difference_t
    use emcon_dgrad9_first, only : affine_first => dg_affine, dg_first_t => dg_t, &
       difference_first => difference, difference_first_t => difference_t, height_first => dg_height
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: frame_vertex_t, frame_vertex, frame_place
+   public :: frame_vertex_t, frame_vertex, frame_place, frame_area_t, frame_area, frame_size
 
    !> Local numbers: coordinates along both vectors of the frame, height over their plane.
    integer, parameter, public :: at_xi = 1, at_eta = 2, at_height = 3
@@ -24,7 +24,42 @@ module emcon_frame_vertex_space
       real(wp) :: h(n_frame_var, n_frame_var, 3) = 0.0_wp
    end type frame_vertex_t
 
+   !> The area that both vectors of a frame span.
+   type :: frame_area_t
+      real(wp) :: f(0:1) = 0.0_wp                !! at both ends of the step [L^2]
+      real(wp) :: df = 0.0_wp                    !! how it changes, to relative accuracy [L^2]
+      real(wp) :: g(6) = 0.0_wp                  !! discrete gradient by both vectors
+      real(wp) :: c(6) = 0.0_wp                  !! gradient at the end
+      real(wp) :: h(6, 6) = 0.0_wp               !! derivative of g by them at the end, if asked for
+   end type frame_area_t
+
 contains
+
+   !> |a x b| at one configuration [L^2].
+   pure real(wp) function frame_size(x) result(area)
+      real(wp), intent(in) :: x(3, 3)            !! the origin and the tips of both vectors [L]
+      real(wp) :: normal(3)
+
+      associate (a => x(:, 2) - x(:, 1), b => x(:, 3) - x(:, 1))
+         normal = cshift(a, 1)*cshift(b, -1) - cshift(a, -1)*cshift(b, 1)
+      end associate
+      area = sqrt(dot_product(normal, normal))
+   end function frame_size
+
+   !> The same over a step.
+   pure subroutine frame_area(x, dx, leaves_second, area)
+      real(wp), intent(in) :: x(3, 3), dx(3, 3)  !! where they start, how they move [L]
+      logical, intent(in) :: leaves_second       !! no second derivatives
+      type(frame_area_t), intent(out) :: area
+      type(dg_t) :: s
+
+      s = dg_area(difference(2, 1, x, dx), difference(3, 1, x, dx))
+      area%f = [s%f0, s%f1]
+      area%df = s%df
+      area%g = s%g(:6)
+      area%c = s%c(:6)
+      if (.not. leaves_second) area%h = s%h(:6, :6)
+   end subroutine frame_area
 
    !> The place at one configuration: (xi, eta, height). The height is an L, the coordinates are
    !> shares of `a` and `b`.

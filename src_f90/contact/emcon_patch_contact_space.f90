@@ -9,7 +9,6 @@ module emcon_patch_contact_space
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
    use emcon_contact_law_registry, only : contact_laws_of_surface
-   use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_errors, only : err_input, error_t, raise
    use emcon_facet_values, only : facets_point_area, facets_pressures
    use emcon_facets, only : facets_init
@@ -22,6 +21,7 @@ module emcon_patch_contact_space
    use emcon_patch_gap_space, only : patch_gap, patch_gap_t, patch_look, patch_look_t
    use emcon_patch_sides_space, only : frame_normal, point_frames_init, patch_sides_t, &
       patch_triangles_init
+   use emcon_patch_spread_space, only : patch_spread, patch_uses
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
       patch_stencil_height, patch_stencil_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
@@ -322,76 +322,28 @@ contains
       real(wp), dimension(3, 3 + self%stencil(i)%patch%n_vertex) :: at, way
       type(patch_gap_t) :: gap
       logical :: is_used(self%stencil(i)%n_node)
-      integer :: column(2 + self%stencil(i)%patch%n_vertex), k, n
+      integer :: k
 
       associate (stencil => self%stencil(i))
          call patch_stencil_gather(stencil, x, u0, du, at, way)
          call patch_gap(stencil%patch, at, way, target, item%leaves_second, gap)
-         n = 2 + gap%n_vertex
-         column(:n) = [1, 2, 2 + gap%vertex(:gap%n_vertex)]
-         is_used = [(any(abs(stencil%weight(k, column(:n))) > 0.0_wp), k = 1, stencil%n_node)]
-         is_used(:stencil%n_slave) = .true.
+         is_used = patch_uses(stencil, gap)
          call condition_resize(item, count(is_used), size(x, 1))
-         item%node(:item%n_node) = pack(stencil%node(:stencil%n_node), is_used)
-         item%n_slave = stencil%n_slave
-         item%size = stencil%size
-         item%is_mean = .true.
-         item%gap0 = gap%f0/self%scale(i)
-         item%gap1 = gap%f1/self%scale(i)
-         item%dgap = gap%df/self%scale(i)
-         associate (row => pack([(k, k = 2, stencil%n_node)], is_used(2:)))
-            call spread_to_nodes(gap, stencil%weight(row, column(:n)), 1.0_wp/self%scale(i), item)
+         associate (n => item%n_node, n_var => size(x, 1)*item%n_node)
+            item%node(:n) = pack(stencil%node(:stencil%n_node), is_used)
+            item%n_slave = stencil%n_slave
+            item%size = stencil%size
+            item%is_mean = .true.
+            item%gap0 = 0.0_wp
+            item%gap1 = 0.0_wp
+            item%dgap = 0.0_wp
+            item%g(:, :n) = 0.0_wp
+            item%c(:, :n) = 0.0_wp
+            if (.not. item%leaves_second) item%h(:n_var, :n_var) = 0.0_wp
+            call patch_spread(stencil, gap, is_used, 1.0_wp/self%scale(i), [(k, k = 1, n)], item)
          end associate
       end associate
    end subroutine evaluate_frame
-
-   !> Derivatives by nodes from those by sums of nodes.
-   pure subroutine spread_to_nodes(gap, weight, factor, item)
-      type(patch_gap_t), intent(in) :: gap
-      real(wp), intent(in) :: weight(:, :)       !! (n_node - 1, 2 + n_vertex) of nodes in the sums
-      real(wp), intent(in) :: factor
-      type(condition_t), intent(inout) :: item
-      real(wp), allocatable :: half(:, :), full(:, :)
-      integer :: i, j, k, n
-
-      n = item%n_node
-      associate (in_order => [(k, k = 1, n)], n_dim => size(item%g, 1))
-         item%g(:, :n) = 0.0_wp
-         item%c(:, :n) = 0.0_wp
-         call nodes_add_first(factor, of_nodes(gap%g), in_order, item%g)
-         call nodes_add_first(factor, of_nodes(gap%c), in_order, item%c)
-         if (item%leaves_second) return
-         associate (m => size(gap%g))
-            allocate(half(n_dim*(n - 1), m), full(n_dim*(n - 1), n_dim*(n - 1)))
-            do k = 1, m
-               half(:, k) = of_nodes(gap%h(:, k))
-            end do
-            full = 0.0_wp
-            do j = 1, size(weight, 2)
-               do i = 1, n - 1
-                  if (.not. abs(weight(i, j)) > 0.0_wp) cycle
-                  associate (to => full(:, n_dim*(i - 1) + 1:n_dim*i))
-                     to = to + weight(i, j)*half(:, n_dim*(j - 1) + 1:n_dim*j)
-                  end associate
-               end do
-            end do
-         end associate
-         item%h(:n_dim*n, :n_dim*n) = 0.0_wp
-         call nodes_add_second(factor, n_dim, full, in_order, item%h)
-      end associate
-
-   contains
-
-      !> The components of each node but the first.
-      pure function of_nodes(part) result(nodes)
-         real(wp), intent(in) :: part(:)         !! components of each sum
-         real(wp) :: nodes(size(item%g, 1)*size(weight, 1))
-
-         nodes = reshape(matmul(reshape(part, [size(item%g, 1), size(weight, 2)]), &
-            transpose(weight)), shape(nodes))
-      end function of_nodes
-
-   end subroutine spread_to_nodes
 
    !> As `contact_t` has it: what of the facets at its point faces along each frame. At the corner
    !> of a body each face is that of its own frame alone.

@@ -1,25 +1,27 @@
-!> The mean height of a surface of triangles over a small square, the patch, that moves with a node.
+!> The height of a surface of triangles over a patch: its mean over a small square that moves with a
+!> node, or its integral over a triangle of a slave facet, with a weight.
 !>
 !> The field over the frame of the patch is continuous, so its integral is smooth while the patch
 !> slides over sides and corners of the triangles. Source: docs/theory.md, eqs. (43) to (49).
 module emcon_patch_gap_space
-   use emcon_frame_vertex_space, only : at_eta, at_height, frame_place, frame_vertex, &
-      frame_vertex_t, n_frame_var
+   use emcon_frame_vertex_space, only : at_eta, at_height, frame_area, frame_area_t, frame_place, &
+      frame_size, frame_vertex, frame_vertex_t, n_frame_var
    use emcon_kinds, only : wp
-   use emcon_patch_moments_space, only : patch_misses, patch_moment_slopes, patch_moments
+   use emcon_patch_moments_space, only : patch_area_t, patch_misses, patch_moment_slopes, &
+      patch_moments, patch_products
    use emcon_polygon_clip_space, only : barycentric
    implicit none
    private
-   public :: patch_t, patch_gap_t, patch_gap, patch_look_t, patch_look
+   public :: patch_t, patch_gap_t, patch_gap, patch_look_t, patch_look, &
+      patch_basis_t, patch_basis
 
    !> Remainders below so many epsilons of what they are the difference of are round-off.
    real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
    !> A vertex whose triangles cover so much of the patch at both ends together has half its weight.
    real(wp), parameter :: some = 0.1_wp
-   !> Places at which a field is given, in coordinates in which the patch is 0 <= y1, y2 <= 1.
+   !> Places at which a field is given, in the coordinates of the patch.
    real(wp), parameter :: unit_corner(2, 3) = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, &
       1.0_wp], [2, 3])
-   real(wp), parameter :: centre = 0.5_wp
 
    !> The triangles that a patch may see in a step.
    type :: patch_t
@@ -28,6 +30,10 @@ module emcon_patch_gap_space
       integer, allocatable :: triangle(:, :)     !! (3, >= n_triangle) counter-clockwise
       real(wp), allocatable :: chi(:)            !! (>= n_vertex) 1; 0 where the surface ends
       real(wp) :: length = 0.0_wp                !! of the patch' sides, in the frame's vectors
+      real(wp) :: unit = 1.0_wp                  !! length of these vectors, about [L]
+      type(patch_area_t) :: area
+      logical :: is_integral = .false.           !! of heights over its area, not by it
+      logical :: of_cover = .false.              !! of 1 in the place of heights: what is covered
    end type patch_t
 
    !> What a patch sees at both ends of a step.
@@ -38,6 +44,15 @@ module emcon_patch_gap_space
       real(wp) :: ahead = 0.0_wp                 !! height at the start of what is over it at the
                                                  !! end, the least; huge: nothing is [L]
    end type patch_look_t
+
+   !> The same of a patch of a slave facet, weight by weight.
+   type :: patch_basis_t
+      real(wp) :: height(3, 0:1) = 0.0_wp        !! integral of chi times height [L^3]
+      real(wp) :: cover(3, 0:1) = 0.0_wp         !! that of chi [L^2]
+      real(wp) :: area(0:1) = 0.0_wp             !! of all of it [L^2]
+      real(wp) :: way = 0.0_wp                   !! as above
+      real(wp) :: ahead = 0.0_wp                 !! as above
+   end type patch_basis_t
 
    !> The integral of chi (height - target) over the patch by its area, over a step.
    type :: patch_gap_t
@@ -55,6 +70,7 @@ module emcon_patch_gap_space
    type :: field_t
       integer :: vertex(3) = 0                   !! among those that count
       real(wp) :: moment(3, 0:1) = 0.0_wp        !! over the part of the patch that it covers
+      real(wp) :: bare(3, 0:1) = 0.0_wp          !! the same without weights
       real(wp) :: value(3, 0:1) = 0.0_wp         !! its field at the `unit_corner` [L]
       real(wp) :: slope(2, 0:1) = 0.0_wp         !! of the field [L]
       real(wp) :: share(3, 3) = 0.0_wp           !! (j, v) of its corner j at v, in the mean
@@ -82,7 +98,7 @@ contains
 
       do j = 1, patch%n_vertex
          place(:, j) = frame_place(x(:, 2) - x(:, 1), x(:, 3) - x(:, 1), x(:, 3 + j) - x(:, 1))
-         place(:2, j) = place(:2, j)/patch%length + centre
+         place(:2, j) = place(:2, j)/patch%length + patch%area%centre
       end do
    end subroutine place_vertices
 
@@ -91,30 +107,69 @@ contains
       type(patch_t), intent(in) :: patch
       real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
       type(patch_look_t) :: look
-      real(wp), dimension(3, patch%n_vertex) :: from, to
+      real(wp) :: place(3, patch%n_vertex, 0:1)
 
-      call place_vertices(patch, x, from)
-      call place_vertices(patch, x + dx, to)
-      call find_means(patch, from, look%height(0), look%cover(0))
-      call find_means(patch, to, look%height(1), look%cover(1))
-      look%way = patch%length*sqrt(maxval(sum((to(:2, :) - from(:2, :))**2, 1)))
-      look%ahead = height_ahead(patch, from, to)
+      call place_vertices(patch, x, place(:, :, 0))
+      call place_vertices(patch, x + dx, place(:, :, 1))
+      call find_means(patch, place(:, :, 0), look%height(0), look%cover(0))
+      call find_means(patch, place(:, :, 1), look%height(1), look%cover(1))
+      look%way = longest_way(patch, place)
+      look%ahead = height_ahead(patch, place(:, :, 0), place(:, :, 1))
    end function patch_look
+
+   !> What a patch of a slave facet sees at both ends of a step, with each of the weights that are 1
+   !> at one of the `unit_corner` and 0 at the others.
+   pure function patch_basis(patch, x, dx) result(basis)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
+      type(patch_basis_t) :: basis
+      real(wp) :: place(3, patch%n_vertex, 0:1), products(3, 3), share(3)
+      integer :: end, k, v
+
+      do end = 0, 1
+         call place_vertices(patch, x + end*dx, place(:, :, end))
+         associate (size_of => frame_size(x(:, :3) + end*dx(:, :3)), height => &
+               basis%height(:, end), cover => basis%cover(:, end), p => place(:, :, end))
+            basis%area(end) = 0.5_wp*size_of
+            do k = 1, patch%n_triangle
+               associate (t => patch%triangle(:, k))
+                  if (patch_misses(patch%area, p(:2, t))) cycle
+                  products = size_of*patch_products(patch%area, p(:2, t))
+                  do v = 1, 3
+                     share = barycentric(p(:2, t), unit_corner(:, v))*patch%chi(t)
+                     height = height + products(:, v)*dot_product(share, p(3, t))
+                     cover = cover + products(:, v)*sum(share)
+                  end do
+               end associate
+            end do
+         end associate
+      end do
+      basis%way = longest_way(patch, place)
+      basis%ahead = height_ahead(patch, place(:, :, 0), place(:, :, 1))
+   end function patch_basis
+
+   !> How far vertices go along a patch, at most [L].
+   pure real(wp) function longest_way(patch, place) result(way)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: place(:, :, 0:)    !! (3, n_vertex, 0:1)
+
+      way = patch%unit*patch%length*sqrt(maxval(sum((place(:2, :, 1) - place(:2, :, 0))**2, 1)))
+   end function longest_way
 
    !> The integral of chi times height over the patch by its area, and what of it is covered.
    pure subroutine find_means(patch, place, height, cover)
       type(patch_t), intent(in) :: patch
       real(wp), intent(in) :: place(:, :)        !! (3, n_vertex)
       real(wp), intent(out) :: height, cover
-      real(wp) :: moment(3), share(3)
+      real(wp) :: moment(3), bare(3), share(3)
       integer :: k, v
 
       height = 0.0_wp
       cover = 0.0_wp
       do k = 1, patch%n_triangle
          associate (t => patch%triangle(:, k))
-            if (patch_misses(place(:2, t))) cycle
-            moment = patch_moments(place(:2, t))
+            if (patch_misses(patch%area, place(:2, t))) cycle
+            call patch_moments(patch%area, place(:2, t), moment, bare)
             do v = 1, 3
                share = moment(v)*barycentric(place(:2, t), unit_corner(:, v))
                height = height + dot_product(share, patch%chi(t)*place(3, t))
@@ -134,9 +189,10 @@ contains
       least = huge(least)
       do k = 1, patch%n_triangle
          associate (t => patch%triangle(:, k))
-            if (patch_misses(to(:2, t))) cycle
+            if (patch_misses(patch%area, to(:2, t))) cycle
             if (any(patch%chi(t) <= 0.0_wp)) cycle
-            least = min(least, dot_product(barycentric(from(:2, t), [centre, centre]), from(3, t)))
+            least = min(least, dot_product(barycentric(from(:2, t), spread(patch%area%centre, 1, &
+               2)), from(3, t)))
          end associate
       end do
    end function height_ahead
@@ -162,21 +218,51 @@ contains
          associate (node => [1, 2, 3, 3 + gap%vertex(j)])
             call frame_vertex(x(:, node), dx(:, node), leaves_second, at(j))
          end associate
-         call to_patch(patch%length, at(j))
+         call to_patch(patch, at(j))
       end do
-      call add_up(patch%chi(gap%vertex(:gap%n_vertex)), target, at, field, leaves_second, gap)
+      call add_up(patch, target, at, field, leaves_second, gap)
+      if (patch%is_integral) call times_area(x(:, :3), dx(:, :3), leaves_second, gap)
    end subroutine patch_gap
 
+   !> Times the area of the frame, by the rule of products.
+   pure subroutine times_area(x, dx, leaves_second, gap)
+      real(wp), intent(in) :: x(3, 3), dx(3, 3)  !! of the frame [L]
+      logical, intent(in) :: leaves_second
+      type(patch_gap_t), intent(inout) :: gap
+      type(frame_area_t) :: area
+      real(wp) :: mean, mean_area
+      integer, parameter :: n = 6
+
+      call frame_area(x, dx, leaves_second, area)
+      mean = 0.5_wp*(gap%f0 + gap%f1)
+      mean_area = 0.5_wp*(area%f(0) + area%f(1))
+      if (.not. leaves_second) then
+         gap%h = mean_area*gap%h
+         gap%h(:, :n) = gap%h(:, :n) + 0.5_wp*outer(gap%g, area%c)
+         gap%h(:n, :) = gap%h(:n, :) + 0.5_wp*outer(area%g, gap%c)
+         gap%h(:n, :n) = gap%h(:n, :n) + mean*area%h
+      end if
+      gap%g = mean_area*gap%g
+      gap%g(:n) = gap%g(:n) + mean*area%g
+      gap%c = area%f(1)*gap%c
+      gap%c(:n) = gap%c(:n) + gap%f1*area%c
+      gap%df = mean_area*gap%df + mean*area%df
+      gap%f0 = area%f(0)*gap%f0
+      gap%f1 = area%f(1)*gap%f1
+   end subroutine times_area
+
    !> Coordinates in the patch in place of those in the frame.
-   pure subroutine to_patch(length, at)
-      real(wp), intent(in) :: length
+   pure subroutine to_patch(patch, at)
+      type(patch_t), intent(in) :: patch
       type(frame_vertex_t), intent(inout) :: at
 
-      at%f(:at_eta, :) = at%f(:at_eta, :)/length + centre
-      at%df(:at_eta) = at%df(:at_eta)/length
-      at%g(:, :at_eta) = at%g(:, :at_eta)/length
-      at%c(:, :at_eta) = at%c(:, :at_eta)/length
-      at%h(:, :, :at_eta) = at%h(:, :, :at_eta)/length
+      associate (length => patch%length)
+         at%f(:at_eta, :) = at%f(:at_eta, :)/length + patch%area%centre
+         at%df(:at_eta) = at%df(:at_eta)/length
+         at%g(:, :at_eta) = at%g(:, :at_eta)/length
+         at%c(:, :at_eta) = at%c(:, :at_eta)/length
+         at%h(:, :, :at_eta) = at%h(:, :, :at_eta)/length
+      end associate
    end subroutine to_patch
 
    !> The triangles over the patch at either end, and their vertices.
@@ -194,9 +280,10 @@ contains
       do k = 1, patch%n_triangle
          associate (t => patch%triangle(:, k))
             do end = 0, 1
-               found(n + 1)%moment(:, end) = patch_moments(place(:2, t, end))
+               call patch_moments(patch%area, place(:2, t, end), found(n + 1)%moment(:, end), &
+                  found(n + 1)%bare(:, end))
             end do
-            if (.not. any(abs(found(n + 1)%moment) > 0.0_wp)) cycle
+            if (.not. any(abs(found(n + 1)%bare) > 0.0_wp)) cycle
             n = n + 1
             do i = 1, 3
                if (number(t(i)) == 0) then
@@ -212,21 +299,30 @@ contains
    end subroutine choose_fields
 
    !> The sum over triangles, docs/theory.md, eqs. (46) and (47).
-   pure subroutine add_up(chi, target, at, field, leaves_second, gap)
-      real(wp), intent(in) :: chi(:), target     !! (n_vertex); [L]
+   pure subroutine add_up(patch, target, at, field, leaves_second, gap)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: target             !! [L]
       type(frame_vertex_t), intent(in) :: at(:)  !! (n_vertex)
       type(field_t), intent(inout) :: field(:)
       logical, intent(in) :: leaves_second
       type(patch_gap_t), intent(inout) :: gap
       real(wp), dimension(3, size(at)) :: by, end_by
+      real(wp), dimension(size(at)) :: chi, flat !! of heights, and of 1
       real(wp) :: change(3*size(at), 3*size(at))
       type(closing_t) :: closing
       integer :: k
 
+      chi = patch%chi(gap%vertex(:gap%n_vertex))
+      flat = 0.0_wp
+      if (patch%of_cover) then
+         flat = chi
+         chi = 0.0_wp
+      end if
       by = 0.0_wp
       end_by = 0.0_wp
       do k = 1, size(field)
-         call form_field(chi(field(k)%vertex), target, at(field(k)%vertex), field(k))
+         call form_field(chi(field(k)%vertex), flat(field(k)%vertex), target, &
+            at(field(k)%vertex), field(k))
          associate (f => field(k), v => field(k)%vertex)
             gap%f0 = gap%f0 + dot_product(f%moment(:, 0), f%value(:, 0))
             gap%f1 = gap%f1 + dot_product(f%moment(:, 1), f%value(:, 1))
@@ -239,8 +335,8 @@ contains
       by(:at_eta, :) = by(:at_eta, :) + closing%factor*spread(closing%weight, 1, at_eta)*closing%way
       call gather_first(at, by, end_by, gap)
       if (leaves_second) return
-      call change_of_parts(chi, at, field, change)
-      call change_of_closing(chi, at, field, closing, change)
+      call change_of_parts(patch%area, chi, at, field, change)
+      call change_of_closing(patch%area, chi, at, field, closing, change)
       call gather_second(at, by, change, gap)
    end subroutine add_up
 
@@ -260,7 +356,7 @@ contains
          associate (f => field(k), v => field(k)%vertex)
             rest = rest + dot_product(f%moment(:, 1) - f%moment(:, 0), sum(f%value, 2)/2.0_wp)
             size_of = max(size_of, maxval(sum(abs(f%value), 2)))
-            area(v) = area(v) + sum(f%moment)
+            area(v) = area(v) + sum(f%bare)
          end associate
       end do
       closing%weight = area/(area + some)
@@ -279,8 +375,9 @@ contains
    end subroutine close_sum
 
    !> The field of a triangle at both ends.
-   pure subroutine form_field(chi, target, at, field)
-      real(wp), intent(in) :: chi(3), target     !! [L]
+   pure subroutine form_field(chi, flat, target, at, field)
+      real(wp), intent(in) :: chi(3), flat(3)    !! of heights, and of 1
+      real(wp), intent(in) :: target             !! [L]
       type(frame_vertex_t), intent(in) :: at(3)  !! its corners
       type(field_t), intent(inout) :: field
       real(wp) :: corner(2, 3, 0:1), p(3)
@@ -291,7 +388,7 @@ contains
       end do
       do end = 0, 1
          do j = 1, 3
-            p(j) = chi(j)*(at(j)%f(at_height, end) - target)
+            p(j) = chi(j)*(at(j)%f(at_height, end) - target) + flat(j)
          end do
          do v = 1, 3
             field%value(v, end) = dot_product(p, barycentric(corner(:, :, end), unit_corner(:, v)))
@@ -327,7 +424,8 @@ contains
    end subroutine add_end
 
    !> How what the vertices take changes with places and heights at the end.
-   pure subroutine change_of_parts(chi, at, field, change)
+   pure subroutine change_of_parts(patch_area, chi, at, field, change)
+      type(patch_area_t), intent(in) :: patch_area
       real(wp), intent(in) :: chi(:)
       type(frame_vertex_t), intent(in) :: at(:)
       type(field_t), intent(in) :: field(:)
@@ -338,7 +436,7 @@ contains
       change = 0.0_wp
       do k = 1, size(field)
          associate (f => field(k), v => field(k)%vertex)
-            call change_of_field(chi(v), at(v), f, part, slope)
+            call change_of_field(patch_area, chi(v), at(v), f, part, slope)
             do i = 1, 3
                do j = 1, 3
                   associate (row => 3*(v(i) - 1), column => 3*(v(j) - 1), by => 3*(j - 1))
@@ -358,18 +456,20 @@ contains
 
    !> How the parts of the corners of a triangle and its mean slope change with their places and
    !> heights at the end.
-   pure subroutine change_of_field(chi, at, field, part, slope)
+   pure subroutine change_of_field(patch_area, chi, at, field, part, slope)
+      type(patch_area_t), intent(in) :: patch_area
       real(wp), intent(in) :: chi(3)
       type(frame_vertex_t), intent(in) :: at(3)
       type(field_t), intent(in) :: field
       real(wp), intent(out) :: part(3, 9), slope(2, 9)
-      real(wp) :: corner(2, 3, 0:1), swept(3, 2, 3), lean(2, 3), lean1(2, 3), mean(3)
+      real(wp) :: corner(2, 3, 0:1), lean(2, 3), lean1(2, 3), mean(3)
+      real(wp), dimension(3, 2, 3) :: swept, bare
       integer :: j, l, v
 
       do j = 1, 3
          corner(:, j, :) = at(j)%f(:at_eta, :)
       end do
-      swept = patch_moment_slopes(corner(:, :, 1))
+      call patch_moment_slopes(patch_area, corner(:, :, 1), swept, bare)
       lean = gradients(sum(corner, 3)/2.0_wp)
       lean1 = gradients(corner(:, :, 1))
       mean = sum(field%moment, 2)/2.0_wp
@@ -400,7 +500,8 @@ contains
    end function gradients
 
    !> Add how the closing term changes.
-   pure subroutine change_of_closing(chi, at, field, closing, change)
+   pure subroutine change_of_closing(patch_area, chi, at, field, closing, change)
+      type(patch_area_t), intent(in) :: patch_area
       real(wp), intent(in) :: chi(:)
       type(frame_vertex_t), intent(in) :: at(:)
       type(field_t), intent(in) :: field(:)
@@ -413,7 +514,8 @@ contains
       by_square = 0.0_wp
       area = 0.0_wp
       do k = 1, size(field)
-         call add_rest(chi(field(k)%vertex), at(field(k)%vertex), field(k), by_rest, area)
+         call add_rest(patch_area, chi(field(k)%vertex), at(field(k)%vertex), field(k), by_rest, &
+            area)
       end do
       do j = 1, size(at)
          associate (slope => closing%weight_slope(j)*area(:, j), way => closing%way(:, j))
@@ -437,19 +539,21 @@ contains
    end subroutine change_of_closing
 
    !> Add how what a triangle leaves to the rest changes, and what of the patch it covers.
-   pure subroutine add_rest(chi, at, field, by_rest, area)
+   pure subroutine add_rest(patch_area, chi, at, field, by_rest, area)
+      type(patch_area_t), intent(in) :: patch_area
       real(wp), intent(in) :: chi(3)
       type(frame_vertex_t), intent(in) :: at(3)
       type(field_t), intent(in) :: field
       real(wp), intent(inout) :: by_rest(:, :)   !! (3, n_vertex)
       real(wp), intent(inout) :: area(:, :)      !! (3 n_vertex, n_vertex) of those at a vertex
-      real(wp) :: corner(2, 3), swept(3, 2, 3), part(3)
+      real(wp) :: corner(2, 3), part(3)
+      real(wp), dimension(3, 2, 3) :: swept, bare
       integer :: i, j, v
 
       do j = 1, 3
          corner(:, j) = at(j)%f(:at_eta, 1)
       end do
-      swept = patch_moment_slopes(corner)
+      call patch_moment_slopes(patch_area, corner, swept, bare)
       part = 0.0_wp
       do v = 1, 3
          part = part + 0.5_wp*(field%moment(v, 1) - field%moment(v, 0)) &
@@ -462,7 +566,7 @@ contains
             to(at_height) = to(at_height) + part(j)*chi(j)
             do i = 1, 3
                associate (of => area(at_j + 1:at_j + at_eta, field%vertex(i)))
-                  of = of + sum(swept(:, :, j), 1)
+                  of = of + sum(bare(:, :, j), 1)
                end associate
             end do
          end associate

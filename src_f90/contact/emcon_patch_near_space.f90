@@ -32,18 +32,20 @@ module emcon_patch_near_space
       logical, allocatable :: is_listed(:)       !! (n) the patch looks at it
       logical, allocatable :: is_apart(:)        !! (n) it is of another layer than the nearest,
                                                  !! or fades where it meets that
+      logical, allocatable :: is_beside(:)       !! (n) so far off that the patch cannot see it
    end type patch_near_t
 
 contains
 
    !> Where the triangles of facets are, from contact point `i` of the slave. Those that it is on
    !> the other side of face nothing, nor do planes of symmetry that it rests along the axis of.
-   pure subroutine patch_near_find(near, sides, i, facet, x, u)
+   pure subroutine patch_near_find(near, sides, i, facet, x, u, is_beside)
       type(patch_near_t), intent(out) :: near
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: i                   !! 1 to the number of contact points
       integer, intent(in) :: facet(:)            !! of the master
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      logical, intent(in), optional :: is_beside(:)          !! as `facet`; none of them
       type(nearest_t) :: nearest
       real(wp) :: origin(3)
       integer :: f, t
@@ -55,7 +57,14 @@ contains
       end associate
       near%n = size(near%triangle)
       allocate(near%corner(3, 3, near%n), near%normal(3, near%n), near%distance(near%n))
-      allocate(near%is_listed(near%n), near%is_apart(near%n), source=.false.)
+      allocate(near%is_listed(near%n), near%is_apart(near%n), near%is_beside(near%n), &
+         source=.false.)
+      if (present(is_beside)) then
+         associate (start => sides%triangles%split%start)
+            near%is_beside = [((is_beside(f), t = start(facet(f)), start(facet(f) + 1) - 1), &
+               f = 1, size(facet))]
+         end associate
+      end if
       do t = 1, near%n
          do f = 1, 3
             near%corner(:, f, t) = sides_place(sides, sides%triangles%split%corner(f, &
@@ -84,7 +93,7 @@ contains
 
       origin = 0.0_wp
       associate (frames => sides%frames, base => sides%frames%base(i))
-         if (i <= size(sides%slave%node) .or. frames%start(i + 1) == frames%start(i)) return
+         if (i <= frames%n_node .or. frames%start(i + 1) == frames%start(i)) return
          do k = frames%ring_start(frames%start(i)), frames%ring_start(frames%start(i) + 1) - 1
             associate (other => frames%ring(k))
                origin = origin + frames%weight(3, k)*((x(:, other) - x(:, base)) &

@@ -25,12 +25,14 @@ module emcon_patch_sides_space
    real(wp), parameter :: blunt = 1.0e-2_wp
 
    !> Frames of contact points: the nodes of a surface, then the virtual centres of its facets that
-   !> have nodes between corners, as far as these are meant. The vectors a and b of a frame, and
-   !> where its point is from the
-   !> node it is counted from, are sums of weight times (x(ring) - x(base)); lengths of a and b are
-   !> as in the reference.
+   !> have nodes between corners, as far as these are meant; or, of gaps that are integrated, the
+   !> middles of the triangles of its split, with sides of these as a and b. The vectors a and b of
+   !> a frame, and where its point is from the node it is counted from, are sums of weight times
+   !> (x(ring) - x(base)); lengths of a and b are as in the reference.
    type :: point_frames_t
       integer :: n = 0                           !! frames of all points
+      integer :: n_node = 0                      !! points 1..n_node are nodes
+      logical :: of_triangles = .false.          !! patches are triangles of slave facets
       integer, allocatable :: middle(:)          !! (n_point - n_node) facets of the centres
       integer, allocatable :: base(:)            !! (n_point) node of the scene
       integer, allocatable :: start(:)           !! (n_point + 1) first frame of each point
@@ -122,6 +124,7 @@ contains
       call facet_groups_init(groups, facets, x, group_angle)
       allocate(still, mold=x)
       still = 0.0_wp
+      self%n_node = size(facets%node)
       self%middle = facet_split_middles(facets, is_meant)
       self%base = [facets%node, facets%facet(2, self%middle)]
       associate (n => size(self%base), n_frame => groups%n_group + size(self%base), &

@@ -8,6 +8,7 @@ module emcon_patch_stencil_space
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : nearest_t, nearest_update
    use emcon_patch_gap_space, only : patch_t
+   use emcon_patch_moments_space, only : patch_triangle
    use emcon_patch_near_space, only : patch_near_find, patch_near_goes_on, patch_near_list, &
       patch_near_nearest, patch_near_t, room_behind
    use emcon_patch_sides_space, only : frame_normal, patch_sides_t, sides_place, sides_point
@@ -22,7 +23,9 @@ module emcon_patch_stencil_space
    !> Where a surface ends it goes on by strips of this part of a facet, by less where those of the
    !> slave are smaller, and fades on the last one.
    real(wp), parameter :: flange = 0.2_wp
-   integer, parameter :: n_strip = 2
+   integer, parameter :: most_strips = 2
+   !> Beside triangles of slave facets it fades at once, over this part of a facet.
+   real(wp), parameter :: narrow_flange = 0.05_wp
    !> A node is behind a triangle by no more than so many of its distances, and `room_behind`.
    real(wp), parameter :: distances = 2.0_wp
 
@@ -32,6 +35,8 @@ module emcon_patch_stencil_space
       type(patch_t) :: patch
       real(wp) :: size = 0.0_wp                  !! length of its facet [L]
       real(wp) :: deepest = 0.0_wp               !! farther behind is another side of the body [L]
+      integer :: n_strip = most_strips           !! where the surface ends:
+      real(wp) :: strip = flange                 !! each so wide, by the facet
       integer :: n_node = 0
       integer :: n_slave = 0                     !! nodes 1..n_slave are of the frame
       integer :: n_origin = 0                    !! of these that its point is a sum of; 0: is one
@@ -47,12 +52,14 @@ contains
    !> Choose the stencil of frame `frame` of the slave at x + u, where the facets `facet` of the
    !> master are near its node: the nearest triangle that faces this frame more than any other of
    !> the node, and what hangs together with that and faces the frame too.
-   pure subroutine patch_stencil_choose(self, sides, frame, facet, x, u)
+   pure subroutine patch_stencil_choose(self, sides, frame, facet, x, u, is_beside)
       type(patch_stencil_t), intent(inout) :: self
       type(patch_sides_t), intent(in) :: sides
       integer, intent(in) :: frame               !! 1 to the number of all frames
       integer, intent(in) :: facet(:)            !! ascending
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      !> (as `facet`) the patch cannot see it in the step; none of them
+      logical, intent(in), optional :: is_beside(:)
       type(patch_near_t) :: near
       real(wp) :: normal(3)
       integer :: i, nearest
@@ -60,7 +67,7 @@ contains
       self%triangle = 0
       if (size(facet) == 0) return
       i = sides%frames%point(frame)
-      call patch_near_find(near, sides, i, facet, x, u)
+      call patch_near_find(near, sides, i, facet, x, u, is_beside)
       nearest = patch_near_nearest(near, sides, frame, x, u)
       if (nearest == 0) return
       normal = frame_normal(sides%frames, frame, sides%frames%base(i), x, u)
@@ -70,6 +77,17 @@ contains
       self%triangle = near%triangle(nearest)
       self%size = sides%triangles%size(self%triangle)
       self%patch%length = patch_size*min(self%size, sides%frames%size(i))
+      ! Of a facet much larger than the patch strips are no wider than of a small one: where they
+      ! fade, heights are those at their inner side, which a slanted frame sees far off the plane.
+      self%strip = flange*self%patch%length/(patch_size*self%size)
+      if (sides%frames%of_triangles) then
+         self%patch%length = 1.0_wp
+         self%patch%unit = sides%frames%size(i)
+         self%patch%area = patch_triangle()
+         self%patch%is_integral = .true.
+         self%n_strip = 1
+         self%strip = narrow_flange
+      end if
       call make_patch(self, sides, frame, near, x, u)
    end subroutine patch_stencil_choose
 
@@ -81,35 +99,61 @@ contains
       type(patch_near_t), intent(in) :: near
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
       logical :: ends(3, near%n)                 !! the list ends at the side of a triangle
+      logical :: is_seen(near%n)
       integer :: k, t
 
+      is_seen = near%is_listed .and. .not. near%is_beside
       ends = .false.
       do t = 1, near%n
          if (.not. near%is_listed(t)) cycle
          do k = 1, 3
-            ends(k, t) = .not. patch_near_goes_on(near, sides, &
-               sides%triangles%beyond(k, near%triangle(t)), x, u)
+            ends(k, t) = .not. goes_on(sides%triangles%beyond(k, near%triangle(t)))
          end do
       end do
-      call begin_patch(self, sides, frame, count(near%is_listed), count(ends))
+      call begin_patch(self, sides, frame, count(is_seen), count(ends))
       do t = 1, near%n
-         if (near%is_listed(t)) call add_triangle(self, sides, near%triangle(t))
+         if (is_seen(t)) call add_triangle(self, sides, near%triangle(t))
       end do
       do t = 1, near%n
          do k = 1, 3
             if (.not. ends(k, t)) cycle
             associate (from => sides%triangles%split%corner(k, near%triangle(t)), &
                   to => sides%triangles%split%corner(1 + mod(k, 3), near%triangle(t)))
-               if (sides%triangles%is_ridge(k, near%triangle(t))) then
+               if (.not. sides%triangles%is_ridge(k, near%triangle(t))) then
+                  call fade(self, from)
+                  call fade(self, to)
+               else if (is_seen(t)) then
                   call add_flange(self, sides, near, [from, to], x, u)
-               else
-                  self%patch%chi(vertex_of(self, from)) = 0.0_wp
-                  self%patch%chi(vertex_of(self, to)) = 0.0_wp
                end if
             end associate
          end do
       end do
+
+   contains
+
+      !> Is a triangle listed, or would it be if it were nearer? A triangle of the slave sees what is
+      !> beside the list.
+      pure logical function goes_on(other)
+         integer, intent(in) :: other            !! 0: none
+
+         if (sides%frames%of_triangles) then
+            goes_on = other > 0 .and. any(near%triangle == other .and. near%is_listed)
+         else
+            goes_on = patch_near_goes_on(near, sides, other, x, u)
+         end if
+      end function goes_on
+
    end subroutine make_patch
+
+   !> What is seen ends at a point.
+   pure subroutine fade(self, point)
+      type(patch_stencil_t), intent(inout) :: self
+      integer, intent(in) :: point
+
+      associate (vertex => vertex_of(self, point))
+         if (vertex > 0) self%patch%chi(vertex) = 0.0_wp
+      end associate
+   end subroutine fade
 
    !> Room for a patch of some triangles with flanges at some sides; its frame.
    pure subroutine begin_patch(self, sides, frame, n_triangle, n_end)
@@ -120,8 +164,8 @@ contains
 
       self%patch%n_triangle = 0
       self%patch%n_vertex = 0
-      associate (most => n_triangle + 2*n_strip*n_end, most_points => &
-            3*n_triangle + 2*n_strip*n_end)
+      associate (most => n_triangle + 2*self%n_strip*n_end, most_points => &
+            3*n_triangle + 2*self%n_strip*n_end)
          call make_room(self%patch, self%point, most, most_points)
          if (allocated(self%weight)) then
             if (size(self%weight, 2) < 2 + most_points) deallocate(self%weight, self%node)
@@ -139,7 +183,7 @@ contains
          end do
          self%n_slave = self%n_node
          self%n_origin = 0
-         if (sides%frames%point(frame) <= size(sides%slave%node)) return
+         if (sides%frames%point(frame) <= frames%n_node) return
          self%n_origin = self%n_slave
          do k = frames%ring_start(frame), frames%ring_start(frame + 1) - 1
             self%origin(findloc(self%node(:self%n_slave), frames%ring(k), 1)) = frames%weight(3, k)
@@ -258,13 +302,13 @@ contains
       type(patch_near_t), intent(in) :: near
       integer, intent(in) :: side(2)             !! points, as the master runs
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      integer :: from(0:n_strip), to(0:n_strip), k
+      integer :: from(0:self%n_strip), to(0:self%n_strip), k
 
       from(0) = vertex_of(self, side(1))
       to(0) = vertex_of(self, side(2))
       call add_outer(self, sides, near, side(1), x, u, from(1:))
       call add_outer(self, sides, near, side(2), x, u, to(1:))
-      do k = 1, n_strip
+      do k = 1, self%n_strip
          call append(self%patch, [to(k - 1), from(k), from(k - 1)])
          call append(self%patch, [to(k - 1), to(k), from(k)])
       end do
@@ -277,23 +321,19 @@ contains
       type(patch_near_t), intent(in) :: near
       integer, intent(in) :: point
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)
-      integer, intent(out) :: vertex(n_strip)
+      integer, intent(out) :: vertex(:)          !! (n_strip)
       integer, allocatable :: inner(:)
-      real(wp) :: strip
       integer :: i, k
 
       k = vertex_of(self, -point)
-      vertex = [(k + i - 1, i = 1, n_strip)]
+      vertex = [(k + i - 1, i = 1, self%n_strip)]
       if (k > 0) return
       call find_inner(sides, near, point, x, u, inner)
-      ! Of a facet much larger than the patch strips are no wider than of a small one: where they
-      ! fade, heights are those at their inner side, which a slanted frame sees far off the plane.
-      strip = flange*self%patch%length/(patch_size*self%size)
-      do i = 1, n_strip
-         call begin_vertex(self, -point, merge(1.0_wp, 0.0_wp, i < n_strip), vertex(i))
-         call add_point(self, sides, point, vertex(i), 1.0_wp + i*strip)
+      do i = 1, self%n_strip
+         call begin_vertex(self, -point, merge(1.0_wp, 0.0_wp, i < self%n_strip), vertex(i))
+         call add_point(self, sides, point, vertex(i), 1.0_wp + i*self%strip)
          do k = 1, size(inner)
-            call add_point(self, sides, inner(k), vertex(i), -i*strip/real(size(inner), wp))
+            call add_point(self, sides, inner(k), vertex(i), -i*self%strip/real(size(inner), wp))
          end do
       end do
    end subroutine add_outer

@@ -3,6 +3,7 @@
 !> What a card does not name stays as it was; only POINTS belongs to the INTEGRATION it was given
 !> with. An option that no pair of the model heeds gives a warning.
 module emcon_deck_mortar
+   use emcon_deck_dimension, only : n_space
    use emcon_deck_options, only : choose_option
    use emcon_deck_reader, only : card_t, card_warning, has_option, option_angle, &
       option_count, option_name, reader_t
@@ -77,6 +78,12 @@ contains
          call add_idle("FEATUREANGLE", "FEATURE ANGLE")
          if (idle /= "") call card_warning(reader, card, &
             idle // ": without effect on pairs of TYPE=SEGMENT; no *CONTACT PAIR has TYPE=MORTAR")
+      else if (reader%n_dim == n_space) then
+         call add_idle("POINTS", "POINTS")
+         call add_idle("NORMAL", "NORMAL")
+         call add_idle("FEATUREANGLE", "FEATURE ANGLE")
+         if (idle /= "") call card_warning(reader, card, idle // ": without effect in three " // &
+            "dimensions, where integrals are exact, along the normals of the slave's faces")
       else if (options%normal == normal_edge) then
          call add_idle("FEATUREANGLE", "FEATURE ANGLE")
          if (idle /= "") call card_warning(reader, card, idle // ": without effect on NORMAL=EDGE")

@@ -51,7 +51,7 @@ module emcon_options
       option_row_t("formulation", formulation_segment, "SEGMENT", "EMCON_SEGMENT", &
          "gaps of nodes integrated over slave edges", "", n_plane, instead="NODE TO SURFACE"), &
       option_row_t("formulation", formulation_mortar, "MORTAR", "EMCON_MORTAR", "mortar", &
-         ",LINMORTAR,PGLINMORTAR,SURFACETOSURFACE,", n_plane, instead="NODE TO SURFACE"), &
+         ",LINMORTAR,PGLINMORTAR,SURFACETOSURFACE,"), &
       option_row_t("formulation", formulation_user, "USER", "", "contact of the program", ""), &
       option_row_t("integration", integration_segments, "SEGMENTS", "EMCON_SEGMENTS", &
          "segments", ""), &

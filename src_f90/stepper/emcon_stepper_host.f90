@@ -172,16 +172,17 @@ contains
       call check_number("smoothing_angle", options%smoothing_angle, error, 0.0_wp, half_turn)
    end subroutine check_options
 
-   !> In space contact is of nodes on faces as they are.
+   !> In space contact is of nodes on faces as they are, or mortar between these.
    pure subroutine check_space(is_own, formulation, options, error)
       logical, intent(in) :: is_own              !! a surface is its own master
       integer, intent(in) :: formulation
       type(contact_options_t), intent(in) :: options
       type(error_t), allocatable, intent(inout) :: error
 
-      call check_that(formulation == formulation_nts, "formulation is " // &
-         to_text(formulation) // ": contact in three dimensions is node to segment (" // &
-         to_text(formulation_nts) // ")", error)
+      call check_that(any(formulation == [formulation_nts, formulation_mortar]), &
+         "formulation is " // to_text(formulation) // ": contact in three dimensions is node to " &
+         // "segment (" // to_text(formulation_nts) // ") or mortar (" // &
+         to_text(formulation_mortar) // ")", error)
       call check_that(.not. is_own, "a surface that is its own master is not in this version in " &
          // "three dimensions", error)
       call check_that(options%smoothing == smoothing_none, "smoothing is of the plane: surfaces " &

@@ -64,6 +64,7 @@ program main
    use test_explicit, only : collect_explicit
    use test_explicit_closed, only : collect_explicit_closed
    use test_facets, only : collect_facets
+   use test_facet_gap, only : collect_facet_gap
    use test_facet_groups, only : collect_facet_groups
    use test_facet_values, only : collect_facet_values
    use test_first_touch, only : collect_first_touch
@@ -296,6 +297,7 @@ program main
    call run("bending", collect_bending)
    call run("bent_bodies", collect_bent_bodies)
    call run("facets", collect_facets)
+   call run("facet_gap", collect_facet_gap)
    call run("facet_groups", collect_facet_groups)
    call run("facet_values", collect_facet_values)
    call run("chain", collect_chain)

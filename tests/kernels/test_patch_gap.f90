@@ -1,11 +1,12 @@
 !> Mean heights over a patch that slides over triangles: values, identities, momenta, derivatives.
 module test_patch_gap
    use check, only : check_near, check_true, test_case_t
-   use emcon_dgrad_nodes, only : nodes_add_first
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_patch_gap_space, only : patch_gap, patch_gap_t, patch_look, patch_look_t, patch_t
    use emcon_text, only : to_text
+   use patch_scenes, only : make_grid, moment_of, n_point, n_side, n_vertex, rough, size_of, &
+      turned, way_of
    use random_draws, only : draw_random
    implicit none
    private
@@ -14,10 +15,6 @@ module test_patch_gap
    real(wp), parameter :: eps = epsilon(1.0_wp)
    !> Some 100 roundings of quantities of size 1.
    real(wp), parameter :: tol = 128.0_wp*eps
-   !> A grid of so many triangles' legs of length 1 along each side, and its vertices.
-   integer, parameter :: n_side = 6, n_vertex = (n_side + 1)**2, n_point = 3 + n_vertex
-   !> The surface is bent by up to this at vertices: kinks of up to .3.
-   real(wp), parameter :: rough = 0.12_wp
    real(wp), parameter :: patch_length = 0.1_wp
 
 contains
@@ -36,34 +33,6 @@ contains
          test_case_t("without second derivatives: the same bits", test_first)]
    end subroutine collect_patch_gap
 
-   !> A grid of triangles, each square halved, seen from below.
-   subroutine make_patch(patch, x)
-      type(patch_t), intent(out) :: patch
-      real(wp), intent(out) :: x(3, n_point)     !! origin and frame in the middle, then the grid
-      integer :: i, j, k
-
-      patch%n_vertex = n_vertex
-      patch%n_triangle = 2*n_side**2
-      patch%length = patch_length
-      allocate(patch%triangle(3, patch%n_triangle), patch%chi(n_vertex))
-      patch%chi = 1.0_wp
-      x = 0.0_wp
-      x(1, 2) = 1.0_wp
-      x(2, 3) = 1.0_wp
-      k = 0
-      do j = 0, n_side
-         do i = 0, n_side
-            x(:2, 4 + i + (n_side + 1)*j) = real([i, j], wp) - 0.5_wp*real(n_side, wp)
-            if (max(i, j) == n_side) cycle
-            associate (at => 1 + i + (n_side + 1)*j)
-               patch%triangle(:, k + 1) = [at, at + 1, at + n_side + 2]
-               patch%triangle(:, k + 2) = [at, at + n_side + 2, at + n_side + 1]
-            end associate
-            k = k + 2
-         end do
-      end do
-   end subroutine make_patch
-
    !> A rough surface, the patch `height` below it near the middle, and a step: a slide of `slide`
    !> in some direction, a turn by `turn`, and a change of shape of `wobble`. Each fourth time the
    !> patch begins at a vertex, else on a side.
@@ -74,7 +43,7 @@ contains
       real(wp), intent(out) :: x(3, n_point), dx(3, n_point)
       real(wp) :: noise(3, n_point), end(3, n_point), at(3), way(2), draw(3)
 
-      call make_patch(patch, x)
+      call make_grid(patch, patch_length, x)
       call draw_random(noise)
       x(:, 4:) = x(:, 4:) + rough*(2.0_wp*noise(:, 4:) - 1.0_wp)
       call draw_random(draw)
@@ -91,23 +60,6 @@ contains
       end = matmul(turned(turn*draw(1), turn*draw(2)), end) + turn
       dx = end - x
    end subroutine draw_step
-
-   !> About the third axis, then about the first one.
-   pure function turned(first, second) result(turn)
-      real(wp), intent(in) :: first, second
-      real(wp) :: turn(3, 3)
-      real(wp) :: one(3, 3)
-
-      one = 0.0_wp
-      one(3, 3) = 1.0_wp
-      one(1, :2) = [cos(first), -sin(first)]
-      one(2, :2) = [sin(first), cos(first)]
-      turn = 0.0_wp
-      turn(1, 1) = 1.0_wp
-      turn(2, 2:) = [cos(second), -sin(second)]
-      turn(3, 2:) = [sin(second), cos(second)]
-      turn = matmul(turn, one)
-   end function turned
 
    !> The mean height at rest, and what is covered.
    subroutine look_at(patch, x, height, cover)
@@ -129,7 +81,7 @@ contains
       integer :: k
 
       do k = 1, 40
-         call make_patch(patch, x)
+         call make_grid(patch, patch_length, x)
          call draw_random(draw)
          if (mod(k, 4) == 0) draw(1) = 0.0_wp
          if (mod(k, 8) == 0) draw(2) = 0.0_wp
@@ -145,7 +97,7 @@ contains
       type(patch_t) :: patch
       real(wp) :: x(3, n_point), height, cover
 
-      call make_patch(patch, x)
+      call make_grid(patch, patch_length, x)
       patch%n_triangle = n_side**2
       x(:2, 1:3) = x(:2, 1:3) + 0.25_wp
       x(2, 1:3) = 0.0_wp
@@ -179,41 +131,18 @@ contains
       end do
    end subroutine test_identity
 
-   !> The motion of the variables of a gap.
-   pure function way_of(gap, dx) result(way)
-      type(patch_gap_t), intent(in) :: gap
-      real(wp), intent(in) :: dx(:, :)
-      real(wp) :: way(6 + 3*gap%n_vertex)
-
-      associate (node => [2, 3, 3 + gap%vertex(:gap%n_vertex)])
-         way = reshape(dx(:, node) - spread(dx(:, 1), 2, size(node)), shape(way))
-      end associate
-   end function way_of
-
    subroutine test_momenta(error)
       type(error_t), allocatable, intent(out) :: error
       type(patch_t) :: patch
       type(patch_gap_t) :: gap
-      real(wp) :: x(3, n_point), dx(3, n_point), moment(3)
-      real(wp), allocatable :: g(:, :)
-      integer :: i, k
+      real(wp) :: x(3, n_point), dx(3, n_point)
+      integer :: k
 
       do k = 1, 60
          call draw_step(k, 0.4_wp**mod(k, 20), 1.0_wp, 0.1_wp, patch, x, dx)
          call patch_gap(patch, x, dx, 0.0_wp, .true., gap)
-         associate (node => [1, 2, 3, 3 + gap%vertex(:gap%n_vertex)])
-            if (allocated(g)) deallocate(g)
-            allocate(g(3, size(node)), source=0.0_wp)
-            call nodes_add_first(1.0_wp, gap%g, [(i, i = 1, size(node))], g)
-            moment = 0.0_wp
-            do i = 1, size(node)
-               associate (at => x(:, node(i)) + 0.5_wp*dx(:, node(i)))
-                  moment = moment + cshift(at, 1)*cshift(g(:, i), -1) &
-                     - cshift(at, -1)*cshift(g(:, i), 1)
-               end associate
-            end do
-         end associate
-         call check_near(error, moment, [0.0_wp, 0.0_wp, 0.0_wp], tol, sum(abs(g)), "moment")
+         call check_near(error, moment_of(gap, x, dx), [0.0_wp, 0.0_wp, 0.0_wp], tol, &
+            size_of(gap), "moment")
       end do
    end subroutine test_momenta
 
@@ -274,7 +203,7 @@ contains
       integer :: k
 
       do k = 1, 4
-         call make_patch(patch, x)
+         call make_grid(patch, patch_length, x)
          x(3, 4:) = [(rough*sin(real(k, wp)), k = 1, n_vertex)]
          corner = patch_length/3.0_wp
          if (k > 2) corner(1) = 0.0_wp

@@ -120,7 +120,7 @@ def press(cells: list[tuple[int, int, int]], kind: list[str], by: float, turn: n
     return text + "*NODE FILE\nU\n*EL FILE\nS\n*END STEP\n"
 
 
-def slide(h: float, until: float, hill: bool) -> str:
+def slide(h: float, until: float, hill: bool, options: str = "") -> str:
     """A block that slides over facets of length 1 on a cylinder of radius 20, held on it by its weight."""
     sign = -1.0 if hill else 1.0
 
@@ -134,7 +134,7 @@ def slide(h: float, until: float, hill: bool) -> str:
     two = Block("C3D8", (16, 4, 1), size=(16.0, 4.0, 1.0), place=bend)
     n = len(one.x)
     return (bodies([one, two], [faces(one, 2, 0), faces(two, 2, 1)], "*HYPERELASTIC, NEO HOOKE\n2000., 1e-3\n*DENSITY\n1.\n")
-            + pair() + velocities(one, (4.0, 0.7, 0.0), (0., 0., 0.)) + f"*NSET, NSET=FLOOR, GENERATE\n{n + 1}, {n + len(two.x)}\n"
+            + pair(options) + velocities(one, (4.0, 0.7, 0.0), (0., 0., 0.)) + f"*NSET, NSET=FLOOR, GENERATE\n{n + 1}, {n + len(two.x)}\n"
             + "*BOUNDARY\nFLOOR, 1, 3\n" + dynamic(h, until, "*DLOAD\nB1, GRAV, 10., 0., 0., -1.\n"))
 
 
