@@ -43,11 +43,12 @@ contains
       k = pair_of(scene, overlap)
       if (k == 0) return
       call overlap_text(overlap, scene%node%label, march%system%space%body, text)
+      if (overlap%is_beside) text = text // "; no node of one need be in the other, as where " // &
+         "edges cross or faces lie in one plane"
       associate (pair => scene%pair(k))
          call raise(error, err_input, where_text(scene, pair%origin) // ": error: bodies of " // &
             names(scene, pair) // " overlap at the start by " // to_text(overlap%depth, 3) // &
-            " of an edge: " // text // "; no node of one is in the other, as where edges cross " &
-            // "or faces lie in one plane; move the bodies apart")
+            " of an edge: " // text // "; move the bodies apart")
       end associate
    end subroutine start_overlap_check
 
@@ -67,16 +68,16 @@ contains
       type(scene_t), intent(in) :: scene
       type(overlap_t), intent(in) :: overlap
       integer, allocatable :: slave(:), master(:)
-      logical :: is_here(2)
+      logical :: is_here, is_there
 
       do pair = 1, size(scene%pair)
          call surface_nodes(scene, scene%surface(scene%pair(pair)%slave), slave)
          call surface_nodes(scene, scene%surface(scene%pair(pair)%master), master)
-         is_here(1) = find_sorted(slave, overlap%node) > 0 .and. &
+         is_here = find_sorted(slave, overlap%node) > 0 .and. &
             find_sorted(master, overlap%facet(1)) > 0
-         is_here(2) = find_sorted(master, overlap%node) > 0 .and. &
+         is_there = find_sorted(master, overlap%node) > 0 .and. &
             find_sorted(slave, overlap%facet(1)) > 0
-         if (any(is_here)) return
+         if (is_here .or. is_there) return
       end do
       pair = 0
    end function pair_of
