@@ -29,7 +29,7 @@ contains
       if (reader%n_dim /= n_space .or. word /= "YES" .or. .not. has_option(card, "EDGES")) return
       do i = 1, size(pair)
          if (pair(i)%slave == 0 .or. pair(i)%master == 0) cycle
-         why = without_edges(scene, pair(i))
+         why = why_none_cross(scene, pair(i))
          if (why == "") cycle
          call card_error(reader, card, "EDGES=YES: " // why // "; take it out")
          return
@@ -37,7 +37,7 @@ contains
    end subroutine read_crossings
 
    !> Why a pair has no edges that could be held; blank if it has.
-   pure function without_edges(scene, pair) result(why)
+   pure function why_none_cross(scene, pair) result(why)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       character(len=:), allocatable :: why
@@ -46,7 +46,7 @@ contains
       associate (slave => scene%surface(pair%slave), master => scene%surface(pair%master))
          if (allocated(master%wall)) then
             why = "surface " // master%name // " has a shape and no edges of elements"
-         else if (slave%is_nodal) then
+         else if (.not. (allocated(slave%element) .or. allocated(slave%edge))) then
             why = "surface " // slave%name // " has nodes and no edges"
          else if (pair%formulation == formulation_user) then
             why = "what TYPE=USER holds the program says that gives it"
@@ -54,6 +54,6 @@ contains
             why = "a pressure by the overclosure acts on areas, and edges have none"
          end if
       end associate
-   end function without_edges
+   end function why_none_cross
 
 end module emcon_deck_crossings
