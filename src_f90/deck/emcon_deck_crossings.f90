@@ -46,7 +46,7 @@ contains
       associate (slave => scene%surface(pair%slave), master => scene%surface(pair%master))
          if (allocated(master%wall)) then
             why = "surface " // master%name // " has a shape and no edges of elements"
-         else if (.not. (allocated(slave%element) .or. allocated(slave%edge))) then
+         else if (allocated(slave%node)) then
             why = "surface " // slave%name // " has nodes and no edges"
          else if (pair%formulation == formulation_user) then
             why = "what TYPE=USER holds the program says that gives it"
