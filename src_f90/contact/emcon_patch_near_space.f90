@@ -188,8 +188,8 @@ contains
       height = dot_product(nearest%weight, ahead)
    end subroutine look_along
 
-   !> List what faces `normal` and hangs together with the nearest triangle. What lies beyond a ridge
-   !> and fades right there is left out, so that the field on this side of it does not fade as well.
+   !> List what faces `normal` and hangs together with the nearest triangle. What lies beyond a
+   !> ridge and fades right there is left out: the field on this side of it would fade as well.
    pure subroutine patch_near_list(near, sides, nearest, normal, x, u)
       type(patch_near_t), intent(inout) :: near
       type(patch_sides_t), intent(in) :: sides

@@ -21,6 +21,8 @@ module emcon_patch_sides_space
 
    !> A ring of no direction: its fourth moment is less than this part of that of distances.
    real(wp), parameter :: round = 1.0e-6_wp
+   !> The tangent of the angle by which a frame may lean from its mean normal.
+   real(wp), parameter :: upright = 0.1_wp
    !> A mean normal shorter than this, by the area, is none.
    real(wp), parameter :: blunt = 1.0e-2_wp
 
@@ -230,12 +232,14 @@ contains
       self%ring_start(self%start(i + 1)) = n + size(ring)
    end subroutine add_frame
 
-   !> The weights of points around another one in its frame.
+   !> The weights of points around another one in its frame. Where that leans, as points of a sharp
+   !> ring are lower on one side, they are those that give the directions themselves.
    pure function frame_weights(from, normal) result(weight)
       real(wp), intent(in) :: from(:, :)         !! (3, n) where they are from it [L]
       real(wp), intent(in) :: normal(3)          !! of unit length
       real(wp) :: weight(2, size(from, 2))       !! [1/L]
-      real(wp) :: first(3), second(3), flat(2, size(from, 2)), square(2, 2), inverse(2, 2)
+      real(wp) :: first(3), second(3), flat(2, size(from, 2)), square(2, 2), inverse(2, 2), &
+         lean(2), rest(size(from, 2))
       integer :: k
 
       first = from(:, 1) - dot_product(from(:, 1), normal)*normal
@@ -249,6 +253,14 @@ contains
       inverse = reshape([square(2, 2), -square(2, 1), -square(1, 2), square(1, 1)], [2, 2]) &
          /(square(1, 1)*square(2, 2) - square(1, 2)*square(2, 1))
       weight = matmul(inverse, flat)
+      rest = matmul(normal, from)
+      lean = matmul(weight, rest)
+      if (dot_product(lean, lean) <= upright**2) return
+      rest = rest - matmul(lean, flat)
+      if (.not. dot_product(rest, rest) > upright**2*sum(flat**2)) return
+      do k = 1, 2
+         weight(k, :) = weight(k, :) - lean(k)*rest/dot_product(rest, rest)
+      end do
    end function frame_weights
 
    !> The turn to axes that a ring of points has by its shape, whatever its numbers are: those of

@@ -2,6 +2,7 @@
 module emcon_deck_contact
    use emcon_deck_contact_damping, only : read_contact_damping
    use emcon_deck_contact_settings, only : read_pair_initiation
+   use emcon_deck_crossings, only : read_crossings
    use emcon_deck_dimension, only : n_space
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, &
       next_line
@@ -296,7 +297,9 @@ contains
             call need_facets(reader, data, master, "master surface", &
                "; only the slave surface may, and only under NODE TO SURFACE; ")
             if (allocated(slave%wall)) call data_error(reader, data, "surface " // slave%name // &
-               " has a shape and no nodes that could be slaves; swap the two")
+               " has a shape and no nodes that could be slaves; " // trim(merge( &
+               "one of the two must have nodes", "swap the two                  ", &
+               allocated(master%wall))))
             if (allocated(master%wall) .and. pair%both_sides) call data_error(reader, data, &
                "surface " // master%name // " has a shape and no nodes; leave out SIDES=BOTH")
          end if
@@ -367,7 +370,7 @@ contains
       end do
       if (has_option(card, "ADJUST")) call read_adjust(reader, card, scene, of_card)
       call read_guard(reader, card, any(pair%both_sides), of_card)
-      call read_crossings(reader, card, of_card%holds_crossings)
+      call read_crossings(reader, card, scene, pair, of_card%holds_crossings)
       call read_pair_initiation(reader, card, of_card%initiation)
       if (any(pair%formulation == formulation_user)) call suit_user(reader, card, of_card)
       do i = 1, size(pair)
@@ -468,20 +471,6 @@ contains
       if (both_sides .and. has_option(card, "GUARD")) call card_error(reader, card, "GUARD has " &
          // "no meaning where the nodes of both surfaces are held; take it out, or say SIDES=ONE")
    end subroutine read_guard
-
-   !> EDGES= of a card: are sharp edges that cross in contact?
-   subroutine read_crossings(reader, card, holds_crossings)
-      type(reader_t), intent(inout) :: reader
-      type(card_t), intent(in) :: card
-      logical, intent(out) :: holds_crossings
-      character(len=:), allocatable :: word
-
-      call option_word(reader, card, "EDGES", "YES, NO", word)
-      holds_crossings = word /= "NO"
-      if (reader%n_dim /= n_space .and. has_option(card, "EDGES")) call card_error(reader, card, &
-         "EDGES is for three dimensions: in the plane bodies meet in nodes and edges alone; take " &
-         // "it out")
-   end subroutine read_crossings
 
    !> ADJUST= a distance or a node set.
    subroutine read_adjust(reader, card, scene, of_card)

@@ -34,6 +34,7 @@ module emcon_march_begin
    use emcon_scheme_registry, only : scheme_create, scheme_user
    use emcon_penalty, only : penalty_begin_step, penalty_start
    use emcon_solver_registry, only : solver_user
+   use emcon_start_overlap, only : start_overlap_check
    use emcon_state, only : state_t
    use emcon_step_control, only : control_begin
    use emcon_steps, only : initiation_massless, initiation_persistent, method_null_space, &
@@ -199,6 +200,9 @@ contains
             at_rest(state%u)), state%contacts%closure, self%ledger%contact_energy)
          call near_laws_begin_step(self%active%near_laws, self%system, scene, step)
          call begin_overclosure(self, scene, step)
+         if (state%clock%i_step == 1 .and. .not. (state%clock%time > 0.0_wp &
+            .or. step%contact%resolves_overclosure)) call start_overlap_check(self, scene, error)
+         if (allocated(error)) return
          call begin_massless(self, scene, step, error)
          if (allocated(error)) return
          call begin_times(self, scene, step)

@@ -260,9 +260,20 @@ contains
       else if (n_over > 0 .and. n_behind == n_over) then
          call raise(error, err_input, where_text(scene, pair%origin) // ": error: the normals of " &
             // title // " surface " // scene%surface(pair%master)%name // " point away from " // &
-            "surface " // scene%surface(pair%slave)%name // "; check the face labels")
+            "surface " // scene%surface(pair%slave)%name // advice_on_sides(scene, pair))
       end if
    end subroutine check_sides
+
+   !> What to do where a master points away.
+   pure function advice_on_sides(scene, pair) result(advice)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      character(len=:), allocatable :: advice
+
+      advice = "; check the face labels"
+      if (allocated(scene%surface(pair%master)%wall)) advice = "; turn the normal of its shape, " &
+         // "or put the bodies on its other side"
+   end function advice_on_sides
 
    !> Is slave node `i` on the wrong side of the master, rather than slightly inside the body?
    pure logical function is_behind(scene, contact, i, gap, noise)

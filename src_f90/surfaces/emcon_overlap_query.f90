@@ -127,7 +127,7 @@ contains
             to_text(body(self%node))
          if (self%is_beside) text = "a point beside " // text
          text = text // " is " // to_text(self%depth*self%length, 3) // " behind "
-         if (body(facet(1)) == 0) then
+         if (body(facet(1)) == 0 .or. count(facet > 0) == 1) then
             text = text // "an analytical surface"
             return
          end if

@@ -104,3 +104,28 @@ def test_tip_on_tip(kinds: tuple[str, str], gap: float, tmp_path: Path) -> None:
     below, above = (z[a:b][axis[a:b]] for a, b in zip(first[1:-1], first[2:], strict=True))
     # Rounded over a patch of .07 of a facet, tips that turn by .4 to .8.
     assert -0.03 < above.min() - below.max() < 1e-3
+
+
+@pytest.mark.parametrize("kinds", [("C3D10", "C3D10"), ("C3D10", "C3D8"), ("C3D4", "C3D10")])
+@pytest.mark.parametrize("cells", [[(2, 1, 1), (1, 1, 1)], [(1, 1, 1), (2, 1, 1)]])
+def test_block_inside_the_rim_of_another(cells: list[tuple[int, int, int]], kinds: tuple[str, str], tmp_path: Path) -> None:
+    """Its rim is .05 inside. The frames of the outer rim, where faces of unlike shape meet, leaned by 60 degrees from the
+    mean normal there: one found the block behind it, pushed its corner out and up, and the run was called good. No node
+    moves by more than all of the weight shortens a column of both by."""
+    blocks = [Block(kinds[0], cells[0], size=(0.9, 0.95, 1.0)), Block(kinds[1], cells[1], size=(0.8, 0.9, 1.0))]
+    blocks[1].x[:, 2] += 1.0
+    fields = ran(tmp_path, stack(blocks)).fields()
+    weight = G*(0.9*0.95 + 0.8*0.9)
+    assert abs(fields["reaction_force"][-1, :, 2].sum() - weight) < LEFT*weight
+    shear, bulk = 2.0*200.0, 2.0/2e-3
+    young = 9.0*bulk*shear/(3.0*bulk + shear)
+    assert np.abs(fields["displacement"][-1]).max() < 2.0*weight/(0.8*0.9)/young
+
+
+def test_four_blocks_of_tetrahedra(tmp_path: Path) -> None:
+    """Unlike sizes and meshes, gaps 0."""
+    blocks = [Block("C3D10", (1 + k % 2, 1, 1), size=(1 - 0.1*k, 1 - 0.05*k, 1.0), place=lambda x, k=k: x + [0, 0, k])
+              for k in range(4)]
+    fields = ran(tmp_path, stack(blocks)).fields()
+    weight = G*sum((1 - 0.1*k)*(1 - 0.05*k) for k in range(4))
+    assert abs(fields["reaction_force"][-1, :, 2].sum() - weight) < LEFT*weight

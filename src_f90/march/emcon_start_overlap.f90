@@ -1,0 +1,85 @@
+!> Bodies in contact that are in each other before the first step with no node behind a surface, as
+!> edges that cross or bodies whose faces lie in the same planes. What nodes penetrate is told
+!> before, with the gaps.
+module emcon_start_overlap
+   use emcon_errors, only : err_input, error_t, raise
+   use emcon_guards, only : touching_bar
+   use emcon_interactions, only : contact_pair_t
+   use emcon_kinds, only : wp
+   use emcon_motion, only : at_rest
+   use emcon_march_types, only : march_t
+   use emcon_overlap_check, only : overlap_check_step, overlap_t
+   use emcon_overlap_query, only : overlap_text
+   use emcon_scene, only : scene_t, where_text
+   use emcon_sort, only : find_sorted
+   use emcon_surface_nodes, only : surface_nodes
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: start_overlap_check
+
+contains
+
+   !> Is a body by more in another than its contacts let it, so that the run could not become good?
+   subroutine start_overlap_check(march, scene, error)
+      type(march_t), intent(inout) :: march      !! at the start of the first step
+      type(scene_t), intent(in) :: scene
+      type(error_t), allocatable, intent(out) :: error
+      type(overlap_t) :: overlap
+      character(len=:), allocatable :: text
+      real(wp) :: bar
+      integer :: k
+
+      if (size(scene%pair) == 0) return
+      bar = touching_bar
+      do k = 1, size(march%system%contact)
+         bar = max(bar, march%system%contact(k)%contact%lets_in())
+      end do
+      associate (state => march%state)
+         call overlap_check_step(march%overlap_check, scene%x, state%u_start, at_rest(state%u), &
+            overlap)
+      end associate
+      if (.not. overlap%depth > bar) return
+      k = pair_of(scene, overlap)
+      if (k == 0) return
+      call overlap_text(overlap, scene%node%label, march%system%space%body, text)
+      if (overlap%is_beside) text = text // "; no node of one need be in the other, as where " // &
+         "edges cross or faces lie in one plane"
+      associate (pair => scene%pair(k))
+         call raise(error, err_input, where_text(scene, pair%origin) // ": error: bodies of " // &
+            names(scene, pair) // " overlap at the start by " // to_text(overlap%depth, 3) // &
+            " of an edge: " // text // "; move the bodies apart")
+      end associate
+   end subroutine start_overlap_check
+
+   !> The surfaces of a pair.
+   pure function names(scene, pair) result(text)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      character(len=:), allocatable :: text
+
+      text = "surface " // scene%surface(pair%slave)%name
+      if (pair%slave /= pair%master) text = text // " and of surface " // &
+         scene%surface(pair%master)%name
+   end function names
+
+   !> The pair whose surfaces have what the overlap names; 0: none does.
+   pure integer function pair_of(scene, overlap) result(pair)
+      type(scene_t), intent(in) :: scene
+      type(overlap_t), intent(in) :: overlap
+      integer, allocatable :: slave(:), master(:)
+      logical :: is_here, is_there
+
+      do pair = 1, size(scene%pair)
+         call surface_nodes(scene, scene%surface(scene%pair(pair)%slave), slave)
+         call surface_nodes(scene, scene%surface(scene%pair(pair)%master), master)
+         is_here = find_sorted(slave, overlap%node) > 0 .and. &
+            find_sorted(master, overlap%facet(1)) > 0
+         is_there = find_sorted(master, overlap%node) > 0 .and. &
+            find_sorted(slave, overlap%facet(1)) > 0
+         if (is_here .or. is_there) return
+      end do
+      pair = 0
+   end function pair_of
+
+end module emcon_start_overlap
