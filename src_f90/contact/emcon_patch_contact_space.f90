@@ -308,7 +308,7 @@ contains
       associate (stencil => self%stencil(i))
          call patch_stencil_gather(stencil, x, u0, du, at, way)
          call patch_gap(stencil%patch, at, way, target, item%leaves_second, gap)
-         is_used = patch_uses(stencil, gap)
+         is_used = patch_uses(stencil, gap%vertex)
          call condition_resize(item, count(is_used), size(x, 1))
          associate (n => item%n_node, n_var => size(x, 1)*item%n_node)
             item%node(:n) = pack(stencil%node(:stencil%n_node), is_used)
@@ -321,7 +321,7 @@ contains
             item%g(:, :n) = 0.0_wp
             item%c(:, :n) = 0.0_wp
             if (.not. item%leaves_second) item%h(:n_var, :n_var) = 0.0_wp
-            call patch_spread(stencil, gap, is_used, 1.0_wp/self%scale(i), [(k, k = 1, n)], item)
+            call patch_spread(stencil, gap, is_used, self%scale(i), [(k, k = 1, n)], item)
          end associate
       end associate
    end subroutine evaluate_frame
