@@ -11,10 +11,10 @@ module emcon_patch_contact_space
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : err_input, error_t, raise
    use emcon_facet_values, only : facets_point_area, facets_pressures
-   use emcon_facets, only : facets_init
-   use emcon_guards, only : crossing_bar, overlap_bar
-   use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach, &
-      pair_has_order
+   use emcon_facets, only : facets_init, facets_rim
+   use emcon_guards, only : corner_slack, crossing_bar, overlap_bar
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
+      interaction_reach, pair_has_order
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
    use emcon_patch_gap_space, only : patch_gap, patch_gap_t, patch_look, patch_look_t
@@ -51,6 +51,7 @@ module emcon_patch_contact_space
       integer, allocatable :: class(:)                !! (n_constraint) of bodies it looks at
       type(patch_stencil_t), allocatable :: stencil(:)   !! (n_constraint)
       type(bulges_t), allocatable :: bulges           !! of the master; only if gaps follow arcs
+      real(wp), allocatable :: own_slack(:)           !! (n_constraint) of a guard beside mortar
       real(wp), allocatable :: scale(:)               !! (n_constraint) covered at the start
       real(wp), allocatable :: cover(:)               !! (n_constraint) covered at the end
    contains
@@ -113,10 +114,32 @@ contains
       if (self%holds_all) self%area_factor = 0.5_wp
       self%may_leave = .true.
       self%slack = pair%slack
+      if (pair%of_pair > 0 .and. pair%slack > 0.0_wp) then
+         if (scene%pair(pair%of_pair)%formulation == formulation_mortar) call hold_corners(self)
+      end if
       self%offset = pair%interaction%offset
       self%max_penetration_at_start = deepest_start
       call contact_laws_of_surface(pair%interaction, self%laws)
    end subroutine patch_contact_init
+
+   !> Corners and rims are held nearly at once beside means of gaps, which do not see them.
+   pure subroutine hold_corners(self)
+      type(patch_contact_t), intent(inout) :: self
+      logical :: is_sharp(size(self%sides%slave%node))
+      integer :: i
+
+      call facets_rim(self%sides%slave, is_sharp)
+      allocate(self%own_slack(self%n_constraint), source=self%slack)
+      associate (frames => self%sides%frames)
+         do i = 1, self%n_constraint
+            associate (point => frames%point(self%frame(i)))
+               if (point > size(is_sharp)) cycle
+               if (is_sharp(point) .or. frames%start(point + 1) > frames%start(point) + 1) &
+                  self%own_slack(i) = corner_slack
+            end associate
+         end do
+      end associate
+   end subroutine hold_corners
 
    !> The nodes that contact points are made of.
    pure function point_items(sides) result(item)
@@ -273,7 +296,12 @@ contains
             >= -max_penetration_on_entry*state%size
          if (cover(1) >= least) state%gap1 = look%height(1)/cover(1) - self%offset &
             - self%sagitta(i)
-         if (self%slack > 0.0_wp) state%closed = -self%slack*min(state%size, state%other_size)
+         if (allocated(self%own_slack)) then
+            state%closed = -merge(self%slack, self%own_slack(i), self%step%has_compliance) &
+               *min(state%size, state%other_size)
+         else if (self%slack > 0.0_wp) then
+            state%closed = -self%slack*min(state%size, state%other_size)
+         end if
          self%cover(i) = cover(1)
          if (state%gap0 < -stencil%deepest - self%offset) state = gap_state_t()
       end associate
