@@ -15,7 +15,7 @@ contains
    pure subroutine condition_start(item, node, n_dim)
       type(condition_t), intent(inout) :: item
       integer, intent(in) :: node(:)             !! of the scene
-      integer, intent(in) :: n_dim
+      integer, intent(in) :: n_dim               !! of the scene
 
       call condition_resize(item, size(node), n_dim)
       item%node(:size(node)) = node

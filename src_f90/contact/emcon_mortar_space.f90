@@ -18,8 +18,8 @@ module emcon_mortar_space
       multiplier_dual
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
-   use emcon_patch_gap_space, only : patch_basis, patch_basis_t, patch_gap, patch_gap_t, &
-      patch_t
+   use emcon_patch_gap_space, only : patch_basis, patch_basis_t, patch_gap_of, patch_gap_t, &
+      patch_open, patch_open_t, patch_t
    use emcon_patch_sides_space, only : patch_sides_t, patch_triangles_init
    use emcon_patch_spread_space, only : patch_spread, patch_uses
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
@@ -38,13 +38,14 @@ module emcon_mortar_space
    !> Covered but for round-off: the dual multipliers are as they are.
    real(wp), parameter :: whole_cover = 256.0_wp*epsilon(1.0_wp)
 
-   !> What a triangle gives to a constraint.
-   type :: facet_part_t
+   !> What a triangle sees in a step, for all that is asked of it.
+   type :: sight_t
       type(patch_basis_t) :: basis
-      logical :: is_blended = .false.                 !! of linear and dual multipliers
-      !> With the linear multiplier, or all of it; with what the dual one has more; the cover
-      type(patch_gap_t) :: gap(3)
-   end type facet_part_t
+      type(patch_open_t) :: open
+      type(patch_gap_t) :: cover                      !! what of it is covered, of an area of 1/2
+      logical :: is_full = .false.                   !! its facet is covered, but for round-off
+      logical :: is_blended = .false.                 !! between the linear multipliers and the dual
+   end type sight_t
 
    type, extends(contact_t) :: mortar_space_t
       type(patch_sides_t) :: sides
@@ -330,151 +331,141 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       real(wp), intent(in) :: target(:)          !! (n) [L]
       type(condition_t), intent(inout) :: item(:)   !! (n)
-      integer :: k
+      type(sight_t) :: sight(size(self%stencil))
+      logical :: is_asked(self%sides%slave%n_facet)
+      integer :: f, k
 
+      is_asked = .false.
       do k = 1, size(wanted)
-         call evaluate_vertex(self, wanted(k), x, u0, du, target(k) + self%offset, item(k))
+         is_asked(self%split%facet(self%triangle(self%start(wanted(k)): &
+            self%start(wanted(k) + 1) - 1))) = .true.
+      end do
+      do f = 1, size(is_asked)
+         if (.not. is_asked(f)) cycle
+         associate (first => self%split%start(f), last => self%split%start(f + 1) - 1)
+            call look_closely(self, first, x, u0, du, all(item%leaves_second), sight(first:last))
+         end associate
+      end do
+      do k = 1, size(wanted)
+         call evaluate_vertex(self, wanted(k), sight, target(k) + self%offset, item(k))
       end do
    end subroutine mortar_evaluate
 
-   !> The condition of constraint `i`: the sum over its facets, docs/theory.md, eq. (62).
-   pure subroutine evaluate_vertex(self, i, x, u0, du, target, item)
-      type(mortar_space_t), intent(in) :: self
-      integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      real(wp), intent(in) :: target             !! height to hold [L]
-      type(condition_t), intent(inout) :: item
-      type(condition_t) :: cover, skew
-      type(facet_part_t) :: part(self%start(i + 1) - self%start(i))
-      integer :: first, k, last
-
-      do k = 1, size(part)
-         associate (place => self%start(i) + k - 1)
-            if (self%stencil(self%triangle(place))%triangle > 0) call look(self, &
-               self%triangle(place), x, u0, du, part(k)%basis)
-         end associate
-      end do
-      first = 1
-      do while (first <= size(part))
-         last = last_of_facet(first)
-         call find_parts(self, self%start(i) + first - 1, x, u0, du, target, item%leaves_second, &
-            part(first:last))
-         first = last + 1
-      end do
-      call begin_condition(self, i, part, item)
-      cover%leaves_second = item%leaves_second
-      skew%leaves_second = item%leaves_second
-      first = 1
-      do while (first <= size(part))
-         last = last_of_facet(first)
-         associate (of => part(first:last), node => item%node(:item%n_node), n_dim => &
-               size(item%g, 1))
-            call add_parts(self, self%start(i) + first - 1, of, 1.0_wp/self%scale(i), item, 1)
-            if (any(of%is_blended)) then
-               call condition_start(skew, node, n_dim)
-               call add_parts(self, self%start(i) + first - 1, of, 1.0_wp/self%scale(i), skew, 2)
-               call condition_start(cover, node, n_dim)
-               call add_parts(self, self%start(i) + first - 1, of, 2.0_wp/real(size(of), wp), &
-                  cover, 3)
-               call condition_add_cubed(item, cover, skew)
-            end if
-         end associate
-         first = last + 1
-      end do
-
-   contains
-
-      !> The last triangle of the facet that the triangle at place `k` is of.
-      pure integer function last_of_facet(k) result(last)
-         integer, intent(in) :: k
-
-         associate (f => self%split%facet(self%triangle(self%start(i) + k - 1)))
-            last = k + self%split%start(f + 1) - self%split%start(f) - 1
-         end associate
-      end function last_of_facet
-
-   end subroutine evaluate_vertex
-
-   !> What the triangles of a facet give to a constraint, those from place `first` on of
-   !> `triangle`. Where all or nothing of the facet is covered its multipliers stay as they are.
-   pure subroutine find_parts(self, first, x, u0, du, target, leaves_second, part)
+   !> What the triangles of a facet see, from `first` on.
+   pure subroutine look_closely(self, first, x, u0, du, leaves_second, sight)
       type(mortar_space_t), intent(in) :: self
       integer, intent(in) :: first
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      real(wp), intent(in) :: target             !! [L]
       logical, intent(in) :: leaves_second
-      type(facet_part_t), intent(inout) :: part(:)
-      real(wp) :: cover(0:1), theta
+      type(sight_t), intent(inout) :: sight(:)   !! (triangles of the facet)
+      real(wp), allocatable :: at(:, :), way(:, :)
       integer :: k
 
-      cover = covered(part%basis)
-      theta = merge(1.0_wp, 0.0_wp, self%is_dual .and. all(abs(cover - 1.0_wp) <= whole_cover))
-      part%is_blended = self%is_dual .and. any(cover > 0.0_wp) .and. .not. theta > 0.0_wp
-      do k = 1, size(part)
-         associate (stencil => self%stencil(self%triangle(first + k - 1)), t => &
-               self%triangle(first + k - 1), m => self%vertex(first + k - 1), gap => part(k)%gap)
+      do k = 1, size(sight)
+         associate (stencil => self%stencil(first + k - 1))
             if (stencil%triangle == 0) cycle
-            call find_gap(stencil, weight_of(self, first + k - 1, theta), .false., x, u0, du, &
-               target, leaves_second, gap(1))
-            if (.not. part(k)%is_blended) cycle
-            call find_gap(stencil, self%weights%skew(:, m, t), .false., x, u0, du, target, &
-               leaves_second, gap(2))
-            call find_gap(stencil, [1.0_wp, 1.0_wp, 1.0_wp], .true., x, u0, du, 0.0_wp, &
-               leaves_second, gap(3))
+            if (allocated(at)) deallocate(at, way)
+            allocate(at(3, 3 + stencil%patch%n_vertex), way(3, 3 + stencil%patch%n_vertex))
+            call patch_stencil_gather(stencil, x, u0, du, at, way)
+            sight(k)%basis = patch_basis(stencil%patch, at, way)
+            call patch_open(stencil%patch, at, way, leaves_second, sight(k)%open)
          end associate
       end do
-   end subroutine find_parts
+      if (.not. self%is_dual) return
+      associate (part => covered(sight%basis))
+         sight%is_full = all(abs(part - 1.0_wp) <= whole_cover)
+         sight%is_blended = any(part > 0.0_wp) .and. .not. sight%is_full
+      end associate
+      do k = 1, size(sight)
+         if (sight(k)%open%n_vertex == 0 .or. .not. sight(k)%is_blended) cycle
+         associate (patch => self%stencil(first + k - 1)%patch)
+            call gap_of(patch, sight(k)%open, [1.0_wp, 1.0_wp, 1.0_wp], .true., 0.0_wp, &
+               leaves_second, sight(k)%cover)
+         end associate
+      end do
+   end subroutine look_closely
 
-   !> The gap of a triangle with a weight, or what of it is covered, of an area of 1/2.
-   pure subroutine find_gap(stencil, weight, of_cover, x, u0, du, target, leaves_second, gap)
-      type(patch_stencil_t), intent(in) :: stencil
+   !> The gap of a triangle with a weight, or what of it is covered.
+   pure subroutine gap_of(patch, open, weight, of_cover, target, leaves_second, gap)
+      type(patch_t), intent(in) :: patch
+      type(patch_open_t), intent(in) :: open
       real(wp), intent(in) :: weight(3)
       logical, intent(in) :: of_cover
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       real(wp), intent(in) :: target             !! [L]
       logical, intent(in) :: leaves_second
       type(patch_gap_t), intent(out) :: gap
-      real(wp), dimension(3, 3 + stencil%patch%n_vertex) :: at, way
-      type(patch_t) :: patch
+      type(patch_t) :: own
 
-      patch = stencil%patch
-      patch%area%weight = weight
-      patch%of_cover = of_cover
-      patch%is_integral = .not. of_cover
-      call patch_stencil_gather(stencil, x, u0, du, at, way)
-      call patch_gap(patch, at, way, target, leaves_second, gap)
-   end subroutine find_gap
+      own = patch
+      own%area%weight = weight
+      own%of_cover = of_cover
+      own%is_integral = .not. of_cover
+      call patch_gap_of(own, open, target, leaves_second, gap)
+   end subroutine gap_of
 
-   !> Add the gaps `which` of the triangles of a facet to a condition.
-   pure subroutine add_parts(self, first, part, factor, item, which)
+   !> The condition of constraint `i`: the sum over its facets, docs/theory.md, eq. (62).
+   pure subroutine evaluate_vertex(self, i, sight, target, item)
       type(mortar_space_t), intent(in) :: self
-      integer, intent(in) :: first               !! place in `triangle`
-      type(facet_part_t), intent(in) :: part(:)
-      real(wp), intent(in) :: factor
+      integer, intent(in) :: i
+      type(sight_t), intent(in) :: sight(:)      !! (n_triangle)
+      real(wp), intent(in) :: target             !! height to hold [L]
       type(condition_t), intent(inout) :: item
-      integer, intent(in) :: which               !! 1 to 3
-      integer :: j, k
+      type(condition_t) :: cover, skew
+      type(patch_gap_t) :: gap
+      integer :: f, k, n
 
-      do k = 1, size(part)
-         associate (stencil => self%stencil(self%triangle(first + k - 1)), gap => &
-               part(k)%gap(which))
-            if (gap%n_vertex == 0) cycle
-            associate (is_used => patch_uses(stencil, gap))
-               associate (node => pack(stencil%node(:stencil%n_node), is_used))
-                  call patch_spread(stencil, gap, is_used, factor, [(findloc( &
-                     item%node(:item%n_node), node(j), 1), j = 1, size(node))], item)
+      call begin_condition(self, i, sight, item)
+      cover%leaves_second = item%leaves_second
+      skew%leaves_second = item%leaves_second
+      do k = self%start(i), self%start(i + 1) - 1
+         associate (t => self%triangle(k), scale => self%scale(i))
+            f = self%split%facet(t)
+            n = self%split%start(f + 1) - self%split%start(f)
+            if (sight(t)%is_blended .and. t == self%split%start(f)) then
+               call condition_start(skew, item%node(:item%n_node), size(item%g, 1))
+               call condition_start(cover, item%node(:item%n_node), size(item%g, 1))
+            end if
+            if (sight(t)%open%n_vertex > 0) then
+               associate (open => sight(t)%open, patch => self%stencil(t)%patch)
+                  call gap_of(patch, open, weight_of(self, k, merge(1.0_wp, 0.0_wp, &
+                     sight(t)%is_full)), .false., target, item%leaves_second, gap)
+                  call add_gap(self%stencil(t), gap, scale, item)
+                  if (sight(t)%is_blended) then
+                     call gap_of(patch, open, self%weights%skew(:, self%vertex(k), t), .false., &
+                        target, item%leaves_second, gap)
+                     call add_gap(self%stencil(t), gap, scale, skew)
+                     call add_gap(self%stencil(t), sight(t)%cover, 0.5_wp*real(n, wp), cover)
+                  end if
                end associate
-            end associate
+            end if
+            if (sight(t)%is_blended .and. t == self%split%start(f) + n - 1) &
+               call condition_add_cubed(item, cover, skew)
          end associate
       end do
-   end subroutine add_parts
+   end subroutine evaluate_vertex
+
+   !> Add a gap of a triangle by `scale` to a condition that has its nodes.
+   pure subroutine add_gap(stencil, gap, scale, item)
+      type(patch_stencil_t), intent(in) :: stencil
+      type(patch_gap_t), intent(in) :: gap
+      real(wp), intent(in) :: scale
+      type(condition_t), intent(inout) :: item
+      integer :: j
+
+      associate (is_used => patch_uses(stencil, gap%vertex))
+         associate (node => pack(stencil%node(:stencil%n_node), is_used))
+            call patch_spread(stencil, gap, is_used, scale, [(findloc( &
+               item%node(:item%n_node), node(j), 1), j = 1, size(node))], item)
+         end associate
+      end associate
+   end subroutine add_gap
 
    !> The nodes of the condition of constraint `i`, its own first, then others of the slave, and no
    !> derivatives yet.
-   pure subroutine begin_condition(self, i, part, item)
+   pure subroutine begin_condition(self, i, sight, item)
       type(mortar_space_t), intent(in) :: self
       integer, intent(in) :: i
-      type(facet_part_t), intent(in) :: part(:)  !! of its triangles
+      type(sight_t), intent(in) :: sight(:)      !! (n_triangle)
       type(condition_t), intent(inout) :: item
       integer, allocatable :: list(:)
       integer :: k, m, n, pass
@@ -485,10 +476,10 @@ contains
          n = 1
          do pass = 1, 2
             do k = 1, size(triangle)
-               if (part(k)%gap(1)%n_vertex == 0) cycle
-               associate (stencil => self%stencil(triangle(k)))
+               associate (stencil => self%stencil(triangle(k)), open => sight(triangle(k))%open)
+                  if (open%n_vertex == 0) cycle
                   associate (is_slave => [(m <= stencil%n_slave, m = 1, stencil%n_node)], &
-                        is_used => patch_uses(stencil, part(k)%gap(1)))
+                        is_used => patch_uses(stencil, open%vertex(:open%n_vertex)))
                      call nodes_append(pack(stencil%node(:stencil%n_node), is_used .and. &
                         (is_slave .eqv. pass == 1)), list, n)
                   end associate

@@ -11,10 +11,10 @@ module emcon_patch_contact_space
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : err_input, error_t, raise
    use emcon_facet_values, only : facets_point_area, facets_pressures
-   use emcon_facets, only : facets_init
-   use emcon_guards, only : crossing_bar, overlap_bar
-   use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach, &
-      pair_has_order
+   use emcon_facets, only : facets_init, facets_rim
+   use emcon_guards, only : corner_slack, crossing_bar, overlap_bar
+   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
+      interaction_reach, pair_has_order
    use emcon_kinds, only : wp
    use emcon_mirror_faces_space, only : always_rests, mirror_axes
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
@@ -52,6 +52,7 @@ module emcon_patch_contact_space
       integer, allocatable :: class(:)                !! (n_constraint) of bodies it looks at
       type(patch_stencil_t), allocatable :: stencil(:)   !! (n_constraint)
       type(bulges_t), allocatable :: bulges           !! of the master; only if gaps follow arcs
+      real(wp), allocatable :: own_slack(:)           !! (n_constraint) of a guard beside mortar
       real(wp), allocatable :: scale(:)               !! (n_constraint) covered at the start
       real(wp), allocatable :: cover(:)               !! (n_constraint) covered at the end
    contains
@@ -117,6 +118,9 @@ contains
       if (self%holds_all) self%area_factor = 0.5_wp
       self%may_leave = .true.
       self%slack = pair%slack
+      if (pair%of_pair > 0 .and. pair%slack > 0.0_wp) then
+         if (scene%pair(pair%of_pair)%formulation == formulation_mortar) call hold_corners(self)
+      end if
       self%offset = pair%interaction%offset
       self%max_penetration_at_start = deepest_start
       call contact_laws_of_surface(pair%interaction, self%laws)
@@ -136,6 +140,25 @@ contains
          of_point(:, i) = all(rests(:, pack(item(:, i), item(:, i) > 0)), 2)
       end do
    end function rests_of_points
+
+   !> Corners and rims are held nearly at once beside means of gaps, which do not see them.
+   pure subroutine hold_corners(self)
+      type(patch_contact_t), intent(inout) :: self
+      logical :: is_sharp(size(self%sides%slave%node))
+      integer :: i
+
+      call facets_rim(self%sides%slave, is_sharp)
+      allocate(self%own_slack(self%n_constraint), source=self%slack)
+      associate (frames => self%sides%frames)
+         do i = 1, self%n_constraint
+            associate (point => frames%point(self%frame(i)))
+               if (point > size(is_sharp)) cycle
+               if (is_sharp(point) .or. frames%start(point + 1) > frames%start(point) + 1) &
+                  self%own_slack(i) = corner_slack
+            end associate
+         end do
+      end associate
+   end subroutine hold_corners
 
    !> The nodes that contact points are made of.
    pure function point_items(sides) result(item)
@@ -292,7 +315,12 @@ contains
             >= -max_penetration_on_entry*state%size
          if (cover(1) >= least) state%gap1 = look%height(1)/cover(1) - self%offset &
             - self%sagitta(i)
-         if (self%slack > 0.0_wp) state%closed = -self%slack*min(state%size, state%other_size)
+         if (allocated(self%own_slack)) then
+            state%closed = -merge(self%slack, self%own_slack(i), self%step%has_compliance) &
+               *min(state%size, state%other_size)
+         else if (self%slack > 0.0_wp) then
+            state%closed = -self%slack*min(state%size, state%other_size)
+         end if
          self%cover(i) = cover(1)
          if (state%gap0 < -stencil%deepest - self%offset) state = gap_state_t()
       end associate
@@ -327,7 +355,7 @@ contains
       associate (stencil => self%stencil(i))
          call patch_stencil_gather(stencil, x, u0, du, at, way)
          call patch_gap(stencil%patch, at, way, target, item%leaves_second, gap)
-         is_used = patch_uses(stencil, gap)
+         is_used = patch_uses(stencil, gap%vertex)
          call condition_resize(item, count(is_used), size(x, 1))
          associate (n => item%n_node, n_var => size(x, 1)*item%n_node)
             item%node(:n) = pack(stencil%node(:stencil%n_node), is_used)
@@ -340,7 +368,7 @@ contains
             item%g(:, :n) = 0.0_wp
             item%c(:, :n) = 0.0_wp
             if (.not. item%leaves_second) item%h(:n_var, :n_var) = 0.0_wp
-            call patch_spread(stencil, gap, is_used, 1.0_wp/self%scale(i), [(k, k = 1, n)], item)
+            call patch_spread(stencil, gap, is_used, self%scale(i), [(k, k = 1, n)], item)
          end associate
       end associate
    end subroutine evaluate_frame

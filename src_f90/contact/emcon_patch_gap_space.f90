@@ -13,7 +13,7 @@ module emcon_patch_gap_space
    implicit none
    private
    public :: patch_t, patch_gap_t, patch_gap, patch_look_t, patch_look, &
-      patch_basis_t, patch_basis
+      patch_basis_t, patch_basis, patch_open_t, patch_open, patch_gap_of
 
    !> Remainders below so many epsilons of what they are the difference of are round-off.
    real(wp), parameter :: rounding = 16.0_wp*epsilon(1.0_wp)
@@ -71,11 +71,21 @@ module emcon_patch_gap_space
       integer :: vertex(3) = 0                   !! among those that count
       real(wp) :: moment(3, 0:1) = 0.0_wp        !! over the part of the patch that it covers
       real(wp) :: bare(3, 0:1) = 0.0_wp          !! the same without weights
+      real(wp) :: products(3, 3, 0:1) = 0.0_wp   !! of patches of facets: for each weight
       real(wp) :: value(3, 0:1) = 0.0_wp         !! its field at the `unit_corner` [L]
       real(wp) :: slope(2, 0:1) = 0.0_wp         !! of the field [L]
       real(wp) :: share(3, 3) = 0.0_wp           !! (j, v) of its corner j at v, in the mean
       real(wp) :: part(3) = 0.0_wp               !! of the integral that each corner takes
    end type field_t
+
+   !> What the gaps of a patch over a step have in common, whatever their weights and targets are.
+   type :: patch_open_t
+      integer :: n_vertex = 0                    !! that they depend on
+      integer, allocatable :: vertex(:)          !! (>= n_vertex) their numbers
+      type(frame_vertex_t), allocatable, private :: at(:)    !! (n_vertex)
+      type(field_t), allocatable, private :: field(:)
+      type(frame_area_t), private :: area        !! of the frame, for an integral
+   end type patch_open_t
 
    !> What is put on the ways of the vertices in the patch, and how it changes.
    type :: closing_t
@@ -205,35 +215,66 @@ contains
       real(wp), intent(in) :: target             !! that heights are counted from [L]
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(patch_gap_t), intent(out) :: gap
+      type(patch_open_t) :: open
+
+      call patch_open(patch, x, dx, leaves_second, open)
+      call patch_gap_of(patch, open, target, leaves_second, gap)
+   end subroutine patch_gap
+
+   !> What a patch is over in a step.
+   pure subroutine patch_open(patch, x, dx, leaves_second, open)
+      type(patch_t), intent(in) :: patch         !! whatever its weights are
+      real(wp), intent(in) :: x(:, :), dx(:, :)  !! as `patch_gap`
+      logical, intent(in) :: leaves_second       !! no gap with second derivatives is asked for
+      type(patch_open_t), intent(out) :: open
       real(wp) :: place(3, patch%n_vertex, 0:1)
-      type(frame_vertex_t), allocatable :: at(:)
-      type(field_t), allocatable :: field(:)
       integer :: j
 
       call place_vertices(patch, x, place(:, :, 0))
       call place_vertices(patch, x + dx, place(:, :, 1))
-      call choose_fields(patch, place, field, gap)
-      allocate(at(gap%n_vertex))
-      do j = 1, gap%n_vertex
-         associate (node => [1, 2, 3, 3 + gap%vertex(j)])
-            call frame_vertex(x(:, node), dx(:, node), leaves_second, at(j))
+      call choose_fields(patch, place, open)
+      allocate(open%at(open%n_vertex))
+      do j = 1, open%n_vertex
+         associate (node => [1, 2, 3, 3 + open%vertex(j)])
+            call frame_vertex(x(:, node), dx(:, node), leaves_second, open%at(j))
          end associate
-         call to_patch(patch, at(j))
+         call to_patch(patch, open%at(j))
       end do
-      call add_up(patch, target, at, field, leaves_second, gap)
-      if (patch%is_integral) call times_area(x(:, :3), dx(:, :3), leaves_second, gap)
-   end subroutine patch_gap
+      if (patch%area%n_side == 3) call frame_area(x(:, :3), dx(:, :3), leaves_second, open%area)
+   end subroutine patch_open
+
+   !> The gap of a patch.
+   pure subroutine patch_gap_of(patch, open, target, leaves_second, gap)
+      type(patch_t), intent(in) :: patch
+      type(patch_open_t), intent(in) :: open     !! of it
+      real(wp), intent(in) :: target             !! that heights are counted from [L]
+      logical, intent(in) :: leaves_second       !! no second derivatives
+      type(patch_gap_t), intent(out) :: gap
+      type(field_t), allocatable :: field(:)
+      integer :: end, k
+
+      gap%n_vertex = open%n_vertex
+      gap%vertex = open%vertex(:open%n_vertex)
+      field = open%field
+      if (patch%area%n_side == 3) then
+         do k = 1, size(field)
+            do end = 0, 1
+               field(k)%moment(:, end) = matmul(patch%area%weight, field(k)%products(:, :, end))
+            end do
+         end do
+      end if
+      call add_up(patch, target, open%at, field, leaves_second, gap)
+      if (patch%is_integral) call times_area(open%area, leaves_second, gap)
+   end subroutine patch_gap_of
 
    !> Times the area of the frame, by the rule of products.
-   pure subroutine times_area(x, dx, leaves_second, gap)
-      real(wp), intent(in) :: x(3, 3), dx(3, 3)  !! of the frame [L]
+   pure subroutine times_area(area, leaves_second, gap)
+      type(frame_area_t), intent(in) :: area
       logical, intent(in) :: leaves_second
       type(patch_gap_t), intent(inout) :: gap
-      type(frame_area_t) :: area
       real(wp) :: mean, mean_area
       integer, parameter :: n = 6
 
-      call frame_area(x, dx, leaves_second, area)
       mean = 0.5_wp*(gap%f0 + gap%f1)
       mean_area = 0.5_wp*(area%f(0) + area%f(1))
       if (.not. leaves_second) then
@@ -266,37 +307,75 @@ contains
    end subroutine to_patch
 
    !> The triangles over the patch at either end, and their vertices.
-   pure subroutine choose_fields(patch, place, field, gap)
+   pure subroutine choose_fields(patch, place, open)
       type(patch_t), intent(in) :: patch
       real(wp), intent(in) :: place(:, :, 0:)    !! (3, n_vertex, 0:1)
-      type(field_t), allocatable, intent(out) :: field(:)
-      type(patch_gap_t), intent(inout) :: gap
-      type(field_t) :: found(patch%n_triangle)
-      integer :: number(patch%n_vertex), i, k, n, end
+      type(patch_open_t), intent(inout) :: open
+      type(field_t) :: field
+      integer :: number(patch%n_vertex), i, k, n
 
-      allocate(gap%vertex(patch%n_vertex))
+      allocate(open%vertex(patch%n_vertex), open%field(count_seen(patch, place)))
       number = 0
       n = 0
       do k = 1, patch%n_triangle
          associate (t => patch%triangle(:, k))
-            do end = 0, 1
-               call patch_moments(patch%area, place(:2, t, end), found(n + 1)%moment(:, end), &
-                  found(n + 1)%bare(:, end))
-            end do
-            if (.not. any(abs(found(n + 1)%bare) > 0.0_wp)) cycle
+            if (is_missed(patch, place(:2, t, :))) cycle
+            field = field_t()
+            call find_moments(patch, place(:2, t, :), field)
+            if (.not. any(abs(field%bare) > 0.0_wp)) cycle
             n = n + 1
             do i = 1, 3
                if (number(t(i)) == 0) then
-                  gap%n_vertex = gap%n_vertex + 1
-                  gap%vertex(gap%n_vertex) = t(i)
-                  number(t(i)) = gap%n_vertex
+                  open%n_vertex = open%n_vertex + 1
+                  open%vertex(open%n_vertex) = t(i)
+                  number(t(i)) = open%n_vertex
                end if
-               found(n)%vertex(i) = number(t(i))
+               field%vertex(i) = number(t(i))
             end do
+            open%field(n) = field
          end associate
       end do
-      field = found(:n)
+      open%field = open%field(:n)
    end subroutine choose_fields
+
+   !> The number of triangles that may be over a patch.
+   pure integer function count_seen(patch, place) result(n)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: place(:, :, 0:)
+      integer :: k
+
+      n = 0
+      do k = 1, patch%n_triangle
+         if (.not. is_missed(patch, place(:2, patch%triangle(:, k), :))) n = n + 1
+      end do
+   end function count_seen
+
+   !> Is a triangle beside a patch at both ends?
+   pure logical function is_missed(patch, corner)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: corner(2, 3, 0:1)
+
+      is_missed = patch_misses(patch%area, corner(:, :, 0))
+      if (is_missed) is_missed = patch_misses(patch%area, corner(:, :, 1))
+   end function is_missed
+
+   !> The moments of a triangle at both ends.
+   pure subroutine find_moments(patch, corner, field)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: corner(2, 3, 0:1)
+      type(field_t), intent(inout) :: field
+      integer :: end
+
+      do end = 0, 1
+         if (patch%area%n_side == 3) then
+            field%products(:, :, end) = patch_products(patch%area, corner(:, :, end))
+            field%bare(:, end) = sum(field%products(:, :, end), 1)
+         else
+            call patch_moments(patch%area, corner(:, :, end), field%moment(:, end), &
+               field%bare(:, end))
+         end if
+      end do
+   end subroutine find_moments
 
    !> The sum over triangles, docs/theory.md, eqs. (46) and (47).
    pure subroutine add_up(patch, target, at, field, leaves_second, gap)
@@ -308,6 +387,7 @@ contains
       type(patch_gap_t), intent(inout) :: gap
       real(wp), dimension(3, size(at)) :: by, end_by
       real(wp), dimension(size(at)) :: chi, flat !! of heights, and of 1
+      real(wp) :: place(3, size(at), 0:1)
       real(wp) :: change(3*size(at), 3*size(at))
       type(closing_t) :: closing
       integer :: k
@@ -318,25 +398,28 @@ contains
          flat = chi
          chi = 0.0_wp
       end if
+      do k = 1, size(at)
+         place(:, k, :) = at(k)%f
+      end do
       by = 0.0_wp
       end_by = 0.0_wp
       do k = 1, size(field)
          call form_field(chi(field(k)%vertex), flat(field(k)%vertex), target, &
-            at(field(k)%vertex), field(k))
+            place(:, field(k)%vertex, :), field(k))
          associate (f => field(k), v => field(k)%vertex)
             gap%f0 = gap%f0 + dot_product(f%moment(:, 0), f%value(:, 0))
             gap%f1 = gap%f1 + dot_product(f%moment(:, 1), f%value(:, 1))
             by(at_height, v) = by(at_height, v) + chi(v)*f%part
             by(:at_eta, v) = by(:at_eta, v) - outer(sum(f%slope, 2)/2.0_wp, f%part)
-            call add_end(chi(v), at(v), f, end_by)
+            call add_end(chi(v), place(:at_eta, v, 1), f, end_by)
          end associate
       end do
       call close_sum(at, field, closing)
       by(:at_eta, :) = by(:at_eta, :) + closing%factor*spread(closing%weight, 1, at_eta)*closing%way
       call gather_first(at, by, end_by, gap)
       if (leaves_second) return
-      call change_of_parts(patch%area, chi, at, field, change)
-      call change_of_closing(patch%area, chi, at, field, closing, change)
+      call change_of_parts(patch%area, chi, place, field, change)
+      call change_of_closing(patch%area, chi, place(:at_eta, :, 1), field, closing, change)
       call gather_second(at, by, change, gap)
    end subroutine add_up
 
@@ -375,21 +458,17 @@ contains
    end subroutine close_sum
 
    !> The field of a triangle at both ends.
-   pure subroutine form_field(chi, flat, target, at, field)
+   pure subroutine form_field(chi, flat, target, place, field)
       real(wp), intent(in) :: chi(3), flat(3)    !! of heights, and of 1
       real(wp), intent(in) :: target             !! [L]
-      type(frame_vertex_t), intent(in) :: at(3)  !! its corners
+      real(wp), intent(in) :: place(3, 3, 0:1)   !! of its corners
       type(field_t), intent(inout) :: field
       real(wp) :: corner(2, 3, 0:1), p(3)
-      integer :: j, v, end
+      integer :: v, end
 
-      do j = 1, 3
-         corner(:, j, :) = at(j)%f(:at_eta, :)
-      end do
+      corner = place(:at_eta, :, :)
       do end = 0, 1
-         do j = 1, 3
-            p(j) = chi(j)*(at(j)%f(at_height, end) - target) + flat(j)
-         end do
+         p = chi*(place(at_height, :, end) - target) + flat
          do v = 1, 3
             field%value(v, end) = dot_product(p, barycentric(corner(:, :, end), unit_corner(:, v)))
          end do
@@ -402,17 +481,14 @@ contains
    end subroutine form_field
 
    !> Add the gradient at the end by places and heights.
-   pure subroutine add_end(chi, at, field, by)
+   pure subroutine add_end(chi, corner, field, by)
       real(wp), intent(in) :: chi(3)
-      type(frame_vertex_t), intent(in) :: at(3)
+      real(wp), intent(in) :: corner(2, 3)       !! at the end
       type(field_t), intent(in) :: field
       real(wp), intent(inout) :: by(:, :)        !! (3, n_vertex)
-      real(wp) :: corner(2, 3), part(3)
-      integer :: j, v
+      real(wp) :: part(3)
+      integer :: v
 
-      do j = 1, 3
-         corner(:, j) = at(j)%f(:at_eta, 1)
-      end do
       part = 0.0_wp
       do v = 1, 3
          part = part + field%moment(v, 1)*barycentric(corner, unit_corner(:, v))
@@ -424,10 +500,10 @@ contains
    end subroutine add_end
 
    !> How what the vertices take changes with places and heights at the end.
-   pure subroutine change_of_parts(patch_area, chi, at, field, change)
+   pure subroutine change_of_parts(patch_area, chi, place, field, change)
       type(patch_area_t), intent(in) :: patch_area
       real(wp), intent(in) :: chi(:)
-      type(frame_vertex_t), intent(in) :: at(:)
+      real(wp), intent(in) :: place(:, :, 0:)    !! (3, n_vertex, 0:1)
       type(field_t), intent(in) :: field(:)
       real(wp), intent(out) :: change(:, :)      !! (3 n_vertex, 3 n_vertex)
       real(wp) :: part(3, 9), slope(2, 9)
@@ -436,7 +512,7 @@ contains
       change = 0.0_wp
       do k = 1, size(field)
          associate (f => field(k), v => field(k)%vertex)
-            call change_of_field(patch_area, chi(v), at(v), f, part, slope)
+            call change_of_field(patch_area, chi(v), place(:at_eta, v, :), f, part, slope)
             do i = 1, 3
                do j = 1, 3
                   associate (row => 3*(v(i) - 1), column => 3*(v(j) - 1), by => 3*(j - 1))
@@ -456,19 +532,16 @@ contains
 
    !> How the parts of the corners of a triangle and its mean slope change with their places and
    !> heights at the end.
-   pure subroutine change_of_field(patch_area, chi, at, field, part, slope)
+   pure subroutine change_of_field(patch_area, chi, corner, field, part, slope)
       type(patch_area_t), intent(in) :: patch_area
       real(wp), intent(in) :: chi(3)
-      type(frame_vertex_t), intent(in) :: at(3)
+      real(wp), intent(in) :: corner(2, 3, 0:1)
       type(field_t), intent(in) :: field
       real(wp), intent(out) :: part(3, 9), slope(2, 9)
-      real(wp) :: corner(2, 3, 0:1), lean(2, 3), lean1(2, 3), mean(3)
+      real(wp) :: lean(2, 3), lean1(2, 3), mean(3)
       real(wp), dimension(3, 2, 3) :: swept, bare
-      integer :: j, l, v
+      integer :: l, v
 
-      do j = 1, 3
-         corner(:, j, :) = at(j)%f(:at_eta, :)
-      end do
       call patch_moment_slopes(patch_area, corner(:, :, 1), swept, bare)
       lean = gradients(sum(corner, 3)/2.0_wp)
       lean1 = gradients(corner(:, :, 1))
@@ -500,24 +573,24 @@ contains
    end function gradients
 
    !> Add how the closing term changes.
-   pure subroutine change_of_closing(patch_area, chi, at, field, closing, change)
+   pure subroutine change_of_closing(patch_area, chi, corner, field, closing, change)
       type(patch_area_t), intent(in) :: patch_area
       real(wp), intent(in) :: chi(:)
-      type(frame_vertex_t), intent(in) :: at(:)
+      real(wp), intent(in) :: corner(:, :)       !! (2, n_vertex) at the end
       type(field_t), intent(in) :: field(:)
       type(closing_t), intent(in) :: closing
       real(wp), intent(inout) :: change(:, :)    !! (3 n_vertex, 3 n_vertex)
-      real(wp) :: by_rest(3, size(at)), by_square(3, size(at)), area(3*size(at), size(at))
+      real(wp) :: by_rest(3, size(chi)), by_square(3, size(chi)), area(3*size(chi), size(chi))
       integer :: a, i, j, k
 
       by_rest = 0.0_wp
       by_square = 0.0_wp
       area = 0.0_wp
       do k = 1, size(field)
-         call add_rest(patch_area, chi(field(k)%vertex), at(field(k)%vertex), field(k), by_rest, &
-            area)
+         call add_rest(patch_area, chi(field(k)%vertex), corner(:, field(k)%vertex), field(k), &
+            by_rest, area)
       end do
-      do j = 1, size(at)
+      do j = 1, size(chi)
          associate (slope => closing%weight_slope(j)*area(:, j), way => closing%way(:, j))
             by_square(:at_eta, j) = by_square(:at_eta, j) + 2.0_wp*closing%weight(j)*way
             by_square = by_square + sum(way**2)*reshape(slope, shape(by_square))
@@ -529,7 +602,7 @@ contains
          end associate
       end do
       by_rest = closing%by_rest*by_rest + closing%by_square*by_square
-      do j = 1, size(at)
+      do j = 1, size(chi)
          do a = 1, at_eta
             i = 3*(j - 1) + a
             change(i, :) = change(i, :) + closing%weight(j)*closing%way(a, j)*reshape(by_rest, &
@@ -539,20 +612,17 @@ contains
    end subroutine change_of_closing
 
    !> Add how what a triangle leaves to the rest changes, and what of the patch it covers.
-   pure subroutine add_rest(patch_area, chi, at, field, by_rest, area)
+   pure subroutine add_rest(patch_area, chi, corner, field, by_rest, area)
       type(patch_area_t), intent(in) :: patch_area
       real(wp), intent(in) :: chi(3)
-      type(frame_vertex_t), intent(in) :: at(3)
+      real(wp), intent(in) :: corner(2, 3)       !! at the end
       type(field_t), intent(in) :: field
       real(wp), intent(inout) :: by_rest(:, :)   !! (3, n_vertex)
       real(wp), intent(inout) :: area(:, :)      !! (3 n_vertex, n_vertex) of those at a vertex
-      real(wp) :: corner(2, 3), part(3)
+      real(wp) :: part(3)
       real(wp), dimension(3, 2, 3) :: swept, bare
       integer :: i, j, v
 
-      do j = 1, 3
-         corner(:, j) = at(j)%f(:at_eta, 1)
-      end do
       call patch_moment_slopes(patch_area, corner, swept, bare)
       part = 0.0_wp
       do v = 1, 3

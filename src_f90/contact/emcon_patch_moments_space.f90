@@ -72,7 +72,8 @@ contains
             part = 0.5_wp*(a(1)*b(2) - a(2)*b(1))
          end associate
          middle = (polygon(:, 1) + polygon(:, k) + polygon(:, k + 1))/3.0_wp
-         weight = [weight_at(area, polygon(:, 1)), (weight_at(area, polygon(:, i)), i = k, k + 1)]
+         weight(1) = weight_at(area, polygon(:, 1))
+         weight(2:) = [(weight_at(area, polygon(:, i)), i = k, k + 1)]
          mean = sum(weight)/3.0_wp
          spread_of(2:) = matmul(polygon(:, [1, k, k + 1]), weight - mean)/12.0_wp
          spread_of(1) = -sum(spread_of(2:))
@@ -81,7 +82,7 @@ contains
       end do
    end subroutine patch_moments
 
-   !> Moments of the common polygon with the products of these functions; weights have no part in it.
+   !> Moments of the common polygon with the products of these functions, without weights.
    pure function patch_products(area, corner) result(product)
       type(patch_area_t), intent(in) :: area
       real(wp), intent(in) :: corner(2, 3)       !! of the triangle, counter-clockwise

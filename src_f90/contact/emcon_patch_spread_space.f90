@@ -12,41 +12,42 @@ module emcon_patch_spread_space
 contains
 
    !> Which nodes of a stencil a gap depends on: those of the slave, and of the vertices it sees.
-   pure function patch_uses(stencil, gap) result(is_used)
+   pure function patch_uses(stencil, vertex) result(is_used)
       type(patch_stencil_t), intent(in) :: stencil
-      type(patch_gap_t), intent(in) :: gap
+      integer, intent(in) :: vertex(:)           !! that it depends on
       logical :: is_used(stencil%n_node)
       integer :: k
 
-      associate (column => columns(gap))
+      associate (column => columns(vertex))
          is_used = [(any(abs(stencil%weight(k, column)) > 0.0_wp), k = 1, stencil%n_node)]
       end associate
       is_used(:stencil%n_slave) = .true.
    end function patch_uses
 
    !> The sums of nodes that a gap depends on.
-   pure function columns(gap) result(column)
-      type(patch_gap_t), intent(in) :: gap
-      integer :: column(2 + gap%n_vertex)
+   pure function columns(vertex) result(column)
+      integer, intent(in) :: vertex(:)
+      integer :: column(2 + size(vertex))
 
-      column = [1, 2, 2 + gap%vertex(:gap%n_vertex)]
+      column = [1, 2, 2 + vertex]
    end function columns
 
-   !> Add `factor` times a gap and its derivatives to a condition.
-   pure subroutine patch_spread(stencil, gap, is_used, factor, place, item)
+   !> Add a gap by `scale` and its derivatives to a condition.
+   pure subroutine patch_spread(stencil, gap, is_used, scale, place, item)
       type(patch_stencil_t), intent(in) :: stencil
       type(patch_gap_t), intent(in) :: gap
       logical, intent(in) :: is_used(:)          !! (n_node of the stencil) of `patch_uses`
-      real(wp), intent(in) :: factor
+      real(wp), intent(in) :: scale              !! > 0, what the value is divided by
       integer, intent(in) :: place(:)            !! (number used) of these nodes in `item`
       type(condition_t), intent(inout) :: item   !! with room for them
       integer :: k
 
-      item%gap0 = item%gap0 + factor*gap%f0
-      item%gap1 = item%gap1 + factor*gap%f1
-      item%dgap = item%dgap + factor*gap%df
+      item%gap0 = item%gap0 + gap%f0/scale
+      item%gap1 = item%gap1 + gap%f1/scale
+      item%dgap = item%dgap + gap%df/scale
       associate (row => pack([(k, k = 2, stencil%n_node)], is_used(2:)))
-         call spread_to_nodes(gap, stencil%weight(row, columns(gap)), factor, place, item)
+         call spread_to_nodes(gap, stencil%weight(row, columns(gap%vertex)), 1.0_wp/scale, place, &
+            item)
       end associate
    end subroutine patch_spread
 

@@ -72,6 +72,7 @@ contains
       if (nearest == 0) return
       normal = frame_normal(sides%frames, frame, sides%frames%base(i), x, u)
       call patch_near_list(near, sides, nearest, normal, x, u)
+      if (.not. any(near%is_listed .and. .not. near%is_beside)) return
       self%deepest = room_behind*sides%triangles%size(near%triangle(nearest)) - distances &
          *near%distance(nearest)/dot_product(near%normal(:, nearest), normal)
       self%triangle = near%triangle(nearest)

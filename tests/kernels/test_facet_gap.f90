@@ -99,7 +99,8 @@ contains
       basis = patch_basis(patch, x, 0.0_wp*x)
       call check_near(error, basis%height(:, 1), area/12.0_wp*(height + sum(height)), tol, 1.0_wp, &
          "of each weight")
-      call check_near(error, basis%cover(:, 0), spread(area/3.0_wp, 1, 3), tol, 1.0_wp, "what is covered")
+      call check_near(error, basis%cover(:, 0), spread(area/3.0_wp, 1, 3), tol, 1.0_wp, &
+         "what is covered")
    end subroutine test_plane
 
    !> The surface ends in a line through the middle of two sides.
@@ -116,11 +117,13 @@ contains
       x(:, 3) = x(:, 1) + [1.0_wp, 2.0_wp, 0.0_wp]
       x(3, 4:) = 0.5_wp
       basis = patch_basis(patch, x, 0.0_wp*x)
-      call check_near(error, basis%cover(:, 1), [7.0_wp, 7.0_wp, 4.0_wp]/12.0_wp, tol, 1.0_wp, "covered")
+      call check_near(error, basis%cover(:, 1), [7.0_wp, 7.0_wp, 4.0_wp]/12.0_wp, tol, &
+         1.0_wp, "covered")
       call check_near(error, basis%height(:, 1), 0.5_wp*basis%cover(:, 1), tol, 1.0_wp, "integrals")
       x(2, :3) = x(2, :3) + 1.0_wp
       basis = patch_basis(patch, x, 0.0_wp*x)
-      call check_near(error, [basis%height, basis%cover], spread(0.0_wp, 1, 12), 0.0_wp, 1.0_wp, "none of it")
+      call check_near(error, [basis%height, basis%cover], spread(0.0_wp, 1, 12), &
+         0.0_wp, 1.0_wp, "none of it")
    end subroutine test_cover
 
    subroutine test_identity(error)

@@ -1,9 +1,11 @@
-!> Contact of nodes in space over stencils of meshes: gaps, identities, momenta, derivatives, ends.
+!> Contact of nodes in space, and mortar, over stencils of meshes: gaps, identities, momenta, derivatives, ends.
 module test_patch_contact
    use check, only : check_near, check_true, test_case_t
    use emcon_constraint, only : condition_t
+   use emcon_contact, only : contact_t
+   use emcon_contact_registry, only : new_contact
    use emcon_errors, only : error_t
-   use emcon_interactions, only : contact_pair_t
+   use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_patch_contact_space, only : patch_contact_init, patch_contact_t
@@ -18,6 +20,9 @@ module test_patch_contact
    real(wp), parameter :: eps = epsilon(1.0_wp)
    !> Some 100 roundings of quantities of size 1, here by the length of a patch, 1/30.
    real(wp), parameter :: tol = 1.0e4_wp*eps
+   !> What closing terms leave out as round-off: 16 epsilon of a field that falls over a twentieth of a
+   !> facet, by the least that is covered, 1/50; of four triangles with multipliers of up to 3.
+   real(wp), parameter :: left_out = 16.0_wp*eps*20.0_wp*50.0_wp*4.0_wp*3.0_wp
    character(len=4), parameter :: kind(2) = ["C3D8", "C3D4"]
 
 contains
@@ -35,16 +40,27 @@ contains
          test_case_t("a corner first: the frame of all its faces", test_corner)]
    end subroutine collect_patch_contact
 
-   !> Two boxes of cells of 1/3, the upper one `gap` above the other and moved by `shift` from it,
-   !> and the contact of the nodes of the upper one.
+   !> The contact of the nodes of the upper one of two boxes.
    subroutine make(name, gap, shift, depth, scene, contact, error)
       character(len=*), intent(in) :: name
       real(wp), intent(in) :: gap, shift(2), depth
       type(scene_t), intent(out) :: scene
       type(patch_contact_t), intent(out) :: contact
       type(error_t), allocatable, intent(out) :: error
-      type(surface_t) :: surface(2), all_of_it
       type(contact_pair_t) :: pair
+
+      call make_boxes(name, gap, shift, depth, scene, pair)
+      call patch_contact_init(contact, scene, pair, error)
+      if (.not. allocated(error)) call contact%suit_steps(.false.)
+   end subroutine make
+
+   !> Two boxes of cells of 1/3, the upper one `gap` above the other and moved by `shift` from it.
+   subroutine make_boxes(name, gap, shift, depth, scene, pair)
+      character(len=*), intent(in) :: name
+      real(wp), intent(in) :: gap, shift(2), depth
+      type(scene_t), intent(out) :: scene
+      type(contact_pair_t), intent(out) :: pair
+      type(surface_t) :: surface(2), all_of_it
       integer :: n
 
       call space_begin(scene)
@@ -62,9 +78,7 @@ contains
       scene%u0 = 0.0_wp
       pair%slave = 1
       pair%master = 2
-      call patch_contact_init(contact, scene, pair, error)
-      if (.not. allocated(error)) call contact%suit_steps(.false.)
-   end subroutine make
+   end subroutine make_boxes
 
    !> Every node of the lower side sees the top; no other node sees anything within reach.
    subroutine test_flat(error)
@@ -97,7 +111,7 @@ contains
 
    !> Begin a step and measure.
    subroutine look(contact, scene, du)
-      type(patch_contact_t), intent(inout) :: contact
+      class(contact_t), intent(inout) :: contact
       type(scene_t), intent(in) :: scene
       real(wp), intent(in), contiguous :: du(:, :)
 
@@ -174,18 +188,22 @@ contains
    end subroutine test_hole
 
    !> A rough scene and a step in which it slides, turns and is bent.
-   subroutine draw(name, size_of, scene, du, contact, error)
-      character(len=*), intent(in) :: name
+   subroutine draw(number, size_of, scene, du, contact, error)
+      integer, intent(in) :: number              !! odd or even, and that of its half, choose kinds
       real(wp), intent(in) :: size_of
       type(scene_t), intent(out) :: scene
       real(wp), allocatable, intent(out) :: du(:, :)
-      type(patch_contact_t), intent(out) :: contact
+      class(contact_t), allocatable, intent(out) :: contact
       type(error_t), allocatable, intent(out) :: error
+      type(contact_pair_t) :: pair
       real(wp) :: turn(3, 3), way(2)
 
       call draw_random(way)
-      call make(name, 0.02_wp, 0.4_wp*way, 0.7_wp, scene, contact, error)
+      call make_boxes(kind(1 + mod(number, 2)), 0.02_wp, 0.4_wp*way, 0.7_wp, scene, pair)
+      pair%formulation = merge(formulation_nts, formulation_mortar, btest(number, 1))
+      call new_contact(scene, pair, contact, error)
       if (allocated(error)) return
+      call contact%suit_steps(.false.)
       allocate(du, mold=scene%x)
       call draw_random(du)
       scene%u0 = 0.03_wp*(2.0_wp*du - 1.0_wp)
@@ -203,7 +221,7 @@ contains
 
    !> The conditions of the nodes that are over the master.
    subroutine evaluate(contact, scene, du, leaves_second, wanted, item)
-      type(patch_contact_t), intent(inout) :: contact
+      class(contact_t), intent(inout) :: contact
       type(scene_t), intent(in) :: scene
       real(wp), intent(in), contiguous :: du(:, :)
       logical, intent(in) :: leaves_second
@@ -218,7 +236,7 @@ contains
 
    !> Those that are over the master at either end.
    function seen(contact) result(wanted)
-      type(patch_contact_t), intent(in) :: contact
+      class(contact_t), intent(in) :: contact
       integer, allocatable :: wanted(:)
       integer :: i
 
@@ -228,14 +246,14 @@ contains
    subroutine test_identity(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
-      type(patch_contact_t) :: contact
+      class(contact_t), allocatable :: contact
       type(condition_t), allocatable :: item(:)
       real(wp), allocatable :: du(:, :)
       real(wp) :: work, total(3), moment(3), magnitude
       integer :: i, j, k, a
 
-      do k = 1, 24
-         call draw(kind(1 + mod(k, 2)), 0.3_wp*0.3_wp**(k/2), scene, du, contact, error)
+      do k = 1, 48
+         call draw(k, 0.3_wp*0.3_wp**(k/4), scene, du, contact, error)
          if (allocated(error)) return
          call look(contact, scene, du)
          call evaluate(contact, scene, du, .true., seen(contact), item)
@@ -256,7 +274,8 @@ contains
                end associate
             end do
             call check_near(error, work, item(i)%dgap, tol, magnitude*maxval(abs(du)), "identity")
-            call check_near(error, item(i)%gap0 + item(i)%dgap, item(i)%gap1, tol, 1.0_wp, "ends")
+            call check_near(error, item(i)%gap0 + item(i)%dgap, item(i)%gap1, left_out, 1.0_wp, &
+               "ends")
             call check_near(error, [total, moment], [(0.0_wp, j = 1, 6)], tol, magnitude, "momenta")
          end do
       end do
@@ -267,7 +286,7 @@ contains
    subroutine test_derivatives(error)
       type(error_t), allocatable, intent(out) :: error
       type(scene_t) :: scene
-      type(patch_contact_t) :: contact
+      class(contact_t), allocatable :: contact
       type(condition_t), allocatable :: item(:), up(:), down(:)
       real(wp), allocatable :: du(:, :), way(:, :)
       real(wp) :: step, bound
@@ -276,7 +295,7 @@ contains
       step = 0.1_wp*eps**(1.0_wp/3.0_wp)
       bound = 1.0e6_wp*step**2
       do k = 1, 8
-         call draw(kind(1 + mod(k, 2)), 0.1_wp, scene, du, contact, error)
+         call draw(k, 0.1_wp, scene, du, contact, error)
          if (allocated(error)) return
          call look(contact, scene, du)
          way = 0.0_wp*du

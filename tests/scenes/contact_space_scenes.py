@@ -138,6 +138,16 @@ def slide(h: float, until: float, hill: bool, options: str = "") -> str:
             + "*BOUNDARY\nFLOOR, 1, 3\n" + dynamic(h, until, "*DLOAD\nB1, GRAV, 10., 0., 0., -1.\n"))
 
 
+def over_the_end(h: float, until: float, options: str = "", more: str = "") -> str:
+    """A block that slides off a plate under its weight, tips over the end and falls."""
+    one = Block("C3D8", (3, 2, 1), size=(1.5, 1.0, 0.5), place=lambda x: x + np.array([1.0, 0.27, 0.001]))
+    two = Block("C3D8", (4, 3, 1), size=(3.0, 1.6, 0.5), place=lambda x: x - np.array([0.0, 0.0, 0.5]))
+    n = len(one.x)
+    return (bodies([one, two], [faces(one, 2, 0), faces(two, 2, 1)], "*HYPERELASTIC, NEO HOOKE\n200., 1e-2\n*DENSITY\n1.\n")
+            + pair(options) + velocities(one, (3.0, 0.2, 0.0), (0., 0., 0.)) + f"*NSET, NSET=FLOOR, GENERATE\n{n + 1}, {n + len(two.x)}\n"
+            + "*BOUNDARY\nFLOOR, 1, 3\n" + dynamic(h, until, "*DLOAD\nB1, GRAV, 10., 0., 0., -1.\n" + more))
+
+
 def dent(angle: float) -> str:
     """A cube that is pressed into a valley of two planes, its middle node over the fold; it finds rest in the dent."""
     lean = float(np.tan(0.5*angle))

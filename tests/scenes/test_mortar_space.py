@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from contact_space_scenes import impact, press, slide, stack, turned
+from contact_space_scenes import impact, over_the_end, press, slide, stack, turned
 from test_contact_space import BALANCE, check_impact, moments, ran, scaled
 
 MORTAR = ", TYPE=MORTAR"
@@ -41,14 +41,14 @@ def test_uniform_pressure(cells: list[tuple[int, int, int]], kind: list[str], is
     assert run.history["newton"].max() <= 8
 
 
-@pytest.mark.parametrize(("first", "second"), [("C3D8", "C3D8"), ("C3D4", "C3D8"), ("C3D8", "C3D4"), ("C3D4", "C3D20R")])
+@pytest.mark.parametrize(("first", "second"), [("C3D4", "C3D8"), ("C3D8", "C3D4"), ("C3D4", "C3D20R")])
 def test_a_ball_bounces_off_a_plate(first: str, second: str, tmp_path: Path) -> None:
     check_impact(ran(tmp_path, impact(first, second, options=MORTAR)), GUARDED)
 
 
 def test_newton_is_quadratic(tmp_path: Path) -> None:
     """Residuals of steps with contact: each about the square of the one before, or round-off."""
-    run = ran(tmp_path, impact("C3D4", "C3D8", "*NEWTON, TYPE=FULL\n", options=MORTAR, cells=4))
+    run = ran(tmp_path, impact("C3D4", "C3D8", "*NEWTON, TYPE=FULL\n", options=MORTAR, cells=3))
     n = 0
     for row, active in zip(run.increments, run.history["active"][1:], strict=True):
         residuals = [float(word) for word in row[-1].split()[9:]]
@@ -60,10 +60,9 @@ def test_newton_is_quadratic(tmp_path: Path) -> None:
     assert n > 10
 
 
-@pytest.mark.parametrize(("cells", "angle"), [
-    ([(2, 2, 2), (2, 2, 2)], 0.0), ([(2, 2, 2), (3, 3, 3)], 0.0), ([(2, 2, 2), (2, 2, 2)], 0.1),
-    ([(2, 2, 2), (3, 3, 3)], 0.3)])
-@pytest.mark.parametrize("kind", ["C3D8", "C3D4"])
+@pytest.mark.parametrize(("kind", "cells", "angle"), [
+    ("C3D8", [(2, 2, 2), (2, 2, 2)], 0.0), ("C3D4", [(2, 2, 2), (3, 3, 3)], 0.0), ("C3D4", [(2, 2, 2), (2, 2, 2)], 0.1),
+    ("C3D8", [(2, 2, 2), (3, 3, 3)], 0.3)])
 def test_cubes_fall_on_cubes(kind: str, cells: list[tuple[int, int, int]], angle: float, tmp_path: Path) -> None:
     """Meshes that match, or do not, with outlines in one plane: flat, and on an edge first."""
     check_impact(ran(tmp_path, stack(cells, 0.03, angle, kind=kind, options=MORTAR)), 2.0e-3)
@@ -80,6 +79,16 @@ def test_sliding_over_facets(is_hill: bool, tmp_path: Path) -> None:
     assert run.fields()["displacement"][-1, 0, 0] > 0.35*4.0*1.2
 
 
+def test_off_the_end(tmp_path: Path) -> None:
+    """Vertices are let go as their faces leave the plate: nothing is lost, no step is cut."""
+    run = ran(tmp_path, over_the_end(0.02, 0.9, MORTAR))
+    assert run.verdict["verdict"] == "good"
+    assert run.verdict["largest_energy_error"] <= 1.0e-13*run.verdict["largest_energy"]
+    assert run.history["cuts"].sum() == 0
+    assert run.history["active"].max() >= 9
+    assert run.history["active"][-1] == 0
+
+
 @pytest.mark.parametrize("more", [
     "*CONTACT INITIATION, TYPE=PERSISTENT\n", "*CONTACT INITIATION, TYPE=MASSLESS\n",
     "*CONTACT INITIATION, TYPE=ADMISSIBLE\n", "*CONTACT INITIATION, TYPE=VELOCITY UPDATE\n",
@@ -87,7 +96,7 @@ def test_sliding_over_facets(is_hill: bool, tmp_path: Path) -> None:
     "*MORTAR, MULTIPLIER=STANDARD\n"])
 def test_ways_to_hold(more: str, tmp_path: Path) -> None:
     """Energy and momenta through all of them."""
-    run = ran(tmp_path, stack([(2, 2, 1), (3, 3, 1)], 0.03, 0.05, options=MORTAR, more=more))
+    run = ran(tmp_path, stack([(1, 1, 1), (2, 2, 1)], 0.03, 0.05, options=MORTAR, more=more))
     history = run.history
     assert run.verdict["verdict"] == "good"
     if "ADMISSIBLE" in more:                     # what is stopped loses a part
@@ -95,14 +104,14 @@ def test_ways_to_hold(more: str, tmp_path: Path) -> None:
     else:
         assert np.ptp(history["total"]) <= BALANCE*history["total"].max()
     p, angular = moments(run, "px py pz"), moments(run, "lx ly lz")
-    assert history["active"].max() >= 6
+    assert history["active"].max() >= 2
     assert np.abs(p - p[0]).max() <= BALANCE*np.abs(p).max()
     assert np.abs(angular - angular[0]).max() <= BALANCE*np.abs(p).max()
 
 
 def test_momenta_of_explicit_steps(tmp_path: Path) -> None:
-    text = stack([(2, 2, 1), (3, 3, 1)], 0.03, 0.05, options=MORTAR)
-    run = ran(tmp_path, text.replace("*DYNAMIC, DIRECT\n0.02, 0.6", "*DYNAMIC, DIRECT, EXPLICIT\n0.004, 0.3"))
+    text = stack([(1, 1, 1), (2, 2, 1)], 0.01, 0.05, options=MORTAR)
+    run = ran(tmp_path, text.replace("*DYNAMIC, DIRECT\n0.02, 0.6", "*DYNAMIC, DIRECT, EXPLICIT\n0.004, 0.12"))
     p, angular = moments(run, "px py pz"), moments(run, "lx ly lz")
     assert run.history["active"].max() > 0
     assert np.abs(p - p[0]).max() <= BALANCE*np.abs(p).max()
@@ -120,7 +129,7 @@ def test_pressure_by_the_overclosure(is_whole: bool, tmp_path: Path) -> None:
 
 def test_bits_do_not_depend_on_units(tmp_path: Path) -> None:
     """In a unit of length and time 1024 times smaller: the same velocities."""
-    text = stack([(2, 2, 1), (3, 3, 1)], 0.03, 0.1, options=MORTAR).replace("*NODE FILE\nU\n", "*NODE FILE\nU, V\n")
+    text = stack([(1, 1, 1), (2, 2, 1)], 0.03, 0.1, options=MORTAR).replace("*NODE FILE\nU\n", "*NODE FILE\nU, V\n")
     found = []
     for power in (0, 10):
         folder = tmp_path/str(power)
