@@ -5,19 +5,20 @@
 !> master: smooth while the node slides over sides and corners. Source: docs/theory.md, section 15.
 module emcon_patch_contact_space
    use emcon_bulges_space, only : bulges_find, bulges_largest, bulges_t
-   use emcon_condition_nodes, only : condition_resize
+   use emcon_condition_nodes, only : condition_resize, condition_resize_slip
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
    use emcon_contact_law_registry, only : contact_laws_of_surface
-   use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_errors, only : err_input, error_t, raise
    use emcon_facet_values, only : facets_point_area, facets_pressures
    use emcon_facets, only : facets_init
+   use emcon_frame_slip_space, only : frame_slip, frame_slip_t
    use emcon_guards, only : crossing_bar, overlap_bar
    use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach, &
       pair_has_order
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
+   use emcon_node_sums, only : node_sums_first, node_sums_second
    use emcon_patch_gap_space, only : patch_gap, patch_gap_t, patch_look, patch_look_t
    use emcon_patch_sides_space, only : frame_normal, point_frames_init, patch_sides_t, &
       patch_triangles_init
@@ -59,6 +60,7 @@ module emcon_patch_contact_space
       procedure :: begin_points => patch_begin_step
       procedure :: measure_points => patch_measure
       procedure :: evaluate_points => patch_evaluate
+      procedure :: slip_points => patch_slip
       procedure :: area_points => patch_area
       procedure :: pressures => patch_pressures
       procedure :: share => patch_share
@@ -312,6 +314,8 @@ contains
          column(:n) = [1, 2, 2 + gap%vertex(:gap%n_vertex)]
          is_used = [(any(abs(stencil%weight(k, column(:n))) > 0.0_wp), k = 1, stencil%n_node)]
          is_used(:stencil%n_slave) = .true.
+         if (item%has_friction) is_used = is_used .or. [(any(abs(stencil%weight(k, &
+            2 + stencil%corner)) > 0.0_wp), k = 1, stencil%n_node)]
          call condition_resize(item, count(is_used), size(x, 1))
          item%node(:item%n_node) = pack(stencil%node(:stencil%n_node), is_used)
          item%n_slave = stencil%n_slave
@@ -320,59 +324,74 @@ contains
          item%gap0 = gap%f0/self%scale(i)
          item%gap1 = gap%f1/self%scale(i)
          item%dgap = gap%df/self%scale(i)
-         associate (row => pack([(k, k = 2, stencil%n_node)], is_used(2:)))
-            call spread_to_nodes(gap, stencil%weight(row, column(:n)), 1.0_wp/self%scale(i), item)
+         associate (row => pack([(k, k = 2, stencil%n_node)], is_used(2:)), &
+               factor => 1.0_wp/self%scale(i))
+            associate (weight => stencil%weight(row, column(:n)))
+               call node_sums_first(gap%g, weight, factor, item%g(:, :item%n_node))
+               call node_sums_first(gap%c, weight, factor, item%c(:, :item%n_node))
+               if (.not. item%leaves_second) call node_sums_second(gap%h, weight, factor, &
+                  item%n_node, item%h)
+            end associate
+            if (item%has_friction) call add_slip(stencil, row, at, way, item)
          end associate
       end associate
    end subroutine evaluate_frame
 
-   !> Derivatives by nodes from those by sums of nodes.
-   pure subroutine spread_to_nodes(gap, weight, factor, item)
-      type(patch_gap_t), intent(in) :: gap
-      real(wp), intent(in) :: weight(:, :)       !! (n_node - 1, 2 + n_vertex) of nodes in the sums
-      real(wp), intent(in) :: factor
-      type(condition_t), intent(inout) :: item
-      real(wp), allocatable :: half(:, :), full(:, :)
-      integer :: i, j, k, n
+   !> Slip over the triangle that was nearest as the step began.
+   pure type(frame_slip_t) function slip_over(stencil, at, way, leaves_second) result(slip)
+      type(patch_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of the stencil [L]
+      logical, intent(in) :: leaves_second
 
-      n = item%n_node
-      associate (in_order => [(k, k = 1, n)], n_dim => size(item%g, 1))
-         item%g(:, :n) = 0.0_wp
-         item%c(:, :n) = 0.0_wp
-         call nodes_add_first(factor, of_nodes(gap%g), in_order, item%g)
-         call nodes_add_first(factor, of_nodes(gap%c), in_order, item%c)
-         if (item%leaves_second) return
-         associate (m => size(gap%g))
-            allocate(half(n_dim*(n - 1), m), full(n_dim*(n - 1), n_dim*(n - 1)))
-            do k = 1, m
-               half(:, k) = of_nodes(gap%h(:, k))
-            end do
-            full = 0.0_wp
-            do j = 1, size(weight, 2)
-               do i = 1, n - 1
-                  if (.not. abs(weight(i, j)) > 0.0_wp) cycle
-                  associate (to => full(:, n_dim*(i - 1) + 1:n_dim*i))
-                     to = to + weight(i, j)*half(:, n_dim*(j - 1) + 1:n_dim*j)
-                  end associate
-               end do
-            end do
-         end associate
-         item%h(:n_dim*n, :n_dim*n) = 0.0_wp
-         call nodes_add_second(factor, n_dim, full, in_order, item%h)
+      ! The point is where the stencil counts from. Its own frame tells directions, so that these
+      ! turn with it, and not from triangle to triangle.
+      associate (place => [3 + stencil%corner, 1])
+         call frame_slip(at(:, place), way(:, place), at(:, 2), leaves_second, slip)
       end associate
+   end function slip_over
 
-   contains
+   !> Slip with its derivatives.
+   pure subroutine add_slip(stencil, row, at, way, item)
+      type(patch_stencil_t), intent(in) :: stencil
+      integer, intent(in) :: row(:)              !! nodes of the stencil in the condition, but 1
+      real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of the stencil [L]
+      type(condition_t), intent(inout) :: item   !! with all of these nodes
+      type(frame_slip_t) :: slip
+      real(wp) :: weight(size(row), 3)
+      integer :: s
 
-      !> The components of each node but the first.
-      pure function of_nodes(part) result(nodes)
-         real(wp), intent(in) :: part(:)         !! components of each sum
-         real(wp) :: nodes(size(item%g, 1)*size(weight, 1))
+      slip = slip_over(stencil, at, way, item%leaves_second)
+      call condition_resize_slip(item)
+      ! Of nodes in both sides of the triangle, and in the way from its corner to the point.
+      associate (by => stencil%weight(row, 2 + stencil%corner), n => item%n_node)
+         weight(:, 1) = by(:, 2) - by(:, 1)
+         weight(:, 2) = by(:, 3) - by(:, 1)
+         weight(:, 3) = -by(:, 1)
+         item%slip(:size(slip%f)) = slip%f
+         do s = 1, size(slip%f)
+            call node_sums_first(slip%g(:, s), weight, 1.0_wp, item%t(:, :n, s))
+            call node_sums_first(slip%c(:, s), weight, 1.0_wp, item%t1(:, :n, s))
+            if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), weight, 1.0_wp, n, &
+               item%ht(:, :, s))
+         end do
+      end associate
+   end subroutine add_slip
 
-         nodes = reshape(matmul(reshape(part, [size(item%g, 1), size(weight, 2)]), &
-            transpose(weight)), shape(nodes))
-      end function of_nodes
+   !> As `contact_t` has it.
+   pure function patch_slip(self, i, x, u0, du) result(slip)
+      class(patch_contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      real(wp) :: slip(size(x, 1) - 1)           !! [L]
+      real(wp), dimension(3, 3 + self%stencil(i)%patch%n_vertex) :: at, way
+      type(frame_slip_t) :: over
 
-   end subroutine spread_to_nodes
+      slip = 0.0_wp
+      if (self%stencil(i)%triangle == 0) return
+      call patch_stencil_gather(self%stencil(i), x, u0, du, at, way)
+      over = slip_over(self%stencil(i), at, way, .true.)
+      slip = over%f
+   end function patch_slip
 
    !> As `contact_t` has it: what of the facets at its point faces along each frame. At the corner
    !> of a body each face is that of its own frame alone.
