@@ -139,14 +139,14 @@ contains
    end subroutine find_targets
 
    !> Where slip has a direction, what acts is led to no slip before the step is solved: friction is
-   !> to be against the slip of the whole step, not that of its end. Those that a solved step stops or
-   !> turns back are, and the step is to be solved again: `leads` if there are some.
+   !> to be against the slip of the whole step, not that of its end. Those that a solved step stops
+   !> or turns back are, and the step is to be solved again.
    subroutine friction_look_back(self, system, set, motion, leads)
       type(friction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set  !! of the step, solved
       type(motion_t), intent(in) :: motion
-      logical, intent(out) :: leads
+      logical, intent(out) :: leads              !! there are some
       real(wp) :: du(size(motion%du, 1), size(motion%du, 2)), to_stop(most_slips)
       integer :: i, k, pair
 

@@ -1,6 +1,7 @@
 !> From derivatives by sums of nodes to those by the nodes.
 !>
-!> The sums are of places from the first node on: derivatives by that are minus the sum of the others.
+!> The sums are of places from the first node on: derivatives by that are minus the sum of the
+!> others.
 module emcon_node_sums
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_kinds, only : wp
@@ -14,7 +15,7 @@ contains
    pure subroutine node_sums_first(part, weight, factor, of_node)
       real(wp), intent(in) :: part(:)            !! by the components of each sum
       real(wp), intent(in) :: weight(:, :)       !! (n_node - 1, sums) of nodes in the sums
-      real(wp), intent(in) :: factor
+      real(wp), intent(in) :: factor             !! of what is asked for
       real(wp), intent(out) :: of_node(:, :)     !! (n_dim, n_node)
       integer :: k
 
@@ -28,7 +29,7 @@ contains
    pure subroutine node_sums_second(part, weight, factor, n, of_node)
       real(wp), intent(in) :: part(:, :)         !! by the components of the sums, twice
       real(wp), intent(in) :: weight(:, :)       !! (n_node - 1, sums) of nodes in the sums
-      real(wp), intent(in) :: factor
+      real(wp), intent(in) :: factor             !! of what is asked for
       integer, intent(in) :: n                   !! n_node
       real(wp), intent(inout) :: of_node(:, :)   !! (>= n_dim n_node, the same)
       real(wp), allocatable :: half(:, :), full(:, :)

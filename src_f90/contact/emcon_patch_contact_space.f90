@@ -371,8 +371,8 @@ contains
          do s = 1, size(slip%f)
             call node_sums_first(slip%g(:, s), weight, 1.0_wp, item%t(:, :n, s))
             call node_sums_first(slip%c(:, s), weight, 1.0_wp, item%t1(:, :n, s))
-            if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), weight, 1.0_wp, n, &
-               item%ht(:, :, s))
+            if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), weight, 1.0_wp, &
+               n, item%ht(:, :, s))
          end do
       end associate
    end subroutine add_slip

@@ -1,8 +1,8 @@
 !> Slip of a point along a wall in space over a step: two numbers.
 !>
 !> The point in the vectors of the wall is three dot products; their changes along two directions
-!> that touch the wall half way are slip. So rigid turns of wall and point together are none, and its
-!> forces have no resultant and no moment. Source: docs/theory.md, section 15.4.
+!> that touch the wall half way are slip. So rigid turns of wall and point together are none, and
+!> its forces have no resultant and no moment. Source: docs/theory.md, section 15.2.
 module emcon_wall_slip_space
    use emcon_dgrad9, only : dg_dot, dg_t, difference, operator(*)
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
