@@ -31,12 +31,14 @@ module emcon_contact_candidates
 
 contains
 
-   !> Are there too many candidates for a problem of all of them?
+   !> Are there too many candidates for a problem of all of them? Where slip has a direction nothing
+   !> else finds it, however many there are.
    pure logical function candidates_are_many(self)
       type(active_set_t), intent(in) :: self
 
       candidates_are_many = self%rules%has_impacts .and. &
-         count(self%candidates%takes_part) > most_condensed
+         count(self%candidates%takes_part) > most_condensed .and. &
+         .not. (self%friction%is_on .and. self%friction%n_slip > 1)
    end function candidates_are_many
 
    !> All candidates act for now, and hold their slips.

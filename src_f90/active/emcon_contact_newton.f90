@@ -404,7 +404,7 @@ contains
          call lay_out(self, set)
          self%push = 0.0_wp
          if (level > 0) call soften(self, softer(level))
-         call contact_problem_solve(self%problem, self%push, effort, is_solved)
+         call contact_problem_solve(self%problem, self%push, effort, is_solved, .true.)
          if (is_solved) exit
       end do
       self%least_soft = min(level, 1)

@@ -15,6 +15,7 @@ module emcon_contact_rounds
    use emcon_contact_support, only : contact_support_forget
    use emcon_coulomb_law, only : contact_open, coulomb_t
    use emcon_errors, only : error_t
+   use emcon_friction, only : friction_look_back
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_newton, only : newton_converged, newton_early, newton_measure_forces, &
@@ -39,6 +40,7 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
+      logical :: leads
 
       call candidates_clear(self%candidates)
       if (self%penalty%is_on) then
@@ -50,7 +52,13 @@ contains
          return
       end if
       call contact_sets_solve(self, system, scene, newton, motion, status, error)
-      if (self%candidates%is_settled .or. allocated(error)) return
+      if (allocated(error)) return
+      if (self%candidates%is_settled) then
+         leads = .false.
+         if (status == step_done) call friction_look_back(self%friction, system, self%set, motion, &
+            leads)
+         if (.not. leads) return
+      end if
       if (size(system%contact) == 0) return
       if (status == newton_refused .and. newton%n_solve == 0) return    ! nor are there forces below
       if (self%support%is_needed) then
@@ -103,6 +111,7 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       type(coulomb_t), allocatable :: law(:)     ! (contacts of the set)
+      logical :: leads
       integer :: i
 
       newton%looks_early = .false.
@@ -136,7 +145,10 @@ contains
          call finish(self, system, newton, motion, error)
          if (allocated(error)) return
          call candidates_look(self, system, motion, status)
-         if (status /= step_done .or. .not. self%candidates%have_changed) return
+         if (status /= step_done) return
+         if (self%candidates%have_changed) cycle
+         call friction_look_back(self%friction, system, self%set, motion, leads)
+         if (.not. leads) return
       end do
       status = step_cycling
    end subroutine solve_with_all

@@ -4,7 +4,7 @@
 !> on is found in emcon_contact_newton. Source: docs/theory.md, section 4.13.
 module emcon_friction
    use emcon_constraint, only : condition_friction, condition_normal, condition_t, most_slips
-   use emcon_constraints, only : constraint_set_t, constraints_stick
+   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_stick
    use emcon_contact, only : contact_t
    use emcon_contact_law, only : contact_laws_add
    use emcon_convergence, only : round_off
@@ -20,7 +20,7 @@ module emcon_friction
    private
    public :: friction_t, friction_init, friction_begin, friction_select, friction_keep, &
       friction_close, friction_turn, friction_use, friction_missed, friction_holds, &
-      friction_stiffness
+      friction_look_back, friction_stiffness
 
    !> So much of the friction of a contact may act on another node than its push, and a step is
    !> solved again so often at most for more.
@@ -112,8 +112,8 @@ contains
       self%n_lagged = 0
       self%law%mu = self%mu
       call leave_still(self, system, motion)
-      if (.not. evaluation_is_equilibrium(motion%evaluation)) call find_targets(self, system, &
-         motion, was_active)
+      if (.not. evaluation_is_equilibrium(motion%evaluation) .and. .not. self%n_slip > 1) &
+         call find_targets(self, system, motion, was_active)
    end subroutine friction_begin
 
    !> The slips of what acted, as `friction_begin` has it.
@@ -137,6 +137,37 @@ contains
          end associate
       end do
    end subroutine find_targets
+
+   !> Where slip has a direction, what acts is led to no slip before the step is solved: friction is
+   !> to be against the slip of the whole step, not that of its end. Those that a solved step stops
+   !> or turns back are, and the step is to be solved again.
+   subroutine friction_look_back(self, system, set, motion, leads)
+      type(friction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set  !! of the step, solved
+      type(motion_t), intent(in) :: motion
+      logical, intent(out) :: leads              !! there are some
+      real(wp) :: du(size(motion%du, 1), size(motion%du, 2)), to_stop(most_slips)
+      integer :: i, k, pair
+
+      leads = .false.
+      if (.not. (self%is_on .and. self%n_slip > 1)) return
+      if (evaluation_is_equilibrium(motion%evaluation)) return
+      du = evaluation_displacement(motion%evaluation, motion%v0, 0.0_wp)
+      do k = set%n_permanent + 1, set%n
+         call constraint_index(system, set%id(k), pair, i)
+         associate (contact => system%contact(pair)%contact, law => self%law(set%id(k)), &
+               slip => set%item(k)%slip)
+            if (.not. law%mu > 0.0_wp .or. any(abs(law%slip_to_stop) > 0.0_wp)) cycle
+            to_stop = 0.0_wp
+            to_stop(:self%n_slip) = contact%slip(i, motion%x, motion%u0, du)
+            ! Of what sticks slip is round-off.
+            if (.not. law%holds_slip() .and. dot_product(slip - to_stop, slip) > 0.0_wp) cycle
+            call law%leads_to(to_stop(:self%n_slip), slip_rounding*contact%state(i)%size)
+            leads = leads .or. any(abs(law%slip_target) > 0.0_wp)
+         end associate
+      end do
+   end subroutine friction_look_back
 
    !> Contacts whose slave node is held in some direction, and which nothing that is free to move
    !> makes slide, as on a line of symmetry, do not rub: any friction would satisfy the law there,
@@ -243,7 +274,8 @@ contains
       associate (law => self%law(system%first_constraint(pair) + i), &
             contact => system%contact(pair)%contact)
          if (.not. law%mu > 0.0_wp) return
-         if (is_new .and. .not. evaluation_is_equilibrium(motion%evaluation)) then
+         if (is_new .and. .not. (evaluation_is_equilibrium(motion%evaluation) &
+            .or. self%n_slip > 1)) then
             call law%leads_to(contact%slip(i, motion%x, motion%u0, evaluation_displacement( &
                motion%evaluation, motion%v0, 0.0_wp)), slip_rounding*contact%state(i)%size)
          end if

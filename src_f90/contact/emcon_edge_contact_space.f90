@@ -4,13 +4,13 @@
 !> other. Which edge it crosses is chosen once per step. Source: docs/theory.md, section 15, after
 !> eq. (51).
 module emcon_edge_contact_space
-   use emcon_condition_nodes, only : condition_resize
+   use emcon_condition_nodes, only : condition_resize, condition_resize_slip
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_csr, only : csr_list_users
    use emcon_edge_pair_space, only : crossing_t, edge_crossing, edge_pair_gap, edge_pair_gap_t, &
-      n_edge_pair_node
+      edge_pair_slip, edge_pair_slip_t, n_edge_pair_node
    use emcon_guards, only : crossing_bar
    use emcon_interactions, only : contact_damping_t, contact_options_t, contact_pair_t, &
       interaction_reach, interaction_t
@@ -58,6 +58,7 @@ module emcon_edge_contact_space
       procedure :: begin_points => edge_begin_step
       procedure :: measure_points => edge_measure
       procedure :: evaluate_points => edge_evaluate
+      procedure :: slip_points => edge_slip
       procedure :: area_points => edge_area
       procedure :: lets_in => edge_lets_in
    end type edge_contact_t
@@ -374,9 +375,49 @@ contains
             item(k)%c(:, :n_edge_pair_node) = gap%c(:, order)
             if (.not. item(k)%leaves_second) item(k)%h(:size(place), :size(place)) = &
                gap%h(place, place)
+            if (item(k)%has_friction) call add_slip(at, way, order, place, item(k))
          end associate
       end do
    end subroutine edge_evaluate
+
+   !> Slip of a crossing with its derivatives.
+   pure subroutine add_slip(at, way, order, place, item)
+      real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 4) of the ends [L]
+      integer, intent(in) :: order(:), place(:)  !! of nodes and coordinates in the condition
+      type(condition_t), intent(inout) :: item   !! with its nodes
+      type(edge_pair_slip_t) :: slip
+      integer :: s
+
+      call edge_pair_slip(at, way, item%leaves_second, slip)
+      call condition_resize_slip(item)
+      item%slip(:size(slip%f)) = slip%f
+      do s = 1, size(slip%f)
+         item%t(:, :n_edge_pair_node, s) = slip%g(:, order, s)
+         item%t1(:, :n_edge_pair_node, s) = slip%c(:, order, s)
+         if (.not. item%leaves_second) item%ht(:size(place), :size(place), s) = slip%h(place, &
+            place, s)
+      end do
+   end subroutine add_slip
+
+   !> As `contact_t` has it.
+   pure function edge_slip(self, i, x, u0, du) result(slip)
+      class(edge_contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      real(wp) :: slip(size(x, 1) - 1)           !! [L]
+      real(wp), dimension(3, n_edge_pair_node) :: at, way, still
+      type(edge_pair_slip_t) :: over
+
+      slip = 0.0_wp
+      still = 0.0_wp
+      associate (edge => 1 + (i - 1)/n_class, stencil => self%stencil(i))
+         if (stencil%master == 0) return
+         call gather(self, edge, stencil, x, u0, still, at)
+         call gather_motion(self, edge, stencil, du, way)
+      end associate
+      call edge_pair_slip(at, way, .true., over)
+      slip = over%f
+   end function edge_slip
 
    !> Edges touch in points: laws by pressure get a quarter of the square of the edge.
    pure subroutine edge_area(self, x, u, area, length)

@@ -1,15 +1,18 @@
 !> Two straight edges that cross: how far apart they are along their common normal, over a step.
 !>
 !> With the edges as the two vectors of a frame this is the height of the second edge in it, and the
-!> places of the crossing are the affine coordinates. Source: docs/theory.md, section 15, eq. (51).
+!> places of the crossing are the affine coordinates; slip is how these change. Source:
+!> docs/theory.md, section 15, eq. (51), and section 15.3.
 module emcon_edge_pair_space
+   use emcon_frame_slip_space, only : frame_slip, frame_slip_t
    use emcon_frame_vertex_space, only : at_eta, at_height, at_xi, frame_place, frame_vertex, &
       frame_vertex_t
    use emcon_kinds, only : wp
    use emcon_rotation, only : cross_product
    implicit none
    private
-   public :: crossing_t, edge_crossing, edge_pair_gap, edge_pair_gap_t
+   public :: crossing_t, edge_crossing, edge_pair_gap, edge_pair_gap_t, edge_pair_slip, &
+      edge_pair_slip_t
 
    integer, parameter, public :: n_edge_pair_node = 4
    integer, parameter :: n_dim = 3, n_coordinate = n_dim*n_edge_pair_node
@@ -33,6 +36,14 @@ module emcon_edge_pair_space
       !> (i, j) derivative of g(i) by end coordinate j, node by node; 0 if not asked for [1/L]
       real(wp) :: h(n_coordinate, n_coordinate) = 0.0_wp
    end type edge_pair_gap_t
+
+   !> Slip of the slave along the master.
+   type :: edge_pair_slip_t
+      real(wp) :: f(2) = 0.0_wp                  !! over the step [L]
+      real(wp) :: g(n_dim, n_edge_pair_node, 2) = 0.0_wp   !! as of the gap
+      real(wp) :: c(n_dim, n_edge_pair_node, 2) = 0.0_wp
+      real(wp) :: h(n_coordinate, n_coordinate, 2) = 0.0_wp
+   end type edge_pair_slip_t
 
 contains
 
@@ -59,35 +70,75 @@ contains
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(edge_pair_gap_t), intent(out) :: gap
       type(frame_vertex_t) :: vertex
-      real(wp), dimension(n_dim, n_edge_pair_node) :: tip, dtip
-      integer :: i, j, k, l
 
-      tip(:, 1) = 0.0_wp
-      dtip(:, 1) = 0.0_wp
-      tip(:, 2:) = matmul(at, real(weight, wp))
-      dtip(:, 2:) = matmul(way, real(weight, wp))
-      call frame_vertex(tip, dtip, leaves_second, vertex)
+      call frame_vertex(tips_of(at), tips_of(way), leaves_second, vertex)
       gap%gap = side*vertex%f(at_height, :)
       gap%dgap = side*vertex%df(at_height)
-      associate (own => side*reshape(vertex%g(:, at_height), [n_dim, 3]), &
-            own_end => side*reshape(vertex%c(:, at_height), [n_dim, 3]), w => real(weight, wp))
-         gap%g = matmul(own, transpose(w))
-         gap%c = matmul(own_end, transpose(w))
-         if (leaves_second) return
+      call first_to_nodes(side, vertex%g(:, at_height), gap%g)
+      call first_to_nodes(side, vertex%c(:, at_height), gap%c)
+      if (.not. leaves_second) call second_to_nodes(side, vertex%h(:, :, at_height), gap%h)
+   end subroutine edge_pair_gap
+
+   !> Slip over a step along two directions in the plane of both edges, the first one along that of
+   !> the slave as the step begins: the master goes by as much the other way.
+   pure subroutine edge_pair_slip(at, way, leaves_second, slip)
+      real(wp), intent(in) :: at(n_dim, n_edge_pair_node)    !! where the ends start [L]
+      real(wp), intent(in) :: way(n_dim, n_edge_pair_node)   !! how they move [L]
+      logical, intent(in) :: leaves_second       !! no second derivatives
+      type(edge_pair_slip_t), intent(out) :: slip
+      type(frame_slip_t) :: over
+      integer :: k
+
+      call frame_slip(tips_of(at), tips_of(way), at(:, 2) - at(:, 1), leaves_second, over)
+      slip%f = -over%f
+      do k = 1, size(over%f)
+         call first_to_nodes(-1.0_wp, over%g(:, k), slip%g(:, :, k))
+         call first_to_nodes(-1.0_wp, over%c(:, k), slip%c(:, :, k))
+         if (.not. leaves_second) call second_to_nodes(-1.0_wp, over%h(:, :, k), slip%h(:, :, k))
+      end do
+   end subroutine edge_pair_slip
+
+   !> Origin and tips of the vectors of the frame, from those of the nodes.
+   pure function tips_of(at) result(tip)
+      real(wp), intent(in) :: at(n_dim, n_edge_pair_node)
+      real(wp) :: tip(n_dim, 4)
+
+      tip(:, 1) = 0.0_wp
+      tip(:, 2:) = matmul(at, real(weight, wp))
+   end function tips_of
+
+   !> `factor` times derivatives by the vectors of the frame as derivatives by the nodes.
+   pure subroutine first_to_nodes(factor, part, of_node)
+      real(wp), intent(in) :: factor
+      real(wp), intent(in) :: part(:)            !! (9)
+      real(wp), intent(out) :: of_node(n_dim, n_edge_pair_node)
+
+      of_node = matmul(factor*reshape(part, [n_dim, 3]), transpose(real(weight, wp)))
+   end subroutine first_to_nodes
+
+   !> The same of second derivatives.
+   pure subroutine second_to_nodes(factor, part, of_node)
+      real(wp), intent(in) :: factor
+      real(wp), intent(in) :: part(:, :)         !! (9, 9)
+      real(wp), intent(out) :: of_node(n_coordinate, n_coordinate)
+      integer :: i, j, k, l
+
+      of_node = 0.0_wp
+      associate (w => real(weight, wp))
          do j = 1, n_edge_pair_node
             do i = 1, n_edge_pair_node
                do l = 1, 3
                   do k = 1, 3
                      if (weight(i, k)*weight(j, l) == 0) cycle
-                     associate (to => gap%h(n_dim*(i - 1) + 1:n_dim*i, n_dim*(j - 1) + 1:n_dim*j))
-                        to = to + side*w(i, k)*w(j, l)*vertex%h(n_dim*(k - 1) + 1:n_dim*k, &
-                           n_dim*(l - 1) + 1:n_dim*l, at_height)
+                     associate (to => of_node(n_dim*(i - 1) + 1:n_dim*i, n_dim*(j - 1) + 1:n_dim*j))
+                        to = to + factor*w(i, k)*w(j, l)*part(n_dim*(k - 1) + 1:n_dim*k, &
+                           n_dim*(l - 1) + 1:n_dim*l)
                      end associate
                   end do
                end do
             end do
          end do
       end associate
-   end subroutine edge_pair_gap
+   end subroutine second_to_nodes
 
 end module emcon_edge_pair_space

@@ -5,19 +5,21 @@
 !> master: smooth while the node slides over sides and corners. Source: docs/theory.md, section 15.
 module emcon_patch_contact_space
    use emcon_bulges_space, only : bulges_find, bulges_largest, bulges_t
-   use emcon_condition_nodes, only : condition_resize
+   use emcon_condition_nodes, only : condition_resize, condition_resize_slip
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : err_input, error_t, raise
    use emcon_facet_values, only : facets_point_area, facets_pressures
    use emcon_facets, only : facets_init, facets_rim
+   use emcon_frame_slip_space, only : frame_slip, frame_slip_t
    use emcon_guards, only : corner_slack, crossing_bar, overlap_bar
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
       interaction_reach, pair_has_order
    use emcon_kinds, only : wp
    use emcon_mirror_faces_space, only : always_rests, mirror_axes
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
+   use emcon_node_sums, only : node_sums_first, node_sums_second
    use emcon_patch_gap_space, only : patch_gap, patch_gap_t, patch_look, patch_look_t
    use emcon_patch_sides_space, only : frame_normal, point_frames_init, patch_sides_t, &
       patch_triangles_init
@@ -61,6 +63,7 @@ module emcon_patch_contact_space
       procedure :: begin_points => patch_begin_step
       procedure :: measure_points => patch_measure
       procedure :: evaluate_points => patch_evaluate
+      procedure :: slip_points => patch_slip
       procedure :: area_points => patch_area
       procedure :: pressures => patch_pressures
       procedure :: share => patch_share
@@ -356,6 +359,8 @@ contains
          call patch_stencil_gather(stencil, x, u0, du, at, way)
          call patch_gap(stencil%patch, at, way, target, item%leaves_second, gap)
          is_used = patch_uses(stencil, gap%vertex)
+         if (item%has_friction) is_used = is_used .or. [(any(abs(stencil%weight(k, &
+            2 + stencil%corner)) > 0.0_wp), k = 1, stencil%n_node)]
          call condition_resize(item, count(is_used), size(x, 1))
          associate (n => item%n_node, n_var => size(x, 1)*item%n_node)
             item%node(:n) = pack(stencil%node(:stencil%n_node), is_used)
@@ -369,9 +374,67 @@ contains
             item%c(:, :n) = 0.0_wp
             if (.not. item%leaves_second) item%h(:n_var, :n_var) = 0.0_wp
             call patch_spread(stencil, gap, is_used, self%scale(i), [(k, k = 1, n)], item)
+            if (item%has_friction) call add_slip(stencil, pack([(k, k = 2, stencil%n_node)], &
+               is_used(2:)), at, way, item)
          end associate
       end associate
    end subroutine evaluate_frame
+
+   !> Slip over the triangle that was nearest as the step began.
+   pure type(frame_slip_t) function slip_over(stencil, at, way, leaves_second) result(slip)
+      type(patch_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of the stencil [L]
+      logical, intent(in) :: leaves_second
+
+      ! The point is where the stencil counts from. Its own frame tells directions, so that these
+      ! turn with it, and not from triangle to triangle.
+      associate (place => [3 + stencil%corner, 1])
+         call frame_slip(at(:, place), way(:, place), at(:, 2), leaves_second, slip)
+      end associate
+   end function slip_over
+
+   !> Slip with its derivatives.
+   pure subroutine add_slip(stencil, row, at, way, item)
+      type(patch_stencil_t), intent(in) :: stencil
+      integer, intent(in) :: row(:)              !! nodes of the stencil in the condition, but 1
+      real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of the stencil [L]
+      type(condition_t), intent(inout) :: item   !! with all of these nodes
+      type(frame_slip_t) :: slip
+      real(wp) :: weight(size(row), 3)
+      integer :: s
+
+      slip = slip_over(stencil, at, way, item%leaves_second)
+      call condition_resize_slip(item)
+      ! Of nodes in both sides of the triangle, and in the way from its corner to the point.
+      associate (by => stencil%weight(row, 2 + stencil%corner), n => item%n_node)
+         weight(:, 1) = by(:, 2) - by(:, 1)
+         weight(:, 2) = by(:, 3) - by(:, 1)
+         weight(:, 3) = -by(:, 1)
+         item%slip(:size(slip%f)) = slip%f
+         do s = 1, size(slip%f)
+            call node_sums_first(slip%g(:, s), weight, 1.0_wp, item%t(:, :n, s))
+            call node_sums_first(slip%c(:, s), weight, 1.0_wp, item%t1(:, :n, s))
+            if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), weight, 1.0_wp, &
+               n, item%ht(:, :, s))
+         end do
+      end associate
+   end subroutine add_slip
+
+   !> As `contact_t` has it.
+   pure function patch_slip(self, i, x, u0, du) result(slip)
+      class(patch_contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      real(wp) :: slip(size(x, 1) - 1)           !! [L]
+      real(wp), dimension(3, 3 + self%stencil(i)%patch%n_vertex) :: at, way
+      type(frame_slip_t) :: over
+
+      slip = 0.0_wp
+      if (self%stencil(i)%triangle == 0) return
+      call patch_stencil_gather(self%stencil(i), x, u0, du, at, way)
+      over = slip_over(self%stencil(i), at, way, .true.)
+      slip = over%f
+   end function patch_slip
 
    !> As `contact_t` has it: what of the facets at its point faces along each frame. At the corner
    !> of a body each face is that of its own frame alone.

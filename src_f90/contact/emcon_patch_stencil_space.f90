@@ -32,6 +32,7 @@ module emcon_patch_stencil_space
    !> The patch of one frame for a step, and its vertices as sums of nodes.
    type :: patch_stencil_t
       integer :: triangle = 0                    !! nearest of the master; 0: none near
+      integer :: corner(3) = 0                   !! its vertices, as those of the patch run
       type(patch_t) :: patch
       real(wp) :: size = 0.0_wp                  !! length of its facet [L]
       real(wp) :: deepest = 0.0_wp               !! farther behind is another side of the body [L]
@@ -115,6 +116,10 @@ contains
       do t = 1, near%n
          if (is_seen(t)) call add_triangle(self, sides, near%triangle(t))
       end do
+      do k = 1, 3
+         self%corner(k) = vertex_of(self, sides%triangles%split%corner(k, self%triangle))
+      end do
+      self%corner = self%corner([1, 3, 2])
       do t = 1, near%n
          do k = 1, 3
             if (.not. ends(k, t)) cycle
@@ -132,8 +137,8 @@ contains
 
    contains
 
-      !> Is a triangle listed, or would it be if it were nearer? A triangle of the slave sees what is
-      !> beside the list.
+      !> Is a triangle listed, or would it be if it were nearer? A triangle of the slave sees what
+      !> is beside the list.
       pure logical function goes_on(other)
          integer, intent(in) :: other            !! 0: none
 

@@ -2,7 +2,7 @@
 !> with nodes between corners, its gap the distance from the shape itself. Source: docs/theory.md,
 !> section 15.1.
 module emcon_wall_contact_space
-   use emcon_condition_nodes, only : condition_resize
+   use emcon_condition_nodes, only : condition_resize, condition_resize_slip
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
    use emcon_contact_law_registry, only : contact_laws_of_surface
@@ -20,6 +20,7 @@ module emcon_wall_contact_space
    use emcon_wall_distance_space, only : wall_at, wall_ends_here, wall_find, wall_is_solid, &
       wall_spot_t
    use emcon_wall_gap_space, only : dg_t, wall_gap, wall_gap_nodes
+   use emcon_wall_slip_space, only : n_wall_point, wall_slip, wall_slip_t
    implicit none
    private
    public :: wall_contact_t, wall_contact_init
@@ -45,6 +46,7 @@ module emcon_wall_contact_space
       procedure :: begin_points => wall_begin_step
       procedure :: measure_points => wall_measure
       procedure :: evaluate_points => wall_evaluate
+      procedure :: slip_points => wall_slip_over
       procedure :: area_points => wall_area
       procedure :: own_area => wall_own_area
       procedure :: mean_size => wall_mean_size
@@ -220,34 +222,64 @@ contains
       real(wp), intent(in) :: target             !! distance to hold [L]
       type(condition_t), intent(inout) :: item
       type(dg_t) :: gap
-      real(wp), dimension(3, 4) :: at, way
+      real(wp), dimension(3, n_wall_point) :: at, way
       integer :: n
 
-      associate (of_wall => self%wall%node(:3))
-         at(:, 1) = point_in(self, i, x) + point_in(self, i, u0)
-         at(:, 2:) = x(:, of_wall) + u0(:, of_wall)
-         way(:, 1) = point_in(self, i, du)
-         way(:, 2:) = du(:, of_wall)
-      end associate
-      gap = wall_gap(self%wall, at, way)
+      call gather(self, i, x, u0, du, at, way)
+      gap = wall_gap(self%wall, at(:, :4), way(:, :4))
       n = wall_gap_nodes(self%wall)
       item%size = self%size(i)
       item%gap0 = gap%f0 - target
       item%gap1 = gap%f1 - target
       item%dgap = gap%df
-      call spread_gap(self, i, gap, n, item)
+      if (item%has_friction) then
+         call spread_gap(self, i, gap, n, n_wall_point, item)
+         call spread_slip(self, i, at, way, item)
+      else
+         call spread_gap(self, i, gap, n, n, item)
+      end if
    end subroutine evaluate_node
 
+   !> Where point `i`, the origin and the tips of the vectors of the wall are, and how they move.
+   pure subroutine gather(self, i, x, u0, du, at, way)
+      type(wall_contact_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(out) :: at(3, n_wall_point), way(3, n_wall_point)   !! [L]
+
+      at(:, 1) = point_in(self, i, x) + point_in(self, i, u0)
+      at(:, 2:) = x(:, self%wall%node) + u0(:, self%wall%node)
+      way(:, 1) = point_in(self, i, du)
+      way(:, 2:) = du(:, self%wall%node)
+   end subroutine gather
+
+   !> As `contact_t` has it.
+   pure function wall_slip_over(self, i, x, u0, du) result(slip)
+      class(wall_contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      real(wp) :: slip(size(x, 1) - 1)           !! [L]
+      real(wp), dimension(3, n_wall_point) :: at, way
+      type(wall_slip_t) :: over
+
+      call gather(self, i, x, u0, du, at, way)
+      call wall_slip(self%wall, at, way, .true., over)
+      slip = over%f
+   end function wall_slip_over
+
    !> Derivatives by the nodes of point `i` and of the wall, from those by the point and the wall.
-   pure subroutine spread_gap(self, i, gap, n, item)
+   pure subroutine spread_gap(self, i, gap, n_of_gap, n, item)
       type(wall_contact_t), intent(in) :: self
       integer, intent(in) :: i
       type(dg_t), intent(in) :: gap
-      integer, intent(in) :: n                   !! the point and nodes of the wall
+      integer, intent(in) :: n_of_gap            !! the point and nodes of the wall
+      integer, intent(in) :: n                   !! the same of the condition
       type(condition_t), intent(inout) :: item
       integer, parameter :: n_dim = 3
-      real(wp) :: g(n_dim, 4), c(n_dim, 4), h(4*n_dim, 4*n_dim), weight(max_face_nodes)
-      integer :: k, l, m, node(max_face_nodes)
+      real(wp) :: g(n_dim, n_wall_point), c(n_dim, n_wall_point), &
+         h(n_dim*n_wall_point, n_dim*n_wall_point)
+      real(wp) :: weight(max_face_nodes)
+      integer :: k, m, node(max_face_nodes)
 
       call find_parts(self, i, m, node, weight)
       call condition_resize(item, m + n - 1, n_dim)
@@ -256,25 +288,74 @@ contains
       g = 0.0_wp
       c = 0.0_wp
       h = 0.0_wp
-      associate (in_order => [(k, k = 1, n)])
+      associate (in_order => [(k, k = 1, n_of_gap)])
          call nodes_add_first(1.0_wp, gap%g, in_order, g)
          call nodes_add_first(1.0_wp, gap%c, in_order, c)
          if (.not. item%leaves_second) call nodes_add_second(1.0_wp, n_dim, gap%h, in_order, h)
       end associate
-      ! Part k of the condition is `part` of the gap times `share`.
-      associate (part => [(1, k = 1, m), (k, k = 2, n)], share => [weight(:m), &
-            (1.0_wp, k = 2, n)])
-         do k = 1, m + n - 1
-            item%g(:, k) = share(k)*g(:, part(k))
-            item%c(:, k) = share(k)*c(:, part(k))
-            if (item%leaves_second) cycle
-            do l = 1, m + n - 1
-               item%h(n_dim*(k - 1) + 1:n_dim*k, n_dim*(l - 1) + 1:n_dim*l) = share(k)*share(l) &
-                  *h(n_dim*(part(k) - 1) + 1:n_dim*part(k), n_dim*(part(l) - 1) + 1:n_dim*part(l))
-            end do
-         end do
+      associate (share => [weight(:m), (1.0_wp, k = 2, n)])
+         call share_first(g, share, m, item%g(:, :m + n - 1))
+         call share_first(c, share, m, item%c(:, :m + n - 1))
+         if (.not. item%leaves_second) call share_second(h, share, m, item%h)
       end associate
    end subroutine spread_gap
+
+   !> Slip of point `i` with its derivatives.
+   pure subroutine spread_slip(self, i, at, way, item)
+      type(wall_contact_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, n_wall_point) of `gather` [L]
+      type(condition_t), intent(inout) :: item   !! with all nodes of the wall
+      type(wall_slip_t) :: slip
+      real(wp) :: weight(max_face_nodes)
+      integer :: k, m, n, s, node(max_face_nodes)
+
+      call wall_slip(self%wall, at, way, item%leaves_second, slip)
+      call find_parts(self, i, m, node, weight)
+      call condition_resize_slip(item)
+      n = item%n_node
+      item%slip(:size(slip%f)) = slip%f
+      associate (share => [weight(:m), (1.0_wp, k = 2, n_wall_point)])
+         do s = 1, size(slip%f)
+            call share_first(slip%g(:, :, s), share, m, item%t(:, :n, s))
+            call share_first(slip%c(:, :, s), share, m, item%t1(:, :n, s))
+            if (.not. item%leaves_second) call share_second(slip%h(:, :, s), share, m, &
+               item%ht(:, :, s))
+         end do
+      end associate
+   end subroutine spread_slip
+
+   !> Derivatives by nodes from those by the point, a sum of the first `m` of them, and by the rest.
+   pure subroutine share_first(part, share, m, of_node)
+      real(wp), intent(in) :: part(:, :)         !! (3, >= 1 + n_node - m)
+      real(wp), intent(in) :: share(:)           !! (n_node) of nodes in these
+      integer, intent(in) :: m
+      real(wp), intent(out) :: of_node(:, :)     !! (3, n_node)
+      integer :: k
+
+      do k = 1, size(share)
+         of_node(:, k) = share(k)*part(:, max(1, 1 + k - m))
+      end do
+   end subroutine share_first
+
+   !> The same of second derivatives.
+   pure subroutine share_second(part, share, m, of_node)
+      real(wp), intent(in) :: part(:, :)         !! (>= 3 (1 + n_node - m), the same)
+      real(wp), intent(in) :: share(:)           !! (n_node)
+      integer, intent(in) :: m
+      real(wp), intent(inout) :: of_node(:, :)   !! (>= 3 n_node, the same)
+      integer, parameter :: n_dim = 3
+      integer :: k, l
+
+      do l = 1, size(share)
+         do k = 1, size(share)
+            associate (i => n_dim*max(0, k - m), j => n_dim*max(0, l - m))
+               of_node(n_dim*(k - 1) + 1:n_dim*k, n_dim*(l - 1) + 1:n_dim*l) = share(k)*share(l) &
+                  *part(i + 1:i + n_dim, j + 1:j + n_dim)
+            end associate
+         end do
+      end do
+   end subroutine share_second
 
    !> As `contact_t` has it: what of the facets at its point faces the wall.
    pure subroutine wall_area(self, x, u, area, length)

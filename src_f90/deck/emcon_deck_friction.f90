@@ -1,11 +1,11 @@
 !> *FRICTION of surface interactions, and what it does not go with.
 module emcon_deck_friction
-   use emcon_deck_dimension, only : n_space
+   use emcon_deck_dimension, only : n_plane, n_space
    use emcon_deck_fields, only : data_error, data_open, data_t, drop_zeros, get_real, next_line, &
       refuse_lines
    use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
    use emcon_diagnostics, only : add_error, add_warning
-   use emcon_interactions, only : contact_pair_t, formulation_user, pressure_hard, &
+   use emcon_interactions, only : contact_pair_t, formulation_mortar, pressure_hard, &
       smoothing_hermite
    use emcon_kinds, only : wp
    use emcon_massless_surfaces, only : pair_keeps_mass
@@ -82,8 +82,10 @@ contains
             if (pair(i)%slave == 0 .or. pair(i)%master == 0) cycle   ! unknown surfaces are told
             call check_other_way(reader, pair(:i), given)
             if (.not. pair(i)%interaction%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
-            if (scene%n_dim == n_space) then
-               call refuse_space(reader, pair(i))
+            if (scene%n_dim == n_space .and. pair(i)%formulation == formulation_mortar) then
+               call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
+                  // "has *FRICTION: in three dimensions MORTAR has none in this version; use " &
+                  // "TYPE=NODE TO SURFACE")
                cycle
             end if
             do k = 1, size(step)
@@ -101,16 +103,6 @@ contains
       end associate
    end subroutine check_friction
 
-   !> Contact slides freely in space. What a program gives is refused friction by its card.
-   subroutine refuse_space(reader, pair)
-      type(reader_t), intent(inout) :: reader
-      type(contact_pair_t), intent(in) :: pair
-
-      if (pair%formulation /= formulation_user) call add_error(reader%log, pair%origin, &
-         "*CONTACT PAIR: its surface interaction has *FRICTION: friction in three dimensions is " &
-         // "not in this version; take it out: contact there slides freely")
-   end subroutine refuse_space
-
    !> What holds gaps sticks exactly.
    subroutine check_stick(reader, pair)
       type(reader_t), intent(inout) :: reader
@@ -123,7 +115,7 @@ contains
       end associate
    end subroutine check_stick
 
-   !> Nodes with a pad are discs. They roll if a rigid body turns them, over edges.
+   !> Nodes with a pad are discs or balls. Discs roll if a rigid body turns them, over edges.
    subroutine check_pad(reader, scene, pair)
       type(reader_t), intent(inout) :: reader
       type(scene_t), intent(in) :: scene
@@ -133,7 +125,8 @@ contains
 
       if (.not. pair%interaction%offset > 0.0_wp) return
       if (.not. scene%surface(pair%slave)%is_nodal) return
-      rolls = .not. any(scene%step%contact%options%smoothing == smoothing_hermite)
+      rolls = scene%n_dim == n_plane .and. &
+         .not. any(scene%step%contact%options%smoothing == smoothing_hermite)
       associate (node => scene%surface(pair%slave)%node)
          do i = 1, size(node)
             rolls = rolls .and. rigid_far_node(scene%rigid, node(i), scene%x) > 0
@@ -141,7 +134,8 @@ contains
       end associate
       if (.not. rolls) call add_warning(reader%log, pair%origin, "*CONTACT PAIR: its surface " &
          // "interaction has *FRICTION and a PAD THICKNESS: friction acts at the nodes, so that " &
-         // "discs slide, but do not roll; they do on nodes of a *RIGID BODY, without HERMITE")
+         // "discs slide, but do not roll; they do in the plane on nodes of a *RIGID BODY, " &
+         // "without HERMITE")
    end subroutine check_pad
 
    !> Two surfaces that are named in both orders rub in the same way in both.

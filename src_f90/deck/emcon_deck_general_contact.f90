@@ -6,7 +6,6 @@
 !> (`emcon_ties`).
 module emcon_deck_general_contact
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t, n_neighbours
-   use emcon_deck_dimension, only : n_plane
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, is_blank, &
       next_line
    use emcon_deck_named, only : refuse_name
@@ -256,8 +255,7 @@ contains
       type(card_t), intent(in) :: card
       type(scene_t), intent(in) :: scene
       character(len=*), parameter :: &
-         by_pair = "list the surfaces that need it by *CONTACT PAIR              ", &
-         in_space = "take it out; in three dimensions contact slides freely so far"
+         by_pair = "list the surfaces that need it by *CONTACT PAIR"
       type(data_t) :: data
       character(len=:), allocatable :: name
       integer :: i, side
@@ -281,8 +279,7 @@ contains
          else
             associate (given => reader%interaction(i))
                call refuse(given%restitution < 1.0_wp, "RESTITUTION below 1", by_pair)
-               call refuse(given%friction > 0.0_wp, "*FRICTION", merge(by_pair, in_space, &
-                  reader%n_dim == n_plane))
+               call refuse(given%friction > 0.0_wp, "*FRICTION", by_pair)
                call refuse(given%damping%coefficient > 0.0_wp, "*CONTACT DAMPING", by_pair)
                call refuse(given%pressure%kind /= pressure_hard, "a PRESSURE-OVERCLOSURE that " // &
                   "is not HARD", by_pair)

@@ -5,7 +5,7 @@ module emcon_wall_distance_space
    use emcon_wall, only : wall_drawn, wall_flat, wall_round, wall_t, wall_turned
    implicit none
    private
-   public :: wall_spot_t, wall_at, wall_find, wall_is_solid, wall_ends_here
+   public :: wall_spot_t, wall_at, wall_find, wall_bend, wall_is_solid, wall_ends_here
 
    !> Past an end by more than this part of the shape, there is nothing: ends meet rims.
    real(wp), parameter :: end_tol = 1.0e-9_wp
@@ -65,6 +65,65 @@ contains
       if (wall%kind == wall_turned) slope = slope(2:1:-1)
       spot%normal = slope(1)*one + slope(2)*other
    end function wall_find
+
+   !> How the normal turns as the point moves: 0 in front of planes [1/L].
+   pure function wall_bend(wall, at, point) result(bend)
+      type(wall_t), intent(in) :: wall
+      real(wp), intent(in) :: at(3, 4)           !! origin and tips [L]
+      real(wp), intent(in) :: point(3)           !! [L]
+      real(wp) :: bend(3, 3)
+      type(profile_place_t) :: place
+      real(wp), dimension(3) :: arm, one, other, along
+      real(wp) :: first, second, slope(2)
+
+      bend = 0.0_wp
+      if (wall%kind == wall_flat) return
+      arm = point - at(:, 1)
+      if (wall%kind == wall_round) then
+         if (.not. length(arm) > 0.0_wp) return
+         associate (normal => arm/length(arm))
+            bend = wall%bulge/length(arm)*(unit_matrix() - outer(normal))
+         end associate
+         return
+      end if
+      one = (at(:, 2) - at(:, 1))/wall%arm
+      other = (at(:, 3) - at(:, 1))/wall%arm
+      first = dot_product(arm, one)
+      second = dot_product(arm, other)
+      if (wall%kind == wall_turned) then
+         second = first
+         other = arm - second*one
+         first = length(other)
+         if (.not. first > 0.0_wp) return
+         other = other/first
+      end if
+      place = profile_find(wall, [first, second])
+      associate (piece => wall%piece(place%piece), p => [first, second])
+         slope = profile_slope(piece, p)
+         along = -slope(2)*one + slope(1)*other
+         if (wall%kind == wall_turned) along = -slope(2)*other + slope(1)*one
+         if (abs(piece%bulge) > 0.0_wp) bend = piece%bulge/norm2(p - piece%centre)*outer(along)
+      end associate
+      if (wall%kind == wall_turned) bend = bend + slope(1)/first*(unit_matrix() - outer(one) &
+         - outer(other))
+   end function wall_bend
+
+   pure function outer(a)
+      real(wp), intent(in) :: a(3)
+      real(wp) :: outer(3, 3)
+
+      outer = spread(a, 2, 3)*spread(a, 1, 3)
+   end function outer
+
+   pure function unit_matrix() result(unit)
+      real(wp) :: unit(3, 3)
+      integer :: i
+
+      unit = 0.0_wp
+      do i = 1, 3
+         unit(i, i) = 1.0_wp
+      end do
+   end function unit_matrix
 
    !> Is all that is behind a wall in its body?
    elemental logical function wall_is_solid(wall)

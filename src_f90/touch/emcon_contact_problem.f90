@@ -29,6 +29,9 @@ module emcon_contact_problem
    !> comes the method of Lemke.
    integer, parameter :: first_trials = 60, few_trials = 10, more_trials = 20, first_sweeps = 20, &
       most_turns = 8, pivot_turn = 2
+   !> Parts of W that places give way by about the forces so far, and how often.
+   integer, parameter :: most_nearings = 30, few_nearings = 3
+   real(wp), parameter :: first_part = 1.0e-3_wp, largest_part = 10.0_wp
    !> Halvings of a step of Newton's method, and the part of what is foreseen that it is to gain.
    integer, parameter :: most_halvings = 12
    real(wp), parameter :: least_gain = 1.0e-4_wp
@@ -63,7 +66,7 @@ module emcon_contact_problem
 
    !> What a solution has cost.
    type :: contact_effort_t
-      integer :: n_trial = 0, n_sweep = 0, n_pivot = 0
+      integer :: n_trial = 0, n_sweep = 0, n_pivot = 0, n_near = 0
    end type contact_effort_t
 
 contains
@@ -82,21 +85,31 @@ contains
    end subroutine contact_problem_create
 
    !> Forces that obey the law at all contacts.
-   subroutine contact_problem_solve(self, push, effort, is_solved)
+   subroutine contact_problem_solve(self, push, effort, is_solved, near_enough)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) start, solution: y [M L/T^2]
       type(contact_effort_t), intent(out) :: effort
       logical, intent(out) :: is_solved              !! else `push` is as near as it came
+      !> The problem is one of several that come nearer to what is to be solved: where slip has a
+      !> direction, forces that are nearer than those at the start will do
+      logical, intent(in), optional :: near_enough
       type(contact_problem_t) :: apart
+      logical :: is_one_of_several
       integer :: turn
 
+      is_one_of_several = .false.
+      if (present(near_enough)) is_one_of_several = near_enough
       is_solved = size(self%mu) == 0
       if (is_solved) return
       associate (has_pushes => .not. any(self%mu > 0.0_wp .or. self%hold(0, :) > 0.0_wp))
-         call solve_by_trials(self, push, merge(few_trials, first_trials, has_pushes), &
-            effort%n_trial, is_solved)
+         call solve_by_trials(self, push, merge(few_trials, first_trials, has_pushes &
+            .or. self%n_slip > 1), effort%n_trial, is_solved)
          if (is_solved .or. .not. has_compliance(self)) return
          if (has_pushes) call solve_by_pushes(self, push, effort%n_pivot, is_solved)
+         if (is_solved) return
+         if (self%n_slip > 1) call solve_by_nearing(self, push, effort, &
+            merge(few_nearings, most_nearings, is_one_of_several), is_solved)
+         is_solved = is_solved .or. (is_one_of_several .and. effort%n_near > 0)
          if (is_solved) return
       end associate
       do turn = 1, most_turns
@@ -388,6 +401,48 @@ contains
       call dense_solve(slope(row, row), rest, step, is_singular)
       x(row) = step(:, 1)
    end subroutine find_step
+
+   !> By trials of places that give way by a part of their own W about the forces so far, over and
+   !> over: forces that follow from others stay as near as can be to those before. The part grows
+   !> where the trials do not end, and falls where they do.
+   subroutine solve_by_nearing(self, push, effort, most, is_solved)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
+      type(contact_effort_t), intent(inout) :: effort    !! counted on
+      integer, intent(in) :: most                    !! times that it comes nearer
+      logical, intent(out) :: is_solved
+      type(contact_problem_t) :: near
+      real(wp) :: found(0:self%n_slip, size(self%mu)), part, more
+      integer :: i, k, row, round
+      logical :: has_ended
+
+      is_solved = .false.
+      near = self
+      part = first_part
+      do round = 1, most_nearings
+         do i = 1, size(self%mu)
+            do k = 0, self%n_slip
+               row = (1 + self%n_slip)*(i - 1) + 1 + k
+               more = part*abs(self%w(row, row))
+               near%w(row, row) = self%w(row, row) + more
+               near%free(k, i) = self%free(k, i) - more*push(k, i)
+            end do
+         end do
+         found = push
+         call solve_by_trials(near, found, few_trials, effort%n_trial, has_ended)
+         if (has_ended) then
+            effort%n_near = effort%n_near + 1
+            push = found
+            is_solved = contact_problem_missed(self, push) <= met
+            if (is_solved .or. effort%n_near == most) return
+            part = 0.1_wp*part
+         else
+            if (effort%n_near > 0 .and. most < most_nearings) return
+            part = 10.0_wp*part
+            if (part > largest_part) return
+         end if
+      end do
+   end subroutine solve_by_nearing
 
    !> Contact by contact, each exactly with the pushes of the others, over and over.
    subroutine solve_by_sweeps(self, push, most, n_sweep, is_solved)

@@ -1,0 +1,73 @@
+!> Slip of a point over the plane of a frame of two vectors in space over a step: two numbers.
+!>
+!> The changes of its affine coordinates, times the vectors of the frame as the step begins. Each
+!> has forces without resultant and moment, and rigid turns are no slip. Source: docs/theory.md,
+!> section 15.3.
+module emcon_frame_slip_space
+   use emcon_frame_vertex_space, only : at_eta, at_xi, frame_vertex, frame_vertex_t, n_frame_var
+   use emcon_kinds, only : wp
+   use emcon_rotation, only : cross_product
+   implicit none
+   private
+   public :: frame_slip_t, frame_slip, tangent_basis
+
+   !> A direction that is normal to a plane but for this part of it is no direction in the plane.
+   real(wp), parameter :: no_direction = 0.1_wp
+
+   type :: frame_slip_t
+      real(wp) :: f(2) = 0.0_wp                  !! slip over the step [L]
+      !> By both vectors of the frame and where the point is, from its origin: discrete gradients,
+      real(wp) :: g(n_frame_var, 2) = 0.0_wp
+      real(wp) :: c(n_frame_var, 2) = 0.0_wp     !! gradients at the end,
+      !> and (i, j, which) derivative of g(i, which) by variable j at the end; 0 if not asked for
+      real(wp) :: h(n_frame_var, n_frame_var, 2) = 0.0_wp
+   end type frame_slip_t
+
+contains
+
+   !> Slip along two directions in the plane of the frame as the step begins, at right angles: the
+   !> first one is as near to `along` as it can be.
+   pure subroutine frame_slip(x, dx, along, leaves_second, slip)
+      !> Origin, tips of both vectors, point: where they start, how they move [L]
+      real(wp), intent(in) :: x(3, 4), dx(3, 4)
+      real(wp), intent(in) :: along(3)           !! of any length
+      logical, intent(in) :: leaves_second       !! no second derivatives
+      type(frame_slip_t), intent(out) :: slip
+      type(frame_vertex_t) :: place
+      real(wp) :: a(3), b(3), basis(3, 2)
+      integer :: k
+
+      a = x(:, 2) - x(:, 1)
+      b = x(:, 3) - x(:, 1)
+      basis = tangent_basis(cross_product(a, b), along)
+      call frame_vertex(x, dx, leaves_second, place)
+      do k = 1, 2
+         associate (by_xi => dot_product(basis(:, k), a), by_eta => dot_product(basis(:, k), b))
+            slip%f(k) = by_xi*place%df(at_xi) + by_eta*place%df(at_eta)
+            slip%g(:, k) = by_xi*place%g(:, at_xi) + by_eta*place%g(:, at_eta)
+            slip%c(:, k) = by_xi*place%c(:, at_xi) + by_eta*place%c(:, at_eta)
+            if (leaves_second) cycle
+            slip%h(:, :, k) = by_xi*place%h(:, :, at_xi) + by_eta*place%h(:, :, at_eta)
+         end associate
+      end do
+   end subroutine frame_slip
+
+   !> Two directions at right angles to `normal` and to each other, of length 1: the first one as
+   !> near to `along` as it can be, unless that is nearly normal.
+   pure function tangent_basis(normal, along) result(basis)
+      real(wp), intent(in) :: normal(3), along(3)   !! not 0, of any length
+      real(wp) :: basis(3, 2)
+      real(wp) :: unit(3), part(3)
+
+      unit = normal/norm2(normal)
+      part = along - dot_product(along, unit)*unit
+      if (norm2(part) <= no_direction*norm2(along)) then
+         part = 0.0_wp
+         part(minloc(abs(unit), 1)) = 1.0_wp
+         part = part - dot_product(part, unit)*unit
+      end if
+      basis(:, 1) = part/norm2(part)
+      basis(:, 2) = cross_product(unit, basis(:, 1))
+   end function tangent_basis
+
+end module emcon_frame_slip_space

@@ -1,0 +1,57 @@
+!> From derivatives by sums of nodes to those by the nodes.
+!>
+!> The sums are of places from the first node on: derivatives by that are minus the sum of the
+!> others.
+module emcon_node_sums
+   use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
+   use emcon_kinds, only : wp
+   implicit none
+   private
+   public :: node_sums_first, node_sums_second
+
+contains
+
+   !> Derivatives by nodes from those by sums of nodes.
+   pure subroutine node_sums_first(part, weight, factor, of_node)
+      real(wp), intent(in) :: part(:)            !! by the components of each sum
+      real(wp), intent(in) :: weight(:, :)       !! (n_node - 1, sums) of nodes in the sums
+      real(wp), intent(in) :: factor             !! of what is asked for
+      real(wp), intent(out) :: of_node(:, :)     !! (n_dim, n_node)
+      integer :: k
+
+      of_node = 0.0_wp
+      call nodes_add_first(factor, reshape(matmul(reshape(part, [size(of_node, 1), &
+         size(weight, 2)]), transpose(weight)), [size(of_node, 1)*size(weight, 1)]), &
+         [(k, k = 1, size(of_node, 2))], of_node)
+   end subroutine node_sums_first
+
+   !> The same of second derivatives.
+   pure subroutine node_sums_second(part, weight, factor, n, of_node)
+      real(wp), intent(in) :: part(:, :)         !! by the components of the sums, twice
+      real(wp), intent(in) :: weight(:, :)       !! (n_node - 1, sums) of nodes in the sums
+      real(wp), intent(in) :: factor             !! of what is asked for
+      integer, intent(in) :: n                   !! n_node
+      real(wp), intent(inout) :: of_node(:, :)   !! (>= n_dim n_node, the same)
+      real(wp), allocatable :: half(:, :), full(:, :)
+      integer :: i, j, k, n_dim
+
+      n_dim = size(part, 1)/size(weight, 2)
+      allocate(half(n_dim*(n - 1), size(part, 1)), full(n_dim*(n - 1), n_dim*(n - 1)))
+      do k = 1, size(part, 1)
+         half(:, k) = reshape(matmul(reshape(part(:, k), [n_dim, size(weight, 2)]), &
+            transpose(weight)), [size(half, 1)])
+      end do
+      full = 0.0_wp
+      do j = 1, size(weight, 2)
+         do i = 1, n - 1
+            if (.not. abs(weight(i, j)) > 0.0_wp) cycle
+            associate (to => full(:, n_dim*(i - 1) + 1:n_dim*i))
+               to = to + weight(i, j)*half(:, n_dim*(j - 1) + 1:n_dim*j)
+            end associate
+         end do
+      end do
+      of_node(:n_dim*n, :n_dim*n) = 0.0_wp
+      call nodes_add_second(factor, n_dim, full, [(k, k = 1, n)], of_node)
+   end subroutine node_sums_second
+
+end module emcon_node_sums

@@ -1,0 +1,120 @@
+"""Friction in space: slopes, turning slip, sliding and rolling, elastic blocks, on walls and on bodies."""
+
+from __future__ import annotations
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+import wall_space_scenes as walls
+from contact_space_scenes import bodies, dynamic, faces, pair, velocities
+from scene_tools import EPSILON, Run, run_deck
+from scipy.integrate import solve_ivp
+from space_mesh import Block
+from test_contact_space_rigid import columns, rigid
+
+GRAVITY = 10.0
+STIFF = "*ELASTIC\n1E4, .3\n*DENSITY\n1.\n"
+
+
+def ran(folder: Path, text: str) -> Run:
+    (folder/"deck.inp").write_text(text)
+    return run_deck(folder/"deck.inp", folder)
+
+
+def weight(slope: float = 0.0, of: str = "B1") -> str:
+    """The floor stays level and the weight leans along x."""
+    return f"*DLOAD\n{of}, GRAV, {GRAVITY}, {float(np.sin(slope))!r}, 0., {float(-np.cos(slope))!r}\n"
+
+
+def slab(cells: tuple[int, int, int] = (2, 2, 1), turn: float = 0.0) -> Block:
+    c, s = np.cos(turn), np.sin(turn)
+    return Block("C3D8", cells, size=(1, 1, .5),
+                 place=lambda x: (x - np.array([.5, .5, 0]))@np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]))
+
+
+def on_floor(mu: float, h: float, until: float, v: tuple, w: tuple = (0, 0, 0), slope: float = 0.0,
+             is_rigid: bool = True, cells: tuple[int, int, int] = (2, 2, 1)) -> str:
+    """A slab on a plane."""
+    block = slab(cells)
+    flies = rigid(1, block, v=v, w=w) if is_rigid else velocities(block, np.array(v, float), np.array(w, float))
+    return (bodies([block], [faces(block, 2, 0)], STIFF) + flies + walls.wall(walls.plane())
+            + walls.pair("", f"*FRICTION\n{mu}\n") + f"*BOUNDARY\n{walls.FIXED}" + dynamic(h, until, weight(slope)))
+
+
+def dissipates(run: Run) -> None:
+    """In each increment, but for what slip is rounded to, 64 epsilon of an edge of 1, under a weight of some 5."""
+    assert np.diff(run.history["friction_loss"]).min() >= -64*EPSILON*GRAVITY
+
+
+@pytest.mark.parametrize("slope", [.49, .499, .501, .51])
+def test_slope(tmp_path: Path, slope: float) -> None:
+    """A rigid slab with mu = .5 slides where the slope is above it, with the acceleration of a particle."""
+    angle, until = float(np.arctan(slope)), 0.2
+    run = ran(tmp_path, on_floor(.5, .01, until, (0, 0, 0), slope=angle))
+    wanted = max(0.0, np.sin(angle) - .5*np.cos(angle))*GRAVITY*until
+    # Forces are met to round-off of them, and add up over the steps.
+    assert abs(run.history["px"][-1]/.5 - wanted) < 1e-12*GRAVITY*until
+    dissipates(run)
+
+
+def test_turning_slip_is_of_second_order(tmp_path: Path) -> None:
+    """A rigid slab slides across a slope, which turns its way: as a particle does."""
+    slope, mu, until = .2, .3, .3
+
+    def rate(_t: float, v: np.ndarray) -> np.ndarray:
+        return GRAVITY*(np.array([np.sin(slope), 0.0]) - mu*np.cos(slope)*v/np.hypot(*v))
+
+    wanted = solve_ivp(rate, [0, until], [0, 1.], rtol=1e-12, atol=1e-14).y[:, -1]
+    error = []
+    for h in (.02, .01):
+        run = ran(tmp_path, on_floor(mu, h, until, (0, 1., 0), slope=slope))
+        error.append(np.abs(columns(run, "px py")[-1]/.5 - wanted).max())
+        dissipates(run)
+    # Half of the step leaves a quarter, by the next order within a twentieth.
+    assert error[0] < 4e-4
+    assert error[0]/error[1] == pytest.approx(4.0, rel=.05)
+
+
+def test_ball_slides_and_rolls(tmp_path: Path) -> None:
+    """A ball that is thrown along a floor rolls with 5/7 of its speed, but for the nodes that it rolls over."""
+    side, step = float(np.sqrt(2.4)), .02        # a cube turns as the ball of radius 1 does
+    floor = Block("C3D8", (16, 2, 1), size=(16*step, 2*step, .1), place=lambda x: x - np.array([.06, step, .1]))
+    core = Block("C3D8", (1, 1, 1), size=(side,)*3, place=lambda x: x - side/2 + np.array([0, 0, 1.]))
+    run = ran(tmp_path, bodies([floor, core], [faces(floor, 2, 1), faces(core)], STIFF)
+              + walls.wall(walls.sphere(1., (0., 0., 1.)), (0., 0., 1.), "ELSET=B2, ")
+              + walls.pair("", "*FRICTION\n.3\n")
+              + f"*BOUNDARY\nN1, 1, 3\n*INITIAL CONDITIONS, TYPE=VELOCITY\n{walls.REFERENCE}, 1, 1.\n"
+              + dynamic(.01, .2, weight(of="B2")))
+    speed = run.history["px"]/side**3
+    assert speed[5] > .8
+    # It sinks between nodes by the square of half their distance over its diameter: 5e-5 of it.
+    assert np.abs(speed[14:] - 5/7).max() < .01
+    dissipates(run)
+
+
+@pytest.mark.parametrize("mu", [.3, .8])
+def test_elastic_slab_comes_to_a_stop(tmp_path: Path, mu: float) -> None:
+    run = ran(tmp_path, on_floor(mu, .01, .5, (1., .2, 0), (0, 0, 1.), is_rigid=False))
+    first, last = columns(run, "kinetic strain").sum(1)[[0, -1]]
+    assert last < .05*first                      # it vibrates on
+    work = run.history["external_work"][-1] - run.history["friction_loss"][-1]
+    assert abs(first + work - last) < 1e-11*first
+    assert max(run.history["cuts"]) == 0
+    assert run.verdict["verdict"] == "good"
+    dissipates(run)
+
+
+@pytest.mark.parametrize("turn", [0., .3])
+def test_slab_on_a_free_plate(tmp_path: Path, turn: float) -> None:
+    """Nodes on nodes, and askew: friction passes momentum on, and turns nothing that was not turning."""
+    one = slab(turn=turn)
+    two = Block("C3D8", (4, 4, 1), size=(3, 3, .5), place=lambda x: x - np.array([1.5, 1.5, .5]))
+    run = ran(tmp_path, bodies([one, two], [faces(one, 2, 0), faces(two, 2, 1)], STIFF)
+              + pair("", "*FRICTION\n.3\n") + velocities(one, np.array([1., .2, -1.]), np.array([0, 0, 1.]))
+              + dynamic(.01, .06))
+    for names in ("px py pz", "lx ly lz"):
+        p = columns(run, names)
+        assert np.abs(p - p[0]).max() < 1e-11*np.abs(p).max(), names
+    assert run.history["friction_loss"][-1] > 0.0
+    dissipates(run)
