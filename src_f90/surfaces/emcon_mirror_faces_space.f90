@@ -45,6 +45,8 @@ contains
       logical :: rests(n_axis, size(scene%x, 2)), now(n_axis, size(scene%x, 2))
       integer :: i, k
 
+      rests = .false.
+      if (.not. allocated(scene%step)) return
       rests = size(scene%step) > 0
       do i = 1, size(scene%step)
          now = .false.
