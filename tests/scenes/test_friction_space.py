@@ -118,3 +118,24 @@ def test_slab_on_a_free_plate(tmp_path: Path, turn: float) -> None:
         assert np.abs(p - p[0]).max() < 1e-11*np.abs(p).max(), names
     assert run.history["friction_loss"][-1] > 0.0
     dissipates(run)
+
+
+def test_many_contacts_slide(tmp_path: Path) -> None:
+    """225 nodes that slide and turn are solved as few are."""
+    run = ran(tmp_path, on_floor(.3, .01, .02, (1., .2, 0), (0, 0, 1.), is_rigid=False, cells=(14, 14, 1)))
+    assert max(run.history["cuts"]) == 0
+    assert max(run.history["newton"]) <= 6
+    dissipates(run)
+
+
+def test_held_by_friction_in_statics(tmp_path: Path) -> None:
+    """Friction alone holds an elastic slab on a slope of .45 with mu = .5, whose floor bears its weight."""
+    block = slab()
+    angle = float(np.arctan(.45))
+    run = ran(tmp_path, bodies([block], [faces(block, 2, 0)], STIFF) + walls.wall(walls.plane())
+              + walls.pair("", "*FRICTION\n.5\n") + f"*BOUNDARY\n{walls.FIXED}"
+              + f"*STEP, NLGEOM\n*STATIC\n.5, 1.\n{weight(angle)}*NODE FILE\nU\n*END STEP\n")
+    assert run.verdict["verdict"] == "good"
+    force = columns(run, "pair1_force_x pair1_force_y pair1_force_z")[-1]
+    wanted = .5*GRAVITY*np.array([np.sin(angle), 0.0, -np.cos(angle)])
+    assert np.abs(np.abs(force) - np.abs(wanted)).max() < 1e-8*GRAVITY
