@@ -101,13 +101,14 @@ contains
       if (present(near_enough)) is_one_of_several = near_enough
       is_solved = size(self%mu) == 0
       if (is_solved) return
-      associate (has_pushes => .not. any(self%mu > 0.0_wp .or. self%hold(0, :) > 0.0_wp))
+      associate (has_pushes => .not. any(self%mu > 0.0_wp .or. self%hold(0, :) > 0.0_wp), &
+            has_direction => self%n_slip > 1 .and. any(self%mu > 0.0_wp))
          call solve_by_trials(self, push, merge(few_trials, first_trials, has_pushes &
-            .or. self%n_slip > 1), effort%n_trial, is_solved)
+            .or. has_direction), effort%n_trial, is_solved)
          if (is_solved .or. .not. has_compliance(self)) return
          if (has_pushes) call solve_by_pushes(self, push, effort%n_pivot, is_solved)
          if (is_solved) return
-         if (self%n_slip > 1) call solve_by_nearing(self, push, effort, &
+         if (has_direction) call solve_by_nearing(self, push, effort, &
             merge(few_nearings, most_nearings, is_one_of_several), is_solved)
          is_solved = is_solved .or. (is_one_of_several .and. effort%n_near > 0)
          if (is_solved) return
