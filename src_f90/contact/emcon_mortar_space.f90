@@ -97,6 +97,7 @@ contains
          call facet_frames_init(sides%frames, sides%slave, self%split)
          call facet_weights_init(self%weights, sides%slave, self%split, scene%x)
          call patch_triangles_init(sides%triangles, sides%master, scene%x)
+         allocate(sides%mirror(sides%master%n_facet), source=0)
          ! Lists end beside what a triangle sees: all that meets with that is listed.
          self%beyond = maxval([0.0_wp, (facets_length(sides%master, f), &
             f = 1, sides%master%n_facet)])

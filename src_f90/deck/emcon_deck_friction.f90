@@ -83,9 +83,9 @@ contains
             call check_other_way(reader, pair(:i), given)
             if (.not. pair(i)%interaction%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
             if (scene%n_dim == n_space .and. pair(i)%formulation == formulation_mortar) then
-               call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface interaction " &
-                  // "has *FRICTION: in three dimensions MORTAR has none in this version; use " &
-                  // "TYPE=NODE TO SURFACE")
+               call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface " &
+                  // "interaction has *FRICTION: in three dimensions MORTAR has none in this " &
+                  // "version; use TYPE=NODE TO SURFACE")
                cycle
             end if
             do k = 1, size(step)

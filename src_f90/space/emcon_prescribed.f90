@@ -48,6 +48,7 @@ contains
       real(wp), intent(out) :: u                 !! [L]
       real(wp), intent(out) :: v                 !! [L/T]
       real(wp), dimension(size(u_start, 1)) :: arm, start, w, rate
+      real(wp) :: begun, angle, spin
       integer :: node
 
       if (prescribed%turn == 0) then
@@ -71,7 +72,11 @@ contains
             return
          end if
          if (size(turn%angle) == 1) then
-            call given_turn(scene, step, turn%angle(1), instant, arm, start, w, rate)
+            begun = turned_by(arm, arm + start)
+            begun = begun + turn_of*anint((turn%angle(1)%before - begun)/turn_of)
+            call given_motion(scene, step, turn%angle(1), instant, begun, angle, spin)
+            call turn_arm(arm, angle, w, rate)
+            rate = spin*rate
          else
             call given_turn_space(scene, step, turn%angle, instant, arm, w, rate)
          end if
@@ -80,25 +85,7 @@ contains
       end associate
    end subroutine prescribed_motion
 
-   !> How an arm of a body turns in the plane, from where the step finds it.
-   pure subroutine given_turn(scene, step, prescribed, instant, arm, start, w, v)
-      type(scene_t), intent(in) :: scene
-      type(step_t), intent(in) :: step
-      type(prescribed_t), intent(in) :: prescribed       !! the angle
-      type(instant_t), intent(in) :: instant
-      real(wp), intent(in) :: arm(:), start(:)   !! (2) and how its end has moved before [L]
-      real(wp), intent(out) :: w(:)              !! (2) [L]
-      real(wp), intent(out) :: v(:)              !! (2) [L/T]
-      real(wp) :: begun, angle, spin
-
-      begun = turned_by(arm, arm + start)
-      begun = begun + turn_of*anint((prescribed%before - begun)/turn_of)
-      call given_motion(scene, step, prescribed, instant, begun, angle, spin)
-      call turn_arm(arm, angle, w, v)
-      v = spin*v
-   end subroutine given_turn
-
-   !> The same in space, by the components of a rotation vector.
+   !> How an arm of a body turns in space, by the components of a rotation vector.
    pure subroutine given_turn_space(scene, step, prescribed, instant, arm, w, v)
       type(scene_t), intent(in) :: scene
       type(step_t), intent(in) :: step
