@@ -55,8 +55,8 @@ contains
       if (allocated(error)) return
       if (self%candidates%is_settled) then
          leads = .false.
-         if (status == step_done) call friction_look_back(self%friction, system, self%set, motion, &
-            leads)
+         if (status == step_done .and. self%friction%looks_back) call friction_look_back( &
+            self%friction, system, self%set, motion, leads)
          if (.not. leads) return
       end if
       if (size(system%contact) == 0) return
@@ -147,7 +147,9 @@ contains
          call candidates_look(self, system, motion, status)
          if (status /= step_done) return
          if (self%candidates%have_changed) cycle
-         call friction_look_back(self%friction, system, self%set, motion, leads)
+         leads = .false.
+         if (self%friction%looks_back) call friction_look_back(self%friction, system, self%set, &
+            motion, leads)
          if (.not. leads) return
       end do
       status = step_cycling

@@ -33,6 +33,8 @@ module emcon_friction
 
    type :: friction_t
       logical :: is_on = .false. !! some contact has friction; else nothing is allocated
+      logical :: looks_back = .false.            !! and slip has two components: a step that is
+                                                 !! solved tells what stops or turns back
       integer :: n_slip = 1                      !! n_dim - 1
       !> (n_constraint) Coulomb's law of each, with mu = 0 where there is none: how what acts holds
       type(coulomb_t), allocatable :: law(:)
@@ -63,6 +65,7 @@ contains
       self%is_on = any(law%mu > 0.0_wp)
       n = merge(system%n_constraint, 0, self%is_on)
       self%n_slip = size(system%space%is_alive, 1) - 1
+      self%looks_back = self%is_on .and. self%n_slip > 1
       allocate(self%law(n))
       allocate(self%tau(self%n_slip, n), self%tau0(self%n_slip, n), &
          self%direction0(self%n_slip, n), source=0.0_wp)
@@ -151,7 +154,6 @@ contains
       integer :: i, k, pair
 
       leads = .false.
-      if (.not. (self%is_on .and. self%n_slip > 1)) return
       if (evaluation_is_equilibrium(motion%evaluation)) return
       du = evaluation_displacement(motion%evaluation, motion%v0, 0.0_wp)
       do k = set%n_permanent + 1, set%n

@@ -29,7 +29,7 @@ contains
       if (reader%n_dim /= n_space .or. word /= "YES" .or. .not. has_option(card, "EDGES")) return
       do i = 1, size(pair)
          if (pair(i)%slave == 0 .or. pair(i)%master == 0) cycle
-         why = why_none_cross(scene, pair(i))
+         call say_why_none_cross(scene, pair(i), why)
          if (why == "") cycle
          call card_error(reader, card, "EDGES=YES: " // why // "; take it out")
          return
@@ -37,10 +37,10 @@ contains
    end subroutine read_crossings
 
    !> Why a pair has no edges that could be held; blank if it has.
-   pure function why_none_cross(scene, pair) result(why)
+   pure subroutine say_why_none_cross(scene, pair, why)
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
-      character(len=:), allocatable :: why
+      character(len=:), allocatable, intent(out) :: why
       logical :: has_nodes                           !! and no faces
 
       why = ""
@@ -57,6 +57,6 @@ contains
             why = "a pressure by the overclosure acts on areas, and edges have none"
          end if
       end associate
-   end function why_none_cross
+   end subroutine say_why_none_cross
 
 end module emcon_deck_crossings

@@ -51,7 +51,7 @@ contains
       if (.not. increment%done > 0.0_wp) call pair_sums_begin(self%state%sums%sum)
       associate (state => self%state, system => self%system, set => self%active%set)
          system%response%residual = system%response%residual - self%newton%contact
-         call book_ties(self, scene, h)
+         if (.not. all(scene%tie%is_adjusted)) call book_ties(self, scene, h)
          call gather_dependent(system%space%numbering, system%response%residual)
          call book_stabilization(self, increment)
          system%response%residual = merge(0.0_wp, system%response%residual, &
@@ -107,7 +107,6 @@ contains
       real(wp), dimension(size(scene%x, 1), size(scene%x, 2)) :: place, force, other
       real(wp) :: couple(size(self%ledger%angular))
 
-      if (all(scene%tie%is_adjusted)) return
       associate (motion => self%motion, numbering => self%system%space%numbering)
          place = scene%x + self%state%u + 0.5_wp*motion%du
          couple = tie_couple_of(numbering, place, self%system%response%residual) &

@@ -4,7 +4,6 @@
 module emcon_start_overlap
    use emcon_errors, only : err_input, error_t, raise
    use emcon_guards, only : touching_bar
-   use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_motion, only : at_rest
    use emcon_march_types, only : march_t
@@ -26,7 +25,7 @@ contains
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(overlap_t) :: overlap
-      character(len=:), allocatable :: text
+      character(len=:), allocatable :: text, title
       real(wp) :: bar
       integer :: k
 
@@ -46,22 +45,14 @@ contains
       if (overlap%is_beside) text = text // "; no node of one need be in the other, as where " // &
          "edges cross or faces lie in one plane"
       associate (pair => scene%pair(k))
+         title = "surface " // scene%surface(pair%slave)%name
+         if (pair%slave /= pair%master) title = title // " and of surface " // &
+            scene%surface(pair%master)%name
          call raise(error, err_input, where_text(scene, pair%origin) // ": error: bodies of " // &
-            names(scene, pair) // " overlap at the start by " // to_text(overlap%depth, 3) // &
-            " of an edge: " // text // "; move the bodies apart")
+            title // " overlap at the start by " // to_text(overlap%depth, 3) // " of an edge: " &
+            // text // "; move the bodies apart")
       end associate
    end subroutine start_overlap_check
-
-   !> The surfaces of a pair.
-   pure function names(scene, pair) result(text)
-      type(scene_t), intent(in) :: scene
-      type(contact_pair_t), intent(in) :: pair
-      character(len=:), allocatable :: text
-
-      text = "surface " // scene%surface(pair%slave)%name
-      if (pair%slave /= pair%master) text = text // " and of surface " // &
-         scene%surface(pair%master)%name
-   end function names
 
    !> The pair whose surfaces have what the overlap names; 0: none does.
    pure integer function pair_of(scene, overlap) result(pair)

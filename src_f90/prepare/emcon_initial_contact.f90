@@ -38,6 +38,11 @@ module emcon_initial_contact
    !> Two polygons of one curve dip into each other by less than this, per edge, at blunt corners.
    real(wp), parameter :: deepest_dip = 0.2_wp
 
+   !> What to do where a master of faces, or of a shape, points away.
+   character(len=*), parameter :: &
+      of_faces = "; check the face labels                                            ", &
+      of_shape = "; turn the normal of its shape, or put the bodies on its other side"
+
 contains
 
    !> Move the nodes that ADJUST= names onto their surface and check every pair; the notes tell
@@ -260,20 +265,10 @@ contains
       else if (n_over > 0 .and. n_behind == n_over) then
          call raise(error, err_input, where_text(scene, pair%origin) // ": error: the normals of " &
             // title // " surface " // scene%surface(pair%master)%name // " point away from " // &
-            "surface " // scene%surface(pair%slave)%name // advice_on_sides(scene, pair))
+            "surface " // scene%surface(pair%slave)%name // trim(merge(of_shape, of_faces, &
+            allocated(scene%surface(pair%master)%wall))))
       end if
    end subroutine check_sides
-
-   !> What to do where a master points away.
-   pure function advice_on_sides(scene, pair) result(advice)
-      type(scene_t), intent(in) :: scene
-      type(contact_pair_t), intent(in) :: pair
-      character(len=:), allocatable :: advice
-
-      advice = "; check the face labels"
-      if (allocated(scene%surface(pair%master)%wall)) advice = "; turn the normal of its shape, " &
-         // "or put the bodies on its other side"
-   end function advice_on_sides
 
    !> Is slave node `i` on the wrong side of the master, rather than slightly inside the body?
    pure logical function is_behind(scene, contact, i, gap, noise)

@@ -272,8 +272,8 @@ def test_what_is_of_the_plane_is_refused() -> None:
     with pytest.raises(InputError, match=r"face 1 has no area"):
         Interface(np.array([[0, 0, 0], [1, 0, 0], [2, 0, 0]], float)).add_faces("flat", [[0, 1, 2]])
     lower, upper = face.add_faces("lower", [[0, 1, 2]]), face.add_faces("upper", [[3, 5, 4]])
-    with pytest.raises(InputError, match="formulation is 3: contact in three dimensions is node"):
-        face.add_pair(upper, lower, "mortar")
+    with pytest.raises(InputError, match="contact in three dimensions is node to segment .* or mortar"):
+        face.add_pair(upper, lower, "segment")
     with pytest.raises(InputError, match="smoothing is of the plane"):
         face.add_pair(upper, lower, "node to segment", smoothing="hermite")
     with pytest.raises(InputError, match="its own master is not in this version in three"):

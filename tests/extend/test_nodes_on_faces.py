@@ -206,7 +206,7 @@ def test_refusals(program: tuple[Path, dict[str, str]], tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize(("old", "new", "words"), [
-    ("TYPE=USER", "TYPE=MORTAR", "TYPE=MORTAR is for plane models"),
+    ("TYPE=USER", "TYPE=SEGMENT", "TYPE=SEGMENT is for plane models"),
     ("TYPE=USER", "TYPE=USER, ADJUST=0.1", "ADJUST is not for TYPE=USER"),
     ("TYPE=USER", "TYPE=USER, GUARD=YES", "GUARD=YES is not for TYPE=USER"),
     ("TYPE=USER", "TYPE=USER, SIDES=BOTH", "what TYPE=USER holds the program says"),
