@@ -18,8 +18,8 @@ module emcon_mortar_space
       multiplier_dual
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
-   use emcon_patch_gap_space, only : patch_basis, patch_basis_t, patch_gap_of, patch_gap_t, &
-      patch_open, patch_open_t, patch_t
+   use emcon_patch_gap_space, only : patch_gap_of, patch_gap_t, patch_open, patch_open_t
+   use emcon_patch_look_space, only : patch_basis, patch_basis_t, patch_t
    use emcon_patch_sides_space, only : patch_sides_t, patch_triangles_init
    use emcon_patch_spread_space, only : patch_spread, patch_uses
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &

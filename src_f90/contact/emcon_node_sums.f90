@@ -11,30 +11,29 @@ module emcon_node_sums
 
 contains
 
-   !> Derivatives by nodes from those by sums of nodes.
-   pure subroutine node_sums_first(part, weight, factor, of_node)
+   !> Add derivatives by nodes from those by sums of nodes.
+   pure subroutine node_sums_first(part, weight, factor, place, of_node)
       real(wp), intent(in) :: part(:)            !! by the components of each sum
-      real(wp), intent(in) :: weight(:, :)       !! (n_node - 1, sums) of nodes in the sums
-      real(wp), intent(in) :: factor             !! of what is asked for
-      real(wp), intent(out) :: of_node(:, :)     !! (n_dim, n_node)
-      integer :: k
+      real(wp), intent(in) :: weight(:, :)       !! (n - 1, sums) of nodes in the sums
+      real(wp), intent(in) :: factor             !! of what is added
+      integer, intent(in) :: place(:)            !! (n) of the nodes among those of `of_node`
+      real(wp), intent(inout) :: of_node(:, :)   !! (n_dim, any)
 
-      of_node = 0.0_wp
       call nodes_add_first(factor, reshape(matmul(reshape(part, [size(of_node, 1), &
-         size(weight, 2)]), transpose(weight)), [size(of_node, 1)*size(weight, 1)]), &
-         [(k, k = 1, size(of_node, 2))], of_node)
+         size(weight, 2)]), transpose(weight)), [size(of_node, 1)*size(weight, 1)]), place, of_node)
    end subroutine node_sums_first
 
    !> The same of second derivatives.
-   pure subroutine node_sums_second(part, weight, factor, n, of_node)
+   pure subroutine node_sums_second(part, weight, factor, place, of_node)
       real(wp), intent(in) :: part(:, :)         !! by the components of the sums, twice
-      real(wp), intent(in) :: weight(:, :)       !! (n_node - 1, sums) of nodes in the sums
-      real(wp), intent(in) :: factor             !! of what is asked for
-      integer, intent(in) :: n                   !! n_node
-      real(wp), intent(inout) :: of_node(:, :)   !! (>= n_dim n_node, the same)
+      real(wp), intent(in) :: weight(:, :)       !! (n - 1, sums) of nodes in the sums
+      real(wp), intent(in) :: factor             !! of what is added
+      integer, intent(in) :: place(:)            !! (n) of the nodes among those of `of_node`
+      real(wp), intent(inout) :: of_node(:, :)   !! components of nodes, twice
       real(wp), allocatable :: half(:, :), full(:, :)
-      integer :: i, j, k, n_dim
+      integer :: i, j, k, n, n_dim
 
+      n = size(place)
       n_dim = size(part, 1)/size(weight, 2)
       allocate(half(n_dim*(n - 1), size(part, 1)), full(n_dim*(n - 1), n_dim*(n - 1)))
       do k = 1, size(part, 1)
@@ -50,8 +49,7 @@ contains
             end associate
          end do
       end do
-      of_node(:n_dim*n, :n_dim*n) = 0.0_wp
-      call nodes_add_second(factor, n_dim, full, [(k, k = 1, n)], of_node)
+      call nodes_add_second(factor, n_dim, full, place, of_node)
    end subroutine node_sums_second
 
 end module emcon_node_sums

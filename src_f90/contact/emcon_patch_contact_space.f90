@@ -20,7 +20,8 @@ module emcon_patch_contact_space
    use emcon_mirror_faces_space, only : always_rests, mirror_axes
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
    use emcon_node_sums, only : node_sums_first, node_sums_second
-   use emcon_patch_gap_space, only : patch_gap, patch_gap_t, patch_look, patch_look_t
+   use emcon_patch_gap_space, only : patch_gap, patch_gap_t
+   use emcon_patch_look_space, only : patch_look, patch_look_t, patch_shares
    use emcon_patch_sides_space, only : frame_normal, point_frames_init, patch_sides_t, &
       patch_triangles_init
    use emcon_patch_spread_space, only : patch_spread, patch_uses
@@ -380,15 +381,38 @@ contains
       end associate
    end subroutine evaluate_frame
 
-   !> Slip over the triangle that was nearest as the step began.
-   pure type(frame_slip_t) function slip_over(stencil, at, way, leaves_second) result(slip)
+   !> How much of the slip is over each triangle of a patch: what it covers of that as the step
+   !> begins; where nothing is covered, all over the nearest one, which comes last.
+   pure function slip_shares(stencil, at) result(share)
       type(patch_stencil_t), intent(in) :: stencil
+      real(wp), intent(in) :: at(:, :)           !! (3, 3 + n_vertex) of the stencil [L]
+      real(wp) :: share(stencil%patch%n_triangle + 1)
+
+      associate (n => stencil%patch%n_triangle)
+         share(:n) = patch_shares(stencil%patch, at)
+         share(n + 1) = merge(0.0_wp, 1.0_wp, any(share(:n) > 0.0_wp))
+      end associate
+   end function slip_shares
+
+   !> The vertices of triangle `k` of these.
+   pure function slip_corner(stencil, k) result(corner)
+      type(patch_stencil_t), intent(in) :: stencil
+      integer, intent(in) :: k
+      integer :: corner(3)
+
+      corner = stencil%corner
+      if (k <= stencil%patch%n_triangle) corner = stencil%patch%triangle(:, k)
+   end function slip_corner
+
+   !> Slip over a triangle.
+   pure type(frame_slip_t) function slip_over(corner, at, way, leaves_second) result(slip)
+      integer, intent(in) :: corner(3)
       real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of the stencil [L]
       logical, intent(in) :: leaves_second
 
       ! The point is where the stencil counts from. Its own frame tells directions, so that these
       ! turn with it, and not from triangle to triangle.
-      associate (place => [3 + stencil%corner, 1])
+      associate (place => [3 + corner, 1])
          call frame_slip(at(:, place), way(:, place), at(:, 2), leaves_second, slip)
       end associate
    end function slip_over
@@ -400,24 +424,36 @@ contains
       real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of the stencil [L]
       type(condition_t), intent(inout) :: item   !! with all of these nodes
       type(frame_slip_t) :: slip
-      real(wp) :: weight(size(row), 3)
-      integer :: s
+      real(wp) :: share(stencil%patch%n_triangle + 1), weight(size(row), 3)
+      integer :: place(item%n_node), corner(3), k, s
 
-      slip = slip_over(stencil, at, way, item%leaves_second)
       call condition_resize_slip(item)
-      ! Of nodes in both sides of the triangle, and in the way from its corner to the point.
-      associate (by => stencil%weight(row, 2 + stencil%corner), n => item%n_node)
-         weight(:, 1) = by(:, 2) - by(:, 1)
-         weight(:, 2) = by(:, 3) - by(:, 1)
-         weight(:, 3) = -by(:, 1)
-         item%slip(:size(slip%f)) = slip%f
-         do s = 1, size(slip%f)
-            call node_sums_first(slip%g(:, s), weight, 1.0_wp, item%t(:, :n, s))
-            call node_sums_first(slip%c(:, s), weight, 1.0_wp, item%t1(:, :n, s))
-            if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), weight, 1.0_wp, &
-               n, item%ht(:, :, s))
-         end do
+      place = [(k, k = 1, item%n_node)]
+      associate (n => item%n_node, n_slip => size(slip%f))
+         item%slip(:n_slip) = 0.0_wp
+         item%t(:, :n, :n_slip) = 0.0_wp
+         item%t1(:, :n, :n_slip) = 0.0_wp
+         if (.not. item%leaves_second) item%ht(:3*n, :3*n, :n_slip) = 0.0_wp
       end associate
+      share = slip_shares(stencil, at)
+      do k = 1, size(share)
+         if (.not. share(k) > 0.0_wp) cycle
+         corner = slip_corner(stencil, k)
+         slip = slip_over(corner, at, way, item%leaves_second)
+         ! Of nodes in both sides of the triangle, and in the way from its corner to the point.
+         associate (by => stencil%weight(row, 2 + corner))
+            weight(:, 1) = by(:, 2) - by(:, 1)
+            weight(:, 2) = by(:, 3) - by(:, 1)
+            weight(:, 3) = -by(:, 1)
+         end associate
+         do s = 1, size(slip%f)
+            item%slip(s) = item%slip(s) + share(k)*slip%f(s)
+            call node_sums_first(slip%g(:, s), weight, share(k), place, item%t(:, :, s))
+            call node_sums_first(slip%c(:, s), weight, share(k), place, item%t1(:, :, s))
+            if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), weight, &
+               share(k), place, item%ht(:, :, s))
+         end do
+      end do
    end subroutine add_slip
 
    !> As `contact_t` has it.
@@ -427,13 +463,19 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       real(wp) :: slip(size(x, 1) - 1)           !! [L]
       real(wp), dimension(3, 3 + self%stencil(i)%patch%n_vertex) :: at, way
+      real(wp) :: share(self%stencil(i)%patch%n_triangle + 1)
       type(frame_slip_t) :: over
+      integer :: k
 
       slip = 0.0_wp
       if (self%stencil(i)%triangle == 0) return
       call patch_stencil_gather(self%stencil(i), x, u0, du, at, way)
-      over = slip_over(self%stencil(i), at, way, .true.)
-      slip = over%f
+      share = slip_shares(self%stencil(i), at)
+      do k = 1, size(share)
+         if (.not. share(k) > 0.0_wp) cycle
+         over = slip_over(slip_corner(self%stencil(i), k), at, way, .true.)
+         slip = slip + share(k)*over%f
+      end do
    end function patch_slip
 
    !> As `contact_t` has it: what of the facets at its point faces along each frame. At the corner

@@ -7,7 +7,7 @@ module emcon_patch_stencil_space
    use emcon_element_kind, only : max_face_nodes
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : nearest_t, nearest_update
-   use emcon_patch_gap_space, only : patch_t
+   use emcon_patch_look_space, only : patch_t
    use emcon_patch_moments_space, only : patch_triangle
    use emcon_patch_near_space, only : patch_near_find, patch_near_goes_on, patch_near_list, &
       patch_near_nearest, patch_near_t, room_behind

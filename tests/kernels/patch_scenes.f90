@@ -2,7 +2,8 @@
 module patch_scenes
    use emcon_dgrad_nodes, only : nodes_add_first
    use emcon_kinds, only : wp
-   use emcon_patch_gap_space, only : patch_gap_t, patch_t
+   use emcon_patch_gap_space, only : patch_gap_t
+   use emcon_patch_look_space, only : patch_t
    implicit none
    private
    public :: make_grid, turned, way_of, moment_of, size_of

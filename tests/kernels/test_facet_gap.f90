@@ -4,8 +4,8 @@ module test_facet_gap
    use check, only : check_near, check_true, test_case_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_patch_gap_space, only : patch_basis, patch_basis_t, patch_gap, &
-      patch_gap_t, patch_t
+   use emcon_patch_gap_space, only : patch_gap, patch_gap_t
+   use emcon_patch_look_space, only : patch_basis, patch_basis_t, patch_t
    use emcon_patch_moments_space, only : patch_triangle
    use emcon_text, only : to_text
    use patch_scenes, only : make_grid, moment_of, n_point, n_side, n_vertex, rough, size_of, &

@@ -120,6 +120,38 @@ def test_slab_on_a_free_plate(tmp_path: Path, turn: float) -> None:
     dissipates(run)
 
 
+def node_on_node(options: str, cells: int) -> str:
+    """A cube that slides along x over one like it, which is held below; x-z is a plane of symmetry."""
+    one = Block("C3D8", (cells,)*3)
+    two = Block("C3D8", (cells,)*3, place=lambda x: x - np.array([0, 0, 1.]))
+    held = "".join(f"{len(one.x) + k}, 1, 3\n" for k in two.on(2, 0))
+    return (bodies([one, two], [faces(one, 2, 0), faces(two, 2, 1)], "*ELASTIC\n1000., 0.\n*DENSITY\n1.\n")
+            + pair(options, "*FRICTION\n.3\n") + velocities(one, np.array([1., 0, 0]), np.zeros(3))
+            + f"*BOUNDARY\n{held}" + dynamic(.01, .1, weight()))
+
+
+def test_a_node_on_a_node_prefers_no_triangle(tmp_path: Path) -> None:
+    """Nor does it leave a plane of symmetry: six increments, in which both cubes touch all over."""
+    run = ran(tmp_path, node_on_node(", SIDES=ONE", 1))
+    fields = run.fields()
+    upper = fields.x[:8]
+    mirror = [int(np.argmin(np.abs(upper - (x*[1, -1, 1] + [0, 1, 0])).sum(1))) for x in upper]
+    for u in fields["displacement"][:7, :8]:
+        assert np.abs(u - u[mirror]*[1, -1, 1]).max() <= 64*EPSILON
+    assert run.history["friction_loss"][-1] > 0.0
+    dissipates(run)
+
+
+@pytest.mark.parametrize("cells", [1, 2])
+def test_nodes_on_nodes_slide_without_cuts(tmp_path: Path, cells: int) -> None:
+    """Held on both sides: each contact is there twice."""
+    run = ran(tmp_path, node_on_node("", cells))
+    assert run.verdict["verdict"] == "good"
+    assert run.history["cuts"].sum() == 0
+    assert run.verdict["law_violation"] < 1e-10
+    dissipates(run)
+
+
 def test_many_contacts_slide(tmp_path: Path) -> None:
     """225 nodes that slide and turn are solved as few are."""
     run = ran(tmp_path, on_floor(.3, .01, .02, (1., .2, 0), (0, 0, 1.), is_rigid=False, cells=(14, 14, 1)))

@@ -1,0 +1,174 @@
+!> What a patch over a surface of triangles sees: a small square that moves with a node, or a
+!> triangle of a slave facet. Source: docs/theory.md, eqs. (43) to (46).
+module emcon_patch_look_space
+   use emcon_frame_vertex_space, only : frame_place, frame_size
+   use emcon_kinds, only : wp
+   use emcon_patch_moments_space, only : patch_area_t, patch_misses, patch_moments, patch_products
+   use emcon_polygon_clip_space, only : barycentric
+   implicit none
+   private
+   public :: patch_t, place_vertices, patch_look_t, patch_look, patch_basis_t, patch_basis, &
+      patch_shares
+
+   !> Places at which a field is given, in the coordinates of the patch.
+   real(wp), parameter, public :: unit_corner(2, 3) = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
+      0.0_wp, 1.0_wp], [2, 3])
+
+   !> The triangles that a patch may see in a step.
+   type :: patch_t
+      integer :: n_vertex = 0
+      integer :: n_triangle = 0
+      integer, allocatable :: triangle(:, :)     !! (3, >= n_triangle) counter-clockwise
+      real(wp), allocatable :: chi(:)            !! (>= n_vertex) 1; 0 where the surface ends
+      real(wp) :: length = 0.0_wp                !! of the patch' sides, in the frame's vectors
+      real(wp) :: unit = 1.0_wp                  !! length of these vectors, about [L]
+      type(patch_area_t) :: area
+      logical :: is_integral = .false.           !! of heights over its area, not by it
+      logical :: of_cover = .false.              !! of 1 in the place of heights: what is covered
+   end type patch_t
+
+   !> What a patch sees at both ends of a step.
+   type :: patch_look_t
+      real(wp) :: height(0:1) = 0.0_wp           !! integral of chi times height, by its area [L]
+      real(wp) :: cover(0:1) = 0.0_wp            !! that of chi: what is covered
+      real(wp) :: way = 0.0_wp                   !! how far vertices go along it, at most [L]
+      real(wp) :: ahead = 0.0_wp                 !! height at the start of what is over it at the
+                                                 !! end, the least; huge: nothing is [L]
+   end type patch_look_t
+
+   !> The same of a patch of a slave facet, weight by weight.
+   type :: patch_basis_t
+      real(wp) :: height(3, 0:1) = 0.0_wp        !! integral of chi times height [L^3]
+      real(wp) :: cover(3, 0:1) = 0.0_wp         !! that of chi [L^2]
+      real(wp) :: area(0:1) = 0.0_wp             !! of all of it [L^2]
+      real(wp) :: way = 0.0_wp                   !! as above
+      real(wp) :: ahead = 0.0_wp                 !! as above
+   end type patch_basis_t
+
+contains
+
+   !> Where vertices are in the frame at one configuration, coordinates those of the patch.
+   pure subroutine place_vertices(patch, x, place)
+      type(patch_t), intent(in) :: patch         !! that looks
+      real(wp), intent(in) :: x(:, :)            !! (3, 3 + n_vertex) origin, frame, vertices [L]
+      real(wp), intent(out) :: place(:, :)       !! (3, n_vertex)
+      integer :: j
+
+      do j = 1, patch%n_vertex
+         place(:, j) = frame_place(x(:, 2) - x(:, 1), x(:, 3) - x(:, 1), x(:, 3 + j) - x(:, 1))
+         place(:2, j) = place(:2, j)/patch%length + patch%area%centre
+      end do
+   end subroutine place_vertices
+
+   !> What a patch sees at both ends of a step.
+   pure function patch_look(patch, x, dx) result(look)
+      type(patch_t), intent(in) :: patch         !! that looks
+      real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
+      type(patch_look_t) :: look
+      real(wp) :: place(3, patch%n_vertex, 0:1)
+
+      call place_vertices(patch, x, place(:, :, 0))
+      call place_vertices(patch, x + dx, place(:, :, 1))
+      call find_means(patch, place(:, :, 0), look%height(0), look%cover(0))
+      call find_means(patch, place(:, :, 1), look%height(1), look%cover(1))
+      look%way = longest_way(patch, place)
+      look%ahead = height_ahead(patch, place(:, :, 0), place(:, :, 1))
+   end function patch_look
+
+   !> What each triangle covers of what is covered of a patch at one configuration.
+   pure function patch_shares(patch, x) result(share)
+      type(patch_t), intent(in) :: patch         !! that looks
+      real(wp), intent(in) :: x(:, :)            !! (3, 3 + n_vertex) origin, frame, vertices [L]
+      real(wp) :: share(patch%n_triangle)        !! their sum is 1, or 0 where nothing is covered
+      real(wp) :: place(3, patch%n_vertex), moment(3), bare(3)
+      integer :: k
+
+      call place_vertices(patch, x, place)
+      do k = 1, patch%n_triangle
+         call patch_moments(patch%area, place(:2, patch%triangle(:, k)), moment, bare)
+         share(k) = sum(bare)
+      end do
+      if (any(share > 0.0_wp)) share = share/sum(share)
+   end function patch_shares
+
+   !> What a patch of a slave facet sees at both ends of a step, with each of the weights that are 1
+   !> at one of the `unit_corner` and 0 at the others.
+   pure function patch_basis(patch, x, dx) result(basis)
+      type(patch_t), intent(in) :: patch         !! that looks
+      real(wp), intent(in) :: x(:, :), dx(:, :)  !! (3, 3 + n_vertex) origin, frame, vertices [L]
+      type(patch_basis_t) :: basis
+      real(wp) :: place(3, patch%n_vertex, 0:1), products(3, 3), share(3)
+      integer :: end, k, v
+
+      do end = 0, 1
+         call place_vertices(patch, x + end*dx, place(:, :, end))
+         associate (size_of => frame_size(x(:, :3) + end*dx(:, :3)), height => &
+               basis%height(:, end), cover => basis%cover(:, end), p => place(:, :, end))
+            basis%area(end) = 0.5_wp*size_of
+            do k = 1, patch%n_triangle
+               associate (t => patch%triangle(:, k))
+                  if (patch_misses(patch%area, p(:2, t))) cycle
+                  products = size_of*patch_products(patch%area, p(:2, t))
+                  do v = 1, 3
+                     share = barycentric(p(:2, t), unit_corner(:, v))*patch%chi(t)
+                     height = height + products(:, v)*dot_product(share, p(3, t))
+                     cover = cover + products(:, v)*sum(share)
+                  end do
+               end associate
+            end do
+         end associate
+      end do
+      basis%way = longest_way(patch, place)
+      basis%ahead = height_ahead(patch, place(:, :, 0), place(:, :, 1))
+   end function patch_basis
+
+   !> How far vertices go along a patch, at most [L].
+   pure real(wp) function longest_way(patch, place) result(way)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: place(:, :, 0:)    !! (3, n_vertex, 0:1)
+
+      way = patch%unit*patch%length*sqrt(maxval(sum((place(:2, :, 1) - place(:2, :, 0))**2, 1)))
+   end function longest_way
+
+   !> The integral of chi times height over the patch by its area, and what of it is covered.
+   pure subroutine find_means(patch, place, height, cover)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: place(:, :)        !! (3, n_vertex)
+      real(wp), intent(out) :: height, cover
+      real(wp) :: moment(3), bare(3), share(3)
+      integer :: k, v
+
+      height = 0.0_wp
+      cover = 0.0_wp
+      do k = 1, patch%n_triangle
+         associate (t => patch%triangle(:, k))
+            if (patch_misses(patch%area, place(:2, t))) cycle
+            call patch_moments(patch%area, place(:2, t), moment, bare)
+            do v = 1, 3
+               share = moment(v)*barycentric(place(:2, t), unit_corner(:, v))
+               height = height + dot_product(share, patch%chi(t)*place(3, t))
+               cover = cover + dot_product(share, patch%chi(t))
+            end do
+         end associate
+      end do
+   end subroutine find_means
+
+   !> How high the planes of the triangles that are over the patch at the end are over it at the
+   !> start: the least; huge if there are none [L].
+   pure real(wp) function height_ahead(patch, from, to) result(least)
+      type(patch_t), intent(in) :: patch
+      real(wp), intent(in) :: from(:, :), to(:, :)   !! (3, n_vertex)
+      integer :: k
+
+      least = huge(least)
+      do k = 1, patch%n_triangle
+         associate (t => patch%triangle(:, k))
+            if (patch_misses(patch%area, to(:2, t))) cycle
+            if (any(patch%chi(t) <= 0.0_wp)) cycle
+            least = min(least, dot_product(barycentric(from(:2, t), spread(patch%area%centre, 1, &
+               2)), from(3, t)))
+         end associate
+      end do
+   end function height_ahead
+
+end module emcon_patch_look_space
