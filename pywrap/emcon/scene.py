@@ -352,5 +352,6 @@ def _see_walls(scene: Scene, place: Sequence[Array], walls: Sequence[NDArray[np.
     for k, (bodies, wall) in enumerate(zip(place, points, strict=True)):
         scene.position[k], near = project(np.concatenate([bodies, wall]))
         order = far_first(scene.cells, near)
-        seen = np.concatenate([np.ones(n_face, dtype=bool), is_seen(scene.position[k], scene.cells[n_face:])])
+        seen = np.concatenate([np.ones(n_face, dtype=bool),
+                               is_seen(scene.position[k], scene.cells[n_face:])])
         scene.order.append(order[seen[order]])

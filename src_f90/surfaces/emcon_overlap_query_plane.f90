@@ -229,7 +229,7 @@ contains
    end subroutine try_edge
 
    !> An edge that crosses nothing lies in the other piece all the same where its ends stand exactly
-   !> on the sides of that.
+   !> on the sides of that; and so may what is behind it.
    pure subroutine try_middle(self, x, e, other, reach, overlap)
       class(overlap_query_plane_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)
@@ -246,7 +246,39 @@ contains
       found = overlap
       call try_place(self, x, e, 0.5_wp, other, found, reach)
       if (found%depth > max(aligned, overlap%depth)) overlap = found
+      if (.not. self%links%is_profile(e)) call try_behind(self, x, e, other, reach, overlap)
    end subroutine try_middle
+
+   !> Is half of its element behind the middle of edge `e` inside, which lies on an edge that looks
+   !> as it does? Where pieces touch, edges look at each other.
+   pure subroutine try_behind(self, x, e, other, reach, overlap)
+      class(overlap_query_plane_t), intent(in) :: self
+      real(wp), intent(in), contiguous :: x(:, :)
+      integer, intent(in) :: e
+      integer, intent(in) :: other(:)
+      real(wp), intent(in) :: reach              !! [L]
+      type(overlap_t), intent(inout) :: overlap
+      type(nearest_t) :: middle, behind
+      real(wp) :: along(2), inwards(2), to_middle(2)
+      integer :: k
+
+      associate (a => self%outline%facet(:, e))
+         along = between(x, self%u, a(1), a(2))
+         if (.not. length_of(along) > 0.0_wp) return
+         inwards = (0.5_wp*self%outline%thickness(e)/length_of(along))*[-along(2), along(1)]
+         do k = 1, size(other)
+            if (are_neighbours(self, e, other(k))) cycle
+            associate (b => self%outline%facet(:, other(k)))
+               to_middle = between(x, self%u, b(1), a(1)) + 0.5_wp*along
+               call nearest_update(middle, other(k), to_middle, between(x, self%u, b(1), b(2)))
+               call nearest_update(behind, other(k), to_middle + inwards, &
+                  between(x, self%u, b(1), b(2)))
+            end associate
+         end do
+      end associate
+      if (.not. dot_product(middle%along, along) > 0.0_wp .or. behind%square > reach**2) return
+      call take_deeper(self, x, behind, e, 0.5_wp, overlap)
+   end subroutine try_behind
 
    !> Is a node on one of these edges, to round-off?
    pure logical function stands_on(self, x, node, other) result(stands)

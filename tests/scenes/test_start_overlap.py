@@ -44,6 +44,22 @@ def test_no_node_is_inside(one: tuple, two: tuple, depth: float, kind: str, cont
     refused(tmp_path/"deck.inp", text, surfaces, depth)
 
 
+@pytest.mark.parametrize(("aside", "depth"), [((0.0, 0.0), 0.5), ((0.0, -0.5), 0.5), ((0.0, -0.8), 0.2)])
+def test_squares_in_one_place(aside: tuple[float, float], depth: float, tmp_path: Path) -> None:
+    """In the plane: with a pair refused, without one told."""
+    square = ((0, 0), (1, 0), (1, 1), (0, 1))
+    nodes = [(x + k*aside[0], y + k*aside[1]) for k in (0, 1) for x, y in square]
+    text = ("*NODE\n" + "".join(f"{i}, {x!r}, {y!r}\n" for i, (x, y) in enumerate(nodes, 1))
+            + "*ELEMENT, TYPE=CPE4, ELSET=A\n1, 1, 2, 3, 4\n*ELEMENT, TYPE=CPE4, ELSET=B\n2, 5, 6, 7, 8\n"
+            "*MATERIAL, NAME=M\n*ELASTIC\n100., .3\n*DENSITY\n1.\n*SOLID SECTION, ELSET=A, MATERIAL=M\n"
+            "*SOLID SECTION, ELSET=B, MATERIAL=M\n*SURFACE, NAME=S1\nA\n*SURFACE, NAME=S2\nB\n")
+    step = "*STEP, NLGEOM\n*DYNAMIC, DIRECT\n.01, .02\n*NODE FILE\nU\n*END STEP\n"
+    refused(tmp_path/"deck.inp", text + pair() + step, "surface S1 and of surface S2", depth)
+    (tmp_path/"deck.inp").write_text(text + step)
+    warnings = run_deck(tmp_path/"deck.inp", tmp_path).verdict["warnings"]
+    assert any("bodies overlap as a step begins" in text for text in warnings)
+
+
 @pytest.mark.parametrize("lift", [0.0, 1e-6])
 def test_what_touches_is_no_overlap(lift: float, tmp_path: Path) -> None:
     blocks = [block((4, 1, 1), (0, 0, 0)), block((1, 4, 1), (1.5, -1.5, 1.0 + lift))]

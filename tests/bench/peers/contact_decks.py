@@ -86,10 +86,8 @@ SPUN = "in place of its steps a static one in which the sector spins"
 DIGITS = "; the two sides of the cut are 5e-6 off each other in the deck"
 UNLIKE = "; unlike meshes at the cut, of which CalculiX ties nodes, EMCON means over faces"
 TIED = "with *TIE in place of the contact"
-MORTAR = "mortar is not in space, by nodes"
 ONE_SIDE = ("unlike meshes: points of one side alone press, by a pressure by the overclosure; CalculiX integrates over "
             "the faces of this side")
-BY_NODES = put("TYPE=MORTAR", "TYPE=SURFACE TO SURFACE")
 SOFTER = put(r"1\.e7,3\.", "1.e5,.01")
 FLAT = chain(put(r"1\.0042779\d+e\+00", "1."), put(r"1\.0000004\d+e\+00", "1."), put(r",ADJUST=[.0-9]+", ""))
 
@@ -102,12 +100,11 @@ REMARKS = {
         shrunk, put(r"1\.e9,3\.", "3.e9,9.")))]),
     "contact4": (f"HARD of CalculiX is a pressure of 50 E by overclosure, here of 1E9; {FACES}, n = 1, 2, 3, 4",
                  split((1, 2, 3, 4), theirs=put("=HARD", "=LINEAR\n1.E9,1."))),
-    "contact4_mortar": (f"{MORTAR}; {FACES}, n = 1, 2, 3", split((1, 2, 3), BY_NODES)),
+    "contact4_mortar": ("both with each element split into n x n x n, n = 1, 2, 3", split((1, 2, 3))),
     "cubespring": (f"{FACES}, n = 2, 3, 4", split((2, 3, 4))),
     "punch1": (f"{RIM}, n = 1, 2, 3", split((1, 2, 3), chain(FLAT, SOFTER), chain(FLAT, SOFTER))),
     "punch2": ("as `punch1`", []),
     "beamcontact": (f"{FACES}, n = 2", split((2,))),
-    "testmortar": (MORTAR, [(None, BY_NODES)]),
     **{name: (ONE_SIDE, []) for name in ("hueeber1", "hueeber2", "hueeber3", "hueeber4")},
     "cubef2f1": ("a penalty of CalculiX against a tie", []),
     "cubef2f2": ("a penalty of CalculiX against a tie", []),
