@@ -99,7 +99,7 @@ WHY = {
                      "digits", None, None),
 }
 #: Of contact and ties, where bench_contact_decks.py has the causes.
-ELSEWHERE = "[the next section](#decks-of-contact-and-ties) tells why"
+ELSEWHERE = "see [the next section](#decks-of-contact-and-ties)"
 #: Times are printed with seven digits.
 SAME_TIME = 1e-6
 
