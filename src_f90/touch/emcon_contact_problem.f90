@@ -537,6 +537,7 @@ contains
 
       free = motion_of(self, -self%base)
       found = -self%base
+      found(0, :) = self%base(0, :) + push(0, :)
       associate (of_gap => self%w(1::1 + self%n_slip, 1::1 + self%n_slip))
          call push_problem_solve(of_gap, free(0, :), found(0, :), is_solved, n_pivot)
       end associate

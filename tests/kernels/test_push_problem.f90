@@ -25,12 +25,13 @@ contains
    end subroutine collect_push_problem
 
    !> A third of the rows are others once more, a third are sums of two; the gaps are such that there
-   !> is a solution. No gap is closed, no push pulls, and none of them does work.
+   !> is a solution. No gap is closed, no push pulls, and none of them does work, from whatever it
+   !> begins: no push, drawn ones, its own solution, which stands.
    subroutine test_drawn(error)
       type(error_t), allocatable, intent(out) :: error
       real(wp), allocatable :: row(:, :), w(:, :), free(:), push(:), gap(:), extra(:), motion(:)
       real(wp) :: draw(2)
-      integer :: i, k, n, n_step
+      integer :: i, k, n, n_step, begins
       logical :: is_solved
 
       do i = 1, 60
@@ -48,15 +49,19 @@ contains
          call draw_random(extra)
          w = matmul(transpose(row), row)
          free = matmul(transpose(row), motion - 0.5_wp) + modulo(i, 2)*0.1_wp*extra
-         call push_problem_solve(w, free, push, is_solved, n_step)
-         call check_true(error, is_solved, "a solution")
-         gap = free + matmul(w, push)
-         associate (scale => maxval(abs(free)))
-            call check_true(error, all(push >= 0.0_wp), "pushes")
-            call check_true(error, all(gap >= -tol*scale), "open gaps")
-            call check_near(error, dot_product(push, gap), 0.0_wp, tol, &
-               scale*max(sum(push), tiny(scale)), "work")
-         end associate
+         do begins = 1, 3
+            if (begins == 1) push = 0.0_wp
+            if (begins == 2) call draw_random(push)
+            call push_problem_solve(w, free, push, is_solved, n_step)
+            call check_true(error, is_solved .and. (begins < 3 .or. n_step == 0), "a solution")
+            gap = free + matmul(w, push)
+            associate (scale => maxval(abs(free)))
+               call check_true(error, all(push >= 0.0_wp), "pushes")
+               call check_true(error, all(gap >= -tol*scale), "open gaps")
+               call check_near(error, dot_product(push, gap), 0.0_wp, tol, &
+                  scale*max(sum(push), tiny(scale)), "work")
+            end associate
+         end do
          deallocate(row, extra, push, motion)
       end do
    end subroutine test_drawn
@@ -70,6 +75,7 @@ contains
       logical :: is_solved
 
       w = 2.0_wp
+      push = 0.0_wp
       call push_problem_solve(w, spread(-1.0_wp, 1, n), push, is_solved, n_step)
       call check_true(error, is_solved, "a solution")
       call check_near(error, sum(push), 0.5_wp, tol, 1.0_wp, "all pushes")
@@ -82,6 +88,7 @@ contains
       logical :: is_solved
 
       w = 1.0_wp
+      push = 0.0_wp
       call push_problem_solve(w, [0.0_wp, 1.0_wp], push, is_solved, n_step)
       call check_true(error, is_solved .and. n_step == 0 .and. all(push <= 0.0_wp), "nothing")
    end subroutine test_open
@@ -94,6 +101,7 @@ contains
       logical :: is_solved
 
       w = reshape([1.0_wp, -1.0_wp, -1.0_wp, 1.0_wp], [2, 2])
+      push = 1.0_wp
       call push_problem_solve(w, [-1.0_wp, -1.0_wp], push, is_solved, n_step)
       call check_true(error, .not. is_solved, "no motion opens both")
    end subroutine test_opposite
