@@ -82,7 +82,7 @@ contains
       type(solve_t) :: self
       integer :: k
 
-      call begin(self, newton, system, set, law)
+      call begin(self, newton, set, law)
       self%is_static = evaluation_is_equilibrium(motion%evaluation)
       call iterate(self, newton, system, set, motion, status, error)
       call condensation_free(self%condensation)
@@ -92,18 +92,18 @@ contains
       end do
    end subroutine contact_newton_solve
 
-   !> Nothing is known yet but the multipliers to start from.
-   subroutine begin(self, newton, system, set, law)
+   !> Nothing is known yet but the multipliers to start from. Without rows of slips the problem has
+   !> none.
+   subroutine begin(self, newton, set, law)
       type(solve_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
-      type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       type(coulomb_t), intent(in) :: law(:)
       integer :: k, n_slip
 
       call convergence_begin(newton%convergence)
       newton%n_solve = 0
-      n_slip = size(system%space%numbering%unknown, 1) - 1
+      n_slip = maxval(set%slip(:set%n_row))
       call contact_problem_create(self%problem, n_slip, size(law))
       do k = 1, size(law)
          self%problem%slip_target(:, k) = law(k)%slip_target(:n_slip)
