@@ -24,22 +24,37 @@ module emcon_contact_candidates
    implicit none
    private
    public :: candidates_select, candidates_solve, &
-      candidates_look, candidates_leave_out, candidates_keep_forces, candidates_are_many
+      candidates_look, candidates_leave_out, candidates_keep_forces, candidates_are_many, &
+      candidates_are_too_many
 
    !> Of more contacts than these trials tell the next set in dynamics too: their problem is dense.
-   integer, parameter :: most_condensed = 200
+   !> Of more than those there is no room for the problem of all of them.
+   integer, parameter :: most_condensed = 200, most_together = 2000
 
 contains
 
-   !> Are there too many candidates for a problem of all of them? Where slip has a direction nothing
-   !> else finds it, however many there are.
+   !> Are there so many candidates that trials find the next set of them sooner than their problem?
    pure logical function candidates_are_many(self)
       type(active_set_t), intent(in) :: self
 
-      candidates_are_many = self%rules%has_impacts .and. &
-         count(self%candidates%takes_part) > most_condensed .and. &
-         .not. (self%friction%is_on .and. self%friction%n_slip > 1)
+      candidates_are_many = are_beyond(self, most_condensed)
    end function candidates_are_many
+
+   !> Are there too many candidates for a problem of all of them?
+   pure logical function candidates_are_too_many(self)
+      type(active_set_t), intent(in) :: self
+
+      candidates_are_too_many = are_beyond(self, most_together)
+   end function candidates_are_too_many
+
+   !> In dynamics; where slip has a direction nothing but the problem finds it, of however many.
+   pure logical function are_beyond(self, most)
+      type(active_set_t), intent(in) :: self
+      integer, intent(in) :: most
+
+      are_beyond = self%rules%has_impacts .and. count(self%candidates%takes_part) > most .and. &
+         .not. (self%friction%is_on .and. self%friction%n_slip > 1)
+   end function are_beyond
 
    !> All candidates act for now, and hold their slips.
    subroutine candidates_select(self, system, motion)

@@ -6,8 +6,8 @@ module emcon_contact_rounds
       step_done, step_not_held
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraints_evaluate
-   use emcon_contact_candidates, only : candidates_are_many, candidates_keep_forces, &
-      candidates_look, candidates_select
+   use emcon_contact_candidates, only : candidates_are_many, &
+      candidates_are_too_many, candidates_keep_forces, candidates_look, candidates_select
    use emcon_contact_conditions, only : gap_noise
    use emcon_contact_newton, only : contact_newton_solve
    use emcon_contact_sets, only : contact_sets_hold, contact_sets_solve, &
@@ -61,17 +61,19 @@ contains
       end if
       if (size(system%contact) == 0) return
       if (status == newton_refused .and. newton%n_solve == 0) return    ! nor are there forces below
-      if (self%support%is_needed) then
+      status = step_cycling
+      if (candidates_are_too_many(self)) return
+      if (self%support%is_needed .or. candidates_are_many(self)) then
          motion%du = self%guess%first
          newton%driven = self%guess%driven
          self%is_active = self%candidates%began
-         call contact_support_forget(self%support)
-         call contact_sets_hold(self, system, scene, newton%driven, motion)
-         call system_stiffen(system, self%support%hangs, motion)
+         if (self%support%is_needed) then
+            call contact_support_forget(self%support)
+            call contact_sets_hold(self, system, scene, newton%driven, motion)
+            call system_stiffen(system, self%support%hangs, motion)
+         end if
          call begin_again(self, system, motion)
       end if
-      status = step_cycling
-      if (candidates_are_many(self)) return
       call solve_with_all(self, system, newton, motion, status, error)
    end subroutine contact_rounds_solve
 

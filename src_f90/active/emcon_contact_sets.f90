@@ -10,8 +10,9 @@ module emcon_contact_sets
       active_set_t, step_cycling, step_done, step_loose, step_not_held
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_gives_back
-   use emcon_contact_candidates, only : candidates_are_many, candidates_keep_forces, &
-      candidates_leave_out, candidates_look, candidates_select, candidates_solve
+   use emcon_contact_candidates, only : candidates_are_many, &
+      candidates_are_too_many, candidates_keep_forces, candidates_leave_out, candidates_look, &
+      candidates_select, candidates_solve
    use emcon_contact_conditions, only : noise_at
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
       contact_problem_solve, contact_problem_status, contact_problem_t
@@ -62,7 +63,7 @@ contains
       call active_set_open_sets(self)
       do i = 1, most_by_trials
          if (i > most_tried .and. self%rules%has_impacts &
-            .and. .not. candidates_are_many(self)) return
+            .and. .not. candidates_are_too_many(self)) return
          if (self%support%is_needed) call hold_on(self, system, scene, newton, motion, gripped)
          status = step_not_held
          self%candidates%is_settled = is_left_free(self, is_first=i == 1)

@@ -40,7 +40,7 @@ def test_no_disc_is_inside_another(pile):
 @pytest.mark.parametrize("n", [50, 110, 300])
 def test_long_strips_take_no_more_solves_than_short_ones(n, tmp_path):
     """All 2.1 n nodes of both come to touch in the first increment, and those of one side act: in
-    dynamics 200 are solved as one problem, more by sets (300 as one problem take minutes)."""
+    dynamics the sets of 200 are told by one problem, those of more by trials."""
     run = run_deck(crowds.strips(n=n), tmp_path, t_end=6e-4)
     assert run.verdict["verdict"] == "good", run.verdict["reasons"]
     assert run.verdict["cuts"] == 0
