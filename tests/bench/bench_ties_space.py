@@ -2,8 +2,8 @@
 
     .venv/bin/python tests/bench/bench_ties_space.py [--short] [--rounds N] [--update]
 
-Some 50,000 unknowns each. Runs take turns, the fastest of each is told, on one thread. Prints a table,
-asserts nothing; the target is 1.15 times the conforming mesh in time and in memory. `--short`: small
+Some 50,000 unknowns each. Runs take turns on one thread; medians are told, those of ratios over pairs of
+runs of one round. Prints a table, asserts nothing; the target is 1.15 times the conforming mesh in time and in memory. `--short`: small
 meshes; `--update` writes the table of docs/performance.md.
 """
 
@@ -12,6 +12,7 @@ import pathlib
 import re
 import sys
 import tempfile
+from statistics import median
 
 sys.path[:0] = [str(pathlib.Path(__file__).resolve().parents[1]/name) for name in ("", "scenes")]
 
@@ -68,9 +69,9 @@ def rows_of(scene: str, meshes: dict, folder: pathlib.Path, rounds: int) -> list
             found[name].append(measure(path))
     rows = []
     for name, runs in found.items():
-        # The fastest run is the one that others on the machine have disturbed least.
-        seconds, memory = (min(run[k] for run in runs) for k in range(2))
-        ratios = [least/min(run[k] for run in found[MATCHING]) for k, least in enumerate((seconds, memory))]
+        # Both runs of a ratio stand side by side, so that other work on the machine weighs on both.
+        ratios = [median(run[k]/one[k] for run, one in zip(runs, found[MATCHING], strict=True)) for k in range(2)]
+        seconds, memory = (median(run[k] for run in runs) for k in range(2))
         rows.append((scene, name, runs[0][2]["unknowns"], f"{seconds:.2f}", f"{memory:.0f}", runs[0][2]["newton"],
                      f"{ratios[0]:.2f}", f"{ratios[1]:.2f}"))
     return rows
