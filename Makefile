@@ -407,11 +407,12 @@ extremes: .venv/test.stamp  ## drive everything to its extremes; write the table
 	$(PY) tests/bench/extremes.py --update
 
 SECONDS ?= 600
-soak: .venv/test.stamp  ## seeded fuzzers, SECONDS=600: decks, damaged files, calls, kills; threads
+soak: .venv/test.stamp  ## seeded fuzzers, SECONDS=600: decks, damaged files, calls, kills; threads; long tests
 	$(BUILDING) app lib kernels
 	@EMCON_TEST_CASES=10000 $(BUILD)/kernels contact_problem
 	@$(PY) tests/soak/soak.py --seconds $(SECONDS)
 	@EMCON_OPENS=20000 $(PY) -m pytest -q tests/embed/test_threads.py
+	@$(PY) -m pytest -q -n $(shell nproc) --long -m long tests
 
 SEEDS ?= 1 500
 soak-scenes: .venv/test.stamp  ## drawn scenes, SEEDS="1 500": verdicts beside a judge by fields

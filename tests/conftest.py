@@ -40,10 +40,14 @@ RING_RUNS = [
 def pytest_addoption(parser):
     parser.addoption("--order", metavar="SEED", help="run the tests in an order drawn by chance: "
                      "files, and the tests of a file")
+    parser.addoption("--long", action="store_true", help="tests marked as long as well")
 
 
 def pytest_collection_modifyitems(config, items):
-    """No test may need another one to have run before it."""
+    """Long tests are left out unless asked for; no test may need another one to have run before it."""
+    if not config.getoption("--long"):
+        config.hook.pytest_deselected([item for item in items if item.get_closest_marker("long")])
+        items[:] = [item for item in items if not item.get_closest_marker("long")]
     seed = config.getoption("--order")
     if seed is None:
         return

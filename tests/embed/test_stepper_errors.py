@@ -240,6 +240,7 @@ def cycles(n: int, deck: Path, bad: Path) -> int:
     return int(Path("/proc/self/statm").read_text().split()[1])
 
 
+@pytest.mark.long
 def test_no_memory_is_lost_in_2000_cycles(one: Path) -> None:
     """In a process of its own: what other tests leave in the heap moves its size. The heap finds its
     size by steps, in two thousand cycles at most; what is lost is lost in all of them."""

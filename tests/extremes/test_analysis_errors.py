@@ -205,6 +205,7 @@ def test_failed_analysis_keeps_its_results(tmp_path):
     assert f"time {history['time'][-1]:.3g}" in done.stderr
 
 
+@pytest.mark.long
 def test_impact_beyond_reason(tmp_path):
     """Three times the speed of sound: it may fail, with a word."""
     deck = ring()

@@ -135,6 +135,7 @@ def test_table_of_first_contact(tmp_path, monkeypatch):
     assert trade_first.lines_of(["punch"])[0] == lines
 
 
+@pytest.mark.long
 def test_table_of_drawn_fine_scenes():
     """Of the first three scenes all shed their mass, and none ends worse for it."""
     lines = trade_fine.lines_of(range(3))
@@ -142,6 +143,7 @@ def test_table_of_drawn_fine_scenes():
     assert [line.count("|") for line in lines[2:]] == 4*[6]
 
 
+@pytest.mark.long
 def test_table_of_discs():
     """Without mass at the rim the force is smoother with half of h; with it it is rough."""
     lines = trade_discs.lines_of(edges=(24,), steps=(0.01, 0.005))

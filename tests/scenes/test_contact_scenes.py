@@ -201,6 +201,7 @@ def test_ironing_works_on_the_block_only(tmp_path):
     assert abs(work - energy) <= error
 
 
+@pytest.mark.long
 def test_ironing_with_nodes_of_both_sides_held(tmp_path):
     """Nodes fall into dents and are pushed over corners, up to t = 2.9: no cuts down to the smallest.
 

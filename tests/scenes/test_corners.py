@@ -141,6 +141,7 @@ BLOCK, GRAV, 0.1, 0., -1.
 """
 
 
+@pytest.mark.long
 def test_an_increment_has_at_most_4000_parts(tmp_path):
     """How a square goes on that rolls and rests on its corners hangs on rounding: of four sizes of
     the increment some are tried in too many parts, and say so, the others come to their end."""

@@ -139,7 +139,7 @@ def test_a_disc_rolls_off_a_disc(tmp_path):
     assert np.abs(total - total[0]).max() < 1e-4*run.history["kinetic"].max()
 
 
-@pytest.mark.parametrize("friction", ["", ", ROUGH"])
+@pytest.mark.parametrize("friction", ["", pytest.param(", ROUGH", marks=pytest.mark.long)])
 def test_into_a_quarter_pipe(friction, tmp_path):
     """From a line into a hollow arc that goes on from it, up and back: no bump, no loss."""
     radius, small, v = 2.0, 0.5, 3.0

@@ -57,6 +57,7 @@ def test_cause(k, tmp_path):
     assert row[6].split()[0] == causes.cells(cause, run)[6].split()[0]
 
 
+@pytest.mark.long
 def test_the_bar_by_all_schemes(tmp_path):
     """The first table: energies after two impacts to a percent, and which runs are told to be bad."""
     futures = {key: Made(run) for key, run in gain.start(Now(tmp_path)).items()}

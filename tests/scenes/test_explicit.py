@@ -288,6 +288,7 @@ def test_impact_keeps_momenta(tmp_path):
     assert 0 < change[change > 0].sum() < -1e-3*change[change < 0].sum()
 
 
+@pytest.mark.long
 def test_impact_beside_the_energy_momentum_scheme(tmp_path):
     """The same bodies by both schemes, small steps: what the masses of the nodes do is left."""
     there = run_deck(explicit("two_bodies"), tmp_path/"explicit", h=0.001, t_end=1.0)

@@ -50,7 +50,7 @@ def test_the_floor_is_the_slave(formulation, rigid, tmp_path):
 
 @pytest.mark.parametrize(("sides", "formulation"),
                          [(ONE, "MORTAR"), (BOTH, "NODE TO SURFACE")])
-@pytest.mark.parametrize("part", [0.8, 1.2, 6.0])
+@pytest.mark.parametrize("part", [0.8, 1.2, pytest.param(6.0, marks=pytest.mark.long)])
 def test_an_arch(part, sides, formulation, tmp_path):
     """It stands by friction where a line of thrust has room in all cones, and else gives way."""
     run = run_deck(arch(part*arch_needs(), sides), tmp_path, formulation=formulation)
@@ -180,6 +180,7 @@ def test_friction_without_a_push_holds_nothing(tmp_path):
     assert "nothing holds what moves without resistance" in run.errors
 
 
+@pytest.mark.long
 def test_partial_slip_to_and_fro(tmp_path):
     """Mindlin and Deresiewicz: on the way back from Q* what slides anew leaves a strip of
     sqrt(1 - (Q* - Q)/(2 mu P)) stuck, with what the way there has locked in."""

@@ -384,7 +384,8 @@ FINER = {"corners": lambda: corners(cells=(3, 3)), "crossing": lambda: crossing(
 @pytest.mark.parametrize(("name", "choice"), [
     ("crossing", {"formulation": "MORTAR", "sides": "UNGUARDED"}),      # a guard would hold them
     ("slide off", MORTAR | {"h": 0.006}),
-    ("pile", NTS), ("pile", NTS | {"h": 0.01}), ("pile", NTS | {"h": 0.0025})],
+    ("pile", NTS), pytest.param("pile", NTS | {"h": 0.01}, marks=pytest.mark.long),
+    pytest.param("pile", NTS | {"h": 0.0025}, marks=pytest.mark.long)],
     ids=["crossing", "slide off", "pile", "pile h/2", "pile h/8"])
 def test_soft_bodies_on_corners(name, choice, tmp_path):
     """A massless node slips off a corner at once; with its mass back it takes its time.

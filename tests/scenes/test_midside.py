@@ -61,6 +61,7 @@ def finer(tmp_path_factory):
     return run_deck(pressed("CPE8", 32), tmp_path_factory.mktemp("finer")).fields()
 
 
+@pytest.mark.long
 @pytest.mark.parametrize("options", ["TYPE=MORTAR", "TYPE=NODE TO SURFACE"])
 @pytest.mark.parametrize("kind", ["CPE6", "CPE8"])
 def test_order_of_contact(tmp_path, finer, kind, options):

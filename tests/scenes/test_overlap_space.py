@@ -83,7 +83,7 @@ def turned(seed: int, to: tuple[float, ...] = (0., 0., 0.)):
     return lambda x: (x - 0.5) @ q.T + 0.5 + np.array(to)
 
 
-@pytest.mark.parametrize(("seed", "kind"), enumerate(KINDS))
+@pytest.mark.parametrize(("seed", "kind"), list(enumerate(KINDS)))
 def test_depths_are_those_that_an_outsider_finds(seed: int, kind: str, tmp_path: Path) -> None:
     """Two cubes of cells of unlike sizes that fly through each other, both turned."""
     blocks = [Block(kind, (2, 2, 2), place=turned(seed)),

@@ -253,7 +253,7 @@ def test_block_comes_to_rest(n, tilt, spin, mu, e, tmp_path):
 
 
 @pytest.mark.parametrize(("n", "slope", "mu", "tilt"), [(1, 0.4, 0.5, 0.0), (2, 0.6, 0.7, 0.0), (3, 0.4, 0.5, 0.05),
-                                                        (8, 0.25, 0.3, 0.0)])
+                                                        pytest.param(8, 0.25, 0.3, 0.0, marks=pytest.mark.long)])
 def test_at_rest_on_a_slope_it_stays(n, slope, mu, tilt, tmp_path):
     deck = block(n, tilt=tilt, lift=0.1, e=0.5, mu=mu, h=0.01, t_end=110.0, slope=slope,
                  velocity=(0.3, -0.5, 0.0))
@@ -348,6 +348,7 @@ def comes_to_rest(deck, folder):
     return run
 
 
+@pytest.mark.long
 def test_fifteen_discs(tmp_path):
     corners = 12
     bodies = {}

@@ -162,7 +162,7 @@ def hook(option, way=14.0):
         f"61, 1, 1, {-way!r}", "*NODE PRINT, NSET=REF, FREQUENCY=1", "U, RF", "*END STEP", ""]), "hook")
 
 
-@pytest.mark.parametrize("option", ["", ", STABILIZE"])
+@pytest.mark.parametrize("option", ["", pytest.param(", STABILIZE", marks=pytest.mark.long)])
 def test_hook_passes_its_catch(option, tmp_path):
     """It springs up behind the catch and is free. With STABILIZE increments are cut where contact
     lets go, so that most of what is set free goes into viscous forces, which rest before and after."""

@@ -115,7 +115,7 @@ def test_a_penalty_keeps_energy_and_momenta(formulation, sides, factor, tmp_path
     assert f"contact penetrates by up to {run.verdict['give']:.3g}"[:30] in run.log
 
 
-@pytest.mark.parametrize(("cells", "h"), [((8, 3), 0.02), ((8, 3), 0.005), ((16, 6), 0.02)])
+@pytest.mark.parametrize(("cells", "h"), [((8, 3), 0.02), ((8, 3), 0.005), pytest.param((16, 6), 0.02, marks=pytest.mark.long)])
 @pytest.mark.parametrize("smoothing", ["NONE", "HERMITE"])
 @pytest.mark.parametrize("normal", ["NODAL", "EDGE"])
 def test_a_penalty_goes_on_where_mortar_meets_other_edges(normal, smoothing, cells, h, tmp_path):

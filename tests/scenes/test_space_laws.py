@@ -28,7 +28,8 @@ def run(text, folder):
     return run_deck(folder/"deck.inp", folder)
 
 
-@pytest.mark.parametrize("kind", ["C3D8", "C3D8H", "C3D8I", "C3D10", "C3D20R"])
+@pytest.mark.parametrize("kind", ["C3D8", "C3D8I", *(
+    pytest.param(kind, marks=pytest.mark.long) for kind in ("C3D8H", "C3D10", "C3D20R"))])
 def test_free_flight(kind, tmp_path):
     flies(kind, OGDEN, tmp_path)
 

@@ -257,6 +257,7 @@ def ring_momentum(run, mass):
     return run.series("BODIES", "MOMENTUM")[1][-1, :n, :2].sum(axis=0)/masses[:n].sum()
 
 
+@pytest.mark.long
 def test_ring_in_pieces(tmp_path):
     """Energy, and the rebound of the ring of one piece within 1 percent; with nodes in the book."""
     runs = [
