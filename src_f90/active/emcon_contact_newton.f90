@@ -103,7 +103,7 @@ contains
 
       call convergence_begin(newton%convergence)
       newton%n_solve = 0
-      n_slip = maxval(set%slip(:set%n_row))
+      n_slip = max(0, maxval(set%slip(:set%n_row)))
       call contact_problem_create(self%problem, n_slip, size(law))
       do k = 1, size(law)
          self%problem%slip_target(:, k) = law(k)%slip_target(:n_slip)
