@@ -46,7 +46,7 @@ def pytest_addoption(parser):
 def pytest_collection_modifyitems(config, items):
     """Long tests are left out unless asked for; no test may need another one to have run before it."""
     if not config.getoption("--long"):
-        config.hook.pytest_deselected([item for item in items if item.get_closest_marker("long")])
+        config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("long")])
         items[:] = [item for item in items if not item.get_closest_marker("long")]
     seed = config.getoption("--order")
     if seed is None:
