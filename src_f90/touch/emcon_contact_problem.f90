@@ -322,7 +322,8 @@ contains
             slope(row:m*i, :) = real(matmul(gain, self%w(row:m*i, :)), dp)
             do k = 0, self%n_slip
                slope(row:m*i, row + k) = slope(row:m*i, row + k) + real(by(:self%n_slip, k) &
-                  *(stiffness*merge(loosely, proximal, self%hold(k, i) > 0.0_wp) &
+                  *(stiffness*merge(loosely, proximal, self%n_slip > 1 &
+                  .or. self%hold(k, i) > 0.0_wp) &
                   *self%w(row + k, row + k) - 1.0_wp), dp)
                slope(row + k, row + k) = slope(row + k, row + k) + 1.0_dp
             end do

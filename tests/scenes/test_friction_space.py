@@ -171,3 +171,49 @@ def test_held_by_friction_in_statics(tmp_path: Path) -> None:
     force = columns(run, "pair1_force_x pair1_force_y pair1_force_z")[-1]
     wanted = .5*GRAVITY*np.array([np.sin(angle), 0.0, -np.cos(angle)])
     assert np.abs(np.abs(force) - np.abs(wanted)).max() < 1e-8*GRAVITY
+
+
+def puck() -> Block:
+    """An octagon of radius 1, thin, which stands on its eight corners."""
+    def place(x: np.ndarray) -> np.ndarray:
+        p = x[:, :2] - 1.0
+        angle, r = np.arctan2(p[:, 1], p[:, 0]), np.abs(p).max(1)
+        z = np.where((r == 0.0) & (x[:, 2] == 0.0), .5*x[:, 2].max(), x[:, 2])
+        return np.column_stack([r*np.cos(angle), r*np.sin(angle), z])
+    return Block("C3D8", (2, 2, 1), size=(2, 2, .002), place=place)
+
+
+def slows_down(until: float, inertia: float) -> np.ndarray:
+    """Velocity along x and spin of eight points with a friction of 1/8 each, over a mass of 1, from 1 and 2."""
+    angle = np.arange(8)*np.pi/4
+    arm = np.array([-np.sin(angle), np.cos(angle)])
+
+    def rate(_t: float, y: np.ndarray) -> np.ndarray:
+        turned = np.array([np.cos(y[2]), np.sin(y[2])])
+        side = np.array([arm[0]*turned[0] - arm[1]*turned[1], arm[0]*turned[1] + arm[1]*turned[0]])
+        slip = np.array([[y[0]], [0.0]]) + y[1]*side
+        force = -slip/np.linalg.norm(slip, axis=0)/8
+        return np.array([force[0].sum(), (force*side).sum()/inertia, y[1]])
+
+    return solve_ivp(rate, [0, until], [1.0, 2.0, 0.0], rtol=1e-11, atol=1e-13).y[:2, -1]
+
+
+def test_puck_slides_and_spins(tmp_path: Path) -> None:
+    """To second order, and both motions end together."""
+    error = []
+    for h, until in ((.02, 1.0), (.01, 1.0), (.02, 3.0)):
+        block = puck()
+        run = ran(tmp_path, bodies([block], [faces(block, 2, 0)], STIFF) + rigid(1, block, v=(1, 0, 0), w=(0, 0, 2))
+                  + walls.wall(walls.plane()) + walls.pair("", "*FRICTION\n.1\n") + f"*BOUNDARY\n{walls.FIXED}"
+                  + dynamic(h, until, weight()))
+        p, spin = columns(run, "px")[:, 0], columns(run, "lz")[:, 0]
+        v, w = p/p[0], 2*spin/spin[0]
+        error.append(np.abs([v[-1], w[-1]] - slows_down(1.0, spin[0]/p[0]/2)).max())
+        assert max(run.history["cuts"]) == 0
+        dissipates(run)
+    assert error[1] < 1e-4
+    assert error[0]/error[1] == pytest.approx(4.0, rel=.2)
+    # What is left of each when the other has gone is of the order of an increment.
+    ends = [np.argmax(np.abs(x) < .04) for x in (v, w)]
+    assert abs(ends[0] - ends[1]) <= 3
+    assert max(abs(v[-1]), abs(w[-1])) < 1e-12
