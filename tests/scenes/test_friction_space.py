@@ -233,3 +233,58 @@ def test_puck_comes_to_rest(tmp_path: Path) -> None:
     assert kinetic[end:].max() < 1e-9
     assert run.verdict["verdict"] == "good"
     dissipates(run)
+
+
+def at_rest(i: int, block: Block) -> str:
+    return rigid(i, block).partition("*INITIAL")[0]
+
+
+def cards(mu: float) -> str:
+    """Two rigid cards of length 1 and thickness .1 lean on each other, 30 degrees from the vertical, under their weight."""
+    lean = np.radians(30.0)
+    blocks = []
+    for side in (1, -1):
+        def place(x: np.ndarray, side: int = side) -> np.ndarray:
+            out, up = x[:, 0] if side > 0 else .1 - x[:, 0], x[:, 2]
+            return np.column_stack([side*(np.sin(lean)*(1.0 - up) + np.cos(lean)*out), x[:, 1] - .25,
+                                    np.cos(lean)*up + np.sin(lean)*out])
+        blocks.append(Block("C3D8", (1, 2, 4), size=(.1, .5, 1), place=place))
+    return (bodies(blocks, [faces(b) for b in blocks], STIFF) + at_rest(1, blocks[0]) + at_rest(2, blocks[1]) + walls.wall(walls.plane()) + pair("", f"*FRICTION\n{mu}\n") + "S1, W\nS2, W\n"
+            + f"*BOUNDARY\n{walls.FIXED}" + dynamic(.01, .3, weight() + weight(of="B2")))
+
+
+@pytest.mark.parametrize("part", [.97, 1.03])
+def test_cards_stand_by_friction(tmp_path: Path, part: float) -> None:
+    """A card touches the floor at its lower inner edge and the other one at its upper inner edge: its weight has the arm
+    sin(30)/2 - .1 cos(30)/2 about the floor, and the push of the other one, which friction bears, cos(30)."""
+    least = .5*(np.tan(np.radians(30.0)) - .1)
+    run = ran(tmp_path, cards(part*least))
+    moved = np.abs(run.fields()["displacement"][-1]).max()
+    if part > 1.0:
+        assert moved < 1e-12
+    else:
+        # A part of the push that is missed accelerates the feet by some of it and of gravity.
+        assert moved > .1*(1.0 - part)*least*.5*GRAVITY*.3**2
+    assert run.verdict["verdict"] == "good"
+    dissipates(run)
+
+
+def test_dominoes_fall_one_after_the_other(tmp_path: Path) -> None:
+    """The first one is pushed over, with a restitution of one half. Fallen, all lie still."""
+    blocks = [Block("C3D8", (1, 1, 1), size=(.2, .5, 1), place=lambda x, i=i: x + np.array([.5*i - .1, -.25, 0]))
+              for i in range(3)]
+    text = (bodies(blocks, [faces(b) for b in blocks], STIFF) + rigid(1, blocks[0], v=(1, 0, .2), w=(0, 2, 0))
+            + at_rest(2, blocks[1]) + at_rest(3, blocks[2]) + walls.wall(walls.plane())
+            + "*SURFACE INTERACTION, NAME=I, RESTITUTION=.5\n*FRICTION\n.3\n*CONTACT PAIR, INTERACTION=I\n"
+            + f"S1, S2\nS2, S3\nS1, W\nS2, W\nS3, W\n*BOUNDARY\n{walls.FIXED}")
+    run = ran(tmp_path, text + dynamic(.01, 2.0, weight() + weight(of="B2") + weight(of="B3")))
+    history = run.history
+    assert run.verdict["verdict"] == "good"
+    assert run.verdict["law_violation"] < 1e-9
+    assert history["kinetic"][-1] < 1e-3*history["kinetic"].max()
+    total = history["total"] - history["contact_work"] + history["friction_loss"]
+    assert np.ptp(total) < 1e-11*history["kinetic"].max()
+    assert np.diff(history["restitution_loss"]).min() > -1e-13*history["kinetic"].max()
+    top = (run.fields().x + run.fields()["displacement"][-1])[:24, 2].max()
+    assert top < .8
+    dissipates(run)
