@@ -36,7 +36,7 @@ module emcon_friction
       logical :: is_on = .false. !! some contact has friction; else nothing is allocated
       logical :: looks_back = .false.            !! and slip has two components: a step that is
                                                  !! solved tells what stops or turns back
-      logical :: stops = .false.                 !! the jump of velocities at its end is to stop some
+      logical :: stops = .false.                 !! the jump of velocities at its end is to stop it
       integer :: n_slip = 1                      !! n_dim - 1
       !> (n_constraint) Coulomb's law of each, with mu = 0 where there is none: how what acts holds
       type(coulomb_t), allocatable :: law(:)

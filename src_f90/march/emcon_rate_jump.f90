@@ -26,8 +26,8 @@ module emcon_rate_jump
       type(contact_problem_t) :: problem
       !> (0:n_slip, n) of gaps, and of slips the other way round, before [L/T]
       real(wp), allocatable :: rate(:, :)
-      !> (0:n_slip, n) impulses of the step that stay. Allocated: the jump is for what friction stops
-      !> by itself, at the end of the step
+      !> (0:n_slip, n) impulses of the step that stay. Allocated: the jump is for what friction
+      !> stops by itself, at the end of the step
       logical, allocatable :: stays(:, :)
       logical :: is_done = .false.               !! .false.: there is none to take, or it would make
                                                  !! energy

@@ -42,7 +42,7 @@ contains
       call take(self, h, notes, error)
    end subroutine restitution_take
 
-   !> The same where contacts act and some law asks.
+   !> The same where contacts act and some law asks, or something stops.
    subroutine take(self, h, notes, error)
       type(march_t), intent(inout) :: self
       real(wp), intent(in) :: h
