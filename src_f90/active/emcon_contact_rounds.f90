@@ -74,6 +74,11 @@ contains
          end if
          call begin_again(self, system, motion)
       end if
+      if (self%friction%looks_back) then
+         ! Sets share forces of rows that follow from others as it comes; friction turns by that.
+         self%lam = self%start%lam0
+         self%friction%tau = self%friction%tau0
+      end if
       call solve_with_all(self, system, newton, motion, status, error)
    end subroutine contact_rounds_solve
 

@@ -11,7 +11,8 @@ module emcon_friction
    use emcon_coulomb_law, only : contact_open, contact_slides, contact_sticks, contact_trial_t, &
       coulomb_status, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
    use emcon_csr, only : csr_find
-   use emcon_evaluation, only : evaluation_is_equilibrium, evaluation_displacement
+   use emcon_evaluation, only : evaluation_contact_conserves, evaluation_displacement, &
+      evaluation_is_equilibrium
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_numbering, only : numbering_fixes
@@ -35,6 +36,7 @@ module emcon_friction
       logical :: is_on = .false. !! some contact has friction; else nothing is allocated
       logical :: looks_back = .false.            !! and slip has two components: a step that is
                                                  !! solved tells what stops or turns back
+      logical :: stops = .false.                 !! the jump of velocities at its end is to stop it
       integer :: n_slip = 1                      !! n_dim - 1
       !> (n_constraint) Coulomb's law of each, with mu = 0 where there is none: how what acts holds
       type(coulomb_t), allocatable :: law(:)
@@ -113,6 +115,7 @@ contains
       end do
       self%tau = self%tau0
       self%n_lagged = 0
+      self%stops = .false.
       self%law%mu = self%mu
       call leave_still(self, system, motion)
       if (.not. evaluation_is_equilibrium(motion%evaluation) .and. .not. self%n_slip > 1) &
@@ -143,13 +146,14 @@ contains
 
    !> Where slip has a direction, what acts is led to no slip before the step is solved: friction is
    !> to be against the slip of the whole step, not that of its end. Those that a solved step stops
-   !> or turns back are, and the step is to be solved again.
+   !> or turns back are: by the jump of velocities that ends the step, or, with a scheme that takes
+   !> none, by the step, which is to be solved again.
    subroutine friction_look_back(self, system, set, motion, leads)
       type(friction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set  !! of the step, solved
       type(motion_t), intent(in) :: motion
-      logical, intent(out) :: leads              !! there are some
+      logical, intent(out) :: leads              !! it is to be solved again
       real(wp) :: du(size(motion%du, 1), size(motion%du, 2)), to_stop(most_slips)
       integer :: i, k, pair
 
@@ -167,8 +171,11 @@ contains
             if (.not. law%holds_slip() .and. dot_product(slip - to_stop, slip) > 0.0_wp) cycle
             call law%leads_to(to_stop(:self%n_slip), slip_rounding*contact%state(i)%size)
             leads = leads .or. any(abs(law%slip_target) > 0.0_wp)
+            if (evaluation_contact_conserves(motion%evaluation)) law%slip_target = 0.0_wp
          end associate
       end do
+      self%stops = leads .and. evaluation_contact_conserves(motion%evaluation)
+      leads = leads .and. .not. self%stops
    end subroutine friction_look_back
 
    !> Contacts whose slave node is held in some direction, and which nothing that is free to move

@@ -26,6 +26,9 @@ module emcon_rate_jump
       type(contact_problem_t) :: problem
       !> (0:n_slip, n) of gaps, and of slips the other way round, before [L/T]
       real(wp), allocatable :: rate(:, :)
+      !> (0:n_slip, n) impulses of the step that stay. Allocated: the jump is for what friction
+      !> stops by itself, at the end of the step
+      logical, allocatable :: stays(:, :)
       logical :: is_done = .false.               !! .false.: there is none to take, or it would make
                                                  !! energy
       logical :: is_idle = .false.               !! laws are met without it, to round-off
@@ -84,6 +87,14 @@ contains
       real(wp), intent(in) :: change(0:, :)      !! (0:n_slip, n) of rates by it [L/T]
       real(wp) :: taken(size(jump%row))
 
+      if (allocated(jump%stays)) then
+         associate (s => jump%problem%n_slip)
+            jump%rubbed = -sum(jump%impulse(1:s, :)*(jump%rate(1:s, :) + 0.5_wp*change(1:s, :)), 1)
+         end associate
+         jump%lost = 0.0_wp
+         jump%is_done = sum(jump%rubbed) >= 0.0_wp
+         return
+      end if
       ! Slips are by half of the size of the step, so that they are twice their mean rates.
       associate (problem => jump%problem, more => jump%impulse, s => jump%problem%n_slip)
          taken = -0.5_wp*sum((problem%base(1:s, :) + more(1:s, :)) &
@@ -116,6 +127,7 @@ contains
          call velocity_mass_keep(self, system, set, error, response, is_singular)
          if (allocated(error)) return
          w = matmul(transpose(row), response)
+         if (allocated(jump%stays)) call part_rows(pack(jump%stays, .true.), w)
          do k = 1, n
             if (set%item(jump%row(k))%has_friction) cycle
             do i = m*(k - 1) + 2, m*k
@@ -124,5 +136,21 @@ contains
          end do
       end associate
    end subroutine find_compliance
+
+   !> Rows that nothing moves, and that move nothing but themselves.
+   pure subroutine part_rows(stays, w)
+      logical, intent(in) :: stays(:)                        !! (n)
+      real(wp), intent(inout) :: w(:, :)                     !! (n, n)
+      real(wp) :: own
+      integer :: i
+
+      do i = 1, size(stays)
+         if (.not. stays(i)) cycle
+         own = w(i, i)
+         w(:, i) = 0.0_wp
+         w(i, :) = 0.0_wp
+         w(i, i) = own
+      end do
+   end subroutine part_rows
 
 end module emcon_rate_jump

@@ -42,7 +42,7 @@ contains
       call take(self, h, notes, error)
    end subroutine restitution_take
 
-   !> The same where contacts act and some law asks.
+   !> The same where contacts act and some law asks, or something stops.
    subroutine take(self, h, notes, error)
       type(march_t), intent(inout) :: self
       real(wp), intent(in) :: h
@@ -51,6 +51,7 @@ contains
       real(wp) :: v(size(self%end_state%v, 1), size(self%end_state%v, 2)), lost, gained
       type(impacts_t) :: impacts
       type(rate_jump_t) :: jump
+      logical :: is_done
 
       v = self%end_state%v
       call velocity_update_hold(self%velocity_update, self%system, self%active%set, &
@@ -59,27 +60,48 @@ contains
       call book(self, lost, gained)
       impacts = impacts_t(h, self%active%friction%n_slip*merge(1, 0, self%active%friction%is_on), &
          self%end_state%v - v)
+      call change_pushes(self, impacts, is_done, notes, error)
+      if (allocated(error) .or. is_done .or. .not. self%active%friction%stops) return
+      call find_impacts(self, impacts, jump)
+      call find_stops(self, jump)
+      call velocity_update_change(self%velocity_update, self%system, self%active%set, jump, &
+         self%end_state%v, error)
+      if (.not. allocated(error) .and. jump%is_done) call book_jump(self, jump)
+   end subroutine take
+
+   !> Where laws change rates of gaps, by impulses along gaps and surfaces together.
+   subroutine change_pushes(self, impacts, is_done, notes, error)
+      type(march_t), intent(inout) :: self
+      type(impacts_t), intent(in) :: impacts
+      logical, intent(out) :: is_done            !! and friction stops what slides
+      type(notes_t), intent(inout) :: notes
+      type(error_t), allocatable, intent(out) :: error
+      type(impacts_t) :: along_gaps
+      type(rate_jump_t) :: jump
+
+      is_done = .false.
       call find_impacts(self, impacts, jump)
       if (.not. any(abs(jump%problem%free(0, :)) > 0.0_wp)) return
       call velocity_update_change(self%velocity_update, self%system, self%active%set, jump, &
          self%end_state%v, error)
       if (allocated(error)) return
-      if (.not. (jump%is_done .or. jump%is_idle) .and. impacts%n_slip > 0) then
+      is_done = jump%is_done .or. jump%is_idle
+      if (.not. is_done .and. impacts%n_slip > 0) then
          ! Along normals alone it makes no energy where all keep the same part.
-         impacts%n_slip = 0
-         call find_impacts(self, impacts, jump)
+         along_gaps = impacts
+         along_gaps%n_slip = 0
+         call find_impacts(self, along_gaps, jump)
          call velocity_update_change(self%velocity_update, self%system, self%active%set, jump, &
             self%end_state%v, error)
          if (allocated(error)) return
       end if
       if (jump%is_done) then
-         call book(self, jump%lost, jump%gained + sum(jump%rubbed))
-         call book_impulses(self, jump)
+         call book_jump(self, jump)
       else if (.not. jump%is_idle) then
          call note_add(notes, "contacts that close in this step rebound fully, whatever their " &
             // "RESTITUTION says: with it they would gain energy")
       end if
-   end subroutine take
+   end subroutine change_pushes
 
    !> Energies of a jump that was taken, beside that of friction.
    pure subroutine book(self, lost, gained)
@@ -93,6 +115,15 @@ contains
          ledger%restitution = ledger%restitution + max(0.0_wp, lost)
       end associate
    end subroutine book
+
+   !> A jump that was taken.
+   pure subroutine book_jump(self, jump)
+      type(march_t), intent(inout) :: self
+      type(rate_jump_t), intent(in) :: jump
+
+      call book(self, jump%lost, jump%gained + sum(jump%rubbed))
+      call book_impulses(self, jump)
+   end subroutine book_jump
 
    !> The impulses of a jump that was taken, and what friction takes by them.
    pure subroutine book_impulses(self, jump)
@@ -109,12 +140,12 @@ contains
       call jumps_rub(self%end_state%jump, self%active%set, impulse(1:, :), rubbed)
    end subroutine book_impulses
 
-   !> Has some pair a law that changes rates?
+   !> Has some pair a law that changes rates, or stops something?
    pure logical function is_asked(self)
       type(march_t), intent(in) :: self
       integer :: k
 
-      is_asked = .false.
+      is_asked = self%active%friction%stops
       do k = 1, size(self%system%contact)
          associate (laws => self%system%contact(k)%contact%laws)
             is_asked = is_asked .or. abs(contact_laws_rate_change(laws, 1.0_wp)) > 0.0_wp
@@ -173,6 +204,30 @@ contains
          end do
       end associate
    end subroutine find_rubbing
+
+   !> Where pushes stay friction alone stops what the step would turn back, by what they allow: its
+   !> impulses take all of the rate along the surface, or are opposite to what is left of that.
+   pure subroutine find_stops(self, jump)
+      type(march_t), intent(in) :: self
+      type(rate_jump_t), intent(inout) :: jump
+      integer :: k
+
+      jump%problem%free = 0.0_wp
+      jump%problem%slip_target = 0.0_wp
+      allocate(jump%stays(0:jump%problem%n_slip, size(jump%row)), source=.true.)
+      do k = 1, size(jump%row)
+         associate (law => self%active%friction%law(self%active%set%id(jump%row(k))))
+            if (self%active%set%item(jump%row(k))%has_friction .and. any(abs(law%slip_to_stop) &
+               > 0.0_wp)) then
+               jump%stays(1:, k) = .false.
+               jump%problem%free(1:, k) = (1.0_wp - law%restitution)*jump%rate(1:, k)
+            else
+               ! What slides on is at its limit, which round-off must not pass.
+               jump%problem%mu(k) = 2.0_wp*jump%problem%mu(k)
+            end if
+         end associate
+      end do
+   end subroutine find_stops
 
    !> Which conditions of the set are contacts of what has mass?
    pure function has_impact(self)

@@ -30,7 +30,7 @@ module emcon_contact_problem
    integer, parameter :: first_trials = 60, few_trials = 10, more_trials = 20, first_sweeps = 20, &
       most_turns = 8, pivot_turn = 2
    !> Parts of W that places give way by about the forces so far, and how often.
-   integer, parameter :: most_nearings = 30, few_nearings = 3
+   integer, parameter :: most_nearings = 30, few_nearings = 8
    real(wp), parameter :: first_part = 1.0e-3_wp, largest_part = 10.0_wp
    !> Halvings of a step of Newton's method, and the part of what is foreseen that it is to gain.
    integer, parameter :: most_halvings = 12
@@ -322,7 +322,8 @@ contains
             slope(row:m*i, :) = real(matmul(gain, self%w(row:m*i, :)), dp)
             do k = 0, self%n_slip
                slope(row:m*i, row + k) = slope(row:m*i, row + k) + real(by(:self%n_slip, k) &
-                  *(stiffness*merge(loosely, proximal, self%hold(k, i) > 0.0_wp) &
+                  *(stiffness*merge(loosely, proximal, self%n_slip > 1 &
+                  .or. self%hold(k, i) > 0.0_wp) &
                   *self%w(row + k, row + k) - 1.0_wp), dp)
                slope(row + k, row + k) = slope(row + k, row + k) + 1.0_dp
             end do
@@ -430,7 +431,7 @@ contains
             end do
          end do
          found = push
-         call solve_by_trials(near, found, few_trials, effort%n_trial, has_ended)
+         call solve_by_trials(near, found, more_trials, effort%n_trial, has_ended)
          if (has_ended) then
             effort%n_near = effort%n_near + 1
             push = found
@@ -438,7 +439,6 @@ contains
             if (is_solved .or. effort%n_near == most) return
             part = 0.1_wp*part
          else
-            if (effort%n_near > 0 .and. most < most_nearings) return
             part = 10.0_wp*part
             if (part > largest_part) return
          end if

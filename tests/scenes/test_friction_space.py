@@ -171,3 +171,120 @@ def test_held_by_friction_in_statics(tmp_path: Path) -> None:
     force = columns(run, "pair1_force_x pair1_force_y pair1_force_z")[-1]
     wanted = .5*GRAVITY*np.array([np.sin(angle), 0.0, -np.cos(angle)])
     assert np.abs(np.abs(force) - np.abs(wanted)).max() < 1e-8*GRAVITY
+
+
+def puck() -> Block:
+    """An octagon of radius 1, thin, which stands on its eight corners."""
+    def place(x: np.ndarray) -> np.ndarray:
+        p = x[:, :2] - 1.0
+        angle, r = np.arctan2(p[:, 1], p[:, 0]), np.abs(p).max(1)
+        z = np.where((r == 0.0) & (x[:, 2] == 0.0), .5*x[:, 2].max(), x[:, 2])
+        return np.column_stack([r*np.cos(angle), r*np.sin(angle), z])
+    return Block("C3D8", (2, 2, 1), size=(2, 2, .002), place=place)
+
+
+def slows_down(until: float, inertia: float) -> np.ndarray:
+    """Momenta px, py, lz over the mass of what stands on eight points that rub with 1/8 each, from 1 along x and a spin
+    of 2."""
+    angle = np.arange(8)*np.pi/4
+
+    def rate(_t: float, y: np.ndarray) -> np.ndarray:
+        arm = np.array([np.cos(angle + y[5]), np.sin(angle + y[5])])
+        slip = y[:2, None] + y[2]*np.array([-arm[1], arm[0]])
+        force = -slip/np.linalg.norm(slip, axis=0)/8
+        return np.array([*force.sum(1), (arm[0]*force[1] - arm[1]*force[0]).sum()/inertia, *y[:3]])
+
+    v = solve_ivp(rate, [0, until], [1.0, 0, 2.0, 0, 0, 0], rtol=1e-11, atol=1e-13).y[:, -1]
+    return np.array([v[0], v[1], inertia*v[2] + v[3]*v[1] - v[4]*v[0]])
+
+
+def slides_and_spins(folder: Path, h: float, until: float) -> Run:
+    block = puck()
+    return ran(folder, bodies([block], [faces(block, 2, 0)], STIFF) + rigid(1, block, v=(1, 0, 0), w=(0, 0, 2))
+               + walls.wall(walls.plane()) + walls.pair("", "*FRICTION\n.1\n") + f"*BOUNDARY\n{walls.FIXED}"
+               + dynamic(h, until, weight()))
+
+
+def test_puck_slides_and_spins(tmp_path: Path) -> None:
+    """To second order: the weight stays shared among eight corners of which three would do. It is half a thousandth
+    above them, so that friction, a tenth of it, tips no more than 1e-4 of it from corner to corner."""
+    last = []
+    for h in (.01, .005, .00125):
+        run = slides_and_spins(tmp_path, h, 1.0)
+        last.append(columns(run, "px py lz")[-1]/run.history["px"][0])
+        assert max(run.history["cuts"]) == 0
+        dissipates(run)
+    assert np.abs(last[2] - slows_down(1.0, run.history["lz"][0]/run.history["px"][0]/2)).max() < 1e-4
+    error = [np.abs(x - last[2]).max() for x in last[:2]]
+    # What the finest one is off by itself is 1/64 of the first: (1 - 1/64)/(1/4 - 1/64).
+    assert error[0]/error[1] == pytest.approx(4.2, rel=.1)
+
+
+def test_puck_comes_to_rest(tmp_path: Path) -> None:
+    """It slides and spins until one increment, in which both motions end. What tips it then, at half a thousandth above
+    the floor, rebounds fully."""
+    run = slides_and_spins(tmp_path, .01, 1.7)
+    p, spin, kinetic = (columns(run, name)[:, 0]/run.history[name][0] for name in ("px", "lz", "kinetic"))
+    end = int(np.argmax(kinetic < 1e-9))
+    # Friction takes the velocity of an increment, .01, before.
+    assert .001 < p[end - 1] < .01
+    assert .0002 < spin[end - 1] < .01
+    assert np.abs(np.array([p, spin])[:, end:]).max() < 1e-7
+    assert kinetic[end:].max() < 1e-9
+    assert run.verdict["verdict"] == "good"
+    dissipates(run)
+
+
+def at_rest(i: int, block: Block) -> str:
+    return rigid(i, block).partition("*INITIAL")[0]
+
+
+def cards(mu: float) -> str:
+    """Two rigid cards of length 1 and thickness .1 lean on each other, 30 degrees from the vertical, under their weight."""
+    lean = np.radians(30.0)
+    blocks = []
+    for side in (1, -1):
+        def place(x: np.ndarray, side: int = side) -> np.ndarray:
+            out, up = x[:, 0] if side > 0 else .1 - x[:, 0], x[:, 2]
+            return np.column_stack([side*(np.sin(lean)*(1.0 - up) + np.cos(lean)*out), x[:, 1] - .25,
+                                    np.cos(lean)*up + np.sin(lean)*out])
+        blocks.append(Block("C3D8", (1, 2, 4), size=(.1, .5, 1), place=place))
+    return (bodies(blocks, [faces(b) for b in blocks], STIFF) + at_rest(1, blocks[0]) + at_rest(2, blocks[1]) + walls.wall(walls.plane()) + pair("", f"*FRICTION\n{mu}\n") + "S1, W\nS2, W\n"
+            + f"*BOUNDARY\n{walls.FIXED}" + dynamic(.01, .3, weight() + weight(of="B2")))
+
+
+@pytest.mark.parametrize("part", [.97, 1.03])
+def test_cards_stand_by_friction(tmp_path: Path, part: float) -> None:
+    """A card touches the floor at its lower inner edge and the other one at its upper inner edge: its weight has the arm
+    sin(30)/2 - .1 cos(30)/2 about the floor, and the push of the other one, which friction bears, cos(30)."""
+    least = .5*(np.tan(np.radians(30.0)) - .1)
+    run = ran(tmp_path, cards(part*least))
+    moved = np.abs(run.fields()["displacement"][-1]).max()
+    if part > 1.0:
+        assert moved < 1e-12
+    else:
+        # A part of the push that is missed accelerates the feet by some of it and of gravity.
+        assert moved > .1*(1.0 - part)*least*.5*GRAVITY*.3**2
+    assert run.verdict["verdict"] == "good"
+    dissipates(run)
+
+
+def test_dominoes_fall_one_after_the_other(tmp_path: Path) -> None:
+    """The first one is pushed over, with a restitution of one half. Fallen, all lie still."""
+    blocks = [Block("C3D8", (1, 1, 1), size=(.2, .5, 1), place=lambda x, i=i: x + np.array([.5*i - .1, -.25, 0]))
+              for i in range(3)]
+    text = (bodies(blocks, [faces(b) for b in blocks], STIFF) + rigid(1, blocks[0], v=(1, 0, .2), w=(0, 2, 0))
+            + at_rest(2, blocks[1]) + at_rest(3, blocks[2]) + walls.wall(walls.plane())
+            + "*SURFACE INTERACTION, NAME=I, RESTITUTION=.5\n*FRICTION\n.3\n*CONTACT PAIR, INTERACTION=I\n"
+            + f"S1, S2\nS2, S3\nS1, W\nS2, W\nS3, W\n*BOUNDARY\n{walls.FIXED}")
+    run = ran(tmp_path, text + dynamic(.01, 2.0, weight() + weight(of="B2") + weight(of="B3")))
+    history = run.history
+    assert run.verdict["verdict"] == "good"
+    assert run.verdict["law_violation"] < 1e-9
+    assert history["kinetic"][-1] < 1e-3*history["kinetic"].max()
+    total = history["total"] - history["contact_work"] + history["friction_loss"]
+    assert np.ptp(total) < 1e-11*history["kinetic"].max()
+    assert np.diff(history["restitution_loss"]).min() > -1e-13*history["kinetic"].max()
+    top = (run.fields().x + run.fields()["displacement"][-1])[:24, 2].max()
+    assert top < .8
+    dissipates(run)

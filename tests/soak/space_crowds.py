@@ -1,11 +1,12 @@
 """Scenes of two to five bodies in space, drawn by a seed, beside what is right.
 
-    .venv/bin/python tests/soak/space_crowds.py [--seeds 1 200] [--folder build/soak-crowds]
+    .venv/bin/python tests/soak/space_crowds.py [--seeds 1 200] [--folder build/soak-crowds] [--friction]
 
 Elastic and rigid bodies of all kinds of elements fly into each other, some of them onto a wall, a ball or a plate that is
 held; each fifth scene is one of statics: bodies on each other that contact alone holds, with planes of symmetry. Options
 are those that nobody chose. Energy is that of the history, momentum and weight are summed here from positions and
-densities, overlap is that of `overlap.py`. The exit code is 1 where a run is called good and one of these says otherwise.
+densities, overlap is that of `overlap.py`. With friction all scenes are of dynamics, and friction takes energy in each
+increment, and is within Coulomb's cone on planes. The exit code is 1 where a run is called good and one of these says otherwise.
 """
 
 import pathlib
@@ -25,6 +26,8 @@ KINDS = ["C3D4", "C3D8", "C3D10", "C3D20"]
 GRAVITY = 2.0
 #: Of the forces in statics, which Newton's method leaves.
 STATIC_BALANCE = 1.0e-7
+#: Have all surfaces friction?
+FRICTION = "--friction" in sys.argv
 
 
 def block(chance, is_ball, size):
@@ -64,16 +67,16 @@ def starts(all_blocks, rigid, v, w):
     return "*INITIAL CONDITIONS, TYPE=VELOCITY\n" + text if text else ""
 
 
-def contact(has_wall, all_blocks):
+def contact(has_wall, all_blocks, mu=0.0):
     """Everything with everything, and all bodies with a wall."""
-    text = "*SURFACE INTERACTION, NAME=I\n"
-    if not has_wall:
+    text = "*SURFACE INTERACTION, NAME=I\n" + (f"*FRICTION\n{mu}\n" if mu > 0.0 else "")
+    if not (has_wall or mu > 0.0):
         return text + "*CONTACT\n*CONTACT INCLUSIONS, ALL EXTERIOR\n*CONTACT PROPERTY ASSIGNMENT\n, , I\n"
     first, lines = 0, ""
     for own in all_blocks:
         lines += "".join(f"{first + e}, S{f}\n" for e, f in own.outer_faces())
         first += len(own.element)
-    return f"{text}*SURFACE, NAME=ALL\n{lines}*CONTACT PAIR, INTERACTION=I\nALL, ALL\nALL, W\n"
+    return f"{text}*SURFACE, NAME=ALL\n{lines}*CONTACT PAIR, INTERACTION=I\nALL, ALL\n" + "ALL, W\n"*has_wall
 
 
 def held_plate(own):
@@ -115,7 +118,8 @@ def dynamics(seed):
         text += f"*BOUNDARY\n{REFERENCE}, ENCASTRE\n"
     elif floor:
         text += held_plate(all_blocks[0])
-    text += contact(floor in ("plane", "sphere"), all_blocks) + starts(all_blocks, rigid, v, w)
+    mu = random.Random(f"friction {seed}").choice([0.1, 0.3, 0.8]) if FRICTION else 0.0
+    text += contact(floor in ("plane", "sphere"), all_blocks, mu) + starts(all_blocks, rigid, v, w)
     text += f"*STEP, NLGEOM, INC=10000\n*DYNAMIC\n{chance.choice([0.01, 0.02, 0.04])}, 0.6\n"
     if floor and chance.random() < 0.5:
         text += "*DLOAD\n" + "".join(f"B{i}, GRAV, {GRAVITY}, 0., 0., -1.\n" for i in range(1, n + 1))
@@ -167,7 +171,7 @@ def statics(seed):
 
 
 def scene(seed):
-    return statics(seed) if seed % 5 == 0 else dynamics(seed)
+    return statics(seed) if seed % 5 == 0 and not FRICTION else dynamics(seed)
 
 
 # ---- what is right --------------------------------------------------------------------------------
@@ -225,7 +229,10 @@ def judge(run, deck):
         found.append(f"overlap {deepest.by_edge:.3g}, told {run.verdict['penetration']:.3g}")
     if "*STATIC" in deck:
         return found + judge_rest(fields, deck)
-    stored = history["kinetic"] + history["strain"] - history["external_work"]
+    stored = history["kinetic"] + history["strain"] - history["external_work"] + history["friction_loss"]
+    stored = stored + history["restitution_loss"]    # what would change the shape of rigid bodies that stop
+    if FRICTION:
+        found += judge_friction(history, deck, (history["kinetic"] + history["strain"]).max())
     if np.ptp(stored) > BALANCE*(history["kinetic"] + history["strain"]).max():
         found.append(f"energy {np.ptp(stored)/(history['kinetic'] + history['strain']).max():.1e}")
     if "*BOUNDARY" in deck:
@@ -237,6 +244,21 @@ def judge(run, deck):
     size = (np.einsum("n,tn->t", np.abs(mass), np.linalg.norm(np.diff(u, axis=0), axis=2))/step[:, 0]).max()
     if np.abs(p - p[0]).max() > BALANCE*size:
         found.append(f"momentum {np.abs(p - p[0]).max()/size:.1e}")
+    return found
+
+
+def judge_friction(history, deck, most):
+    """It takes energy, and on a plane the force of a pair, a sum of cones, is in the cone."""
+    found = []
+    least = np.diff(history["friction_loss"]).min()
+    if least < -BALANCE*most:
+        found.append(f"friction gives {-least/most:.1e}")
+    if "TYPE=PLANE" in deck:
+        mu = float(deck.split("*FRICTION\n")[1].split()[0])
+        force = np.array([history[f"pair2_force_{a}"] for a in "xyz"])
+        over = np.hypot(force[0], force[1]) - mu*np.abs(force[2])
+        if over.max() > BALANCE*np.abs(force).max():
+            found.append(f"outside of Coulomb's cone by {over.max()/np.abs(force).max():.1e}")
     return found
 
 
@@ -254,4 +276,6 @@ def judge_rest(fields, deck):
 
 
 if __name__ == "__main__":
+    if FRICTION:
+        sys.argv.remove("--friction")
     sys.exit(run_scenes(scene, judge, (1, 200), "build/soak-crowds"))
