@@ -58,11 +58,10 @@ contains
    pure subroutine condition_fold(self, flip)
       type(condition_t), intent(inout) :: self   !! with its values and derivatives
       integer, intent(in) :: flip(:)             !! (n_node) planes of each, a bit for each axis
-      integer :: of(size(flip)), a, i, n, n_slave, s
-      integer, allocatable :: node(:)
+      integer :: of(size(flip)), node(size(flip)), a, i, n, n_slave, s
 
       n = 0
-      node = self%node(:size(flip))
+      node = 0
       call nodes_append(self%node(:size(flip)), node, n)
       n_slave = 0
       do i = 1, size(flip)
