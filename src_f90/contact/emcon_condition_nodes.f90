@@ -4,7 +4,8 @@ module emcon_condition_nodes
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: condition_resize, condition_resize_slip, condition_include, nodes_append
+   public :: condition_resize, condition_resize_slip, condition_include, condition_fold, &
+      nodes_append
 
 contains
 
@@ -51,6 +52,74 @@ contains
          self%h(:n_dim*m, :n_dim*m) = old%h(:n_dim*m, :n_dim*m)
       end associate
    end subroutine condition_include
+
+   !> Let a condition depend on nodes alone in the place of nodes and images of them in planes of
+   !> symmetry, which move as they do but against the axis of each plane.
+   pure subroutine condition_fold(self, flip)
+      type(condition_t), intent(inout) :: self   !! with its values and derivatives
+      integer, intent(in) :: flip(:)             !! (n_node) planes of each, a bit for each axis
+      integer :: of(size(flip)), node(size(flip)), a, i, n, n_slave, s
+
+      n = 0
+      node = 0
+      call nodes_append(self%node(:size(flip)), node, n)
+      n_slave = 0
+      do i = 1, size(flip)
+         of(i) = findloc(node(:n), self%node(i), 1)
+         if (i <= self%n_slave) n_slave = max(n_slave, of(i))
+      end do
+      associate (d => size(self%g, 1))
+         associate (sign => [((merge(-1.0_wp, 1.0_wp, btest(flip(i), a)), a = 0, d - 1), i = 1, &
+               size(flip))], to => [((d*(of(i) - 1) + a, a = 1, d), i = 1, size(flip))])
+            call fold(sign, to, self%g)
+            call fold(sign, to, self%c)
+            if (.not. self%leaves_second) call fold_twice(sign, to, self%h)
+            if (self%has_friction) then
+               do s = 1, d - 1
+                  call fold(sign, to, self%t(:, :, s))
+                  call fold(sign, to, self%t1(:, :, s))
+                  if (.not. self%leaves_second) call fold_twice(sign, to, self%ht(:, :, s))
+               end do
+            end if
+         end associate
+      end associate
+      self%n_node = n
+      self%n_slave = n_slave
+      self%node(:n) = node(:n)
+   end subroutine condition_fold
+
+   !> Sum up derivatives by components, each times `sign`, at component `to`.
+   pure subroutine fold(sign, to, part)
+      real(wp), intent(in) :: sign(:)
+      integer, intent(in) :: to(:)
+      real(wp), intent(inout) :: part(:, :)      !! (n_dim, any)
+      real(wp) :: all_of_it(size(part))
+      integer :: k
+
+      all_of_it = 0.0_wp
+      do k = 1, size(to)
+         all_of_it(to(k)) = all_of_it(to(k)) + sign(k)*part(1 + mod(k - 1, size(part, 1)), &
+            1 + (k - 1)/size(part, 1))
+      end do
+      part = reshape(all_of_it, shape(part))
+   end subroutine fold
+
+   !> The same of second derivatives.
+   pure subroutine fold_twice(sign, to, part)
+      real(wp), intent(in) :: sign(:)
+      integer, intent(in) :: to(:)
+      real(wp), intent(inout) :: part(:, :)
+      real(wp) :: all_of_it(size(part, 1), size(part, 2))
+      integer :: j, k
+
+      all_of_it = 0.0_wp
+      do k = 1, size(to)
+         do j = 1, size(to)
+            all_of_it(to(j), to(k)) = all_of_it(to(j), to(k)) + sign(j)*sign(k)*part(j, k)
+         end do
+      end do
+      part = all_of_it
+   end subroutine fold_twice
 
    !> Append those of `node` that are nodes and not among list(:n) yet.
    pure subroutine nodes_append(node, list, n)

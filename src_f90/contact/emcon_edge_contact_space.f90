@@ -1,23 +1,27 @@
 !> Contact of sharp edges in space: edges of two bodies that cross, with no node in front of a face.
 !>
-!> Each edge of one surface has a few places for crossings, one for each class of edges of the
-!> other. Which edge it crosses is chosen once per step. Source: docs/theory.md, section 15, after
-!> eq. (51).
+!> Each sharp edge has a few places for crossings, one for each class of edges of the other surface:
+!> of sharp ones, and of those along which a face bends outwards. Which edge it crosses is chosen
+!> once per step. Source: docs/theory.md, section 15, after eq. (51).
 module emcon_edge_contact_space
-   use emcon_condition_nodes, only : condition_resize, condition_resize_slip
+   use emcon_bodies, only : bodies_find_tied
+   use emcon_condition_nodes, only : condition_resize, condition_resize_slip, nodes_append
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_csr, only : csr_list_users
    use emcon_edge_pair_space, only : crossing_t, edge_crossing, edge_pair_gap, edge_pair_gap_t, &
       edge_pair_slip, edge_pair_slip_t, n_edge_pair_node
+   use emcon_element_kind, only : max_face_nodes
    use emcon_guards, only : crossing_bar
    use emcon_interactions, only : contact_damping_t, contact_options_t, contact_pair_t, &
       interaction_reach, interaction_t
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
+   use emcon_node_sums, only : node_sums_first, node_sums_second
+   use emcon_outline_edges_space, only : outline_edges_add, outline_edges_nodes, &
+      outline_edges_normals, outline_edges_place, outline_edges_t
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
-   use emcon_ridges_space, only : sharp_edge_normals, sharp_edges_init, sharp_edges_t
    use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
    implicit none
@@ -25,9 +29,14 @@ module emcon_edge_contact_space
    public :: edge_contact_t, edge_contact_init
 
    !> Edges of the other surface that an edge may cross at once: one of each class.
-   integer, parameter :: n_class = 4
+   integer, parameter :: n_class = 8
    !> The sine of the angle between edges below which they run along each other, and nodes hold.
    real(wp), parameter :: least_sine = 1.0e-2_wp
+   !> That of the angle between the faces at an edge below which it is as flat as none, and holds
+   !> nothing; but it holds, up to where it is as hollow, what is in it already by a part of the
+   !> length, and what comes down on it edge on: by so much clear of its own faces.
+   real(wp), parameter :: least_turn = 1.0e-3_wp, hollow = 0.05_wp, inside = 1.0e-4_wp, &
+      clear = 0.1_wp
    !> An edge holds what comes from between its faces, and from so much outside: the sine of that
    !> angle by the sine of that between the faces. Edges that lie on faces would be on the limit.
    real(wp), parameter :: beside = 0.25_wp
@@ -37,18 +46,33 @@ module emcon_edge_contact_space
    !> So deep, by the edge, two edges may be in each other, and may be as a contact begins.
    real(wp), parameter :: deepest = 0.3_wp, deepest_start = 0.1_wp
 
+   !> Two nodes of a sharp edge, and those of one with a centre at its end.
+   integer, parameter :: most_nodes = 2 + max_face_nodes
+   integer, parameter :: n_part = 3*n_edge_pair_node
+
    !> The crossing of two edges in a step.
    type :: edge_stencil_t
-      integer :: master = 0                      !! edge of the other surface; 0: none
+      integer :: edge = 0                        !! sharp
+      integer :: master = 0                      !! that it crosses; 0: none
       real(wp) :: side = 0.0_wp                  !! 1 or -1: heights are gaps
    end type edge_stencil_t
 
+   !> The nodes that the four ends of a stencil are made of.
+   type :: edge_ends_t
+      integer :: n = 0
+      integer :: n_slave = 0                     !! nodes 1..n_slave are of the pair's slave
+      integer :: node(most_nodes) = 0            !! (n) of the scene
+      integer :: place(most_nodes) = 0           !! (n) the first end's, then the others' in `node`
+      real(wp) :: weight(most_nodes, n_edge_pair_node) = 0.0_wp  !! (n - 1) of others, in ends
+   end type edge_ends_t
+
    type, extends(contact_t) :: edge_contact_t
       logical :: is_self = .false.                    !! of a surface with itself
-      logical :: is_exchanged = .false.               !! the edges below are the pair's master's
-      type(sharp_edges_t) :: slave
-      type(sharp_edges_t), allocatable :: master      !! gfortran 12 loses a second one of its kind
-      integer, allocatable :: class(:)                !! (n of the master) 1 to n_class
+      integer :: first = 1                            !! surface whose edges cross sharp ones
+      type(outline_edges_t) :: edges                  !! of both surfaces
+      integer, allocatable :: slave(:)                !! the sharp ones
+      integer, allocatable :: body(:)                 !! (n of the edges)
+      integer, allocatable :: class(:)                !! (n of the edges) 1 to n_class
       type(near_list_t) :: near
       type(position_memo_t) :: memo                   !! of the nodes as stencils were chosen:
       real(wp) :: chosen_reach = 0.0_wp               !! among edges up to there [L]
@@ -65,38 +89,33 @@ module emcon_edge_contact_space
 
 contains
 
-   !> Set up the edges of the pair `pair` of `scene`; without sharp edges on both sides there are no
-   !> constraints. They are those of the side with more edges, so that each crosses few.
+   !> Set up the edges of the pair `pair` of `scene`; without sharp ones there are no constraints.
    subroutine edge_contact_init(self, scene, pair)
       type(edge_contact_t), intent(out) :: self
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
-      type(sharp_edges_t), allocatable :: first, second
       type(interaction_t) :: surface
+      integer, allocatable :: node(:, :), body(:)
       integer :: i, k
 
-      allocate(first, second)
-      call sharp_edges_init(first, scene, scene%surface(pair%slave))
-      call sharp_edges_init(second, scene, scene%surface(pair%master))
-      self%n_constraint = n_class*max(size(first%node, 2), size(second%node, 2))
-      if (min(size(first%node, 2), size(second%node, 2)) == 0) self%n_constraint = 0
       self%is_self = pair%slave == pair%master
-      self%is_exchanged = size(second%node, 2) > size(first%node, 2)
-      if (self%is_exchanged) then
-         self%slave = second
-         call move_alloc(first, self%master)
-      else
-         self%slave = first
-         call move_alloc(second, self%master)
-      end if
-      self%node = [((self%slave%node(1, i), k = 1, n_class), i = 1, self%n_constraint/n_class)]
+      call outline_edges_add(self%edges, scene, scene%surface(pair%slave))
+      if (.not. self%is_self) call outline_edges_add(self%edges, scene, scene%surface(pair%master))
+      associate (edges => self%edges)
+         self%slave = pack([(i, i = 1, edges%n)], edges%is_sharp)
+         self%first = merge(1, 2, count(edges%surface(self%slave) == 1) >= &
+            count(edges%surface(self%slave) == 2))
+         self%n_constraint = n_class*size(self%slave)
+         self%node = [((edges%node(1, edges%ends(1, self%slave(i))), k = 1, n_class), &
+            i = 1, size(self%slave))]
+         node = outline_edges_nodes(edges)
+         call bodies_find_tied(scene, node, body, k)
+         self%body = body(node(1, :))
+         call find_classes(edges, self%class)
+      end associate
       allocate(self%duplicate(self%n_constraint), source=0)
       allocate(self%state(self%n_constraint), self%stencil(self%n_constraint))
       allocate(self%sagitta(self%n_constraint), self%thickness(self%n_constraint), source=0.0_wp)
-      do i = 1, self%n_constraint
-         self%thickness(i) = norm2(scene%x(:, self%slave%node(2, 1 + (i - 1)/n_class)) &
-            - scene%x(:, self%node(i)))
-      end do
       self%may_leave = .true.
       self%offset = pair%interaction%offset
       self%max_penetration_at_start = deepest_start
@@ -104,28 +123,30 @@ contains
       surface%damping = contact_damping_t()
       call contact_laws_of_surface(surface, self%laws)
       if (self%n_constraint == 0) return
-      call find_classes(self%master, size(scene%x, 2), self%class)
-      call near_list_init(self%near, self%slave%node, self%master%node, scene%x, scene%u0, &
+      do i = 1, self%n_constraint
+         associate (ends => node(:2, self%slave(1 + (i - 1)/n_class)))
+            self%thickness(i) = norm2(scene%x(:, ends(2)) - scene%x(:, ends(1)))
+         end associate
+      end do
+      call near_list_init(self%near, node(:2, self%slave), node, scene%x, scene%u0, &
          self%offset + interaction_reach(surface))
    end subroutine edge_contact_init
 
-   !> Sort edges into classes so that those with a node in common are of different ones, as far as
+   !> Sort edges into classes so that those with an end in common are of different ones, as far as
    !> there are enough.
-   pure subroutine find_classes(edges, n_node, class)
-      type(sharp_edges_t), intent(in) :: edges
-      integer, intent(in) :: n_node              !! of the scene
+   pure subroutine find_classes(edges, class)
+      type(outline_edges_t), intent(in) :: edges
       integer, allocatable, intent(out) :: class(:)
       integer, allocatable :: start(:), at(:)
       integer :: i, j, k, used(n_class)
 
-      allocate(class(size(edges%node, 2)), source=0)
-      associate (n => size(edges%node, 2))
-         call csr_list_users(n_node, [(1 + 2*k, k = 0, n)], reshape(edges%node, [2*n]), start, at)
-      end associate
+      allocate(class(edges%n), source=0)
+      call csr_list_users(size(edges%node, 2), [(1 + 2*k, k = 0, edges%n)], &
+         reshape(edges%ends, [2*edges%n]), start, at)
       do i = 1, size(class)
          used = 0
          do k = 1, 2
-            do j = start(edges%node(k, i)) + 1, start(edges%node(k, i) + 1)
+            do j = start(edges%ends(k, i)) + 1, start(edges%ends(k, i) + 1)
                if (class(at(j)) > 0) used(class(at(j))) = used(class(at(j))) + 1
             end do
          end do
@@ -161,7 +182,7 @@ contains
       self%chosen_reach = self%reach
       self%stencil%master = 0
       associate (list => self%near%candidates)
-         do i = 1, size(self%slave%node, 2)
+         do i = 1, size(self%slave)
             do k = list%start(i), list%start(i + 1) - 1
                if (near_list_within(self%near, i, list%facet(k), x, u0, self%reach)) &
                   call choose(self, i, list%facet(k), x, u0)
@@ -170,73 +191,110 @@ contains
       end associate
    end subroutine edge_begin_step
 
-   !> Let slave edge `i` cross master edge `m` in the step, if they may meet in it and no other one
-   !> of the class is nearer.
+   !> Let sharp edge number `i` cross edge `m` in the step, if they may meet in it and no other one
+   !> of the class comes first.
    pure subroutine choose(self, i, m, x, u0)
       class(edge_contact_t), intent(inout) :: self
       integer, intent(in) :: i, m
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
-      real(wp), dimension(3, n_edge_pair_node) :: at, still
-      real(wp) :: normal(3), of_slave(3, 2), of_master(3, 2), length(2)
+      real(wp), dimension(3, n_edge_pair_node) :: at
+      real(wp) :: normal(3), length(2), gap, within(2), turn(2), least
       type(crossing_t) :: crossing
       type(edge_stencil_t) :: new
 
-      if (self%is_self .and. m <= i) return
-      if (any(self%slave%node(1, i) == self%master%node(:, m)) .or. &
-         any(self%slave%node(2, i) == self%master%node(:, m))) return
-      new = edge_stencil_t(m, 1.0_wp)
-      still = 0.0_wp
-      call gather(self, i, new, x, u0, still, at)
+      if (.not. may_cross(self, self%slave(i), m)) return
+      new = edge_stencil_t(self%slave(i), m, 1.0_wp)
+      call gather(self, new, x, u0, at)
       crossing = edge_crossing(at)
       if (crossing%sine < least_sine) return
       length = [length_of(at(:, :2)), length_of(at(:, 3:))]
       if (any(max(-crossing%place, crossing%place - 1.0_wp)*length > self%reach)) return
       normal = unit(cross_product(at(:, 2) - at(:, 1), at(:, 4) - at(:, 3)))
-      of_slave = sharp_edge_normals(self%slave, i, x, u0)
-      of_slave = reshape([unit(of_slave(:, 1)), unit(of_slave(:, 2))], shape(of_slave))
-      of_master = sharp_edge_normals(self%master, m, x, u0)
-      of_master = reshape([unit(of_master(:, 1)), unit(of_master(:, 2))], shape(of_master))
-      new%side = sign(1.0_wp, dot_product(normal, sum(of_slave, 2)))
-      normal = new%side*normal
-      if (.not. (is_between(normal, of_slave) .and. is_between(-normal, of_master))) return
-      associate (gap => new%side*crossing%height, old => self%stencil(n_class*(i - 1) &
-            + self%class(m)))
-         if (gap - self%offset < -deepest*minval(length) .or. gap > self%reach) return
+      associate (of_slave => outline_edges_normals(self%edges, new%edge, x, u0), &
+            of_master => outline_edges_normals(self%edges, m, x, u0))
+         new%side = sign(1.0_wp, dot_product(normal, sum(of_slave, 2)))
+         normal = new%side*normal
+         gap = new%side*crossing%height
+         call look_between(normal, of_slave, at(:, 2) - at(:, 1), within(1), turn(1))
+         call look_between(-normal, of_master, at(:, 4) - at(:, 3), within(2), turn(2))
+      end associate
+      least = least_turn
+      if (gap - self%offset < -inside*minval(length) .or. (within(1) > clear .and. &
+         self%edges%bends(m))) least = -hollow
+      if (any(turn <= least .or. within <= min(least, 0.0_wp) - beside*abs(turn))) return
+      if (gap - self%offset < -deepest*minval(length) .or. gap > self%reach) return
+      associate (old => self%stencil(n_class*(i - 1) + self%class(m)))
          if (old%master > 0) then
-            if (.not. is_nearer(self, i, gap, old, x, u0)) return
+            if (.not. comes_first(self, new, crossing, old, x, u0)) return
          end if
          old = new
       end associate
    end subroutine choose
 
-   !> Is a gap nearer to 0 than that with `old`?
-   pure logical function is_nearer(self, i, gap, old, x, u0)
+   !> May sharp edge `i` ever cross edge `m`? Of two sharp ones one crosses the other. What bends is
+   !> of other bodies.
+   pure logical function may_cross(self, i, m)
       class(edge_contact_t), intent(in) :: self
-      integer, intent(in) :: i
-      real(wp), intent(in) :: gap                !! [L]
-      type(edge_stencil_t), intent(in) :: old
+      integer, intent(in) :: i, m                !! 1 to n of the edges
+      integer :: k
+
+      associate (edges => self%edges)
+         if (edges%is_sharp(m)) then
+            may_cross = merge(m > i, edges%surface(i) == self%first .and. edges%surface(m) &
+               /= self%first, self%is_self)
+         else
+            may_cross = merge(self%body(i) /= self%body(m), edges%surface(i) /= edges%surface(m), &
+               self%is_self)
+         end if
+         do k = 1, 2
+            if (.not. may_cross) return
+            may_cross = .not. any(edges%node(:, edges%ends(:, m)) == edges%node(1, &
+               edges%ends(k, i)))
+         end do
+      end associate
+   end function may_cross
+
+   !> Is a crossing more within the ends of its edges than that of `old`, or as much and at a lower
+   !> gap?
+   pure logical function comes_first(self, new, crossing, old, x, u0)
+      class(edge_contact_t), intent(in) :: self
+      type(edge_stencil_t), intent(in) :: new, old
+      type(crossing_t), intent(in) :: crossing   !! of the new one
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      real(wp), dimension(3, n_edge_pair_node) :: at, still
-      type(crossing_t) :: crossing
+      real(wp) :: at(3, n_edge_pair_node)
+      type(crossing_t) :: other
 
-      still = 0.0_wp
-      call gather(self, i, old, x, u0, still, at)
-      crossing = edge_crossing(at)
-      is_nearer = abs(gap) < abs(crossing%height)
-   end function is_nearer
+      call gather(self, old, x, u0, at)
+      other = edge_crossing(at)
+      associate (mine => beyond_ends(crossing), its => beyond_ends(other))
+         comes_first = mine < its
+         if (max(mine, its) <= 0.0_wp) comes_first = new%side*crossing%height &
+            < old%side*other%height
+      end associate
+   end function comes_first
 
-   !> Is a direction normal to an edge between the outward normals of its faces, or hardly outside?
-   pure logical function is_between(direction, normal)
+   !> How far past the ends of edges they cross, by their lengths; within them 0 or less.
+   pure real(wp) function beyond_ends(crossing) result(beyond)
+      type(crossing_t), intent(in) :: crossing
+
+      beyond = maxval(max(-crossing%place, crossing%place - 1.0_wp)) - begins_beyond
+   end function beyond_ends
+
+   !> How far within the outward normals of the faces at an edge a direction normal to it is: the
+   !> sine of the angle from the nearer one, < 0 outside; and that of the turn between the faces.
+   pure subroutine look_between(direction, normal, along, within, turn)
       real(wp), intent(in) :: direction(3)       !! of unit length
       real(wp), intent(in) :: normal(3, 2)       !! of unit length
-      real(wp) :: cosine, least
+      real(wp), intent(in) :: along(3)           !! the edge, as its first face runs [L]
+      real(wp), intent(out) :: within, turn
 
-      cosine = dot_product(normal(:, 1), normal(:, 2))
-      least = -beside*(1.0_wp - cosine**2)
-      is_between = dot_product(direction, normal(:, 1) - cosine*normal(:, 2)) > least .and. &
-         dot_product(direction, normal(:, 2) - cosine*normal(:, 1)) > least .and. &
-         dot_product(direction, sum(normal, 2)) > 0.0_wp
-   end function is_between
+      associate (axis => unit(along))
+         turn = dot_product(cross_product(normal(:, 1), normal(:, 2)), axis)
+         within = min(dot_product(cross_product(normal(:, 1), direction), axis), &
+            dot_product(cross_product(direction, normal(:, 2)), axis))
+      end associate
+      if (.not. dot_product(direction, sum(normal, 2)) > 0.0_wp) within = -1.0_wp
+   end subroutine look_between
 
    pure function unit(vector)
       real(wp), intent(in) :: vector(3)
@@ -251,47 +309,75 @@ contains
       length = sqrt(dot_product(ends(:, 2) - ends(:, 1), ends(:, 2) - ends(:, 1)))
    end function length_of
 
-   !> Where the ends of slave edge `i` and of the master edge it crosses are from the first of them.
-   pure subroutine gather(self, i, stencil, x, u, way, at)
+   !> Where the ends of the edges of a stencil are, from the first one.
+   pure subroutine gather(self, stencil, x, u, at)
       class(edge_contact_t), intent(in) :: self
-      integer, intent(in) :: i
       type(edge_stencil_t), intent(in) :: stencil
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      real(wp), intent(in) :: way(:, :)          !! (3, 4) that they move then [L]
       real(wp), intent(out) :: at(:, :)          !! (3, 4) [L]
       integer :: k
 
-      associate (node => nodes_of(self, i, stencil))
+      associate (point => points_of(self, stencil))
          do k = 1, n_edge_pair_node
-            at(:, k) = (x(:, node(k)) - x(:, node(1))) + (u(:, node(k)) - u(:, node(1))) + way(:, k)
+            at(:, k) = outline_edges_place(self%edges, point(k), self%edges%node(1, point(1)), x, u)
          end do
       end associate
    end subroutine gather
 
-   pure function nodes_of(self, i, stencil) result(node)
+   !> The ends of the edges of a stencil.
+   pure function points_of(self, stencil) result(point)
       class(edge_contact_t), intent(in) :: self
-      integer, intent(in) :: i
       type(edge_stencil_t), intent(in) :: stencil
-      integer :: node(n_edge_pair_node)
+      integer :: point(n_edge_pair_node)
 
-      node = [self%slave%node(:, i), self%master%node(:, stencil%master)]
-   end function nodes_of
+      point = [self%edges%ends(:, stencil%edge), self%edges%ends(:, stencil%master)]
+   end function points_of
 
    !> How the ends move in the step, from the first of them on.
-   pure subroutine gather_motion(self, i, stencil, du, way)
+   pure subroutine gather_motion(self, stencil, du, way)
       class(edge_contact_t), intent(in) :: self
-      integer, intent(in) :: i
       type(edge_stencil_t), intent(in) :: stencil
-      real(wp), intent(in), contiguous :: du(:, :)
+      real(wp), intent(in), contiguous :: du(:, :)   !! (3, n_node) [L]
       real(wp), intent(out) :: way(:, :)         !! (3, 4) [L]
-      integer :: k
+      real(wp) :: motion(3)
+      integer :: j, k
 
-      associate (node => nodes_of(self, i, stencil))
-         do k = 1, n_edge_pair_node
-            way(:, k) = du(:, node(k)) - du(:, node(1))
+      way = 0.0_wp
+      associate (point => points_of(self, stencil), edges => self%edges)
+         do k = 2, n_edge_pair_node
+            do j = 1, size(edges%node, 1)
+               if (edges%node(j, point(k)) == 0) exit
+               motion = du(:, edges%node(j, point(k))) - du(:, edges%node(1, point(1)))
+               way(:, k) = way(:, k) + edges%weight(j, point(k))*motion
+            end do
          end do
       end associate
    end subroutine gather_motion
+
+   !> The nodes that the ends of a stencil are made of. Those of the surface that the pair names as
+   !> its slave come first.
+   pure function ends_of(self, stencil) result(ends)
+      class(edge_contact_t), intent(in) :: self
+      type(edge_stencil_t), intent(in) :: stencil
+      type(edge_ends_t) :: ends
+      integer :: i, j, k, point(n_edge_pair_node), order(n_edge_pair_node)
+
+      point = points_of(self, stencil)
+      order = cshift([1, 2, 3, 4], merge(2, 0, self%edges%surface(stencil%edge) == 2))
+      do k = 1, n_edge_pair_node
+         call nodes_append(self%edges%node(:, point(order(k))), ends%node, ends%n)
+         if (k == 2) ends%n_slave = ends%n
+      end do
+      associate (base => findloc(ends%node(:ends%n), self%edges%node(1, point(1)), 1))
+         ends%place(:ends%n) = [base, (i, i = 1, base - 1), (i, i = base + 1, ends%n)]
+      end associate
+      do k = 1, n_edge_pair_node
+         do i = 2, ends%n
+            j = findloc(self%edges%node(:, point(k)), ends%node(ends%place(i)), 1)
+            if (j > 0) ends%weight(i - 1, k) = self%edges%weight(j, point(k))
+         end do
+      end do
+   end function ends_of
 
    pure subroutine edge_measure(self, x, u0, du)
       class(edge_contact_t), intent(inout) :: self
@@ -309,20 +395,19 @@ contains
       type(edge_contact_t), intent(inout) :: self
       integer, intent(in) :: k
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      real(wp), dimension(3, n_edge_pair_node) :: at, way, still
+      real(wp), dimension(3, n_edge_pair_node) :: at, way
       type(crossing_t) :: from, to
 
-      associate (state => self%state(k), stencil => self%stencil(k), i => 1 + (k - 1)/n_class)
-         still = 0.0_wp
-         call gather(self, i, stencil, x, u0, still, at)
+      associate (state => self%state(k), stencil => self%stencil(k))
+         call gather(self, stencil, x, u0, at)
          from = edge_crossing(at)
          state%size = length_of(at(:, :2))
          state%other_size = length_of(at(:, 3:))
-         call gather_motion(self, i, stencil, du, way)
-         call gather(self, i, stencil, x, u0, way, at)
-         to = edge_crossing(at)
+         call gather_motion(self, stencil, du, way)
+         to = edge_crossing(at + way)
          state%is_near = .true.
          state%is_over = is_within(to, begins_beyond)
+         if (self%edges%is_bare(stencil%master)) state%is_over = state%is_over .or. is_at_end(to)
          state%is_leaving = .not. is_within(to, ends_beyond)
          state%is_arriving = .not. is_within(from, ends_beyond)
          state%gap0 = stencil%side*from%height - self%offset
@@ -342,48 +427,71 @@ contains
          crossing%place < 1.0_wp + beyond)
    end function is_within
 
+   !> Does an edge cross the other one at its last end, or hardly beside it?
+   pure logical function is_at_end(crossing)
+      type(crossing_t), intent(in) :: crossing
+
+      associate (place => crossing%place)
+         is_at_end = crossing%sine > 0.0_wp .and. abs(place(2) - 1.0_wp) <= -begins_beyond .and. &
+            place(1) > -begins_beyond .and. place(1) < 1.0_wp + begins_beyond
+      end associate
+   end function is_at_end
+
    pure subroutine edge_evaluate(self, wanted, x, u0, du, target, item)
       class(edge_contact_t), intent(inout) :: self
       integer, intent(in) :: wanted(:)           !! (n) numbers of constraints, ascending
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       real(wp), intent(in) :: target(:)          !! (n) [L]
       type(condition_t), intent(inout) :: item(:)   !! (n)
-      real(wp), dimension(3, n_edge_pair_node) :: at, way, still
-      type(edge_pair_gap_t) :: gap
-      integer :: k, order(n_edge_pair_node), place(3*n_edge_pair_node)
+      integer :: k
 
-      still = 0.0_wp
-      ! The side that the pair names as the slave comes first.
-      order = cshift([1, 2, 3, 4], merge(2, 0, self%is_exchanged))
-      place = cshift([(k, k = 1, size(place))], merge(6, 0, self%is_exchanged))
       do k = 1, size(wanted)
-         associate (i => 1 + (wanted(k) - 1)/n_class, stencil => self%stencil(wanted(k)), &
-               hold => target(k) + self%offset)
-            call gather(self, i, stencil, x, u0, still, at)
-            call gather_motion(self, i, stencil, du, way)
-            call edge_pair_gap(at, way, stencil%side, item(k)%leaves_second, gap)
-            call condition_resize(item(k), n_edge_pair_node, size(x, 1))
-            associate (node => nodes_of(self, i, stencil))
-               item(k)%node(:n_edge_pair_node) = node(order)
-            end associate
-            item(k)%n_slave = 2
-            item(k)%size = length_of(at(:, :2))
-            item(k)%gap0 = gap%gap(0) - hold
-            item(k)%gap1 = gap%gap(1) - hold
-            item(k)%dgap = gap%dgap
-            item(k)%g(:, :n_edge_pair_node) = gap%g(:, order)
-            item(k)%c(:, :n_edge_pair_node) = gap%c(:, order)
-            if (.not. item(k)%leaves_second) item(k)%h(:size(place), :size(place)) = &
-               gap%h(place, place)
-            if (item(k)%has_friction) call add_slip(at, way, order, place, item(k))
-         end associate
+         call evaluate_crossing(self, self%stencil(wanted(k)), x, u0, du, target(k) + self%offset, &
+            item(k))
       end do
    end subroutine edge_evaluate
 
+   !> The condition of a crossing.
+   pure subroutine evaluate_crossing(self, stencil, x, u0, du, hold, item)
+      type(edge_contact_t), intent(in) :: self
+      type(edge_stencil_t), intent(in) :: stencil
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      real(wp), intent(in) :: hold               !! gap [L]
+      type(condition_t), intent(inout) :: item
+      real(wp), dimension(3, n_edge_pair_node) :: at, way
+      type(edge_pair_gap_t) :: gap
+      type(edge_ends_t) :: ends
+
+      call gather(self, stencil, x, u0, at)
+      call gather_motion(self, stencil, du, way)
+      call edge_pair_gap(at, way, stencil%side, item%leaves_second, gap)
+      ends = ends_of(self, stencil)
+      call condition_resize(item, ends%n, size(x, 1))
+      item%node(:ends%n) = ends%node(:ends%n)
+      item%n_slave = ends%n_slave
+      item%size = length_of(at(:, :2))
+      item%gap0 = gap%gap(0) - hold
+      item%gap1 = gap%gap(1) - hold
+      item%dgap = gap%dgap
+      associate (n => ends%n)
+         associate (weight => ends%weight(:n - 1, :), place => ends%place(:n))
+            item%g(:, :n) = 0.0_wp
+            item%c(:, :n) = 0.0_wp
+            call node_sums_first(reshape(gap%g, [n_part]), weight, 1.0_wp, place, item%g(:, :n))
+            call node_sums_first(reshape(gap%c, [n_part]), weight, 1.0_wp, place, item%c(:, :n))
+            if (.not. item%leaves_second) then
+               item%h(:3*n, :3*n) = 0.0_wp
+               call node_sums_second(gap%h, weight, 1.0_wp, place, item%h(:3*n, :3*n))
+            end if
+         end associate
+      end associate
+      if (item%has_friction) call add_slip(at, way, ends, item)
+   end subroutine evaluate_crossing
+
    !> Slip of a crossing with its derivatives.
-   pure subroutine add_slip(at, way, order, place, item)
+   pure subroutine add_slip(at, way, ends, item)
       real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 4) of the ends [L]
-      integer, intent(in) :: order(:), place(:)  !! of nodes and coordinates in the condition
+      type(edge_ends_t), intent(in) :: ends
       type(condition_t), intent(inout) :: item   !! with its nodes
       type(edge_pair_slip_t) :: slip
       integer :: s
@@ -391,12 +499,22 @@ contains
       call edge_pair_slip(at, way, item%leaves_second, slip)
       call condition_resize_slip(item)
       item%slip(:size(slip%f)) = slip%f
-      do s = 1, size(slip%f)
-         item%t(:, :n_edge_pair_node, s) = slip%g(:, order, s)
-         item%t1(:, :n_edge_pair_node, s) = slip%c(:, order, s)
-         if (.not. item%leaves_second) item%ht(:size(place), :size(place), s) = slip%h(place, &
-            place, s)
-      end do
+      associate (n => ends%n)
+         associate (weight => ends%weight(:n - 1, :), place => ends%place(:n))
+            do s = 1, size(slip%f)
+               item%t(:, :n, s) = 0.0_wp
+               item%t1(:, :n, s) = 0.0_wp
+               call node_sums_first(reshape(slip%g(:, :, s), [n_part]), weight, 1.0_wp, place, &
+                  item%t(:, :n, s))
+               call node_sums_first(reshape(slip%c(:, :, s), [n_part]), weight, 1.0_wp, place, &
+                  item%t1(:, :n, s))
+               if (item%leaves_second) cycle
+               item%ht(:3*n, :3*n, s) = 0.0_wp
+               call node_sums_second(slip%h(:, :, s), weight, 1.0_wp, place, &
+                  item%ht(:3*n, :3*n, s))
+            end do
+         end associate
+      end associate
    end subroutine add_slip
 
    !> As `contact_t` has it.
@@ -405,16 +523,13 @@ contains
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       real(wp) :: slip(size(x, 1) - 1)           !! [L]
-      real(wp), dimension(3, n_edge_pair_node) :: at, way, still
+      real(wp), dimension(3, n_edge_pair_node) :: at, way
       type(edge_pair_slip_t) :: over
 
       slip = 0.0_wp
-      still = 0.0_wp
-      associate (edge => 1 + (i - 1)/n_class, stencil => self%stencil(i))
-         if (stencil%master == 0) return
-         call gather(self, edge, stencil, x, u0, still, at)
-         call gather_motion(self, edge, stencil, du, way)
-      end associate
+      if (self%stencil(i)%master == 0) return
+      call gather(self, self%stencil(i), x, u0, at)
+      call gather_motion(self, self%stencil(i), du, way)
       call edge_pair_slip(at, way, .true., over)
       slip = over%f
    end function edge_slip

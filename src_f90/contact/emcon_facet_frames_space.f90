@@ -42,7 +42,7 @@ contains
       self%point = [(t, t = 1, n)]
       self%start = [(t, t = 1, n + 1)]
       allocate(self%middle(0), self%base(n), self%ring_start(n + 1), self%size(n), self%area(n))
-      allocate(self%ring(max_face_nodes*n), source=0)
+      allocate(self%ring(max_face_nodes*n), self%flip(max_face_nodes*n), source=0)
       allocate(self%weight(3, max_face_nodes*n), source=0.0_wp)
       self%ring_start(1) = 1
       m = 0

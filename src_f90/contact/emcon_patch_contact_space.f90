@@ -5,7 +5,7 @@
 !> master: smooth while the node slides over sides and corners. Source: docs/theory.md, section 15.
 module emcon_patch_contact_space
    use emcon_bulges_space, only : bulges_find, bulges_largest, bulges_t
-   use emcon_condition_nodes, only : condition_resize, condition_resize_slip
+   use emcon_condition_nodes, only : condition_fold, condition_resize, condition_resize_slip
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
    use emcon_contact_law_registry, only : contact_laws_of_surface
@@ -87,8 +87,9 @@ contains
       associate (sides => self%sides)
          call slave_faces_init(sides%slave, scene, scene%surface(pair%slave), is_meant, error)
          if (allocated(error)) return
+         sides%node_rests = always_rests(scene)
          call point_frames_init(sides%frames, sides%slave, scene%x, is_meant, &
-            mirror_axes(sides%slave, scene) > 0)
+            mirror_axes(sides%slave, scene) > 0, sides%node_rests)
          if (sides%frames%n == 0) then
             call raise(error, err_input, where_text(scene, scene%surface(pair%slave)%origin) &
                // ": surface " // scene%surface(pair%slave)%name // " has no face with a " // &
@@ -100,7 +101,7 @@ contains
          if (allocated(error)) return
          call patch_triangles_init(sides%triangles, sides%master, scene%x)
          sides%mirror = mirror_axes(sides%master, scene)
-         sides%rests = rests_of_points(sides, always_rests(scene))
+         sides%rests = rests_of_points(sides, sides%node_rests)
          if (pair%slave == pair%master) call touch_rule_space_init(sides%rule, sides%slave, &
             sides%frames%middle, scene)
          associate (n => sides%frames%n, m => sides%rule%n_class)
@@ -377,6 +378,8 @@ contains
             call patch_spread(stencil, gap, is_used, self%scale(i), [(k, k = 1, n)], item)
             if (item%has_friction) call add_slip(stencil, pack([(k, k = 2, stencil%n_node)], &
                is_used(2:)), at, way, item)
+            if (any(stencil%flip(:stencil%n_node) > 0)) call condition_fold(item, &
+               pack(stencil%flip(:stencil%n_node), is_used))
          end associate
       end associate
    end subroutine evaluate_frame

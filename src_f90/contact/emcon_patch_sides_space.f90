@@ -17,12 +17,19 @@ module emcon_patch_sides_space
    implicit none
    private
    public :: point_frames_t, point_frames_init, patch_triangles_t, patch_triangles_init, &
-      patch_sides_t, sides_point, sides_place, frame_normal
+      patch_sides_t, sides_point, sides_place, sides_in_plane, sides_holds, &
+      frame_normal, flip_signs
 
    !> A ring of no direction: its fourth moment is less than this part of that of distances.
    real(wp), parameter :: round = 1.0e-6_wp
    !> The tangent of the angle by which a frame may lean from its mean normal.
    real(wp), parameter :: upright = 0.1_wp
+   !> A node is in a plane if it is no farther off than this, by the facets.
+   real(wp), parameter :: in_plane = 1.0e-9_wp
+   !> A surface goes through a plane of symmetry smoothly if the sine of its slope there is less.
+   real(wp), parameter :: steep = 0.5_wp
+   !> A node may be in two planes of symmetry, with as many images of what is around it.
+   integer, parameter :: n_image = 4
    !> A mean normal shorter than this, by the area, is none.
    real(wp), parameter :: blunt = 1.0e-2_wp
 
@@ -41,6 +48,7 @@ module emcon_patch_sides_space
       integer, allocatable :: point(:)           !! (n) that of each frame
       integer, allocatable :: ring_start(:)      !! (n + 1)
       integer, allocatable :: ring(:)            !! nodes of the scene
+      integer, allocatable :: flip(:)            !! (size of `ring`) or mirror images of them
       real(wp), allocatable :: weight(:, :)      !! (3, size of `ring`) in a, in b, in the point
       real(wp), allocatable :: size(:)           !! (n_point) mean length of facets there [L]
       real(wp), allocatable :: area(:)           !! (n_point) in the reference [L^2]
@@ -65,6 +73,7 @@ module emcon_patch_sides_space
       integer, allocatable :: mirror(:)          !! (n_facet of the master) axis along which it
                                                  !! rests in a plane of symmetry; 0: none
       logical, allocatable :: rests(:, :)        !! (3, n_point) where contact points do
+      logical, allocatable :: node_rests(:, :)   !! (3, n_node of the scene) where nodes do
    end type patch_sides_t
 
 contains
@@ -110,37 +119,64 @@ contains
       end do
    end function sides_place
 
+   !> Is a point of the master in the plane of symmetry normal to axis `a` that contact point `i` of
+   !> the slave rests in?
+   pure logical function sides_in_plane(self, point, a, i, x) result(is_in)
+      type(patch_sides_t), intent(in) :: self
+      integer, intent(in) :: point               !! of the split
+      integer, intent(in) :: a                   !! axis
+      integer, intent(in) :: i                   !! contact point
+      real(wp), intent(in) :: x(:, :)            !! (3, n_node) [L]
+      integer :: k, n, node(max_face_nodes)
+      real(wp) :: weight(max_face_nodes)
+
+      is_in = self%rests(a, i)
+      if (.not. is_in) return
+      call sides_point(self, point, n, node, weight)
+      is_in = all([(sides_holds(self, node(k), a, i, x), k = 1, n)])
+   end function sides_in_plane
+
+   !> Does a node rest in the plane normal to axis `a` that contact point `i` of the slave is in?
+   pure logical function sides_holds(self, node, a, i, x) result(holds)
+      type(patch_sides_t), intent(in) :: self
+      integer, intent(in) :: node                !! of the scene
+      integer, intent(in) :: a                   !! axis
+      integer, intent(in) :: i                   !! contact point
+      real(wp), intent(in) :: x(:, :)            !! (3, n_node) [L]
+
+      holds = self%node_rests(a, node) .and. abs(x(a, node) - x(a, self%frames%base(i))) &
+         <= in_plane*self%frames%size(i)
+   end function sides_holds
+
    !> The frames at all contact points of a surface: at a node of each smooth group of its facets
    !> there, and of all of them where there are several; at a centre of its facet. Facets in a plane
    !> of symmetry make no corner with others.
-   pure subroutine point_frames_init(self, facets, x, is_meant, is_mirror)
+   pure subroutine point_frames_init(self, facets, x, is_meant, is_mirror, rests)
       type(point_frames_t), intent(out) :: self
       type(facets_t), intent(in) :: facets       !! in space
       real(wp), intent(in) :: x(:, :)            !! (3, n_node of the scene) reference [L]
       logical, intent(in) :: is_meant(:)         !! (n_node) it needs frames
       logical, intent(in) :: is_mirror(:)        !! (n_facet) in a plane of symmetry
+      logical, intent(in) :: rests(:, :)         !! (3, n_node of the scene) always
       type(facet_groups_t) :: groups
-      real(wp), allocatable :: still(:, :)
       integer :: g, i
 
       call facet_groups_init(groups, facets, x, group_angle)
-      allocate(still, mold=x)
-      still = 0.0_wp
       self%n_node = size(facets%node)
       self%middle = facet_split_middles(facets, is_meant)
       self%base = [facets%node, facets%facet(2, self%middle)]
       associate (n => size(self%base), n_frame => groups%n_group + size(self%base), &
-            n_ring => 2*size(groups%ring) + size(facets%facet, 1)*size(self%middle))
+            n_ring => n_image*2*size(groups%ring) + size(facets%facet, 1)*size(self%middle))
          allocate(self%start(n + 1), self%ring_start(n_frame + 1), source=1)
          allocate(self%size(n), self%area(n), self%weight(3, n_ring), source=0.0_wp)
-         allocate(self%ring(n_ring), source=0)
+         allocate(self%ring(n_ring), self%flip(n_ring), source=0)
       end associate
       do i = 1, size(self%base)
          self%start(i + 1) = self%start(i)
          if (i <= size(facets%node)) then
-            if (is_meant(i)) call add_node(self, facets, groups, x, still, is_mirror, i)
+            if (is_meant(i)) call add_node(self, facets, groups, x, is_mirror, rests, i)
          else
-            call add_centre(self, facets, x, still, i, self%middle(i - size(facets%node)))
+            call add_centre(self, facets, x, i, self%middle(i - size(facets%node)))
          end if
       end do
       self%n = self%start(size(self%start)) - 1
@@ -148,12 +184,12 @@ contains
    end subroutine point_frames_init
 
    !> The frames of node `i`.
-   pure subroutine add_node(self, facets, groups, x, still, is_mirror, i)
+   pure subroutine add_node(self, facets, groups, x, is_mirror, rests, i)
       type(point_frames_t), intent(inout) :: self
       type(facets_t), intent(in) :: facets
       type(facet_groups_t), intent(in) :: groups
-      real(wp), intent(in) :: x(:, :), still(:, :)
-      logical, intent(in) :: is_mirror(:)
+      real(wp), intent(in) :: x(:, :)
+      logical, intent(in) :: is_mirror(:), rests(:, :)
       integer, intent(in) :: i
       integer, allocatable :: corner(:), ring(:)
       integer :: g, n
@@ -163,14 +199,14 @@ contains
       do g = groups%node_start(i), groups%node_start(i + 1) - 1
          associate (own => groups%facet(groups%start(g):groups%start(g + 1) - 1), &
                around => groups%ring(groups%ring_start(g):groups%ring_start(g + 1) - 1))
-            call add_frame(self, facets, x, still, i, own, around)
+            call add_frame(self, facets, x, i, own, around, rests)
             if (all(is_mirror(own))) cycle
             n = n + 1
             corner = [corner, own]
             ring = [ring, around]
          end associate
       end do
-      if (n > 1) call add_frame(self, facets, x, still, i, corner, unique_sorted(ring))
+      if (n > 1) call add_frame(self, facets, x, i, corner, unique_sorted(ring), rests)
       associate (around => facets%around(facets%around_start(i):facets%around_start(i + 1) - 1))
          if (size(around) == 0) return
          self%size(i) = sum([(facets_length(facets, around(g)), g = 1, size(around))]) &
@@ -181,56 +217,129 @@ contains
    end subroutine add_node
 
    !> The frame of the centre of facet `f`, point `i`.
-   pure subroutine add_centre(self, facets, x, still, i, f)
+   pure subroutine add_centre(self, facets, x, i, f)
       type(point_frames_t), intent(inout) :: self
       type(facets_t), intent(in) :: facets
-      real(wp), intent(in) :: x(:, :), still(:, :)
+      real(wp), intent(in) :: x(:, :)
       integer, intent(in) :: i, f
 
       self%size(i) = facets_length(facets, f)
       self%area(i) = facets%size(f)/real(count(facets%corner(:, f) > 0), wp)
-      call add_frame(self, facets, x, still, i, [f], pack(facets%corner(:, f), &
+      call add_frame(self, facets, x, i, [f], pack(facets%corner(:, f), &
          facets%corner(:, f) > 0))
    end subroutine add_centre
 
    !> Add the frame of the facets `facet` at point `i`, if they have a mean normal: docs/theory.md,
-   !> eq. (44).
-   pure subroutine add_frame(self, facets, x, still, i, facet, ring)
+   !> eq. (44). At a node in planes of symmetry mirror images of the facets are around it, too.
+   pure subroutine add_frame(self, facets, x, i, facet, ring, rests)
       type(point_frames_t), intent(inout) :: self
       type(facets_t), intent(in) :: facets
-      real(wp), intent(in) :: x(:, :), still(:, :)
+      real(wp), intent(in) :: x(:, :)
       integer, intent(in) :: i                   !! a node or a centre
       integer, intent(in) :: facet(:), ring(:)   !! facets, and nodes of them as indices
-      real(wp) :: normal(3), area, from(3, size(ring)), weight(3, size(ring))
-      integer :: k, n
+      logical, intent(in), optional :: rests(:, :)           !! (3, n_node of the scene); of a node
+      real(wp) :: normal(3), area, from(3, n_image*size(ring)), weight(3, n_image*size(ring))
+      integer :: planes, k, m, n, node(n_image*size(ring)), flip(n_image*size(ring))
 
-      normal = 0.0_wp
-      area = 0.0_wp
-      do k = 1, size(facet)
-         normal = normal + facets_normal(facets, facet(k), x, still)
-         area = area + facets%size(facet(k))
-      end do
+      normal = mean_normal(facets, facet, x, 0)
+      area = sum(facets%size(facet))
+      planes = 0
+      if (present(rests)) planes = mirror_planes(x, rests, self%base(i), facets%node(ring), normal)
+      if (planes > 0) normal = mean_normal(facets, facet, x, planes)
       if (.not. sqrt(dot_product(normal, normal)) > blunt*area) return
       normal = normal/sqrt(dot_product(normal, normal))
-      associate (other => facets%node(ring))
-         from = x(:, other) - spread(x(:, self%base(i)), 2, size(ring))
-         weight(3, :) = 0.0_wp
-         if (i > size(facets%node)) then
-            weight(3, :) = facet_split_centre(size(ring))
-            from = from - spread(matmul(from, weight(3, :)), 2, size(ring))
-         end if
-         weight(:2, :) = frame_weights(from, normal)
-         ! Places are counted from the base, the frame is about its point.
-         do k = 1, 2
-            weight(k, :) = weight(k, :) - sum(weight(k, :))*weight(3, :)
-         end do
-         n = self%ring_start(self%start(i + 1))
-         self%ring(n:n + size(ring) - 1) = other
-         self%weight(:, n:n + size(ring) - 1) = weight
-      end associate
+      call find_images(x, facets%node(ring), self%base(i), planes, m, node, flip)
+      do k = 1, m
+         from(:, k) = flip_signs(flip(k))*(x(:, node(k)) - x(:, self%base(i)))
+      end do
+      weight = 0.0_wp
+      if (i > size(facets%node)) then
+         weight(3, :m) = facet_split_centre(m)
+         from(:, :m) = from(:, :m) - spread(matmul(from(:, :m), weight(3, :m)), 2, m)
+      end if
+      weight(:2, :m) = frame_weights(from(:, :m), normal)
+      ! Places are counted from the base, the frame is about its point.
+      do k = 1, 2
+         weight(k, :m) = weight(k, :m) - sum(weight(k, :m))*weight(3, :m)
+      end do
+      n = self%ring_start(self%start(i + 1))
+      self%ring(n:n + m - 1) = node(:m)
+      self%flip(n:n + m - 1) = flip(:m)
+      self%weight(:, n:n + m - 1) = weight(:, :m)
       self%start(i + 1) = self%start(i + 1) + 1
-      self%ring_start(self%start(i + 1)) = n + size(ring)
+      self%ring_start(self%start(i + 1)) = n + m
    end subroutine add_frame
+
+   !> The sum of the normals of facets, and of their images in planes of symmetry.
+   pure function mean_normal(facets, facet, x, planes) result(normal)
+      type(facets_t), intent(in) :: facets
+      integer, intent(in) :: facet(:)
+      real(wp), intent(in) :: x(:, :)
+      integer, intent(in) :: planes
+      real(wp) :: normal(3), still(3, size(x, 2))
+      integer :: k
+
+      still = 0.0_wp
+      normal = 0.0_wp
+      do k = 1, size(facet)
+         normal = normal + facets_normal(facets, facet(k), x, still)
+      end do
+      where ([(btest(planes, k), k = 0, 2)]) normal = 0.0_wp
+   end function mean_normal
+
+   !> The planes of symmetry that a node is in, a bit for each axis along which it rests: a side of
+   !> the facets at it is in them, all of these are on one side, and go through the plane smoothly.
+   pure integer function mirror_planes(x, rests, node, ring, normal) result(planes)
+      real(wp), intent(in) :: x(:, :)
+      logical, intent(in) :: rests(:, :)
+      integer, intent(in) :: node, ring(:)       !! of the scene
+      real(wp), intent(in) :: normal(3)          !! of the facets, of any length
+      real(wp) :: along(size(ring)), room
+      integer :: a
+
+      planes = 0
+      if (all(rests(:, node))) return
+      do a = 1, 3
+         if (.not. rests(a, node)) cycle
+         along = x(a, ring) - x(a, node)
+         room = in_plane*maxval(abs(along))
+         if (.not. any(rests(a, ring) .and. abs(along) <= room)) cycle
+         if (.not. (all(along >= -room) .or. all(along <= room))) cycle
+         if (abs(normal(a)) < steep*sqrt(dot_product(normal, normal))) planes = ibset(planes, a - 1)
+      end do
+   end function mirror_planes
+
+   !> The nodes around another one, and their images in the planes that it is in.
+   pure subroutine find_images(x, ring, node, planes, n, image, flip)
+      real(wp), intent(in) :: x(:, :)
+      integer, intent(in) :: ring(:), node       !! of the scene
+      integer, intent(in) :: planes
+      integer, intent(out) :: n, image(:), flip(:)
+      integer :: code, k, a
+
+      n = 0
+      do code = 0, 2**3 - 1
+         if (iand(code, planes) /= code) cycle
+         do k = 1, size(ring)
+            associate (way => x(:, ring(k)) - x(:, node))
+               if (any([(btest(code, a - 1) .and. abs(way(a)) <= in_plane*maxval(abs(way)), &
+                  a = 1, 3)])) cycle
+               n = n + 1
+               image(n) = ring(k)
+               flip(n) = code
+            end associate
+         end do
+      end do
+   end subroutine find_images
+
+   !> What the components of a vector are multiplied by in mirrors, a bit for each axis.
+   pure function flip_signs(flip) result(signs)
+      integer, intent(in) :: flip                !! 0 to 7
+      real(wp) :: signs(3)
+      integer :: a
+
+      signs = [(merge(-1.0_wp, 1.0_wp, btest(flip, a)), a = 0, 2)]
+   end function flip_signs
 
    !> The weights of points around another one in its frame. Where that leans, as points of a sharp
    !> ring are lower on one side, they are those that give the directions themselves.
@@ -291,6 +400,7 @@ contains
       side = 0.0_wp
       do i = self%ring_start(k), self%ring_start(k + 1) - 1
          way = (x(:, self%ring(i)) - x(:, node)) + (u(:, self%ring(i)) - u(:, node))
+         if (self%flip(i) > 0) way = flip_signs(self%flip(i))*way
          side(:, 1) = side(:, 1) + self%weight(1, i)*way
          side(:, 2) = side(:, 2) + self%weight(2, i)*way
       end do

@@ -16,7 +16,7 @@ module emcon_facet_groups
    !> Up to this turn facets are smooth, and beyond it a side is a ridge [degrees].
    real(wp), parameter :: group_angle = 60.0_wp, ridge_angle = 20.0_wp
    !> What a turn has to exceed an angle by [degrees]: far above the rounding of coordinates.
-   real(wp), parameter :: turn_tol = 1.0e-3_wp
+   real(wp), parameter, public :: turn_tol = 1.0e-3_wp
    integer, parameter :: n_end = 2               !! of a side
    real(wp), parameter :: degree = acos(-1.0_wp)/180.0_wp
 

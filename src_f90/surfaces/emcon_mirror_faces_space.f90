@@ -39,7 +39,8 @@ contains
       end do
    end function mirror_axes
 
-   !> The freedoms that rest in every step.
+   !> The freedoms that rest in every step; those of a rigid body do as its reference node and its
+   !> turns.
    pure function always_rests(scene) result(rests)
       type(scene_t), intent(in) :: scene
       logical :: rests(n_axis, size(scene%x, 2)), now(n_axis, size(scene%x, 2))
@@ -55,8 +56,26 @@ contains
                now(own%dof, own%node) = prescribed_rests(own)
             end associate
          end do
+         if (allocated(scene%step(i)%turn)) call let_turns_rest(scene, i, now)
          rests = rests .and. now
       end do
    end function always_rests
+
+   !> Let rigid bodies rest whose reference node and turns do in a step.
+   pure subroutine let_turns_rest(scene, i, now)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i                   !! number of the step
+      logical, intent(inout) :: now(:, :)        !! (3, n_node) what rests in it
+      integer :: k
+
+      do k = 1, size(scene%step(i)%turn)
+         associate (turn => scene%step(i)%turn(k))
+            if (.not. all(prescribed_rests(turn%angle))) cycle
+            associate (body => scene%rigid(turn%rigid))
+               if (all(now(:, body%reference))) now(:, body%node) = .true.
+            end associate
+         end associate
+      end do
+   end subroutine let_turns_rest
 
 end module emcon_mirror_faces_space

@@ -174,6 +174,22 @@ def test_a_mirrored_scene_is_mirrored(tmp_path: Path) -> None:
     assert np.ptp(ends[0]) <= BALANCE
 
 
+@pytest.mark.parametrize("cells", [(2, 2), (2, 3)])
+def test_a_block_that_slides_off_keeps_its_mirror(cells: tuple[int, int], tmp_path: Path) -> None:
+    """Without friction over the rim of another one: past the rim the surface fades alike on both sides of the plane."""
+    one = Block("C3D8", (cells[0],)*3)
+    two = Block("C3D8", (cells[1],)*3, place=lambda x: x - np.array([0, 0, 1.]))
+    text = (bodies([one, two], [faces(one, 2, 0), faces(two, 2, 1)], "*ELASTIC\n1000., 0.\n*DENSITY\n1.\n") + pair()
+            + velocities(one, np.array([1., 0, 0]), np.zeros(3)) + "*BOUNDARY\n"
+            + "".join(f"{len(one.x) + k}, 1, 3\n" for k in two.on(2, 0))
+            + dynamic(.01, .12, "*DLOAD\nB1, GRAV, 10., 0., 0., -1.\n"))
+    fields = ran(tmp_path, text).fields()
+    x = fields.x[:len(one.x)]
+    mirror = [int(np.argmin(np.abs(x - (p*[1, -1, 1] + [0, 1, 0])).sum(1))) for p in x]
+    for u in fields["displacement"][:, :len(x)]:
+        assert np.abs(u - u[mirror]*[1, -1, 1]).max() <= 64*EPSILON
+
+
 def scaled(text: str, power: int) -> str:
     """Coordinates, times, velocities of a deck in a unit of length 2**power times smaller; speeds alike."""
     unit, out, card = 2.0**power, [], ""
