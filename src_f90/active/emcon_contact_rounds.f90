@@ -13,7 +13,7 @@ module emcon_contact_rounds
    use emcon_contact_sets, only : contact_sets_hold, contact_sets_solve, &
       contact_sets_solve_by_laws
    use emcon_contact_support, only : contact_support_forget
-   use emcon_coulomb_law, only : contact_open, coulomb_t
+   use emcon_coulomb_law, only : contact_open, coulomb_t, slip_status_t
    use emcon_errors, only : error_t
    use emcon_friction, only : friction_look_back
    use emcon_kinds, only : wp
@@ -40,6 +40,7 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: slides    ! what friction at its limit leaves free
       logical :: leads
 
       call candidates_clear(self%candidates)
@@ -62,18 +63,38 @@ contains
       if (size(system%contact) == 0) return
       if (status == newton_refused .and. newton%n_solve == 0) return    ! nor are there forces below
       if (self%support%is_needed) then
-         motion%du = self%guess%first
-         newton%driven = self%guess%driven
-         self%is_active = self%candidates%began
-         call contact_support_forget(self%support)
-         call contact_sets_hold(self, system, scene, newton%driven, motion)
-         call system_stiffen(system, self%support%hangs, motion)
+         call move_alloc(self%support%text, slides)
+         call hold_again(self, system, scene, newton, motion)
+         status = step_not_held
+         if (allocated(self%support%text)) return
          call begin_again(self, system, motion)
       end if
       status = step_cycling
-      if (candidates_are_many(self)) return
-      call solve_with_all(self, system, newton, motion, status, error)
+      if (.not. candidates_are_many(self)) call solve_with_all(self, system, newton, motion, &
+         status, error)
+      if (status == step_done .or. .not. allocated(slides) .or. allocated(error)) return
+      status = step_not_held
+      self%support%is_pushed = .true.
+      call move_alloc(slides, self%support%text)
    end subroutine contact_rounds_solve
+
+   !> Hold what contact alone holds, from the first guess on and with friction that holds all that
+   !> touches.
+   subroutine hold_again(self, system, scene, newton, motion)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+
+      motion%du = self%guess%first
+      newton%driven = self%guess%driven
+      self%is_active = self%candidates%began
+      if (self%friction%is_on) self%friction%law%status = slip_status_t()
+      call contact_support_forget(self%support)
+      call contact_sets_hold(self, system, scene, newton%driven, motion)
+      call system_stiffen(system, self%support%hangs, motion)
+   end subroutine hold_again
 
    !> From `motion`, the first guess, with what acted then.
    subroutine begin_again(self, system, motion)

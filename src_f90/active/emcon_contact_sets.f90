@@ -7,7 +7,7 @@
 !> Source: docs/theory.md, section 6.1.
 module emcon_contact_sets
    use emcon_active_set, only : active_set_complete, active_set_open_sets, active_set_repeats, &
-      active_set_t, step_cycling, step_done, step_loose, step_not_held
+      active_set_slides, active_set_t, step_cycling, step_done, step_loose, step_not_held
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_gives_back
    use emcon_contact_candidates, only : candidates_are_many, candidates_keep_forces, &
@@ -106,13 +106,15 @@ contains
    end subroutine contact_sets_solve
 
    !> Does something stay free that contact is to hold? What no load works on in a set that was
-   !> tried on the way tells of that set alone.
+   !> tried on the way tells of that set alone, and so does what slides: friction that is at its
+   !> limit at all contacts may hold a body all the same, if it is at it along different ways.
    pure logical function is_left_free(self, is_first)
       type(active_set_t), intent(in) :: self
       logical, intent(in) :: is_first            !! no set was tried before
 
       is_left_free = allocated(self%support%text)
-      if (is_left_free) is_left_free = is_first .or. self%support%is_pushed
+      if (is_left_free) is_left_free = (is_first .or. self%support%is_pushed) &
+         .and. .not. active_set_slides(self)
    end function is_left_free
 
    !> Take in what holds bodies, with friction that has gripped in the set before, if there was one.

@@ -61,11 +61,13 @@ contains
    end subroutine mechanism_rows_find
 
    !> Append the rows of contact: the gradients of gaps at the end, and of what `grips` the surface
-   !> also those of slips.
-   subroutine mechanism_rows_append(rows, item, grips)
+   !> also those of slips. What slides in space holds across its way: friction would turn.
+   subroutine mechanism_rows_append(rows, item, grips, way)
       type(mechanism_rows_t), intent(inout) :: rows
       type(condition_t), intent(in) :: item(:)
       logical, intent(in) :: grips(:)            !! (size(item)) these rub
+      !> (n_dim - 1, size(item)) of length 1: along which of these it slides; 0: it does not
+      real(wp), intent(in) :: way(:, :)
       integer :: k, n, m, s, n_dim
 
       if (size(item) == 0) return
@@ -78,6 +80,11 @@ contains
       do k = 1, size(item)
          call append(item(k), item(k)%c)
          if (.not. grips(k)) cycle
+         if (any(abs(way(:, k)) > 0.0_wp)) then
+            if (n_dim > 2) call append(item(k), way(1, k)*item(k)%t1(:, :, 2) &
+               - way(2, k)*item(k)%t1(:, :, 1))
+            cycle
+         end if
          do s = 1, n_dim - 1
             call append(item(k), item(k)%t1(:, :, s))
          end do
