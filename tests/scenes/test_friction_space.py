@@ -160,14 +160,46 @@ def test_many_contacts_slide(tmp_path: Path) -> None:
     dissipates(run)
 
 
-def test_held_by_friction_in_statics(tmp_path: Path) -> None:
-    """Friction alone holds an elastic slab on a slope of .45 with mu = .5, whose floor bears its weight."""
-    block = slab()
-    angle = float(np.arctan(.45))
-    run = ran(tmp_path, bodies([block], [faces(block, 2, 0)], STIFF) + walls.wall(walls.plane())
-              + walls.pair("", "*FRICTION\n.5\n") + f"*BOUNDARY\n{walls.FIXED}"
-              + f"*STEP, NLGEOM\n*STATIC\n.5, 1.\n{weight(angle)}*NODE FILE\nU\n*END STEP\n")
+def at_rest(slope: float, load: float, card: str = "*STEP, NLGEOM") -> str:
+    """A slab under `load` times its weight on a floor with mu = .5."""
+    block, angle, g = slab(), float(np.arctan(slope)), load*GRAVITY
+    return (bodies([block], [faces(block, 2, 0)], STIFF) + walls.wall(walls.plane())
+            + walls.pair("", "*FRICTION\n.5\n") + f"*BOUNDARY\n{walls.FIXED}"
+            + f"{card}\n*STATIC\n.5, 1.\n*DLOAD\nB1, GRAV, {g!r}, {float(np.sin(angle))!r}, 0., "
+            + f"{float(-np.cos(angle))!r}\n*NODE FILE\nU\n*END STEP\n")
+
+
+@pytest.mark.parametrize("slope", [.45, .49, .499])
+def test_held_by_friction_in_statics(tmp_path: Path, slope: float) -> None:
+    """Friction alone holds an elastic slab, whose floor bears its weight. Near the limit all nodes slide.
+
+    They do so along different ways, as the slab spreads: it stays where it is.
+    """
+    run = ran(tmp_path, at_rest(slope, 1.0))
     assert run.verdict["verdict"] == "good"
+    assert not run.verdict["warnings"]
+    angle = float(np.arctan(slope))
     force = columns(run, "pair1_force_x pair1_force_y pair1_force_z")[-1]
     wanted = .5*GRAVITY*np.array([np.sin(angle), 0.0, -np.cos(angle)])
     assert np.abs(np.abs(force) - np.abs(wanted)).max() < 1e-8*GRAVITY
+    assert run.history["friction_loss"][-1] > 0.0
+
+
+def test_what_slides_down_has_no_rest(tmp_path: Path) -> None:
+    (tmp_path/"deck.inp").write_text(at_rest(.51, 1.0))
+    run = run_deck(tmp_path/"deck.inp", tmp_path, 3)
+    assert run.verdict["verdict"] == "not completed"
+    assert "friction is at its limit" in run.errors
+
+
+@pytest.mark.parametrize("slope", [.45, .49])
+def test_loads_of_any_size_take_the_same_iterations(tmp_path: Path, slope: float) -> None:
+    """Linear elements: forces and motions are in proportion to the load."""
+    counts, moved = [], []
+    for load in (1e-3, 1.0, 1e3):
+        run = ran(tmp_path, at_rest(slope, load, "*STEP"))
+        counts.append(list(run.history["newton"]))
+        moved.append(run.fields()["displacement"][-1]/load)
+    assert counts[0] == counts[1] == counts[2]
+    size = np.abs(moved[1]).max()
+    assert max(np.abs(u - moved[1]).max() for u in moved) < 1e-6*size
