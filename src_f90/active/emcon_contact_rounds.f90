@@ -2,8 +2,8 @@
 !> none stands emcon_contact_newton solves the step with all candidates. Source: docs/theory.md,
 !> section 6.1.
 module emcon_contact_rounds
-   use emcon_active_set, only : active_set_select, active_set_t, candidates_clear, step_cycling, &
-      step_done, step_not_held
+   use emcon_active_set, only : active_set_select, active_set_slides, active_set_t, &
+      candidates_clear, step_cycling, step_done, step_not_held
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraints_evaluate
    use emcon_contact_candidates, only : candidates_are_many, candidates_keep_forces, &
@@ -52,6 +52,14 @@ contains
          call contact_sets_solve_by_laws(self, system, newton, motion, status, error)
          return
       end if
+      if (turns(self)) then
+         call begin_again(self, system, motion)
+         call solve_with_all(self, system, newton, motion, status, error)
+         if (status == step_done .or. allocated(error)) return
+         motion%du = self%guess%first
+         newton%driven = self%guess%driven
+         call candidates_clear(self%candidates)
+      end if
       call contact_sets_solve(self, system, scene, newton, motion, status, error)
       if (allocated(error)) return
       if (self%candidates%is_settled) then
@@ -77,6 +85,14 @@ contains
       self%support%is_pushed = .true.
       call move_alloc(slides, self%support%text)
    end subroutine contact_rounds_solve
+
+   !> Does something slide whose way turns, as slip with two components does? No set says where to.
+   pure logical function turns(self)
+      type(active_set_t), intent(in) :: self
+
+      turns = self%friction%looks_back .and. .not. self%support%is_needed
+      if (turns) turns = active_set_slides(self) .and. .not. candidates_are_many(self)
+   end function turns
 
    !> Hold what contact alone holds, from the first guess on and with friction that holds all that
    !> touches.
