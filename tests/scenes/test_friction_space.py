@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 import wall_space_scenes as walls
+from contact_blocks import FieldsOf
 from contact_space_scenes import bodies, dynamic, faces, pair, velocities
 from scene_tools import EPSILON, Run, run_deck
 from scipy.integrate import solve_ivp
@@ -228,3 +229,23 @@ def test_loads_of_any_size_take_the_same_iterations(tmp_path: Path, slope: float
     assert counts[0] == counts[1] == counts[2]
     size = np.abs(moved[1]).max()
     assert max(np.abs(u - moved[1]).max() for u in moved) < 1e-6*size
+
+
+def test_traction_and_slip_of_faces(tmp_path: Path) -> None:
+    """Vectors in space: traction adds up to what acts along the plane, slip is how the nodes went."""
+    text = on_floor(.3, .01, .1, (1., .2, 0), (0, 0, 1.), is_rigid=False)
+    run = ran(tmp_path, text.replace("*END STEP", "*CONTACT FILE\nCF, CSHEAR, CSLIP\n*END STEP"))
+    fields, faces = run.fields(), FieldsOf(run.file(".surfaces.vtkhdf"))
+    is_face = np.isfinite(faces.cell["contact_status"][0]).ravel()
+    shear, slip = faces.cell["contact_shear"][:, is_face], faces.cell["contact_slip"][:, is_face]
+    assert is_face.sum() == 4
+    force = fields["contact_force"][:, np.array(slab().on(2, 0)) - 1].sum(1)
+    # Each face has a quarter of the area, but for what the slab strains.
+    assert np.abs(.25*shear.sum(1)[1:, :2] - force[1:, :2]).max() < 1e-2*np.abs(force).max()
+    assert np.abs(shear[..., 2]).max() < 1e-12*np.abs(shear).max()
+    moved = fields["displacement"][-1]
+    node = faces.point["node"][0].astype(int)
+    for k, way in zip(np.flatnonzero(is_face), slip[-1], strict=True):
+        wanted = moved[node[np.asarray(faces.cells[k], int)], :2].mean(0)
+        assert np.abs(way[:2] - wanted).max() < 1e-10
+    assert run.history["pair1_friction_loss"][-1] == pytest.approx(run.history["friction_loss"][-1])
