@@ -9,9 +9,11 @@ import pytest
 import wall_space_scenes as walls
 from contact_blocks import FieldsOf
 from contact_space_scenes import bodies, dynamic, faces, pair, velocities
+from friction_space_scenes import belt
 from scene_tools import EPSILON, Run, run_deck
 from scipy.integrate import solve_ivp
 from space_mesh import Block
+from test_contact_output import restart
 from test_contact_space_rigid import columns, rigid
 
 GRAVITY = 10.0
@@ -249,3 +251,76 @@ def test_traction_and_slip_of_faces(tmp_path: Path) -> None:
         wanted = moved[node[np.asarray(faces.cells[k], int)], :2].mean(0)
         assert np.abs(way[:2] - wanted).max() < 1e-10
     assert run.history["pair1_friction_loss"][-1] == pytest.approx(run.history["friction_loss"][-1])
+
+
+def test_belt_on_a_drum(tmp_path: Path) -> None:
+    """The drum turns under the belt: pulls at its ends are as e to the mu times pi, in the middle of its thickness."""
+    mu, thickness = .3, .02
+    block, text = belt(24, mu, thickness)
+    run = ran(tmp_path, text)
+    pull = -run.fields()["reaction_force"][-1, np.array(block.on(0, 0)) - 1, 2].sum()
+    assert pull == pytest.approx(np.exp(mu*np.pi), rel=.02)
+    # Friction acts at the radius 1, pulls half of the thickness further out. Sides of the polygon: (pi/24)^2/8.
+    assert pull == pytest.approx(np.exp(mu*np.pi/(1 + thickness/2)), rel=.003)
+
+
+def thrown(card: str, v: tuple = (1., .2, 0)) -> str:
+    return on_floor(.3, .01, .3, v, (0, 0, 1.), is_rigid=False).replace("*FRICTION\n0.3\n", card)
+
+
+@pytest.mark.parametrize("card", [
+    "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1E5\n*FRICTION\n0.3, 1E4\n", "*FRICTION, ROUGH\n",
+    "*FRICTION, RESTITUTION=0.5\n0.3\n"])
+def test_cards_of_friction(tmp_path: Path, card: str) -> None:
+    """What springs of stick store comes back; what is rough never slides; energy is known in all of them."""
+    run = ran(tmp_path, thrown(card).replace("*END STEP", "*CONTACT FILE\nCSHEAR\n*END STEP"))
+    h = run.history
+    kept = columns(run, "kinetic strain friction_loss").sum(1) - h["external_work"]
+    if "LINEAR" in card:
+        kept = kept + h["contact_energy"]
+        assert h["contact_energy"].max() > 1e-3
+    assert np.abs(kept - kept[0]).max() < 1e-11*kept[0]
+    dissipates(run)
+    slides = run.fields()["contact_status"].max() == 2
+    assert slides == ("ROUGH" not in card)
+
+
+def test_springs_of_stick_give_back(tmp_path: Path) -> None:
+    """Pushed by less than its limit and let go in one step: nothing is lost, and nothing stays."""
+    block = slab((1, 1, 1))
+    text = (bodies([block], [faces(block, 2, 0)], STIFF) + walls.wall(walls.plane())
+            + walls.pair("", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1E4\n*FRICTION\n.5, 1E3\n")
+            + f"*BOUNDARY\n{walls.FIXED}*AMPLITUDE, NAME=A\n0., 0., 1., 1., 2., 0.\n*AMPLITUDE, NAME=B\n0., 1., 2., 1.\n"
+            + "*STEP\n*STATIC, DIRECT\n.25, 2.\n*DLOAD, AMPLITUDE=B\nB1, GRAV, 10., 0., 0., -1.\n"
+            + "*DLOAD, AMPLITUDE=A\nB1, GRAV, 3., .6, .8, 0.\n*NODE FILE\nU\n*END STEP\n")
+    run = ran(tmp_path, text)
+    low = np.array(block.on(2, 0)) - 1
+    u = run.fields()["displacement"][:, low, :2].mean(1)
+    # 1.5 over an area of 1.
+    assert np.abs(u[4] - 1.5/1e3*np.array([.6, .8])).max() < 1e-10
+    assert np.abs(u[-1]).max() < 1e-12
+    assert abs(run.history["friction_loss"][-1]) < 1e-14
+
+
+def test_impacts_with_restitution_and_friction(tmp_path: Path) -> None:
+    """Along the normal half of the rate comes back; what that takes is told beside friction, energy is balanced."""
+    run = ran(tmp_path, thrown("*FRICTION\n0.3\n", (1., .2, -1.)).replace("NAME=I\n", "NAME=I, RESTITUTION=.5\n"))
+    kept = columns(run, "kinetic strain friction_loss restitution_loss").sum(1) - run.history["external_work"]
+    assert run.history["restitution_loss"][-1] > .01*kept[0]
+    assert np.diff(run.history["restitution_loss"]).min() >= 0.0
+    assert np.abs(kept - kept[0]).max() < 1e-11*kept[0]
+    dissipates(run)
+
+
+def test_a_restart_has_the_same_bits(tmp_path: Path) -> None:
+    """Also of slips and tractions of faces, while the slab slides and turns."""
+    (tmp_path/"whole").mkdir()
+    (tmp_path/"again").mkdir()
+    text = thrown("*FRICTION\n0.3\n").replace("*END STEP", "*CONTACT FILE\nCSHEAR, CSLIP\n*RESTART, WRITE, FREQUENCY=13\n*END STEP")
+    whole = ran(tmp_path/"whole", text)
+    again = restart(whole, tmp_path/"again")
+    assert again.digits() == whole.digits()
+    first, second = (FieldsOf(run.file(".surfaces.vtkhdf")).cell for run in (whole, again))
+    for name in ("contact_shear", "contact_slip"):
+        np.testing.assert_array_equal(first[name], second[name])
+    assert np.abs(first["contact_slip"][-1, :4]).max() > .05
