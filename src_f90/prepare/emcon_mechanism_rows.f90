@@ -81,8 +81,7 @@ contains
          call append(item(k), item(k)%c)
          if (.not. grips(k)) cycle
          if (any(abs(way(:, k)) > 0.0_wp)) then
-            if (n_dim > 2) call append(item(k), way(1, k)*item(k)%t1(:, :, 2) &
-               - way(2, k)*item(k)%t1(:, :, 1))
+            if (size(way, 1) > 1) call append(item(k), across(item(k), way(:, k)))
             cycle
          end if
          do s = 1, n_dim - 1
@@ -113,5 +112,19 @@ contains
       end subroutine append
 
    end subroutine mechanism_rows_append
+
+   !> The slip across the way of what slides: of the component that has the least part in it.
+   pure function across(item, way) result(part)
+      type(condition_t), intent(in) :: item
+      real(wp), intent(in) :: way(:)          !! (n_dim - 1) of length 1
+      real(wp) :: part(size(item%t1, 1), size(item%t1, 2))
+      integer :: s, least
+
+      least = minloc(abs(way), 1)
+      part = item%t1(:, :, least)
+      do s = 1, size(way)
+         part = part - way(least)*way(s)*item%t1(:, :, s)
+      end do
+   end function across
 
 end module emcon_mechanism_rows

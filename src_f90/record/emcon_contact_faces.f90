@@ -184,7 +184,7 @@ contains
       end do
    end subroutine find_gaps
 
-   !> Traction and slip along each face, where friction acts at one of its nodes or on the other side.
+   !> Traction and slip along each face, in runs with friction.
    subroutine find_along(self, stepper, push, normal, shear, slip)
       type(contact_faces_t), intent(in) :: self
       type(stepper_t), intent(in) :: stepper

@@ -324,3 +324,15 @@ def test_a_restart_has_the_same_bits(tmp_path: Path) -> None:
     for name in ("contact_shear", "contact_slip"):
         np.testing.assert_array_equal(first[name], second[name])
     assert np.abs(first["contact_slip"][-1, :4]).max() > .05
+
+
+@pytest.mark.parametrize("mu", [.3, .8])
+def test_friction_keeps_a_plane_of_symmetry(tmp_path: Path, mu: float) -> None:
+    """Of a slab of several elements that slides along it, and stops."""
+    run = ran(tmp_path, on_floor(mu, .01, .2, (1., 0, 0), is_rigid=False, cells=(4, 4, 2)))
+    fields = run.fields()
+    n = 5*5*3
+    x = fields.x[:n]
+    mirror = [int(np.argmin(np.abs(x - p*[1, -1, 1]).sum(1))) for p in x]
+    u = fields["displacement"][:, :n]
+    assert np.abs(u - u[:, mirror]*[1, -1, 1]).max() <= 64*EPSILON
