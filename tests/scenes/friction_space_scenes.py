@@ -13,7 +13,7 @@ from space_mesh import Block
 def belt(cells: int, mu: float, thickness: float, legs: int = 2) -> tuple[Block, str]:
     """A belt over the upper half of a drum of radius 1 that turns under it, held at one end, pulled by 1 at the other.
 
-    Its stiffness along is such that it stretches by 1/20000 where it is pulled by 1.
+    Its stiffness along is such that it stretches by 1/2000 where it is pulled by 1.
     """
     n, width, down = cells + 2*legs, .1, .2
 
@@ -27,7 +27,7 @@ def belt(cells: int, mu: float, thickness: float, legs: int = 2) -> tuple[Block,
     held = "".join(f"{k}, 1, 3\n" for k in block.on(0, 0))
     end = block.on(0, 1)
     drum = "TYPE=REVOLUTION\n0., -1., 0., 0., 1., 0.\nSTART, 1., 2.\nLINE, 1., 0.\n"
-    text = bodies([block], [faces(block, 2, 0)], f"*ELASTIC\n{2e4/(width*thickness)!r}, 0.\n")
+    text = bodies([block], [faces(block, 2, 0)], f"*ELASTIC\n{2e3/(width*thickness)!r}, 0.\n")
     text += walls.wall(drum, (0., 0., 0.)) + walls.pair("", f"*FRICTION\n{mu!r}\n")
     text += f"*BOUNDARY\n{held}{walls.REFERENCE}, 1, 4\n{walls.REFERENCE}, 6, 6\n*STEP, NLGEOM\n*STATIC\n.25, 1.\n"
     text += f"*BOUNDARY\n{walls.REFERENCE}, 5, 5, .02\n*CLOAD\n"
