@@ -11,6 +11,7 @@ module emcon_active_set_solve
    use emcon_contact_conditions, only : noise_at
    use emcon_contact_rounds, only : contact_rounds_solve
    use emcon_contact_support, only : contact_support_find_free
+   use emcon_coulomb_law, only : contact_slides
    use emcon_errors, only : error_t
    use emcon_friction, only : friction_holds
    use emcon_kinds, only : wp
@@ -42,7 +43,6 @@ contains
          call contact_rounds_solve(self, system, scene, newton, motion, status, error)
          if (allocated(error) .or. allocated(self%support%text)) return
          if (status == step_done) then
-            if (self%support%is_needed) call find_grips(self, system)
             call look_for_free(self, system, scene, motion, status)
             return
          end if
@@ -97,8 +97,11 @@ contains
       logical :: is_held
 
       if (status /= step_done .or. .not. self%support%is_needed) return
+      call find_grips(self, system)
+      call find_ways(self)
       call contact_support_find_free(self%support, system, scene, motion, &
          self%candidates%acts, is_held)
+      self%support%way = 0.0_wp
       if (.not. is_held) status = step_not_held
    end subroutine look_for_free
 
@@ -119,6 +122,21 @@ contains
          end associate
       end do
    end subroutine find_grips
+
+   !> What slides, and is pushed, holds across its way.
+   pure subroutine find_ways(self)
+      type(active_set_t), intent(inout) :: self
+      integer :: k
+
+      if (.not. self%friction%is_on) return
+      do k = self%set%n_permanent + 1, self%set%n
+         associate (law => self%friction%law(self%set%id(k)), id => self%set%id(k))
+            if (law%status%kind /= contact_slides .or. .not. self%set%lam(k) > 0.0_wp) cycle
+            self%support%grips(id) = .true.
+            self%support%way(:, id) = law%status%direction(:self%friction%n_slip)
+         end associate
+      end do
+   end subroutine find_ways
 
    !> Begin the step again with convex corners that are not rounded: in statics, where a node that
    !> is pushed over a corner finds no place to stand but on its round top. `is_done`: not possible.

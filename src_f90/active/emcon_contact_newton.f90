@@ -47,6 +47,8 @@ module emcon_contact_newton
    !> Parts of its W by which a row gives way where the condensed problem has no solution, in turn;
    !> by the last ones an iterate goes a part of the way only.
    real(wp), parameter :: softer(*) = [1.0e-7_wp, 1.0e-5_wp, 1.0e-3_wp, 1.0e-1_wp, 10.0_wp]
+   !> The tangent of an iterate does for the next one if that leaves less than this part.
+   real(wp), parameter :: enough_kept = 0.1_wp
    !> Once it is within the tolerance an iterate that leaves more than this part is the last.
    real(wp), parameter :: polish_gain = 0.3_wp
 
@@ -65,6 +67,8 @@ module emcon_contact_newton
       integer :: least_soft = 0                  !! first of `softer` that is tried, 0: none
       logical :: is_static = .false.             !! nothing has inertia
       logical :: is_searching = .false.          !! no tangent is wanted
+      logical :: turns = .false.                 !! something rubs, and slip has a direction
+      logical :: keeps_tangent = .false.         !! the last one does for the next correction
    end type solve_t
 
 contains
@@ -109,6 +113,7 @@ contains
          self%problem%slip_target(:, k) = law(k)%slip_target(:n_slip)
       end do
       self%mu = law%mu
+      self%turns = n_slip > 1 .and. any(self%mu > 0.0_wp)
       self%problem%mu = law%mu
       allocate(self%push(0:n_slip, size(law)), source=0.0_wp)
       allocate(self%condensation%hold(set%n_row), source=0.0_wp)
@@ -134,14 +139,15 @@ contains
          call newton_check_interrupt(newton, status, error)
          if (allocated(error)) return
          ! The correction to come from here may be the last one, or by the tangent that there is.
-         self%is_searching = i > 0 .and. self%size <= no_search
+         self%is_searching = i > 0 .and. (self%size <= no_search .or. self%turns)
          call measure_damped(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          if (i > 0 .and. is_done(self, newton)) return
          if (i == most_iterates .and. self%size <= newton%convergence%tolerance) return
          status = newton_diverged
          if (i == most_iterates .or. .not. self%size < huge(self%size)) return
-         if (self%is_searching .and. .not. nears_end(self, newton)) then
+         self%keeps_tangent = does_keep_tangent(self, newton)
+         if (self%is_searching .and. .not. self%keeps_tangent) then
             self%is_searching = .false.
             call measure(self, newton, system, set, motion, status, error)
             if (allocated(error) .or. status /= newton_converged) return
@@ -370,7 +376,7 @@ contains
       do turn = 1, 2
          has_curvature = .not. btest(self%n_stall/stall_turn, 0)
          call phase_enter(system%phases, phase_factorise, left)
-         if (turn == 1 .and. nears_end(self, newton)) then
+         if (turn == 1 .and. self%keeps_tangent) then
             call condensation_renew(self%condensation, set, newton%residual, error)
             call phase_leave(system%phases, phase_eliminate)
          else
@@ -410,14 +416,16 @@ contains
       self%least_soft = min(level, 1)
    end subroutine solve_condensed
 
-   !> Is the step within its tolerance? The last tangent does for what is left.
-   pure logical function nears_end(self, newton)
+   !> Does the last tangent do for what is left? It does within the tolerance; and where slip has a
+   !> direction, which needs a motion by each row, as long as it gains as much as there is to gain.
+   pure logical function does_keep_tangent(self, newton) result(keeps)
       type(solve_t), intent(in) :: self
       type(newton_t), intent(in) :: newton
 
-      nears_end = newton%convergence%n_iteration > 0 .and. .not. self%condensation%is_singular &
-         .and. self%size <= newton%convergence%tolerance
-   end function nears_end
+      keeps = newton%convergence%n_iteration > 0 .and. .not. self%condensation%is_singular
+      if (keeps) keeps = self%size <= newton%convergence%tolerance &
+         .or. (self%turns .and. self%size < enough_kept*self%last)
+   end function does_keep_tangent
 
    !> In statics contacts may be all that holds a body: they are held as the tangent is factorised.
    pure subroutine find_hold(self, system, set)

@@ -2,18 +2,18 @@
 !> none stands emcon_contact_newton solves the step with all candidates. Source: docs/theory.md,
 !> section 6.1.
 module emcon_contact_rounds
-   use emcon_active_set, only : active_set_select, active_set_t, candidates_clear, step_cycling, &
-      step_done, step_not_held
+   use emcon_active_set, only : active_set_select, active_set_slides, active_set_t, &
+      candidates_clear, step_cycling, step_done, step_not_held
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraints_evaluate
    use emcon_contact_candidates, only : candidates_are_many, &
       candidates_are_too_many, candidates_keep_forces, candidates_look, candidates_select
    use emcon_contact_conditions, only : gap_noise
    use emcon_contact_newton, only : contact_newton_solve
-   use emcon_contact_sets, only : contact_sets_hold, contact_sets_solve, &
+   use emcon_contact_sets, only : contact_sets_begin_anew, contact_sets_hold, contact_sets_solve, &
       contact_sets_solve_by_laws
    use emcon_contact_support, only : contact_support_forget
-   use emcon_coulomb_law, only : contact_open, coulomb_t
+   use emcon_coulomb_law, only : contact_open, coulomb_t, slip_status_t
    use emcon_errors, only : error_t
    use emcon_friction, only : friction_look_back
    use emcon_kinds, only : wp
@@ -40,6 +40,7 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: slides    ! what friction at its limit leaves free
       logical :: leads
 
       call candidates_clear(self%candidates)
@@ -50,6 +51,13 @@ contains
          if (allocated(self%support%text)) return
          call contact_sets_solve_by_laws(self, system, newton, motion, status, error)
          return
+      end if
+      if (turns(self)) then
+         call begin_again(self, system, motion)
+         call solve_with_all(self, system, newton, motion, status, error)
+         if (status == step_done .or. allocated(error)) return
+         call contact_sets_begin_anew(self, newton, motion)
+         call candidates_clear(self%candidates)
       end if
       call contact_sets_solve(self, system, scene, newton, motion, status, error)
       if (allocated(error)) return
@@ -63,15 +71,15 @@ contains
       if (status == newton_refused .and. newton%n_solve == 0) return    ! nor are there forces below
       status = step_cycling
       if (candidates_are_too_many(self)) return
-      if (self%support%is_needed .or. candidates_are_many(self)) then
-         motion%du = self%guess%first
-         newton%driven = self%guess%driven
+      if (self%support%is_needed) then
+         call move_alloc(self%support%text, slides)
+         call hold_again(self, system, scene, newton, motion)
+         status = step_not_held
+         if (allocated(self%support%text)) return
+         call begin_again(self, system, motion)
+      else if (candidates_are_many(self)) then
+         call contact_sets_begin_anew(self, newton, motion)
          self%is_active = self%candidates%began
-         if (self%support%is_needed) then
-            call contact_support_forget(self%support)
-            call contact_sets_hold(self, system, scene, newton%driven, motion)
-            call system_stiffen(system, self%support%hangs, motion)
-         end if
          call begin_again(self, system, motion)
       end if
       if (self%friction%looks_back) then
@@ -80,7 +88,36 @@ contains
          self%friction%tau = self%friction%tau0
       end if
       call solve_with_all(self, system, newton, motion, status, error)
+      if (status == step_done .or. .not. allocated(slides) .or. allocated(error)) return
+      status = step_not_held
+      self%support%is_pushed = .true.
+      call move_alloc(slides, self%support%text)
    end subroutine contact_rounds_solve
+
+   !> Does something slide whose way turns, as slip with two components does? No set says where to.
+   pure logical function turns(self)
+      type(active_set_t), intent(in) :: self
+
+      turns = self%friction%looks_back .and. .not. self%support%is_needed
+      if (turns) turns = active_set_slides(self) .and. .not. candidates_are_many(self)
+   end function turns
+
+   !> Hold what contact alone holds, from the first guess on and with friction that holds all that
+   !> touches.
+   subroutine hold_again(self, system, scene, newton, motion)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+
+      call contact_sets_begin_anew(self, newton, motion)
+      self%is_active = self%candidates%began
+      if (self%friction%is_on) self%friction%law%status = slip_status_t()
+      call contact_support_forget(self%support)
+      call contact_sets_hold(self, system, scene, newton%driven, motion)
+      call system_stiffen(system, self%support%hangs, motion)
+   end subroutine hold_again
 
    !> From `motion`, the first guess, with what acted then.
    subroutine begin_again(self, system, motion)

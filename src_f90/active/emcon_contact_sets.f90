@@ -7,7 +7,7 @@
 !> Source: docs/theory.md, section 6.1.
 module emcon_contact_sets
    use emcon_active_set, only : active_set_complete, active_set_open_sets, active_set_repeats, &
-      active_set_t, step_cycling, step_done, step_loose, step_not_held
+      active_set_slides, active_set_t, step_cycling, step_done, step_loose, step_not_held
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_gives_back
    use emcon_contact_candidates, only : candidates_are_many, &
@@ -31,7 +31,8 @@ module emcon_contact_sets
    use emcon_system, only : system_t
    implicit none
    private
-   public :: contact_sets_solve, contact_sets_solve_by_laws, contact_sets_hold
+   public :: contact_sets_solve, contact_sets_solve_by_laws, contact_sets_hold, &
+      contact_sets_begin_anew
 
    !> Sets that are tried by the null space in one step at most, and where trials tell them.
    integer, parameter :: most_tried = 6, most_by_trials = 20
@@ -69,7 +70,7 @@ contains
          self%candidates%is_settled = is_left_free(self, is_first=i == 1)
          if (allocated(self%support%text)) return
          if (has_failed .and. active_set_repeats(self)) then
-            call begin_anew(self, newton, motion)
+            call contact_sets_begin_anew(self, newton, motion)
             return
          end if
          self%guess%before = motion%du
@@ -107,13 +108,15 @@ contains
    end subroutine contact_sets_solve
 
    !> Does something stay free that contact is to hold? What no load works on in a set that was
-   !> tried on the way tells of that set alone.
+   !> tried on the way tells of that set alone, and so does what slides: friction that is at its
+   !> limit at all contacts may hold a body all the same, if it is at it along different ways.
    pure logical function is_left_free(self, is_first)
       type(active_set_t), intent(in) :: self
       logical, intent(in) :: is_first            !! no set was tried before
 
       is_left_free = allocated(self%support%text)
-      if (is_left_free) is_left_free = is_first .or. self%support%is_pushed
+      if (is_left_free) is_left_free = (is_first .or. self%support%is_pushed) &
+         .and. .not. active_set_slides(self)
    end function is_left_free
 
    !> Take in what holds bodies, with friction that has gripped in the set before, if there was one.
@@ -178,19 +181,19 @@ contains
          motion%du = self%guess%before
          if (is_driven) newton%driven = self%guess%driven
       else
-         call begin_anew(self, newton, motion)
+         call contact_sets_begin_anew(self, newton, motion)
       end if
    end subroutine take_back
 
    !> No set stands: from the first guess on.
-   pure subroutine begin_anew(self, newton, motion)
+   pure subroutine contact_sets_begin_anew(self, newton, motion)
       type(active_set_t), intent(in) :: self
       type(newton_t), intent(inout) :: newton
-      type(motion_t), intent(inout) :: motion
+      type(motion_t), intent(inout) :: motion    !! its increment
 
       motion%du = self%guess%first
       newton%driven = self%guess%driven
-   end subroutine begin_anew
+   end subroutine contact_sets_begin_anew
 
    !> Take in what holds the bodies that would be free with the present set. The prescribed motion
    !> `driven`, which the first correction of Newton's method meets, is left out on the way.

@@ -42,6 +42,8 @@ module emcon_contact_support
       character(len=:), allocatable :: told      !! whose motion the user has been told of
       !> (n_constraint) contacts that hold along the surface as well, by friction
       logical, allocatable :: grips(:)
+      !> (n_dim - 1, n_constraint) of length 1: of what grips, along which it slides all the same
+      real(wp), allocatable :: way(:, :)
       !> (n_constraint) [L] gaps that were closed though no load closes them, and of which bodies
       real(wp), allocatable :: brought(:)
       !> (n_constraint) gaps at the start of the step that it resolves, <= 0 [L]
@@ -85,6 +87,7 @@ contains
       end associate
       allocate(self%is_loose(system%space%n_body), self%hangs(system%space%n_body), source=.false.)
       allocate(self%grips, source=system_springs(system))
+      allocate(self%way(size(u, 1) - 1, system%n_constraint), source=0.0_wp)
       allocate(self%brought(system%n_constraint), self%overclosure(system%n_constraint), &
          source=0.0_wp)
       if (size(system%contact) == 0) return
@@ -253,7 +256,7 @@ contains
 
       call take_look(self, system, scene, motion%u0 + motion%du, look)
       call gaps_evaluate(system, motion, is_active, set, self%grips)
-      call mechanism_rows_append(look%rows, set%item, set%item%has_friction)
+      call mechanism_rows_append(look%rows, set%item, set%item%has_friction, self%way(:, set%id))
    end subroutine look_at_contacts
 
    !> The assemblies that can move.

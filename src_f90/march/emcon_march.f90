@@ -74,12 +74,12 @@ contains
       associate (contacts => self%state%contacts, friction => self%active%friction)
          if (friction%is_on .or. any(system_springs(self%system))) then
             associate (n_slip => size(scene%x, 1) - 1, n => self%system%n_constraint)
-               allocate(contacts%slip_path(n), source=0.0_wp)
+               allocate(contacts%slip_path(n), contacts%slid(n_slip + 1, n), source=0.0_wp)
                allocate(contacts%slides_along(n_slip, n), contacts%drag(n_slip, n), &
                   contacts%slip(n_slip, n), source=0.0_wp)
             end associate
          else
-            allocate(contacts%slip_path(0))
+            allocate(contacts%slip_path(0), contacts%slid(0, 0))
             allocate(contacts%slides_along, contacts%drag, contacts%slip, &
                source=0.0_wp*friction%tau)
          end if

@@ -279,7 +279,8 @@ contains
    subroutine keep_slip(self, k)
       type(march_t), intent(inout) :: self       !! some contact rubs
       integer, intent(in) :: k                   !! place in the set, up to n
-      real(wp) :: drag(most_slips)
+      real(wp) :: drag(most_slips), way(size(self%state%u, 1), size(self%state%u, 1) - 1)
+      integer :: s
       logical :: is_spring
 
       is_spring = allocated(self%active%set%law(k)%row)
@@ -300,6 +301,11 @@ contains
          contacts%drag(:, id) = drag(:n)
          contacts%slip(:, id) = contacts%slip(:, id) + item%slip(:n)
          contacts%slip_path(id) = contacts%slip_path(id) + norm2(item%slip)
+         ! Where a motion of its slave side slips to.
+         do s = 1, n
+            way(:, s) = sum(item%t1(:, :item%n_slave, s), 2)
+         end do
+         contacts%slid(:, id) = matmul(way, contacts%slip(:, id))
       end associate
    end subroutine keep_slip
 

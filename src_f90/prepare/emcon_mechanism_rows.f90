@@ -61,11 +61,13 @@ contains
    end subroutine mechanism_rows_find
 
    !> Append the rows of contact: the gradients of gaps at the end, and of what `grips` the surface
-   !> also those of slips.
-   subroutine mechanism_rows_append(rows, item, grips)
+   !> also those of slips. What slides in space holds across its way: friction would turn.
+   subroutine mechanism_rows_append(rows, item, grips, way)
       type(mechanism_rows_t), intent(inout) :: rows
       type(condition_t), intent(in) :: item(:)
       logical, intent(in) :: grips(:)            !! (size(item)) these rub
+      !> (n_dim - 1, size(item)) of length 1: along which of these it slides; 0: it does not
+      real(wp), intent(in) :: way(:, :)
       integer :: k, n, m, s, n_dim
 
       if (size(item) == 0) return
@@ -78,6 +80,10 @@ contains
       do k = 1, size(item)
          call append(item(k), item(k)%c)
          if (.not. grips(k)) cycle
+         if (any(abs(way(:, k)) > 0.0_wp)) then
+            if (size(way, 1) > 1) call append(item(k), across(item(k), way(:, k)))
+            cycle
+         end if
          do s = 1, n_dim - 1
             call append(item(k), item(k)%t1(:, :, s))
          end do
@@ -106,5 +112,19 @@ contains
       end subroutine append
 
    end subroutine mechanism_rows_append
+
+   !> The slip across the way of what slides: of the component that has the least part in it.
+   pure function across(item, way) result(part)
+      type(condition_t), intent(in) :: item
+      real(wp), intent(in) :: way(:)          !! (n_dim - 1) of length 1
+      real(wp) :: part(size(item%t1, 1), size(item%t1, 2))
+      integer :: s, least
+
+      least = minloc(abs(way), 1)
+      part = item%t1(:, :, least)
+      do s = 1, size(way)
+         part = part - way(least)*way(s)*item%t1(:, :, s)
+      end do
+   end function across
 
 end module emcon_mechanism_rows

@@ -35,6 +35,9 @@ module emcon_contact_faces
       real(dp), allocatable :: pressure(:, :)    !! (1, n_face) along the normal [M/(L T^2)]
       real(dp), allocatable :: gap(:, :)         !! (1, n_face) mean of slave nodes; NaN: none [L]
       real(dp), allocatable :: status(:, :)      !! (1, n_face) 0 open, 1 closed, 2 slides
+      real(dp), allocatable :: shear(:, :)       !! (n_dim, n_face) force along it over its area
+      !> (n_dim, n_face) along it, mean of the slave nodes that rub; 0: none [L]
+      real(dp), allocatable :: slip(:, :)
       real(dp), allocatable :: at_node(:, :)     !! (1, n_point) mean pressure of the faces there
       real(dp), allocatable :: gap_there(:, :)   !! (1, n_point) of slave nodes; NaN: none [L]
    end type face_values_t
@@ -155,6 +158,8 @@ contains
          end associate
       end do
       values%force = real(push, dp)
+      allocate(values%shear, values%slip, mold=values%force)
+      call find_along(self, stepper, push, normal, values%shear, values%slip)
       deallocate(of_all)
       allocate(of_all, source=contact_field(stepper, "CDIS"))
       values%gap_there = of_all(:, self%node)
@@ -178,6 +183,59 @@ contains
          end associate
       end do
    end subroutine find_gaps
+
+   !> Traction and slip along each face, in runs with friction.
+   subroutine find_along(self, stepper, push, normal, shear, slip)
+      type(contact_faces_t), intent(in) :: self
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(in) :: push(:, :)         !! (n_dim, n_face) forces [M L/T^2]
+      real(wp), intent(in) :: normal(:, :)       !! (n_dim, n_face) as long as its area [L^2]
+      real(dp), intent(out) :: shear(:, :)       !! (n_dim, n_face) [M/(L T^2)]
+      real(dp), intent(out) :: slip(:, :)        !! (n_dim, n_face) [L]
+      real(wp), allocatable :: slid(:, :)
+      integer, allocatable :: rubs(:)
+      real(wp) :: area
+      integer :: f
+
+      shear = 0.0_dp
+      slip = 0.0_dp
+      if (size(stepper%march%state%contacts%drag) == 0) return
+      call nodes_slid(stepper, slid, rubs)
+      do f = 1, size(push, 2)
+         area = norm2(normal(:, f))
+         if (.not. area > 0.0_wp) cycle
+         associate (node => self%node(pack(self%vertex(:, f), self%vertex(:, f) > 0)), &
+               n => normal(:, f)/area)
+            shear(:, f) = real((push(:, f) - dot_product(n, push(:, f))*n)/area, dp)
+            associate (mean => sum(slid(:, node), 2)/max(1, sum(rubs(node))))
+               slip(:, f) = real(mean - dot_product(n, mean)*n, dp)
+            end associate
+         end associate
+      end do
+   end subroutine find_along
+
+   !> How nodes have slid in space, summed over the contacts there, and the number of these.
+   subroutine nodes_slid(stepper, slid, rubs)
+      type(stepper_t), intent(in) :: stepper
+      real(wp), allocatable, intent(out) :: slid(:, :)   !! (n_dim, n_node) [L]
+      integer, allocatable, intent(out) :: rubs(:)       !! (n_node)
+      integer :: pair, i
+
+      allocate(slid, source=0.0_wp*stepper%scene%x)
+      allocate(rubs(size(slid, 2)), source=0)
+      associate (system => stepper%march%system, contacts => stepper%march%state%contacts)
+         do pair = 1, system%n_pair
+            do i = 1, system%contact(pair)%contact%n_constraint
+               associate (id => system%first_constraint(pair) + i, &
+                     node => system%contact(pair)%contact%node(i))
+                  if (.not. contacts%slip_path(id) > 0.0_wp) cycle
+                  slid(:, node) = slid(:, node) + contacts%slid(:, id)
+                  rubs(node) = rubs(node) + 1
+               end associate
+            end do
+         end do
+      end associate
+   end subroutine nodes_slid
 
    !> A face is closed where a constraint of one of its nodes acts, or what acts on the other side
    !> presses on it.

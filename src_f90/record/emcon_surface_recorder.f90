@@ -121,14 +121,14 @@ contains
 
    !> Of nodes, of faces.
    pure function fields_of() result(fields)
-      type(field_t) :: fields(10)
+      type(field_t) :: fields(12)
 
       fields%name = [character(len=len(fields%name)) :: "displacement", "contact_pressure", &
          "contact_gap", "node", "surface", "body", "contact_pressure", "contact_gap", &
-         "contact_status", "contact_force"]
+         "contact_status", "contact_force", "contact_shear", "contact_slip"]
       fields(5:)%is_cell = .true.
       fields(2:)%is_sparse = .true.
-      fields([1, 10])%n_component = 3
+      fields([1, 10, 11, 12])%n_component = 3
    end function fields_of
 
    !> Append a frame of the present state.
@@ -213,6 +213,10 @@ contains
          call vtkhdf_write(self%fields, "contact_status", with_none(values%status, n), error)
          if (allocated(error)) return
          call vtkhdf_write(self%fields, "contact_force", with_none(values%force, n), error)
+         if (allocated(error)) return
+         call vtkhdf_write(self%fields, "contact_shear", with_none(values%shear, n), error)
+         if (allocated(error)) return
+         call vtkhdf_write(self%fields, "contact_slip", with_none(values%slip, n), error)
       end associate
    end subroutine write_faces
 

@@ -40,6 +40,8 @@ module emcon_state
       real(wp), allocatable :: drag(:, :)        !! (n_slip, n_constraint) friction against slip
       real(wp), allocatable :: slip(:, :)        !! (n_slip, n_constraint) so far, to and fro [L]
       real(wp), allocatable :: slip_path(:)      !! (n_constraint) the same, all of it >= 0 [L]
+      !> (n_dim, n_constraint) `slip` as a vector in space, as surfaces lay when it last acted [L]
+      real(wp), allocatable :: slid(:, :)
    contains
       procedure :: begin => contacts_begin
       procedure :: clear => contacts_clear

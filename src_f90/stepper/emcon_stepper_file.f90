@@ -215,6 +215,8 @@ contains
             call restart_exchange(restart, "drag", state%contacts%drag)
             call restart_exchange(restart, "slip", state%contacts%slip)
             call restart_exchange(restart, "slip_path", state%contacts%slip_path)
+            if (restart_offers(restart, "slid", .true.)) call restart_exchange(restart, "slid", &
+               state%contacts%slid)
          end if
          call exchange_past(state, restart)
          if (restart_offers(restart, "has_mass", &

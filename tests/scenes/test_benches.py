@@ -32,7 +32,8 @@ def run(*command):
 
 
 @pytest.mark.parametrize(("name", "least"), [("bench_ring", 10), ("bench_python", 10),
-                                             ("bench_discs", 4), ("bench_ties_space", 7)])
+                                             ("bench_discs", 4), ("bench_ties_space", 7),
+                                             ("bench_friction_space", 6)])
 def test_bench(name, least):
     """Its tables are there; their figures are nothing to judge by."""
     lines = run(BENCH / f"{name}.py", "--short").splitlines()

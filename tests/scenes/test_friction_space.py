@@ -7,10 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import wall_space_scenes as walls
+from contact_blocks import FieldsOf
 from contact_space_scenes import bodies, dynamic, faces, pair, velocities
+from friction_space_scenes import belt
 from scene_tools import EPSILON, Run, run_deck
 from scipy.integrate import solve_ivp
 from space_mesh import Block
+from test_contact_output import restart
 from test_contact_space_rigid import columns, rigid
 
 GRAVITY = 10.0
@@ -95,28 +98,53 @@ def test_ball_slides_and_rolls(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("mu", [.3, .8])
 def test_elastic_slab_comes_to_a_stop(tmp_path: Path, mu: float) -> None:
-    run = ran(tmp_path, on_floor(mu, .01, .5, (1., .2, 0), (0, 0, 1.), is_rigid=False))
+    text = on_floor(mu, .01, .5, (1., .2, 0), (0, 0, 1.), is_rigid=False)
+    run = ran(tmp_path, text.replace("*END STEP", "*CONTACT FILE\nCF\n*END STEP"))
     first, last = columns(run, "kinetic strain").sum(1)[[0, -1]]
     assert last < .05*first                      # it vibrates on
     work = run.history["external_work"][-1] - run.history["friction_loss"][-1]
     assert abs(first + work - last) < 1e-11*first
     assert max(run.history["cuts"]) == 0
     assert run.verdict["verdict"] == "good"
+    assert run.verdict["law_violation"] < 1e-10
     dissipates(run)
+    judge_nodes(run, mu)
 
 
-@pytest.mark.parametrize("turn", [0., .3])
-def test_slab_on_a_free_plate(tmp_path: Path, turn: float) -> None:
-    """Nodes on nodes, and askew: friction passes momentum on, and turns nothing that was not turning."""
+def judge_nodes(run: Run, mu: float) -> None:
+    """Of each node on the plane, by forces and places alone: pushed, within the disc, braked; while it slides by all of it."""
+    fields = run.fields()
+    low = np.array(slab().on(2, 0)) - 1
+    slip = np.diff(fields["displacement"][:, low, :2], axis=0)
+    force = fields["contact_force"][1:, low]
+    push, drag = force[..., 2], force[..., :2]
+    tiny = 1e-10*push.max()
+    assert push.min() >= -tiny
+    assert (np.linalg.norm(drag, axis=2) - mu*push).max() <= tiny
+    taken = -(drag*slip).sum(2)
+    assert taken.min() >= -tiny*np.abs(slip).max()
+    assert taken.sum() == pytest.approx(run.history["friction_loss"][-1], rel=1e-9)
+    # Until the first of them could stop.
+    along = slip[:5]/np.linalg.norm(slip[:5], axis=2, keepdims=True)
+    assert np.abs(drag[:5] + mu*push[:5, :, None]*along).max() <= tiny
+
+
+@pytest.mark.parametrize(("mu", "turn"), [(.3, 0.), (.3, .3), (.8, .3)])
+def test_elastic_slab_on_a_free_plate(tmp_path: Path, mu: float, turn: float) -> None:
+    """Thrown with a spin, nodes on nodes and askew: momenta stay, energy is what friction leaves."""
     one = slab(turn=turn)
     two = Block("C3D8", (4, 4, 1), size=(3, 3, .5), place=lambda x: x - np.array([1.5, 1.5, .5]))
     run = ran(tmp_path, bodies([one, two], [faces(one, 2, 0), faces(two, 2, 1)], STIFF)
-              + pair("", "*FRICTION\n.3\n") + velocities(one, np.array([1., .2, -1.]), np.array([0, 0, 1.]))
-              + dynamic(.01, .06))
+              + pair("", f"*FRICTION\n{mu}\n") + velocities(one, np.array([1., .2, -1.]), np.array([0, 0, 1.]))
+              + dynamic(.01, .4))
     for names in ("px py pz", "lx ly lz"):
         p = columns(run, names)
         assert np.abs(p - p[0]).max() < 1e-11*np.abs(p).max(), names
-    assert run.history["friction_loss"][-1] > 0.0
+    energy = columns(run, "kinetic strain friction_loss").sum(1)
+    assert np.abs(energy - energy[0]).max() < 1e-11*energy[0]
+    assert run.history["friction_loss"][-1] > .05*energy[0]
+    assert run.verdict["law_violation"] < 1e-10
+    assert run.verdict["verdict"] == "good"
     dissipates(run)
 
 
@@ -160,14 +188,25 @@ def test_many_contacts_slide(tmp_path: Path) -> None:
     dissipates(run)
 
 
-def test_held_by_friction_in_statics(tmp_path: Path) -> None:
-    """Friction alone holds an elastic slab on a slope of .45 with mu = .5, whose floor bears its weight."""
-    block = slab()
-    angle = float(np.arctan(.45))
-    run = ran(tmp_path, bodies([block], [faces(block, 2, 0)], STIFF) + walls.wall(walls.plane())
-              + walls.pair("", "*FRICTION\n.5\n") + f"*BOUNDARY\n{walls.FIXED}"
-              + f"*STEP, NLGEOM\n*STATIC\n.5, 1.\n{weight(angle)}*NODE FILE\nU\n*END STEP\n")
+def at_rest(slope: float, load: float, card: str = "*STEP, NLGEOM") -> str:
+    """A slab under `load` times its weight on a floor with mu = .5."""
+    block, angle, g = slab(), float(np.arctan(slope)), load*GRAVITY
+    return (bodies([block], [faces(block, 2, 0)], STIFF) + walls.wall(walls.plane())
+            + walls.pair("", "*FRICTION\n.5\n") + f"*BOUNDARY\n{walls.FIXED}"
+            + f"{card}\n*STATIC\n.5, 1.\n*DLOAD\nB1, GRAV, {g!r}, {float(np.sin(angle))!r}, 0., "
+            + f"{float(-np.cos(angle))!r}\n*NODE FILE\nU\n*END STEP\n")
+
+
+@pytest.mark.parametrize("slope", [.45, .49, .499])
+def test_held_by_friction_in_statics(tmp_path: Path, slope: float) -> None:
+    """Friction alone holds an elastic slab, whose floor bears its weight. Near the limit all nodes slide.
+
+    They do so along different ways, as the slab spreads: it stays where it is.
+    """
+    run = ran(tmp_path, at_rest(slope, 1.0))
     assert run.verdict["verdict"] == "good"
+    assert not run.verdict["warnings"]
+    angle = float(np.arctan(slope))
     force = columns(run, "pair1_force_x pair1_force_y pair1_force_z")[-1]
     wanted = .5*GRAVITY*np.array([np.sin(angle), 0.0, -np.cos(angle)])
     assert np.abs(np.abs(force) - np.abs(wanted)).max() < 1e-8*GRAVITY
@@ -235,7 +274,7 @@ def test_puck_comes_to_rest(tmp_path: Path) -> None:
     dissipates(run)
 
 
-def at_rest(i: int, block: Block) -> str:
+def comes_to_rest(i: int, block: Block) -> str:
     return rigid(i, block).partition("*INITIAL")[0]
 
 
@@ -249,7 +288,7 @@ def cards(mu: float) -> str:
             return np.column_stack([side*(np.sin(lean)*(1.0 - up) + np.cos(lean)*out), x[:, 1] - .25,
                                     np.cos(lean)*up + np.sin(lean)*out])
         blocks.append(Block("C3D8", (1, 2, 4), size=(.1, .5, 1), place=place))
-    return (bodies(blocks, [faces(b) for b in blocks], STIFF) + at_rest(1, blocks[0]) + at_rest(2, blocks[1]) + walls.wall(walls.plane()) + pair("", f"*FRICTION\n{mu}\n") + "S1, W\nS2, W\n"
+    return (bodies(blocks, [faces(b) for b in blocks], STIFF) + comes_to_rest(1, blocks[0]) + at_rest(2, blocks[1]) + walls.wall(walls.plane()) + pair("", f"*FRICTION\n{mu}\n") + "S1, W\nS2, W\n"
             + f"*BOUNDARY\n{walls.FIXED}" + dynamic(.01, .3, weight() + weight(of="B2")))
 
 
@@ -274,7 +313,7 @@ def test_dominoes_fall_one_after_the_other(tmp_path: Path) -> None:
     blocks = [Block("C3D8", (1, 1, 1), size=(.2, .5, 1), place=lambda x, i=i: x + np.array([.5*i - .1, -.25, 0]))
               for i in range(3)]
     text = (bodies(blocks, [faces(b) for b in blocks], STIFF) + rigid(1, blocks[0], v=(1, 0, .2), w=(0, 2, 0))
-            + at_rest(2, blocks[1]) + at_rest(3, blocks[2]) + walls.wall(walls.plane())
+            + comes_to_rest(2, blocks[1]) + at_rest(3, blocks[2]) + walls.wall(walls.plane())
             + "*SURFACE INTERACTION, NAME=I, RESTITUTION=.5\n*FRICTION\n.3\n*CONTACT PAIR, INTERACTION=I\n"
             + f"S1, S2\nS2, S3\nS1, W\nS2, W\nS3, W\n*BOUNDARY\n{walls.FIXED}")
     run = ran(tmp_path, text + dynamic(.01, 2.0, weight() + weight(of="B2") + weight(of="B3")))
@@ -288,3 +327,129 @@ def test_dominoes_fall_one_after_the_other(tmp_path: Path) -> None:
     top = (run.fields().x + run.fields()["displacement"][-1])[:24, 2].max()
     assert top < .8
     dissipates(run)
+    assert run.history["friction_loss"][-1] > 0.0
+
+
+def test_what_slides_down_has_no_rest(tmp_path: Path) -> None:
+    (tmp_path/"deck.inp").write_text(at_rest(.51, 1.0))
+    run = run_deck(tmp_path/"deck.inp", tmp_path, 3)
+    assert run.verdict["verdict"] == "not completed"
+    assert "friction is at its limit" in run.errors
+
+
+@pytest.mark.parametrize("slope", [.45, .49])
+def test_loads_of_any_size_take_the_same_iterations(tmp_path: Path, slope: float) -> None:
+    """Linear elements: forces and motions are in proportion to the load."""
+    counts, moved = [], []
+    for load in (1e-3, 1.0, 1e3):
+        run = ran(tmp_path, at_rest(slope, load, "*STEP"))
+        counts.append(list(run.history["newton"]))
+        moved.append(run.fields()["displacement"][-1]/load)
+    assert counts[0] == counts[1] == counts[2]
+    size = np.abs(moved[1]).max()
+    assert max(np.abs(u - moved[1]).max() for u in moved) < 1e-6*size
+
+
+def test_traction_and_slip_of_faces(tmp_path: Path) -> None:
+    """Vectors in space: traction adds up to what acts along the plane, slip is how the nodes went."""
+    text = on_floor(.3, .01, .1, (1., .2, 0), (0, 0, 1.), is_rigid=False)
+    run = ran(tmp_path, text.replace("*END STEP", "*CONTACT FILE\nCF, CSHEAR, CSLIP\n*END STEP"))
+    fields, faces = run.fields(), FieldsOf(run.file(".surfaces.vtkhdf"))
+    is_face = np.isfinite(faces.cell["contact_status"][0]).ravel()
+    shear, slip = faces.cell["contact_shear"][:, is_face], faces.cell["contact_slip"][:, is_face]
+    assert is_face.sum() == 4
+    force = fields["contact_force"][:, np.array(slab().on(2, 0)) - 1].sum(1)
+    # Each face has a quarter of the area, but for what the slab strains.
+    assert np.abs(.25*shear.sum(1)[1:, :2] - force[1:, :2]).max() < 1e-2*np.abs(force).max()
+    assert np.abs(shear[..., 2]).max() < 1e-12*np.abs(shear).max()
+    moved = fields["displacement"][-1]
+    node = faces.point["node"][0].astype(int)
+    for k, way in zip(np.flatnonzero(is_face), slip[-1], strict=True):
+        wanted = moved[node[np.asarray(faces.cells[k], int)], :2].mean(0)
+        assert np.abs(way[:2] - wanted).max() < 1e-10
+    assert run.history["pair1_friction_loss"][-1] == pytest.approx(run.history["friction_loss"][-1])
+
+
+def test_belt_on_a_drum(tmp_path: Path) -> None:
+    """The drum turns under the belt: pulls at its ends are as e to the mu times pi, in the middle of its thickness."""
+    mu, thickness = .3, .02
+    block, text = belt(24, mu, thickness)
+    run = ran(tmp_path, text)
+    pull = -run.fields()["reaction_force"][-1, np.array(block.on(0, 0)) - 1, 2].sum()
+    assert pull == pytest.approx(np.exp(mu*np.pi), rel=.02)
+    # Friction acts at the radius 1, pulls half of the thickness further out. Sides of the polygon: (pi/24)^2/8.
+    assert pull == pytest.approx(np.exp(mu*np.pi/(1 + thickness/2)), rel=.003)
+
+
+def thrown(card: str, v: tuple = (1., .2, 0)) -> str:
+    return on_floor(.3, .01, .3, v, (0, 0, 1.), is_rigid=False).replace("*FRICTION\n0.3\n", card)
+
+
+@pytest.mark.parametrize("card", [
+    "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1E5\n*FRICTION\n0.3, 1E4\n", "*FRICTION, ROUGH\n",
+    "*FRICTION, RESTITUTION=0.5\n0.3\n"])
+def test_cards_of_friction(tmp_path: Path, card: str) -> None:
+    """What springs of stick store comes back; what is rough never slides; energy is known in all of them."""
+    run = ran(tmp_path, thrown(card).replace("*END STEP", "*CONTACT FILE\nCSHEAR\n*END STEP"))
+    h = run.history
+    kept = columns(run, "kinetic strain friction_loss").sum(1) - h["external_work"]
+    if "LINEAR" in card:
+        kept = kept + h["contact_energy"]
+        assert h["contact_energy"].max() > 1e-3
+    assert np.abs(kept - kept[0]).max() < 1e-11*kept[0]
+    dissipates(run)
+    slides = run.fields()["contact_status"].max() == 2
+    assert slides == ("ROUGH" not in card)
+
+
+def test_springs_of_stick_give_back(tmp_path: Path) -> None:
+    """Pushed by less than its limit and let go in one step: nothing is lost, and nothing stays."""
+    block = slab((1, 1, 1))
+    text = (bodies([block], [faces(block, 2, 0)], STIFF) + walls.wall(walls.plane())
+            + walls.pair("", "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1E4\n*FRICTION\n.5, 1E3\n")
+            + f"*BOUNDARY\n{walls.FIXED}*AMPLITUDE, NAME=A\n0., 0., 1., 1., 2., 0.\n*AMPLITUDE, NAME=B\n0., 1., 2., 1.\n"
+            + "*STEP\n*STATIC, DIRECT\n.25, 2.\n*DLOAD, AMPLITUDE=B\nB1, GRAV, 10., 0., 0., -1.\n"
+            + "*DLOAD, AMPLITUDE=A\nB1, GRAV, 3., .6, .8, 0.\n*NODE FILE\nU\n*END STEP\n")
+    run = ran(tmp_path, text)
+    low = np.array(block.on(2, 0)) - 1
+    u = run.fields()["displacement"][:, low, :2].mean(1)
+    # 1.5 over an area of 1.
+    assert np.abs(u[4] - 1.5/1e3*np.array([.6, .8])).max() < 1e-10
+    assert np.abs(u[-1]).max() < 1e-12
+    assert abs(run.history["friction_loss"][-1]) < 1e-14
+
+
+def test_impacts_with_restitution_and_friction(tmp_path: Path) -> None:
+    """Along the normal half of the rate comes back; what that takes is told beside friction, energy is balanced."""
+    run = ran(tmp_path, thrown("*FRICTION\n0.3\n", (1., .2, -1.)).replace("NAME=I\n", "NAME=I, RESTITUTION=.5\n"))
+    kept = columns(run, "kinetic strain friction_loss restitution_loss").sum(1) - run.history["external_work"]
+    assert run.history["restitution_loss"][-1] > .01*kept[0]
+    assert np.diff(run.history["restitution_loss"]).min() >= 0.0
+    assert np.abs(kept - kept[0]).max() < 1e-11*kept[0]
+    dissipates(run)
+
+
+def test_a_restart_has_the_same_bits(tmp_path: Path) -> None:
+    """Also of slips and tractions of faces, while the slab slides and turns."""
+    (tmp_path/"whole").mkdir()
+    (tmp_path/"again").mkdir()
+    text = thrown("*FRICTION\n0.3\n").replace("*END STEP", "*CONTACT FILE\nCSHEAR, CSLIP\n*RESTART, WRITE, FREQUENCY=13\n*END STEP")
+    whole = ran(tmp_path/"whole", text)
+    again = restart(whole, tmp_path/"again")
+    assert again.digits() == whole.digits()
+    first, second = (FieldsOf(run.file(".surfaces.vtkhdf")).cell for run in (whole, again))
+    for name in ("contact_shear", "contact_slip"):
+        np.testing.assert_array_equal(first[name], second[name])
+    assert np.abs(first["contact_slip"][-1, :4]).max() > .05
+
+
+@pytest.mark.parametrize("mu", [.3, .8])
+def test_friction_keeps_a_plane_of_symmetry(tmp_path: Path, mu: float) -> None:
+    """Of a slab of several elements that slides along it, and stops."""
+    run = ran(tmp_path, on_floor(mu, .01, .2, (1., 0, 0), is_rigid=False, cells=(4, 4, 2)))
+    fields = run.fields()
+    n = 5*5*3
+    x = fields.x[:n]
+    mirror = [int(np.argmin(np.abs(x - p*[1, -1, 1]).sum(1))) for p in x]
+    u = fields["displacement"][:, :n]
+    assert np.abs(u - u[:, mirror]*[1, -1, 1]).max() <= 64*EPSILON

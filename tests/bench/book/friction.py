@@ -26,9 +26,10 @@ from friction_scenes import (
     stack_on_slope,
     way,
 )
+from friction_space_scenes import Ball, belt
 from plain_scenes import BOTH, ONE
 from plate_alone import displacements
-from scene_tools import PROGRAM
+from scene_tools import PROGRAM, Deck, Run
 
 from .common import Chapter, drift, size, table
 
@@ -309,10 +310,60 @@ def report_ring(started, _):
                   "py", "lz", "Newton", "cuts", "law"], rows)
 
 
+# ---- in space -----------------------------------------------------------------------------------
+
+BELTS = [(12, .02), (24, .02), (48, .02), (12, .002), (24, .002)]
+BALLS = (2, 3, 4)
+
+
+def start_space(runs):
+    started = {}
+    for cells, thickness in BELTS:
+        block, text = belt(cells, .3, thickness)
+        started["belt", cells, thickness] = block, runs.start(Deck(text, "belt"), patient)
+    for cells in BALLS:
+        ball = Ball(cells)
+        block = ball.block()
+        started["ball", cells, ball] = block, runs.start(Deck(ball.deck(block, .15, 6), "ball"), patient)
+    return started
+
+
+def patient(deck, folder):
+    """A run that may take its time."""
+    folder.mkdir(parents=True, exist_ok=True)
+    subprocess.run([PROGRAM, deck.write(folder/"deck.inp"), "--quiet", "--output", folder], check=True)
+    return Run(folder/"deck")
+
+
+def report_space(started, _):
+    rows = []
+    for (scene, cells, more), (block, future) in started.items():
+        run = future.result()
+        fields = run.fields()
+        if scene == "belt":
+            value = -fields["reaction_force"][-1, np.array(block.on(0, 0)) - 1, 2].sum()
+            known, own = math.exp(.3*math.pi), math.exp(.3*math.pi/(1 + more/2))
+            name = f"belt, t = {more:g}: ratio of pulls"
+        else:
+            low = np.array(block.on(2, 0)) - 1
+            force = fields["contact_force"][-1, low]
+            place = block.x[low] + fields["displacement"][-1, low]
+            value = (place[:, 0]*force[:, 1] - place[:, 1]*force[:, 0]).sum()
+            known = more.torque(force[:, 2].sum())
+            own = more.mu*(force[:, 2]*np.hypot(place[:, 0], place[:, 1])).sum()
+            name = "ball: torque"
+        rows.append((name, cells, f"{value:.6f}", f"{known:.6f}", f"{100*(value/known - 1):+.2f} %",
+                     f"{100*(value/own - 1):+.3f} %", f"{run.history['newton'].sum():.0f}",
+                     f"{run.history['cuts'].sum():.0f}", law(run)))
+    return table(["scene", "cells over pi, a", "found", "known", "difference", "by thickness, by forces", "Newton",
+                  "cuts", "law"], rows)
+
+
 CHAPTERS = [Chapter("friction_rest", start_rest, report_rest),
             Chapter("friction_known", start_known, report_known),
             Chapter("friction_curves", start_curves, report_curves),
             Chapter("friction_flutter", start_flutter, report_flutter),
             Chapter("friction_held", start_held, report_held),
+            Chapter("friction_space", start_space, report_space),
             Chapter("friction_random", start_random, report_random),
             Chapter("friction_ring", start_ring, report_ring)]
