@@ -18,8 +18,10 @@ module emcon_mortar_space
       multiplier_dual
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
-   use emcon_patch_gap_space, only : patch_gap_of, patch_gap_t, patch_open, patch_open_t
+   use emcon_patch_gap_space, only : patch_gap_of, patch_gap_t, patch_open, &
+      patch_open_cover, patch_open_t
    use emcon_patch_look_space, only : patch_basis, patch_basis_t, patch_t
+   use emcon_patch_moments_space, only : patch_area_t
    use emcon_patch_sides_space, only : patch_sides_t, patch_triangles_init
    use emcon_patch_spread_space, only : patch_spread, patch_uses
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_gather, &
@@ -40,7 +42,6 @@ module emcon_mortar_space
 
    !> What a triangle sees in a step, for all that is asked of it.
    type :: sight_t
-      type(patch_basis_t) :: basis
       type(patch_open_t) :: open
       type(patch_gap_t) :: cover                      !! what of it is covered, of an area of 1/2
       logical :: is_full = .false.                   !! its facet is covered, but for round-off
@@ -360,23 +361,23 @@ contains
       logical, intent(in) :: leaves_second
       type(sight_t), intent(inout) :: sight(:)   !! (triangles of the facet)
       real(wp), allocatable :: at(:, :), way(:, :)
+      real(wp) :: part(0:1)
       integer :: k
 
+      part = 0.0_wp
       do k = 1, size(sight)
          associate (stencil => self%stencil(first + k - 1))
             if (stencil%triangle == 0) cycle
             if (allocated(at)) deallocate(at, way)
             allocate(at(3, 3 + stencil%patch%n_vertex), way(3, 3 + stencil%patch%n_vertex))
             call patch_stencil_gather(stencil, x, u0, du, at, way)
-            sight(k)%basis = patch_basis(stencil%patch, at, way)
             call patch_open(stencil%patch, at, way, leaves_second, sight(k)%open)
+            part = part + 2.0_wp*patch_open_cover(sight(k)%open)/real(size(sight), wp)
          end associate
       end do
       if (.not. self%is_dual) return
-      associate (part => covered(sight%basis))
-         sight%is_full = all(abs(part - 1.0_wp) <= whole_cover)
-         sight%is_blended = any(part > 0.0_wp) .and. .not. sight%is_full
-      end associate
+      sight%is_full = all(abs(part - 1.0_wp) <= whole_cover)
+      sight%is_blended = any(part > 0.0_wp) .and. .not. sight%is_full
       do k = 1, size(sight)
          if (sight(k)%open%n_vertex == 0 .or. .not. sight(k)%is_blended) cycle
          associate (patch => self%stencil(first + k - 1)%patch)
@@ -395,13 +396,11 @@ contains
       real(wp), intent(in) :: target             !! [L]
       logical, intent(in) :: leaves_second
       type(patch_gap_t), intent(out) :: gap
-      type(patch_t) :: own
+      type(patch_area_t) :: area
 
-      own = patch
-      own%area%weight = weight
-      own%of_cover = of_cover
-      own%is_integral = .not. of_cover
-      call patch_gap_of(own, open, target, leaves_second, gap)
+      area = patch%area
+      area%weight = weight
+      call patch_gap_of(open, area, of_cover, .not. of_cover, target, leaves_second, gap)
    end subroutine gap_of
 
    !> The condition of constraint `i`: the sum over its facets, docs/theory.md, eq. (62).
