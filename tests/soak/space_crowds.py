@@ -1,10 +1,10 @@
 """Scenes of two to five bodies in space, drawn by a seed, beside what is right.
 
-    .venv/bin/python tests/soak/space_crowds.py [--seeds 1 200] [--folder build/soak-crowds]
+    .venv/bin/python tests/soak/space_crowds.py [--seeds 1 200] [--folder build/soak-crowds] [--mortar]
 
 Elastic and rigid bodies of all kinds of elements fly into each other, some of them onto a wall, a ball or a plate that is
 held; each fifth scene is one of statics: bodies on each other that contact alone holds, with planes of symmetry. Options
-are those that nobody chose. Energy is that of the history, momentum and weight are summed here from positions and
+are those that nobody chose; with --mortar each pair of bodies has a contact of that kind, and walls one of nodes. Energy is that of the history, momentum and weight are summed here from positions and
 densities, overlap is that of `overlap.py`. The exit code is 1 where a run is called good and one of these says otherwise.
 """
 
@@ -64,9 +64,15 @@ def starts(all_blocks, rigid, v, w):
     return "*INITIAL CONDITIONS, TYPE=VELOCITY\n" + text if text else ""
 
 
-def contact(has_wall, all_blocks):
+def contact(has_wall, all_blocks, mortar):
     """Everything with everything, and all bodies with a wall."""
     text = "*SURFACE INTERACTION, NAME=I\n"
+    if mortar:
+        n = len(all_blocks)
+        text += "*CONTACT PAIR, INTERACTION=I, TYPE=MORTAR\n"
+        text += "".join(f"S{i}, S{k}\n" for i in range(1, n + 1) for k in range(i + 1, n + 1))
+        lines = "".join(f"S{i}, W\n" for i in range(1, n + 1)) if has_wall else ""
+        return text + (f"*CONTACT PAIR, INTERACTION=I\n{lines}" if lines else "")
     if not has_wall:
         return text + "*CONTACT\n*CONTACT INCLUSIONS, ALL EXTERIOR\n*CONTACT PROPERTY ASSIGNMENT\n, , I\n"
     first, lines = 0, ""
@@ -81,7 +87,7 @@ def held_plate(own):
     return f"*NSET, NSET=FOOT\n{foot}*BOUNDARY\nFOOT, 1, 3\n"
 
 
-def dynamics(seed):
+def dynamics(seed, mortar):
     chance, draw = random.Random(f"crowd {seed}"), np.random.default_rng(seed)
     is_plain = seed % 3 == 0
     floor = chance.choice(["", "", "plane", "sphere", "plate"])
@@ -115,14 +121,14 @@ def dynamics(seed):
         text += f"*BOUNDARY\n{REFERENCE}, ENCASTRE\n"
     elif floor:
         text += held_plate(all_blocks[0])
-    text += contact(floor in ("plane", "sphere"), all_blocks) + starts(all_blocks, rigid, v, w)
+    text += contact(floor in ("plane", "sphere"), all_blocks, mortar) + starts(all_blocks, rigid, v, w)
     text += f"*STEP, NLGEOM, INC=10000\n*DYNAMIC\n{chance.choice([0.01, 0.02, 0.04])}, 0.6\n"
     if floor and chance.random() < 0.5:
         text += "*DLOAD\n" + "".join(f"B{i}, GRAV, {GRAVITY}, 0., 0., -1.\n" for i in range(1, n + 1))
     return text + "*NODE FILE\nU\n*END STEP\n"
 
 
-def statics(seed):
+def statics(seed, mortar):
     """Bodies on each other, each with two planes of symmetry."""
     chance = random.Random(f"crowd {seed}")
     floor, n = chance.choice(["plane", "support"]), chance.randint(2, 5)
@@ -156,7 +162,7 @@ def statics(seed):
     if floor == "plane":
         text += wall(plane())
         held += f"{REFERENCE}, ENCASTRE\n"
-    text += contact(floor == "plane", all_blocks) + f"*BOUNDARY\n{held}*STEP, NLGEOM\n*STATIC\n0.25, 1.\n"
+    text += contact(floor == "plane", all_blocks, mortar) + f"*BOUNDARY\n{held}*STEP, NLGEOM\n*STATIC\n0.25, 1.\n"
     if load == "gravity":
         text += "*DLOAD\n" + "".join(f"B{i}, GRAV, {GRAVITY}, 0., 0., -1.\n" for i in range(1, n + 1))
     elif load == "pressure":
@@ -166,8 +172,8 @@ def statics(seed):
     return text + "*NODE FILE\nU, RF\n*END STEP\n"
 
 
-def scene(seed):
-    return statics(seed) if seed % 5 == 0 else dynamics(seed)
+def scene(seed, mortar=False):
+    return statics(seed, mortar) if seed % 5 == 0 else dynamics(seed, mortar)
 
 
 # ---- what is right --------------------------------------------------------------------------------
@@ -254,4 +260,4 @@ def judge_rest(fields, deck):
 
 
 if __name__ == "__main__":
-    sys.exit(run_scenes(scene, judge, (1, 200), "build/soak-crowds"))
+    sys.exit(run_scenes(scene, judge, (1, 200), "build/soak-crowds", ["mortar"]))
