@@ -218,17 +218,20 @@ contains
       type(motion_t), intent(in) :: motion
       integer, intent(inout) :: k                !! places of the set that were looked at
       integer, intent(inout) :: status
-      logical :: was_stale
+      logical :: was_stale, may_join
       integer :: i, id, own
 
       was_stale = self%is_stale
+      ! What the pairs take in may hold the bodies away from their guards.
+      may_join = .not. (system%contact(pair)%contact%slack > 0.0_wp .and. &
+         self%candidates%have_changed)
       associate (contact => system%contact(pair)%contact)
          do i = 1, contact%n_constraint
             id = system%first_constraint(pair) + i
             own = step_done
             self%is_stale = .false.
             if (.not. self%candidates%takes_part(id)) then
-               call join(self, system, pair, i, motion, own)
+               call join(self, system, pair, i, motion, may_join, own)
             else if (self%candidates%acts(id) .or. contact%state(i)%is_leaving) then
                if (self%candidates%acts(id)) k = k + 1
                call look_at_acting(self, contact, i, id, k, motion, own)
@@ -287,19 +290,19 @@ contains
    end function has_closed
 
    !> Does the `i`-th constraint of a pair, which is no candidate, close?
-   subroutine join(self, system, pair, i, motion, status)
+   subroutine join(self, system, pair, i, motion, may_join, status)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       integer, intent(in) :: pair, i
       type(motion_t), intent(in) :: motion
+      logical, intent(in) :: may_join            !! else it is looked at later
       integer, intent(inout) :: status           !! a failure where it cannot
       logical :: closes
 
       associate (contact => system%contact(pair)%contact, id => system%first_constraint(pair) + i)
          if (contact%state(i)%is_leaving) return
          call look_at_open(self, contact, i, id, closes, status)
-         ! What the pairs take in may hold the bodies away from their guards.
-         if (.not. closes .or. (contact%slack > 0.0_wp .and. self%candidates%have_changed)) return
+         if (.not. (closes .and. may_join)) return
          if (self%candidates%has_left(id) .and. self%candidates%is_back(id)) status = step_too_far
          self%candidates%is_back(id) = self%candidates%has_left(id)
          if (self%friction%is_on) call friction_close(self%friction, system, pair, i, motion, &

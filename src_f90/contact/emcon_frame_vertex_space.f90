@@ -8,7 +8,8 @@ module emcon_frame_vertex_space
    use emcon_kinds, only : wp
    implicit none
    private
-   public :: frame_vertex_t, frame_vertex, frame_place, frame_area_t, frame_area, frame_size
+   public :: frame_vertex_t, frame_vertex, frame_place, frame_places, &
+      frame_area_t, frame_area, frame_size
 
    !> Local numbers: coordinates along both vectors of the frame, height over their plane.
    integer, parameter, public :: at_xi = 1, at_eta = 2, at_height = 3
@@ -67,17 +68,33 @@ contains
       real(wp), intent(in) :: a(3), b(3)         !! the frame [L]
       real(wp), intent(in) :: d(3)               !! the point, from its origin [L]
       real(wp) :: place(3)
-      real(wp) :: aa, ab, bb, da, db, normal(3)
+      real(wp) :: places(3, 1)
+
+      call frame_places(a, b, reshape(d, [3, 1]), places)
+      place = places(:, 1)
+   end function frame_place
+
+   !> The places of points.
+   pure subroutine frame_places(a, b, d, place)
+      real(wp), intent(in) :: a(3), b(3)         !! the frame [L]
+      real(wp), intent(in) :: d(:, :)            !! (3, n) the points, from its origin [L]
+      real(wp), intent(out) :: place(:, :)       !! (3, n)
+      real(wp) :: aa, ab, bb, da, db, square, length, normal(3)
+      integer :: j
 
       aa = dot_product(a, a)
       ab = dot_product(a, b)
       bb = dot_product(b, b)
-      da = dot_product(d, a)
-      db = dot_product(d, b)
+      square = aa*bb - ab*ab
       normal = cshift(a, 1)*cshift(b, -1) - cshift(a, -1)*cshift(b, 1)
-      place(:2) = [bb*da - ab*db, aa*db - ab*da]/(aa*bb - ab*ab)
-      place(3) = dot_product(d, normal)/sqrt(dot_product(normal, normal))
-   end function frame_place
+      length = sqrt(dot_product(normal, normal))
+      do j = 1, size(d, 2)
+         da = dot_product(d(:, j), a)
+         db = dot_product(d(:, j), b)
+         place(:2, j) = [bb*da - ab*db, aa*db - ab*da]/square
+         place(3, j) = dot_product(d(:, j), normal)/length
+      end do
+   end subroutine frame_places
 
    !> The place over a step. `x` are the origin, the tips of both vectors and the point.
    pure subroutine frame_vertex(x, dx, leaves_second, vertex)

@@ -11,7 +11,7 @@ module emcon_patch_contact_space
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : err_input, error_t, raise
    use emcon_facet_values, only : facets_point_area, facets_pressures
-   use emcon_facets, only : facets_init, facets_rim
+   use emcon_facets, only : facets_init
    use emcon_frame_slip_space, only : frame_slip, frame_slip_t
    use emcon_guards, only : corner_slack, crossing_bar, overlap_bar
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
@@ -146,20 +146,18 @@ contains
       end do
    end function rests_of_points
 
-   !> Corners and rims are held nearly at once beside means of gaps, which do not see them.
+   !> Corners of bodies are held nearly at once beside means of gaps, which do not see them. Along a
+   !> rim they do: rows of both there would say nearly the same, and fight.
    pure subroutine hold_corners(self)
       type(patch_contact_t), intent(inout) :: self
-      logical :: is_sharp(size(self%sides%slave%node))
       integer :: i
 
-      call facets_rim(self%sides%slave, is_sharp)
       allocate(self%own_slack(self%n_constraint), source=self%slack)
       associate (frames => self%sides%frames)
          do i = 1, self%n_constraint
             associate (point => frames%point(self%frame(i)))
-               if (point > size(is_sharp)) cycle
-               if (is_sharp(point) .or. frames%start(point + 1) > frames%start(point) + 1) &
-                  self%own_slack(i) = corner_slack
+               if (frames%start(point + 1) > frames%start(point) + 1) self%own_slack(i) = &
+                  corner_slack
             end associate
          end do
       end associate

@@ -8,12 +8,14 @@ module emcon_patch_gap_space
       frame_vertex_t, n_frame_var
    use emcon_kinds, only : wp
    use emcon_patch_look_space, only : patch_t, place_vertices
-   use emcon_patch_moments_space, only : patch_misses, patch_moments, patch_products
+   use emcon_patch_moments_space, only : patch_area_t, patch_misses, patch_moments, &
+      patch_products
    use emcon_patch_sum_space, only : add_end, change_of_closing, change_of_parts, close_sum, &
-      closing_t, field_t, form_field, outer
+      closing_t, field_t, form_field, outer, place_field
    implicit none
    private
-   public :: patch_gap_t, patch_gap, patch_open_t, patch_open, patch_gap_of
+   public :: patch_gap_t, patch_gap, patch_open_t, patch_open, patch_open_cover, &
+      patch_gap_of
 
    !> The integral of chi (height - target) over the patch by its area, over a step.
    type :: patch_gap_t
@@ -31,6 +33,7 @@ module emcon_patch_gap_space
    type :: patch_open_t
       integer :: n_vertex = 0                    !! that they depend on
       integer, allocatable :: vertex(:)          !! (>= n_vertex) their numbers
+      real(wp), allocatable, private :: chi(:)               !! (n_vertex)
       type(frame_vertex_t), allocatable, private :: at(:)    !! (n_vertex)
       type(field_t), allocatable, private :: field(:)
       type(frame_area_t), private :: area        !! of the frame, for an integral
@@ -49,7 +52,8 @@ contains
       type(patch_open_t) :: open
 
       call patch_open(patch, x, dx, leaves_second, open)
-      call patch_gap_of(patch, open, target, leaves_second, gap)
+      call patch_gap_of(open, patch%area, patch%of_cover, patch%is_integral, target, &
+         leaves_second, gap)
    end subroutine patch_gap
 
    !> What a patch is over in a step.
@@ -58,8 +62,8 @@ contains
       real(wp), intent(in) :: x(:, :), dx(:, :)  !! as `patch_gap`
       logical, intent(in) :: leaves_second       !! no gap with second derivatives is asked for
       type(patch_open_t), intent(out) :: open
-      real(wp) :: place(3, patch%n_vertex, 0:1)
-      integer :: j
+      real(wp) :: place(3, patch%n_vertex, 0:1), corner(2, 3, 0:1)
+      integer :: end, j, k
 
       call place_vertices(patch, x, place(:, :, 0))
       call place_vertices(patch, x + dx, place(:, :, 1))
@@ -71,13 +75,41 @@ contains
          end associate
          call to_patch(patch, open%at(j))
       end do
+      open%chi = patch%chi(open%vertex(:open%n_vertex))
+      do k = 1, size(open%field)
+         do j = 1, 3
+            do end = 0, 1
+               corner(:, j, end) = open%at(open%field(k)%vertex(j))%f(:at_eta, end)
+            end do
+         end do
+         call place_field(corner, open%field(k))
+      end do
       if (patch%area%n_side == 3) call frame_area(x(:, :3), dx(:, :3), leaves_second, open%area)
    end subroutine patch_open
 
+   !> What of a patch is covered at both ends, in its coordinates.
+   pure function patch_open_cover(open) result(cover)
+      type(patch_open_t), intent(in) :: open
+      real(wp) :: cover(0:1)
+      integer :: end, k
+
+      cover = 0.0_wp
+      do k = 1, size(open%field)
+         associate (f => open%field(k))
+            do end = 0, 1
+               cover(end) = cover(end) + dot_product(open%chi(f%vertex), matmul( &
+                  f%at_end(:, :, end), f%bare(:, end)))
+            end do
+         end associate
+      end do
+   end function patch_open_cover
+
    !> The gap of a patch.
-   pure subroutine patch_gap_of(patch, open, target, leaves_second, gap)
-      type(patch_t), intent(in) :: patch
-      type(patch_open_t), intent(in) :: open     !! of it
+   pure subroutine patch_gap_of(open, patch_area, of_cover, is_integral, target, leaves_second, &
+         gap)
+      type(patch_open_t), intent(in) :: open     !! of the patch
+      type(patch_area_t), intent(in) :: patch_area   !! what that is, with its weight
+      logical, intent(in) :: of_cover, is_integral   !! as `patch_t` has them
       real(wp), intent(in) :: target             !! that heights are counted from [L]
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(patch_gap_t), intent(out) :: gap
@@ -87,15 +119,15 @@ contains
       gap%n_vertex = open%n_vertex
       gap%vertex = open%vertex(:open%n_vertex)
       field = open%field
-      if (patch%area%n_side == 3) then
+      if (patch_area%n_side == 3) then
          do k = 1, size(field)
             do end = 0, 1
-               field(k)%moment(:, end) = matmul(patch%area%weight, field(k)%products(:, :, end))
+               field(k)%moment(:, end) = matmul(patch_area%weight, field(k)%products(:, :, end))
             end do
          end do
       end if
-      call add_up(patch, target, open%at, field, leaves_second, gap)
-      if (patch%is_integral) call times_area(open%area, leaves_second, gap)
+      call add_up(open, patch_area, of_cover, target, field, leaves_second, gap)
+      if (is_integral) call times_area(open%area, leaves_second, gap)
    end subroutine patch_gap_of
 
    !> Times the area of the frame, by the rule of products.
@@ -209,49 +241,52 @@ contains
    end subroutine find_moments
 
    !> The sum over triangles, docs/theory.md, eqs. (46) and (47).
-   pure subroutine add_up(patch, target, at, field, leaves_second, gap)
-      type(patch_t), intent(in) :: patch
+   pure subroutine add_up(open, patch_area, of_cover, target, field, leaves_second, gap)
+      type(patch_open_t), intent(in) :: open
+      type(patch_area_t), intent(in) :: patch_area
+      logical, intent(in) :: of_cover
       real(wp), intent(in) :: target             !! [L]
-      type(frame_vertex_t), intent(in) :: at(:)  !! (n_vertex)
-      type(field_t), intent(inout) :: field(:)
+      type(field_t), intent(inout) :: field(:)   !! with their moments
       logical, intent(in) :: leaves_second
       type(patch_gap_t), intent(inout) :: gap
-      real(wp), dimension(3, size(at)) :: by, end_by
-      real(wp), dimension(size(at)) :: chi, flat !! of heights, and of 1
-      real(wp) :: place(3, size(at), 0:1)
-      real(wp) :: change(3*size(at), 3*size(at))
+      real(wp), dimension(3, open%n_vertex) :: by, end_by
+      real(wp), dimension(open%n_vertex) :: chi, flat !! of heights, and of 1
+      real(wp) :: corner(2, open%n_vertex)       !! at the end
+      real(wp) :: height(open%n_vertex, 0:1)
+      real(wp) :: change(3*open%n_vertex, 3*open%n_vertex)
       type(closing_t) :: closing
       integer :: k
 
-      chi = patch%chi(gap%vertex(:gap%n_vertex))
+      chi = open%chi
       flat = 0.0_wp
-      if (patch%of_cover) then
+      if (of_cover) then
          flat = chi
          chi = 0.0_wp
       end if
-      do k = 1, size(at)
-         place(:, k, :) = at(k)%f
+      do k = 1, open%n_vertex
+         corner(:, k) = open%at(k)%f(:at_eta, 1)
+         height(k, :) = open%at(k)%f(at_height, :)
       end do
       by = 0.0_wp
       end_by = 0.0_wp
       do k = 1, size(field)
          call form_field(chi(field(k)%vertex), flat(field(k)%vertex), target, &
-            place(:, field(k)%vertex, :), field(k))
+            height(field(k)%vertex, :), field(k))
          associate (f => field(k), v => field(k)%vertex)
             gap%f0 = gap%f0 + dot_product(f%moment(:, 0), f%value(:, 0))
             gap%f1 = gap%f1 + dot_product(f%moment(:, 1), f%value(:, 1))
             by(at_height, v) = by(at_height, v) + chi(v)*f%part
             by(:at_eta, v) = by(:at_eta, v) - outer(sum(f%slope, 2)/2.0_wp, f%part)
-            call add_end(chi(v), place(:at_eta, v, 1), f, end_by)
+            call add_end(chi(v), f, end_by)
          end associate
       end do
-      call close_sum(at, field, closing)
+      call close_sum(open%at, field, closing)
       by(:at_eta, :) = by(:at_eta, :) + closing%factor*spread(closing%weight, 1, at_eta)*closing%way
-      call gather_first(at, by, end_by, gap)
+      call gather_first(open%at, by, end_by, gap)
       if (leaves_second) return
-      call change_of_parts(patch%area, chi, place, field, change)
-      call change_of_closing(patch%area, chi, place(:at_eta, :, 1), field, closing, change)
-      call gather_second(at, by, change, gap)
+      call change_of_parts(patch_area, chi, corner, field, change)
+      call change_of_closing(patch_area, chi, corner, field, closing, change)
+      call gather_second(open%at, by, change, gap)
    end subroutine add_up
 
    !> First derivatives by the frame and by the vertices.
@@ -276,17 +311,28 @@ contains
       type(frame_vertex_t), intent(in) :: at(:)
       real(wp), intent(in) :: by(:, :), change(:, :)
       type(patch_gap_t), intent(inout) :: gap
-      integer :: j, k, l
+      real(wp) :: sums(3, 6 + 3*size(at))        !! what places and heights of a vertex take
+      integer :: column(n_frame_var), i, j, k, l
 
       allocate(gap%h(6 + 3*size(at), 6 + 3*size(at)), source=0.0_wp)
       do j = 1, size(at)
-         associate (row => places(j))
+         sums = 0.0_wp
+         do l = 1, size(at)
+            column = places(l)
+            associate (by_l => change(3*j - 2:3*j, 3*l - 2:3*l), c => at(l)%c)
+               do i = 1, n_frame_var
+                  sums(:, column(i)) = sums(:, column(i)) + (by_l(:, 1)*c(i, 1) &
+                     + by_l(:, 2)*c(i, 2) + by_l(:, 3)*c(i, 3))
+               end do
+            end associate
+         end do
+         associate (row => places(j), g => at(j)%g)
+            do i = 1, size(sums, 2)
+               gap%h(row, i) = gap%h(row, i) + (g(:, 1)*sums(1, i) + g(:, 2)*sums(2, i) &
+                  + g(:, 3)*sums(3, i))
+            end do
             do k = 1, 3
                gap%h(row, row) = gap%h(row, row) + by(k, j)*at(j)%h(:, :, k)
-            end do
-            do l = 1, size(at)
-               gap%h(row, places(l)) = gap%h(row, places(l)) + matmul(at(j)%g, &
-                  matmul(change(3*j - 2:3*j, 3*l - 2:3*l), transpose(at(l)%c)))
             end do
          end associate
       end do

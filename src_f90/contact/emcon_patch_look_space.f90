@@ -1,7 +1,7 @@
 !> What a patch over a surface of triangles sees: a small square that moves with a node, or a
 !> triangle of a slave facet. Source: docs/theory.md, eqs. (43) to (46).
 module emcon_patch_look_space
-   use emcon_frame_vertex_space, only : frame_place, frame_size
+   use emcon_frame_vertex_space, only : frame_places, frame_size
    use emcon_kinds, only : wp
    use emcon_patch_moments_space, only : patch_area_t, patch_misses, patch_moments, patch_products
    use emcon_polygon_clip_space, only : barycentric
@@ -52,12 +52,12 @@ contains
       type(patch_t), intent(in) :: patch         !! that looks
       real(wp), intent(in) :: x(:, :)            !! (3, 3 + n_vertex) origin, frame, vertices [L]
       real(wp), intent(out) :: place(:, :)       !! (3, n_vertex)
-      integer :: j
 
-      do j = 1, patch%n_vertex
-         place(:, j) = frame_place(x(:, 2) - x(:, 1), x(:, 3) - x(:, 1), x(:, 3 + j) - x(:, 1))
-         place(:2, j) = place(:2, j)/patch%length + patch%area%centre
-      end do
+      associate (n => patch%n_vertex)
+         call frame_places(x(:, 2) - x(:, 1), x(:, 3) - x(:, 1), x(:, 4:3 + n) &
+            - spread(x(:, 1), 2, n), place(:, :n))
+         place(:2, :n) = place(:2, :n)/patch%length + patch%area%centre
+      end associate
    end subroutine place_vertices
 
    !> What a patch sees at both ends of a step.

@@ -8,7 +8,7 @@ module emcon_patch_sum_space
    use emcon_polygon_clip_space, only : barycentric
    implicit none
    private
-   public :: field_t, form_field, add_end, change_of_parts, closing_t, close_sum, &
+   public :: field_t, place_field, form_field, add_end, change_of_parts, closing_t, close_sum, &
       change_of_closing, outer
 
    !> Remainders below so many epsilons of what they are the difference of are round-off.
@@ -25,6 +25,7 @@ module emcon_patch_sum_space
       real(wp) :: value(3, 0:1) = 0.0_wp         !! its field at the `unit_corner` [L]
       real(wp) :: slope(2, 0:1) = 0.0_wp         !! of the field [L]
       real(wp) :: share(3, 3) = 0.0_wp           !! (j, v) of its corner j at v, in the mean
+      real(wp) :: at_end(3, 3, 0:1) = 0.0_wp     !! the same at the start and at the end
       real(wp) :: part(3) = 0.0_wp               !! of the integral that each corner takes
    end type field_t
 
@@ -40,33 +41,42 @@ module emcon_patch_sum_space
 
 contains
 
-   !> The field of a triangle at both ends.
-   pure subroutine form_field(chi, flat, target, place, field)
-      real(wp), intent(in) :: chi(3), flat(3)    !! of heights, and of 1
-      real(wp), intent(in) :: target             !! [L]
-      real(wp), intent(in) :: place(3, 3, 0:1)   !! of its corners
-      type(field_t), intent(inout) :: field      !! in: with its moments
-      real(wp) :: corner(2, 3, 0:1), p(3)
+   !> Where the corners of a triangle are: their shares at the `unit_corner`.
+   pure subroutine place_field(corner, field)
+      real(wp), intent(in) :: corner(2, 3, 0:1)  !! at both ends
+      type(field_t), intent(inout) :: field
       integer :: v, end
 
-      corner = place(:at_eta, :, :)
+      do v = 1, 3
+         do end = 0, 1
+            field%at_end(:, v, end) = barycentric(corner(:, :, end), unit_corner(:, v))
+         end do
+         field%share(:, v) = barycentric(sum(corner, 3)/2.0_wp, unit_corner(:, v))
+      end do
+   end subroutine place_field
+
+   !> The field of a triangle at both ends.
+   pure subroutine form_field(chi, flat, target, height, field)
+      real(wp), intent(in) :: chi(3), flat(3)    !! of heights, and of 1
+      real(wp), intent(in) :: target             !! [L]
+      real(wp), intent(in) :: height(3, 0:1)     !! of its corners [L]
+      type(field_t), intent(inout) :: field      !! in: with its moments, placed
+      real(wp) :: p(3)
+      integer :: v, end
+
       do end = 0, 1
-         p = chi*(place(at_height, :, end) - target) + flat
+         p = chi*(height(:, end) - target) + flat
          do v = 1, 3
-            field%value(v, end) = dot_product(p, barycentric(corner(:, :, end), unit_corner(:, v)))
+            field%value(v, end) = dot_product(p, field%at_end(:, v, end))
          end do
          field%slope(:, end) = field%value(2:3, end) - field%value(1, end)
-      end do
-      do v = 1, 3
-         field%share(:, v) = barycentric(sum(corner, 3)/2.0_wp, unit_corner(:, v))
       end do
       field%part = matmul(field%share, sum(field%moment, 2)/2.0_wp)
    end subroutine form_field
 
    !> Add the gradient at the end by places and heights.
-   pure subroutine add_end(chi, corner, field, by)
+   pure subroutine add_end(chi, field, by)
       real(wp), intent(in) :: chi(3)             !! at its corners
-      real(wp), intent(in) :: corner(2, 3)       !! at the end
       type(field_t), intent(in) :: field         !! formed
       real(wp), intent(inout) :: by(:, :)        !! (3, n_vertex)
       real(wp) :: part(3)
@@ -74,7 +84,7 @@ contains
 
       part = 0.0_wp
       do v = 1, 3
-         part = part + field%moment(v, 1)*barycentric(corner, unit_corner(:, v))
+         part = part + field%moment(v, 1)*field%at_end(:, v, 1)
       end do
       associate (to => field%vertex)
          by(at_height, to) = by(at_height, to) + chi*part
@@ -83,10 +93,10 @@ contains
    end subroutine add_end
 
    !> How what the vertices take changes with places and heights at the end.
-   pure subroutine change_of_parts(patch_area, chi, place, field, change)
+   pure subroutine change_of_parts(patch_area, chi, corner, field, change)
       type(patch_area_t), intent(in) :: patch_area   !! what the patch is
       real(wp), intent(in) :: chi(:)             !! (n_vertex)
-      real(wp), intent(in) :: place(:, :, 0:)    !! (3, n_vertex, 0:1)
+      real(wp), intent(in) :: corner(:, :)       !! (2, n_vertex) at the end
       type(field_t), intent(in) :: field(:)      !! the triangles, formed
       real(wp), intent(out) :: change(:, :)      !! (3 n_vertex, 3 n_vertex)
       real(wp) :: part(3, 9), slope(2, 9)
@@ -95,7 +105,7 @@ contains
       change = 0.0_wp
       do k = 1, size(field)
          associate (f => field(k), v => field(k)%vertex)
-            call change_of_field(patch_area, chi(v), place(:at_eta, v, :), f, part, slope)
+            call change_of_field(patch_area, chi(v), corner(:, v), f, part, slope)
             do i = 1, 3
                do j = 1, 3
                   associate (row => 3*(v(i) - 1), column => 3*(v(j) - 1), by => 3*(j - 1))
@@ -118,16 +128,16 @@ contains
    pure subroutine change_of_field(patch_area, chi, corner, field, part, slope)
       type(patch_area_t), intent(in) :: patch_area
       real(wp), intent(in) :: chi(3)
-      real(wp), intent(in) :: corner(2, 3, 0:1)
+      real(wp), intent(in) :: corner(2, 3)       !! at the end
       type(field_t), intent(in) :: field
       real(wp), intent(out) :: part(3, 9), slope(2, 9)
       real(wp) :: lean(2, 3), lean1(2, 3), mean(3)
       real(wp), dimension(3, 2, 3) :: swept, bare
       integer :: l, v
 
-      call patch_moment_slopes(patch_area, corner(:, :, 1), swept, bare)
-      lean = gradients(sum(corner, 3)/2.0_wp)
-      lean1 = gradients(corner(:, :, 1))
+      call patch_moment_slopes(patch_area, corner, swept, bare)
+      lean = gradients(field%share)
+      lean1 = gradients(field%at_end(:, :, 1))
       mean = sum(field%moment, 2)/2.0_wp
       part = 0.0_wp
       slope = 0.0_wp
@@ -145,14 +155,12 @@ contains
    end subroutine change_of_field
 
    !> Gradients of the barycentric coordinates of a triangle.
-   pure function gradients(corner) result(lean)
-      real(wp), intent(in) :: corner(2, 3)
+   pure function gradients(share) result(lean)
+      real(wp), intent(in) :: share(3, 3)        !! (j, v) of corner j at the `unit_corner`
       real(wp) :: lean(2, 3)
-      real(wp) :: first(3)
 
-      first = barycentric(corner, unit_corner(:, 1))
-      lean(1, :) = barycentric(corner, unit_corner(:, 2)) - first
-      lean(2, :) = barycentric(corner, unit_corner(:, 3)) - first
+      lean(1, :) = share(:, 2) - share(:, 1)
+      lean(2, :) = share(:, 3) - share(:, 1)
    end function gradients
 
    !> What the gradient lacks, put on the ways of the vertices, each by what it has to do with the
@@ -243,8 +251,7 @@ contains
       call patch_moment_slopes(patch_area, corner, swept, bare)
       part = 0.0_wp
       do v = 1, 3
-         part = part + 0.5_wp*(field%moment(v, 1) - field%moment(v, 0)) &
-            *barycentric(corner, unit_corner(:, v))
+         part = part + 0.5_wp*(field%moment(v, 1) - field%moment(v, 0))*field%at_end(:, v, 1)
       end do
       do j = 1, 3
          associate (to => by_rest(:, field%vertex(j)), at_j => 3*(field%vertex(j) - 1))

@@ -4,7 +4,8 @@ module test_facet_gap
    use check, only : check_near, check_true, test_case_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_patch_gap_space, only : patch_gap, patch_gap_t
+   use emcon_patch_gap_space, only : patch_gap, patch_gap_t, patch_open, patch_open_cover, &
+      patch_open_t
    use emcon_patch_look_space, only : patch_basis, patch_basis_t, patch_t
    use emcon_patch_moments_space, only : patch_triangle
    use emcon_text, only : to_text
@@ -79,6 +80,7 @@ contains
       type(patch_gap_t) :: gap
       real(wp) :: x(3, n_point), area, height(3), corner(3)
       type(patch_basis_t) :: basis
+      type(patch_open_t) :: open
       integer :: i
 
       call make_facet(patch, x)
@@ -96,6 +98,13 @@ contains
       call patch_gap(patch, x, 0.0_wp*x, 0.0_wp, .true., gap)
       call check_near(error, gap%f1, area/12.0_wp*(dot_product(dual, height) &
          + sum(dual)*sum(height)), tol, 1.0_wp, "the integral")
+      patch%chi(1:patch%n_vertex:2) = 0.4_wp
+      call patch_open(patch, x, 0.0_wp*x, .true., open)
+      basis = patch_basis(patch, x, 0.0_wp*x)
+      call check_near(error, 2.0_wp*basis%area*patch_open_cover(open), sum(basis%cover, 1), tol, &
+         1.0_wp, "the cover")
+      if (allocated(error)) return
+      patch%chi = 1.0_wp
       basis = patch_basis(patch, x, 0.0_wp*x)
       call check_near(error, basis%height(:, 1), area/12.0_wp*(height + sum(height)), tol, 1.0_wp, &
          "of each weight")

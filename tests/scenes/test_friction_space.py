@@ -288,7 +288,7 @@ def cards(mu: float) -> str:
             return np.column_stack([side*(np.sin(lean)*(1.0 - up) + np.cos(lean)*out), x[:, 1] - .25,
                                     np.cos(lean)*up + np.sin(lean)*out])
         blocks.append(Block("C3D8", (1, 2, 4), size=(.1, .5, 1), place=place))
-    return (bodies(blocks, [faces(b) for b in blocks], STIFF) + comes_to_rest(1, blocks[0]) + at_rest(2, blocks[1]) + walls.wall(walls.plane()) + pair("", f"*FRICTION\n{mu}\n") + "S1, W\nS2, W\n"
+    return (bodies(blocks, [faces(b) for b in blocks], STIFF) + comes_to_rest(1, blocks[0]) + comes_to_rest(2, blocks[1]) + walls.wall(walls.plane()) + pair("", f"*FRICTION\n{mu}\n") + "S1, W\nS2, W\n"
             + f"*BOUNDARY\n{walls.FIXED}" + dynamic(.01, .3, weight() + weight(of="B2")))
 
 
@@ -313,7 +313,7 @@ def test_dominoes_fall_one_after_the_other(tmp_path: Path) -> None:
     blocks = [Block("C3D8", (1, 1, 1), size=(.2, .5, 1), place=lambda x, i=i: x + np.array([.5*i - .1, -.25, 0]))
               for i in range(3)]
     text = (bodies(blocks, [faces(b) for b in blocks], STIFF) + rigid(1, blocks[0], v=(1, 0, .2), w=(0, 2, 0))
-            + comes_to_rest(2, blocks[1]) + at_rest(3, blocks[2]) + walls.wall(walls.plane())
+            + comes_to_rest(2, blocks[1]) + comes_to_rest(3, blocks[2]) + walls.wall(walls.plane())
             + "*SURFACE INTERACTION, NAME=I, RESTITUTION=.5\n*FRICTION\n.3\n*CONTACT PAIR, INTERACTION=I\n"
             + f"S1, S2\nS2, S3\nS1, W\nS2, W\nS3, W\n*BOUNDARY\n{walls.FIXED}")
     run = ran(tmp_path, text + dynamic(.01, 2.0, weight() + weight(of="B2") + weight(of="B3")))

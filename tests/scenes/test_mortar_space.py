@@ -6,14 +6,18 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from contact_space_scenes import impact, over_the_end, press, slide, stack, turned
+from contact_space_scenes import bodies, dynamic, faces, impact, over_the_end, pair, press, slide, stack, turned, velocities
+from space_mesh import Block
 from test_contact_space import BALANCE, check_impact, moments, ran, scaled
+from test_statics_space import bore, lame, shells
 
 MORTAR = ", TYPE=MORTAR"
 #: Of the largest stress: a thousand roundings.
 EVEN = 1.0e-12
 #: Where gaps are closed in the mean nodes go in by less than guards let them.
 GUARDED = 0.05
+#: Of bars, small beside that of waves; a quarter of what a wave takes through the smallest element.
+BAR_SPEED, BAR_STEP = 1.0e-3, 0.02
 
 
 @pytest.mark.parametrize(("cells", "kind"), [
@@ -136,3 +140,65 @@ def test_bits_do_not_depend_on_units(tmp_path: Path) -> None:
         folder.mkdir()
         found.append(ran(folder, scaled(text, power)).fields()["velocity"][-1])
     assert np.array_equal(found[0], found[1])
+
+
+def bars() -> str:
+    """A bar of length 1 hits one of length 2; nothing moves sideways: c = 1, rho A = 1."""
+    one = Block("C3D8", (1, 1, 20))
+    two = Block("C3D8", (2, 2, 36), size=(1, 1, 2), place=lambda x: x - np.array([0., 0., 2.]))
+    return (bodies([one, two], [faces(one, 2, 0), faces(two, 2, 1)], "*ELASTIC\n1., 0.\n*DENSITY\n1.\n")
+            + pair(MORTAR) + velocities(one, (0., 0., -BAR_SPEED), (0., 0., 0.))
+            + f"*NSET, NSET=ALL, GENERATE\n1, {len(one.x) + len(two.x)}\n*BOUNDARY\nALL, 1, 2\n"
+            + dynamic(BAR_STEP, 2.6, "*CONTACT INITIATION, TYPE=MASSLESS\n"))
+
+
+def test_two_bars(tmp_path: Path) -> None:
+    """The short bar gives away all it has: the force is half of rho c v while a wave goes there and back, then none."""
+    run = ran(tmp_path, bars())
+    assert run.verdict["verdict"] == "good"
+    time, impulse = run.history["time"], np.abs(run.history["pair1_impulse_z"])/BAR_SPEED
+    force = np.diff(impulse)/BAR_STEP
+    print("scatter of the force", force[time[1:] < 1.9].std())
+    assert np.interp(2.0, time, impulse)/2.0 == pytest.approx(0.5, rel=0.01)
+    assert run.history["active"][-1] == 0
+    fields = run.fields()
+    way = np.diff(fields["displacement"][-2:, :, 2], axis=0)[0]/(BAR_STEP*BAR_SPEED)
+    n = 2*2*21                                   # nodes of the first bar
+    for part, exact in ((slice(0, n), 0.0), (slice(n, None), -0.5)):
+        levels, layer = np.unique(fields.x[part, 2].round(9), return_inverse=True)
+        of_layer = np.bincount(layer, way[part])/np.bincount(layer)
+        assert np.trapezoid(of_layer, levels)/np.ptp(levels) == pytest.approx(exact, abs=0.01)
+
+
+def test_press_fit(tmp_path: Path) -> None:
+    """Tubes whose faces meet, pressed into each other, against Lame."""
+    off = []
+    for n in (4, 8, 16):
+        folder = tmp_path/str(n)
+        folder.mkdir()
+        run = ran(folder, shells((n, n), 1.0e-3).replace("INTERACTION=I\nF1", "INTERACTION=I, TYPE=MORTAR\nF1"))
+        assert run.verdict["verdict"] == "good"
+        off.append(abs(bore(run)/lame(1.0e-3) - 1.0))
+    assert off[1] < 0.4*off[0] and off[2] < 0.4*off[1]
+    assert off[2] < 0.002
+
+
+@pytest.mark.parametrize("is_slave", [False, True])
+@pytest.mark.parametrize("kind", ["C3D4", "C3D8"])
+def test_a_rigid_side(kind: str, is_slave: bool, tmp_path: Path) -> None:
+    """A ball on a free plate, one of them rigid: energy and momenta of the flight, sums of both bodies."""
+    text = impact(kind, "C3D8", options=MORTAR)
+    rigid = 1 if is_slave else 2
+    middle = "0., 0., 1.06" if is_slave else "0., 0., -.35"
+    text = text.replace("*INITIAL", f"*NODE\n9999, {middle}\n*RIGID BODY, ELSET=B{rigid}, REF NODE=9999\n*INITIAL", 1)
+    if is_slave:
+        i, j = text.index("*INITIAL"), text.index("*STEP")
+        text = text[:i] + "*INITIAL CONDITIONS, TYPE=VELOCITY\n9999, 1, .6\n9999, 2, .25\n9999, 3, -1.\n" + text[j:]
+    run = ran(tmp_path, text)
+    history = run.history
+    assert run.verdict["verdict"] == "good"
+    assert history["active"].max() > 0 and np.abs(history["pair1_impulse_z"]).max() > 0.1
+    assert np.ptp(history["total"]) <= BALANCE*history["total"].max()
+    for names in ("px py pz", "lx ly lz"):
+        found = moments(run, names)
+        assert np.abs(found - found[0]).max() <= BALANCE*np.abs(moments(run, "px py pz")).max()

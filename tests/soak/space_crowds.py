@@ -1,12 +1,13 @@
 """Scenes of two to five bodies in space, drawn by a seed, beside what is right.
 
-    .venv/bin/python tests/soak/space_crowds.py [--seeds 1 200] [--folder build/soak-crowds] [--friction]
+    .venv/bin/python tests/soak/space_crowds.py [--seeds 1 200] [--folder build/soak-crowds] [--mortar] [--friction]
 
 Elastic and rigid bodies of all kinds of elements fly into each other, some of them onto a wall, a ball or a plate that is
 held; each fifth scene is one of statics: bodies on each other that contact alone holds, with planes of symmetry. Options
-are those that nobody chose. Energy is that of the history, momentum and weight are summed here from positions and
-densities, overlap is that of `overlap.py`. With friction all scenes are of dynamics, and friction takes energy in each
-increment, and is within Coulomb's cone on planes. The exit code is 1 where a run is called good and one of these says otherwise.
+are those that nobody chose; with --mortar each pair of bodies has a contact of that kind, and walls one of nodes. Energy is
+that of the history, momentum and weight are summed here from positions and densities, overlap is that of `overlap.py`. With
+--friction all scenes are of dynamics, and friction takes energy in each increment, and is within Coulomb's cone on planes.
+The exit code is 1 where a run is called good and one of these says otherwise.
 """
 
 import pathlib
@@ -26,8 +27,6 @@ KINDS = ["C3D4", "C3D8", "C3D10", "C3D20"]
 GRAVITY = 2.0
 #: Of the forces in statics, which Newton's method leaves.
 STATIC_BALANCE = 1.0e-7
-#: Have all surfaces friction?
-FRICTION = "--friction" in sys.argv
 
 
 def block(chance, is_ball, size):
@@ -67,9 +66,15 @@ def starts(all_blocks, rigid, v, w):
     return "*INITIAL CONDITIONS, TYPE=VELOCITY\n" + text if text else ""
 
 
-def contact(has_wall, all_blocks, mu=0.0):
+def contact(has_wall, all_blocks, mortar, mu):
     """Everything with everything, and all bodies with a wall."""
     text = "*SURFACE INTERACTION, NAME=I\n" + (f"*FRICTION\n{mu}\n" if mu > 0.0 else "")
+    if mortar:
+        n = len(all_blocks)
+        text += "*CONTACT PAIR, INTERACTION=I, TYPE=MORTAR\n"
+        text += "".join(f"S{i}, S{k}\n" for i in range(1, n + 1) for k in range(i + 1, n + 1))
+        lines = "".join(f"S{i}, W\n" for i in range(1, n + 1)) if has_wall else ""
+        return text + (f"*CONTACT PAIR, INTERACTION=I\n{lines}" if lines else "")
     if not (has_wall or mu > 0.0):
         return text + "*CONTACT\n*CONTACT INCLUSIONS, ALL EXTERIOR\n*CONTACT PROPERTY ASSIGNMENT\n, , I\n"
     first, lines = 0, ""
@@ -84,7 +89,7 @@ def held_plate(own):
     return f"*NSET, NSET=FOOT\n{foot}*BOUNDARY\nFOOT, 1, 3\n"
 
 
-def dynamics(seed):
+def dynamics(seed, mortar, friction):
     chance, draw = random.Random(f"crowd {seed}"), np.random.default_rng(seed)
     is_plain = seed % 3 == 0
     floor = chance.choice(["", "", "plane", "sphere", "plate"])
@@ -118,15 +123,15 @@ def dynamics(seed):
         text += f"*BOUNDARY\n{REFERENCE}, ENCASTRE\n"
     elif floor:
         text += held_plate(all_blocks[0])
-    mu = random.Random(f"friction {seed}").choice([0.1, 0.3, 0.8]) if FRICTION else 0.0
-    text += contact(floor in ("plane", "sphere"), all_blocks, mu) + starts(all_blocks, rigid, v, w)
+    mu = random.Random(f"friction {seed}").choice([0.1, 0.3, 0.8]) if friction else 0.0
+    text += contact(floor in ("plane", "sphere"), all_blocks, mortar, mu) + starts(all_blocks, rigid, v, w)
     text += f"*STEP, NLGEOM, INC=10000\n*DYNAMIC\n{chance.choice([0.01, 0.02, 0.04])}, 0.6\n"
     if floor and chance.random() < 0.5:
         text += "*DLOAD\n" + "".join(f"B{i}, GRAV, {GRAVITY}, 0., 0., -1.\n" for i in range(1, n + 1))
     return text + "*NODE FILE\nU\n*END STEP\n"
 
 
-def statics(seed):
+def statics(seed, mortar):
     """Bodies on each other, each with two planes of symmetry."""
     chance = random.Random(f"crowd {seed}")
     floor, n = chance.choice(["plane", "support"]), chance.randint(2, 5)
@@ -160,7 +165,7 @@ def statics(seed):
     if floor == "plane":
         text += wall(plane())
         held += f"{REFERENCE}, ENCASTRE\n"
-    text += contact(floor == "plane", all_blocks) + f"*BOUNDARY\n{held}*STEP, NLGEOM\n*STATIC\n0.25, 1.\n"
+    text += contact(floor == "plane", all_blocks, mortar) + f"*BOUNDARY\n{held}*STEP, NLGEOM\n*STATIC\n0.25, 1.\n"
     if load == "gravity":
         text += "*DLOAD\n" + "".join(f"B{i}, GRAV, {GRAVITY}, 0., 0., -1.\n" for i in range(1, n + 1))
     elif load == "pressure":
@@ -170,8 +175,8 @@ def statics(seed):
     return text + "*NODE FILE\nU, RF\n*END STEP\n"
 
 
-def scene(seed):
-    return statics(seed) if seed % 5 == 0 and not FRICTION else dynamics(seed)
+def scene(seed, mortar=False, friction=False):
+    return statics(seed, mortar) if seed % 5 == 0 and not friction else dynamics(seed, mortar, friction)
 
 
 # ---- what is right --------------------------------------------------------------------------------
@@ -231,7 +236,7 @@ def judge(run, deck):
         return found + judge_rest(fields, deck)
     stored = history["kinetic"] + history["strain"] - history["external_work"] + history["friction_loss"]
     stored = stored + history["restitution_loss"]    # what would change the shape of rigid bodies that stop
-    if FRICTION:
+    if "*FRICTION" in deck:
         found += judge_friction(history, deck, (history["kinetic"] + history["strain"]).max())
     if np.ptp(stored) > BALANCE*(history["kinetic"] + history["strain"]).max():
         found.append(f"energy {np.ptp(stored)/(history['kinetic'] + history['strain']).max():.1e}")
@@ -276,6 +281,4 @@ def judge_rest(fields, deck):
 
 
 if __name__ == "__main__":
-    if FRICTION:
-        sys.argv.remove("--friction")
-    sys.exit(run_scenes(scene, judge, (1, 200), "build/soak-crowds"))
+    sys.exit(run_scenes(scene, judge, (1, 200), "build/soak-crowds", ["mortar", "friction"]))

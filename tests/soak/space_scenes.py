@@ -98,9 +98,11 @@ def judge(run, _deck):
     return found
 
 
-def run_scenes(scene, judge, seeds, folder):
-    """Run what is drawn, count the verdicts, and say what is wrong; the exit code."""
+def run_scenes(scene, judge, seeds, folder, words=()):
+    """Run what is drawn, count the verdicts, and say what is wrong; the exit code. `scene` is told of `words`."""
     parser = argparse.ArgumentParser()
+    for word in words:
+        parser.add_argument(f"--{word}", action="store_true")
     parser.add_argument("--seeds", type=int, nargs=2, default=seeds)
     parser.add_argument("--folder", type=pathlib.Path, default=pathlib.Path(folder))
     chosen = parser.parse_args()
@@ -108,7 +110,7 @@ def run_scenes(scene, judge, seeds, folder):
     count, wrong, cuts, newton, steps = {}, 0, 0, 0, 0
     for seed in range(chosen.seeds[0], chosen.seeds[1] + 1):
         deck = chosen.folder/f"scene{seed}.inp"
-        deck.write_text(scene(seed))
+        deck.write_text(scene(seed, **{word: getattr(chosen, word) for word in words}))
         done = subprocess.run(["sh", "-c", f'ulimit -t {PATIENCE}; exec "$@"', "sh", PROGRAM, deck, "--quiet"],
                               capture_output=True, text=True, check=False)
         if done.returncode in (-signal.SIGXCPU, -signal.SIGKILL):

@@ -1,0 +1,172 @@
+!> Conditions of mortar contact in space: what the triangles of slave facets see over a step, and
+!> the sum of it over the facets of a vertex. Source: docs/theory.md, section 15.2.
+module emcon_mortar_sum_space
+   use emcon_condition_nodes, only : nodes_append
+   use emcon_condition_product, only : condition_add_cubed, condition_start
+   use emcon_constraint, only : condition_t
+   use emcon_kinds, only : wp
+   use emcon_mortar_faces_space, only : mortar_faces_t, mortar_faces_weight
+   use emcon_patch_gap_space, only : patch_gap_of, patch_gap_t, patch_open, patch_open_cover, &
+      patch_open_t
+   use emcon_patch_look_space, only : patch_t
+   use emcon_patch_moments_space, only : patch_area_t
+   use emcon_patch_spread_space, only : patch_spread, patch_uses
+   use emcon_patch_stencil_space, only : patch_stencil_gather, patch_stencil_t
+   implicit none
+   private
+   public :: sight_t, mortar_sight, mortar_sum
+
+   !> Covered but for round-off: the dual multipliers are as they are.
+   real(wp), parameter :: whole_cover = 256.0_wp*epsilon(1.0_wp)
+
+   !> What a triangle sees in a step, for all that is asked of it.
+   type :: sight_t
+      type(patch_open_t) :: open
+      type(patch_gap_t) :: cover                      !! what of it is covered, of an area of 1/2
+      logical :: is_full = .false.                    !! its facet is covered, but for round-off
+      logical :: is_blended = .false.                 !! between the linear multipliers and the dual
+   end type sight_t
+
+contains
+
+   !> What the triangles of a facet see, from `first` on.
+   pure subroutine mortar_sight(self, first, x, u0, du, leaves_second, sight)
+      type(mortar_faces_t), intent(in) :: self
+      integer, intent(in) :: first               !! triangle of the slave's split
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      logical, intent(in) :: leaves_second       !! no second derivatives are asked for
+      type(sight_t), intent(inout) :: sight(:)   !! (triangles of the facet)
+      real(wp), allocatable :: at(:, :), way(:, :)
+      real(wp) :: part(0:1)
+      integer :: k
+
+      part = 0.0_wp
+      do k = 1, size(sight)
+         associate (stencil => self%stencil(first + k - 1))
+            if (stencil%triangle == 0) cycle
+            if (allocated(at)) deallocate(at, way)
+            allocate(at(3, 3 + stencil%patch%n_vertex), way(3, 3 + stencil%patch%n_vertex))
+            call patch_stencil_gather(stencil, x, u0, du, at, way)
+            call patch_open(stencil%patch, at, way, leaves_second, sight(k)%open)
+            part = part + 2.0_wp*patch_open_cover(sight(k)%open)/real(size(sight), wp)
+         end associate
+      end do
+      if (.not. self%is_dual) return
+      sight%is_full = all(abs(part - 1.0_wp) <= whole_cover)
+      sight%is_blended = any(part > 0.0_wp) .and. .not. sight%is_full
+      do k = 1, size(sight)
+         if (sight(k)%open%n_vertex == 0 .or. .not. sight(k)%is_blended) cycle
+         associate (patch => self%stencil(first + k - 1)%patch)
+            call gap_of(patch, sight(k)%open, [1.0_wp, 1.0_wp, 1.0_wp], .true., 0.0_wp, &
+               leaves_second, sight(k)%cover)
+         end associate
+      end do
+   end subroutine mortar_sight
+
+   !> The gap of a triangle with a weight, or what of it is covered.
+   pure subroutine gap_of(patch, open, weight, of_cover, target, leaves_second, gap)
+      type(patch_t), intent(in) :: patch
+      type(patch_open_t), intent(in) :: open
+      real(wp), intent(in) :: weight(3)
+      logical, intent(in) :: of_cover
+      real(wp), intent(in) :: target             !! [L]
+      logical, intent(in) :: leaves_second
+      type(patch_gap_t), intent(out) :: gap
+      type(patch_area_t) :: area
+
+      area = patch%area
+      area%weight = weight
+      call patch_gap_of(open, area, of_cover, .not. of_cover, target, leaves_second, gap)
+   end subroutine gap_of
+
+   !> The condition of constraint `i`: the sum over its facets, docs/theory.md, eq. (62).
+   pure subroutine mortar_sum(self, i, sight, target, scale, item)
+      type(mortar_faces_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n
+      type(sight_t), intent(in) :: sight(:)      !! (n_triangle)
+      real(wp), intent(in) :: target             !! height to hold [L]
+      real(wp), intent(in) :: scale              !! > 0, what the value is divided by [L^2]
+      type(condition_t), intent(inout) :: item
+      type(condition_t) :: cover, skew
+      type(patch_gap_t) :: gap
+      integer :: f, k, n
+
+      call begin_condition(self, i, sight, item)
+      cover%leaves_second = item%leaves_second
+      skew%leaves_second = item%leaves_second
+      do k = self%start(i), self%start(i + 1) - 1
+         associate (t => self%triangle(k))
+            f = self%split%facet(t)
+            n = self%split%start(f + 1) - self%split%start(f)
+            if (sight(t)%is_blended .and. t == self%split%start(f)) then
+               call condition_start(skew, item%node(:item%n_node), size(item%g, 1))
+               call condition_start(cover, item%node(:item%n_node), size(item%g, 1))
+            end if
+            if (sight(t)%open%n_vertex > 0) then
+               associate (open => sight(t)%open, patch => self%stencil(t)%patch)
+                  call gap_of(patch, open, mortar_faces_weight(self, k, merge(1.0_wp, 0.0_wp, &
+                     sight(t)%is_full)), .false., target, item%leaves_second, gap)
+                  call add_gap(self%stencil(t), gap, scale, item)
+                  if (sight(t)%is_blended) then
+                     call gap_of(patch, open, self%weights%skew(:, self%vertex(k), t), .false., &
+                        target, item%leaves_second, gap)
+                     call add_gap(self%stencil(t), gap, scale, skew)
+                     call add_gap(self%stencil(t), sight(t)%cover, 0.5_wp*real(n, wp), cover)
+                  end if
+               end associate
+            end if
+            if (sight(t)%is_blended .and. t == self%split%start(f) + n - 1) &
+               call condition_add_cubed(item, cover, skew)
+         end associate
+      end do
+   end subroutine mortar_sum
+
+   !> Add a gap of a triangle by `scale` to a condition that has its nodes.
+   pure subroutine add_gap(stencil, gap, scale, item)
+      type(patch_stencil_t), intent(in) :: stencil
+      type(patch_gap_t), intent(in) :: gap
+      real(wp), intent(in) :: scale
+      type(condition_t), intent(inout) :: item
+      integer :: j
+
+      associate (is_used => patch_uses(stencil, gap%vertex))
+         associate (node => pack(stencil%node(:stencil%n_node), is_used))
+            call patch_spread(stencil, gap, is_used, scale, [(findloc( &
+               item%node(:item%n_node), node(j), 1), j = 1, size(node))], item)
+         end associate
+      end associate
+   end subroutine add_gap
+
+   !> The nodes of the condition of constraint `i`, its own first, then others of the slave, and no
+   !> derivatives yet.
+   pure subroutine begin_condition(self, i, sight, item)
+      type(mortar_faces_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n
+      type(sight_t), intent(in) :: sight(:)      !! (n_triangle)
+      type(condition_t), intent(inout) :: item
+      integer, allocatable :: list(:)
+      integer :: k, m, n, pass
+
+      associate (triangle => self%triangle(self%start(i):self%start(i + 1) - 1))
+         allocate(list(1 + sum(self%stencil(triangle)%n_node)))
+         list(1) = self%node(i)
+         n = 1
+         do pass = 1, 2
+            do k = 1, size(triangle)
+               associate (stencil => self%stencil(triangle(k)), open => sight(triangle(k))%open)
+                  if (open%n_vertex == 0) cycle
+                  associate (is_slave => [(m <= stencil%n_slave, m = 1, stencil%n_node)], &
+                        is_used => patch_uses(stencil, open%vertex(:open%n_vertex)))
+                     call nodes_append(pack(stencil%node(:stencil%n_node), is_used .and. &
+                        (is_slave .eqv. pass == 1)), list, n)
+                  end associate
+               end associate
+            end do
+            if (pass == 1) item%n_slave = n
+         end do
+      end associate
+      call condition_start(item, list(:n), self%sides%slave%n_dim)
+      item%is_mean = .true.
+   end subroutine begin_condition
+
+end module emcon_mortar_sum_space
