@@ -165,7 +165,7 @@ def statics(seed, mortar):
     if floor == "plane":
         text += wall(plane())
         held += f"{REFERENCE}, ENCASTRE\n"
-    text += contact(floor == "plane", all_blocks, mortar) + f"*BOUNDARY\n{held}*STEP, NLGEOM\n*STATIC\n0.25, 1.\n"
+    text += contact(floor == "plane", all_blocks, mortar, 0.0) + f"*BOUNDARY\n{held}*STEP, NLGEOM\n*STATIC\n0.25, 1.\n"
     if load == "gravity":
         text += "*DLOAD\n" + "".join(f"B{i}, GRAV, {GRAVITY}, 0., 0., -1.\n" for i in range(1, n + 1))
     elif load == "pressure":
