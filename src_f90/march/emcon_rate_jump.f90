@@ -71,6 +71,8 @@ contains
       if (jump%is_done) jump%is_done = contact_problem_missed(jump%problem, jump%impulse) &
          <= nearly_met
       if (.not. jump%is_done) return
+      ! Pushes of the step that pull by round-off are those of the step, too.
+      if (allocated(jump%stays)) where (jump%stays) jump%impulse = 0.0_wp
       after = reshape(matmul(jump%problem%w, reshape(jump%impulse, [size(after)])), shape(after))
       call measure_losses(jump, after)
       if (.not. jump%is_done) return

@@ -31,6 +31,7 @@ contains
       tests = [ &
          test_case_t("rates of gaps change as asked for", test_change), &
          test_case_t("beside one that rubs and sticks", test_stick), &
+         test_case_t("and stops, while pushes stay", test_stop), &
          test_case_t("no jump that would give energy", test_gain), &
          test_case_t("no energy but what solves leave", test_uncertain), &
          test_case_t("a force gives or takes an energy", test_push), &
@@ -203,6 +204,46 @@ contains
          "momenta")
       call velocity_update_free(update)
    end subroutine test_stick
+
+   !> Contact 2 is stopped along the surface by friction alone; what pushes at the others, and pulls
+   !> at one by round-off, stays, and friction takes all the energy that goes.
+   subroutine test_stop(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: pull = -0.5_wp**20
+      type(system_t) :: system
+      type(constraint_set_t) :: set
+      type(velocity_update_t) :: update
+      type(rate_jump_t) :: jump
+      real(wp) :: slip
+      real(wp), allocatable :: v(:, :), v0(:, :), x(:, :)
+
+      call begin(system, set, v, x, .false., error)
+      if (allocated(error)) return
+      set%item(2)%has_friction = .true.
+      call constraints_evaluate(set, system, motion_of(evaluation_t(), x, 0.0_wp*v, 0.0_wp*v))
+      v0 = v
+      slip = condition_rate(set%item(2), v, 1)
+      jump%row = [1, 2, 3]
+      call contact_problem_create(jump%problem, 1, 3)
+      allocate(jump%rate(0:1, 3), jump%taken(3), source=0.0_wp)
+      allocate(jump%stays(0:1, 3), source=.true.)
+      jump%stays(1, 2) = .false.
+      jump%rate(1, 2) = slip
+      jump%problem%free(1, 2) = slip
+      jump%problem%base(0, :) = [8.0_wp, 8.0_wp, pull]
+      jump%problem%mu(2) = 10.0_wp
+      call velocity_update_change(update, system, set, jump, v, error)
+      if (allocated(error)) return
+      call check_true(error, jump%is_done .and. abs(slip) > 1.0e-3_wp, "it is taken")
+      call check_near(error, condition_rate(set%item(2), v, 1), 0.0_wp, tol, 1.0_wp, "a stop")
+      call check_near(error, pack(jump%impulse, jump%stays), spread(0.0_wp, 1, 5), 0.0_wp, 1.0_wp, &
+         "pushes stay")
+      call check_near(error, [jump%gained, -sum(jump%rubbed)], spread(energy_of(system, v) &
+         - energy_of(system, v0), 1, 2), tol, 1.0_wp, "energy")
+      call check_near(error, momenta_of(system, v, x), momenta_of(system, v0, x), tol, 1.0_wp, &
+         "momenta")
+      call velocity_update_free(update)
+   end subroutine test_stop
 
    subroutine test_gain(error)
       type(error_t), allocatable, intent(out) :: error
