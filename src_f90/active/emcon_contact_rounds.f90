@@ -40,7 +40,6 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      character(len=:), allocatable :: slides    ! what friction at its limit leaves free
       logical :: leads
 
       call candidates_clear(self%candidates)
@@ -69,6 +68,21 @@ contains
       end if
       if (size(system%contact) == 0) return
       if (status == newton_refused .and. newton%n_solve == 0) return    ! nor are there forces below
+      call solve_together(self, system, scene, newton, motion, status, error)
+   end subroutine contact_rounds_solve
+
+   !> No set stands: with all candidates, from where the sets have led to, or from the first guess on
+   !> where they lead astray.
+   subroutine solve_together(self, system, scene, newton, motion, status, error)
+      type(active_set_t), intent(inout) :: self
+      type(system_t), intent(inout) :: system
+      type(scene_t), intent(in) :: scene
+      type(newton_t), intent(inout) :: newton
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status             !! one of the `step_` codes
+      type(error_t), allocatable, intent(out) :: error
+      character(len=:), allocatable :: slides    ! what friction at its limit leaves free
+
       status = step_cycling
       if (candidates_are_too_many(self)) return
       if (self%support%is_needed) then
@@ -92,7 +106,7 @@ contains
       status = step_not_held
       self%support%is_pushed = .true.
       call move_alloc(slides, self%support%text)
-   end subroutine contact_rounds_solve
+   end subroutine solve_together
 
    !> Does something slide whose way turns, as slip with two components does? No set says where to.
    pure logical function turns(self)

@@ -146,8 +146,8 @@ contains
 
    !> Where slip has a direction, what acts is led to no slip before the step is solved: friction is
    !> to be against the slip of the whole step, not that of its end. Those that a solved step stops
-   !> or turns back are: by the jump of velocities that ends the step, or, with a scheme that takes
-   !> none, by the step, which is to be solved again.
+   !> or turns back are, and it is to be solved again; but of nodes of rigid bodies, whose slips
+   !> over a step disagree by the square of its turn, by the jump of velocities that ends the step.
    subroutine friction_look_back(self, system, set, motion, leads)
       type(friction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
@@ -155,10 +155,13 @@ contains
       type(motion_t), intent(in) :: motion
       logical, intent(out) :: leads              !! it is to be solved again
       real(wp) :: du(size(motion%du, 1), size(motion%du, 2)), to_stop(most_slips)
+      logical :: is_bound(size(motion%du, 2)), takes_jumps, by_jump
       integer :: i, k, pair
 
       leads = .false.
       if (evaluation_is_equilibrium(motion%evaluation)) return
+      takes_jumps = evaluation_contact_conserves(motion%evaluation)
+      call find_bound(system, set, is_bound)
       du = evaluation_displacement(motion%evaluation, motion%v0, 0.0_wp)
       do k = set%n_permanent + 1, set%n
          call constraint_index(system, set%id(k), pair, i)
@@ -170,13 +173,32 @@ contains
             ! Of what sticks slip is round-off.
             if (.not. law%holds_slip() .and. dot_product(slip - to_stop, slip) > 0.0_wp) cycle
             call law%leads_to(to_stop(:self%n_slip), slip_rounding*contact%state(i)%size)
-            leads = leads .or. any(abs(law%slip_target) > 0.0_wp)
-            if (evaluation_contact_conserves(motion%evaluation)) law%slip_target = 0.0_wp
+            if (.not. any(abs(law%slip_target) > 0.0_wp)) cycle
+            by_jump = takes_jumps .and. all(is_bound(set%item(k)%node(:set%item(k)%n_node)))
+            if (by_jump) law%slip_target = 0.0_wp
+            self%stops = self%stops .or. by_jump
+            leads = leads .or. .not. by_jump
          end associate
       end do
-      self%stops = leads .and. evaluation_contact_conserves(motion%evaluation)
-      leads = leads .and. .not. self%stops
    end subroutine friction_look_back
+
+   !> Nodes of rigid bodies, and those that are held in all directions.
+   pure subroutine find_bound(system, set, is_bound)
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+      logical, intent(out) :: is_bound(:)        !! (n_node)
+      integer :: a, i, k
+
+      associate (numbering => system%space%numbering)
+         do i = 1, size(is_bound)
+            is_bound(i) = all([(numbering_fixes(numbering, a, i), &
+               a = 1, size(numbering%unknown, 1))])
+         end do
+      end associate
+      do k = 1, set%n_permanent
+         is_bound(set%item(k)%node(:set%item(k)%n_node)) = .true.
+      end do
+   end subroutine find_bound
 
    !> Contacts whose slave node is held in some direction, and which nothing that is free to move
    !> makes slide, as on a line of symmetry, do not rub: any friction would satisfy the law there,

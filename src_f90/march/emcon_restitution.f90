@@ -217,8 +217,9 @@ contains
       allocate(jump%stays(0:jump%problem%n_slip, size(jump%row)), source=.true.)
       do k = 1, size(jump%row)
          associate (law => self%active%friction%law(self%active%set%id(jump%row(k))))
+            ! What is led to its stop in the step has it.
             if (self%active%set%item(jump%row(k))%has_friction .and. any(abs(law%slip_to_stop) &
-               > 0.0_wp)) then
+               > 0.0_wp) .and. .not. any(abs(law%slip_target) > 0.0_wp)) then
                jump%stays(1:, k) = .false.
                jump%problem%free(1:, k) = (1.0_wp - law%restitution)*jump%rate(1:, k)
             else

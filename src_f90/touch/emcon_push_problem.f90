@@ -1,13 +1,13 @@
 !> Gaps without friction: pushes lam >= 0 with g = b + W lam >= 0 and lam.g = 0, where W may be
 !> singular: rows may follow from others, as of aligned bodies in a stack.
 !>
-!> The least motion that closes no gap, by its dual: the deepest gap is pushed open while those that
-!> push stay closed; what would come to pull is let go, also in favour of a row that follows from it.
-!> So those that push never depend on each other, and each push that is added does work. It begins
-!> with those of a start that push without closing anything, as in a step whose contacts are nearly
-!> those of the iterate before. With a symmetric W the method ends; over a step rows and columns of
-!> W are gradients at its end and discrete ones, and differ a little. Source: Goldfarb and Idnani,
-!> Math. Program. 27 (1983) 1-33.
+!> The least motion that closes no gap, by its dual: the deepest gap is pushed open while those
+!> that push stay closed; what would come to pull is let go, also in favour of a row that follows
+!> from it. So those that push never depend on each other, and each push that is added does work.
+!> It begins with those of a start that push without closing anything, as in a step whose contacts
+!> are nearly those of the iterate before. With a symmetric W the method ends; over a step rows and
+!> columns of W are gradients at its end and discrete ones, and differ a little. Source: Goldfarb
+!> and Idnani, Math. Program. 27 (1983) 1-33.
 module emcon_push_problem
    use emcon_kinds, only : wp
    implicit none
