@@ -19,7 +19,8 @@ contains
       logical :: has_faces(0:size(surface)), is_meant(size(pair))
       integer :: i
 
-      has_faces = [.false., (.not. allocated(surface(i)%wall), i = 1, size(surface))]
+      has_faces = [.false., (.not. (allocated(surface(i)%wall) .or. surface(i)%is_nodal), &
+         i = 1, size(surface))]
       do i = 1, size(pair)
          is_meant(i) = pair(i)%holds_crossings .and. pair(i)%formulation /= formulation_user &
             .and. pair(i)%interaction%pressure%kind == pressure_hard &
