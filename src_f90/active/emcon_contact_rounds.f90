@@ -71,8 +71,8 @@ contains
       call solve_together(self, system, scene, newton, motion, status, error)
    end subroutine contact_rounds_solve
 
-   !> No set stands: with all candidates, from where the sets have led to, or from the first guess on
-   !> where they lead astray.
+   !> No set stands: with all candidates, from where the sets have led to, or from the first guess
+   !> on where they lead astray.
    subroutine solve_together(self, system, scene, newton, motion, status, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
