@@ -128,7 +128,7 @@ contains
       type(active_set_t), intent(inout) :: self
       integer :: k
 
-      if (.not. self%friction%is_on) return
+      if (.not. self%friction%looks_back) return
       do k = self%set%n_permanent + 1, self%set%n
          associate (law => self%friction%law(self%set%id(k)), id => self%set%id(k))
             if (law%status%kind /= contact_slides .or. .not. self%set%lam(k) > 0.0_wp) cycle

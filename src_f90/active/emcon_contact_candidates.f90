@@ -231,6 +231,9 @@ contains
             own = step_done
             self%is_stale = .false.
             if (.not. self%candidates%takes_part(id)) then
+               ! In statics a guard bears what others would: one at a time.
+               if (.not. self%rules%has_impacts) may_join = .not. (contact%slack > 0.0_wp .and. &
+                  self%candidates%have_changed)
                call join(self, system, pair, i, motion, may_join, own)
             else if (self%candidates%acts(id) .or. contact%state(i)%is_leaving) then
                if (self%candidates%acts(id)) k = k + 1

@@ -116,8 +116,8 @@ contains
       if (turns) turns = active_set_slides(self) .and. .not. candidates_are_many(self)
    end function turns
 
-   !> Hold what contact alone holds, from the first guess on and with friction that holds all that
-   !> touches.
+   !> Hold what contact alone holds, from the first guess on; where slip has a direction with
+   !> friction that holds all that touches.
    subroutine hold_again(self, system, scene, newton, motion)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
@@ -127,7 +127,7 @@ contains
 
       call contact_sets_begin_anew(self, newton, motion)
       self%is_active = self%candidates%began
-      if (self%friction%is_on) self%friction%law%status = slip_status_t()
+      if (self%friction%looks_back) self%friction%law%status = slip_status_t()
       call contact_support_forget(self%support)
       call contact_sets_hold(self, system, scene, newton%driven, motion)
       call system_stiffen(system, self%support%hangs, motion)

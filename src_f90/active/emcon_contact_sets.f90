@@ -108,15 +108,16 @@ contains
    end subroutine contact_sets_solve
 
    !> Does something stay free that contact is to hold? What no load works on in a set that was
-   !> tried on the way tells of that set alone, and so does what slides: friction that is at its
-   !> limit at all contacts may hold a body all the same, if it is at it along different ways.
+   !> tried on the way tells of that set alone, and so does what slides where slip has a direction:
+   !> friction that is at its limit at all contacts, along different ways, may hold a body all the
+   !> same.
    pure logical function is_left_free(self, is_first)
       type(active_set_t), intent(in) :: self
       logical, intent(in) :: is_first            !! no set was tried before
 
       is_left_free = allocated(self%support%text)
       if (is_left_free) is_left_free = (is_first .or. self%support%is_pushed) &
-         .and. .not. active_set_slides(self)
+         .and. .not. (self%friction%looks_back .and. active_set_slides(self))
    end function is_left_free
 
    !> Take in what holds bodies, with friction that has gripped in the set before, if there was one.
