@@ -19,7 +19,7 @@ contains
       logical :: has_faces(0:size(surface)), is_meant(size(pair))
       integer :: i
 
-      has_faces = [.false., (has_edges(surface(i)), i = 1, size(surface))]
+      has_faces = [.false., (.not. allocated(surface(i)%wall), i = 1, size(surface))]
       do i = 1, size(pair)
          is_meant(i) = pair(i)%holds_crossings .and. pair(i)%formulation /= formulation_user &
             .and. pair(i)%interaction%pressure%kind == pressure_hard &
@@ -32,13 +32,5 @@ contains
       edges%of_pair = [(i, i = 1, size(pair))]
       edges = pack(edges, is_meant)
    end subroutine edge_pairs_find
-
-   !> Walls have a shape, and a surface of nodes has nothing between them.
-   pure logical function has_edges(surface)
-      type(surface_t), intent(in) :: surface
-
-      has_edges = .not. allocated(surface%wall)
-      if (has_edges .and. allocated(surface%node)) has_edges = size(surface%node) == 0
-   end function has_edges
 
 end module emcon_edge_pairs_space
