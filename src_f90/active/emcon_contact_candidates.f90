@@ -218,23 +218,18 @@ contains
       type(motion_t), intent(in) :: motion
       integer, intent(inout) :: k                !! places of the set that were looked at
       integer, intent(inout) :: status
-      logical :: was_stale, may_join
+      logical :: was_stale, had_changed
       integer :: i, id, own
 
       was_stale = self%is_stale
-      ! What the pairs take in may hold the bodies away from their guards.
-      may_join = .not. (system%contact(pair)%contact%slack > 0.0_wp .and. &
-         self%candidates%have_changed)
+      had_changed = self%candidates%have_changed
       associate (contact => system%contact(pair)%contact)
          do i = 1, contact%n_constraint
             id = system%first_constraint(pair) + i
             own = step_done
             self%is_stale = .false.
             if (.not. self%candidates%takes_part(id)) then
-               ! In statics a guard bears what others would: one at a time.
-               if (.not. self%rules%has_impacts) may_join = .not. (contact%slack > 0.0_wp .and. &
-                  self%candidates%have_changed)
-               call join(self, system, pair, i, motion, may_join, own)
+               call join(self, system, pair, i, motion, had_changed, own)
             else if (self%candidates%acts(id) .or. contact%state(i)%is_leaving) then
                if (self%candidates%acts(id)) k = k + 1
                call look_at_acting(self, contact, i, id, k, motion, own)
@@ -292,20 +287,24 @@ contains
       end associate
    end function has_closed
 
-   !> Does the `i`-th constraint of a pair, which is no candidate, close?
-   subroutine join(self, system, pair, i, motion, may_join, status)
+   !> Does the `i`-th constraint of a pair, which is no candidate, close? A guard waits: what the
+   !> pairs take in may hold the bodies away from it. In statics one guard bears what others would,
+   !> so that they join one at a time.
+   subroutine join(self, system, pair, i, motion, had_changed, status)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       integer, intent(in) :: pair, i
       type(motion_t), intent(in) :: motion
-      logical, intent(in) :: may_join            !! else it is looked at later
+      logical, intent(in) :: had_changed         !! candidates, before this pair was looked at
       integer, intent(inout) :: status           !! a failure where it cannot
       logical :: closes
 
       associate (contact => system%contact(pair)%contact, id => system%first_constraint(pair) + i)
          if (contact%state(i)%is_leaving) return
          call look_at_open(self, contact, i, id, closes, status)
-         if (.not. (closes .and. may_join)) return
+         if (.not. closes) return
+         if (contact%slack > 0.0_wp .and. merge(had_changed, self%candidates%have_changed, &
+            self%rules%has_impacts)) return
          if (self%candidates%has_left(id) .and. self%candidates%is_back(id)) status = step_too_far
          self%candidates%is_back(id) = self%candidates%has_left(id)
          if (self%friction%is_on) call friction_close(self%friction, system, pair, i, motion, &
