@@ -184,16 +184,26 @@ def test_restart_does_not_need_the_deck(deck, whole, tmp_path):
 # ---- interrupted --------------------------------------------------------------------------------
 
 
+def interrupt(deck, run, moment, number=signal.SIGINT):
+    """Interrupt a run when `moment(process, attempt)` returns; again where it had ended by then."""
+    for attempt in range(8):
+        shutil.rmtree(run.base.parent, ignore_errors=True)
+        process = start(deck, "--output", run.base.parent)
+        moment(process, attempt)
+        process.send_signal(number)
+        out, err = process.communicate(timeout=60)
+        if process.returncode != 0:
+            break
+    return process.returncode, out, err
+
+
 @pytest.mark.parametrize("number", [signal.SIGINT, signal.SIGTERM])
 def test_interrupt_keeps_all_whole_increments(deck, whole, tmp_path, number):
     expected, _ = whole
-    run = Run(tmp_path / "ring")
-    process = start(deck, "--output", tmp_path)
-    wait_for(run.file(".rst.h5"), process)
-    process.send_signal(number)
-    out, err = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert_no_crash(process.returncode, out + err)
+    run = Run(tmp_path / "out" / "ring")
+    code, out, err = interrupt(deck, run, lambda process, _: wait_for(run.file(".rst.h5"), process), number)
+    assert code == 130
+    assert_no_crash(code, out + err)
     assert "interrupted after increment" in err and "emcon restart" in err
     assert_files_open(run)
     n_done = len(run.history) - 1
@@ -208,17 +218,13 @@ def test_interrupt_keeps_all_whole_increments(deck, whole, tmp_path, number):
 def test_interrupt_before_the_first_increment(deck, whole, tmp_path):
     """At any moment of the first half: 130 with files that can be gone on with, or not begun."""
     for k in range(4):
-        folder = tmp_path / str(k)
-        run = Run(folder / "ring")
-        process = start(deck, "--quiet", "--output", folder)
-        time.sleep(whole[1]*k/8)
-        process.send_signal(signal.SIGINT)
-        out, err = process.communicate(timeout=60)
-        if process.returncode == -signal.SIGINT:
+        run = Run(tmp_path / str(k) / "ring")
+        code, out, err = interrupt(deck, run, lambda _, attempt, k=k: time.sleep(whole[1]*k/8/2**attempt))
+        if code == -signal.SIGINT:
             assert not run.file(".csv").exists()
             continue
-        assert process.returncode == 130, err
-        assert_no_crash(process.returncode, out + err)
+        assert code == 130, err
+        assert_no_crash(code, out + err)
         finish(run, deck)
         assert run.digits() == whole[0].digits()
 
