@@ -1,5 +1,6 @@
 """Fixtures for all tests. Helpers to import are in scene_tools.py, beside this file."""
 
+import collections
 import concurrent.futures
 import functools
 import os
@@ -43,8 +44,28 @@ def pytest_addoption(parser):
     parser.addoption("--long", action="store_true", help="tests marked as long as well")
 
 
+def mark_what_others_show(items):
+    """Of a test marked `each_value` as many cases are quick as hold each value of each parameter."""
+    cases = collections.defaultdict(list)
+    for item in items:
+        if item.get_closest_marker("each_value") and not item.get_closest_marker("long"):
+            values = {(name, id(value)) for name, value in item.callspec.params.items()}
+            cases[item.function].append((values, item))
+    for left in cases.values():
+        n_seen = dict.fromkeys(set().union(*(values for values, _ in left)), 0)
+        while 0 in n_seen.values():
+            case = max(left, key=lambda case: (sum(n_seen[v] == 0 for v in case[0]),
+                                               -sum(n_seen[v] for v in case[0])))
+            for value in case[0]:
+                n_seen[value] += 1
+            left.remove(case)
+        for _, item in left:
+            item.add_marker("long")
+
+
 def pytest_collection_modifyitems(config, items):
     """Long tests are left out unless asked for; no test may need another one to have run before it."""
+    mark_what_others_show(items)
     if not config.getoption("--long"):
         config.hook.pytest_deselected(items=[item for item in items if item.get_closest_marker("long")])
         items[:] = [item for item in items if not item.get_closest_marker("long")]

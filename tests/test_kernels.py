@@ -1,5 +1,6 @@
 """The kernel tests, one suite at a time, as built for use and with all run-time checks."""
 
+import itertools
 import os
 import pathlib
 import re
@@ -12,8 +13,13 @@ ROOT = pathlib.Path(__file__).resolve().parents[1]
 SUITES = re.findall(r'^ *call run\("(\w+)"', (ROOT / "tests/kernels/main.F90").read_text(), re.M)
 
 
-@pytest.mark.parametrize("mode", ["release", "debug"])
-@pytest.mark.parametrize("suite", SUITES)
+#: With all checks it takes ten seconds; the kernels of marches, that take one, call the same code.
+LONG = {("march_units", "debug")}
+
+
+@pytest.mark.parametrize(("suite", "mode"), [
+    pytest.param(*which, marks=[pytest.mark.long]*(which in LONG))
+    for which in itertools.product(SUITES, ["release", "debug"])])
 def test_suite(suite, mode):
     program = ROOT / "build" / mode / "kernels"
     done = subprocess.run(

@@ -209,6 +209,7 @@ def test_outlines_in_space_enclose_their_volume(kind):
     assert np.allclose(turns(p, points[triangle]), [1, 0, 0])
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("depth", [0.2, 1e-3, 1e-9])
 def test_depth_of_a_block_in_a_block(kind, depth):

@@ -182,7 +182,8 @@ contains
       end do
    end subroutine friction_look_back
 
-   !> Nodes of rigid bodies, and those that are held in all directions.
+   !> Nodes that permanent conditions bind, as those of rigid bodies, and nodes that are held in all
+   !> directions.
    pure subroutine find_bound(system, set, is_bound)
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set

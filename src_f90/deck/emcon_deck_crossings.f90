@@ -41,16 +41,11 @@ contains
       type(scene_t), intent(in) :: scene
       type(contact_pair_t), intent(in) :: pair
       character(len=:), allocatable, intent(out) :: why
-      logical :: has_nodes                           !! and no faces
 
       why = ""
-      has_nodes = allocated(scene%surface(pair%slave)%node)
-      if (has_nodes) has_nodes = size(scene%surface(pair%slave)%node) > 0
-      associate (slave => scene%surface(pair%slave), master => scene%surface(pair%master))
+      associate (master => scene%surface(pair%master))
          if (allocated(master%wall)) then
             why = "surface " // master%name // " has a shape and no edges of elements"
-         else if (has_nodes) then
-            why = "surface " // slave%name // " has nodes and no edges"
          else if (pair%formulation == formulation_user) then
             why = "what TYPE=USER holds the program says that gives it"
          else if (pair%interaction%pressure%kind /= pressure_hard) then

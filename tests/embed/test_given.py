@@ -131,6 +131,7 @@ def run(model: Model) -> tuple[np.ndarray, float, int]:
 
 # ---- what a law does -----------------------------------------------------------------------------
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "MORTAR"])
 @pytest.mark.parametrize("law", [quadratic, neo_hooke, tension_only, anisotropic])
 def test_energy_is_kept_through_an_impact(formulation: str, law: Law) -> None:

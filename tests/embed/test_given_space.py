@@ -90,6 +90,7 @@ def run(model: Model) -> tuple[np.ndarray, np.ndarray, float]:
         return stepper.u, stepper.stress, drift/abs(before) if before else drift
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("kind", ["C3D4", "C3D8", "C3D10", "C3D20"])
 @pytest.mark.parametrize("law", [quadratic, neo_hooke, crystal])
 def test_energy_and_momenta_are_kept(law: Law, kind: str) -> None:

@@ -9,8 +9,10 @@ import pytest
 from python_doc import OUTPUTS, PAGES, RUNS, blocks, examples, is_near, pictures, run_chapter
 
 TEXTS = {path: path.read_text(encoding="utf-8") for path in PAGES}
-CHAPTERS = [pytest.param(path, title, id=f"{path.stem}-{title}") for path, text in TEXTS.items()
-            for title in examples(text)]
+#: Their runs take seconds.
+LONG = {"7 Studies", "11 What settings buy"}
+CHAPTERS = [pytest.param(path, title, id=f"{path.stem}-{title}", marks=[pytest.mark.long]*(title in LONG))
+            for path, text in TEXTS.items() for title in examples(text)]
 
 
 @pytest.mark.parametrize("page, title", CHAPTERS)

@@ -95,6 +95,7 @@ def free(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, str]:
     return folder, done.stdout
 
 
+@pytest.mark.long
 def test_a_free_fall_has_no_error(free: tuple[Path, str]) -> None:
     """The scheme is exact for it: errors are rounding, of sums over fifty elements."""
     folder, text = free

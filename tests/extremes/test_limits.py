@@ -15,8 +15,11 @@ from limits.conditions import condition, conditions, matrices  # noqa: E402
 from limits.impacts import NODES, stiffer  # noqa: E402
 from limits.seen import energies, energy_seen, overlap_seen, sections  # noqa: E402
 
-CASES = [pytest.param(row, k, id=f"{row.name}-{text_of(row.values[k]).replace(' ', '-')}")
-         for row in ROWS for k in row.tested()]
+#: Rows whose runs take seconds.
+LONG = {"sizes", "scale", "stack", "space_origin", "space_aspect", "space_rotation", "space_slant", "space_crossing",
+        "space_gap", "space_corner", "space_modulus"}
+CASES = [pytest.param(row, k, id=f"{row.name}-{text_of(row.values[k]).replace(' ', '-')}",
+                      marks=[pytest.mark.long]*(row.name in LONG)) for row in ROWS for k in row.tested()]
 
 
 @pytest.mark.parametrize(("row", "k"), CASES)

@@ -73,6 +73,7 @@ def test_a_signal_leaves_a_restart_file(flight, tmp_path, number):
     assert run.file(".rst.h5").exists() and "emcon restart" in err
 
 
+@pytest.mark.long
 def test_standard_output_that_nobody_reads_any_more(flight, tmp_path):
     """As under `emcon deck | head -1`: the first line that is not taken stops the run."""
     read_end, write_end = os.pipe()

@@ -174,6 +174,7 @@ FORMULATIONS = [
 ]
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("units", [(-10, 20, -7), (100, -90, 60)])
 @pytest.mark.parametrize("choice", FORMULATIONS, ids=lambda choice: ", ".join(choice.values()))
 def test_formulations(tmp_path, reference, choice, units):

@@ -252,8 +252,8 @@ contains
       real(wp) :: work, total(3), moment(3), magnitude
       integer :: i, j, k, a
 
-      do k = 1, 48
-         call draw(k, 0.3_wp*0.3_wp**(k/4), scene, du, contact, error)
+      do k = 1, 24
+         call draw(k, 0.3_wp*0.09_wp**(k/4), scene, du, contact, error)
          if (allocated(error)) return
          call look(contact, scene, du)
          call evaluate(contact, scene, du, .true., seen(contact), item)

@@ -20,6 +20,7 @@ def run_scene(name, sides, folder, code=0):
     return run, worst(run.fields(), scene.alone).by_edge
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("sides", [BOTH, ALL])
 @pytest.mark.parametrize("name", ["ledge", "bowl", "coil", "accordion", "slide off"])
 def test_nothing_overlaps(name, sides, tmp_path):

@@ -119,6 +119,7 @@ def test_hollow_ball(kind, tmp_path):
     assert fine < (1e-4 if kind in QUADRATIC else 1e-2)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("damping", ["", "*DAMPING, BETA=0.1\n"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_free_flight(kind, damping, tmp_path):

@@ -31,9 +31,9 @@ def run(*command):
     return done.stdout
 
 
-@pytest.mark.parametrize(("name", "least"), [("bench_ring", 10), ("bench_python", 10),
-                                             ("bench_discs", 4), ("bench_ties_space", 7),
-                                             ("bench_friction_space", 6)])
+@pytest.mark.parametrize(("name", "least"), [
+    ("bench_ring", 10), pytest.param("bench_python", 10, marks=pytest.mark.long), ("bench_discs", 4),
+    pytest.param("bench_ties_space", 7, marks=pytest.mark.long), ("bench_friction_space", 6)])
 def test_bench(name, least):
     """Its tables are there; their figures are nothing to judge by."""
     lines = run(BENCH / f"{name}.py", "--short").splitlines()
@@ -118,6 +118,7 @@ def test_chapter_of_the_book():
     assert text.startswith("patch\n") and text.count("|") > 6
 
 
+@pytest.mark.long
 def test_table_of_simplifications():
     """The scene of docs/trade.md that is the quickest to run, each kind once."""
     lines = run(BENCH / "trade.py", "--rounds", "1", "gears").splitlines()

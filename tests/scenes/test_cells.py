@@ -46,6 +46,7 @@ def whole_deck(mesh: Mesh, n: int, sides: list[tuple[int, int]]) -> tuple[str, n
     return text, x, first
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("how", ["large", "linear", "multipliers"])
 @pytest.mark.parametrize("name", RINGS)
 def test_sector_at_rest(name: str, how: str, tmp_path: Path) -> None:

@@ -50,7 +50,7 @@ def test_a_stack(mu, tmp_path):
     assert (moved > 0.02) == (mu < 0.2)
 
 
-@pytest.mark.parametrize("part", [0.8, 6.0])
+@pytest.mark.parametrize("part", [0.8, pytest.param(6.0, marks=pytest.mark.long)])
 def test_an_arch(part, tmp_path):
     run = run_deck(arch(part*arch_needs(), BOTH, t_end=0.2), tmp_path, formulation=NODES,
                    method="SADDLE POINT")

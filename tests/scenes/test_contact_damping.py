@@ -56,6 +56,7 @@ def impulse(gap, mu, clearance, flat):
     return mu*part
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("flat", [1.0, 0.5, 0.0])
 @pytest.mark.parametrize("h", [0.5, 0.08, 0.02])
 @pytest.mark.parametrize("more", KINDS)
@@ -214,6 +215,7 @@ def test_a_ring_keeps_momenta_and_pays_for_damping(more, tmp_path):
         assert np.allclose(whole[name][:len(part)], part[name], rtol=1e-9, atol=1e-11)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("more", [{"method": "PENALTY"}, {"method": "AUGMENTED LAGRANGE"},
                                   {"initiation": "ADMISSIBLE"}, {"initiation": "VELOCITY UPDATE"}])
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "MORTAR"])

@@ -32,7 +32,12 @@ def series(run, place, variable):
     return run.series(place, variable)[1]
 
 
-@pytest.fixture(scope="module", params=[(m, s) for m in MESHES for s in SIDES],
+#: Held from both sides quadratic faces take seconds.
+PRESSED = [pytest.param((m, s), marks=[pytest.mark.long]*(m[0] in ("C3D10", "C3D20") and not s))
+           for m in MESHES for s in SIDES]
+
+
+@pytest.fixture(scope="module", params=PRESSED,
                 ids=lambda p: "-".join(map(str, p[0])) + ("-one" if p[1] else "-both"))
 def pressing(request, tmp_path_factory):
     (upper, lower, m, n), sides = request.param

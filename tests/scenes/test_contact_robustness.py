@@ -205,6 +205,7 @@ TOUCHING = {
 }
 
 
+@pytest.mark.each_value
 @every_choice
 @pytest.mark.parametrize("name", TOUCHING)
 def test_gap_zero_with_coincident_nodes(tmp_path, name, choice):
@@ -218,6 +219,7 @@ def test_gap_zero_with_coincident_nodes(tmp_path, name, choice):
     assert low < up
 
 
+@pytest.mark.each_value
 @every_choice
 @pytest.mark.parametrize("velocity", [(0.5, 0.0), (0.0, 1.0)])
 def test_gap_zero_without_pressure(tmp_path, velocity, choice):
@@ -260,6 +262,7 @@ CORNERS = {
 }
 
 
+@pytest.mark.each_value
 @every_choice
 @pytest.mark.parametrize("name", CORNERS)
 def test_corners_meet(tmp_path, name, choice):
@@ -270,6 +273,7 @@ def test_corners_meet(tmp_path, name, choice):
     assert momentum_of(run, 0)[-1, 1] < 0
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("choice", [name for name in CHOICES if name != "points"])
 @pytest.mark.parametrize("shift", [0.0, 1e-3])
 def test_tips_meet(tmp_path, shift, choice):
@@ -314,6 +318,7 @@ def test_persistent_contact_does_not_pull(tmp_path, name, coarser):
 TARGET = ((-2, -1), (4, 1), (16, 4))
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("initiation", INITIATIONS)
 @every_choice
 @pytest.mark.parametrize("gap", [0.3, 2.4])
@@ -329,6 +334,7 @@ def test_no_tunnelling(tmp_path, gap, choice, initiation):
     assert momentum_of(run, 0)[-1, 1] < 0
 
 
+@pytest.mark.each_value
 @every_choice
 @pytest.mark.parametrize("swap", [False, True])
 def test_no_flight_through_a_body(tmp_path, swap, choice):
@@ -348,6 +354,7 @@ def test_no_flight_through_a_body(tmp_path, swap, choice):
 # ---- several pairs ------------------------------------------------------------------------------
 
 
+@pytest.mark.each_value
 @every_choice
 @pytest.mark.parametrize("cells", [(4, 4, 4), (4, 5, 3)])
 @pytest.mark.parametrize("gap", [0.0, 0.03])
@@ -397,6 +404,7 @@ def test_sides_that_do_not_touch_change_nothing(tmp_path, choice):
     np.testing.assert_allclose(force[1], force[0], rtol=0, atol=1e-9*np.abs(force[0]).max())
 
 
+@pytest.mark.each_value
 @every_choice
 @pytest.mark.parametrize("shift", [0.5 + 1e-3, 0.5 + 1e-5, 0.5 - 1e-5, 0.75 - 1e-3, 0.75 - 1e-5])
 def test_nearly_coincident_nodes_and_ends(tmp_path, shift, choice):

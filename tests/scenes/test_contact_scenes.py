@@ -59,6 +59,7 @@ def patch(deck, folder, **parameters):
     return fields["cauchy_stress"][-1], fields["contact_pressure"][-1][active]
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("choice", MORTAR)
 @pytest.mark.parametrize("variant", PATCH)
 def test_mortar_passes_the_patch_test(tmp_path, variant, choice):
@@ -145,7 +146,7 @@ def hertz_pressure(run):
     return x[arc, 0], force, force/length
 
 
-@pytest.mark.parametrize("choice", ["edge", "nodal, dual"])
+@pytest.mark.parametrize("choice", [pytest.param("edge", marks=pytest.mark.long), "nodal, dual"])
 def test_hertz_converges(tmp_path, choice):
     """Half-width, from the second moment of the force (a^2/4), and peak pressure."""
     width_error, peak_error = [], []
@@ -243,6 +244,7 @@ def free(tmp_path_factory):
     return run
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("choice", CHOICES)
 @pytest.mark.parametrize("scene", FREE)
 def test_free_bodies_conserve(free, scene, choice):
@@ -285,6 +287,7 @@ def test_momenta_of_the_headings(tmp_path):
     np.testing.assert_allclose(momentum, px, rtol=0, atol=spread)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("method", ["NULL SPACE", "SADDLE POINT"])
 @pytest.mark.parametrize("choice", ["node", "segment", "edge", "nodal, dual"])
 def test_two_passes(tmp_path, choice, method):

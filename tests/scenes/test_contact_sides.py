@@ -30,6 +30,7 @@ def rounding(fields):
     return 8*EPSILON*np.abs(fields.x).max()/np.linalg.norm(edges, axis=-1).min()
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("sides", [BOTH, ALL])
 @pytest.mark.parametrize("name", SHORT)
 def test_nothing_is_in_another(tmp_path, name, sides):

@@ -162,6 +162,7 @@ def test_a_ball_on_a_free_block(tmp_path: Path) -> None:
     assert "stands no denser than" in run.errors + run.log
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("kind", ["C3D8", "C3D4"])
 @pytest.mark.parametrize(("cells", "angle"), [
     ([(1, 1, 1), (1, 1, 1)], 0.0), ([(2, 2, 2), (2, 2, 2)], 0.0), ([(2, 2, 2), (2, 2, 2)], 0.1),

@@ -92,6 +92,7 @@ def check(run: Run, is_free: bool = True) -> None:
     assert overlap.worst(run.fields()).depth <= 64*EPSILON
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("way", WAYS)
 @pytest.mark.parametrize("cells", [1, 3])
 @pytest.mark.parametrize("below", ["elastic", "free", "fixed"])
@@ -143,7 +144,7 @@ def test_a_box_tumbles_by_eulers_equations(tmp_path: Path) -> None:
     assert error[0]/error[1] == pytest.approx(4.0, rel=0.1)
 
 
-@pytest.mark.parametrize("cells", [1, 2])
+@pytest.mark.parametrize("cells", [1, pytest.param(2, marks=pytest.mark.long)])
 def test_a_top_on_a_plane(cells: int, tmp_path: Path) -> None:
     """A cube spins on its corner: with moments of inertia A, spin n and height l of its middle it goes round at the
     slow root of A cos(theta) Omega^2 - A n Omega + m g l = 0, at its angle; of second order."""
@@ -203,7 +204,8 @@ def cell_volume(block: Block) -> float:
     return total
 
 
-@pytest.mark.parametrize(("cells", "restitution"), [(1, 0.5), (1, 0.0), (2, 0.5)])
+@pytest.mark.parametrize(("cells", "restitution"), [
+    (1, 0.5), (1, 0.0), pytest.param(2, 0.5, marks=pytest.mark.long)])
 def test_a_box_comes_to_rest(cells: int, restitution: float, tmp_path: Path) -> None:
     """It tumbles without friction, loses at each impact, and lies flat at the end: what is left is its spin about the
     vertical and its flight along the plane. Energy goes down, never up."""
@@ -258,7 +260,7 @@ def test_a_rigid_punch(tmp_path: Path) -> None:
         -modulus*by, rel=0.03)
 
 
-@pytest.mark.parametrize("held", ["", "1, 6"])
+@pytest.mark.parametrize("held", ["", pytest.param("1, 6", marks=pytest.mark.long)])
 def test_a_ball_bounces_off_a_rigid_plate(held: str, tmp_path: Path) -> None:
     """An elastic ball, askew with a spin, on one that is free or fixed; Newton's method is quadratic: each residual is
     about the square of the one before, or round-off."""

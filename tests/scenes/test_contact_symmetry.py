@@ -139,6 +139,7 @@ EVERY = [*MORTAR,
 NAMES = ("formulation", "normal", "integration", "multiplier", "smoothing")
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("place", ["node over node", "node over edge"])
 @pytest.mark.parametrize("slave", ["UP", "LOW"])
 @pytest.mark.parametrize("choice", EVERY, ids=", ".join)
@@ -169,6 +170,7 @@ def test_disc_and_block_in_one_surface(tmp_path, multiplier, normal, size):
 
 # ---- corners and edges that coincide ------------------------------------------------------------
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("slave", ["UP", "LOW"])
 @pytest.mark.parametrize("choice", EVERY, ids=", ".join)
 def test_punch_with_corners_over_nodes(tmp_path, choice, slave):
@@ -180,6 +182,7 @@ def test_punch_with_corners_over_nodes(tmp_path, choice, slave):
     assert_symmetric(run_deck(deck, tmp_path, **dict(zip(NAMES, choice, strict=True))), n_step)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("choice", MORTAR, ids=", ".join)
 def test_square_on_its_twin(tmp_path, choice):
     """Of gaps of nodes the gradient jumps at every node here: Newton's method may need cuts."""

@@ -139,6 +139,7 @@ def crash(scheme="ENERGY MOMENTUM", beta=0.01):
     return deck
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("method", ["NULL SPACE", "SADDLE POINT", "PENALTY"])
 @pytest.mark.parametrize("scheme", ["ENERGY MOMENTUM", "ENERGY DECAYING"])
 def test_damped_bodies_collide_with_their_books_in_order(scheme, method, tmp_path):

@@ -80,6 +80,7 @@ def bars(kind: str, cells: int, is_exact: bool) -> list[Block]:
     return [one, two]
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("is_exact", [True, False])
 @pytest.mark.parametrize(("kind", "cells", "depth"), [
     ("C3D8", 1, DEPTH), ("C3D8", 3, CROSSING), ("C3D10", 1, CROSSING), ("C3D20", 1, CROSSING)])

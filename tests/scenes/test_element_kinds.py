@@ -163,6 +163,7 @@ def test_cooks_membrane(tmp_path):
     assert "at nu = 0.4999 locks" in done.log
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
 @pytest.mark.parametrize("kind", ["CPE4H", "CPE4I", "CPE6", "CPE8", "CPE8R"])
 def test_a_block_bounces(kind, formulation, tmp_path):
@@ -214,6 +215,7 @@ def pressed_blocks(kind, formulation, lower, upper, folder):
     return np.abs(run(deck, folder).fields()["cauchy_stress"][-1][:, 1] + 1).max()
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "MORTAR"])
 @pytest.mark.parametrize("kind", ["CPE4", "CPE4H", "CPE4I", "CPE6", "CPE8", "CPE8R"])
 def test_contact_patch(kind, formulation, tmp_path):
@@ -225,6 +227,7 @@ def test_contact_patch(kind, formulation, tmp_path):
     assert error <= (1e-7 if on_node else 1e-12)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize(("section", "damping"), [(", KINEMATICS=LINEAR", ""),
                                                   (", KINEMATICS=COROTATED", ""),
                                                   ("", "*DAMPING, BETA=0.001\n")])

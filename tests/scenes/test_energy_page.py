@@ -41,7 +41,7 @@ def test_the_page_has_all_causes():
     assert [row[0] for row in rows_of_page("causes")] == [cause.what for cause in causes.CAUSES]
 
 
-@pytest.mark.parametrize("k", range(len(causes.CAUSES)))
+@pytest.mark.parametrize("k", [pytest.param(k, marks=[pytest.mark.long]*(k == 7)) for k in range(len(causes.CAUSES))])
 def test_cause(k, tmp_path):
     """What the page says of it holds, and its figures are those of the run."""
     cause = causes.CAUSES[k]

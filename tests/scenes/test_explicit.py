@@ -235,6 +235,7 @@ FOOT, FLOOR
                  step=EVERY, **LINEAR)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("kind", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
 @pytest.mark.parametrize("share", [0.3, 0.9])
 def test_bar_on_a_wall(tmp_path, kind, share):

@@ -62,6 +62,7 @@ def keeps_momenta(run):
 # ---- sliding to rest ----------------------------------------------------------------------------
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("cells", [(4, 2), (8, 4)])
 @pytest.mark.parametrize("h", [0.02, 0.01, 0.005, 0.0025])
 def test_a_damped_block_slides_to_rest(h, cells, tmp_path):
@@ -132,6 +133,7 @@ def test_an_elastic_block_sticks(tmp_path):
     assert np.abs(way(run, 5)).max() < 1e-3
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("cells", [(1, 1), (2, 1), (4, 2)])
 @pytest.mark.parametrize("push", [0.49, 0.499, 0.501, 0.51])
 def test_a_rigid_block_that_is_pushed(push, cells, tmp_path):
@@ -375,6 +377,7 @@ def test_a_ring_held_in_other_ways(more, tmp_path):
     obeys(run)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("more", [{"formulation": "SEGMENT"}, {"formulation": "MORTAR"},
                                   {"formulation": "MORTAR", "integration": "ELEMENTS"},
                                   {"formulation": "MORTAR", "multiplier": "STANDARD"}])
@@ -408,6 +411,7 @@ def test_a_rigid_block_slides_to_rest_by_integrated_gaps(more, tmp_path):
     assert way(run, 15)[-1] == pytest.approx(n*h*(2.0 - 0.5*n*3.0*h) + 0.5*h*left, rel=1e-9)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("more", INTEGRATED)
 @pytest.mark.parametrize("push", [0.499, 0.501])
 def test_a_rigid_block_pushed_by_integrated_gaps(push, more, tmp_path):
@@ -438,8 +442,9 @@ def test_a_damped_block_slides_to_rest_by_integrated_gaps(more, tmp_path):
 # ---- a surface with itself ----------------------------------------------------------------------
 
 
-@pytest.mark.parametrize("more", [{"sides": "BOTH", **NODES}, {"sides": "ONE", **NODES},
-                                  {"formulation": "SEGMENT"}, {"formulation": "MORTAR"}])
+@pytest.mark.parametrize("more", [{"sides": "BOTH", **NODES}, {"formulation": "MORTAR"},
+                                  pytest.param({"sides": "ONE", **NODES}, marks=pytest.mark.long),
+                                  pytest.param({"formulation": "SEGMENT"}, marks=pytest.mark.long)])
 def test_a_strip_that_rubs_itself(more, tmp_path):
     """The hairpin whose legs fly together: momenta, energy and law; null space and saddle point."""
     deck = rubbing(Deck.read(DECKS / "self_contact.inp"), 0.5, "FRICTIONLESS")

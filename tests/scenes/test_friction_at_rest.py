@@ -87,6 +87,7 @@ FORMULATIONS = [(ONE, "NODE TO SURFACE"), (BOTH, "NODE TO SURFACE"), (ONE, "SEGM
                 (ONE, "MORTAR")]
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize(("sides", "formulation"), FORMULATIONS)
 @pytest.mark.parametrize("cells", [(1, 1), (2, 1), (4, 2)])
 def test_a_rigid_block_rests_and_slides_slowly(cells, sides, formulation, tmp_path):
@@ -112,6 +113,7 @@ def static(deck, nlgeom=True):
     return deck
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize(("sides", "formulation"), FORMULATIONS)
 @pytest.mark.parametrize("method", ["NULL SPACE", "SADDLE POINT"])
 @pytest.mark.parametrize(("slope", "nlgeom"), [(0.0, True), (0.4, False), (0.4, True),
@@ -127,7 +129,8 @@ def test_a_block_lies_by_friction_alone(slope, nlgeom, method, sides, formulatio
     assert np.abs(force - [0.0, WEIGHT]).max() < 1e-9*WEIGHT
 
 
-@pytest.mark.parametrize(("sides", "formulation"), FORMULATIONS)
+@pytest.mark.parametrize(("sides", "formulation"), [
+    pytest.param(*which, marks=[pytest.mark.long]*(which[0] == BOTH)) for which in FORMULATIONS])
 def test_a_block_slides_off_in_statics(sides, formulation, tmp_path):
     """A thousandth above the limit no state of rest is there, and the message says so."""
     deck = static(block_on_floor(0.5, 1.0, 0.5, slope=-math.atan(0.5005), sides=sides))
@@ -155,6 +158,7 @@ def overhanging(shift):
     return static(rubbing(scene.deck("AUTO"), 0.5))
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
 @pytest.mark.parametrize("shift", [0.12, 0.07, 0.05, 0.03])
 def test_a_block_stands_over_an_end(shift, formulation, tmp_path):

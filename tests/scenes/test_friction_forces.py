@@ -58,6 +58,7 @@ def unguarded(deck):
     return deck
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("leaves", [False, True])
 @pytest.mark.parametrize("more", MESHED)
 def test_a_block_comes_onto_a_floor_or_leaves_it(more, leaves, tmp_path):
@@ -71,6 +72,7 @@ def test_guards_rub_as_their_pair(tmp_path):
     assert np.abs(ratios(run, 28)[0]/MU - 1).max() < 0.01
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("leaves", [False, True])
 @pytest.mark.parametrize("more", [MESHED[k] for k in (1, 2, 3)])
 def test_a_block_of_two_pieces_or_with_inertia(more, leaves, tmp_path):

@@ -10,6 +10,7 @@ from test_contact_symmetry import Mesh, assert_symmetric, scene
 TOLERANCE = 1e-9
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize(("n_edge", "h"), [(24, 0.01), (24, 0.3), (24, 1.0), (48, 0.05), (48, 1.0)])
 @pytest.mark.parametrize(("form", "sides"), FORMS)
 def test_two_discs(tmp_path, form, sides, n_edge, h):

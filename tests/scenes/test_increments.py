@@ -144,6 +144,7 @@ def events(log):
     return [(what, int(node), float(a), float(b)) for what, node, a, b in found]
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("initiation", ["PERSISTENT", "MASSLESS", "ADMISSIBLE", "VELOCITY UPDATE"])
 @pytest.mark.parametrize("fraction", [0.1, 1e-3, 1e-6])
 @pytest.mark.parametrize("direct", ["", ", DIRECT"])

@@ -21,7 +21,7 @@ def ring(law, folder, h, t_end):
     return run_deck(deck, folder, h=h, t_end=t_end, frame=t_end)
 
 
-@pytest.mark.parametrize("law", LAWS)
+@pytest.mark.parametrize("law", [pytest.param(law, marks=[pytest.mark.long]*(law == "ogden 3")) for law in LAWS])
 def test_energy_and_momenta_stay(tmp_path, law):
     """16 increments, 12 a turn."""
     history = ring(law, tmp_path, 0.5, 8).history

@@ -79,6 +79,7 @@ def disc_on_floor(angle, shift, h, edges=24):
     return scene.hold("FLOOR", lambda x, y: True)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("order", ["DISC", "FLOOR"])
 @pytest.mark.parametrize("shift", [0.0, 0.02, 0.08, 0.16, 0.24])
 @pytest.mark.parametrize("angle", [30, 60, 90])
@@ -348,8 +349,9 @@ def jumps(run):
     return np.sqrt(np.mean(np.diff(force, 2)**2))/np.abs(force[np.abs(force) > 1e-9]).mean()
 
 
-@pytest.mark.parametrize("choice", [NTS, MORTAR, MORTAR | {"formulation": "SEGMENT"}],
-                         ids=["nodes", "mortar", "segments"])
+@pytest.mark.parametrize("choice", [
+    NTS, pytest.param(MORTAR, marks=pytest.mark.long),
+    pytest.param(MORTAR | {"formulation": "SEGMENT"}, marks=pytest.mark.long)], ids=["nodes", "mortar", "segments"])
 def test_friction_on_nodes_without_mass(choice, tmp_path):
     """Energy and what friction takes, momenta and the law, as with mass; forces less than half as
     rough, and smoother with h, where those of nodes with mass are not."""
@@ -384,7 +386,7 @@ FINER = {"corners": lambda: corners(cells=(3, 3)), "crossing": lambda: crossing(
 @pytest.mark.parametrize(("name", "choice"), [
     ("crossing", {"formulation": "MORTAR", "sides": "UNGUARDED"}),      # a guard would hold them
     ("slide off", MORTAR | {"h": 0.006}),
-    ("pile", NTS), pytest.param("pile", NTS | {"h": 0.01}, marks=pytest.mark.long),
+    pytest.param("pile", NTS, marks=pytest.mark.long), pytest.param("pile", NTS | {"h": 0.01}, marks=pytest.mark.long),
     pytest.param("pile", NTS | {"h": 0.0025}, marks=pytest.mark.long)],
     ids=["crossing", "slide off", "pile", "pile h/2", "pile h/8"])
 def test_soft_bodies_on_corners(name, choice, tmp_path):
@@ -403,6 +405,7 @@ def test_soft_bodies_on_corners(name, choice, tmp_path):
     assert run.verdict["verdict"] == "good" or name == "crossing"
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("part", [1.0, 0.5])
 @pytest.mark.parametrize("name", ["press", "wedge", "ledge"])
 def test_bodies_that_move_over_corners_without_mass(name, part, tmp_path):

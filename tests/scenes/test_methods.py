@@ -39,6 +39,7 @@ def pressed(tmp_path_factory):
     return deck
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("initiation", INITIATIONS)
 @pytest.mark.parametrize("h", [0.05, 0.005, 0.0005])
 def test_one_step_from_the_same_state(pressed, tmp_path, initiation, h):

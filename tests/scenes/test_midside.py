@@ -27,6 +27,7 @@ KINDS = [("CPE4", "CPE8"), ("CPE8", "CPE4"), ("CPE8", "CPE8"), ("CPE8R", "CPE6")
 ROUND_OFF = 1e-12
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("swap", [False, True], ids=["", "swapped"])
 @pytest.mark.parametrize("join", EXACT)
 @pytest.mark.parametrize("kinds", KINDS, ids="-".join)

@@ -20,6 +20,7 @@ GUARDED = 0.05
 BAR_SPEED, BAR_STEP = 1.0e-3, 0.02
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize(("cells", "kind"), [
     ([(1, 1, 1), (1, 1, 1)], ["C3D8", "C3D8"]), ([(3, 3, 1), (3, 3, 1)], ["C3D8", "C3D8"]),
     ([(2, 2, 2), (3, 3, 2)], ["C3D8", "C3D8"]), ([(4, 4, 1), (3, 3, 1)], ["C3D8", "C3D8"]),
@@ -183,6 +184,7 @@ def test_press_fit(tmp_path: Path) -> None:
     assert off[2] < 0.002
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("is_slave", [False, True])
 @pytest.mark.parametrize("kind", ["C3D4", "C3D8"])
 def test_a_rigid_side(kind: str, is_slave: bool, tmp_path: Path) -> None:

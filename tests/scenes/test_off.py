@@ -149,6 +149,7 @@ def test_nothing_is_computed_for_output_that_nobody_asks_for(plain):
     assert not [name for name in calls if name.endswith(("vtkhdf_write", "begin_frame"))]
 
 
+@pytest.mark.long
 def test_rows_and_frames_are_gathered(tmp_path):
     """They go to the library of files many at a time, and restart files are not written anew at
     once: on its own pace this happens a few times in a run, however short the increments are."""
@@ -175,6 +176,7 @@ def test_an_increment_allocates_for_its_record_alone(plain):
     assert not others
 
 
+@pytest.mark.long
 def test_allocations_do_not_grow_with_the_mesh(plain, tmp_path):
     """What the program itself allocates in an increment is as much for four times the elements."""
     _, made = plain
@@ -187,6 +189,7 @@ def test_allocations_do_not_grow_with_the_mesh(plain, tmp_path):
     assert not grown
 
 
+@pytest.mark.long
 def test_a_linear_body_is_factorised_once(tmp_path):
     """Its matrix is symmetric and constant: by CHOLMOD, once in a run."""
     calls, _ = run_counted(block(3, section=", KINEMATICS=LINEAR"), LONG, tmp_path)
@@ -195,6 +198,7 @@ def test_a_linear_body_is_factorised_once(tmp_path):
     assert "__emcon_umfpack_MOD_umfpack_analyse" not in calls
 
 
+@pytest.mark.long
 def test_statics_of_small_displacements_are_symmetric(tmp_path):
     procedure = "*STATIC, DIRECT\n0.01, {end}\n*BOUNDARY\n1, 1, 2\n4, 1, 2\n*CLOAD\n16, 1, 0.01"
     text = block(3, procedure=procedure).replace("NLGEOM", "INC=100").replace(

@@ -25,6 +25,7 @@ ROUNDING = 1e-13
 FORMULATIONS = ["NODE TO SURFACE", "SEGMENT", "MORTAR"]
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("n", [2, 4])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 def test_crossing_squares_do_not_miss(tmp_path, formulation, n):
@@ -38,6 +39,7 @@ def test_crossing_squares_do_not_miss(tmp_path, formulation, n):
     assert not missed
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("method", ["NULL SPACE", "SADDLE POINT"])
 @pytest.mark.parametrize("name", ["tower", "ledge", "slave floor", "drop", "punch", "gears"])
 def test_nodes_held_from_both_sides_at_once_need_no_cuts(tmp_path, name, method):
@@ -48,6 +50,7 @@ def test_nodes_held_from_both_sides_at_once_need_no_cuts(tmp_path, name, method)
     assert done.energy_error <= 1e-12
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("name", ["wedge", "ledge", "bullet", "strips", "corners", "slide off",
                                   "accordion", "edge along edge", "twin", "tower", "crossing"])
 @pytest.mark.parametrize("sides", [BOTH, ALL])
@@ -59,6 +62,7 @@ def test_two_sided_contact_overlaps_nowhere(tmp_path, sides, name):
     assert done.energy_error <= 1e-12
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("name", ["wedge", "ledge", "gears", "accordion", "slave floor",
                                   "slide off"])
 @pytest.mark.parametrize("formulation", FORMULATIONS)

@@ -134,6 +134,7 @@ def test_a_tension_bends_the_line(tmp_path):
             assert over == pytest.approx(expected, rel=1e-9)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("gap", [0.0, 0.02])
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("behaviour", BEHAVIOURS)
@@ -241,6 +242,7 @@ def test_a_block_is_moved_to_and_fro(formulation, tmp_path):
     assert run.history["friction_loss"][-1] == pytest.approx(loss, rel=1e-6)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", FORMULATIONS)
 @pytest.mark.parametrize("behaviour", BEHAVIOURS)
 def test_it_slides_to_rest(behaviour, formulation, tmp_path):
@@ -356,6 +358,7 @@ U
 """
 
 
+@pytest.mark.each_value
 @pytest.mark.skipif(not shutil.which("ccx"), reason="CalculiX is not installed")
 @pytest.mark.parametrize("friction", [False, True])
 @pytest.mark.parametrize("behaviour", ["LINEAR\n1e4, 1e-6", "LINEAR\n1e4, 1.",

@@ -375,6 +375,7 @@ def split(x, v):
     return spin, np.abs(v - v.mean(0) - spin*left).max()
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("initiation", ["PERSISTENT", "ADMISSIBLE", "VELOCITY UPDATE", "MASSLESS"])
 @pytest.mark.parametrize("floor", ["rigid", "elastic"])
 def test_tilted_on_a_floor(initiation, floor, tmp_path):

@@ -100,6 +100,7 @@ def disc(n, turn=0.0, lift=0.0, **more):
 # ---- closed forms -------------------------------------------------------------------------------
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("e", [0.0, 0.5, 0.8, 1.0])
 @pytest.mark.parametrize(("mu", "slide"), [(0.1, 1.0), (0.4, 3.0), (0.4, 0.5), (0.4, 0.7), (1.0, 0.3)])
 def test_flat_and_oblique(e, mu, slide, tmp_path):
@@ -237,6 +238,7 @@ def test_a_circle_falls(e, mu, slide, spin, tmp_path):
 # ---- to rest ------------------------------------------------------------------------------------
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("e", [0.0, 0.5])
 @pytest.mark.parametrize(("n", "tilt", "spin", "mu"), [
     (1, 0.0, 0.0, 0.1), (3, 0.0, 0.0, 1.0), (8, 0.0, 0.0, 0.4), (1, 0.05, 0.0, 1.0),
@@ -252,8 +254,9 @@ def test_block_comes_to_rest(n, tilt, spin, mu, e, tmp_path):
     assert history["kinetic"][-1] < 1e-16*history["kinetic"].max()
 
 
-@pytest.mark.parametrize(("n", "slope", "mu", "tilt"), [(1, 0.4, 0.5, 0.0), (2, 0.6, 0.7, 0.0), (3, 0.4, 0.5, 0.05),
-                                                        pytest.param(8, 0.25, 0.3, 0.0, marks=pytest.mark.long)])
+@pytest.mark.parametrize(("n", "slope", "mu", "tilt"), [
+    (1, 0.4, 0.5, 0.0), pytest.param(2, 0.6, 0.7, 0.0, marks=pytest.mark.long), (3, 0.4, 0.5, 0.05),
+    pytest.param(8, 0.25, 0.3, 0.0, marks=pytest.mark.long)])
 def test_at_rest_on_a_slope_it_stays(n, slope, mu, tilt, tmp_path):
     deck = block(n, tilt=tilt, lift=0.1, e=0.5, mu=mu, h=0.01, t_end=110.0, slope=slope,
                  velocity=(0.3, -0.5, 0.0))
@@ -362,6 +365,7 @@ def test_fifteen_discs(tmp_path):
     comes_to_rest(deck, tmp_path)
 
 
+@pytest.mark.long
 def test_ten_dominoes(tmp_path):
     """The first one is pushed over; they fall one after the other and lie on each other."""
     bodies = {}
@@ -391,6 +395,7 @@ def at_rest(n, slope, mu, unit=1.0, formulation="NODE TO SURFACE", gap=0.0):
     return deck
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
 @pytest.mark.parametrize("unit", [1e-9, 1.0, 1e9])
 @pytest.mark.parametrize(("n", "slope", "gap"), [(1, 0.0, 0.0), (1, 0.4, 0.0), (3, 0.4, 0.0), (8, 0.0, 0.25)])

@@ -89,6 +89,7 @@ def check(run, formulation):
 # ---- a disc that is held to first order ---------------------------------------------------------
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=" ".join)
 @pytest.mark.parametrize(("turn", "gap"), [(math.pi/RIM, 0.0), (0.05, 0.0), (0.05, 0.03)])
 def test_disc_rolls_onto_its_edges(tmp_path, formulation, turn, gap):
@@ -230,6 +231,7 @@ def guided(tmp_path_factory):
     return functools.cache(lambda *which: pressed(tmp_path_factory.mktemp("hertz"), *which))
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=" ".join)
 @pytest.mark.parametrize("level", [3, 6])
 def test_hertz_by_load(guided, formulation, level):

@@ -93,6 +93,7 @@ def plate_under_a_ball(thick):
     return scene.hold("PLATE", lambda x, y, z: abs(x) > 0.899).deck(AUTO)
 
 
+@pytest.mark.long
 def test_what_can_bend_is_told_in_space(tmp_path):
     """As a rigid body a thin plate changes the impulse by more than the strain of a contact would, a thick one by less;
     the advice says which it is."""

@@ -273,6 +273,7 @@ def test_backward_differences_keep_their_order_over_steps_of_any_size(tmp_path, 
     assert abs(np.log2(error[0]/error[1]) - 2) <= 0.1
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("kinematics", ["LINEAR", "COROTATED"])
 @pytest.mark.parametrize("scheme", SCHEMES)
 def test_bodies_of_small_strains(tmp_path, scheme, kinematics):

@@ -66,6 +66,7 @@ def pulled(mesh, elements, faces, ends, law, nlgeom, folder, tol=1e-8):
     return found
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("nlgeom", ["", ", NLGEOM"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_a_cut_in_space(kind, nlgeom, tmp_path):

@@ -131,7 +131,7 @@ def dropped(n: tuple[int, int, int], gap: float, until: float) -> str:
             + "*INITIAL CONDITIONS, TYPE=VELOCITY\n" + moves + dynamic(0.02, until))
 
 
-@pytest.mark.parametrize(("n", "until"), [((2, 2, 2), 0.3), ((5, 4, 3), 0.06)])
+@pytest.mark.parametrize(("n", "until"), [((2, 2, 2), 0.3), pytest.param((5, 4, 3), 0.06, marks=pytest.mark.long)])
 def test_many_cubes(n: tuple[int, int, int], until: float, tmp_path: Path) -> None:
     """One surface of all bodies: nothing is lost, nothing overlaps."""
     run = ran(tmp_path, dropped(n, 0.01, until))

@@ -90,6 +90,7 @@ def discs(sides, cells=(8, 3)):
     return scene.deck(sides)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("factor", [0.1, 1, 10])
 @pytest.mark.parametrize(("formulation", "sides"), [
     ("NODE TO SURFACE", ONE), ("NODE TO SURFACE", BOTH), ("SEGMENT", ONE)])
@@ -115,6 +116,7 @@ def test_a_penalty_keeps_energy_and_momenta(formulation, sides, factor, tmp_path
     assert f"contact penetrates by up to {run.verdict['give']:.3g}"[:30] in run.log
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize(("cells", "h"), [((8, 3), 0.02), ((8, 3), 0.005), pytest.param((16, 6), 0.02, marks=pytest.mark.long)])
 @pytest.mark.parametrize("smoothing", ["NONE", "HERMITE"])
 @pytest.mark.parametrize("normal", ["NODAL", "EDGE"])
@@ -133,6 +135,7 @@ def test_a_penalty_goes_on_where_mortar_meets_other_edges(normal, smoothing, cel
     assert run.verdict["verdict"] == "good"
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
 @pytest.mark.parametrize("name", ["pile", "wedge", "ledge", "coil", "tower", "crossing", "slide off",
                                   "slave floor", "twin"])
@@ -152,7 +155,8 @@ def factorisations(run):
     return int(re.search(r"(\d+) factorisations", run.log)[1])
 
 
-@pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])
+@pytest.mark.parametrize("formulation", [pytest.param("NODE TO SURFACE", marks=pytest.mark.long),
+                                         pytest.param("SEGMENT", marks=pytest.mark.long), "MORTAR"])
 def test_a_stiff_penalty_costs_what_exact_contact_does(formulation, tmp_path):
     """Its multipliers are unknowns on their way, so that no iterate is pushed by what its gaps
     happen to be. The step to exact contact is as large as that to a softer one: some three times (76
@@ -375,7 +379,8 @@ def test_contacts_that_stiffen_a_node_by_more_than_their_share_are_told(tmp_path
 
 
 @pytest.mark.parametrize(("formulation", "sides"), [
-    ("NODE TO SURFACE", ONE), ("NODE TO SURFACE", BOTH), ("SEGMENT", ONE)])
+    ("NODE TO SURFACE", ONE), pytest.param("NODE TO SURFACE", BOTH, marks=pytest.mark.long),
+    pytest.param("SEGMENT", ONE, marks=pytest.mark.long)])
 def test_explicit_penalties_keep_momenta(formulation, sides, tmp_path):
     """Momenta to round-off, energy but for what central differences are off by, of order 2, and for
     a part that is the same for any step: tops of vertices that face each other stand out by another

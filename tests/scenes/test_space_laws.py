@@ -52,6 +52,7 @@ def stretched(kind, axes, to):
                            + "*NODE FILE\nU\n*EL FILE\nS\n*END STEP\n")
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("kind", ["C3D8", "C3D8H", "C3D8I", "C3D10", "C3D20"])
 @pytest.mark.parametrize("axes", [(2,), (0, 1)])
 def test_uniaxial_and_biaxial(axes, kind, tmp_path):

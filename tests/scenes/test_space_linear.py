@@ -34,6 +34,7 @@ def speeds(v):
         f"{k}, {a + 1}, {float(w)!r}\n" for k, row in enumerate(v, 1) for a, w in enumerate(row))
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("kind", KINDS)
 @pytest.mark.parametrize("law", LAWS)
 def test_a_patch_has_the_stress_of_the_law_at_rest(law, kind, tmp_path):

@@ -99,6 +99,7 @@ def test_interface_with_edges(cells, kinds, slave, tmp_path: Path) -> None:
     check_stretched(run(text + stretch(x), tmp_path), x)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("more", ["", "*CONSTRAINT METHOD, TYPE=SADDLE POINT\n"])
 @pytest.mark.parametrize("kinds", [("C3D8", "C3D8"), ("C3D8", "C3D10"), ("C3D10", "C3D8"), ("C3D20", "C3D20R"), ("C3D10", "C3D20")])
 def test_flight_of_curved_pieces(kinds, more, tmp_path: Path) -> None:

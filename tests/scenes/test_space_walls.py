@@ -40,6 +40,7 @@ def in_a_corner(kind: str, q: np.ndarray, procedure: str, folder: Path):
     return mesh, run_deck(deck, folder)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("procedure", ["*STATIC\n0.5, 1.\n", "*DYNAMIC, DIRECT\n0.05, 1.\n"])
 @pytest.mark.parametrize("kind", KINDS)
 def test_walls_at_any_slope(kind: str, procedure: str, tmp_path: Path) -> None:

@@ -106,6 +106,7 @@ def test_tip_on_tip(kinds: tuple[str, str], gap: float, tmp_path: Path) -> None:
     assert -0.03 < above.min() - below.max() < 1e-3
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("kinds", [("C3D10", "C3D10"), ("C3D10", "C3D8"), ("C3D4", "C3D10")])
 @pytest.mark.parametrize("cells", [[(2, 1, 1), (1, 1, 1)], [(1, 1, 1), (2, 1, 1)]])
 def test_block_inside_the_rim_of_another(cells: list[tuple[int, int, int]], kinds: tuple[str, str], tmp_path: Path) -> None:

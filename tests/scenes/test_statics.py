@@ -100,6 +100,7 @@ def displacement(run, k, n=2):
 # ---- held by contact ----------------------------------------------------------------------------
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", FORMULATIONS, ids=" ".join)
 @pytest.mark.parametrize("gap", GAPS)
 def test_square_on_a_square(tmp_path, formulation, gap):
@@ -166,6 +167,7 @@ def test_square_that_is_pulled_off(tmp_path, formulation, gap):
     assert "body of element 101 is free to move in y" in run.errors
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("formulation", FORMULATIONS[::2], ids=" ".join)
 @pytest.mark.parametrize("part", [0.5, 0.98])
 @pytest.mark.parametrize("first", [0.02, 0.2, 1.0])
@@ -197,6 +199,7 @@ def grid(name, corner, size, cells, first):
     return [*lines, f"*SURFACE, NAME={name}_TOP", *(f"{first + (m - 1) * n + k}, S3" for k in range(n))]
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("cells", [(4, 2), (3, 2), (8, 4)])
 @pytest.mark.parametrize("first", [0.05, 0.1, 0.5, 1.0])
 def test_a_push_in_big_increments_on_a_wide_floor(cells, first, tmp_path):
@@ -299,6 +302,7 @@ HEAD, 2, 2, {-unit * (way + 0.5)!r}
 """
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("kind", ["SURFACE TO SURFACE", "NODE TO SURFACE"])
 @pytest.mark.parametrize(("unit", "force"), [(1.0, 1.0), (1e-6, 1.0), (1e6, 1.0), (1.0, 1e6)])
 def test_rubber_between_plates_that_come_from_afar(tmp_path, unit, force, kind):

@@ -60,6 +60,7 @@ def check_tops(run: Run, tops: list, expected: np.ndarray, size: float) -> None:
         assert np.abs(u[top] - exact).max() <= ACCURACY*size
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("gap", GAPS)
 @pytest.mark.parametrize(("kind", "cells"), [("C3D8", 2), ("C3D4", 2), ("C3D8", [1, 1]), ("C3D8", [2, 3]),
                                              ("C3D8", [3, 2])])

@@ -41,6 +41,7 @@ def run(text, folder):
     return run_deck(folder/"deck.inp", folder)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("card", ["DSLOAD", "DLOAD"])
 @pytest.mark.parametrize("kind", [*PLANE, *AXIAL, *SPACE])
 def test_as_on_each_face(kind, card, tmp_path):

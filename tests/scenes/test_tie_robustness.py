@@ -206,6 +206,7 @@ SCENES = {
 }
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("multiplier", MULTIPLIERS)
 @pytest.mark.parametrize("scene", SCENES)
 def test_uniform_stress(tmp_path, scene, multiplier):
@@ -217,6 +218,7 @@ def test_uniform_stress(tmp_path, scene, multiplier):
         assert "constant stress" not in run.log
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("multiplier", MULTIPLIERS)
 @pytest.mark.parametrize("scene", SCENES)
 def test_free_flight(tmp_path, scene, multiplier):
@@ -265,6 +267,7 @@ def assert_stiff(run, force):
     np.testing.assert_allclose(reaction, [-force, 0], rtol=0, atol=1e-9*force)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("multiplier", MULTIPLIERS)
 @pytest.mark.parametrize("cells", [(1, 1), (3, 1), (2, 2), (1, 2), (4, 5)])
 @pytest.mark.parametrize("held", ["edge", "both ends"])
@@ -278,6 +281,7 @@ def test_supported_ends_of_the_slave(tmp_path, held, cells, multiplier):
         assert_stiff(run, force)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("multiplier", MULTIPLIERS)
 @pytest.mark.parametrize("cells", [(1, 1), (1, 3), (2, 2), (2, 3), (3, 2), (4, 4)])
 def test_slave_between_crosspoints(tmp_path, cells, multiplier):
@@ -382,6 +386,7 @@ def test_preload_and_release(tmp_path):
 # ---- beside contact -----------------------------------------------------------------------------
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("adjust", ["", ", ADJUST=0.03"])
 @pytest.mark.parametrize("surfaces", ["SIDE, WALL", "WALL, SIDE"])
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT", "MORTAR"])

@@ -44,6 +44,7 @@ def assert_uniform(deck, run):
     )
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("multiplier", MULTIPLIERS)
 @pytest.mark.parametrize("linear", [False, True], ids=["nlgeom", "linear"])
 @pytest.mark.parametrize("load", LOADS)
@@ -54,6 +55,7 @@ def test_patch_in_statics(tmp_path, interface, load, linear, multiplier):
     assert_uniform(deck, run_deck(deck, tmp_path, multiplier=multiplier))
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("multiplier", MULTIPLIERS)
 @pytest.mark.parametrize("load", LOADS)
 @pytest.mark.parametrize("interface", INTERFACES)
@@ -116,6 +118,7 @@ LEVELS = {1: (8, 16), 1.5: (8, 16), 10: (3, 6)}
 SMOOTH_INTERFACES = ["STRAIGHT", "CURVED", "FOUR", "FOUR CURVED"]
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("multiplier", MULTIPLIERS)
 @pytest.mark.parametrize("ratio", LEVELS)
 @pytest.mark.parametrize("interface", SMOOTH_INTERFACES)
@@ -137,6 +140,7 @@ def test_orders(tmp_path, matching, interface, ratio, multiplier):
 BEAM_LEVELS = LEVELS | {10: (4, 8)}
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("multiplier", MULTIPLIERS)
 @pytest.mark.parametrize("ratio", BEAM_LEVELS)
 def test_cantilever(tmp_path, ratio, multiplier):

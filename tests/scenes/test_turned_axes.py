@@ -75,6 +75,7 @@ def turned(n_dim: int, angle: float, procedure: str, folder: Path) -> Run:
     return run_deck(folder/"deck.inp", folder)
 
 
+@pytest.mark.each_value
 @pytest.mark.parametrize("procedure", PROCEDURES)
 @pytest.mark.parametrize("n_dim", [2, 3])
 def test_turned_with_its_axes(n_dim: int, procedure: str, tmp_path: Path) -> None:

@@ -5,7 +5,7 @@ import re
 import numpy as np
 import pytest
 from plain_scenes import BOTH, ONE, Scene, turned
-from scene_tools import DECKS, Deck, emcon, run_deck
+from scene_tools import DECKS, Deck, Run, emcon, run_deck
 
 
 @pytest.fixture(scope="module")
@@ -54,7 +54,7 @@ def test_failed_run_is_not_called_good(tmp_path):
     path = ring_that_stops(tmp_path)
     done = emcon(path, "--output", tmp_path, "--set=h=0.05")
     assert done.returncode == 3
-    run = run_deck(path, tmp_path, code=3, h=0.05)
+    run = Run(tmp_path / path.stem)
     assert run.verdict["verdict"] == "not completed"
     assert "the analysis stops" in run.verdict["message"]
     assert "verdict: NOT COMPLETED" in done.stdout and "closes to" not in done.stdout

@@ -18,7 +18,7 @@ from space_crowds import scene
 CASES = {"decks": 25, "crossed": 3, "restart": 12, "calls": 4, "kill": 1, "scenes": 12, "space": 10, "words": 20, "damaged": 20}
 
 
-@pytest.mark.parametrize("name", FUZZERS)
+@pytest.mark.parametrize("name", [pytest.param(name, marks=[pytest.mark.long]*(name == "kill")) for name in FUZZERS])
 def test_a_few_cases(name, tmp_path):
     assert soak(name, 1, tmp_path, cases=CASES[name]) == CASES[name]
 
