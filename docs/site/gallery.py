@@ -20,8 +20,8 @@ PROGRAM = ROOT/"build"/"release"/"emcon"
 #: Decks by what they show; those that are not named stand last.
 CHAPTERS = {
     "Impacts": "ring two_bodies three_bodies self_contact bouncing_bar bar_on_wall rigid_bar "
-               "bouncing_ball ball_in_bowl thrown_ring caught_ring linked_rings"
-               " hertz_ball",
+               "bouncing_ball ball_in_bowl thrown_ring caught_ring linked_rings "
+               "hertz_ball snap_fit",
     "Friction": "sliding_block",
     "Contact at rest": "hertz press_fit roller ironing two_blocks_static patch_pressure "
                        "contact_patch pressed_ball",

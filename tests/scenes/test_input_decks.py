@@ -21,6 +21,7 @@ SHORT = {
     "hertz_ball": {"t_end": 0.05},
     "caught_ring": {"t_end": 0.1},
     "linked_rings": {"h": 0.02, "t_end": 0.3},
+    "snap_fit": {"h": 0.05, "t_end": 1.5},
     "ironing": {"h_press": 0.25, "h": 0.1, "path": 0.5},
     "two_bodies": {"h": 0.02, "t_end": 0.4},
     "thrown_ring": {"t_end": 0.9},
@@ -129,6 +130,20 @@ def test_caught_ring(tmp_path):
     assert run.history["active"].max() > 1 and np.ptp(momenta[:, 2]) > 0.02*np.abs(momenta).max()
     assert np.abs(momenta[:, [0, 1, 5]]).max() <= 1e-12*np.abs(momenta).max()
     np.testing.assert_allclose(run.history["total"], run.history["total"][0], rtol=1e-12)
+
+
+def test_snap_fit(tmp_path):
+    """The force that pushes the hook in, by beam theory and what the heading says of this speed; then its nose stands
+    behind the catch, whose rear face is at x = 1.17."""
+    deck = DECKS / "snap_fit.inp"
+    (force,) = figures(deck, r"at most (\S+) by beam theory")
+    run = run_deck(deck, tmp_path, t_end=2.8)
+    time, along = run.history["time"], -run.history["pair1_force_x"]
+    slides_up = (time > 1.4) & (time < 1.8)
+    assert force < along[slides_up].max() < 1.2*force
+    fields = run.fields()
+    nose = np.isclose(fields.x[:, 0], 0.85) & (fields.x[:, 2] < 0)
+    assert (fields.x + fields["displacement"][-1])[nose, 0].min() > 1.17
 
 
 @pytest.mark.parametrize(("deck", "pair", "until"), [("ball_in_bowl", 3, 2.0), ("thrown_ring", 1, 1.2)])
