@@ -63,8 +63,8 @@ module emcon_deck_keywords
          // "!IPROPERTIES:0,!VARIABLES:1,~UNSYMM,!LINEAR,!TENSOR,!INTEGRATION,!FILE"), &
       keyword_t("NSET", in_both, "NSET=,GENERATE,ELSET=,INTERNAL,~UNSORTED,!INSTANCE"), &
       keyword_t("ELSET", in_both, "ELSET=,GENERATE,INTERNAL,~UNSORTED,!INSTANCE"), &
-      keyword_t("SURFACE", in_model, "NAME=,TYPE=,INPUT=,SCALE=,INTERNAL,!COMBINE,!CROP,!TRIM," &
-         // "!FILLETRADIUS:0"), &
+      keyword_t("SURFACE", in_model, "NAME=,TYPE=,INPUT=,SCALE=,FILLETRADIUS=,INTERNAL," &
+         // "!COMBINE,!CROP,!TRIM"), &
       keyword_t("GIVEN FORCES", in_model, "NSET=", has_data=.false.), &
       keyword_t("SOLID SECTION", in_model, "ELSET=,MATERIAL=,KINEMATICS=,MASSLESS," &
          // "ORIENTATION=,!OFFSET:0,~CONTROLS"), &

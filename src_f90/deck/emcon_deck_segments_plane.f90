@@ -3,13 +3,14 @@
 !> Going on from the start, the body is to the right. Nodes behind those of the deck get the labels
 !> that follow the largest one; a *RIGID BODY takes them.
 module emcon_deck_segments_plane
-   use emcon_deck_fields, only : data_error, data_open, data_t, next_line
+   use emcon_deck_fields, only : data_open, data_t
    use emcon_deck_own_nodes, only : add_own_nodes
-   use emcon_deck_reader, only : card_error, card_t, reader_t
-   use emcon_deck_segment_lines_plane, only : check_arc, get_segment, rounding
+   use emcon_deck_reader, only : card_t, reader_t
+   use emcon_deck_segment_lines_plane, only : read_segment_lines, rounding
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_origin, only : origin_t
+   use emcon_profile_fillet_plane, only : segment_t
    use emcon_scene, only : scene_t
    implicit none
    private
@@ -27,48 +28,30 @@ contains
       type(scene_t), intent(inout) :: scene
       type(surface_t), intent(inout) :: surface
       type(data_t) :: data
+      type(segment_t), allocatable :: segment(:)
       real(wp), allocatable :: place(:, :)
       logical :: is_well
+      integer :: i
 
       surface%is_profile = .true.
-      allocate(place(2, 0), surface%edge(2, 0))
-      is_well = .true.
+      allocate(surface%edge(2, 0))
       call data_open(data, card)
-      do while (next_line(reader, data))
-         call read_segment(reader, data, place)
-         is_well = is_well .and. data%ok
-      end do
-      if (is_well .and. size(place, 2) < 2) call card_error(reader, card, &
-         "a profile begins with START, x, y and goes on with LINE, x, y or CIRCL, x, y, xc, yc")
-      if (is_well .and. size(place, 2) >= 2) call add_nodes(scene, card%origin, place, surface)
+      call read_segment_lines(reader, card, data, segment, is_well)
       reader%doubt%names = reader%doubt%names .or. .not. is_well
+      if (.not. is_well) return
+      place = reshape(segment(1)%to, [2, 1])
+      do i = 2, size(segment)
+         if (segment(i)%is_arc) then
+            call add_arc(segment(i)%to, segment(i)%centre, place)
+         else
+            place = reshape([place, segment(i)%to], [2, size(place, 2) + 1])
+         end if
+      end do
+      call add_nodes(scene, card%origin, place, surface)
    end subroutine read_segments
 
-   !> The points of a data line behind those of `place`.
-   subroutine read_segment(reader, data, place)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
-      real(wp), allocatable, intent(inout) :: place(:, :)
-      real(wp) :: x(4)
-      logical :: is_arc
-
-      call get_segment(reader, data, size(place, 2) == 0, is_arc, x)
-      if (.not. data%ok) return
-      if (is_arc) then
-         call add_arc(reader, data, x(1:2), x(3:4), place)
-         return
-      end if
-      if (size(place, 2) > 0) then
-         if (all(abs(place(:, size(place, 2)) - x(1:2)) <= 0.0_wp)) call data_error(reader, data, &
-            "the line has no length")
-      end if
-      place = reshape([place, x(1:2)], [2, size(place, 2) + 1])
-   end subroutine read_segment
-
    !> The shorter arc about `centre` from the last point to `end`.
-   subroutine add_arc(reader, data, end, centre, place)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
+   pure subroutine add_arc(end, centre, place)
       real(wp), intent(in) :: end(2), centre(2)
       real(wp), allocatable, intent(inout) :: place(:, :)
       real(wp) :: from(2), to(2), angle, part
@@ -77,8 +60,7 @@ contains
 
       from = place(:, size(place, 2)) - centre
       to = end - centre
-      call check_arc(reader, data, from, to, angle)
-      if (.not. data%ok) return
+      angle = atan2(from(1)*to(2) - from(2)*to(1), dot_product(from, to))
       n = ceiling(abs(angle)/finest)
       allocate(point(2, n))
       do k = 1, n - 1

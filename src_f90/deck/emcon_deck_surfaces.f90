@@ -91,6 +91,9 @@ contains
          "use *INCLUDE")
       if (has_option(card, "SCALE") .and. kind /= surface_of_triangles) call card_error(reader, &
          card, "SCALE= is of TYPE=STL")
+      if (has_option(card, "FILLETRADIUS") .and. all(kind /= [surface_of_segments, &
+         surface_of_revolution, surface_of_extrusion])) call card_error(reader, card, &
+         "FILLET RADIUS= is of TYPE=SEGMENTS, REVOLUTION and CYLINDER")
       select case (kind)
       case (surface_of_faces)
          call read_faces(reader, card, scene, adjacency, surface)

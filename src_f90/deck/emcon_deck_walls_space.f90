@@ -5,11 +5,13 @@ module emcon_deck_walls_space
       next_line
    use emcon_deck_own_nodes, only : add_own_nodes
    use emcon_deck_reader, only : card_error, card_t, reader_t
-   use emcon_deck_wall_profile_plane, only : profile_add, profile_builder_t, profile_finish
+   use emcon_deck_segment_lines_plane, only : read_segment_lines
+   use emcon_deck_wall_profile_plane, only : profile_finish
    use emcon_diagnostics, only : quoted
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_of_extrusion, surface_of_plane, surface_of_revolution, &
       surface_of_sphere, surface_t
+   use emcon_profile_fillet_plane, only : segment_t
    use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
    use emcon_wall, only : wall_drawn, wall_flat, wall_round, wall_t, wall_turned
@@ -209,25 +211,11 @@ contains
       type(card_t), intent(in) :: card
       type(data_t), intent(inout) :: data
       type(wall_t), intent(inout) :: wall
-      type(profile_builder_t) :: profile
+      type(segment_t), allocatable :: segment(:)
       logical :: is_well
-      integer :: n
 
-      is_well = .true.
-      do while (next_line(reader, data))
-         data%ok = .true.
-         call profile_add(profile, reader, data)
-         is_well = is_well .and. data%ok
-      end do
-      if (.not. is_well) return
-      n = 0
-      if (allocated(profile%piece)) n = size(profile%piece)
-      if (n == 0) then
-         call card_error(reader, card, "a profile begins with START, x, y and goes on with LINE, " &
-            // "x, y or CIRCL, x, y, xc, yc")
-      else
-         call profile_finish(profile, reader, card, wall)
-      end if
+      call read_segment_lines(reader, card, data, segment, is_well)
+      if (is_well) call profile_finish(segment, reader, card, wall)
    end subroutine read_profile
 
    !> Three directions of length 1 at right angles, the first one along `way`.

@@ -205,6 +205,7 @@ program main
    use test_verdict, only : collect_verdict
    use test_verdict_follow, only : collect_verdict_follow
    use test_turn_space, only : collect_turn_space
+   use test_profile_fillet, only : collect_profile_fillet
    use test_wall_gap, only : collect_wall_gap
    use test_velocity_update, only : collect_velocity_update
    implicit none
@@ -341,6 +342,7 @@ program main
    call run("patch_contact", collect_patch_contact)
    call run("patch_gap", collect_patch_gap)
    call run("turn_space", collect_turn_space)
+   call run("profile_fillet", collect_profile_fillet)
    call run("wall_gap", collect_wall_gap)
    call run("outline", collect_outline)
    call run("overlap_boxes", collect_overlap_boxes)

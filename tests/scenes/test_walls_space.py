@@ -389,12 +389,31 @@ def test_behind_at_the_start(tmp_path: Path) -> None:
     ran(tmp_path, falling(cube(gap=-0.01), plane(), (0., 0., -1.), options=", ADJUST=0."))
 
 
+def test_fillets(tmp_path: Path) -> None:
+    """The rim of a table, and a hollow corner, which is refused without one."""
+    sharp = "TYPE=REVOLUTION, FILLET RADIUS=1.\n0., 0., -2., 0., 0., 1.\nSTART, 0., 2.\nLINE, 1.3, 2.\nLINE, 1.3, -1.\n"
+    way = []
+    for name, shape in (("arc", TABLE), ("fillet", sharp)):
+        folder = tmp_path/name
+        folder.mkdir()
+        text = falling(rubber_ball((1.5, 0.25, 1.06)), shape, (0., 0., -1.))
+        way.append(ran(folder, text).fields()["displacement"][-1])
+    assert np.abs(way[1] - way[0]).max() <= 1e-12*np.abs(way[0]).max()
+    bowl = "TYPE=REVOLUTION, FILLET RADIUS=.5\n0, 0, -.06, 0, 0, 1\nSTART, 0., 0.\nLINE, 3., 0.\nLINE, 3., 2.\n"
+    assert "hollow corner" in refusal(tmp_path, falling(cube(), bowl.replace(", FILLET RADIUS=.5", ""), (0., 0., -1.)))
+    check_balance(ran(tmp_path, falling(cube(), bowl, (0., 0., -1.))))
+
+
 @pytest.mark.parametrize(("shape", "said"), [
     ("TYPE=REVOLUTION\n0, 0, 0, 0, 0, 1\nSTART, 1., 2.\nLINE, 1., 0.\nLINE, 3., 0.\n", "hollow corner at 1, 0"),
     ("TYPE=REVOLUTION\n0, 0, 0, 0, 0, 1\nSTART, -1., 2.\nLINE, 1., 0.\n", "radii below 0"),
     ("TYPE=REVOLUTION\n0, 0, 0, 0, 0, 0\nSTART, 1., 2.\nLINE, 1., 0.\n", "a and b are the same"),
     ("TYPE=REVOLUTION\n0, 0, 0, 0, 0, 1\n", "a profile begins with START"),
     ("TYPE=CYLINDER\n0, 0, 0, 1, 0, 0\n1., 1., 0.\nSTART, 1., 2.\nLINE, 1., 0.\n", "right angle"),
+    ("TYPE=PLANE, FILLET RADIUS=1.\n0, 0, 0, 0, 0, 1\n", "FILLET RADIUS= is of TYPE=SEGMENTS, REVOLUTION and CYLINDER"),
+    ("TYPE=REVOLUTION, FILLET RADIUS=1.5\n0, 0, 0, 0, 0, 1\nSTART, 0., 0.\nLINE, 1., 0.\nLINE, 1., -3.\n",
+     "FILLET RADIUS=1.5 has no room at 1, 0"),
+    ("TYPE=REVOLUTION, FILLET RADIUS=-1.\n0, 0, 0, 0, 0, 1\nSTART, 0., 0.\nLINE, 1., 0.\n", "is not 0 or a positive number"),
     ("TYPE=SPHERE\n0., 0., 0., -1.\n", "radius is not above 0"), ("TYPE=SPHERE\n0., 0., 0., 1., UP\n", "INSIDE or OUTSIDE"),
     ("TYPE=PLANE\n0., 0., 0., 0., 0., 0.\n", "normal has no length"), ("TYPE=PLANE\n", "a data line is missing")])
 def test_refused(shape: str, said: str, tmp_path: Path) -> None:
