@@ -25,7 +25,8 @@ module emcon_active_set
    public :: active_set_t, active_set_init, active_set_suit, active_set_overclosure, &
       active_set_begin, active_set_restart, active_set_select, active_set_update_gaps
    public :: active_set_pass, active_set_note_stale, active_set_brought, active_set_complete
-   public :: active_set_open_sets, active_set_repeats, active_set_take, active_set_is_empty, &
+   public :: active_set_may_turn, active_set_mixes, active_set_open_sets, active_set_repeats, &
+      active_set_take, active_set_is_empty, &
       active_set_slides, active_set_could_hold, active_set_mark
    public :: candidates_t, candidates_clear, touch_tol
    public :: step_done, step_refused, step_diverged, step_singular, step_cycling, step_too_far, &
@@ -451,6 +452,24 @@ contains
       if (slides) slides = any(self%is_active .and. self%friction%law%mu > 0.0_wp &
          .and. .not. friction_holds(self%friction))
    end function active_set_slides
+
+   !> Do sets find out where to what rubs slides in a step? In space they do, in dynamics, but not
+   !> beside rows that always hold: those of rigid bodies depend on each other.
+   pure logical function active_set_may_turn(self, system) result(may_turn)
+      type(active_set_t), intent(in) :: self
+      type(system_t), intent(in) :: system
+
+      may_turn = self%friction%is_on .and. self%friction%n_slip > 1 .and. self%rules%has_impacts &
+         .and. .not. any(system%acts)
+   end function active_set_may_turn
+
+   !> Do some contacts that act slide, and others not?
+   pure logical function active_set_mixes(self) result(mixes)
+      type(active_set_t), intent(in) :: self
+
+      mixes = active_set_slides(self)
+      if (mixes) mixes = any(self%is_active .and. friction_holds(self%friction))
+   end function active_set_mixes
 
    !> Could contacts hold the nodes of `overlap` that does not?
    pure logical function active_set_could_hold(self, system, overlap) result(could_hold)

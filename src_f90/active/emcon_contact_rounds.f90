@@ -2,8 +2,8 @@
 !> none stands emcon_contact_newton solves the step with all candidates. Source: docs/theory.md,
 !> section 6.1.
 module emcon_contact_rounds
-   use emcon_active_set, only : active_set_select, active_set_slides, active_set_t, &
-      candidates_clear, step_cycling, step_done, step_not_held
+   use emcon_active_set, only : active_set_may_turn, active_set_mixes, active_set_select, &
+      active_set_slides, active_set_t, candidates_clear, step_cycling, step_done, step_not_held
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraints_evaluate
    use emcon_contact_candidates, only : candidates_are_many, &
@@ -51,13 +51,14 @@ contains
          call contact_sets_solve_by_laws(self, system, newton, motion, status, error)
          return
       end if
-      if (turns(self)) then
+      if (turns(self, system)) then
          call begin_again(self, system, motion)
          call solve_with_all(self, system, newton, motion, status, error)
          if (status == step_done .or. allocated(error)) return
          call contact_sets_begin_anew(self, newton, motion)
          call candidates_clear(self%candidates)
       end if
+      self%friction%follows = active_set_may_turn(self, system)
       call contact_sets_solve(self, system, scene, newton, motion, status, error)
       if (allocated(error)) return
       if (self%candidates%is_settled) then
@@ -108,12 +109,15 @@ contains
       call move_alloc(slides, self%support%text)
    end subroutine solve_together
 
-   !> Does something slide whose way turns, as slip with two components does? No set says where to.
-   pure logical function turns(self)
+   !> Does something slide whose way turns, as slip with two components does, and no set say where
+   !> to? None does while some of it stops.
+   pure logical function turns(self, system)
       type(active_set_t), intent(in) :: self
+      type(system_t), intent(in) :: system
 
       turns = self%friction%looks_back .and. .not. self%support%is_needed
-      if (turns) turns = active_set_slides(self) .and. .not. candidates_are_many(self)
+      if (turns) turns = active_set_mixes(self) .or. (active_set_slides(self) .and. &
+         .not. active_set_may_turn(self, system))
    end function turns
 
    !> Hold what contact alone holds, from the first guess on; where slip has a direction with
@@ -172,6 +176,7 @@ contains
       logical :: leads
       integer :: i
 
+      self%friction%follows = .false.
       newton%looks_early = .false.
       newton%convergence%largest_move = huge(1.0_wp)
       if (.not. self%rules%has_impacts) newton%convergence%largest_move = self%rules%largest_move

@@ -6,8 +6,9 @@
 !> set; in statics trials of single contacts do. Contacts that give way are solved by sets alone.
 !> Source: docs/theory.md, section 6.1.
 module emcon_contact_sets
-   use emcon_active_set, only : active_set_complete, active_set_open_sets, active_set_repeats, &
-      active_set_slides, active_set_t, step_cycling, step_done, step_loose, step_not_held
+   use emcon_active_set, only : active_set_complete, active_set_may_turn, active_set_open_sets, &
+      active_set_repeats, active_set_slides, active_set_t, step_cycling, step_done, step_loose, &
+      step_not_held
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_gives_back
    use emcon_contact_candidates, only : candidates_are_many, &
@@ -19,7 +20,8 @@ module emcon_contact_sets
    use emcon_contact_support, only : contact_support_find_jam
    use emcon_coulomb_law, only : contact_open, slip_status_t
    use emcon_errors, only : error_t
-   use emcon_friction, only : friction_holds, friction_missed, friction_turn, friction_use
+   use emcon_friction, only : friction_holds, friction_missed, friction_stiffness, friction_turn, &
+      friction_use
    use emcon_gaps, only : pair_search
    use emcon_kept_factor, only : kept_factor_condense, kept_factor_has_room
    use emcon_kinds, only : wp
@@ -36,6 +38,8 @@ module emcon_contact_sets
 
    !> Sets that are tried by the null space in one step at most, and where trials tell them.
    integer, parameter :: most_tried = 6, most_by_trials = 20
+   !> With friction trials tell the next set where the problem of all has more rows.
+   integer, parameter :: most_rows = 200
    !> By so much of the largest push friction may miss its law: what a solve leaves.
    real(wp), parameter :: least_missed = 1.0e4_wp*epsilon(1.0_wp)
    !> Contacts that jam slide alone if others use less than this part of what they do.
@@ -241,17 +245,21 @@ contains
       logical, intent(out) :: goes_on            !! there is such a set
       type(error_t), allocatable, intent(out) :: error
       logical :: turns
+      integer :: n_row
 
       turns = .false.
+      n_row = (1 + merge(self%friction%n_slip, 0, self%friction%is_on)) &
+         *count(self%candidates%takes_part)
       goes_on = newton%factor_policy%is_allowed .and. newton%correction%kept%is_made &
-         .and. .not. (self%friction%is_on .or. candidates_are_many(self))
-      if (goes_on) goes_on = kept_factor_has_room(newton%correction%kept, &
-         count(self%candidates%takes_part), size(system%matrix%column))
+         .and. .not. (candidates_are_many(self) .or. (self%friction%is_on .and. n_row > most_rows))
+      if (goes_on) goes_on = kept_factor_has_room(newton%correction%kept, n_row, &
+         size(system%matrix%column))
       if (goes_on) then
-         call choose_by_problem(self, system, newton, motion, goes_on, error)
+         call choose_by_problem(self, system, newton, motion, turns, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
       else
-         goes_on = .not. self%rules%has_impacts .or. candidates_are_many(self)
+         goes_on = .not. self%rules%has_impacts .or. candidates_are_many(self) .or. &
+            active_set_may_turn(self, system)
          if (.not. goes_on) return
          call choose_by_trials(self, system, turns)
       end if
@@ -292,18 +300,21 @@ contains
    end subroutine choose_by_trials
 
    !> The contacts condensed by the kept factor, and the laws solved there.
-   subroutine choose_by_problem(self, system, newton, motion, is_solved, error)
+   subroutine choose_by_problem(self, system, newton, motion, turns, is_solved, error)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
+      logical, intent(out) :: turns              !! friction holds in another way somewhere
       logical, intent(out) :: is_solved
       type(error_t), allocatable, intent(out) :: error
       type(contact_problem_t) :: problem
       type(contact_effort_t) :: effort
-      type(slip_status_t), allocatable :: status(:)
+      type(slip_status_t), allocatable :: status(:), before(:)
       real(wp), allocatable :: force(:, :)
 
+      turns = .false.
+      if (self%friction%is_on) before = self%friction%law%status
       call candidates_select(self, system, motion)
       associate (set => self%set)
          is_solved = set%n_permanent == 0 .and. set%n > 0 .and. set%n_condition == set%n
@@ -311,19 +322,72 @@ contains
          call constraints_evaluate(set, system, motion, .true.)
          call constraints_rows(set, system%space%numbering)
          call newton_pick_residual(newton, system, set)
-         call contact_problem_create(problem, 0, set%n)
-         allocate(force(0:0, set%n))
-         call kept_factor_condense(newton%correction%kept, set, newton%residual, problem%w, &
-            problem%free(0, :), error)
+         call lay_out_problem(self, system, newton, problem, force, error)
          if (allocated(error)) return
-         force(0, :) = set%lam(:set%n)
-         call contact_problem_solve(problem, force, effort, is_solved)
+         call contact_problem_solve(problem, force, effort, is_solved, .true.)
          if (.not. is_solved) return
          self%lam(set%id) = force(0, :)
          status = contact_problem_status(problem, force)
          self%candidates%acts(set%id) = status%kind /= contact_open
+         if (.not. self%friction%is_on) return
+         self%friction%tau(:, set%id) = force(1:, :)
+         where (status%kind == contact_open) status = before(set%id)
+         self%friction%law(set%id)%status = status
+         turns = any(status%kind /= before(set%id)%kind)
       end associate
    end subroutine choose_by_problem
+
+   !> The contacts of the set, evaluated, in their multipliers alone by the kept factor, and those
+   !> that there are.
+   subroutine lay_out_problem(self, system, newton, problem, force, error)
+      type(active_set_t), intent(in) :: self     !! of candidates
+      type(system_t), intent(in) :: system
+      type(newton_t), intent(inout) :: newton
+      type(contact_problem_t), intent(out) :: problem
+      real(wp), allocatable, intent(out) :: force(:, :)  !! (0:n_slip, n) [M L/T^2]
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: w(self%set%n_row, self%set%n_row), free(self%set%n_row)
+      integer :: place(self%set%n_row), k, m
+
+      associate (set => self%set, friction => self%friction)
+         m = 1 + merge(friction%n_slip, 0, friction%is_on)
+         call contact_problem_create(problem, m - 1, set%n)
+         allocate(force(0:m - 1, set%n), source=0.0_wp)
+         call kept_factor_condense(newton%correction%kept, set, newton%residual, w, free, error)
+         if (allocated(error)) return
+         do k = 1, set%n
+            problem%w(m*(k - 1) + 1:m*k, m*(k - 1) + 1:m*k) = unit_matrix(m)*w(k, k)
+         end do
+         place = m*(set%condition - 1) + 1 + set%slip
+         problem%w(place, place) = w
+         do k = 1, set%n_row
+            associate (s => set%slip(k), i => set%condition(k))
+               problem%free(s, i) = free(k)
+               force(s, i) = set%lam(k)
+            end associate
+         end do
+         if (.not. friction%is_on) return
+         problem%mu = friction%law(set%id)%mu*set%item(:set%n)%normal
+         do k = 1, set%n
+            problem%stiffness(k) = friction_stiffness(system, set%item(k))
+            if (.not. set%item(k)%has_friction) cycle
+            problem%slip_target(:, k) = friction%law(set%id(k))%slip_target(:m - 1)
+            problem%free(1:, k) = problem%free(1:, k) - problem%slip_target(:, k)
+         end do
+      end associate
+   end subroutine lay_out_problem
+
+   !> Of the size `m`.
+   pure function unit_matrix(m) result(unit)
+      integer, intent(in) :: m
+      real(wp) :: unit(m, m)
+      integer :: k
+
+      unit = 0.0_wp
+      do k = 1, m
+         unit(k, k) = 1.0_wp
+      end do
+   end function unit_matrix
 
    !> Do all contacts of the set push, and is friction as its law says?
    pure logical function obeys_laws(self, system)

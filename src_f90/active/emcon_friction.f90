@@ -36,6 +36,7 @@ module emcon_friction
       logical :: is_on = .false. !! some contact has friction; else nothing is allocated
       logical :: looks_back = .false.            !! and slip has two components: a step that is
                                                  !! solved tells what stops or turns back
+      logical :: follows = .false.               !! sets are tried, whose friction turns with slip
       logical :: stops = .false.                 !! the jump of velocities at its end is to stop it
       integer :: n_slip = 1                      !! n_dim - 1
       !> (n_constraint) Coulomb's law of each, with mu = 0 where there is none: how what acts holds
@@ -264,6 +265,7 @@ contains
             if (.not. law%mu > 0.0_wp) cycle
             item%has_friction = .true.
             item%slip_target = law%slip_held()
+            law%turns = self%follows
             call contact_laws_add(set%law(k), law)
             sticks(k) = law%holds_slip()
          end associate
@@ -281,7 +283,7 @@ contains
       grips = self%law%mu > 0.0_wp .and. self%law%status%kind /= contact_slides
    end function friction_holds
 
-   !> Friction of what sticks, to start from with the next set.
+   !> Friction of what sticks, to start from with the next set, and the ways that slip has taken.
    pure subroutine friction_keep(self, set)
       type(friction_t), intent(inout) :: self
       type(constraint_set_t), intent(in) :: set
@@ -289,6 +291,13 @@ contains
 
       do k = set%n + 1, set%n_row
          self%tau(set%slip(k), set%id(set%condition(k))) = set%lam(k)
+      end do
+      if (.not. self%looks_back) return
+      do k = set%n_permanent + 1, set%n
+         associate (law => self%law(set%id(k)), drag => set%item(k)%response%mu_sigma)
+            if (law%status%kind == contact_slides .and. any(abs(drag) > 0.0_wp)) &
+               law%status%direction = drag/norm2(drag)
+         end associate
       end do
    end subroutine friction_keep
 

@@ -369,13 +369,26 @@ contains
          call active_set_solve(self%active, self%system, self%scene, self%newton, self%motion, &
             status, error)
          if (status /= step_done .or. allocated(error)) return
-         if (maxval(abs(self%motion%du - before)) <= rounding*maxval(abs(before))) exit
+         if (.not. does_shift(self) .or. maxval(abs(self%motion%du - before)) &
+            <= rounding*maxval(abs(before))) exit
          self%state%contacts%is_active = self%active%is_active
          self%state%contacts%lam = self%active%lam
          call take_friction(self, self%active%friction, 0)
       end do
       if (any(have_closed(self) .and. .not. stays)) status = step_too_far
    end subroutine balance
+
+   !> Does some friction act where it was expected, and not where it is? In the plane that is not
+   !> asked.
+   pure logical function does_shift(self)
+      type(layer_t), intent(in) :: self
+      integer :: i
+
+      does_shift = self%active%friction%n_slip == 1
+      do i = 1, size(self%system%contact)
+         does_shift = does_shift .or. any(self%system%contact(i)%contact%state%slip_shift > 0.0_wp)
+      end do
+   end function does_shift
 
    !> The contacts that were left out as they seemed to follow from others, and close all the same:
    !> of two corners that pass each other z may take the wrong side.

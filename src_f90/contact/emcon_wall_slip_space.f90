@@ -5,6 +5,8 @@
 !> its forces have no resultant and no moment. Source: docs/theory.md, section 15.3.
 module emcon_wall_slip_space
    use emcon_dgrad9, only : dg_dot, dg_t, difference, operator(*)
+   use emcon_dgrad9_first, only : first_dot => dg_dot, first_t => dg_t, &
+      first_difference => difference, operator(*)
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_frame_slip_space, only : tangent_basis
    use emcon_kinds, only : wp
@@ -21,8 +23,8 @@ module emcon_wall_slip_space
       real(wp) :: f(2) = 0.0_wp                  !! slip over the step [L]
       real(wp) :: g(n_dim, n_wall_point, 2) = 0.0_wp   !! discrete gradients
       real(wp) :: c(n_dim, n_wall_point, 2) = 0.0_wp   !! gradients at the end
-      !> (i, j, which) derivative of g(i, which) by coordinate j at the end; 0 if not asked for
-      real(wp) :: h(n_dim*n_wall_point, n_dim*n_wall_point, 2) = 0.0_wp
+      !> (i, j, which) derivative of g(i, which) by coordinate j at the end, if it is asked for
+      real(wp) :: h(n_dim*n_wall_point, n_dim*n_wall_point, 2)
    end type wall_slip_t
 
 contains
@@ -34,14 +36,24 @@ contains
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(wall_slip_t), intent(out) :: slip
       type(dg_t) :: place(n_dim)
+      type(first_t) :: first
       real(wp) :: basis(n_dim, 2), by_place(n_dim, n_dim, 2), part_g(n_dim, n_wall_point), &
          part_c(n_dim, n_wall_point)
       integer :: i, k
 
       do i = 1, n_dim
          associate (three => [1, 2, 2 + i, 2 + i])
-            place(i) = (1.0_wp/wall%arm)*dg_dot(difference(1, 2, x(:, three), dx(:, three)), &
-               difference(3, 2, x(:, three), dx(:, three)))
+            if (leaves_second) then
+               first = (1.0_wp/wall%arm)*first_dot(first_difference(1, 2, x(:, three), &
+                  dx(:, three)), first_difference(3, 2, x(:, three), dx(:, three)))
+               place(i)%f0 = first%f0
+               place(i)%df = first%df
+               place(i)%g = first%g
+               place(i)%c = first%c
+            else
+               place(i) = (1.0_wp/wall%arm)*dg_dot(difference(1, 2, x(:, three), dx(:, three)), &
+                  difference(3, 2, x(:, three), dx(:, three)))
+            end if
          end associate
       end do
       call find_basis(wall, place%f0, place%df, basis, by_place)
@@ -76,6 +88,7 @@ contains
       real(wp), dimension(n_dim, n_wall_point) :: part, turn
       integer :: i, j, k
 
+      slip%h = 0.0_wp
       do k = 1, 2
          do i = 1, n_dim
             call nodes_add_second(basis(i, k), n_dim, place(i)%h, points_of(i), slip%h(:, :, k))

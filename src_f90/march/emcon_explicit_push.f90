@@ -107,6 +107,7 @@ contains
       integer :: k, n
 
       some%n = size(row)
+      some%n_row = size(row)
       if (allocated(some%defect)) deallocate(some%defect)
       allocate(some%defect(size(row)), source=0.0_wp)
       rows%n_row = size(row)

@@ -1,6 +1,7 @@
 !> One step in time: first guess, solution, the judge's look at it, and what follows from it.
 module emcon_march_step
-   use emcon_active_set, only : active_set_begin, active_set_could_hold, step_diverged, &
+   use emcon_active_set, only : active_set_begin, active_set_could_hold, active_set_may_turn, &
+      step_diverged, &
       step_done, step_overlaps, step_refused, step_singular, step_unbalanced
    use emcon_active_set_solve, only : active_set_solve
    use emcon_amplitudes, only : find_amplitude_value
@@ -157,9 +158,10 @@ contains
 
       associate (factor_policy => self%newton%factor_policy, correction => self%newton%correction)
          factor_policy%is_allowed = factor_policy%is_wanted &
-            .and. .not. (self%active%friction%is_on &
-            .or. self%active%near_laws%is_on) .and. (correction%method == method_null_space &
-            .or. self%system%n_constraint == 0)
+            .and. .not. self%active%near_laws%is_on &
+            .and. (correction%method == method_null_space .or. self%system%n_constraint == 0)
+         if (self%active%friction%is_on) factor_policy%is_allowed = factor_policy%is_allowed &
+            .and. active_set_may_turn(self%active, self%system)
          call factor_policy_step(factor_policy, correction, self%state%base, part%start, part%h, &
             self%state%clock%increment, is_lost)
          if (.not. is_lost) return

@@ -22,17 +22,26 @@ module emcon_early_set
 
 contains
 
-   !> Does the motion, which solves the step to a few digits, ask for another set?
-   subroutine predicts_new_set(system, set, motion, changes)
+   !> Does the motion, which solves the step to a few digits, ask for another set? Gaps and slips
+   !> below `left` may be those of what is left of the way: huge, what slides is not looked at.
+   subroutine predicts_new_set(system, set, motion, left, changes)
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(in) :: set
       type(motion_t), intent(in) :: motion
+      real(wp), intent(in) :: left               !! > 0 [L]
       logical, intent(out) :: changes            !! clearly so
       integer :: pair, i, id, k
 
       changes = .false.
       if (set%n > set%n_permanent) changes = minval(set%lam(set%n_permanent + 1:set%n)) &
          < -clearly*maxval(abs(set%lam(set%n_permanent + 1:set%n)))
+      do k = set%n_permanent + 1, merge(set%n, 0, left < huge(left))
+         ! What slides against the way that its friction has stops, or turns back.
+         associate (item => set%item(k))
+            if (item%has_friction) changes = changes .or. dot_product(item%response%mu_sigma, &
+               item%slip) < -left*norm2(item%response%mu_sigma)
+         end associate
+      end do
       if (changes) return
       k = set%n_permanent                        ! active ones so far; they ascend
       do pair = 1, size(system%contact)
@@ -51,7 +60,8 @@ contains
                end if
                associate (gap => contact%state(i))
                   if (.not. (gap%is_near .and. gap%is_over) .or. gap%is_arriving) cycle
-                  changes = changes .or. (gap%gap1 < min(gap%gap0, gap%closed) - clearly*gap%size)
+                  changes = changes .or. (gap%gap1 < min(gap%gap0, gap%closed) &
+                     - min(left, clearly*gap%size))
                end associate
             end do
          end associate

@@ -146,13 +146,13 @@ contains
       logical, intent(out) :: is_fit             !! there is a factor, and one of W^T W, not t
       type(error_t), allocatable, intent(out) :: error
 
-      is_fit = self%is_made .and. kept_factor_has_room(self, set%n, self%n_slot)
+      is_fit = self%is_made .and. kept_factor_has_room(self, set%n_row, self%n_slot)
       if (.not. is_fit) return
       call reach_rows(self, set, error)
       if (allocated(error)) return
       if (set%penalty%is_on) then
          self%product = self%l
-         self%compliance = spread(0.0_dp, 1, set%n)
+         self%compliance = spread(0.0_dp, 1, set%n_row)
          call add_penalty(self, set, is_fit)
       else
          call dense_cholesky(self%l, is_fit)
@@ -175,7 +175,7 @@ contains
       self%x = -real(residual, dp)
       call blocks_solve(self%blocks, .false., self%x, self%y, error)
       if (allocated(error)) return
-      do k = 1, set%n
+      do k = 1, set%n_row
          w(k:, k) = real(self%blocks%scale*self%l(k:, k), wp)
          w(k, k:) = w(k:, k)
          free(k) = set%defect(k)
@@ -193,12 +193,12 @@ contains
       integer :: k, n
 
       if (allocated(self%l)) then
-         if (size(self%mu) /= set%n) deallocate(self%l, self%mu, self%start, self%bend)
+         if (size(self%mu) /= set%n_row) deallocate(self%l, self%mu, self%start, self%bend)
       end if
-      if (.not. allocated(self%l)) allocate(self%l(set%n, set%n), self%mu(set%n), &
-         self%start(set%n + 1), self%bend(set%n))
+      if (.not. allocated(self%l)) allocate(self%l(set%n_row, set%n_row), self%mu(set%n_row), &
+         self%start(set%n_row + 1), self%bend(set%n_row))
       self%start(1) = 0
-      do k = 1, set%n
+      do k = 1, set%n_row
          call make_room(self, self%start(k) + size(self%y))
          associate (rows => set%gap_rows, first => set%gap_rows%row_start(k) + 1, &
                last => set%gap_rows%row_start(k + 1), at => self%start(k) + 1)
@@ -208,7 +208,7 @@ contains
          if (allocated(error)) return
          self%start(k + 1) = self%start(k) + n
       end do
-      self%n_forward = self%n_forward + set%n
+      self%n_forward = self%n_forward + set%n_row
       call fill_products(self)
    end subroutine reach_rows
 
@@ -360,7 +360,7 @@ contains
       self%x = -real(residual, dp)
       call blocks_solve(self%blocks, .false., self%x, self%y, error)
       if (allocated(error)) return
-      do k = 1, set%n
+      do k = 1, set%n_row
          self%mu(k) = -real(set%defect(k), dp)/self%blocks%scale
          if (set%penalty%is_on) self%mu(k) = self%mu(k) &
             + self%compliance(k)*real(set%penalty%lack(k), dp)
@@ -369,7 +369,7 @@ contains
          end do
       end do
       call dense_cholesky_solve(self%l, self%mu)
-      do k = 1, set%n
+      do k = 1, set%n_row
          do j = self%start(k) + 1, self%start(k + 1)
             self%y(self%index(j) + 1) = self%y(self%index(j) + 1) + self%mu(k)*self%w(j)
          end do

@@ -303,11 +303,16 @@ contains
       real(wp), intent(in) :: size               !! relative residual
       integer, intent(inout) :: status           !! `newton_early` if so
       logical :: changes
+      real(wp) :: left
 
       ! Before any correction the multipliers are those of a guess: where that flies, round-off.
       if (.not. self%looks_early .or. size > early_enough .or. self%n_solve == 0) return
       self%looks_early = .false.
-      call predicts_new_set(system, set, motion, changes)
+      left = huge(left)
+      ! Where something rubs sets change in most steps.
+      if (self%convergence%is_kept .and. any(set%item(:set%n)%has_friction)) &
+         left = maxval(abs(self%dq))
+      call predicts_new_set(system, set, motion, left, changes)
       if (changes) status = newton_early
    end subroutine look
 
@@ -479,7 +484,7 @@ contains
          leaves_second = .not. with_tangent
          if (self%convergence%is_kept) leaves_second &
             = .not. (factor_policy_looks(self%factor_policy) &
-            .and. kept_factor_has_room(self%correction%kept, set%n, size(system%matrix%column)))
+            .and. kept_factor_has_room(self%correction%kept, set%n_row, size(system%matrix%column)))
          call constraints_evaluate(set, system, motion, leaves_second)
          call constraints_rows(set, system%space%numbering)
       end if

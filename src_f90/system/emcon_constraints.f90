@@ -219,7 +219,7 @@ contains
 
       associate (item => self%item(k))
          values = contact_values_t(item%gap0, item%gap1, item%dgap, item%gap1, item%slip, &
-            frequency=self%frequency, is_stored=self%penalty%is_stored)
+            item%size, frequency=self%frequency, is_stored=self%penalty%is_stored)
          if (k <= self%n) values%left = self%defect(k)
          if (item%has_friction) values%friction = condition_friction(item, constraints_lam(self, k))
       end associate

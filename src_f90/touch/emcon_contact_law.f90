@@ -24,6 +24,7 @@ module emcon_contact_law
       real(wp) :: dgap = 0.0_wp                  !! gap1 - gap0, to relative accuracy [L]
       real(wp) :: left = 0.0_wp                  !! of the gap, to what it is to be at the end [L]
       real(wp) :: slip(most_slips) = 0.0_wp      !! [L]
+      real(wp) :: size = 0.0_wp                  !! of an edge [L]
       !> Against slip, by the rows of the condition: what sticks, or slides [M L/T^2]
       real(wp) :: friction(most_slips) = 0.0_wp
       real(wp) :: frequency = 0.0_wp             !! 1/h; 0 in statics [1/T]

@@ -21,6 +21,9 @@ module emcon_coulomb_law
    !> Slip is made of a dozen products of lengths of an edge: by so much of it slip is uncertain.
    real(wp), parameter :: slip_rounding = 16.0_wp*epsilon(1.0_wp)
 
+   !> Slip has a way that forces can be found by above so many times what it is rounded to.
+   real(wp), parameter :: has_way = 1.0e3_wp*slip_rounding
+
    !> Ways in which the law holds. It sticks at the slip that is led to, is free along the way to
    !> that, or rests where it was at the start.
    integer, parameter :: contact_open = 2, contact_sticks = 0, contact_slides = 1, &
@@ -46,6 +49,7 @@ module emcon_coulomb_law
       real(wp) :: mu = 0.0_wp                        !! >= 0
       real(wp) :: restitution = 0.0_wp               !! along the surface, of what sticks, 0 to 1
       type(slip_status_t) :: status
+      logical :: turns = .false.                     !! slip has two components: its way turns
       real(wp) :: slip_target(most_slips) = 0.0_wp   !! a [L]
       real(wp) :: slip_to_stop(most_slips) = 0.0_wp  !! the same, also below what slip is rounded to
    contains
@@ -88,13 +92,31 @@ contains
       acts_near = .false.
    end function coulomb_acts_near
 
-   !> Where it slides friction is a part of the push; what sticks is for rows of slips.
+   !> Where it slides friction is a part of the push, against the slip as it goes: what goes against
+   !> the way that it had is about to stop, and keeps that. What sticks is for rows of slips.
    pure subroutine coulomb_respond(self, at, response)
       class(coulomb_t), intent(inout) :: self
       type(contact_values_t), intent(in) :: at
       type(contact_response_t), intent(inout) :: response
 
+      type(remainder_t) :: rest
+      real(wp) :: size, direction(most_slips), across(most_slips, most_slips)
+      integer :: s
+
       response%mu_sigma = self%mu*self%status%direction
+      if (.not. self%turns .or. self%status%kind /= contact_slides) return
+      rest = remainder_of(at%slip, self%slip_target)
+      size = norm2(rest%over)
+      if (size <= has_way*at%size .or. dot_product(rest%over, self%status%direction) <= 0.0_wp) &
+         return
+      direction = rest%over/size
+      self%status%direction = direction
+      response%mu_sigma = self%mu*direction
+      across = across_of(rest)
+      do s = 1, most_slips
+         response%stiffness(1:, s) = norm2(at%friction)/size*(across(:, s) &
+            - dot_product(direction, across(:, s))*direction)
+      end do
    end subroutine coulomb_respond
 
    pure real(wp) function coulomb_dissipated(self, at, response) result(dissipated)
@@ -177,6 +199,20 @@ contains
       end if
    end function remainder_of
 
+   !> What is left grows by with the trial: the nearest point moves along inside the segment alone.
+   pure function across_of(rest) result(across)
+      type(remainder_t), intent(in) :: rest
+      real(wp) :: across(most_slips, most_slips)
+      integer :: s
+
+      across = 0.0_wp
+      do s = 1, most_slips
+         across(s, s) = 1.0_wp
+         if (rest%part > 0.0_wp .and. rest%part < 1.0_wp) across(:, s) = across(:, s) &
+            - rest%along(s)*rest%along
+      end do
+   end function across_of
+
    !> The natural map, whose fixed points obey the law: the push (0) and the friction that a trial
    !> (n, p) stands for, and their derivatives (row, by) by that: with the gap they fall by c times
    !> those, with slips they grow. At kinks the derivative is that of one side.
@@ -198,12 +234,7 @@ contains
       most = mu*force(0)
       size = norm2(rest%over)
       force(1:) = rest%over
-      do s = 1, most_slips
-         slope(s, s) = 1.0_wp
-         ! The nearest point moves along inside the segment alone.
-         if (rest%part > 0.0_wp .and. rest%part < 1.0_wp) slope(1:, s) = slope(1:, s) &
-            - rest%along(s)*rest%along
-      end do
+      slope(1:, 1:) = across_of(rest)
       if (size <= most) return
       direction = rest%over/size
       force(1:) = most*direction

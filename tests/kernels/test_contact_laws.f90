@@ -36,6 +36,7 @@ contains
          test_case_t("copies of a pair's laws", test_begin), &
          test_case_t("a law that says no more", test_plain), &
          test_case_t("forces and losses in sum", test_respond), &
+         test_case_t("friction that turns with slip", test_turns), &
          test_case_t("rates that impacts change", test_rates)]
    end subroutine collect_contact_laws
 
@@ -168,6 +169,42 @@ contains
       call check_near(error, contact_laws_dissipated(laws, at, loss_damping), 2.0_wp*(0.6_wp &
          + 15.0_wp*0.13_wp), tol, 10.0_wp, "damping takes")
    end subroutine test_respond
+
+   !> Friction that turns is against the slip there is, less where it is led to, but not against its
+   !> own way, nor by what is round-off.
+   subroutine test_turns(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(coulomb_t) :: law
+      type(contact_response_t) :: response
+      real(wp), parameter :: friction(2) = [2.0_wp, 0.0_wp], step = 1.0e-6_wp
+      real(wp) :: slip(2)
+      integer :: k
+
+      law = coulomb_t(mu=0.5_wp, status=slip_status_t(contact_slides, [1.0_wp, 0.0_wp]), &
+         turns=.true.)
+      slip = [-1.0e-3_wp, 0.4_wp]
+      call law%respond(contact_values_t(slip=slip, friction=friction), response)
+      call check_near(error, response%mu_sigma, [0.5_wp, 0.0_wp], tol, 1.0_wp, "turns back")
+      call check_near(error, maxval(abs(response%stiffness)), 0.0_wp, tol, 1.0_wp, "is not soft")
+      slip = [0.1_wp*epsilon(1.0_wp), epsilon(1.0_wp)]
+      call law%respond(contact_values_t(slip=slip, friction=friction, size=1.0_wp), response)
+      call check_near(error, response%mu_sigma, [0.5_wp, 0.0_wp], tol, 1.0_wp, "round-off")
+      slip = [0.3_wp, 0.4_wp]
+      call law%respond(contact_values_t(slip=slip, friction=friction, size=1.0_wp), response)
+      call check_near(error, response%mu_sigma, [0.3_wp, 0.4_wp], tol, 1.0_wp, "against slip")
+      do k = 1, 2
+         slip = [0.3_wp, 0.4_wp]
+         slip(k) = slip(k) + step
+         call check_near(error, 2.0_wp*(slip/norm2(slip) - [0.6_wp, 0.8_wp]), &
+            step*response%stiffness(1:2, k), 10.0_wp*step*step, 1.0_wp, "by slip")
+      end do
+      law%slip_target = [1.0_wp, 0.0_wp]
+      slip = [0.3_wp, 0.2_wp]
+      response = contact_response_t()
+      call law%respond(contact_values_t(slip=slip, friction=friction, size=1.0_wp), response)
+      call check_near(error, response%mu_sigma, [0.0_wp, 0.5_wp], tol, 1.0_wp, "free along its way")
+      call check_near(error, maxval(abs(response%stiffness)), 0.0_wp, tol, 1.0_wp, "across")
+   end subroutine test_turns
 
    !> What parts is slowed down, by the sum of all, and so is what approaches.
    subroutine test_rates(error)

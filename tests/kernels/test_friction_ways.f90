@@ -265,6 +265,7 @@ contains
          call select(system, active, motion, [.true., .false., .true., .true.])
          set%lam(:3) = [2.0_wp, -3.0_wp, 4.0_wp]
          set%lam(2) = 3.0_wp
+         set%item%n_slave = 1
          set%defect = 0.0_wp
          set%defect(3) = 9.0_wp
          call friction_missed(friction, system, set, missed, largest)
