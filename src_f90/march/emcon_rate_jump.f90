@@ -4,8 +4,9 @@
 !> Source: docs/theory.md, eqs. (22e) and (22f).
 module emcon_rate_jump
    use emcon_constraints, only : constraint_set_t
-   use emcon_contact_problem, only : contact_effort_t, contact_problem_missed, &
-      contact_problem_solve, contact_problem_t, met, nearly_met
+   use emcon_contact_parts, only : contact_parts_solve
+   use emcon_contact_problem, only : contact_effort_t, contact_problem_missed, contact_problem_t, &
+      met, nearly_met
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_system, only : mass_times, system_t
@@ -67,7 +68,7 @@ contains
       allocate(jump%impulse(0:jump%problem%n_slip, size(jump%row)), source=0.0_wp)
       jump%is_idle = contact_problem_missed(jump%problem, jump%impulse) <= rounded
       if (jump%is_idle) return
-      call contact_problem_solve(jump%problem, jump%impulse, effort, jump%is_done)
+      call contact_parts_solve(jump%problem, jump%impulse, effort, jump%is_done, .false.)
       if (jump%is_done) jump%is_done = contact_problem_missed(jump%problem, jump%impulse) &
          <= nearly_met
       if (.not. jump%is_done) return
