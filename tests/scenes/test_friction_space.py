@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import wall_space_scenes as walls
 from contact_blocks import FieldsOf
-from contact_space_scenes import bodies, dynamic, faces, pair, velocities
+from contact_space_scenes import ball, bodies, dynamic, faces, pair, velocities
 from friction_space_scenes import belt
 from scene_tools import EPSILON, Run, run_deck
 from scipy.integrate import solve_ivp
@@ -453,3 +453,61 @@ def test_friction_keeps_a_plane_of_symmetry(tmp_path: Path, mu: float) -> None:
     mirror = [int(np.argmin(np.abs(x - p*[1, -1, 1]).sum(1))) for p in x]
     u = fields["displacement"][:, :n]
     assert np.abs(u - u[:, mirror]*[1, -1, 1]).max() <= 64*EPSILON
+
+
+def inertia(block: Block) -> tuple[float, float]:
+    """Mass of a block of C3D8 of density 1, and its moment about the axis z through its middle."""
+    point, weight = np.polynomial.legendre.leggauss(4)
+    corner = np.array([[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1],
+                       [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]])
+    mass = moment = 0.0
+    for nodes in block.element:
+        x = block.x[np.array(nodes) - 1]
+        for i, j, k in np.ndindex(4, 4, 4):
+            part = (1 + corner*[point[i], point[j], point[k]])/2
+            slope = corner/2*np.stack([part[:, 1]*part[:, 2], part[:, 2]*part[:, 0], part[:, 0]*part[:, 1]], 1)
+            volume = weight[i]*weight[j]*weight[k]*np.linalg.det(slope.T@x)
+            at = part.prod(1)@x
+            mass, moment = mass + volume, moment + volume*(at[0]**2 + at[1]**2)
+    return mass, moment
+
+
+@pytest.mark.parametrize("mu", [.06, .5])
+def test_throw_of_billiard_balls(tmp_path: Path, mu: float) -> None:
+    """A ball is hit at a cut of 30 degrees: friction throws it off the line of centres by atan(mu) = 3.434 degrees as long
+    as they slide, and by the slip that is stopped over the push where they do not: for like balls atan(tan(30)/7)."""
+    cut, h, side = np.radians(30.0), .001, float(np.sqrt(2.4))       # a cube turns as the ball of radius 1 does
+    hit = Block("C3D8", (2, 2, 2), size=(2, 2, 2), place=ball)       # a node of it is where they touch
+    core = Block("C3D8", (1, 1, 1), size=(side,)*3, place=lambda x: x - side/2 - np.array([2., 0, 0]))
+    run = ran(tmp_path, bodies([hit, core], [faces(hit), faces(core)], STIFF) + comes_to_rest(1, hit)
+              + walls.wall(walls.sphere(1., (-2., 0., 0.)), (-2., 0., 0.), "ELSET=B2, ")
+              + walls.pair("", f"*FRICTION\n{mu}\n") + "*INITIAL CONDITIONS, TYPE=VELOCITY\n"
+              + f"{walls.REFERENCE}, 1, {float(np.cos(cut))!r}\n{walls.REFERENCE}, 2, {float(np.sin(cut))!r}\n"
+              + dynamic(h, 10*h))
+    x = run.fields()["displacement"][:, :len(hit.x)].mean(1)
+    way = x[-1] - x[-2]
+    (m, turns), (n, spins) = inertia(hit), (side**3, .4*side**3)
+    stopped = np.tan(cut)*(1/m + 1/n)/2/(1/m + 1/turns + 1/n + 1/spins)
+    wanted = min(mu, stopped)
+    assert .06 < stopped < .5
+    # The line of centres turns by sin(30) h/2 in the increment of the impact.
+    assert abs(np.arctan2(way[1], way[0]) - np.arctan(wanted)) < .5*h
+    assert run.verdict["verdict"] == "good"
+    dissipates(run)
+
+
+@pytest.mark.parametrize("mu", [.1, .3])
+def test_ball_rolls_down_a_slope(tmp_path: Path, mu: float) -> None:
+    """Of 30 degrees: by 5/7 of its pull where mu is above 2/7 tan(30) = .165, and slides by its pull less friction else."""
+    side, step, angle, until = float(np.sqrt(2.4)), .02, np.radians(30.0), .2
+    floor = Block("C3D8", (12, 2, 1), size=(12*step, 2*step, .1), place=lambda x: x - np.array([.06, step, .1]))
+    core = Block("C3D8", (1, 1, 1), size=(side,)*3, place=lambda x: x - side/2 + np.array([0, 0, 1.]))
+    run = ran(tmp_path, bodies([floor, core], [faces(floor, 2, 1), faces(core)], STIFF)
+              + walls.wall(walls.sphere(1., (0., 0., 1.)), (0., 0., 1.), "ELSET=B2, ")
+              + walls.pair("", f"*FRICTION\n{mu}\n") + "*BOUNDARY\nN1, 1, 3\n"
+              + dynamic(.005, until, weight(float(angle), of="B2")))
+    pull = GRAVITY*np.sin(angle)
+    wanted = 5/7*pull if mu > 2/7*np.tan(angle) else pull - mu*GRAVITY*np.cos(angle)
+    speed = run.history["px"]/side**3
+    assert speed[-1]/until == pytest.approx(wanted, rel=.01)
+    dissipates(run)
