@@ -9,6 +9,7 @@ import pytest
 import wall_space_scenes as walls
 from contact_blocks import FieldsOf
 from contact_space_scenes import ball, bodies, dynamic, faces, pair, velocities
+from friction_scenes import arch_needs
 from friction_space_scenes import belt
 from scene_tools import EPSILON, Run, run_deck
 from scipy.integrate import solve_ivp
@@ -304,6 +305,41 @@ def test_cards_stand_by_friction(tmp_path: Path, part: float) -> None:
     else:
         # A part of the push that is missed accelerates the feet by some of it and of gravity.
         assert moved > .1*(1.0 - part)*least*.5*GRAVITY*.3**2
+    assert run.verdict["verdict"] == "good"
+    dissipates(run)
+
+
+def arch(mu: float, stones: int = 5) -> str:
+    """Half a ring of rigid wedges between two that are held; the radii are 1 and 1.4."""
+    part = np.pi/(stones + 2)
+
+    def stone(k: int) -> Block:
+        def place(x: np.ndarray) -> np.ndarray:
+            angle, r = np.pi - (k + x[:, 0])*part, 1.0 + .4*x[:, 2]
+            return np.column_stack([r*np.cos(angle), .5*x[:, 1] - .25, r*np.sin(angle)])
+        return Block("C3D8", (1, 1, 1), place=place)
+
+    blocks = [stone(k) for k in range(stones + 2)]
+    n = len(blocks)
+    return (bodies(blocks, [faces(b) for b in blocks], STIFF)
+            + "".join(comes_to_rest(i, blocks[i - 1]) for i in range(2, n))
+            + f"*SURFACE INTERACTION, NAME=I\n*FRICTION\n{mu!r}\n*CONTACT PAIR, INTERACTION=I\n"
+            + "".join(f"S{i}, S{i + 1}\n" for i in range(1, n)) + f"*BOUNDARY\nN1, 1, 3\nN{n}, 1, 3\n"
+            + dynamic(.01, .15, "".join(weight(of=f"B{i}") for i in range(2, n))))
+
+
+@pytest.mark.parametrize("part", [.97, 1.03])
+def test_an_arch_stands_by_friction(tmp_path: Path, part: float) -> None:
+    """A thrust H passes through each joint, tilted by t from the upright, with the weight above it, of k half stones, where
+    |atan(k w/H) - t| is within the angle of friction for the best H: `arch_needs` has that bound. The ring is thick enough
+    for the line of thrust."""
+    run = ran(tmp_path, arch(part*arch_needs()))
+    moved = np.abs(run.fields()["displacement"][-1]).max()
+    if part > 1.0:
+        assert moved < 1e-12
+    else:
+        # Joints that miss 3 % of their friction, .1 of their push, accelerate stones by some part of that and of gravity.
+        assert moved > .1*(1.0 - part)*arch_needs()*.5*GRAVITY*.15**2
     assert run.verdict["verdict"] == "good"
     dissipates(run)
 
