@@ -334,13 +334,13 @@ contains
       end do
    end subroutine natural_map
 
-   !> By Newton's method for the natural map. `push` stays as it was if that does not end. Where slip
-   !> has a direction the second step in a row of which no part gains is the last one.
+   !> By Newton's method for the natural map. `push` stays as it was if that does not end. Where
+   !> slip has a direction the second step in a row of which no part gains is the last one.
    subroutine solve_by_trials(self, push, most, near_enough, n_trial, is_solved)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
       integer, intent(in) :: most                    !! trials
-      logical, intent(in) :: near_enough             !! where it comes no nearer `nearly_met` will do
+      logical, intent(in) :: near_enough             !! where it stalls `nearly_met` will do
       integer, intent(inout) :: n_trial              !! counted on
       logical, intent(out) :: is_solved
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: trial, defect, new, step
