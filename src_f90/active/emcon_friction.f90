@@ -416,8 +416,8 @@ contains
    end function largest_push
 
    !> The mean stiffness of the system at the slave nodes of a condition: of their unknowns, or
-   !> those that they follow. Where they are held and have none, that at its other nodes. The order of the
-   !> nodes, which the mesh gives, does not matter.
+   !> those that they follow. Where they are held and have none, that at its other nodes. The
+   !> order of the nodes, which the mesh gives, does not matter.
    pure real(wp) function friction_stiffness(system, item) result(stiffness)
       type(system_t), intent(in) :: system
       type(condition_t), intent(in) :: item
