@@ -12,9 +12,9 @@ module emcon_contact_newton
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_rounding, &
       constraints_take_hold
+   use emcon_contact_parts, only : contact_parts_solve
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
-      contact_problem_force, contact_problem_solve, contact_problem_status, &
-      contact_problem_stiffness, contact_problem_t
+      contact_problem_force, contact_problem_status, contact_problem_stiffness, contact_problem_t
    use emcon_convergence, only : convergence_begin, most_rounding, round_off
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
       contact_trial_t, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
@@ -410,7 +410,7 @@ contains
          call lay_out(self, set)
          self%push = 0.0_wp
          if (level > 0) call soften(self, softer(level))
-         call contact_problem_solve(self%problem, self%push, effort, is_solved, .true.)
+         call contact_parts_solve(self%problem, self%push, effort, is_solved, .true.)
          if (is_solved) exit
       end do
       self%least_soft = min(level, 1)

@@ -21,7 +21,7 @@ module emcon_friction
    private
    public :: friction_t, friction_init, friction_begin, friction_select, friction_keep, &
       friction_close, friction_turn, friction_use, friction_missed, friction_holds, &
-      friction_look_back, friction_stiffness
+      friction_look_back, friction_stiffness, friction_suit
 
    !> So much of the friction of a contact may act on another node than its push, and a step is
    !> solved again so often at most for more.
@@ -64,6 +64,7 @@ contains
       do i = 1, size(system%contact)
          if (.not. allocated(system%contact(i)%contact)) cycle    ! of a layer, given with the step
          law(i) = coulomb_of(system%contact(i)%contact)
+         if (allocated(law(i)%mu_of_step)) deallocate(law(i)%mu_of_step)
       end do
       self%is_on = any(law%mu > 0.0_wp)
       n = merge(system%n_constraint, 0, self%is_on)
@@ -80,6 +81,24 @@ contains
       end do
       self%mu = self%law%mu
    end subroutine friction_init
+
+   !> A step of the deck begins: laws of contacts whose coefficients change have those of the step.
+   pure subroutine friction_suit(self, system)
+      type(friction_t), intent(inout) :: self
+      type(system_t), intent(in) :: system
+      type(coulomb_t) :: law
+      integer :: i
+
+      if (.not. self%is_on) return
+      do i = 1, size(system%contact)
+         law = coulomb_of(system%contact(i)%contact)
+         if (.not. allocated(law%mu_of_step)) cycle
+         associate (first => system%first_constraint(i) + 1, last => system%first_constraint(i + 1))
+            self%mu(first:last) = law%mu
+            self%knows_limit(first:last) = .false.
+         end associate
+      end do
+   end subroutine friction_suit
 
    !> Coulomb's law of a contact; without friction that with mu = 0.
    pure type(coulomb_t) function coulomb_of(contact) result(coulomb)

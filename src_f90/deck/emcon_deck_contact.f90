@@ -2,6 +2,7 @@
 module emcon_deck_contact
    use emcon_deck_contact_damping, only : read_contact_damping
    use emcon_deck_contact_settings, only : read_pair_initiation
+   use emcon_deck_change_friction, only : read_friction_changes
    use emcon_deck_crossings, only : read_crossings
    use emcon_deck_dimension, only : n_space
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_real, &
@@ -57,6 +58,7 @@ contains
                   reader%interaction(n)%restitution)
                call read_thickness(reader, card)
             case ("SURFACEBEHAVIOR", "FRICTION", "CONTACTDAMPING")
+               if (card%step > 0) cycle             ! a change of friction
                if (n == 0 .and. .not. reader%doubt%names) call card_error(reader, card, &
                   "there is no *SURFACE INTERACTION before")
                if (card%name == "CONTACTDAMPING") then
@@ -84,6 +86,7 @@ contains
       reader%interaction = reader%interaction(:n)
       reader%interaction_name = reader%interaction_name(:n)
       call suit_sticks(reader, friction(:n))
+      call read_friction_changes(reader)
    end subroutine read_interactions
 
    !> Friction without a slope of stick on a pressure gets half of its slope, as CalculiX has it.

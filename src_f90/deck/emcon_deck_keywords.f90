@@ -85,7 +85,7 @@ module emcon_deck_keywords
       keyword_t("SURFACE INTERACTION", in_model, "NAME=,PADTHICKNESS=,RESTITUTION="), &
       keyword_t("SURFACE BEHAVIOR", in_model, "PRESSURE-OVERCLOSURE=,DIRECT,!NOSEPARATION," &
          // "~PENALTY,~AUGMENTEDLAGRANGE"), &
-      keyword_t("FRICTION", in_model, "RESTITUTION=,ROUGH,~SLIPTOLERANCE,~ELASTICSLIP," &
+      keyword_t("FRICTION", in_both, "RESTITUTION=,ROUGH,~SLIPTOLERANCE,~ELASTICSLIP," &
          // "~LAGRANGE,!TAUMAX,!SHEARTRACTIONSLOPE,!EXPONENTIALDECAY,!TESTDATA,!ANISOTROPIC," &
          // "!USER,!DEPVAR:0,!PROPERTIES:0,!DEPENDENCIES:0"), &
       keyword_t("CONTACT DAMPING", in_model, "DEFINITION=,TANGENTFRACTION="), &
@@ -104,6 +104,8 @@ module emcon_deck_keywords
       keyword_t("EQUATION", in_both, "REMOVE,REMOVEALL,!INPUT"), &
       keyword_t("TRANSFORM", in_model, "NSET=,TYPE="), &
       keyword_t("CONTACT INTERFERENCE", in_step, "SHRINK,AMPLITUDE=,TYPE=,~OP:NEW"), &
+      keyword_t("CHANGE FRICTION", in_step, "INTERACTION=,RESET,!AMPLITUDE,!ELEMENTSET," &
+         // "!NODESET", has_data=.false.), &
       keyword_t("CONTACT CONTROLS", in_step, "STABILIZE?,RESET,~MASTER,~SLAVE," &
          // "!AUTOMATICTOLERANCES,!FRICTIONONSET,!LAGRANGEMULTIPLIER,!MAXCHP,!PERRMX,!UERRMX," &
          // "!STIFFNESSSCALEFACTOR,!TANGENTFRACTION:1", has_data=.false.), &
@@ -208,7 +210,6 @@ module emcon_deck_keywords
       refusal_t("faces of solids have no thickness", "SURFACE PROPERTY ASSIGNMENT", &
          is_idle=.true.), &
       refusal_t("nothing damps but *DAMPING", "BULK VISCOSITY", is_idle=.true.), &
-      refusal_t("coefficients hold for the whole run", "CHANGE FRICTION"), &
       refusal_t("pairs and elements stay as they are for the whole run", "MODEL CHANGE,CHANGE " &
          // "CONTACT TYPE,CHANGE SURFACE BEHAVIOR,CHANGE MATERIAL"), &
       refusal_t("prescribe displacements by *BOUNDARY", "PRE-TENSION SECTION"), &

@@ -5,7 +5,7 @@
 !> friction by nothing. Source: docs/theory.md, section 4.13.
 module emcon_interlock_plane
    use emcon_coulomb_law, only : contact_slides
-   use emcon_interactions, only : contact_options_t, smoothing_none
+   use emcon_interactions, only : contact_options_t, interaction_friction, smoothing_none
    use emcon_kinds, only : wp
    use emcon_march_types, only : increment_t, march_t
    use emcon_scene, only : scene_t
@@ -32,7 +32,8 @@ contains
 
       if (.not. march%active%friction%is_on) return
       do pair = 1, size(scene%pair)
-         associate (mu => scene%pair(pair)%interaction%friction, &
+         associate (mu => interaction_friction(scene%pair(pair)%interaction, &
+               march%state%clock%i_step), &
                knows => march%active%friction%knows_corners(pair))
             if (knows .or. .not. mu > 0.0_wp) cycle
             spread = spread_of(march, pair)

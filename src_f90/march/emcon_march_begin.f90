@@ -7,10 +7,12 @@ module emcon_march_begin
    use emcon_explicit, only : explicit_prepare
    use emcon_factor_base, only : factor_base_t
    use emcon_guards, only : touching_bar
+   use emcon_contact_law, only : contact_laws_suit
    use emcon_contact_support, only : contact_support_begin, contact_support_t
    use emcon_near_laws, only : near_laws_begin_step
    use emcon_host, only : host_find_solver
    use emcon_host_scheme, only : host_scheme_find
+   use emcon_friction, only : friction_suit
    use emcon_interactions, only : contact_options_t
    use emcon_overlap_check, only : overlap_check_excuse, overlap_check_smooth, overlap_check_step, &
       overlap_t
@@ -190,6 +192,7 @@ contains
          self%newton%factor_policy%is_wanted = step%solution%newton == newton_kept .and. &
             step_is_dynamic(step)
          call begin_active(self%active, step)
+         call suit_laws(self)
          if (.not. step_is_dynamic(step)) call contact_support_begin(self%active%support, &
             self%system, scene, state%u)
          call configure_contact(self, scene)
@@ -324,6 +327,17 @@ contains
       active%rules%closes = .false.
       active%support = contact_support_t()
    end subroutine begin_active
+
+   !> Laws of contact as they are in the step.
+   subroutine suit_laws(self)
+      type(march_t), intent(inout) :: self
+      integer :: k
+
+      do k = 1, size(self%system%contact)
+         call contact_laws_suit(self%system%contact(k)%contact%laws, self%state%clock%i_step)
+      end do
+      call friction_suit(self%active%friction, self%system)
+   end subroutine suit_laws
 
    !> Set up the layer of massless nodes for a dynamic step, and tell how many there are.
    subroutine begin_massless(self, scene, step, error)

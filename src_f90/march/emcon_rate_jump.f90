@@ -4,8 +4,9 @@
 !> Source: docs/theory.md, eqs. (22e) and (22f).
 module emcon_rate_jump
    use emcon_constraints, only : constraint_set_t
-   use emcon_contact_problem, only : contact_effort_t, contact_problem_missed, &
-      contact_problem_solve, contact_problem_t, met, nearly_met
+   use emcon_contact_parts, only : contact_parts_solve
+   use emcon_contact_problem, only : contact_effort_t, contact_problem_missed, contact_problem_t, &
+      met, nearly_met
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_system, only : mass_times, system_t
@@ -17,6 +18,10 @@ module emcon_rate_jump
 
    !> Laws that are met to this part need no jump: a sum of some products.
    real(wp), parameter :: rounded = 64.0_wp*epsilon(1.0_wp)
+   !> Where slip has a direction and rows follow from others a law may be met to no more than this
+   !> part of the largest impulse. What it leaves of rates the next step begins with: no drift; but
+   !> without the jump all that it would stop turns back.
+   real(wp), parameter :: nearly_stopped = 1.0e-6_wp
 
    !> A jump that changes the rates of contacts by impulses along the gradients C of their gaps and
    !> slips, as laws say that take impulses and rates for forces and motions.
@@ -67,9 +72,9 @@ contains
       allocate(jump%impulse(0:jump%problem%n_slip, size(jump%row)), source=0.0_wp)
       jump%is_idle = contact_problem_missed(jump%problem, jump%impulse) <= rounded
       if (jump%is_idle) return
-      call contact_problem_solve(jump%problem, jump%impulse, effort, jump%is_done)
+      call contact_parts_solve(jump%problem, jump%impulse, effort, jump%is_done, .true.)
       if (jump%is_done) jump%is_done = contact_problem_missed(jump%problem, jump%impulse) &
-         <= nearly_met
+         <= merge(nearly_stopped, nearly_met, jump%problem%n_slip > 1)
       if (.not. jump%is_done) return
       ! Pushes of the step that pull by round-off are those of the step, too.
       if (allocated(jump%stays)) where (jump%stays) jump%impulse = 0.0_wp

@@ -182,6 +182,8 @@ contains
 
    !> The same along the surface, for place `k` of the jump. Slips are by half of the size of the
    !> step: twice their mean rates, so that what changes a rate at the end changes them by as much.
+   !> In space what stops or sticks does so by its rate at the end, as in a stop without impact:
+   !> slips of a rigid body over a step disagree by the square of its turn, rates do not.
    pure subroutine find_rubbing(self, impacts, jump, k)
       type(march_t), intent(in) :: self
       type(impacts_t), intent(in) :: impacts
@@ -202,6 +204,9 @@ contains
                - 2.0_wp/impacts%h*item%slip(s)
             problem%slip_target(s, k) = 2.0_wp/impacts%h*law%slip_to_stop(s)
          end do
+         if (problem%n_slip > 1 .and. (law%holds_slip() .or. any(abs(law%slip_to_stop) > 0.0_wp))) &
+            problem%slip_target(:, k) = (1.0_wp - law%restitution)*jump%rate(1:, k) &
+            - problem%free(1:, k)
       end associate
    end subroutine find_rubbing
 

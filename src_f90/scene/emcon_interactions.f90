@@ -5,7 +5,7 @@ module emcon_interactions
    implicit none
    private
    public :: contact_pair_t, contact_options_t, contact_damping_t, interaction_t, adjustment_t
-   public :: pressure_t, pressure_reach, pressure_slope, interaction_reach
+   public :: pressure_t, pressure_reach, pressure_slope, interaction_reach, interaction_friction
    public :: pressure_hard, pressure_linear, pressure_exponential, pressure_tabular, pressure_tied
    public :: pair_has_order, pair_holds_nodes, pair_may_exchange, pair_is_reverse_of, pair_of_one
    public :: formulation_nts, formulation_segment, formulation_mortar, formulation_user, &
@@ -62,7 +62,8 @@ module emcon_interactions
    type :: interaction_t
       real(wp) :: offset = 0.0_wp                    !! of the gap: a layer in between, >= 0 [L]
       real(wp) :: restitution = 1.0_wp               !! of impacts, 0 to 1
-      real(wp) :: friction = 0.0_wp                  !! mu of Coulomb's law, >= 0
+      real(wp) :: friction = 0.0_wp                  !! mu of Coulomb's law, >= 0, most of steps
+      real(wp), allocatable :: friction_of_step(:)   !! (n_step) not allocated: one for all
       real(wp) :: stick = 0.0_wp                     !! slope of stick, 0: exact [M/(L^2 T^2)]
       real(wp) :: rebound = 0.0_wp                   !! along the surface, of what sticks, 0 to 1
       type(contact_damping_t) :: damping
@@ -120,6 +121,15 @@ contains
          slope = (p(n) - p(1))/(o(n) - o(1))
       end associate
    end function pressure_slope
+
+   !> The coefficient of friction in a step, >= 0.
+   pure real(wp) function interaction_friction(surface, i_step) result(mu)
+      type(interaction_t), intent(in) :: surface
+      integer, intent(in) :: i_step              !! of the deck
+
+      mu = surface%friction
+      if (allocated(surface%friction_of_step)) mu = surface%friction_of_step(i_step)
+   end function interaction_friction
 
    !> The gap up to which surfaces act on each other, pads left out [L].
    pure real(wp) function interaction_reach(surface) result(reach)

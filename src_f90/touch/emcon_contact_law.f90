@@ -11,8 +11,9 @@ module emcon_contact_law
    implicit none
    private
    public :: contact_law_t, contact_law_box_t, contact_laws_t, contact_values_t, contact_place_t
-   public :: contact_laws_add, contact_laws_begin, contact_laws_respond, contact_laws_dissipated, &
-      contact_laws_reach, contact_laws_rub, contact_laws_rate_change, contact_laws_drag
+   public :: contact_laws_add, contact_laws_begin, contact_laws_suit, contact_laws_respond, &
+      contact_laws_dissipated, contact_laws_reach, contact_laws_rub, contact_laws_rate_change, &
+      contact_laws_drag
    public :: loss_damping, loss_friction
 
    !> What a law takes is told as a loss of one of these kinds.
@@ -53,6 +54,7 @@ module emcon_contact_law
    contains
       procedure(respond_interface), deferred :: respond
       procedure :: take
+      procedure :: suit
       procedure :: acts_near
       procedure :: begin
       procedure :: push_on
@@ -112,6 +114,12 @@ contains
 
       acts_near = .true.
    end function acts_near
+
+   !> A step of the deck begins; nothing to do unless overridden.
+   pure subroutine suit(self, i_step)
+      class(contact_law_t), intent(inout) :: self
+      integer, intent(in) :: i_step              !! its number
+   end subroutine suit
 
    !> Told before each solve of a step; nothing to do unless overridden.
    pure subroutine begin(self, place)
@@ -204,6 +212,18 @@ contains
       allocate(longer(n + 1)%law, source=law)
       call move_alloc(longer, self%beside)
    end subroutine contact_laws_add
+
+   !> A step of the deck begins.
+   pure subroutine contact_laws_suit(self, i_step)
+      type(contact_laws_t), intent(inout) :: self
+      integer, intent(in) :: i_step              !! its number
+      integer :: i
+
+      if (.not. allocated(self%beside)) return
+      do i = 1, size(self%beside)
+         call self%beside(i)%law%suit(i_step)
+      end do
+   end subroutine contact_laws_suit
 
    !> Add copies of the laws of a pair that act on what is near, before a step is solved.
    pure subroutine contact_laws_begin(self, of_pair, place)

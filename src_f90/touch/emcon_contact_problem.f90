@@ -35,6 +35,9 @@ module emcon_contact_problem
    !> Halvings of a step of Newton's method, and the part of what is foreseen that it is to gain.
    integer, parameter :: most_halvings = 12
    real(wp), parameter :: least_gain = 1.0e-4_wp
+   !> Where slip has a direction steps of which at most this part gains are so many in a row.
+   integer, parameter :: most_stalls = 2
+   real(wp), parameter :: no_part = 1.0e-3_wp
    !> The law is met where it is missed by less than this part of the largest force: by what a solve
    !> in double precision leaves of some hundred forces. Where no turn comes to that W is nearly
    !> singular, and what moves nothing may be missed by more.
@@ -95,7 +98,7 @@ contains
       logical, intent(in), optional :: near_enough
       type(contact_problem_t) :: apart
       logical :: is_one_of_several
-      integer :: turn
+      integer :: turn, n_turn
 
       is_one_of_several = .false.
       if (present(near_enough)) is_one_of_several = near_enough
@@ -104,19 +107,19 @@ contains
       associate (has_pushes => .not. any(self%mu > 0.0_wp .or. self%hold(0, :) > 0.0_wp), &
             has_direction => self%n_slip > 1 .and. any(self%mu > 0.0_wp))
          call solve_by_trials(self, push, merge(few_trials, first_trials, has_pushes &
-            .or. has_direction), effort%n_trial, is_solved)
+            .or. has_direction), is_one_of_several, effort%n_trial, is_solved)
          if (is_solved .or. .not. has_compliance(self)) return
          if (has_pushes) call solve_by_pushes(self, push, effort%n_pivot, is_solved)
          if (is_solved) return
-         if (has_direction) call solve_by_nearing(self, push, effort, &
-            merge(few_nearings, most_nearings, is_one_of_several), is_solved)
+         if (has_direction) call solve_by_nearing(self, push, effort, is_one_of_several, is_solved)
          is_solved = is_solved .or. (is_one_of_several .and. effort%n_near > 0)
          if (is_solved) return
+         n_turn = merge(1, most_turns, has_direction .and. is_one_of_several)
       end associate
-      do turn = 1, most_turns
+      do turn = 1, n_turn
          call solve_by_sweeps(self, push, first_sweeps*2**(turn - 1), effort%n_sweep, is_solved)
          if (is_solved) return
-         call solve_by_trials(self, push, more_trials, effort%n_trial, is_solved)
+         call solve_by_trials(self, push, more_trials, .false., effort%n_trial, is_solved)
          if (is_solved) return
          if (turn /= pivot_turn .or. self%n_slip /= 1 .or. any(self%hold > 0.0_wp)) cycle
          call contact_problem_pivot(self, push, effort%n_pivot, is_solved)
@@ -128,7 +131,7 @@ contains
       call contact_problem_pivot(apart, push, effort%n_pivot, is_solved)
       if (.not. is_solved) return
       call take_back(self, push)
-      call solve_by_trials(self, push, more_trials, effort%n_trial, is_solved)
+      call solve_by_trials(self, push, more_trials, .false., effort%n_trial, is_solved)
    end subroutine contact_problem_solve
 
    !> The same places without what holds them: what moves freely is held by round-off's root of it.
@@ -331,26 +334,30 @@ contains
       end do
    end subroutine natural_map
 
-   !> By Newton's method for the natural map. `push` stays as it was if that does not end.
-   subroutine solve_by_trials(self, push, most, n_trial, is_solved)
+   !> By Newton's method for the natural map. `push` stays as it was if that does not end. Where
+   !> slip has a direction the second step in a row of which no part gains is the last one.
+   subroutine solve_by_trials(self, push, most, near_enough, n_trial, is_solved)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
       integer, intent(in) :: most                    !! trials
+      logical, intent(in) :: near_enough             !! where it stalls `nearly_met` will do
       integer, intent(inout) :: n_trial              !! counted on
       logical, intent(out) :: is_solved
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: trial, defect, new, step
       real(dp) :: slope(size(push), size(push)), x(size(push))
-      real(wp) :: part, before
-      integer :: i, halving
+      real(wp) :: part, before, missed
+      integer :: i, halving, n_stall
       logical :: is_singular, was_solved
 
       trial = push
       is_solved = .false.
+      n_stall = 0
       do i = 0, most
          was_solved = is_solved
          call natural_map(self, trial, defect, slope)
-         is_solved = missed_by(self, trial, defect) <= met*maxval(abs(contact_problem_force(self, &
-            trial)))
+         missed = missed_by(self, trial, defect)/max(maxval(abs(contact_problem_force(self, &
+            trial))), tiny(missed))
+         is_solved = missed <= met
          ! What is near is made exact: the first step to it leaves what W is stiffer by.
          if ((is_solved .and. (was_solved .or. .not. maxval(abs(defect)) > 0.0_wp)) &
             .or. i == most) exit
@@ -367,6 +374,11 @@ contains
             part = 0.5_wp*part
          end do
          if (.not. norm2(defect) < huge(before)) exit
+         n_stall = merge(0, n_stall + 1, part > no_part .or. self%n_slip < 2)
+         if (n_stall == most_stalls) then
+            is_solved = near_enough .and. missed <= nearly_met
+            exit
+         end if
          trial = new
       end do
       if (is_solved) push = trial
@@ -406,19 +418,21 @@ contains
 
    !> By trials of places that give way by a part of their own W about the forces so far, over and
    !> over: forces that follow from others stay as near as can be to those before. The part grows
-   !> where the trials do not end, and falls where they do.
-   subroutine solve_by_nearing(self, push, effort, most, is_solved)
+   !> where the trials do not end, and falls where they do; where near enough will do not to what
+   !> they have failed at.
+   subroutine solve_by_nearing(self, push, effort, near_enough, is_solved)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
       type(contact_effort_t), intent(inout) :: effort    !! counted on
-      integer, intent(in) :: most                    !! times that it comes nearer
+      logical, intent(in) :: near_enough             !! a few nearings do
       logical, intent(out) :: is_solved
       type(contact_problem_t) :: near
-      real(wp) :: found(0:self%n_slip, size(self%mu)), part, more
+      real(wp) :: found(0:self%n_slip, size(self%mu)), part, more, least_part
       integer :: i, k, row, round
       logical :: has_ended
 
       is_solved = .false.
+      least_part = 0.0_wp
       near = self
       part = first_part
       do round = 1, most_nearings
@@ -431,15 +445,16 @@ contains
             end do
          end do
          found = push
-         call solve_by_trials(near, found, more_trials, effort%n_trial, has_ended)
+         call solve_by_trials(near, found, more_trials, near_enough, effort%n_trial, has_ended)
          if (has_ended) then
             effort%n_near = effort%n_near + 1
             push = found
-            is_solved = contact_problem_missed(self, push) <= met
-            if (is_solved .or. effort%n_near == most) return
-            part = 0.1_wp*part
+            is_solved = contact_problem_missed(self, push) <= merge(nearly_met, met, near_enough)
+            if (is_solved .or. (near_enough .and. effort%n_near == few_nearings)) return
+            part = max(least_part, 0.1_wp*part)
          else
             part = 10.0_wp*part
+            if (near_enough) least_part = part
             if (part > largest_part) return
          end if
       end do

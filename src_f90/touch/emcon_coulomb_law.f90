@@ -47,6 +47,7 @@ module emcon_coulomb_law
    !> The law at one condition.
    type, extends(contact_law_t) :: coulomb_t
       real(wp) :: mu = 0.0_wp                        !! >= 0
+      real(wp), allocatable :: mu_of_step(:)         !! (n_step) not allocated: one for all
       real(wp) :: restitution = 0.0_wp               !! along the surface, of what sticks, 0 to 1
       type(slip_status_t) :: status
       logical :: turns = .false.                     !! slip has two components: its way turns
@@ -54,6 +55,7 @@ module emcon_coulomb_law
       real(wp) :: slip_to_stop(most_slips) = 0.0_wp  !! the same, also below what slip is rounded to
    contains
       procedure :: take => coulomb_take
+      procedure :: suit => coulomb_suit
       procedure :: respond => coulomb_respond
       procedure :: dissipated => coulomb_dissipated
       procedure :: acts_near => coulomb_acts_near
@@ -79,11 +81,20 @@ contains
       logical, intent(out) :: acts               !! the deck asks for it
 
       self%mu = surface%friction
+      if (allocated(surface%friction_of_step)) self%mu_of_step = surface%friction_of_step
       self%restitution = surface%rebound
       self%has_friction = .true.
       self%loss = loss_friction
       acts = self%mu > 0.0_wp .and. surface%pressure%kind == pressure_hard
    end subroutine coulomb_take
+
+   !> Its coefficient there.
+   pure subroutine coulomb_suit(self, i_step)
+      class(coulomb_t), intent(inout) :: self
+      integer, intent(in) :: i_step              !! of the deck
+
+      if (allocated(self%mu_of_step)) self%mu = self%mu_of_step(i_step)
+   end subroutine coulomb_suit
 
    !> It is asked with the row of its condition.
    pure logical function coulomb_acts_near(self) result(acts_near)

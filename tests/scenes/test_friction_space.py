@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 import wall_space_scenes as walls
 from contact_blocks import FieldsOf
-from contact_space_scenes import bodies, dynamic, faces, pair, velocities
+from contact_space_scenes import ball, bodies, dynamic, faces, pair, velocities
+from friction_scenes import arch_needs
 from friction_space_scenes import Ball, belt
 from scene_tools import EPSILON, Run, run_deck
 from scipy.integrate import solve_ivp
@@ -308,6 +309,41 @@ def test_cards_stand_by_friction(tmp_path: Path, part: float) -> None:
     dissipates(run)
 
 
+def arch(mu: float, stones: int = 5) -> str:
+    """Half a ring of rigid wedges between two that are held; the radii are 1 and 1.4."""
+    part = np.pi/(stones + 2)
+
+    def stone(k: int) -> Block:
+        def place(x: np.ndarray) -> np.ndarray:
+            angle, r = np.pi - (k + x[:, 0])*part, 1.0 + .4*x[:, 2]
+            return np.column_stack([r*np.cos(angle), .5*x[:, 1] - .25, r*np.sin(angle)])
+        return Block("C3D8", (1, 1, 1), place=place)
+
+    blocks = [stone(k) for k in range(stones + 2)]
+    n = len(blocks)
+    return (bodies(blocks, [faces(b) for b in blocks], STIFF)
+            + "".join(comes_to_rest(i, blocks[i - 1]) for i in range(2, n))
+            + f"*SURFACE INTERACTION, NAME=I\n*FRICTION\n{mu!r}\n*CONTACT PAIR, INTERACTION=I\n"
+            + "".join(f"S{i}, S{i + 1}\n" for i in range(1, n)) + f"*BOUNDARY\nN1, 1, 3\nN{n}, 1, 3\n"
+            + dynamic(.01, .15, "".join(weight(of=f"B{i}") for i in range(2, n))))
+
+
+@pytest.mark.parametrize("part", [.97, 1.03])
+def test_an_arch_stands_by_friction(tmp_path: Path, part: float) -> None:
+    """A thrust H passes through each joint, tilted by t from the upright, with the weight above it, of k half stones, where
+    |atan(k w/H) - t| is within the angle of friction for the best H: `arch_needs` has that bound. The ring is thick enough
+    for the line of thrust."""
+    run = ran(tmp_path, arch(part*arch_needs()))
+    moved = np.abs(run.fields()["displacement"][-1]).max()
+    if part > 1.0:
+        assert moved < 1e-12
+    else:
+        # Joints that miss 3 % of their friction, .1 of their push, accelerate stones by some part of that and of gravity.
+        assert moved > .1*(1.0 - part)*arch_needs()*.5*GRAVITY*.15**2
+    assert run.verdict["verdict"] == "good"
+    dissipates(run)
+
+
 def test_dominoes_fall_one_after_the_other(tmp_path: Path) -> None:
     """The first one is pushed over, with a restitution of one half. Fallen, all lie still."""
     blocks = [Block("C3D8", (1, 1, 1), size=(.2, .5, 1), place=lambda x, i=i: x + np.array([.5*i - .1, -.25, 0]))
@@ -473,3 +509,85 @@ def test_friction_keeps_a_plane_of_symmetry(tmp_path: Path, mu: float) -> None:
     mirror = [int(np.argmin(np.abs(x - p*[1, -1, 1]).sum(1))) for p in x]
     u = fields["displacement"][:, :n]
     assert np.abs(u - u[:, mirror]*[1, -1, 1]).max() <= 64*EPSILON
+
+
+def inertia(block: Block) -> tuple[float, float]:
+    """Mass of a block of C3D8 of density 1, and its moment about the axis z through its middle."""
+    point, weight = np.polynomial.legendre.leggauss(4)
+    corner = np.array([[-1, -1, -1], [1, -1, -1], [1, 1, -1], [-1, 1, -1],
+                       [-1, -1, 1], [1, -1, 1], [1, 1, 1], [-1, 1, 1]])
+    mass = moment = 0.0
+    for nodes in block.element:
+        x = block.x[np.array(nodes) - 1]
+        for i, j, k in np.ndindex(4, 4, 4):
+            part = (1 + corner*[point[i], point[j], point[k]])/2
+            slope = corner/2*np.stack([part[:, 1]*part[:, 2], part[:, 2]*part[:, 0], part[:, 0]*part[:, 1]], 1)
+            volume = weight[i]*weight[j]*weight[k]*np.linalg.det(slope.T@x)
+            at = part.prod(1)@x
+            mass, moment = mass + volume, moment + volume*(at[0]**2 + at[1]**2)
+    return mass, moment
+
+
+@pytest.mark.parametrize("mu", [.06, .5])
+def test_throw_of_billiard_balls(tmp_path: Path, mu: float) -> None:
+    """A ball is hit at a cut of 30 degrees: friction throws it off the line of centres by atan(mu) = 3.434 degrees as long
+    as they slide, and by the slip that is stopped over the push where they do not: for like balls atan(tan(30)/7)."""
+    cut, h, side = np.radians(30.0), .001, float(np.sqrt(2.4))       # a cube turns as the ball of radius 1 does
+    hit = Block("C3D8", (2, 2, 2), size=(2, 2, 2), place=ball)       # a node of it is where they touch
+    core = Block("C3D8", (1, 1, 1), size=(side,)*3, place=lambda x: x - side/2 - np.array([2., 0, 0]))
+    run = ran(tmp_path, bodies([hit, core], [faces(hit), faces(core)], STIFF) + comes_to_rest(1, hit)
+              + walls.wall(walls.sphere(1., (-2., 0., 0.)), (-2., 0., 0.), "ELSET=B2, ")
+              + walls.pair("", f"*FRICTION\n{mu}\n") + "*INITIAL CONDITIONS, TYPE=VELOCITY\n"
+              + f"{walls.REFERENCE}, 1, {float(np.cos(cut))!r}\n{walls.REFERENCE}, 2, {float(np.sin(cut))!r}\n"
+              + dynamic(h, 10*h))
+    x = run.fields()["displacement"][:, :len(hit.x)].mean(1)
+    way = x[-1] - x[-2]
+    (m, turns), (n, spins) = inertia(hit), (side**3, .4*side**3)
+    stopped = np.tan(cut)*(1/m + 1/n)/2/(1/m + 1/turns + 1/n + 1/spins)
+    wanted = min(mu, stopped)
+    assert .06 < stopped < .5
+    # The line of centres turns by sin(30) h/2 in the increment of the impact.
+    assert abs(np.arctan2(way[1], way[0]) - np.arctan(wanted)) < .5*h
+    assert run.verdict["verdict"] == "good"
+    dissipates(run)
+
+
+@pytest.mark.parametrize("mu", [.1, .3])
+def test_ball_rolls_down_a_slope(tmp_path: Path, mu: float) -> None:
+    """Of 30 degrees: by 5/7 of its pull where mu is above 2/7 tan(30) = .165, and slides by its pull less friction else."""
+    side, step, angle, until = float(np.sqrt(2.4)), .02, np.radians(30.0), .2
+    floor = Block("C3D8", (12, 2, 1), size=(12*step, 2*step, .1), place=lambda x: x - np.array([.06, step, .1]))
+    core = Block("C3D8", (1, 1, 1), size=(side,)*3, place=lambda x: x - side/2 + np.array([0, 0, 1.]))
+    run = ran(tmp_path, bodies([floor, core], [faces(floor, 2, 1), faces(core)], STIFF)
+              + walls.wall(walls.sphere(1., (0., 0., 1.)), (0., 0., 1.), "ELSET=B2, ")
+              + walls.pair("", f"*FRICTION\n{mu}\n") + "*BOUNDARY\nN1, 1, 3\n"
+              + dynamic(.005, until, weight(float(angle), of="B2")))
+    pull = GRAVITY*np.sin(angle)
+    wanted = 5/7*pull if mu > 2/7*np.tan(angle) else pull - mu*GRAVITY*np.cos(angle)
+    speed = run.history["px"]/side**3
+    assert speed[-1]/until == pytest.approx(wanted, rel=.01)
+    dissipates(run)
+
+
+@pytest.mark.parametrize("is_rigid", [True, False])
+def test_friction_changes_between_steps(tmp_path: Path, is_rigid: bool) -> None:
+    """A slab on a slope of .3 rests with mu = .5, slides down with .1 as a particle does, and is held again by RESET."""
+    angle, until = float(np.arctan(.3)), .1
+    text = on_floor(.5, .01, until, (0, 0, 0), slope=angle, is_rigid=is_rigid)
+    step = text[text.index("*STEP"):]
+    slides = "*CHANGE FRICTION, INTERACTION=I\n*FRICTION\n.1\n"
+    text += step.replace("*NODE FILE", slides + "*NODE FILE")
+    if is_rigid:
+        text += step.replace("*NODE FILE", "*CHANGE FRICTION, INTERACTION=I, RESET\n*NODE FILE").replace(f"{until}\n", ".3\n")
+    run = ran(tmp_path, text)
+    t, p = run.history["time"], run.history["px"]/.5
+    first = int(np.argmin(np.abs(t - until)))
+    second = int(np.argmin(np.abs(t - 2*until)))
+    wanted = GRAVITY*(np.sin(angle) - .1*np.cos(angle))*until
+    if is_rigid:
+        assert np.abs(p[:first + 1]).max() < 1e-12
+        assert p[second] == pytest.approx(wanted, rel=1e-10)
+        assert abs(p[-1]) < 1e-9
+    else:                                        # it swings about that by what its shear gives
+        assert p[second] == pytest.approx(wanted, rel=.1)
+    dissipates(run)
