@@ -231,6 +231,29 @@ def test_press_fit_of_unlike_meshes(n: tuple[int, int], accuracy: float, tmp_pat
     assert "F1 and F0: gaps are measured between the curves" in run.log
 
 
+def test_a_turned_cube_pressed_on_a_block(tmp_path: Path) -> None:
+    """Nodes and means agree as meshes get finer: of second order in the mean over all nodes."""
+    c, s = np.cos(0.5), np.sin(0.5)
+    turn, off = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]]), []
+    for n in (2, 4):
+        one = Block("C3D8", (n,)*3, place=lambda x: (x - np.array([0.5, 0.5, 0.0])) @ turn.T)
+        two = Block("C3D8", (2*n, 2*n, n), size=(2, 2, 1), place=lambda x: x - np.array([1.0, 1.0, 1.0]))
+        top, foot = one.on(2, 1), two.on(2, 0) + len(one.x)
+        text = (bodies([one, two], [faces(one, 2, 0), faces(two, 2, 1)], "*HYPERELASTIC, NEO HOOKE\n200., 2e-3\n")
+                + "".join(f"*NSET, NSET={name}\n" + "".join(f"{k}\n" for k in on) for name, on in (("TOP", top), ("FOOT", foot)))
+                + pair() + "*BOUNDARY\nFOOT, 1, 3\n*STEP, NLGEOM\n*STATIC\n.25, 1.\n*BOUNDARY\nTOP, 1, 2\nTOP, 3, 3, -.1\n"
+                + "*NODE FILE\nU\n*END STEP\n")
+        u = []
+        for options in ("", MORTAR):
+            folder = tmp_path/f"{n}{bool(options)}"
+            folder.mkdir()
+            run = ran(folder, text.replace("INTERACTION=I\n", f"INTERACTION=I{options}\n"))
+            assert run.verdict["verdict"] == "good"
+            u.append(run.fields()["displacement"][-1])
+        off.append(np.sqrt(((u[1] - u[0])**2).mean())/0.1)
+    assert off[1] < 0.005 and off[1] < 0.35*off[0]
+
+
 @pytest.mark.parametrize("is_slave", [False, True])
 @pytest.mark.parametrize("kind", ["C3D4", "C3D8"])
 def test_a_rigid_side(kind: str, is_slave: bool, tmp_path: Path) -> None:
