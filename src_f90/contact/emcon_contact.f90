@@ -85,6 +85,7 @@ module emcon_contact
    contains
       procedure :: suit_steps
       procedure :: follow_arcs
+      procedure :: curve_doubt
       procedure :: linearise
       procedure :: has_looked
       procedure :: own_area
@@ -183,6 +184,13 @@ contains
       type(contact_options_t), intent(in) :: options   !! as `configure` had them
       logical, intent(in) :: is_wanted           !! else between edges
    end subroutine follow_arcs
+
+   !> How wrong gaps between arcs may be; circles are exact in the plane [L].
+   pure real(wp) function curve_doubt(self)
+      class(contact_t), intent(in) :: self
+
+      curve_doubt = 0.0_wp
+   end function curve_doubt
 
    !> A step has begun; see `clearance`.
    pure subroutine has_looked(self, clearance)

@@ -73,12 +73,15 @@ module emcon_edge_contact_space
       integer, allocatable :: slave(:)                !! the sharp ones
       integer, allocatable :: body(:)                 !! (n of the edges)
       integer, allocatable :: class(:)                !! (n of the edges) 1 to n_class
+      !> (n of the edges) is one of a curved surface, if gaps follow arcs; else not allocated
+      logical, allocatable :: is_curved(:)
       type(near_list_t) :: near
       type(position_memo_t) :: memo                   !! of the nodes as stencils were chosen:
       real(wp) :: chosen_reach = 0.0_wp               !! among edges up to there [L]
       type(edge_stencil_t), allocatable :: stencil(:)    !! (n_constraint), by slave edge and class
    contains
       procedure :: configure => edge_configure
+      procedure :: follow_arcs => edge_follow_arcs
       procedure :: begin_points => edge_begin_step
       procedure :: measure_points => edge_measure
       procedure :: evaluate_points => edge_evaluate
@@ -162,6 +165,28 @@ contains
       type(contact_options_t), intent(in) :: options
    end subroutine edge_configure
 
+   !> Where gaps follow curved surfaces these have no edges: nodes hold them.
+   pure subroutine edge_follow_arcs(self, x, options, is_wanted)
+      class(edge_contact_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)   !! (3, n_node) reference positions [L]
+      type(contact_options_t), intent(in) :: options
+      logical, intent(in) :: is_wanted           !! else between facets
+      real(wp), parameter :: degree = acos(-1.0_wp)/180.0_wp
+      real(wp) :: still(3, size(x, 2)), normal(3, 2)
+      integer :: i
+
+      self%memo%is_known = .false.
+      if (allocated(self%is_curved)) deallocate(self%is_curved)
+      if (.not. is_wanted) return
+      allocate(self%is_curved(self%edges%n))
+      still = 0.0_wp
+      do i = 1, self%edges%n
+         normal = outline_edges_normals(self%edges, i, x, still)
+         self%is_curved(i) = dot_product(normal(:, 1), normal(:, 2)) &
+            > cos(options%smoothing_angle*degree)
+      end do
+   end subroutine edge_follow_arcs
+
    !> Choose the edge that each one crosses in the step, for each class. From the same start and up
    !> to the same reach the choice is the same.
    pure subroutine edge_begin_step(self, x, u0, du)
@@ -238,6 +263,10 @@ contains
       integer, intent(in) :: i, m                !! 1 to n of the edges
       integer :: k
 
+      may_cross = .false.
+      if (allocated(self%is_curved)) then
+         if (self%is_curved(i)) return
+      end if
       associate (edges => self%edges)
          if (edges%is_sharp(m)) then
             may_cross = merge(m > i, edges%surface(i) == self%first .and. edges%surface(m) &

@@ -4,14 +4,18 @@
 !> Each triangle of the slave facets has a stencil of its own, that of a patch as large as it is.
 !> Source: docs/theory.md, section 15.2.
 module emcon_mortar_space
+   use emcon_bulges_space, only : bulges_find
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : error_t
+   use emcon_guards, only : touching_bar
    use emcon_interactions, only : contact_options_t, contact_pair_t, multiplier_dual
    use emcon_kinds, only : wp
    use emcon_mortar_faces_space, only : mortar_faces_choose, mortar_faces_init, mortar_faces_t, &
       mortar_faces_weight
+   use emcon_mortar_rise_space, only : mortar_rise, mortar_rise_doubt, &
+      mortar_rise_largest, mortar_rise_t
    use emcon_mortar_sum_space, only : mortar_sight, mortar_sum, sight_t
    use emcon_near_list, only : near_list_update
    use emcon_patch_look_space, only : patch_basis, patch_basis_t
@@ -31,6 +35,7 @@ module emcon_mortar_space
       type(mortar_faces_t) :: faces
       type(position_memo_t) :: memo                   !! of the nodes as stencils were chosen:
       real(wp) :: chosen_reach = 0.0_wp               !! among facets up to there [L]
+      type(mortar_rise_t), allocatable :: rise        !! of both sides; only if gaps follow arcs
       type(patch_basis_t), allocatable :: basis(:)    !! (n_triangle) as last measured
       !> (0:1, n_facet) how dual the multipliers of slave facets are at start and end
       real(wp), allocatable :: theta(:, :)
@@ -39,6 +44,8 @@ module emcon_mortar_space
       real(wp), allocatable :: cover(:)               !! (n_constraint) covered at the end [L^2]
    contains
       procedure :: configure => mortar_configure
+      procedure :: follow_arcs => mortar_follow_arcs
+      procedure :: curve_doubt => mortar_curve_doubt
       procedure :: begin_points => mortar_begin_step
       procedure :: measure_points => mortar_measure
       procedure :: evaluate_points => mortar_evaluate
@@ -46,6 +53,7 @@ module emcon_mortar_space
       procedure :: own_area => mortar_own_area
       procedure :: share => mortar_share
       procedure :: mean_gap => mortar_mean_gap
+      procedure :: lets_in => mortar_lets_in
    end type mortar_space_t
 
 contains
@@ -103,6 +111,32 @@ contains
       self%faces%is_dual = options%multiplier == multiplier_dual
    end subroutine mortar_configure
 
+   !> Measure gaps between the curved surfaces that both sides stand for, or between facets.
+   pure subroutine mortar_follow_arcs(self, x, options, is_wanted)
+      class(mortar_space_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :)   !! (3, n_node) reference positions [L]
+      type(contact_options_t), intent(in) :: options
+      logical, intent(in) :: is_wanted           !! else between facets
+
+      self%memo%is_known = .false.
+      self%sagitta = 0.0_wp
+      if (allocated(self%rise)) deallocate(self%rise)
+      if (.not. is_wanted) return
+      allocate(self%rise)
+      associate (faces => self%faces, sides => self%faces%sides)
+         call bulges_find(self%rise%slave, sides%slave, faces%split, x, options%smoothing_angle)
+         call bulges_find(self%rise%master, sides%master, sides%triangles%split, x, &
+            options%smoothing_angle)
+      end associate
+   end subroutine mortar_follow_arcs
+
+   pure real(wp) function mortar_curve_doubt(self) result(doubt)
+      class(mortar_space_t), intent(in) :: self
+
+      doubt = 0.0_wp
+      if (allocated(self%rise)) doubt = mortar_rise_doubt(self%rise, self%faces)
+   end function mortar_curve_doubt
+
    !> Choose for each triangle what it may see in the step, and the multipliers.
    pure subroutine mortar_begin_step(self, x, u0, du)
       class(mortar_space_t), intent(inout) :: self
@@ -119,7 +153,34 @@ contains
       do f = 1, self%faces%sides%slave%n_facet
          call mortar_faces_choose(self%faces, f, x, u0, self%reach)
       end do
+      if (allocated(self%rise)) call find_sagittas(self, x, u0)
    end subroutine mortar_begin_step
+
+   !> How far both surfaces rise over what gaps are measured between.
+   pure subroutine find_sagittas(self, x, u0)
+      type(mortar_space_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
+      real(wp), dimension(3, size(self%faces%stencil)) :: rise, cover
+      real(wp) :: weight(3), total, area
+      integer :: i, k, t
+
+      do t = 1, size(self%faces%stencil)
+         call mortar_rise(self%rise, self%faces, t, x, u0, rise(:, t), cover(:, t))
+      end do
+      call find_bases(self, x, u0, 0.0_wp*u0)
+      do i = 1, self%n_constraint
+         total = 0.0_wp
+         area = 0.0_wp
+         do k = self%faces%start(i), self%faces%start(i + 1) - 1
+            t = self%faces%triangle(k)
+            weight = mortar_faces_weight(self%faces, k, self%theta(0, self%faces%split%facet(t)))
+            total = total + dot_product(weight, rise(:, t))
+            area = area + dot_product(weight, cover(:, t))
+         end do
+         self%sagitta(i) = 0.0_wp
+         if (area >= least_cover*self%whole(i)) self%sagitta(i) = total/area
+      end do
+   end subroutine find_sagittas
 
    !> What triangle `t` sees.
    pure subroutine look(self, t, x, u0, du, basis)
@@ -138,7 +199,19 @@ contains
    pure subroutine mortar_measure(self, x, u0, du)
       class(mortar_space_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
-      integer :: f, i, t
+      integer :: i
+
+      call find_bases(self, x, u0, du)
+      do i = 1, self%n_constraint
+         call measure_vertex(self, i)
+      end do
+   end subroutine mortar_measure
+
+   !> What triangles see at both ends of the step, and the multipliers of their facets.
+   pure subroutine find_bases(self, x, u0, du)
+      type(mortar_space_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      integer :: f, t
 
       do t = 1, size(self%faces%stencil)
          call look(self, t, x, u0, du, self%basis(t))
@@ -148,10 +221,7 @@ contains
          if (self%faces%is_dual) self%theta(:, f) = covered(self%basis(self%faces%split%start(f): &
             self%faces%split%start(f + 1) - 1))**3
       end do
-      do i = 1, self%n_constraint
-         call measure_vertex(self, i)
-      end do
-   end subroutine mortar_measure
+   end subroutine find_bases
 
    !> What of a slave facet is covered at both ends of the step, each of its triangles a part of it
    !> as large as the others: 0 to 1.
@@ -208,8 +278,10 @@ contains
          state%is_over = area(1) >= least .or. (self%step%is_penalty .and. area(0) >= least)
          state%is_leaving = .not. state%is_over
          state%is_arriving = area(0) < least
-         if (area(0) > 0.0_wp) state%gap0 = gap(0)/area(0) - self%offset
-         if (area(1) >= least) state%gap1 = gap(1)/area(1) - self%offset
+         if (area(0) > 0.0_wp) state%gap0 = gap(0)/area(0) - self%offset &
+            - self%sagitta(i)
+         if (area(1) >= least) state%gap1 = gap(1)/area(1) - self%offset &
+            - self%sagitta(i)
          if (state%is_arriving) state%was_open = &
             ahead - self%offset >= -max_penetration_on_entry*state%size
          if (state%gap0 < -deepest - self%offset) state = gap_state_t(size=state%size)
@@ -239,8 +311,8 @@ contains
          end associate
       end do
       do k = 1, size(wanted)
-         call mortar_sum(self%faces, wanted(k), sight, target(k) + self%offset, &
-            self%scale(wanted(k)), item(k))
+         call mortar_sum(self%faces, wanted(k), sight, target(k) + self%offset &
+            + self%sagitta(wanted(k)), self%scale(wanted(k)), item(k))
          item(k)%size = self%state(wanted(k))%size
       end do
    end subroutine mortar_evaluate
@@ -280,5 +352,13 @@ contains
       mean_gap = 0.0_wp
       if (self%cover(i) > 0.0_wp) mean_gap = gap*self%scale(i)/self%cover(i)
    end function mortar_mean_gap
+
+   !> Beside what a mean lets in, the chords of curved surfaces cross by their rises.
+   pure real(wp) function mortar_lets_in(self) result(lets_in)
+      class(mortar_space_t), intent(in) :: self
+
+      lets_in = touching_bar
+      if (allocated(self%rise)) lets_in = lets_in + mortar_rise_largest(self%rise, self%faces)
+   end function mortar_lets_in
 
 end module emcon_mortar_space

@@ -4,12 +4,13 @@
 !> The patch moves with the slave's surface, and its gap is the mean over what it covers of the
 !> master: smooth while the node slides over sides and corners. Source: docs/theory.md, section 15.
 module emcon_patch_contact_space
-   use emcon_bulges_space, only : bulges_find, bulges_largest, bulges_t
+   use emcon_bulges_space, only : bulges_doubt, bulges_find, bulges_largest, bulges_t
    use emcon_condition_nodes, only : condition_fold, condition_resize, condition_resize_slip
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : err_input, error_t, raise
+   use emcon_facet_split, only : facet_split_init, facet_split_t
    use emcon_facet_values, only : facets_point_area, facets_pressures
    use emcon_facets, only : facets_init
    use emcon_frame_slip_space, only : frame_slip, frame_slip_t
@@ -55,12 +56,14 @@ module emcon_patch_contact_space
       integer, allocatable :: class(:)                !! (n_constraint) of bodies it looks at
       type(patch_stencil_t), allocatable :: stencil(:)   !! (n_constraint)
       type(bulges_t), allocatable :: bulges           !! of the master; only if gaps follow arcs
+      real(wp), allocatable :: own_rise(:)            !! then of the slave (n_point) [L]
       real(wp), allocatable :: own_slack(:)           !! (n_constraint) of a guard beside mortar
       real(wp), allocatable :: scale(:)               !! (n_constraint) covered at the start
       real(wp), allocatable :: cover(:)               !! (n_constraint) covered at the end
    contains
       procedure :: configure => patch_configure
       procedure :: follow_arcs => patch_follow_arcs
+      procedure :: curve_doubt => patch_curve_doubt
       procedure :: begin_points => patch_begin_step
       procedure :: measure_points => patch_measure
       procedure :: evaluate_points => patch_evaluate
@@ -194,18 +197,35 @@ contains
       real(wp), intent(in), contiguous :: x(:, :)   !! (3, n_node) reference positions [L]
       type(contact_options_t), intent(in) :: options
       logical, intent(in) :: is_wanted           !! else between facets
+      type(facet_split_t) :: split
+      type(bulges_t) :: own
 
       self%memo%is_known = .false.
       self%sagitta = 0.0_wp
-      if (allocated(self%bulges)) deallocate(self%bulges)
+      if (allocated(self%bulges)) deallocate(self%bulges, self%own_rise)
       if (.not. is_wanted) return
       allocate(self%bulges)
       call bulges_find(self%bulges, self%sides%master, self%sides%triangles%split, x, &
          options%smoothing_angle)
+      associate (frames => self%sides%frames)
+         allocate(self%own_rise(frames%n_node + size(frames%middle)), source=0.0_wp)
+         if (size(frames%middle) == 0) return
+         call facet_split_init(split, self%sides%slave)
+         call bulges_find(own, self%sides%slave, split, x, options%smoothing_angle)
+         self%own_rise(frames%n_node + 1:) = own%point(split%centre(frames%middle))
+      end associate
    end subroutine patch_follow_arcs
 
-   !> How much less than its patch has it the node of frame constraint `i` is in front of the curved
-   !> surface.
+   pure real(wp) function patch_curve_doubt(self) result(doubt)
+      class(patch_contact_t), intent(in) :: self
+
+      doubt = 0.0_wp
+      if (allocated(self%bulges)) &
+         doubt = bulges_doubt(self%bulges, self%sides%triangles%split)
+   end function patch_curve_doubt
+
+   !> How much less than its patch has it the contact point of constraint `i` is in front of the
+   !> curved surface of the master, as a point of that of the slave.
    pure real(wp) function sagitta_under(self, i, x, u0) result(sagitta)
       class(patch_contact_t), intent(in) :: self
       integer, intent(in) :: i                   !! 1..n_constraint
@@ -218,7 +238,8 @@ contains
       call patch_stencil_gather(self%stencil(i), x, u0, 0.0_wp*u0, at, way)
       look = patch_look(self%stencil(i)%patch, at, way)
       if (look%cover(0) > no_cover) sagitta = look%height(0)/look%cover(0) &
-         - patch_stencil_height(self%stencil(i), self%sides, self%bulges, x, u0)
+         - (patch_stencil_height(self%stencil(i), self%sides, self%bulges, x, u0) &
+         - self%own_rise(self%sides%frames%point(self%frame(i))))
    end function sagitta_under
 
    !> Choose for each frame what its patch may see in the step. From the same start and up to

@@ -555,7 +555,7 @@ contains
       end associate
    end subroutine patch_stencil_gather
 
-   !> How far the slave node of a stencil is from the curved surface that the nearest triangle
+   !> How far the contact point of a stencil is from the curved surface that the nearest triangle
    !> stands for, > 0 in front of it.
    pure real(wp) function patch_stencil_height(self, sides, bulges, x, u) result(height)
       type(patch_stencil_t), intent(in) :: self  !! with a triangle
@@ -563,13 +563,19 @@ contains
       type(bulges_t), intent(in) :: bulges       !! of the master
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       real(wp), dimension(3, 3 + self%patch%n_vertex) :: at, way
-      real(wp) :: corner(3, 3)
+      real(wp) :: corner(3, 3), origin(3)
       type(nearest_t) :: nearest
       integer :: k
 
+      origin = 0.0_wp
+      do k = 2, self%n_origin
+         associate (i => self%node(k), slave => self%node(1))
+            origin = origin + self%origin(k)*((x(:, i) - x(:, slave)) + (u(:, i) - u(:, slave)))
+         end associate
+      end do
       do k = 1, 3
          corner(:, k) = sides_place(sides, sides%triangles%split%corner(k, self%triangle), &
-            self%node(1), x, u)
+            self%node(1), x, u) - origin
       end do
       call nearest_update(nearest, self%triangle, [0.0_wp, 0.0_wp, 0.0_wp], corner)
       call patch_stencil_gather(self, x, u, 0.0_wp*u, at, way)

@@ -55,6 +55,8 @@ module emcon_march_begin
    character(len=*), parameter, public :: overlap_at_start = "bodies overlap as a step begins"
    !> Fields in a deck are rounded by less than this part of their largest value.
    real(wp), parameter :: deck_rounding = 1.0e-6_wp
+   !> An interference that is known less well than to this part is told.
+   real(wp), parameter :: doubtful = 0.1_wp
 
 contains
 
@@ -225,7 +227,7 @@ contains
       type(march_t), intent(inout) :: self
       type(scene_t), intent(in) :: scene
       type(contact_options_t) :: options
-      real(wp) :: change
+      real(wp) :: change, interference
       integer :: i
 
       do i = 1, size(self%system%contact)
@@ -237,17 +239,38 @@ contains
             call contact%suit_steps(any(.not. step_is_dynamic(scene%step)))
             call contact%configure(scene%x, options)
             if (.not. scene%step(1)%contact%resolves_overclosure) cycle
-            call overclosure_follow_arcs(contact, scene%x, scene%u0, options, change)
+            call overclosure_follow_arcs(contact, scene%x, scene%u0, options, change, &
+               interference)
          end associate
          if (i > size(scene%pair) .or. .not. change > 0.0_wp .or. self%state%clock%i_step > 1) cycle
-         associate (pair => scene%pair(i))
-            call note_add(self%system%notes, "surfaces " // scene%surface(pair%slave)%name // &
-               " and " // scene%surface(pair%master)%name // ": gaps are measured between the " // &
-               "curves that edges are chords of, for *CONTACT INTERFERENCE; that changes them " // &
-               "by up to " // to_text(change, 3))
-         end associate
+         call tell_curves(self, scene, i, change, interference)
       end do
    end subroutine configure_contact
+
+   !> Say that gaps of a pair follow arcs, and where that is not known well enough.
+   subroutine tell_curves(self, scene, i, change, interference)
+      type(march_t), intent(inout) :: self
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: i                   !! 1 to the number of pairs
+      real(wp), intent(in) :: change             !! of a gap [L]
+      real(wp), intent(in) :: interference       !! between the arcs [L]
+      real(wp) :: doubt
+
+      associate (pair => scene%pair(i))
+         associate (names => scene%surface(pair%slave)%name // " and " // &
+               scene%surface(pair%master)%name)
+            call note_add(self%system%notes, "surfaces " // names // ": gaps are measured " // &
+               "between the curves that edges are chords of, for *CONTACT INTERFERENCE; that " // &
+               "changes them by up to " // to_text(change, 3) // ", and leaves " // &
+               to_text(interference, 3))
+            doubt = self%system%contact(i)%contact%curve_doubt()
+            if (doubt > doubtful*interference) call note_add(self%warnings, "surfaces " // names &
+               // ": the interference of " // to_text(interference, 3) // " is small beside " // &
+               "what faces are off the curves, and may be wrong by " // to_text(doubt, 2) // &
+               "; smaller faces, or nodes that meet nodes, are better")
+         end associate
+      end associate
+   end subroutine tell_curves
 
    !> What is closed at the start, and what of it the step is to resolve.
    subroutine begin_overclosure(self, scene, step)

@@ -19,11 +19,12 @@ contains
 
    !> Let a contact measure its gaps between arcs from now on, if that matters for what is closed at
    !> x + u, by either measure.
-   subroutine overclosure_follow_arcs(contact, x, u, options, largest)
+   subroutine overclosure_follow_arcs(contact, x, u, options, largest, deepest)
       class(contact_t), intent(inout) :: contact !! configured
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) as all begins [L]
       type(contact_options_t), intent(in) :: options         !! it was configured with
       real(wp), intent(out) :: largest           !! change of a gap that is closed; 0: none [L]
+      real(wp), intent(out) :: deepest           !! interference between the arcs, if that is not 0
       real(wp), dimension(contact%n_constraint) :: chords, arcs
       logical :: is_closed(contact%n_constraint)
 
@@ -31,8 +32,9 @@ contains
       call measure(chords)
       call contact%follow_arcs(x, options, .true.)
       call measure(arcs)
-      is_closed = contact%state%is_near .and. contact%state%is_over .and. min(chords, arcs) < 0.0_wp
+      is_closed = min(chords, arcs) < 0.0_wp
       largest = maxval(abs(arcs - chords), mask=is_closed)
+      deepest = max(0.0_wp, -minval(arcs))
       if (any(is_closed)) then
          if (largest > -small_part*minval(min(chords, arcs), mask=is_closed)) return
       end if
@@ -41,7 +43,7 @@ contains
 
    contains
 
-      !> The gaps as nothing moves.
+      !> The gaps as nothing moves; 0 where there is none.
       subroutine measure(gap)
          real(wp), intent(out) :: gap(:)         !! (n_constraint) [L]
          real(wp) :: rest(size(u, 1), size(u, 2))
@@ -50,7 +52,7 @@ contains
          contact%reach = 0.0_wp
          call contact%begin_step(x, u, rest)
          call contact%measure(x, u, rest)
-         gap = contact%state%gap0
+         gap = merge(contact%state%gap0, 0.0_wp, contact%state%is_near .and. contact%state%is_over)
       end subroutine measure
 
    end subroutine overclosure_follow_arcs

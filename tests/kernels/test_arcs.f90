@@ -218,6 +218,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       real(wp), intent(out), optional :: largest !! change of a gap by arcs, taken where it matters
       type(contact_options_t) :: options
+      real(wp) :: deepest
 
       call choose(k, scene%pair(1)%formulation, options)
       call new_contact(scene, scene%pair(1), contact, error)
@@ -226,7 +227,7 @@ contains
       call contact%configure(scene%x, options)
       call contact%follow_arcs(scene%x, options, has_arcs)
       if (present(largest)) call overclosure_follow_arcs(contact, scene%x, scene%u0, options, &
-         largest)
+         largest, deepest)
       contact%reach = 0.0_wp
       call contact%begin_step(scene%x, scene%u0, 0.0_wp*scene%u0)
       call contact%measure(scene%x, scene%u0, 0.0_wp*scene%u0)
@@ -333,7 +334,7 @@ contains
       type(scene_t) :: scene
       class(contact_t), allocatable :: contact
       type(contact_options_t) :: options
-      real(wp) :: largest
+      real(wp) :: largest, deepest
       integer :: k, formulation
 
       do k = 1, 6
@@ -342,7 +343,8 @@ contains
          if (allocated(error)) return
          call choose(k, formulation, options)
          contact%reach = 10.0_wp
-         call overclosure_follow_arcs(contact, scene%x, scene%u0, options, largest)
+         call overclosure_follow_arcs(contact, scene%x, scene%u0, options, largest, &
+            deepest)
          call check_near(error, largest, 0.0_wp, 0.0_wp, 1.0_wp, "combination " // to_text(k))
          call check_true(error, .not. any(contact%state%is_near), "far")
       end do

@@ -29,10 +29,11 @@ contains
          test_case_t("over facets of a cylinder and a sphere", test_round)]
    end subroutine collect_bulges_space
 
-   !> The upper faces of a box of 4 x 3 cells that is bent about an axis below, or above.
-   subroutine begin(shape, sign, scene, facets, split, error)
+   !> The upper faces of a box of 4 x n cells that is bent about an axis below, or above.
+   subroutine begin(shape, sign, n, scene, facets, split, error)
       integer, intent(in) :: shape
       real(wp), intent(in) :: sign               !! 1: bulges out of the box, -1: is hollow
+      integer, intent(in) :: n                   !! cells along the axis
       type(scene_t), intent(out) :: scene
       type(facets_t), intent(out) :: facets
       type(facet_split_t), intent(out) :: split
@@ -43,7 +44,7 @@ contains
 
       call space_begin(scene)
       call add_box(scene, "C3D8", [-0.5_wp, -0.375_wp, -0.25_wp], [1.0_wp, 0.75_wp, 0.25_wp], &
-         [4, 3, 1])
+         [4, n, 1])
       surface = skin(scene)
       associate (is_top => surface%face == 2)
          surface%element = pack(surface%element, is_top)
@@ -73,7 +74,7 @@ contains
       type(bulges_t) :: bulges
       integer :: t
 
-      call begin(is_flat, 1.0_wp, scene, facets, split, error)
+      call begin(is_flat, 1.0_wp, 3, scene, facets, split, error)
       if (allocated(error)) return
       call bulges_find(bulges, facets, split, scene%x, 60.0_wp)
       do t = 1, size(split%facet)
@@ -91,12 +92,13 @@ contains
       type(facet_split_t) :: split
       type(bulges_t) :: bulges
       real(wp) :: sign, exact, most
-      integer :: k, shape, t
+      integer :: k, n, shape, t
 
       do shape = is_cylinder, is_sphere
-         do k = 1, 2
-            sign = real(3 - 2*k, wp)
-            call begin(shape, sign, scene, facets, split, error)
+         do k = 1, 4
+            sign = merge(1.0_wp, -1.0_wp, btest(k, 0))
+            n = merge(3, 1, k <= 2 .or. shape == is_sphere)  ! one cell tells of one curvature
+            call begin(shape, sign, n, scene, facets, split, error)
             if (allocated(error)) return
             call bulges_find(bulges, facets, split, scene%x, 60.0_wp)
             most = 0.0_wp
