@@ -12,6 +12,7 @@ module emcon_edge_contact_space
    use emcon_csr, only : csr_list_users
    use emcon_edge_pair_space, only : crossing_t, edge_crossing, edge_pair_gap, edge_pair_gap_t, &
       edge_pair_slip, edge_pair_slip_t, n_edge_pair_node
+   use emcon_edge_sight_space, only : is_outside, is_past_ends, length_of, look_between, unit
    use emcon_element_kind, only : max_face_nodes
    use emcon_guards, only : crossing_bar
    use emcon_interactions, only : contact_damping_t, contact_options_t, contact_pair_t, &
@@ -37,9 +38,6 @@ module emcon_edge_contact_space
    !> length, and what comes down on it edge on: by so much clear of its own faces.
    real(wp), parameter :: least_turn = 1.0e-3_wp, hollow = 0.05_wp, inside = 1.0e-4_wp, &
       clear = 0.1_wp
-   !> An edge holds what comes from between its faces, and from so much outside: the sine of that
-   !> angle by the sine of that between the faces. Edges that lie on faces would be on the limit.
-   real(wp), parameter :: beside = 0.25_wp
    !> So far inside its ends, by its length, an edge begins to hold, as nodes hold there; so far
    !> past them it goes on to hold.
    real(wp), parameter :: begins_beyond = -1.0e-3_wp, ends_beyond = 0.05_wp
@@ -239,31 +237,6 @@ contains
       end associate
    end subroutine choose
 
-   !> Do edges cross past their ends by more than `reach`? Of parallel ones it is not told.
-   pure logical function is_past_ends(at, length, reach)
-      real(wp), intent(in) :: at(3, n_edge_pair_node)        !! [L]
-      real(wp), intent(in) :: length(2)          !! of the edges [L]
-      real(wp), intent(in) :: reach              !! [L]
-      real(wp) :: a(3), b(3), d(3), ab, determinant, place(2)
-
-      a = at(:, 2) - at(:, 1)
-      b = at(:, 4) - at(:, 3)
-      d = at(:, 3) - at(:, 1)
-      ab = dot_product(a, b)
-      determinant = (length(1)*length(2))**2 - ab**2
-      place(1) = dot_product(d, a)*length(2)**2 - dot_product(d, b)*ab
-      place(2) = dot_product(d, a)*ab - dot_product(d, b)*length(1)**2
-      is_past_ends = any(max(-place, place - determinant)*length > reach*determinant)
-   end function is_past_ends
-
-   !> Does a direction that is `within` the normals at an edge, which turns by `turn`, count as one
-   !> that is not between them, `least` being the least turn that holds?
-   pure logical function is_outside(within, turn, least)
-      real(wp), intent(in) :: within, turn, least
-
-      is_outside = turn <= least .or. within <= min(least, 0.0_wp) - beside*abs(turn)
-   end function is_outside
-
    !> May sharp edge `i` ever cross edge `m`? Of two sharp ones one crosses the other. What bends is
    !> of other bodies.
    pure logical function may_cross(self, i, m)
@@ -314,35 +287,6 @@ contains
 
       beyond = maxval(max(-crossing%place, crossing%place - 1.0_wp)) - begins_beyond
    end function beyond_ends
-
-   !> How far within the outward normals of the faces at an edge a direction normal to it is: the
-   !> sine of the angle from the nearer one, < 0 outside; and that of the turn between the faces.
-   pure subroutine look_between(direction, normal, along, within, turn)
-      real(wp), intent(in) :: direction(3)       !! of unit length
-      real(wp), intent(in) :: normal(3, 2)       !! of unit length
-      real(wp), intent(in) :: along(3)           !! the edge, as its first face runs [L]
-      real(wp), intent(out) :: within, turn
-
-      associate (axis => unit(along))
-         turn = dot_product(cross_product(normal(:, 1), normal(:, 2)), axis)
-         within = min(dot_product(cross_product(normal(:, 1), direction), axis), &
-            dot_product(cross_product(direction, normal(:, 2)), axis))
-      end associate
-      if (.not. dot_product(direction, sum(normal, 2)) > 0.0_wp) within = -1.0_wp
-   end subroutine look_between
-
-   pure function unit(vector)
-      real(wp), intent(in) :: vector(3)
-      real(wp) :: unit(3)
-
-      unit = vector/max(sqrt(dot_product(vector, vector)), tiny(vector))
-   end function unit
-
-   pure real(wp) function length_of(from, to) result(length)
-      real(wp), intent(in) :: from(3), to(3)
-
-      length = sqrt(dot_product(to - from, to - from))
-   end function length_of
 
    !> Where the ends of the edges of a stencil are, from the first one.
    pure subroutine gather(self, stencil, x, u, at)
