@@ -12,12 +12,13 @@ module emcon_edge_contact_space
    use emcon_csr, only : csr_list_users
    use emcon_edge_pair_space, only : crossing_t, edge_crossing, edge_pair_gap, edge_pair_gap_t, &
       edge_pair_slip, edge_pair_slip_t, n_edge_pair_node
+   use emcon_edge_sight_space, only : is_outside, is_past_ends, length_of, look_between, unit
    use emcon_element_kind, only : max_face_nodes
    use emcon_guards, only : crossing_bar
    use emcon_interactions, only : contact_damping_t, contact_options_t, contact_pair_t, &
       interaction_reach, interaction_t
    use emcon_kinds, only : wp
-   use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
+   use emcon_near_list, only : near_list_find, near_list_init, near_list_t, near_list_update
    use emcon_node_sums, only : node_sums_first, node_sums_second
    use emcon_outline_edges_space, only : outline_edges_add, outline_edges_nodes, &
       outline_edges_normals, outline_edges_place, outline_edges_t
@@ -37,14 +38,13 @@ module emcon_edge_contact_space
    !> length, and what comes down on it edge on: by so much clear of its own faces.
    real(wp), parameter :: least_turn = 1.0e-3_wp, hollow = 0.05_wp, inside = 1.0e-4_wp, &
       clear = 0.1_wp
-   !> An edge holds what comes from between its faces, and from so much outside: the sine of that
-   !> angle by the sine of that between the faces. Edges that lie on faces would be on the limit.
-   real(wp), parameter :: beside = 0.25_wp
    !> So far inside its ends, by its length, an edge begins to hold, as nodes hold there; so far
    !> past them it goes on to hold.
    real(wp), parameter :: begins_beyond = -1.0e-3_wp, ends_beyond = 0.05_wp
    !> So deep, by the edge, two edges may be in each other, and may be as a contact begins.
    real(wp), parameter :: deepest = 0.3_wp, deepest_start = 0.1_wp
+   !> Heights that are larger by this than any that counts are so whatever rounding does.
+   real(wp), parameter :: far = 1.001_wp
 
    !> Two nodes of a sharp edge, and those of one with a centre at its end.
    integer, parameter :: most_nodes = 2 + max_face_nodes
@@ -192,7 +192,8 @@ contains
    pure subroutine edge_begin_step(self, x, u0, du)
       class(edge_contact_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
-      integer :: i, k
+      real(wp) :: normals(3, 2)
+      integer :: i, k, n, near(self%edges%n)
 
       if (self%n_constraint == 0) then
          call self%has_looked(huge(1.0_wp))
@@ -206,48 +207,53 @@ contains
       call position_memo_take(self%memo, self%near%node, x, u0)
       self%chosen_reach = self%reach
       self%stencil%master = 0
-      associate (list => self%near%candidates)
-         do i = 1, size(self%slave)
-            do k = list%start(i), list%start(i + 1) - 1
-               if (near_list_within(self%near, i, list%facet(k), x, u0, self%reach)) &
-                  call choose(self, i, list%facet(k), x, u0)
-            end do
+      do i = 1, size(self%slave)
+         call near_list_find(self%near, i, self%reach, near, n)
+         if (n > 0) normals = outline_edges_normals(self%edges, self%slave(i), x, u0)
+         do k = 1, n
+            if (may_cross(self, self%slave(i), near(k))) &
+               call choose(self, i, near(k), normals, x, u0)
          end do
-      end associate
+      end do
    end subroutine edge_begin_step
 
    !> Let sharp edge number `i` cross edge `m` in the step, if they may meet in it and no other one
    !> of the class comes first.
-   pure subroutine choose(self, i, m, x, u0)
+   pure subroutine choose(self, i, m, of_slave, x, u0)
       class(edge_contact_t), intent(inout) :: self
       integer, intent(in) :: i, m
+      real(wp), intent(in) :: of_slave(3, 2)     !! outward normals of the faces at the sharp edge
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
       real(wp), dimension(3, n_edge_pair_node) :: at
-      real(wp) :: normal(3), length(2), gap, within(2), turn(2), least
+      real(wp) :: normal(3), length(2), gap, within, turn, least
       type(crossing_t) :: crossing
       type(edge_stencil_t) :: new
 
-      if (.not. may_cross(self, self%slave(i), m)) return
       new = edge_stencil_t(self%slave(i), m, 1.0_wp)
       call gather(self, new, x, u0, at)
+      length(1) = length_of(at(:, 1), at(:, 2))
+      length(2) = length_of(at(:, 3), at(:, 4))
+      normal = unit(cross_product(at(:, 2) - at(:, 1), at(:, 4) - at(:, 3)))
+      if (abs(dot_product(normal, at(:, 3) - at(:, 1))) > far*max(self%reach, deepest &
+         *minval(length) - self%offset)) return
+      new%side = sign(1.0_wp, dot_product(normal, sum(of_slave, 2)))
+      normal = new%side*normal
+      ! The places take the most to find: what no place would count for goes before.
+      call look_between(normal, of_slave, at(:, 2) - at(:, 1), within, turn)
+      if (is_outside(within, turn, -hollow)) return
+      if (is_past_ends(at, length, far*self%reach)) return
       crossing = edge_crossing(at)
       if (crossing%sine < least_sine) return
-      length = [length_of(at(:, :2)), length_of(at(:, 3:))]
       if (any(max(-crossing%place, crossing%place - 1.0_wp)*length > self%reach)) return
-      normal = unit(cross_product(at(:, 2) - at(:, 1), at(:, 4) - at(:, 3)))
-      associate (of_slave => outline_edges_normals(self%edges, new%edge, x, u0), &
-            of_master => outline_edges_normals(self%edges, m, x, u0))
-         new%side = sign(1.0_wp, dot_product(normal, sum(of_slave, 2)))
-         normal = new%side*normal
-         gap = new%side*crossing%height
-         call look_between(normal, of_slave, at(:, 2) - at(:, 1), within(1), turn(1))
-         call look_between(-normal, of_master, at(:, 4) - at(:, 3), within(2), turn(2))
-      end associate
-      least = least_turn
-      if (gap - self%offset < -inside*minval(length) .or. (within(1) > clear .and. &
-         self%edges%bends(m))) least = -hollow
-      if (any(turn <= least .or. within <= min(least, 0.0_wp) - beside*abs(turn))) return
+      gap = new%side*crossing%height
       if (gap - self%offset < -deepest*minval(length) .or. gap > self%reach) return
+      least = least_turn
+      if (gap - self%offset < -inside*minval(length) .or. (within > clear .and. &
+         self%edges%bends(m))) least = -hollow
+      if (is_outside(within, turn, least)) return
+      call look_between(-normal, outline_edges_normals(self%edges, m, x, u0), &
+         at(:, 4) - at(:, 3), within, turn)
+      if (is_outside(within, turn, least)) return
       associate (old => self%stencil(n_class*(i - 1) + self%class(m)))
          if (old%master > 0) then
             if (.not. comes_first(self, new, crossing, old, x, u0)) return
@@ -261,7 +267,7 @@ contains
    pure logical function may_cross(self, i, m)
       class(edge_contact_t), intent(in) :: self
       integer, intent(in) :: i, m                !! 1 to n of the edges
-      integer :: k
+      integer :: j, k
 
       may_cross = .false.
       if (allocated(self%is_curved)) then
@@ -276,9 +282,11 @@ contains
                self%is_self)
          end if
          do k = 1, 2
-            if (.not. may_cross) return
-            may_cross = .not. any(edges%node(:, edges%ends(:, m)) == edges%node(1, &
-               edges%ends(k, i)))
+            do j = 1, 2
+               if (.not. may_cross) return
+               may_cross = .not. any(edges%node(:, edges%ends(j, m)) == edges%node(1, &
+                  edges%ends(k, i)))
+            end do
          end do
       end associate
    end function may_cross
@@ -309,35 +317,6 @@ contains
       beyond = maxval(max(-crossing%place, crossing%place - 1.0_wp)) - begins_beyond
    end function beyond_ends
 
-   !> How far within the outward normals of the faces at an edge a direction normal to it is: the
-   !> sine of the angle from the nearer one, < 0 outside; and that of the turn between the faces.
-   pure subroutine look_between(direction, normal, along, within, turn)
-      real(wp), intent(in) :: direction(3)       !! of unit length
-      real(wp), intent(in) :: normal(3, 2)       !! of unit length
-      real(wp), intent(in) :: along(3)           !! the edge, as its first face runs [L]
-      real(wp), intent(out) :: within, turn
-
-      associate (axis => unit(along))
-         turn = dot_product(cross_product(normal(:, 1), normal(:, 2)), axis)
-         within = min(dot_product(cross_product(normal(:, 1), direction), axis), &
-            dot_product(cross_product(direction, normal(:, 2)), axis))
-      end associate
-      if (.not. dot_product(direction, sum(normal, 2)) > 0.0_wp) within = -1.0_wp
-   end subroutine look_between
-
-   pure function unit(vector)
-      real(wp), intent(in) :: vector(3)
-      real(wp) :: unit(3)
-
-      unit = vector/max(sqrt(dot_product(vector, vector)), tiny(vector))
-   end function unit
-
-   pure real(wp) function length_of(ends) result(length)
-      real(wp), intent(in) :: ends(3, 2)
-
-      length = sqrt(dot_product(ends(:, 2) - ends(:, 1), ends(:, 2) - ends(:, 1)))
-   end function length_of
-
    !> Where the ends of the edges of a stencil are, from the first one.
    pure subroutine gather(self, stencil, x, u, at)
       class(edge_contact_t), intent(in) :: self
@@ -359,7 +338,8 @@ contains
       type(edge_stencil_t), intent(in) :: stencil
       integer :: point(n_edge_pair_node)
 
-      point = [self%edges%ends(:, stencil%edge), self%edges%ends(:, stencil%master)]
+      point(:2) = self%edges%ends(:, stencil%edge)
+      point(3:) = self%edges%ends(:, stencil%master)
    end function points_of
 
    !> How the ends move in the step, from the first of them on.
@@ -430,8 +410,8 @@ contains
       associate (state => self%state(k), stencil => self%stencil(k))
          call gather(self, stencil, x, u0, at)
          from = edge_crossing(at)
-         state%size = length_of(at(:, :2))
-         state%other_size = length_of(at(:, 3:))
+         state%size = length_of(at(:, 1), at(:, 2))
+         state%other_size = length_of(at(:, 3), at(:, 4))
          call gather_motion(self, stencil, du, way)
          to = edge_crossing(at + way)
          state%is_near = .true.
@@ -498,7 +478,7 @@ contains
       call condition_resize(item, ends%n, size(x, 1))
       item%node(:ends%n) = ends%node(:ends%n)
       item%n_slave = ends%n_slave
-      item%size = length_of(at(:, :2))
+      item%size = length_of(at(:, 1), at(:, 2))
       item%gap0 = gap%gap(0) - hold
       item%gap1 = gap%gap(1) - hold
       item%dgap = gap%dgap

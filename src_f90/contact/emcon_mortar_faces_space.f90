@@ -102,9 +102,9 @@ contains
       self%stencil(self%split%start(f):self%split%start(f + 1) - 1)%triangle = 0
       associate (list => self%near%candidates)
          associate (of => list%facet(list%start(f):list%start(f + 1) - 1))
-            associate (is_near => [(near_list_within(self%near, f, of(k), x, u0, reach), &
-                  k = 1, size(of))], is_beside => [(.not. near_list_within(self%near, f, of(k), &
-                  x, u0, reach - self%beyond), k = 1, size(of))])
+            associate (is_near => [(near_list_within(self%near, f, of(k), reach), k = 1, &
+                  size(of))], is_beside => [(.not. near_list_within(self%near, f, of(k), &
+                  reach - self%beyond), k = 1, size(of))])
                if (all(is_beside)) return
                do t = self%split%start(f), self%split%start(f + 1) - 1
                   call patch_stencil_choose(self%stencil(t), self%sides, t, pack(of, is_near), x, &

@@ -155,7 +155,7 @@ contains
       best = huge(best)
       associate (near => self%near%candidates, item => self%near_item(i))
          do k = near%start(item), near%start(item + 1) - 1
-            if (.not. near_list_within(self%near, item, near%facet(k), x, u0, self%reach)) cycle
+            if (.not. near_list_within(self%near, item, near%facet(k), self%reach)) cycle
             call choice_take_nearer(self, i, near%facet(k), x, u0, best)
          end do
       end associate

@@ -263,7 +263,7 @@ contains
             associate (item => self%sides%frames%point(self%frame(i)))
                associate (of => list%facet(list%start(item):list%start(item + 1) - 1))
                   facet = pack(of, [(touch_rule_space_sees(self%sides%rule, self%class(i), of(k)) &
-                     .and. near_list_within(self%near, item, of(k), x, u0, self%reach), &
+                     .and. near_list_within(self%near, item, of(k), self%reach), &
                      k = 1, size(of))])
                end associate
             end associate

@@ -48,15 +48,19 @@ contains
       box_distance = max(0.0_wp, maxval(low_a - high_b), maxval(low_b - high_a))
    end function box_distance
 
-   !> Low and high corners (n_dim, n, 2) of the boxes around the nodes of each item at x + u.
+   !> Low and high corners (n_dim, n, 2) of the boxes around the nodes of each item at x + u, in the
+   !> place of what was in `box`.
    pure subroutine search_boxes(x, u, item, box)
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (n_dim, n_node) [L]
       integer, intent(in) :: item(:, :)          !! (most nodes, n) 0: no more of it
-      real(wp), allocatable, intent(out) :: box(:, :, :)     !! [L]
+      real(wp), allocatable, intent(inout) :: box(:, :, :)   !! [L]
       real(wp) :: at
       integer :: a, i, k
 
-      allocate(box(size(x, 1), size(item, 2), 2))
+      if (allocated(box)) then
+         if (any(shape(box) /= [size(x, 1), size(item, 2), 2])) deallocate(box)
+      end if
+      if (.not. allocated(box)) allocate(box(size(x, 1), size(item, 2), 2))
       do i = 1, size(item, 2)
          do k = 1, size(item, 1)
             associate (node => item(k, i))

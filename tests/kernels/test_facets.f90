@@ -291,7 +291,7 @@ contains
          associate (near => list%candidates)
             associate (listed => near%facet(near%start(i):near%start(i + 1) - 1))
                do f = 1, facets%n_facet
-                  call check_true(error, near_list_within(list, i, f, x, u, within) .eqv. &
+                  call check_true(error, near_list_within(list, i, f, within) .eqv. &
                      distance(f) <= within, "near")
                   if (distance(f) <= within) call check_true(error, any(listed == f), "listed")
                end do

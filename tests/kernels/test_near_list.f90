@@ -3,7 +3,8 @@ module test_near_list
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
-   use emcon_near_list, only : near_list_init, near_list_t, near_list_update, near_list_within
+   use emcon_near_list, only : near_list_find, near_list_init, near_list_t, near_list_update, &
+      near_list_within
    use random_draws, only : draw_random
    use small_scenes, only : shake
    implicit none
@@ -73,6 +74,7 @@ contains
       type(near_list_t) :: list
       real(wp), dimension(2, n_node) :: x, u, du
       real(wp) :: within, expected, motion, edge_size
+      integer :: found(n_edge), n
       integer :: step, i, e
 
       call make_list(0.3_wp, x, list)
@@ -87,9 +89,14 @@ contains
          expected = max(0.5_wp*edge_size, 2.0_wp*motion) + depth
          call check_near(error, within, expected, 16.0_wp*eps, 1.0_wp, "within")
          do i = 1, n_item
+            call near_list_find(list, i, within, found, n)
+            call check_true(error, n == count([(distance(list, x + u, i, e) <= within, &
+               e = 1, n_edge)]), "how many are near")
+            call check_true(error, all([(distance(list, x + u, i, found(e)) <= within, &
+               e = 1, n)]), "those")
             do e = 1, n_edge
                associate (d => distance(list, x + u, i, e))
-                  call check_true(error, near_list_within(list, i, e, x, u, within) .eqv. &
+                  call check_true(error, near_list_within(list, i, e, within) .eqv. &
                      d <= within, "near")
                   if (d <= within) call check_true(error, is_listed(list, i, e), "in the list")
                   if (list%clearance > 0.0_wp) call check_true(error, d > within, "clear")

@@ -40,10 +40,10 @@ def on_plate(one: Block, h: float, v: tuple[float, float, float] = (0, 0, -1), w
             + f"*BOUNDARY\n9999, 1, 6\n{held}" + dynamic(h, until, more))
 
 
-def roughness(run: Run, h: float) -> tuple[float, float]:
-    """Of the force while there is one, from momenta: the root mean square of its second differences over the mean, and
-    its total variation over the largest: 2 where it rises and falls once."""
-    force = np.diff(run.history["pair1_impulse_z"])/h
+def roughness(run: Run, h: float, each: int = 1) -> tuple[float, float]:
+    """Of the force while there is one, from momenta after each so many steps, `h` apart: the root mean square of its
+    second differences over the mean, and its total variation over the largest: 2 where it rises and falls once."""
+    force = np.diff(run.history["pair1_impulse_z"][::each])/h
     acts = np.flatnonzero(np.abs(force) > 1.0e-9*np.abs(force).max())
     force = force[acts[0]:acts[-1] + 1]
     return (float(np.sqrt((np.diff(force, 2)**2).mean())/abs(force.mean())),
@@ -81,6 +81,45 @@ def test_the_force_of_a_ball_is_smooth(tmp_path: Path) -> None:
     assert 0.99 < found[0.01][1] < 1.0
     text = on_plate(Block("C3D8", (4, 4, 4), size=(2, 2, 2), place=ball), 0.01, more="*CONTACT INITIATION, TYPE=PERSISTENT\n")
     assert roughness(ran(tmp_path/"mass", text), 0.01)[0] > 20*found[0.01][0]
+
+
+def stiffness_at_the_pole(folder: Path, own: Block) -> float:
+    """Of a surface without mass over inner nodes, which do not move within a short time: force by way, by statics."""
+    pole = int(np.argmin(own.x[:, 2])) + 1
+    outer = {own.element[e - 1][c] for e, f in faces(own) for c in CUBE_FACES[f - 1]}
+    held = "".join(f"{k}, 1, 3\n" for k in range(1, len(own.x) + 1) if k not in outer)
+    run = ran(folder, bodies([own], [faces(own)]) + f"*BOUNDARY\n{held}*STEP, NLGEOM\n*STATIC\n1., 1.\n*BOUNDARY\n"
+              f"{pole}, 3, 3, 1e-5\n*NODE FILE\nU, RF\n*END STEP\n")
+    return float(run.fields()["reaction_force"][-1][pole - 1][2])/1e-5
+
+
+def test_where_the_force_of_a_ball_bends(tmp_path: Path) -> None:
+    """A node that joins at the speed v is stiffer by k than none, and the rate of the force jumps by k v. So second
+    differences are of the second order but where nodes join and leave: there they go with h. The same motion in steps of
+    a half, looked at as rarely, is as rough; a finer mesh is not."""
+    def own(n: int) -> Block:
+        return Block("C3D8", (n, n, n), size=(2, 2, 2), place=ball)
+
+    smooth, bends, runs = [], [], []
+    for h in (0.01, 0.005):
+        run = ran(tmp_path/repr(h), on_plate(own(4), h))
+        force = np.diff(run.history["pair1_impulse_z"])/h
+        second = np.diff(force, 2)
+        joins = np.flatnonzero(np.diff(run.history["active"]))
+        at_joins = np.zeros(len(second), bool)
+        for i in joins:
+            at_joins[i - 3:i + 2] = True
+        acts = np.flatnonzero(force > 1.0e-9*force.max())
+        inside = slice(acts[0], acts[-1] - 1)
+        smooth.append(np.sqrt((second[inside][~at_joins[inside]]**2).mean()))
+        bends.append(np.array([second[i - 2:i + 3].sum()/h for i in joins]))
+        runs.append(run)
+    assert smooth[0] > 2**1.8*smooth[1]
+    assert len(bends[0]) == len(bends[1]) == 4
+    assert np.abs(bends[0]/bends[1] - 1.0).max() < 0.15
+    assert abs(bends[1][0]/stiffness_at_the_pole(tmp_path/"pole", own(4)) - 1.0) < 0.05
+    assert roughness(runs[1], 0.01, each=2)[0] > 0.9*roughness(runs[0], 0.01)[0]
+    assert roughness(ran(tmp_path/"finer", on_plate(own(5), 0.01)), 0.01)[0] < 0.02
 
 
 def test_faces_of_a_plane_make_no_difference(tmp_path: Path) -> None:
