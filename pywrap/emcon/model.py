@@ -201,6 +201,7 @@ class Model(Source):
                 elements: Where | None = None, nodes: Where | None = None,
                 edges: ArrayLike | None = None,
                 segments: Sequence[tuple[Any, ...]] | None = None,
+                fillet_radius: Number | None = None,
                 stl: str | os.PathLike[str] | None = None, scale: Number | None = None) -> Model:
         """`*SURFACE`: of faces, of free faces of elements, of nodes, of edges, a profile, a file.
 
@@ -210,7 +211,8 @@ class Model(Source):
         nodes      node set, or (k,) nodes; only for slave surfaces of NODE TO SURFACE
         edges      (k, 2): first and last node of each edge
         segments   ("START", x, y), then ("LINE", x, y) or ("CIRCL", x, y, xc, yc): lines and arcs
-                   for `rigid_body(profile=)`, the body to the right [L]
+                   for `rigid_body(profile=)`, the body to the right [L]; `fillet_radius` [L] of
+                   the arcs that corners between them get, default none
         stl        file of triangles in space, text or binary, beside the deck; for
                    `rigid_body(profile=)`; its lengths are `scale` (default 1) of the model's
         """
@@ -239,7 +241,8 @@ class Model(Source):
         elif nodes is not None:
             rows = [(item,) for item in self._names(nodes, self._nodes, what)]
         kind = {"edges": "EDGE", "nodes": "NODE", "segments": "SEGMENTS"}.get(given[0], "ELEMENT")
-        return self._card("SURFACE", {"NAME": name, "TYPE": kind}, rows, data)
+        return self._card("SURFACE", {"NAME": name, "TYPE": kind, "FILLET RADIUS": fillet_radius},
+                          rows, data)
 
     def _faces(self, faces: ArrayLike | Sequence[tuple[Any, int]],
                what: str) -> list[tuple[str | int, int]]:

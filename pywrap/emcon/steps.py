@@ -130,6 +130,19 @@ class Step(Cards):
         """
         return self._card("CONTACT CONTROLS", {"STABILIZE": True} if stabilize else {"RESET": True})
 
+    def change_friction(self, interaction: str,
+                        friction: Number | Literal["ROUGH"] | None = None) -> Step:
+        """`*CHANGE FRICTION`: from the start of this step on, until another change.
+
+        friction        coefficient, 0 or more, or "ROUGH"; None: that of the model again
+        """
+        text = card("CHANGE FRICTION", {"INTERACTION": interaction, "RESET": friction is None})
+        if friction is not None:
+            is_rough = isinstance(friction, str) and friction.upper() == "ROUGH"
+            text += card("FRICTION", {"ROUGH": is_rough}, rows=[] if is_rough else [(friction,)])
+        self._add(text)
+        return self
+
     def mortar(self, *, integration: str | None = None, points: int | str | None = None,
                multiplier: str | None = None, normal: str | None = None,
                feature_angle: Number | None = None) -> Step:

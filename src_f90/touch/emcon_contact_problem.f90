@@ -345,7 +345,7 @@ contains
       logical, intent(out) :: is_solved
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: trial, defect, new, step
       real(dp) :: slope(size(push), size(push)), x(size(push))
-      real(wp) :: part, before, missed
+      real(wp) :: part, before, missed, largest
       integer :: i, halving, n_stall
       logical :: is_singular, was_solved
 
@@ -355,9 +355,9 @@ contains
       do i = 0, most
          was_solved = is_solved
          call natural_map(self, trial, defect, slope)
-         missed = missed_by(self, trial, defect)/max(maxval(abs(contact_problem_force(self, &
-            trial))), tiny(missed))
-         is_solved = missed <= met
+         missed = missed_by(self, trial, defect)
+         largest = maxval(abs(contact_problem_force(self, trial)))
+         is_solved = missed <= met*largest
          ! What is near is made exact: the first step to it leaves what W is stiffer by.
          if ((is_solved .and. (was_solved .or. .not. maxval(abs(defect)) > 0.0_wp)) &
             .or. i == most) exit
@@ -376,7 +376,7 @@ contains
          if (.not. norm2(defect) < huge(before)) exit
          n_stall = merge(0, n_stall + 1, part > no_part .or. self%n_slip < 2)
          if (n_stall == most_stalls) then
-            is_solved = near_enough .and. missed <= nearly_met
+            is_solved = near_enough .and. missed <= nearly_met*largest
             exit
          end if
          trial = new

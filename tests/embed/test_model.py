@@ -241,7 +241,7 @@ def everything() -> Model:
     model.section("A", "E", thickness=2.0, kinematics="LINEAR", massless=True, orientation="O")
     model.orientation("O", (1, 0, 0), (0, 1, 0))
     model.initial("DISPLACEMENT", "N", 1, 0.5)
-    model.surface("S5", segments=[("START", 0.0, 0.0), ("LINE", 1.0, 0.0)])
+    model.surface("S5", segments=[("START", 0.0, 0.0), ("LINE", 1.0, 0.0)], fillet_radius=0.1)
     model.rigid_body("E2", 3, profile="S5").rotating("N", 0.5, velocity=(1.0, 0.0), about=(0.5, 0.5))
     model.amplitude("AMP", [0.0, 1.0], [0.0, 1.0], time="TOTAL TIME")
     model.time_points("T1", [0.5, 1.0]).time_points("T2", generate=(0.0, 1.0, "<h>"))
@@ -273,6 +273,7 @@ def everything() -> Model:
     step.contact_initiation("PERSISTENT", gap_tolerance=0.1)
     step.contact_interference(amplitude="AMP")
     step.contact_controls(stabilize=True).contact_controls(stabilize=False)
+    step.change_friction("I", 0.5).change_friction("I", "rough").change_friction("I")
     step.mortar(integration="SEGMENTS", points=3, multiplier="DUAL", normal="EDGE",
                 feature_angle=40.0)
     step.smoothing("HERMITE", feature_angle=30.0)
