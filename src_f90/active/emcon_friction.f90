@@ -425,41 +425,44 @@ contains
          + 1:set%n)))
    end function largest_push
 
-   !> The mean stiffness of the system at the slave nodes of a condition: of their unknowns, or
-   !> those that they follow. Where they are held and have none, that at its other nodes. The order
-   !> of the nodes, which the mesh gives, does not matter.
+   !> The mean stiffness of the system at the slave nodes of a condition, each as the gap goes by
+   !> it: of their unknowns, or those that they follow. Where they are held and have none, that at
+   !> its other nodes. The order of the nodes, which the mesh gives, does not matter.
    pure real(wp) function friction_stiffness(system, item) result(stiffness)
       type(system_t), intent(in) :: system
       type(condition_t), intent(in) :: item
 
-      stiffness = mean_stiffness(system, item%node(:item%n_slave))
-      if (.not. stiffness > 0) stiffness = mean_stiffness(system, item%node(item%n_slave &
-         + 1:item%n_node))
+      stiffness = mean_stiffness(system, item, 1, item%n_slave)
+      if (.not. stiffness > 0) stiffness = mean_stiffness(system, item, item%n_slave + 1, &
+         item%n_node)
    end function friction_stiffness
 
-   !> The mean of the diagonal entries at the unknowns of nodes; 0 where they have none.
-   pure real(wp) function mean_stiffness(system, node) result(mean)
+   !> The mean of the diagonal entries at the unknowns of the nodes `first` to `last` of a
+   !> condition, weighted by the squares of its gradient; 0 where they have none.
+   pure real(wp) function mean_stiffness(system, item, first, last) result(mean)
       type(system_t), intent(in) :: system
-      integer, intent(in) :: node(:)  !! nodes
-      integer :: a, k, t, n, place
+      type(condition_t), intent(in) :: item      !! evaluated
+      integer, intent(in) :: first, last
+      real(wp) :: weight, total
+      integer :: a, k, t, place
 
       mean = 0.0_wp
-      n = 0
-      associate (numbering => system%space%numbering, &
-            n_dim => size(system%space%numbering%unknown, 1))
-         do k = 1, size(node)
-            do a = n_dim*(node(k) - 1) + 1, n_dim*node(k)
+      total = 0.0_wp
+      associate (numbering => system%space%numbering, n_dim => size(item%g, 1))
+         do k = first, last
+            weight = sum(item%g(:, k)**2)
+            do a = n_dim*(item%node(k) - 1) + 1, n_dim*item%node(k)
                do t = numbering%start(a) + 1, numbering%start(a + 1)
                   if (numbering%column(t) == 0) cycle
                   place = csr_find(system%matrix, numbering%column(t), numbering%column(t))
                   if (place == 0 .or. .not. abs(numbering%weight(t)) > 0.5_wp) cycle
-                  mean = mean + real(abs(system%matrix%value(place)), wp)
-                  n = n + 1
+                  mean = mean + weight*real(abs(system%matrix%value(place)), wp)
+                  total = total + weight
                end do
             end do
          end do
       end associate
-      if (n > 0) mean = mean/n
+      if (total > 0.0_wp) mean = mean/total
    end function mean_stiffness
 
 end module emcon_friction

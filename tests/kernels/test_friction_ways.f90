@@ -80,6 +80,7 @@ contains
             item%node = [active%set%id(k), 4]
             item%size = 1.0_wp
             allocate(item%g(2, 2), item%t(2, 2, 1), source=0.0_wp)
+            item%g(2, :) = [1.0_wp, -1.0_wp]
          end associate
       end do
    end subroutine select

@@ -618,3 +618,17 @@ def test_what_is_driven_along_a_fixed_surface_rubs(way, tmp_path):
     run = run_deck(deck, tmp_path, **NODES)
     assert run.verdict["verdict"] == "good"
     assert np.abs(run.history["pair1_force_x"][1:]/run.history["pair1_force_y"][1:]) == pytest.approx(0.3, rel=1e-9)
+
+
+def test_friction_changes_between_steps(tmp_path):
+    """The momentum that a block loses by steps: 3/10, 1/10 and again 3/10 of its weight of 20, for .2 each."""
+    deck = (DECKS / "sliding_block.inp").read_text()
+    model, step = deck[:deck.index("*STEP")], deck[deck.index("*STEP"):].replace("<t_end>", ".2")
+    load = "*DLOAD\nBLOCK, GRAV, 10., 0., -1.\n"
+    changes = ["*CHANGE FRICTION, INTERACTION=ROUGH\n*FRICTION\n.1\n", "*CHANGE FRICTION, INTERACTION=ROUGH, RESET\n"]
+    text = model.replace("<t_end>", ".6") + step + "".join(step.replace(load, change) for change in changes)
+    run = run_deck(Deck(text, "changes"), tmp_path)
+    assert run.verdict["law_violation"] < 1e-10 and run.history["cuts"].sum() == 0
+    at = [np.argmin(np.abs(run.history["time"] - time)) for time in (0.0, 0.2, 0.4, 0.6)]
+    # The block vibrates on its floor: its weight is met in the mean.
+    assert -np.diff(run.history["px"][at]) == pytest.approx([1.2, 0.4, 1.2], rel=1e-3)

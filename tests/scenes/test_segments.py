@@ -59,6 +59,23 @@ def test_a_disc_in_a_bowl_of_arcs(smoothing, off, tmp_path):
     assert 1 - 1e-3 < r < 1 + off
 
 
+def test_a_trough_with_round_corners_is_that_bowl(tmp_path):
+    """FILLET RADIUS of half its width and all of its depth leaves nothing of three sides."""
+    way = []
+    for name, cards in (("bowl", "START, -1., 0.\nCIRCL, 0., -1., 0., 0.\nCIRCL, 1., 0., 0., 0."),
+                        ("trough", "START, -1., 0.\nLINE, -1., -1.\nLINE, 1., -1.\nLINE, 1., 0.")):
+        scene = Scene(0.02, 0.4, gravity=10.0)
+        scene.disc("BODY", (0.35, -0.606), 0.3, (6, 2), stiffness=3000.0)
+        deck = with_profile(scene, cards)
+        if name == "trough":
+            deck.replace("TYPE=SEGMENTS", "TYPE=SEGMENTS, FILLET RADIUS=1.")
+        run = run_deck(deck, tmp_path/name)
+        assert (run.history["active"] > 0).mean() > 0.5
+        n = len(scene.part["BODY"].node)
+        way.append(places(run)[:, :n])
+    np.testing.assert_allclose(way[1], way[0], rtol=0, atol=1e-12)
+
+
 @pytest.mark.parametrize("formulation", ["NODE TO SURFACE", "SEGMENT"])
 def test_short_edges_on_a_short_hollow_arc(formulation, tmp_path):
     """Corners that touch it next to its ends are behind a chord, by .002 of it: no overlap."""
