@@ -18,7 +18,7 @@ CHAPTERS = (
       "derivatives": ["check_derivatives"], "errors": []}),
     ("Results", "What a run has written. No compiled library is needed.",
      {"results": [], "fields": [], "series": [], "comparison": [], "plotting": ["plot"],
-      "animation": ["animate"]}),
+      "animation": ["animate"], "export": ["export"]}),
     ("Meshes", "`emcon.mesh`", {"mesh": []}),
     ("Studies", "`emcon.study`", {"study": []}),
     ("Contact and ties for a host", "`emcon.interface`", {"interface": []}),

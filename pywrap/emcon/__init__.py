@@ -2,7 +2,7 @@
 
 Results of a run, read when asked for:
 
-    from emcon import Results, animate, compare
+    from emcon import Results, animate, compare, export, plot
 
     with Results("ring") as ring:
         ring.history["total"]                # (n_row), one row per increment
@@ -10,6 +10,7 @@ Results of a run, read when asked for:
         u[-1], u.at(2.5), u[:, 12]           # last frame, a time, a node over time
     plot("ring")                             # ring.png
     animate("ring")                          # ring.gif
+    export("ring")                           # ring.pvd, for ParaView before 5.12
     print(compare("ring", "other/ring"))     # largest differences
 
 A mesh, and a deck made of it: `emcon.mesh`.
@@ -25,7 +26,7 @@ A run, step by step:
 Contact and ties for a code with its own solids: `emcon.interface`.
 
 Single kernels, for tests: `emcon.kernels`. From the shell: `python -m emcon plot ring`,
-`summary ring`, `animate ring`, `compare ring other/ring`.
+`summary ring`, `animate ring`, `export ring`, `compare ring other/ring`.
 
 Units are those of the deck, any consistent set: length [L], mass [M], time [T].
 """
@@ -41,6 +42,7 @@ if TYPE_CHECKING:
     from .comparison import Comparison, Difference, compare
     from .derivatives import check_derivatives
     from .errors import AnalysisError, InputError
+    from .export import export
     from .given import Outside
     from .interface import Interface
     from .model import Model
@@ -53,7 +55,7 @@ if TYPE_CHECKING:
 __all__ = ["AnalysisError", "Bodies", "Comparison", "Difference", "FieldFile", "FieldSeries",
            "HistoryFile", "InputError", "Interface", "Model", "Outside", "Pairs", "ResultError",
            "ResultPaths", "Results", "Series", "Stepper", "__version__", "animate",
-           "check_derivatives", "compare", "energy_drift", "get_cmake_dir", "get_include",
+           "check_derivatives", "compare", "energy_drift", "export", "get_cmake_dir", "get_include",
            "get_library", "locate", "mesh", "plot", "read_bodies", "read_history", "read_pairs"]
 
 #: The names of the package by module, imported when first used: matplotlib and HDF5 take long to
@@ -63,6 +65,7 @@ _PLACES = {
     "comparison": "Comparison Difference compare",
     "derivatives": "check_derivatives",
     "errors": "AnalysisError InputError",
+    "export": "export",
     "given": "Outside",
     "interface": "Interface",
     "model": "Model",

@@ -24,6 +24,7 @@ from .summary import summary
 
 #: Commands of this file; anything else is for the compiled program.
 _COMMANDS = {"plot": "write a picture of a run", "animate": "write an animation of a run",
+             "export": "write the fields of a run as .pvd and .vtu, for ParaView before 5.12",
              "compare": "print the largest differences of two runs",
              "summary": "print a short table of a run",
              "mesh": "turn a mesh of Gmsh or another program into cards of a deck",
@@ -83,6 +84,14 @@ def _parser(arguments: list[str]) -> argparse.ArgumentParser:
                        help="values at the ends of the colours (default by the values)")
     movie.add_argument("--frames", metavar=("FIRST", "LAST"), type=int, nargs=2,
                        help="frames of the file that are shown; -1 is the last (default all)")
+    files = commands.add_parser("export", help=_COMMANDS["export"])
+    files.add_argument("result", metavar="RESULT", help=_RESULT)
+    files.add_argument("--output", metavar="FILE", type=Path,
+                       help="file that lists the frames, NAME.pvd (default that of the result)")
+    files.add_argument("--frames", metavar=("FIRST", "LAST"), type=int, nargs=2,
+                       help="frames of the file that are written; -1 is the last (default all)")
+    files.add_argument("--fields", metavar="NAME", nargs="+", default=[],
+                       help="point and cell fields that are written (default all)")
     two = commands.add_parser("compare", help=_COMMANDS["compare"])
     two.add_argument("one", metavar="A", help=_RESULT)
     two.add_argument("other", metavar="B", help="another result of the same model")
@@ -144,6 +153,14 @@ def _animate(options: argparse.Namespace) -> None:
     for note in notes:
         print(f"note: {note}", file=sys.stderr)
     print(f"animation: {movie}")
+
+
+def _export(options: argparse.Namespace) -> None:
+    from .export import export
+
+    for path in export(options.result, options.output, fields=options.fields,
+                       frames=tuple(options.frames) if options.frames else None):
+        print(f"to open: {path}")
 
 
 def _compare(options: argparse.Namespace) -> int:
@@ -212,6 +229,8 @@ def main(arguments: list[str] | None = None) -> int:
             _plot(options)
         elif options.command == "animate":
             _animate(options)
+        elif options.command == "export":
+            _export(options)
         elif options.command == "compare":
             return _compare(options)
         elif options.command == "mesh":

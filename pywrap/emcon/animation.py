@@ -14,6 +14,7 @@ from matplotlib.figure import Figure
 
 from .drawing import (DrawnBodies, ColourScale, colour_scale, draw_colour_bar, fixed_scale, frame_view,
                       set_view, titles)
+from .fields import frame_range
 from .results import FieldFile, ResultError, ResultPaths, locate
 from .scene import STYLE, Scene, read_scene
 
@@ -56,19 +57,6 @@ class Film:
     clim: tuple[float, float] | None = None       #: ends of the colours, default by the values
     frames: tuple[int, int] | None = None         #: first and last, default all
 
-    def numbers(self, count: int) -> range:
-        """Numbers of the frames, of a file that has `count`."""
-        if self.frames is None:
-            return range(count)
-        for frame in self.frames:
-            if not -count <= frame < count:
-                raise ResultError(f"there is no frame {frame}; the file has {count}, from 0 on")
-        first, last = (frame % count for frame in self.frames)
-        if first > last:
-            raise ResultError(f"frames go from one to a later one, not from {self.frames[0]} to "
-                              f"{self.frames[1]}")
-        return range(first, last + 1)
-
 
 def write_animation(paths: ResultPaths, output: Path | None = None, fps: float = 20.0,
                     film: Film = Film()) -> tuple[Path, list[str]]:
@@ -78,7 +66,7 @@ def write_animation(paths: ResultPaths, output: Path | None = None, fps: float =
     if not output.parent.is_dir():
         raise FileNotFoundError(2, "no such folder", str(output.parent))
     with FieldFile(paths.field) as file:
-        asked = film.numbers(len(file.times))
+        asked = frame_range(film.frames, len(file.times))
         frames = _choose_frames(asked)
         scene = read_scene(file, frames, film.field)
         notes = list(scene.notes)

@@ -6,7 +6,7 @@ import os
 from collections.abc import Iterator
 from pathlib import Path
 from types import TracebackType
-from typing import Any
+from typing import Any, NamedTuple
 
 import h5py
 import numpy as np
@@ -21,6 +21,30 @@ QUADRATIC = (22, 23)
 SOLIDS = (10, 12, 24, 25)
 #: Cells of VTK files that are lines of profiles, which stand behind the elements.
 LINE = 3
+
+
+class VtkCells(NamedTuple):
+    """All cells of a file, the lines of profiles too, in the order of nodes that VTK has."""
+
+    connectivity: NDArray[np.int64]      #: node numbers from 0 on, cell after cell
+    offsets: NDArray[np.int64]           #: (n_cell + 1) where in `connectivity` a cell begins
+    types: NDArray[np.int64]             #: (n_cell) as VTK counts
+
+
+def frame_range(frames: tuple[int, int] | None, count: int) -> range:
+    """The frames from the first to the last of `frames`, all by default, of a file that has `count`.
+
+    Raises `ResultError` for one that is not there and for a last one before the first.
+    """
+    if frames is None:
+        return range(count)
+    for frame in frames:
+        if not -count <= frame < count:
+            raise ResultError(f"there is no frame {frame}; the file has {count}, from 0 on")
+    first, last = (frame % count for frame in frames)
+    if first > last:
+        raise ResultError(f"frames go from one to a later one, not from {frames[0]} to {frames[1]}")
+    return range(first, last + 1)
 
 
 class FieldFile:
@@ -66,6 +90,7 @@ class FieldFile:
                 or connectivity.min() < 0 or connectivity.max() >= n_node):
             raise ResultError(f"{self.path}: the mesh in it is broken")
         self.types: NDArray[np.int64] = read(root, "Types").astype(np.int64)
+        self.vtk_cells = VtkCells(connectivity, offsets, self.types)
         cells = np.split(connectivity, offsets[1:-1])
         self._n_row = len(cells)
         n_element = self._n_row - int((self.types == LINE).sum())
@@ -101,6 +126,10 @@ class FieldFile:
     def cell(self, name: str, frame: int) -> Array:
         """Cell field `name` at `frame`: (n_element) or (n_element, n_comp)."""
         return self._series("CellData", name)[frame]
+
+    def vtk_rows(self, group: str, name: str, frame: int) -> Array:
+        """Field `name` of `PointData` or `CellData` at `frame`, of all points or `vtk_cells`."""
+        return self._series(group, name).all_rows(frame)
 
     def __getitem__(self, name: str) -> FieldSeries:
         """A point or cell field at all frames; nothing is read yet."""
@@ -263,15 +292,26 @@ class FieldSeries:
     def __repr__(self) -> str:
         return f"FieldSeries({self.name!r}, shape={self.shape})"
 
+    def all_rows(self, frame: int) -> Array:
+        """One frame as it is in the file: fields of cells at the lines of profiles, too."""
+        return self._read(frame, slice(0, self._n_row))
+
     def _frame(self, frame: int, rest: list[Any]) -> Array:
         """Part `rest` of one frame; of a single node only its row is read."""
+        n = self.shape[1]
+        row = rest[0] if rest and isinstance(rest[0], (int, np.integer)) else None
+        if row is None:
+            return np.asarray(self._read(frame, slice(0, n))[tuple(rest)])
+        if not -n <= row < n:
+            raise IndexError(f"{self.name} has {n} rows in a frame; there is no row {row}")
+        only = int(row) % n
+        return np.asarray(self._read(frame, slice(only, only + 1))[0][tuple(rest[1:])])
+
+    def _read(self, frame: int, rows: slice) -> Array:
+        """Some rows of one frame."""
         group, name = self._place
         root = self._field_file._root()
-        n = self.shape[1]
         path = self._field_file.path
-        row = rest[0] if rest and isinstance(rest[0], (int, np.integer)) else None
-        if row is not None and not -n <= row < n:
-            raise IndexError(f"{name} has {n} rows in a frame; there is no row {row}")
         with guarded(path, f"field {name} at frame {frame}"):
             offsets = root["Steps"].get(f"{group}Offsets/{name}")
             data = root[group][name]
@@ -279,11 +319,10 @@ class FieldSeries:
             start = frame*self._n_row if offsets is None else -1
             if offsets is not None and frame < len(offsets):
                 start = int(offsets[frame])
-            if start < 0 or start + n > len(data):
+            if start < 0 or start + max(self.shape[1], rows.stop) > len(data):
                 raise ResultError(f"{path}: field {name} ends before frame {frame}")
-            chosen = slice(start, start + n) if row is None else start + int(row) % n
-            values: Array = np.asarray(data[chosen], dtype=np.float64)
-        return np.asarray(values[tuple(rest if row is None else rest[1:])])
+            values: Array = np.asarray(data[start + rows.start:start + rows.stop], dtype=np.float64)
+        return values
 
 
 def _outline(cell: NDArray[np.int64], kind: int) -> NDArray[np.int64]:

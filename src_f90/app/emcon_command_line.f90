@@ -10,8 +10,8 @@ module emcon_command_line
    public :: command_t, command_read, usage
 
    !> Commands that are made in Python, beside those of the program.
-   character(len=*), parameter :: of_package(6) = [character(len=7) :: "plot", "animate", &
-      "compare", "summary", "mesh", "study"]
+   character(len=*), parameter :: of_package(7) = [character(len=7) :: "plot", "animate", &
+      "export", "compare", "summary", "mesh", "study"]
 
    type :: command_t
       character(len=:), allocatable :: verb      !! run, check, restart, keywords, version or help
