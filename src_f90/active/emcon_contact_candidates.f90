@@ -303,7 +303,7 @@ contains
          if (contact%state(i)%is_leaving) return
          call look_at_open(self, contact, i, id, closes, status)
          if (.not. closes) return
-         if (contact%slack > 0.0_wp .and. merge(had_changed, self%candidates%have_changed, &
+         if (contact%waits(i) .and. merge(had_changed, self%candidates%have_changed, &
             self%rules%has_impacts)) return
          if (self%candidates%has_left(id) .and. self%candidates%is_back(id)) status = step_too_far
          self%candidates%is_back(id) = self%candidates%has_left(id)

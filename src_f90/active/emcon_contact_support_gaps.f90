@@ -81,12 +81,14 @@ contains
    pure function gaps_of_guards(system) result(is_guard)
       type(system_t), intent(in) :: system
       logical :: is_guard(system%n_constraint)
-      integer :: pair
+      integer :: i, pair
 
       is_guard = .false.
       do pair = 1, size(system%contact)
-         is_guard(system%first_constraint(pair) + 1:system%first_constraint(pair + 1)) = &
-            system%contact(pair)%contact%slack > 0.0_wp
+         associate (contact => system%contact(pair)%contact)
+            is_guard(system%first_constraint(pair) + 1:system%first_constraint(pair + 1)) = &
+               [(contact%waits(i), i = 1, contact%n_constraint)]
+         end associate
       end do
    end function gaps_of_guards
 

@@ -96,6 +96,7 @@ module emcon_contact
       procedure :: mean_gap
       procedure :: could_hold
       procedure :: lets_in
+      procedure :: waits
       ! To be called, with the displacements of nodes:
       procedure, non_overridable :: begin_step
       procedure, non_overridable :: measure
@@ -391,6 +392,14 @@ contains
 
       lets_in = merge(overlap_bar, touching_bar, self%slack > 0.0_wp)
    end function lets_in
+
+   !> Is constraint `i` a guard, which begins only where nothing else does?
+   pure logical function waits(self, i)
+      class(contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+
+      waits = self%slack > 0.0_wp
+   end function waits
 
    !> As `constraint_t` has it: second derivatives are by the end of the step. Conditions hold at
    !> that end, and work over the whole step, wherever in it a scheme evaluates forces, or push

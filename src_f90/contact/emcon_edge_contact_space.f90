@@ -29,10 +29,12 @@ module emcon_edge_contact_space
    private
    public :: edge_contact_t, edge_contact_init
 
-   !> Edges of the other surface that an edge may cross at once: one of each class.
-   integer, parameter :: n_class = 8
-   !> The sine of the angle between edges below which they run along each other, and nodes hold.
-   real(wp), parameter :: least_sine = 1.0e-2_wp
+   !> Edges of the other surface that an edge may cross at once: one of each class; of those that
+   !> are guarded only, of each second one.
+   integer, parameter :: n_class = 8, n_guard_class = 8
+   !> The sine of the angle between edges below which they run along each other, and nodes hold: of
+   !> sharp ones, and of others.
+   real(wp), parameter :: least_sine = 1.0e-2_wp, guard_sine = 0.1_wp
    !> That of the angle between the faces at an edge below which it is as flat as none, and holds
    !> nothing; but it holds, up to where it is as hollow, what is in it already by a part of the
    !> length, and what comes down on it edge on: by so much clear of its own faces.
@@ -43,6 +45,8 @@ module emcon_edge_contact_space
    real(wp), parameter :: begins_beyond = -1.0e-3_wp, ends_beyond = 0.05_wp
    !> So deep, by the edge, two edges may be in each other, and may be as a contact begins.
    real(wp), parameter :: deepest = 0.3_wp, deepest_start = 0.1_wp
+   !> So deep, by the smaller face, two edges that are not sharp begin to hold each other.
+   real(wp), parameter :: guard_depth = 0.8_wp*crossing_bar
    !> Heights that are larger by this than any that counts are so whatever rounding does.
    real(wp), parameter :: far = 1.001_wp
 
@@ -52,7 +56,7 @@ module emcon_edge_contact_space
 
    !> The crossing of two edges in a step.
    type :: edge_stencil_t
-      integer :: edge = 0                        !! sharp
+      integer :: edge = 0                        !! sharp, or guarded
       integer :: master = 0                      !! that it crosses; 0: none
       real(wp) :: side = 0.0_wp                  !! 1 or -1: heights are gaps
    end type edge_stencil_t
@@ -70,7 +74,9 @@ module emcon_edge_contact_space
       logical :: is_self = .false.                    !! of a surface with itself
       integer :: first = 1                            !! surface whose edges cross sharp ones
       type(outline_edges_t) :: edges                  !! of both surfaces
-      integer, allocatable :: slave(:)                !! the sharp ones
+      integer :: n_sharp = 0
+      integer, allocatable :: slave(:)                !! the sharp ones, then those with guards
+      integer, allocatable :: start(:)                !! (n slaves + 1) constraints before each
       integer, allocatable :: body(:)                 !! (n of the edges)
       integer, allocatable :: class(:)                !! (n of the edges) 1 to n_class
       !> (n of the edges) is one of a curved surface, if gaps follow arcs; else not allocated
@@ -88,6 +94,7 @@ module emcon_edge_contact_space
       procedure :: slip_points => edge_slip
       procedure :: area_points => edge_area
       procedure :: lets_in => edge_lets_in
+      procedure :: waits => edge_waits
    end type edge_contact_t
 
 contains
@@ -106,11 +113,16 @@ contains
       if (.not. self%is_self) call outline_edges_add(self%edges, scene, scene%surface(pair%master))
       associate (edges => self%edges)
          self%slave = pack([(i, i = 1, edges%n)], edges%is_sharp)
+         self%n_sharp = size(self%slave)
          self%first = merge(1, 2, count(edges%surface(self%slave) == 1) >= &
             count(edges%surface(self%slave) == 2))
-         self%n_constraint = n_class*size(self%slave)
-         self%node = [((edges%node(1, edges%ends(1, self%slave(i))), k = 1, n_class), &
-            i = 1, size(self%slave))]
+         self%slave = [self%slave, pack([(i, i = 1, edges%n)], .not. (edges%is_sharp .or. &
+            edges%is_spoke))]
+         self%start = [(n_class*min(i, self%n_sharp) + n_guard_class*max(0, i - self%n_sharp), &
+            i = 0, size(self%slave))]
+         self%n_constraint = self%start(size(self%slave) + 1)
+         self%node = [((edges%node(1, edges%ends(1, self%slave(i))), k = self%start(i) + 1, &
+            self%start(i + 1)), i = 1, size(self%slave))]
          node = outline_edges_nodes(edges)
          call bodies_find_tied(scene, node, body, k)
          self%body = body(node(1, :))
@@ -126,12 +138,13 @@ contains
       surface%damping = contact_damping_t()
       call contact_laws_of_surface(surface, self%laws)
       if (self%n_constraint == 0) return
-      do i = 1, self%n_constraint
-         associate (ends => node(:2, self%slave(1 + (i - 1)/n_class)))
-            self%thickness(i) = norm2(scene%x(:, ends(2)) - scene%x(:, ends(1)))
+      do i = 1, size(self%slave)
+         associate (ends => node(:2, self%slave(i)))
+            self%thickness(self%start(i) + 1:self%start(i + 1)) = &
+               norm2(scene%x(:, ends(2)) - scene%x(:, ends(1)))
          end associate
       end do
-      call near_list_init(self%near, node(:2, self%slave), node, scene%x, scene%u0, &
+      call near_list_init(self%near, node(:2, self%slave(:self%n_sharp)), node, scene%x, scene%u0, &
          self%offset + interaction_reach(surface))
    end subroutine edge_contact_init
 
@@ -207,7 +220,7 @@ contains
       call position_memo_take(self%memo, self%near%node, x, u0)
       self%chosen_reach = self%reach
       self%stencil%master = 0
-      do i = 1, size(self%slave)
+      do i = 1, self%n_sharp
          call near_list_find(self%near, i, self%reach, near, n)
          if (n > 0) normals = outline_edges_normals(self%edges, self%slave(i), x, u0)
          do k = 1, n
@@ -215,14 +228,90 @@ contains
                call choose(self, i, near(k), normals, x, u0)
          end do
       end do
+      call choose_guards(self, x, u0)
    end subroutine edge_begin_step
 
-   !> Let sharp edge number `i` cross edge `m` in the step, if they may meet in it and no other one
+   !> Let edges that are not sharp, but bend outwards by enough, cross each other in the step. Few
+   !> do, and they are looked for where both surfaces are.
+   pure subroutine choose_guards(self, x, u0)
+      class(edge_contact_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
+      real(wp) :: low(3), high(3), normals(3, 2, self%edges%n)
+      integer :: master(self%edges%n), i, k, n
+      logical :: bends(self%edges%n)
+
+      call find_shared_box(self, low, high)
+      n = 0
+      do i = 1, self%edges%n
+         bends(i) = .not. self%edges%is_sharp(i) .and. all(self%near%facet_box(:, i, 1) <= high &
+            .and. self%near%facet_box(:, i, 2) >= low)
+         if (.not. bends(i)) cycle
+         normals(:, :, i) = outline_edges_normals(self%edges, i, x, u0)
+         bends(i) = turn_of(self, i, normals(:, :, i), x, u0) > -hollow
+         if (.not. bends(i)) cycle
+         n = n + 1
+         master(n) = i
+      end do
+      do i = self%n_sharp + 1, size(self%slave)
+         associate (own => self%slave(i))
+            if (.not. bends(own)) cycle
+            do k = 1, n
+               if (are_apart(self%near%facet_box(:, own, :), self%near%facet_box(:, master(k), :), &
+                  self%reach)) cycle
+               if (may_cross(self, own, master(k))) &
+                  call choose(self, i, master(k), normals(:, :, own), x, u0)
+            end do
+         end associate
+      end do
+   end subroutine choose_guards
+
+   !> The sine of the turn at an edge, > 0 outwards.
+   pure real(wp) function turn_of(self, i, normal, x, u0) result(turn)
+      class(edge_contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1 to n of the edges
+      real(wp), intent(in) :: normal(3, 2)       !! of its faces
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
+      real(wp) :: within
+
+      associate (edges => self%edges)
+         call look_between(normal(:, 1), normal, outline_edges_place(edges, edges%ends(2, i), &
+            edges%node(1, edges%ends(1, i)), x, u0), within, turn)
+      end associate
+   end function turn_of
+
+   !> Are two boxes farther than `reach` from each other along an axis?
+   pure logical function are_apart(a, b, reach)
+      real(wp), intent(in) :: a(3, 2), b(3, 2)   !! low and high corners [L]
+      real(wp), intent(in) :: reach              !! [L]
+
+      are_apart = any(max(b(:, 1) - a(:, 2), a(:, 1) - b(:, 2)) > reach)
+   end function are_apart
+
+   !> What the boxes around both surfaces, larger by the reach, have in common; of one surface all.
+   pure subroutine find_shared_box(self, low, high)
+      class(edge_contact_t), intent(in) :: self
+      real(wp), intent(out) :: low(3), high(3)   !! [L]
+      real(wp) :: box(3, 2, 2)
+      integer :: a, s
+
+      do s = 1, 2
+         do a = 1, 3
+            associate (is_own => self%edges%surface == s .or. self%is_self)
+               box(a, 1, s) = minval(self%near%facet_box(a, :, 1), is_own) - self%reach
+               box(a, 2, s) = maxval(self%near%facet_box(a, :, 2), is_own) + self%reach
+            end associate
+         end do
+      end do
+      low = maxval(box(:, 1, :), 2)
+      high = minval(box(:, 2, :), 2)
+   end subroutine find_shared_box
+
+   !> Let edge number `i` cross edge `m` in the step, if they may meet in it and no other one
    !> of the class comes first.
    pure subroutine choose(self, i, m, of_slave, x, u0)
       class(edge_contact_t), intent(inout) :: self
       integer, intent(in) :: i, m
-      real(wp), intent(in) :: of_slave(3, 2)     !! outward normals of the faces at the sharp edge
+      real(wp), intent(in) :: of_slave(3, 2)     !! outward normals of the faces at the edge `i`
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
       real(wp), dimension(3, n_edge_pair_node) :: at
       real(wp) :: normal(3), length(2), gap, within, turn, least
@@ -233,7 +322,7 @@ contains
       call gather(self, new, x, u0, at)
       length(1) = length_of(at(:, 1), at(:, 2))
       length(2) = length_of(at(:, 3), at(:, 4))
-      normal = unit(cross_product(at(:, 2) - at(:, 1), at(:, 4) - at(:, 3)))
+      normal = unit(normal_of(at))
       if (abs(dot_product(normal, at(:, 3) - at(:, 1))) > far*max(self%reach, deepest &
          *minval(length) - self%offset)) return
       new%side = sign(1.0_wp, dot_product(normal, sum(of_slave, 2)))
@@ -243,18 +332,20 @@ contains
       if (is_outside(within, turn, -hollow)) return
       if (is_past_ends(at, length, far*self%reach)) return
       crossing = edge_crossing(at)
-      if (crossing%sine < least_sine) return
+      if (crossing%sine < merge(least_sine, guard_sine, i <= self%n_sharp)) return
       if (any(max(-crossing%place, crossing%place - 1.0_wp)*length > self%reach)) return
       gap = new%side*crossing%height
       if (gap - self%offset < -deepest*minval(length) .or. gap > self%reach) return
       least = least_turn
       if (gap - self%offset < -inside*minval(length) .or. (within > clear .and. &
          self%edges%bends(m))) least = -hollow
+      if (i > self%n_sharp) least = -hollow
       if (is_outside(within, turn, least)) return
       call look_between(-normal, outline_edges_normals(self%edges, m, x, u0), &
          at(:, 4) - at(:, 3), within, turn)
       if (is_outside(within, turn, least)) return
-      associate (old => self%stencil(n_class*(i - 1) + self%class(m)))
+      associate (old => self%stencil(self%start(i) + 1 + mod(self%class(m) - 1, &
+            self%start(i + 1) - self%start(i))))
          if (old%master > 0) then
             if (.not. comes_first(self, new, crossing, old, x, u0)) return
          end if
@@ -262,8 +353,8 @@ contains
       end associate
    end subroutine choose
 
-   !> May sharp edge `i` ever cross edge `m`? Of two sharp ones one crosses the other. What bends is
-   !> of other bodies.
+   !> May edge `i` with places ever cross edge `m`? Of two edges with places one crosses the other.
+   !> What is not sharp is of other bodies.
    pure logical function may_cross(self, i, m)
       class(edge_contact_t), intent(in) :: self
       integer, intent(in) :: i, m                !! 1 to n of the edges
@@ -274,13 +365,10 @@ contains
          if (self%is_curved(i)) return
       end if
       associate (edges => self%edges)
-         if (edges%is_sharp(m)) then
-            may_cross = merge(m > i, edges%surface(i) == self%first .and. edges%surface(m) &
-               /= self%first, self%is_self)
-         else
-            may_cross = merge(self%body(i) /= self%body(m), edges%surface(i) /= edges%surface(m), &
-               self%is_self)
-         end if
+         may_cross = merge(self%body(i) /= self%body(m) .or. edges%is_sharp(m), &
+            edges%surface(i) /= edges%surface(m), self%is_self)
+         if ((edges%is_sharp(i) .eqv. edges%is_sharp(m)) .and. .not. edges%is_spoke(m)) &
+            may_cross = may_cross .and. merge(m > i, edges%surface(i) == self%first, self%is_self)
          do k = 1, 2
             do j = 1, 2
                if (.not. may_cross) return
@@ -417,15 +505,28 @@ contains
          state%is_near = .true.
          state%is_over = is_within(to, begins_beyond)
          if (self%edges%is_bare(stencil%master)) state%is_over = state%is_over .or. is_at_end(to)
+         ! Past parallel ones the normal points the other way, and tells nothing.
+         state%is_over = state%is_over .and. &
+            dot_product(normal_of(at), normal_of(at + way)) > 0.0_wp
          state%is_leaving = .not. is_within(to, ends_beyond)
          state%is_arriving = .not. is_within(from, ends_beyond)
          state%gap0 = stencil%side*from%height - self%offset
          state%gap1 = stencil%side*to%height - self%offset
+         if (.not. self%edges%is_sharp(stencil%edge)) state%closed = -guard_depth &
+            *minval(self%edges%breadth([stencil%edge, stencil%master]))
          state%was_open = state%gap0 >= -max_penetration_on_entry*state%size
          state%is_covered = sqrt(maxval(sum(way**2, 1))) <= self%chosen_reach .and. &
             to%sine >= 0.5_wp*least_sine
       end associate
    end subroutine measure_crossing
+
+   !> Normal to both edges, of any length.
+   pure function normal_of(at) result(normal)
+      real(wp), intent(in) :: at(3, n_edge_pair_node)        !! [L]
+      real(wp) :: normal(3)
+
+      normal = cross_product(at(:, 2) - at(:, 1), at(:, 4) - at(:, 3))
+   end function normal_of
 
    !> Do edges cross within their ends, and `beyond` of their lengths past them?
    pure logical function is_within(crossing, beyond)
@@ -560,5 +661,13 @@ contains
 
       lets_in = crossing_bar
    end function edge_lets_in
+
+   !> Those of edges that are not sharp, the last ones.
+   pure logical function edge_waits(self, i) result(waits)
+      class(edge_contact_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+
+      waits = i > self%start(self%n_sharp + 1)
+   end function edge_waits
 
 end module emcon_edge_contact_space

@@ -122,7 +122,7 @@ contains
                   call look_at_left_out(active, system, pair, i, status)
                   call look_at_open(active, contact, i, id, changes, status)
                   ! What the pairs take in may hold the bodies away from their guards.
-                  changes = changes .and. .not. (contact%slack > 0.0_wp .and. has_changed)
+                  changes = changes .and. .not. (contact%waits(i) .and. has_changed)
                   if (changes .and. begins_unseen(active, contact, i, motion)) status = step_too_far
                   active%is_candidate(id) = active%is_candidate(id) .or. changes
                end if

@@ -52,7 +52,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       type(gap_state_t), allocatable :: gap(:)
       logical, allocatable :: is_wanted(:)
-      integer :: k
+      integer :: i, k
 
       call query_sync(self, stepper, error)
       call check_field("u0", u0, stepper%scene, error)
@@ -65,11 +65,11 @@ contains
          call gaps_search(system, self%march%motion, gap)
          is_wanted = gap%is_near .and. gap%is_over
          do k = 1, size(system%contact)
-            if (.not. system%contact(k)%contact%slack > 0.0_wp) cycle
-            associate (first => system%first_constraint(k) + 1, last => &
-                  system%first_constraint(k + 1))
-               is_wanted(first:last) = is_wanted(first:last) .and. &
-                  gap(first:last)%gap1 < gap(first:last)%closed
+            associate (contact => system%contact(k)%contact, first => system%first_constraint(k))
+               do i = 1, contact%n_constraint
+                  if (contact%waits(i)) is_wanted(first + i) = is_wanted(first + i) .and. &
+                     gap(first + i)%gap1 < gap(first + i)%closed
+               end do
             end associate
          end do
          call constraints_select(set, pack([(k, k = 1, size(gap))], is_wanted))

@@ -8,7 +8,7 @@ module emcon_outline_edges_space
    use emcon_errors, only : error_t
    use emcon_facet_groups, only : find_turns, ridge_angle, turn_tol
    use emcon_facet_split, only : facet_split_centre, facet_split_init, facet_split_t
-   use emcon_facets, only : facets_init, facets_t
+   use emcon_facets, only : facets_init, facets_length, facets_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_mirror_faces_space, only : always_rests, mirror_axes
@@ -34,8 +34,10 @@ module emcon_outline_edges_space
       integer, allocatable :: ends(:, :)         !! (2, n) points, as the first triangle runs
       integer, allocatable :: beside(:, :)       !! (2, n) third points of both triangles
       logical, allocatable :: is_sharp(:)        !! (n) outwards, in the reference
+      logical, allocatable :: is_spoke(:)        !! (n) to a virtual centre; else a side of faces
       logical, allocatable :: is_bare(:)         !! (n) contact of nodes does not hold the last end
       logical, allocatable :: bends(:)           !! (n) the angle between its triangles may change
+      real(wp), allocatable :: breadth(:)        !! (n) of the smaller face there, reference [L]
       integer, allocatable :: surface(:)         !! (n) 1, 2
    end type outline_edges_t
 
@@ -64,7 +66,8 @@ contains
       goes_on = goes_on .or. mirror_axes(outer, scene) > 0
       if (self%n_surface == 0) allocate(self%node(max_face_nodes, 0), self%weight( &
          max_face_nodes, 0), self%ends(2, 0), self%beside(2, 0), self%is_sharp(0), &
-         self%is_bare(0), self%surface(0))
+         self%is_spoke(0), self%is_bare(0), &
+         self%breadth(0), self%surface(0))
       self%n_surface = self%n_surface + 1
       n = size(self%node, 2)
       call add_points(self, outer, split)
@@ -169,6 +172,7 @@ contains
       real(wp), allocatable :: turn(:, :)
       integer :: ends(2, size(outer%corner)), beside(2, size(outer%corner)), f, j, k, m, n
       logical :: is_sharp(size(outer%corner))
+      real(wp) :: breadth(size(outer%corner))
 
       call find_turns(outer, scene%x, turn)
       n = 0
@@ -184,10 +188,11 @@ contains
                ends(:, n) = n_before + side
                beside(:, n) = n_before + [apex(f, side), apex(beyond, side)]
                is_sharp(n) = turn(k, f) > ridge_angle + turn_tol
+               breadth(n) = min(facets_length(outer, f), facets_length(outer, beyond))
             end associate
          end do
       end do
-      call append(self, ends(:, :n), beside(:, :n), is_sharp(:n))
+      call append(self, ends(:, :n), beside(:, :n), is_sharp(:n), breadth(:n))
 
    contains
 
@@ -213,6 +218,7 @@ contains
       logical, intent(in) :: goes_on(:)          !! (n_facet) the body does, behind a face
       integer, intent(in) :: n_before            !! points of other surfaces
       integer :: ends(2, size(outer%corner)), beside(2, size(outer%corner)), f, k, m, n
+      real(wp) :: breadth(size(outer%corner))
 
       n = 0
       do f = 1, outer%n_facet
@@ -224,24 +230,29 @@ contains
                ends(:, n + k) = n_before + [corner(k), split%centre(f)]
                beside(:, n + k) = n_before + corner([1 + mod(k + m - 2, m), 1 + mod(k, m)])
             end do
+            breadth(n + 1:n + m) = facets_length(outer, f)
             n = n + m
          end associate
       end do
-      call append(self, ends(:, :n), beside(:, :n), spread(.false., 1, n))
+      call append(self, ends(:, :n), beside(:, :n), spread(.false., 1, n), breadth(:n))
    end subroutine add_spokes
 
    !> Append edges of the newest surface.
-   pure subroutine append(self, ends, beside, is_sharp)
+   pure subroutine append(self, ends, beside, is_sharp, breadth)
       type(outline_edges_t), intent(inout) :: self
       integer, intent(in) :: ends(:, :), beside(:, :)
       logical, intent(in) :: is_sharp(:)
+      real(wp), intent(in) :: breadth(:)         !! [L]
       integer :: i, n
 
       n = size(self%is_sharp) + size(is_sharp)
       self%ends = reshape([self%ends, ends], [2, n])
       self%beside = reshape([self%beside, beside], [2, n])
       self%is_sharp = [self%is_sharp, is_sharp]
+      self%is_spoke = [self%is_spoke, (count(self%node(:, ends(2, i)) > 0) > 1, i = 1, &
+         size(is_sharp))]
       self%is_bare = [self%is_bare, (is_centre(self%node(:, ends(2, i))), i = 1, size(is_sharp))]
+      self%breadth = [self%breadth, breadth]
       self%surface = [self%surface, spread(self%n_surface, 1, size(is_sharp))]
    end subroutine append
 

@@ -122,6 +122,28 @@ def test_an_edge_on_a_face_that_bends(kind: str, cells: int, yaw: float, off: tu
     assert run.history["active"][-1] == 0
 
 
+@pytest.mark.parametrize("spin", [(0., 0., 0.), (0., 0., 0.8)])
+def test_ridges_that_are_not_sharp(spin: tuple[float, float, float], tmp_path: Path) -> None:
+    """Two faces of each body are a roof of 16 degrees; the ridges cross between their nodes. They are let in by as much
+    as the verdict lets edges, and held."""
+    def roof(x: np.ndarray) -> np.ndarray:
+        y = x - [0.5, 0.5, 0.5]
+        y[:, 2] -= 0.14*np.abs(y[:, 1])*(y[:, 2] > 0)
+        return y
+
+    def above(x: np.ndarray) -> np.ndarray:
+        y = roof(x)*[1., 1., -1.]
+        return np.stack([-y[:, 1], y[:, 0], y[:, 2]], axis=1) + [0.07, 0.04, 1.02]
+
+    one, two = Block("C3D8", (1, 2, 1), place=above), Block("C3D8", (1, 2, 1), place=roof)
+    one.element = [[*e[4:], *e[:4]] for e in one.element]        # mirrored
+    text = bodies([one, two], [faces(one), faces(two)]) + pair() + velocities(
+        one, np.array([0., 0., -1.]), np.array(spin)) + dynamic(0.02, 0.6)
+    run = ran(tmp_path, text)
+    check_free_flight(run, CROSSING)
+    assert run.history["active"][-1] == 0
+
+
 @pytest.mark.parametrize("sides", ["whole", "facing"])
 def test_a_bar_on_a_bar_at_rest(sides: str, tmp_path: Path) -> None:
     """Four corners of the common square bear a quarter of the load each, whether surfaces are outlines or the two
