@@ -8,6 +8,7 @@ submodule (emcon_contact_registry) emcon_contact_kinds
    use emcon_midside_plane, only : midside_init
    use emcon_mortar, only : mortar_init, mortar_t
    use emcon_mortar_space, only : mortar_space_init, mortar_space_t
+   use emcon_mortar_wall_space, only : mortar_wall_init, mortar_wall_t
    use emcon_nts, only : nts_init, nts_t
    use emcon_patch_contact_space, only : patch_contact_init, patch_contact_t
    use emcon_scene, only : where_text
@@ -29,7 +30,6 @@ contains
       type(segment_t), allocatable :: segment
       type(patch_contact_t), allocatable :: patch
       type(edge_contact_t), allocatable :: edges
-      type(wall_contact_t), allocatable :: wall
 
       select case (pair%formulation)
       case (formulation_user)
@@ -42,9 +42,7 @@ contains
          return
       end select
       if (allocated(scene%surface(pair%master)%wall)) then
-         allocate(wall)
-         call wall_contact_init(wall, scene, pair, error)
-         call move_alloc(wall, contact)
+         call new_on_wall(scene, pair, contact, error)
          return
       end if
       if (scene%n_dim == n_space .and. pair%formulation == formulation_mortar) then
@@ -97,6 +95,26 @@ contains
       call start_gaps_plane_init(plane, scene, pair, error, options)
       call move_alloc(plane, gaps)
    end procedure new_start_gaps
+
+   !> The contact of a pair whose master is a wall.
+   subroutine new_on_wall(scene, pair, contact, error)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      class(contact_t), allocatable, intent(out) :: contact
+      type(error_t), allocatable, intent(out) :: error
+      type(mortar_wall_t), allocatable :: mortar
+      type(wall_contact_t), allocatable :: nodes
+
+      if (pair%formulation == formulation_mortar) then
+         allocate(mortar)
+         call mortar_wall_init(mortar, scene, pair, error)
+         call move_alloc(mortar, contact)
+         return
+      end if
+      allocate(nodes)
+      call wall_contact_init(nodes, scene, pair, error)
+      call move_alloc(nodes, contact)
+   end subroutine new_on_wall
 
    !> The contact that a program gives for a pair.
    subroutine new_given(scene, pair, contact, error, user)

@@ -11,7 +11,7 @@ module emcon_facet_frames_space
    use emcon_patch_sides_space, only : point_frames_t
    implicit none
    private
-   public :: facet_frames_init, facet_weights_t, facet_weights_init
+   public :: facet_frames_init, facet_weights_t, facet_weights_init, facet_corner_shares
 
    !> Vertices of a facet at most; one with more nodes has others between them.
    integer, parameter, public :: most_vertices = 4
@@ -48,7 +48,7 @@ contains
       m = 0
       do t = 1, n
          f = split%facet(t)
-         call vertex_shares(facets, split, t, share)
+         call facet_corner_shares(facets, split, t, share)
          self%base(t) = facets%node(split%corner(1, t))
          self%size(t) = facets_length(facets, f)
          self%area(t) = facets%size(f)/real(split%start(f + 1) - split%start(f), wp)
@@ -63,10 +63,10 @@ contains
    end subroutine facet_frames_init
 
    !> The corners of triangle `t` as sums of the nodes of its facet.
-   pure subroutine vertex_shares(facets, split, t, share)
-      type(facets_t), intent(in) :: facets
-      type(facet_split_t), intent(in) :: split
-      integer, intent(in) :: t
+   pure subroutine facet_corner_shares(facets, split, t, share)
+      type(facets_t), intent(in) :: facets       !! in space
+      type(facet_split_t), intent(in) :: split   !! of them
+      integer, intent(in) :: t                   !! 1 to the number of triangles
       real(wp), intent(out) :: share(:, :)       !! (node of the facet, corner)
       integer :: j, n
 
@@ -81,7 +81,7 @@ contains
             end if
          end do
       end associate
-   end subroutine vertex_shares
+   end subroutine facet_corner_shares
 
    !> The multipliers of vertices. On facets with nodes between these they are those of the facet
    !> without.
@@ -175,7 +175,7 @@ contains
       real(wp) :: share(max_face_nodes, 3), corner(3, 3), normal(3)
       integer :: n
 
-      call vertex_shares(facets, split, t, share)
+      call facet_corner_shares(facets, split, t, share)
       associate (f => split%facet(t))
          n = count(facets%facet(:, f) > 0)
          corner = matmul(x(:, facets%facet(:n, f)) - spread(x(:, facets%facet(1, f)), 2, n), &

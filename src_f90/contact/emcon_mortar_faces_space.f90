@@ -2,31 +2,23 @@
 !> what of the master each triangle may see. Source: docs/theory.md, section 15.2.
 module emcon_mortar_faces_space
    use emcon_errors, only : error_t
-   use emcon_facet_frames_space, only : facet_frames_init, facet_weights_init, facet_weights_t
-   use emcon_facet_groups, only : facet_groups_init, facet_groups_t, group_angle
-   use emcon_facet_split, only : facet_split_init, facet_split_t
+   use emcon_facet_frames_space, only : facet_frames_init
    use emcon_facets, only : facets_init, facets_length
    use emcon_interactions, only : contact_pair_t, interaction_reach
    use emcon_kinds, only : wp
+   use emcon_mortar_slave_space, only : mortar_slave_init, mortar_slave_t
    use emcon_near_list, only : near_list_init, near_list_t, near_list_within
    use emcon_patch_sides_space, only : patch_sides_t, patch_triangles_init
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_t
    use emcon_scene, only : scene_t
    implicit none
    private
-   public :: mortar_faces_t, mortar_faces_init, mortar_faces_choose, mortar_faces_weight
+   public :: mortar_faces_t, mortar_faces_init, mortar_faces_choose
 
-   type :: mortar_faces_t
+   type, extends(mortar_slave_t) :: mortar_faces_t
       type(patch_sides_t) :: sides
-      type(facet_split_t) :: split                    !! of the slave
-      type(facet_weights_t) :: weights
       type(near_list_t) :: near
       real(wp) :: beyond = 0.0_wp                     !! of its reach what is beside stencils [L]
-      logical :: is_dual = .true.                     !! multiplier basis
-      integer, allocatable :: node(:)                 !! (n) of each constraint
-      integer, allocatable :: start(:)                !! (n + 1) triangles of each:
-      integer, allocatable :: triangle(:)             !! start(i) to start(i + 1) - 1
-      integer, allocatable :: vertex(:)               !! the same: which vertex of its facet it is
       type(patch_stencil_t), allocatable :: stencil(:)   !! (n_triangle)
    end type mortar_faces_t
 
@@ -46,9 +38,8 @@ contains
          allocate(sides%master)
          call facets_init(sides%master, scene, scene%surface(pair%master), error)
          if (allocated(error)) return
-         call facet_split_init(self%split, sides%slave)
+         call mortar_slave_init(self, sides%slave, scene%x)
          call facet_frames_init(sides%frames, sides%slave, self%split)
-         call facet_weights_init(self%weights, sides%slave, self%split, scene%x)
          call patch_triangles_init(sides%triangles, sides%master, scene%x)
          allocate(sides%mirror(sides%master%n_facet), source=0)
          ! Lists end beside what a triangle sees: all that meets with that is listed.
@@ -57,39 +48,8 @@ contains
          call near_list_init(self%near, sides%slave%facet, sides%master%facet, scene%x, scene%u0, &
             self%beyond + pair%interaction%offset + interaction_reach(pair%interaction))
       end associate
-      call list_vertices(self, scene%x)
       allocate(self%stencil(size(self%split%facet)))
    end subroutine mortar_faces_init
-
-   !> One for each smooth group of slave facets at a vertex.
-   pure subroutine list_vertices(self, x)
-      type(mortar_faces_t), intent(inout) :: self
-      real(wp), intent(in) :: x(:, :)            !! (3, n_node) reference positions [L]
-      type(facet_groups_t) :: groups
-      integer :: f, g, i, k, m, t
-
-      associate (slave => self%sides%slave)
-         call facet_groups_init(groups, slave, x, group_angle)
-         allocate(self%node(0), self%triangle(0), self%vertex(0))
-         self%start = [1]
-         do i = 1, size(slave%node)
-            do g = groups%node_start(i), groups%node_start(i + 1) - 1
-               do k = groups%start(g), groups%start(g + 1) - 1
-                  f = groups%facet(k)
-                  m = findloc(self%weights%node(:self%weights%n(f), f), i, 1)
-                  if (m == 0) exit               ! between vertices
-                  associate (part => [(t, t = self%split%start(f), self%split%start(f + 1) - 1)])
-                     self%triangle = [self%triangle, part]
-                     self%vertex = [self%vertex, spread(m, 1, size(part))]
-                  end associate
-               end do
-               if (size(self%triangle) < self%start(size(self%start))) cycle
-               self%node = [self%node, slave%node(i)]
-               self%start = [self%start, size(self%triangle) + 1]
-            end do
-         end do
-      end associate
-   end subroutine list_vertices
 
    !> The stencils of the triangles of slave facet `f`; none of them where nothing comes near.
    pure subroutine mortar_faces_choose(self, f, x, u0, reach)
@@ -114,18 +74,5 @@ contains
          end associate
       end associate
    end subroutine mortar_faces_choose
-
-   !> The multiplier of place `k` of `triangle` at the corners of that: the dual one if theta is 1,
-   !> the linear one if it is 0.
-   pure function mortar_faces_weight(self, k, theta) result(weight)
-      type(mortar_faces_t), intent(in) :: self
-      integer, intent(in) :: k                   !! as `start` has it
-      real(wp), intent(in) :: theta              !! 0 to 1
-      real(wp) :: weight(3)
-
-      associate (t => self%triangle(k), m => self%vertex(k))
-         weight = self%weights%linear(:, m, t) + theta*self%weights%skew(:, m, t)
-      end associate
-   end function mortar_faces_weight
 
 end module emcon_mortar_faces_space

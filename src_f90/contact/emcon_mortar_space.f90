@@ -12,10 +12,10 @@ module emcon_mortar_space
    use emcon_guards, only : touching_bar
    use emcon_interactions, only : contact_options_t, contact_pair_t, multiplier_dual
    use emcon_kinds, only : wp
-   use emcon_mortar_faces_space, only : mortar_faces_choose, mortar_faces_init, mortar_faces_t, &
-      mortar_faces_weight
+   use emcon_mortar_faces_space, only : mortar_faces_choose, mortar_faces_init, mortar_faces_t
    use emcon_mortar_rise_space, only : mortar_rise, mortar_rise_doubt, &
       mortar_rise_largest, mortar_rise_t
+   use emcon_mortar_slave_space, only : mortar_slave_weight
    use emcon_mortar_sum_space, only : mortar_sight, mortar_sum, sight_t
    use emcon_near_list, only : near_list_update
    use emcon_patch_look_space, only : patch_basis, patch_basis_t
@@ -173,7 +173,7 @@ contains
          area = 0.0_wp
          do k = self%faces%start(i), self%faces%start(i + 1) - 1
             t = self%faces%triangle(k)
-            weight = mortar_faces_weight(self%faces, k, self%theta(0, self%faces%split%facet(t)))
+            weight = mortar_slave_weight(self%faces, k, self%theta(0, self%faces%split%facet(t)))
             total = total + dot_product(weight, rise(:, t))
             area = area + dot_product(weight, cover(:, t))
          end do
@@ -255,7 +255,7 @@ contains
                self%faces%triangle(k)))
             if (stencil%triangle == 0) cycle
             do end = 0, 1
-               weight = mortar_faces_weight(self%faces, k, self%theta(end, &
+               weight = mortar_slave_weight(self%faces, k, self%theta(end, &
                   self%faces%split%facet(self%faces%triangle(k))))
                gap(end) = gap(end) + dot_product(weight, basis%height(:, end))
                area(end) = area(end) + dot_product(weight, basis%cover(:, end))

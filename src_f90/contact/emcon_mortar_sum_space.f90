@@ -5,7 +5,8 @@ module emcon_mortar_sum_space
    use emcon_condition_product, only : condition_add_cubed, condition_start
    use emcon_constraint, only : condition_t
    use emcon_kinds, only : wp
-   use emcon_mortar_faces_space, only : mortar_faces_t, mortar_faces_weight
+   use emcon_mortar_faces_space, only : mortar_faces_t
+   use emcon_mortar_slave_space, only : mortar_slave_weight
    use emcon_patch_gap_space, only : patch_gap_of, patch_gap_t, patch_open, patch_open_cover, &
       patch_open_t
    use emcon_patch_look_space, only : patch_t
@@ -104,7 +105,7 @@ contains
             end if
             if (sight(t)%open%n_vertex > 0) then
                associate (open => sight(t)%open, patch => self%stencil(t)%patch)
-                  call gap_of(patch, open, mortar_faces_weight(self, k, merge(1.0_wp, 0.0_wp, &
+                  call gap_of(patch, open, mortar_slave_weight(self, k, merge(1.0_wp, 0.0_wp, &
                      sight(t)%is_full)), .false., target, item%leaves_second, gap)
                   call add_gap(self%stencil(t), gap, scale, item)
                   if (sight(t)%is_blended) then

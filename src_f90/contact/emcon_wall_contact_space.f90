@@ -9,9 +9,11 @@ module emcon_wall_contact_space
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_element_kind, only : max_face_nodes
    use emcon_errors, only : error_t
+   use emcon_facet_groups, only : facet_groups_init, facet_groups_t, group_angle
    use emcon_facet_split, only : facet_split_centre, facet_split_middles
    use emcon_facet_values, only : facets_point_area, facets_pressures
    use emcon_facets, only : facets_length, facets_normal, facets_t
+   use emcon_guards, only : corner_slack
    use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
@@ -41,6 +43,7 @@ module emcon_wall_contact_space
       integer, allocatable :: place(:)                !! (n_constraint) its nodes, then `middle`
       real(wp), allocatable :: size(:)                !! (n_constraint) mean facet there [L]
       real(wp) :: depth = 0.0_wp                      !! that pads and laws reach [L]
+      real(wp), allocatable :: own_slack(:)           !! (n_constraint) of a guard beside mortar
    contains
       procedure :: configure => wall_configure
       procedure :: begin_points => wall_begin_step
@@ -86,10 +89,29 @@ contains
       self%depth = pair%interaction%offset + interaction_reach(pair%interaction)
       self%may_leave = .not. wall_is_solid(self%wall)
       self%slack = pair%slack
+      if (pair%of_pair > 0) call hold_corners(self, scene%x)
       self%offset = pair%interaction%offset
       self%max_penetration_at_start = merge(huge(1.0_wp), deepest_start, wall_is_solid(self%wall))
       call contact_laws_of_surface(pair%interaction, self%laws)
    end subroutine wall_contact_init
+
+   !> Corners of bodies are held nearly at once beside means of gaps, which do not see them.
+   pure subroutine hold_corners(self, x)
+      type(wall_contact_t), intent(inout) :: self
+      real(wp), intent(in) :: x(:, :)            !! (3, n_node of the scene) reference [L]
+      type(facet_groups_t) :: groups
+      integer :: i
+
+      call facet_groups_init(groups, self%slave, x, group_angle)
+      allocate(self%own_slack(self%n_constraint), source=self%slack)
+      do i = 1, self%n_constraint
+         associate (place => self%place(i))
+            if (place > size(self%slave%node)) cycle
+            if (groups%node_start(place + 1) > groups%node_start(place) + 1) &
+               self%own_slack(i) = corner_slack
+         end associate
+      end do
+   end subroutine hold_corners
 
    !> The facets at point `i`.
    pure function facets_at(self, i) result(facet)
@@ -195,6 +217,8 @@ contains
          state%is_arriving = .not. is_over(0)
          if (state%is_arriving) state%was_open = state%gap0 >= -max_penetration_on_entry*state%size
          if (self%slack > 0.0_wp) state%closed = -self%slack*state%size
+         if (allocated(self%own_slack) .and. .not. self%step%has_compliance) &
+            state%closed = -self%own_slack(i)*state%size
          ! Behind a shape that ends, the other side of it is farther away than this.
          if (.not. wall_is_solid(self%wall) .and. from%distance < -0.5_wp*self%wall%extent) &
             state = gap_state_t()

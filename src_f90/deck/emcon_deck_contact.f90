@@ -324,9 +324,6 @@ contains
             call data_error(reader, data, "surface " // master%name // " in contact with itself: " &
                // "in three dimensions MORTAR is between two surfaces in this version; use " // &
                "TYPE=NODE TO SURFACE")
-         else if (allocated(master%wall)) then
-            call data_error(reader, data, "surface " // master%name // " has a shape and no " // &
-               "faces, between which MORTAR integrates; use TYPE=NODE TO SURFACE")
          end if
       end associate
    end subroutine check_mortar_space
@@ -382,8 +379,10 @@ contains
          pair(i)%is_guarded = of_card%is_guarded .and. (has_option(card, "GUARD") .or. &
             pair(i)%interaction%pressure%kind == pressure_hard)
          pair(i)%holds_crossings = of_card%holds_crossings
-         if (pair(i)%master > 0) pair(i)%is_guarded = pair(i)%is_guarded .and. &
-            .not. allocated(scene%surface(pair(i)%master)%wall)
+         if (pair(i)%master > 0) then
+            if (allocated(scene%surface(pair(i)%master)%wall)) pair(i)%is_guarded = &
+               pair(i)%is_guarded .and. pair(i)%formulation == formulation_mortar
+         end if
          pair(i)%initiation = of_card%initiation
          if (pair(i)%interaction%pressure%kind == pressure_tied) call check_tied(reader, card, &
             scene, pair(i))

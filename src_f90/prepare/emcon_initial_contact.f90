@@ -426,6 +426,7 @@ contains
       integer :: k, n
 
       if (pair%slave == pair%master .or. pair%is_reverse) return
+      if (allocated(scene%surface(pair%master)%wall)) return     ! without corners
       if (pair%formulation == formulation_nts) then
          if (pair_has_order(pair) .or. .not. pair%may_choose) return
       end if

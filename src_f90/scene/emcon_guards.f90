@@ -45,7 +45,9 @@ contains
       do i = 1, size(pair)
          if (.not. pair(i)%is_guarded .or. pair(i)%slave == 0 .or. pair(i)%master == 0) cycle
          call watch(pair, i, .false., known, all, n)
-         if (.not. surface(pair(i)%slave)%is_nodal) call watch(pair, i, .true., known, all, n)
+         if (surface(pair(i)%slave)%is_nodal) cycle
+         if (allocated(surface(pair(i)%master)%wall)) cycle     ! without nodes
+         call watch(pair, i, .true., known, all, n)
       end do
       guard = all(:n)
    end subroutine guards_find

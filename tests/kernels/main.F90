@@ -133,6 +133,7 @@ program main
    use test_mortar_frame, only : collect_mortar_frame
    use test_mortar_pair, only : collect_mortar_pair
    use test_mortar_stencil, only : collect_mortar_stencil
+   use test_mortar_wall_gap, only : collect_mortar_wall_gap
    use test_motion_bound, only : collect_motion_bound
    use test_pair_forces, only : collect_pair_forces
    use test_penalty_state, only : collect_penalty_state
@@ -329,6 +330,7 @@ program main
    call run("mortar_frame", collect_mortar_frame)
    call run("mortar_pair", collect_mortar_pair)
    call run("mortar_stencil", collect_mortar_stencil)
+   call run("mortar_wall_gap", collect_mortar_wall_gap)
    call run("motion_bound", collect_motion_bound)
    call run("pair_forces", collect_pair_forces)
    call run("penalty_state", collect_penalty_state)
