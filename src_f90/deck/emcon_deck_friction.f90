@@ -5,7 +5,7 @@ module emcon_deck_friction
       refuse_lines
    use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
    use emcon_diagnostics, only : add_error, add_warning
-   use emcon_interactions, only : contact_pair_t, formulation_mortar, pressure_hard, &
+   use emcon_interactions, only : contact_pair_t, pressure_hard, &
       smoothing_hermite
    use emcon_kinds, only : wp
    use emcon_massless_surfaces, only : pair_keeps_mass
@@ -82,12 +82,6 @@ contains
             if (pair(i)%slave == 0 .or. pair(i)%master == 0) cycle   ! unknown surfaces are told
             call check_other_way(reader, pair(:i), given)
             if (.not. pair(i)%interaction%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
-            if (scene%n_dim == n_space .and. pair(i)%formulation == formulation_mortar) then
-               call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface " &
-                  // "interaction has *FRICTION: in three dimensions MORTAR has none in this " &
-                  // "version; use TYPE=NODE TO SURFACE")
-               cycle
-            end if
             do k = 1, size(step)
                call check_step(reader, pair(i), step(k), k)
             end do
