@@ -6,15 +6,18 @@ module emcon_mortar_faces_space
    use emcon_facet_groups, only : facet_groups_init, facet_groups_t, group_angle
    use emcon_facet_split, only : facet_split_init, facet_split_t
    use emcon_facets, only : facets_init, facets_length
+   use emcon_frame_slip_space, only : tangent_basis
    use emcon_interactions, only : contact_pair_t, interaction_reach
    use emcon_kinds, only : wp
    use emcon_near_list, only : near_list_init, near_list_t, near_list_within
    use emcon_patch_sides_space, only : patch_sides_t, patch_triangles_init
    use emcon_patch_stencil_space, only : patch_stencil_choose, patch_stencil_t
+   use emcon_rotation, only : cross_product
    use emcon_scene, only : scene_t
    implicit none
    private
-   public :: mortar_faces_t, mortar_faces_init, mortar_faces_choose, mortar_faces_weight
+   public :: mortar_faces_t, mortar_faces_init, mortar_faces_choose, mortar_faces_weight, &
+      mortar_faces_direction
 
    type :: mortar_faces_t
       type(patch_sides_t) :: sides
@@ -27,6 +30,8 @@ module emcon_mortar_faces_space
       integer, allocatable :: start(:)                !! (n + 1) triangles of each:
       integer, allocatable :: triangle(:)             !! start(i) to start(i + 1) - 1
       integer, allocatable :: vertex(:)               !! the same: which vertex of its facet it is
+      !> (2, n) a direction along the surface at each, in the sides of its first facet at its vertex
+      real(wp), allocatable :: along(:, :)
       type(patch_stencil_t), allocatable :: stencil(:)   !! (n_triangle)
    end type mortar_faces_t
 
@@ -58,6 +63,7 @@ contains
             self%beyond + pair%interaction%offset + interaction_reach(pair%interaction))
       end associate
       call list_vertices(self, scene%x)
+      call find_directions(self, scene%x)
       allocate(self%stencil(size(self%split%facet)))
    end subroutine mortar_faces_init
 
@@ -90,6 +96,62 @@ contains
          end do
       end associate
    end subroutine list_vertices
+
+   !> A direction at each vertex: the first axis in the reference, as near as it can be along the
+   !> surface; where that is normal, another one.
+   pure subroutine find_directions(self, x)
+      type(mortar_faces_t), intent(inout) :: self
+      real(wp), intent(in) :: x(:, :)            !! (3, n_node) reference positions [L]
+      real(wp) :: side(3, 2), basis(3, 2), square(2, 2), part(2)
+      integer :: i
+
+      allocate(self%along(2, size(self%node)), source=0.0_wp)
+      do i = 1, size(self%node)
+         call find_sides(self, i, x, 0.0_wp*x, side)
+         associate (normal => cross_product(side(:, 1), side(:, 2)))
+            if (.not. norm2(normal) > 0.0_wp) cycle
+            basis = tangent_basis(normal, [1.0_wp, 0.0_wp, 0.0_wp])
+         end associate
+         square = matmul(transpose(side), side)
+         part = matmul(basis(:, 1), side)
+         self%along(:, i) = [square(2, 2)*part(1) - square(1, 2)*part(2), &
+            square(1, 1)*part(2) - square(1, 2)*part(1)]/(square(1, 1)*square(2, 2) &
+            - square(1, 2)**2)
+      end do
+   end subroutine find_directions
+
+   !> Both sides of the first facet of constraint `i` at its vertex.
+   pure subroutine find_sides(self, i, x, u, side)
+      type(mortar_faces_t), intent(in) :: self
+      integer, intent(in) :: i
+      real(wp), intent(in) :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      real(wp), intent(out) :: side(3, 2)        !! to the next vertex and to the one before [L]
+      integer :: j, to(2)
+
+      associate (f => self%split%facet(self%triangle(self%start(i))), &
+            m => self%vertex(self%start(i)))
+         associate (n => self%weights%n(f), own => self%sides%slave%node)
+            to = own(self%weights%node([1 + mod(m, n), 1 + mod(m + n - 2, n)], f))
+            associate (from => own(self%weights%node(m, f)))
+               do j = 1, 2
+                  side(:, j) = (x(:, to(j)) - x(:, from)) + (u(:, to(j)) - u(:, from))
+               end do
+            end associate
+         end associate
+      end associate
+   end subroutine find_sides
+
+   !> The direction along the surface at constraint `i` at x + u, of any length: it turns with that.
+   pure function mortar_faces_direction(self, i, x, u) result(along)
+      type(mortar_faces_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n
+      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
+      real(wp) :: along(3)
+      real(wp) :: side(3, 2)
+
+      call find_sides(self, i, x, u, side)
+      along = matmul(side, self%along(:, i))
+   end function mortar_faces_direction
 
    !> The stencils of the triangles of slave facet `f`; none of them where nothing comes near.
    pure subroutine mortar_faces_choose(self, f, x, u0, reach)

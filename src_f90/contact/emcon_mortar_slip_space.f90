@@ -1,38 +1,38 @@
 !> Slip of mortar contact in space over a step: how slave facets go over what they cover, in the
 !> mean with the weight of each of their vertices.
 !>
-!> It is made of the places of the master's vertices in the frames of slave triangles, with the
-!> weights that the gap gives them, kept over the step: friction acts where the push does. Source:
+!> Over each triangle of the master it is the slip of nodes, of the points of the slave's triangle
+!> above it, with the weights that the gap gives them; these are kept over the step. Source:
 !> docs/theory.md, section 15.3.
 module emcon_mortar_slip_space
    use emcon_constraint, only : condition_t, most_slips
-   use emcon_frame_slip_space, only : tangent_basis
-   use emcon_frame_vertex_space, only : at_eta, at_xi, frame_vertex, frame_vertex_t
+   use emcon_frame_slip_space, only : frame_slip, frame_slip_t
+   use emcon_frame_vertex_space, only : n_frame_var
    use emcon_kinds, only : wp
-   use emcon_mortar_faces_space, only : mortar_faces_t, mortar_faces_weight
+   use emcon_mortar_faces_space, only : mortar_faces_direction, mortar_faces_t, mortar_faces_weight
    use emcon_node_sums, only : node_sums_first, node_sums_second
-   use emcon_patch_look_space, only : patch_vertex_shares
+   use emcon_patch_look_space, only : patch_cells
    use emcon_patch_spread_space, only : patch_uses
    use emcon_patch_stencil_space, only : patch_stencil_gather, patch_stencil_t
-   use emcon_rotation, only : cross_product
    implicit none
    private
    public :: mortar_slip_t, mortar_slip_choose, mortar_slip_shift, mortar_slip_of, &
       slip_sight_t, mortar_slip_sight, mortar_slip_add
 
-   !> What the slip of a slave triangle is made of in a step.
+   !> What the slip of a slave triangle is made of in a step: cells, where triangles of the master
+   !> are below it.
    type :: mortar_slip_t
       real(wp) :: theta = 0.0_wp                 !! how dual the multipliers of its facet are
-      integer, allocatable :: vertex(:)          !! of its stencil, those over which it slides
-      integer, allocatable :: point(:)           !! (as `vertex`) of the master
-      real(wp), allocatable :: share(:, :)       !! (3, as `vertex`) of each, for each corner [L^2]
+      integer, allocatable :: vertex(:, :)       !! (3, n_cell) of its stencil, those of each
+      integer, allocatable :: point(:, :)        !! (as `vertex`) of the master
+      !> (3, 3, n_cell) integrals of products of the weights that are 1 at one corner [L^2]
+      real(wp), allocatable :: products(:, :, :)
    end type mortar_slip_t
 
-   !> Where these vertices are in the frame of the triangle over a motion.
+   !> Where the vertices of a triangle's stencil are.
    type :: slip_sight_t
-      real(wp) :: a(3) = 0.0_wp, b(3) = 0.0_wp   !! the frame as the motion begins [L]
-      integer, allocatable :: vertex(:)          !! of its stencil
-      type(frame_vertex_t), allocatable :: at(:)
+      integer, allocatable :: vertex(:)          !! of the stencil, all that slip is over
+      real(wp), allocatable :: at(:, :), way(:, :)   !! of `patch_stencil_gather` [L]
    end type slip_sight_t
 
 contains
@@ -44,174 +44,179 @@ contains
       type(mortar_faces_t), intent(in) :: faces       !! with their stencils
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       logical, intent(in) :: is_at_end                !! forces act at the end of the motion alone
-      real(wp) :: area, part
+      real(wp) :: part, covered
       integer :: f, t
 
       do f = 1, faces%sides%slave%n_facet
          associate (first => faces%split%start(f), last => faces%split%start(f + 1) - 1)
             part = 0.0_wp
             do t = first, last
-               call choose_triangle(self(t), faces%stencil(t), x, u0, du, is_at_end, area)
-               if (area > 0.0_wp) part = part + sum(self(t)%share)/area
+               call choose_triangle(self(t), faces%stencil(t), x, u0, du, is_at_end, covered)
+               part = part + covered/real(last - first + 1, wp)
             end do
-            self(first:last)%theta = merge((part/real(last - first + 1, wp))**3, 0.0_wp, &
-               faces%is_dual)
+            self(first:last)%theta = merge(part**3, 0.0_wp, faces%is_dual)
          end associate
       end do
    end subroutine mortar_slip_choose
 
-   !> That of one triangle, and its area; none where nothing is near it.
-   pure subroutine choose_triangle(self, stencil, x, u0, du, is_at_end, area)
+   !> That of one triangle; none where nothing is near it.
+   pure subroutine choose_triangle(self, stencil, x, u0, du, is_at_end, covered)
       type(mortar_slip_t), intent(inout) :: self
       type(patch_stencil_t), intent(in) :: stencil
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
       logical, intent(in) :: is_at_end
-      real(wp), intent(out) :: area              !! [L^2]
+      real(wp), intent(out) :: covered           !! a part of its area
       real(wp), dimension(3, 3 + stencil%patch%n_vertex) :: at, way
-      real(wp) :: share(3, stencil%patch%n_vertex), normal(3)
-      integer :: j
+      real(wp), dimension(3, 3, stencil%patch%n_triangle) :: products, start
+      real(wp) :: area(2)
+      integer, allocatable :: cell(:)
+      integer :: k
 
+      products = 0.0_wp
       area = 0.0_wp
-      share = 0.0_wp
+      covered = 0.0_wp
       if (stencil%triangle > 0) then
          call patch_stencil_gather(stencil, x, u0, du, at, way)
-         share = patch_vertex_shares(stencil%patch, at + way)
-         if (.not. is_at_end) share = 0.5_wp*(share + patch_vertex_shares(stencil%patch, at))
-         at = at + merge(1.0_wp, 0.5_wp, is_at_end)*way
-         normal = cross_product(at(:, 2) - at(:, 1), at(:, 3) - at(:, 1))
-         area = 0.5_wp*norm2(normal)
+         call patch_cells(stencil%patch, at + way, products, area(1))
+         if (.not. is_at_end) then
+            call patch_cells(stencil%patch, at, start, area(2))
+            products = 0.5_wp*(products + start)
+            area(1) = 0.5_wp*sum(area)
+         end if
+         if (area(1) > 0.0_wp) covered = sum(products)/area(1)
       end if
-      self%vertex = pack([(j, j = 1, size(share, 2))], any(abs(share) > 0.0_wp, 1))
-      self%share = share(:, self%vertex)
-      if (size(self%vertex) == 0) then
+      cell = pack([(k, k = 1, size(products, 3))], &
+         [(sum(products(:, :, k)) > 0.0_wp, k = 1, size(products, 3))])
+      self%products = products(:, :, cell)
+      if (size(cell) == 0) then
+         self%vertex = reshape(cell, [3, 0])
          self%point = self%vertex
       else
-         self%point = stencil%point(self%vertex)
+         self%vertex = stencil%patch%triangle(:, cell)
+         self%point = reshape(stencil%point([self%vertex]), shape(self%vertex))
       end if
    end subroutine choose_triangle
 
-   !> The part of the slip of constraint `i` at each vertex of the triangle of place `k`.
-   pure function parts_of(self, faces, i, k) result(part)
+   !> The integrals of the multiplier of constraint place `k` over the cells of its triangle, with
+   !> the weights that are 1 at one corner of that.
+   pure function moments_of(self, faces, k) result(moment)
       type(mortar_slip_t), intent(in) :: self(:)
       type(mortar_faces_t), intent(in) :: faces
-      integer, intent(in) :: i, k
-      real(wp) :: part(size(self(faces%triangle(k))%vertex))
-      real(wp) :: total
-      integer :: m
+      integer, intent(in) :: k
+      real(wp) :: moment(3, size(self(faces%triangle(k))%vertex, 2))
+      integer :: c
+
+      associate (own => self(faces%triangle(k)))
+         do c = 1, size(moment, 2)
+            moment(:, c) = matmul(own%products(:, :, c), mortar_faces_weight(faces, k, own%theta))
+         end do
+      end associate
+   end function moments_of
+
+   !> What of the facets at constraint `i` is covered, with its weight [L^2].
+   pure real(wp) function total_of(self, faces, i) result(total)
+      type(mortar_slip_t), intent(in) :: self(:)
+      type(mortar_faces_t), intent(in) :: faces
+      integer, intent(in) :: i                   !! 1..n_constraint
+      integer :: k
 
       total = 0.0_wp
-      do m = faces%start(i), faces%start(i + 1) - 1
-         associate (own => self(faces%triangle(m)))
-            if (size(own%vertex) > 0) total = total + sum(matmul(mortar_faces_weight(faces, m, &
-               own%theta), own%share))
-         end associate
+      do k = faces%start(i), faces%start(i + 1) - 1
+         total = total + sum(moments_of(self, faces, k))
       end do
-      part = 0.0_wp
-      if (.not. total > 0.0_wp) return
-      associate (own => self(faces%triangle(k)))
-         part = matmul(mortar_faces_weight(faces, k, own%theta), own%share)/total
-      end associate
-   end function parts_of
+   end function total_of
 
-   !> How much of the friction of constraint `i` is on other points of the master by one choice than
-   !> by another: 0 to 1, and more where weights have both signs.
+   !> How much of the slip of constraint `i` is over other triangles of the master by one choice
+   !> than by the one before.
    pure real(wp) function mortar_slip_shift(self, before, faces, i) result(shift)
       type(mortar_slip_t), intent(in) :: self(:), before(:)
       type(mortar_faces_t), intent(in) :: faces
       integer, intent(in) :: i                   !! 1..n_constraint
-      integer :: j, k
+      real(wp) :: total, old_total
+      integer :: c, k, old
 
       shift = 0.0_wp
+      total = total_of(self, faces, i)
+      old_total = total_of(before, faces, i)
+      if (.not. min(total, old_total) > 0.0_wp) return
       do k = faces%start(i), faces%start(i + 1) - 1
-         associate (t => faces%triangle(k), now => parts_of(self, faces, i, k), &
-               old => parts_of(before, faces, i, k))
-            ! What is new has a partner with nothing in the old choice, and what is gone one here.
-            do j = 1, size(now)
-               associate (place => self(t)%point == self(t)%point(j), &
-                     was => before(t)%point == self(t)%point(j))
-                  if (findloc(place, .true., 1) == j) shift = shift + 0.5_wp*abs(sum(now, place) &
-                     - sum(old, was))
-               end associate
+         associate (now => self(faces%triangle(k))%point, was => before(faces%triangle(k))%point, &
+               part => sum(moments_of(self, faces, k), 1)/total, &
+               old_part => sum(moments_of(before, faces, k), 1)/old_total)
+            ! Half of what comes and half of what goes.
+            do c = 1, size(part)
+               old = find_cell(was, now(:, c))
+               if (old > 0) shift = shift + 0.5_wp*abs(part(c) - old_part(old))
+               if (old == 0) shift = shift + 0.5_wp*abs(part(c))
             end do
-            do j = 1, size(old)
-               if (.not. any(self(t)%point == before(t)%point(j))) shift = shift &
-                  + 0.5_wp*abs(old(j))
+            do c = 1, size(old_part)
+               if (find_cell(now, was(:, c)) == 0) shift = shift + 0.5_wp*abs(old_part(c))
             end do
          end associate
       end do
    end function mortar_slip_shift
 
-   !> Where the vertices of a triangle's slip are over a motion.
-   pure subroutine mortar_slip_sight(self, at, way, leaves_second, sight)
+   !> The cell over some points; 0: none.
+   pure integer function find_cell(list, point) result(c)
+      integer, intent(in) :: list(:, :), point(3)
+
+      do c = size(list, 2), 1, -1
+         if (all(list(:, c) == point)) return
+      end do
+   end function find_cell
+
+   !> Where the vertices below a triangle are.
+   pure subroutine mortar_slip_sight(self, stencil, x, u0, du, sight)
       type(mortar_slip_t), intent(in) :: self
-      real(wp), intent(in) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) of its stencil [L]
-      logical, intent(in) :: leaves_second       !! no second derivatives
+      type(patch_stencil_t), intent(in) :: stencil
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       type(slip_sight_t), intent(out) :: sight
       integer :: j
 
-      sight%a = at(:, 2) - at(:, 1)
-      sight%b = at(:, 3) - at(:, 1)
-      sight%vertex = self%vertex
-      allocate(sight%at(size(self%vertex)))
-      do j = 1, size(self%vertex)
-         associate (node => [1, 2, 3, 3 + self%vertex(j)])
-            call frame_vertex(at(:, node), way(:, node), leaves_second, sight%at(j))
-         end associate
-      end do
+      if (size(self%vertex) == 0) return
+      associate (n => stencil%patch%n_vertex)
+         allocate(sight%at(3, 3 + n), sight%way(3, 3 + n))
+         call patch_stencil_gather(stencil, x, u0, du, sight%at, sight%way)
+         sight%vertex = pack([(j, j = 1, n)], [(any(self%vertex == j), j = 1, n)])
+      end associate
    end subroutine mortar_slip_sight
 
-   !> The direction along the slave's surface that turns with it at constraint `i`: towards the next
-   !> vertex of its first facet.
-   pure function first_direction(faces, i, x, u) result(along)
-      type(mortar_faces_t), intent(in) :: faces
-      integer, intent(in) :: i
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      real(wp) :: along(3), basis(3, 2), normal(3)
-      integer :: f, k, n
+   !> How much there is of the vectors of a slave triangle's frame, and of the first corner of a
+   !> cell's triangle, in the way from that to the points of the slave, summed up by their weights.
+   pure function way_parts(moment) result(part)
+      real(wp), intent(in) :: moment(3)          !! of the cell [L^2]
+      real(wp) :: part(3)
 
-      normal = 0.0_wp
-      do k = faces%start(i), faces%start(i + 1) - 1
-         associate (t => faces%triangle(k))
-            f = faces%split%facet(t)
-            n = faces%weights%n(f)
-            if (t /= faces%split%start(f)) cycle
-            normal = normal + cross_product(from_to(1, 1 + n/2), from_to(2, n))
-         end associate
-      end do
-      f = faces%split%facet(faces%triangle(faces%start(i)))
-      associate (m => faces%vertex(faces%start(i)))
-         along = from_to(m, 1 + mod(m, faces%weights%n(f)))
-      end associate
-      if (.not. norm2(normal) > 0.0_wp) return
-      basis = tangent_basis(normal, along)
-      along = basis(:, 1)
+      part = [moment(2:) - sum(moment)/3.0_wp, -sum(moment)]
+   end function way_parts
+
+   !> The slip of a cell times its weight.
+   pure type(frame_slip_t) function slip_of_cell(sight, vertex, moment, along, leaves_second) &
+         result(slip)
+      type(slip_sight_t), intent(in) :: sight
+      integer, intent(in) :: vertex(3)
+      real(wp), intent(in) :: moment(3)
+      real(wp), intent(in) :: along(3)
+      logical, intent(in) :: leaves_second
+
+      call frame_slip(gathered(sight%at), gathered(sight%way), along, leaves_second, slip)
 
    contains
 
-      !> From one vertex of the facet to another.
-      pure function from_to(j, l) result(vector)
-         integer, intent(in) :: j, l
-         real(wp) :: vector(3)
+      !> From the first corner of the triangle: the sides there, and the sum of ways to points.
+      pure function gathered(x) result(frame)
+         real(wp), intent(in) :: x(:, :)
+         real(wp) :: frame(3, 4)
 
-         associate (node => faces%sides%slave%node(faces%weights%node(:, f)))
-            vector = (x(:, node(l)) - x(:, node(j))) + (u(:, node(l)) - u(:, node(j)))
+         frame(:, 1) = 0.0_wp
+         frame(:, 2) = x(:, 3 + vertex(2)) - x(:, 3 + vertex(1))
+         frame(:, 3) = x(:, 3 + vertex(3)) - x(:, 3 + vertex(1))
+         associate (part => way_parts(moment))
+            frame(:, 4) = part(1)*x(:, 2) + part(2)*x(:, 3) + part(3)*x(:, 3 + vertex(1))
          end associate
-      end function from_to
+      end function gathered
 
-   end function first_direction
-
-   !> What the slips along two directions are by the coordinates in the frame of a triangle, with
-   !> the sign of a motion of the slave.
-   pure function by_frame(sight, along) result(by)
-      type(slip_sight_t), intent(in) :: sight
-      real(wp), intent(in) :: along(3)
-      real(wp) :: by(at_xi:at_eta, most_slips)
-      real(wp) :: basis(3, most_slips)
-
-      basis = tangent_basis(cross_product(sight%a, sight%b), along)
-      by(at_xi, :) = -matmul(sight%a, basis)
-      by(at_eta, :) = -matmul(sight%b, basis)
-   end function by_frame
+   end function slip_of_cell
 
    !> The slip of constraint `i` [L].
    pure function mortar_slip_of(self, faces, i, x, u0, du) result(slip)
@@ -220,25 +225,21 @@ contains
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       real(wp) :: slip(most_slips)
-      real(wp), allocatable :: at(:, :), way(:, :)
-      real(wp) :: along(3), by(at_xi:at_eta, most_slips)
+      real(wp) :: along(3), total
       type(slip_sight_t) :: sight
-      integer :: j, k
+      type(frame_slip_t) :: cell
+      integer :: c, k
 
       slip = 0.0_wp
-      along = first_direction(faces, i, x, u0)
+      total = total_of(self, faces, i)
+      if (.not. total > 0.0_wp) return
+      along = mortar_faces_direction(faces, i, x, u0)
       do k = faces%start(i), faces%start(i + 1) - 1
-         associate (t => faces%triangle(k), part => parts_of(self, faces, i, k))
-            if (size(part) == 0) cycle
-            associate (n => 3 + faces%stencil(t)%patch%n_vertex)
-               if (allocated(at)) deallocate(at, way)
-               allocate(at(3, n), way(3, n))
-            end associate
-            call patch_stencil_gather(faces%stencil(t), x, u0, du, at, way)
-            call mortar_slip_sight(self(t), at, way, .true., sight)
-            by = by_frame(sight, along)
-            do j = 1, size(part)
-               slip = slip + part(j)*matmul(sight%at(j)%df(:at_eta), by)
+         associate (t => faces%triangle(k), moment => moments_of(self, faces, k)/total)
+            call mortar_slip_sight(self(t), faces%stencil(t), x, u0, du, sight)
+            do c = 1, size(moment, 2)
+               cell = slip_of_cell(sight, self(t)%vertex(:, c), moment(:, c), along, .true.)
+               slip = slip + cell%f
             end do
          end associate
       end do
@@ -246,61 +247,55 @@ contains
 
    !> Add the slip of constraint `i` and its derivatives to its condition, which has all nodes of
    !> it, and room for slip.
-   pure subroutine mortar_slip_add(self, faces, i, sight, x, u0, item)
+   pure subroutine mortar_slip_add(self, faces, i, sight, along, item)
       type(mortar_slip_t), intent(in) :: self(:)
       type(mortar_faces_t), intent(in) :: faces
       integer, intent(in) :: i                   !! 1..n_constraint
       type(slip_sight_t), intent(in) :: sight(:) !! (n_triangle)
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) where it begins [L]
+      real(wp), intent(in) :: along(3)           !! of `mortar_faces_direction`
       type(condition_t), intent(inout) :: item
-      real(wp) :: along(3)
-      integer :: k
+      real(wp) :: total
+      integer :: c, k
 
-      along = first_direction(faces, i, x, u0)
+      total = total_of(self, faces, i)
+      if (.not. total > 0.0_wp) return
       do k = faces%start(i), faces%start(i + 1) - 1
-         associate (t => faces%triangle(k))
-            if (size(self(t)%vertex) == 0) cycle
-            call add_triangle(faces%stencil(t), sight(t), parts_of(self, faces, i, k), &
-               by_frame(sight(t), along), item)
+         associate (t => faces%triangle(k), moment => moments_of(self, faces, k)/total)
+            do c = 1, size(moment, 2)
+               call add_cell(slip_of_cell(sight(t), self(t)%vertex(:, c), moment(:, c), along, &
+                  item%leaves_second), faces%stencil(t), self(t)%vertex(:, c), &
+                  way_parts(moment(:, c)), item)
+            end do
          end associate
       end do
    end subroutine mortar_slip_add
 
-   !> Add that of one triangle.
-   pure subroutine add_triangle(stencil, sight, part, by, item)
+   !> Add that of one cell.
+   pure subroutine add_cell(slip, stencil, vertex, part, item)
+      type(frame_slip_t), intent(in) :: slip
       type(patch_stencil_t), intent(in) :: stencil
-      type(slip_sight_t), intent(in) :: sight
-      real(wp), intent(in) :: part(:)            !! (as its vertices)
-      real(wp), intent(in) :: by(at_xi:, :)      !! of `by_frame`
+      integer, intent(in) :: vertex(3)
+      real(wp), intent(in) :: part(3)            !! of `way_parts`
       type(condition_t), intent(inout) :: item
-      real(wp), dimension(6 + 3*size(part)) :: g, c
-      real(wp) :: h(size(g), size(g))
+      real(wp), allocatable :: weight(:, :)
       integer, allocatable :: place(:), row(:)
-      integer :: j, s, own(9)
+      integer :: j, s
 
-      row = pack([(j, j = 1, stencil%n_node)], patch_uses(stencil, sight%vertex))
+      row = pack([(j, j = 1, stencil%n_node)], patch_uses(stencil, vertex))
       place = [(findloc(item%node(:item%n_node), stencil%node(row(j)), 1), j = 1, size(row))]
-      associate (weight => stencil%weight(row(2:), [1, 2, 2 + sight%vertex]))
-         do s = 1, size(by, 2)
-            g = 0.0_wp
-            c = 0.0_wp
-            h = 0.0_wp
-            do j = 1, size(part)
-               own = [1, 2, 3, 4, 5, 6, 3*j + 4, 3*j + 5, 3*j + 6]
-               associate (at => sight%at(j), factor => part(j)*by(:, s))
-                  item%slip(s) = item%slip(s) + dot_product(factor, at%df(:at_eta))
-                  g(own) = g(own) + matmul(at%g(:, :at_eta), factor)
-                  c(own) = c(own) + matmul(at%c(:, :at_eta), factor)
-                  if (.not. item%leaves_second) h(own, own) = h(own, own) &
-                     + factor(1)*at%h(:, :, at_xi) + factor(2)*at%h(:, :, at_eta)
-               end associate
-            end do
-            call node_sums_first(g, weight, 1.0_wp, place, item%t(:, :, s))
-            call node_sums_first(c, weight, 1.0_wp, place, item%t1(:, :, s))
-            if (.not. item%leaves_second) call node_sums_second(h, weight, 1.0_wp, place, &
-               item%ht(:, :, s))
-         end do
+      allocate(weight(size(row) - 1, n_frame_var/3))
+      associate (by => stencil%weight(row(2:), 2 + vertex), frame => stencil%weight(row(2:), :2))
+         weight(:, 1) = by(:, 2) - by(:, 1)
+         weight(:, 2) = by(:, 3) - by(:, 1)
+         weight(:, 3) = matmul(frame, part(:2)) + part(3)*by(:, 1)
       end associate
-   end subroutine add_triangle
+      do s = 1, size(slip%f)
+         item%slip(s) = item%slip(s) + slip%f(s)
+         call node_sums_first(slip%g(:, s), weight, 1.0_wp, place, item%t(:, :, s))
+         call node_sums_first(slip%c(:, s), weight, 1.0_wp, place, item%t1(:, :, s))
+         if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), weight, 1.0_wp, &
+            place, item%ht(:, :, s))
+      end do
+   end subroutine add_cell
 
 end module emcon_mortar_slip_space

@@ -14,12 +14,12 @@ module emcon_mortar_space
    use emcon_guards, only : touching_bar
    use emcon_interactions, only : contact_options_t, contact_pair_t, multiplier_dual
    use emcon_kinds, only : wp
-   use emcon_mortar_faces_space, only : mortar_faces_choose, mortar_faces_init, mortar_faces_t, &
-      mortar_faces_weight
+   use emcon_mortar_faces_space, only : mortar_faces_choose, mortar_faces_direction, &
+      mortar_faces_init, mortar_faces_t, mortar_faces_weight
    use emcon_mortar_rise_space, only : mortar_rise, mortar_rise_doubt, &
       mortar_rise_largest, mortar_rise_t
    use emcon_mortar_slip_space, only : mortar_slip_add, mortar_slip_choose, mortar_slip_of, &
-      mortar_slip_shift, mortar_slip_sight, mortar_slip_t, slip_sight_t
+      mortar_slip_shift, mortar_slip_sight, mortar_slip_t
    use emcon_mortar_sum_space, only : mortar_sight, mortar_sum, sight_t
    use emcon_near_list, only : near_list_update
    use emcon_patch_look_space, only : patch_basis, patch_basis_t
@@ -341,7 +341,8 @@ contains
                sight(first:last))
             if (.not. any(item%has_friction)) cycle
             do t = first, last
-               call see_slip(self, t, x, u0, du, all(item%leaves_second), sight(t)%slip)
+               call mortar_slip_sight(self%slide(t), self%faces%stencil(t), x, u0, du, &
+                  sight(t)%slip)
             end do
          end associate
       end do
@@ -351,23 +352,10 @@ contains
          item(k)%size = self%state(wanted(k))%size
          if (.not. item(k)%has_friction) cycle
          call condition_resize_slip(item(k))
-         call mortar_slip_add(self%slide, self%faces, wanted(k), sight%slip, x, u0, item(k))
+         call mortar_slip_add(self%slide, self%faces, wanted(k), sight%slip, &
+            mortar_faces_direction(self%faces, wanted(k), x, u0), item(k))
       end do
    end subroutine mortar_evaluate
-
-   !> Where the vertices of the slip of triangle `t` are.
-   pure subroutine see_slip(self, t, x, u0, du, leaves_second, sight)
-      type(mortar_space_t), intent(in) :: self
-      integer, intent(in) :: t
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      logical, intent(in) :: leaves_second
-      type(slip_sight_t), intent(inout) :: sight
-      real(wp), dimension(3, 3 + self%faces%stencil(t)%patch%n_vertex) :: at, way
-
-      if (size(self%slide(t)%vertex) == 0) return
-      call patch_stencil_gather(self%faces%stencil(t), x, u0, du, at, way)
-      call mortar_slip_sight(self%slide(t), at, way, leaves_second, sight)
-   end subroutine see_slip
 
    !> As `contact_t` has it.
    pure function mortar_slip(self, i, x, u0, du) result(slip)

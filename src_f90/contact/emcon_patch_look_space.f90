@@ -8,7 +8,7 @@ module emcon_patch_look_space
    implicit none
    private
    public :: patch_t, place_vertices, patch_look_t, patch_look, patch_basis_t, patch_basis, &
-      patch_shares, patch_vertex_shares
+      patch_shares, patch_cells
 
    !> Places at which a field is given, in the coordinates of the patch.
    real(wp), parameter, public :: unit_corner(2, 3) = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
@@ -91,31 +91,29 @@ contains
       if (any(share > 0.0_wp)) share = share/sum(share)
    end function patch_shares
 
-   !> How much of what is covered of the patch of a slave facet each vertex takes, as much of it as
-   !> it has of the field there, with each of the weights that are 1 at one of the `unit_corner` and
-   !> 0 at the others [L^2].
-   pure function patch_vertex_shares(patch, x) result(share)
+   !> What each triangle covers of the patch of a slave facet, as much of it as it has of the field
+   !> there: the integrals of products of the weights that are 1 at one of the `unit_corner`.
+   pure subroutine patch_cells(patch, x, products, area)
       type(patch_t), intent(in) :: patch         !! that looks
       real(wp), intent(in) :: x(:, :)            !! (3, 3 + n_vertex) origin, frame, vertices [L]
-      real(wp) :: share(3, patch%n_vertex)
-      real(wp) :: place(3, patch%n_vertex), products(3, 3), part(3)
-      integer :: j, k, v
+      real(wp), intent(out) :: products(:, :, :) !! (3, 3, n_triangle) [L^2]
+      real(wp), intent(out) :: area              !! of the patch [L^2]
+      real(wp) :: place(3, patch%n_vertex), middle(3)
+      integer :: k
 
       call place_vertices(patch, x, place)
-      share = 0.0_wp
+      area = 0.5_wp*frame_size(x(:, :3))
+      products = 0.0_wp
       do k = 1, patch%n_triangle
-         associate (t => patch%triangle(:, k))
+         associate (t => patch%triangle(:, k), own => products(:, :, k))
             if (patch_misses(patch%area, place(:2, t))) cycle
-            products = frame_size(x(:, :3))*patch_products(patch%area, place(:2, t))
-            do v = 1, 3
-               part = barycentric(place(:2, t), unit_corner(:, v))*patch%chi(t)
-               do j = 1, 3
-                  share(:, t(j)) = share(:, t(j)) + part(j)*products(:, v)
-               end do
-            end do
+            own = 2.0_wp*area*patch_products(patch%area, place(:2, t))
+            if (all(patch%chi(t) >= 1.0_wp) .or. .not. sum(own) > 0.0_wp) cycle
+            middle = sum(own, 1)/sum(own)
+            own = dot_product(patch%chi(t), barycentric(place(:2, t), middle(2:)))*own
          end associate
       end do
-   end function patch_vertex_shares
+   end subroutine patch_cells
 
    !> What a patch of a slave facet sees at both ends of a step, with each of the weights that are 1
    !> at one of the `unit_corner` and 0 at the others.
