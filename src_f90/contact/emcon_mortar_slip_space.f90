@@ -7,12 +7,10 @@
 module emcon_mortar_slip_space
    use emcon_constraint, only : condition_t, most_slips
    use emcon_frame_slip_space, only : frame_slip, frame_slip_t
-   use emcon_frame_vertex_space, only : n_frame_var
    use emcon_kinds, only : wp
    use emcon_mortar_faces_space, only : mortar_faces_direction, mortar_faces_t, mortar_faces_weight
    use emcon_node_sums, only : node_sums_first, node_sums_second
    use emcon_patch_look_space, only : patch_cells
-   use emcon_patch_spread_space, only : patch_uses
    use emcon_patch_stencil_space, only : patch_stencil_gather, patch_stencil_t
    implicit none
    private
@@ -34,6 +32,15 @@ module emcon_mortar_slip_space
       integer, allocatable :: vertex(:)          !! of the stencil, all that slip is over
       real(wp), allocatable :: at(:, :), way(:, :)   !! of `patch_stencil_gather` [L]
    end type slip_sight_t
+
+   !> The triangles of the master that a constraint slides over: frames, and the sum of ways from
+   !> their origins to points of the slave by weights.
+   type :: slip_cells_t
+      integer :: n = 0
+      integer, allocatable :: point(:, :)        !! (3, >= n)
+      real(wp), allocatable :: at(:, :, :), way(:, :, :)   !! (3, 4, >= n) as `frame_slip` [L]
+      real(wp), allocatable :: weight(:, :, :)   !! (3, n_node, >= n) of nodes in these vectors
+   end type slip_cells_t
 
 contains
 
@@ -181,42 +188,90 @@ contains
       end associate
    end subroutine mortar_slip_sight
 
-   !> How much there is of the vectors of a slave triangle's frame, and of the first corner of a
-   !> cell's triangle, in the way from that to the points of the slave, summed up by their weights.
-   pure function way_parts(moment) result(part)
-      real(wp), intent(in) :: moment(3)          !! of the cell [L^2]
-      real(wp) :: part(3)
-
-      part = [moment(2:) - sum(moment)/3.0_wp, -sum(moment)]
-   end function way_parts
-
-   !> The slip of a cell times its weight.
-   pure type(frame_slip_t) function slip_of_cell(sight, vertex, moment, along, leaves_second) &
-         result(slip)
+   !> Add the cells of place `k` of a constraint, as triangle `t` of the slave sees them, to those
+   !> of the places before it: of one triangle of the master the ways to all points of the slave
+   !> are summed up, as slip is linear in them.
+   pure subroutine add_cells(cells, self, stencil, sight, moment, node)
+      type(slip_cells_t), intent(inout) :: cells
+      type(mortar_slip_t), intent(in) :: self
+      type(patch_stencil_t), intent(in) :: stencil
       type(slip_sight_t), intent(in) :: sight
-      integer, intent(in) :: vertex(3)
-      real(wp), intent(in) :: moment(3)
-      real(wp), intent(in) :: along(3)
-      logical, intent(in) :: leaves_second
+      real(wp), intent(in) :: moment(:, :)       !! (3, n_cell) of `moments_of`, by the total
+      integer, intent(in) :: node(:)             !! (n_node) of the condition; none: no weights
+      integer :: c, j, place(stencil%n_node)
 
-      call frame_slip(gathered(sight%at), gathered(sight%way), along, leaves_second, slip)
+      place = 0
+      if (size(node) > 0) place = [(findloc(node, stencil%node(j), 1), j = 1, stencil%n_node)]
+      do c = 1, size(moment, 2)
+         call add_cell(cells, self, stencil, sight, place, c, [moment(2:, c) &
+            - sum(moment(:, c))/3.0_wp, -sum(moment(:, c))])
+      end do
+   end subroutine add_cells
 
-   contains
+   !> Add cell `c` of a triangle of the slave.
+   pure subroutine add_cell(cells, self, stencil, sight, place, c, part)
+      type(slip_cells_t), intent(inout) :: cells
+      type(mortar_slip_t), intent(in) :: self
+      type(patch_stencil_t), intent(in) :: stencil
+      type(slip_sight_t), intent(in) :: sight
+      integer, intent(in) :: place(:)            !! of nodes of the stencil in the condition; 0: none
+      integer, intent(in) :: c
+      !> Of both vectors of the slave's triangle, from whose middle ways count, and of the first
+      !> corner of the master's
+      real(wp), intent(in) :: part(3)
+      real(wp) :: own(3)
+      integer :: l, m, column(3)
+      logical :: is_new
 
-      !> From the first corner of the triangle: the sides there, and the sum of ways to points.
-      pure function gathered(x) result(frame)
-         real(wp), intent(in) :: x(:, :)
-         real(wp) :: frame(3, 4)
+      m = 0
+      ! Flanges are made of what one triangle of the slave sees.
+      if (all(self%point(:, c) > 0)) m = find_cell(cells%point(:, :cells%n), self%point(:, c))
+      is_new = m == 0
+      if (is_new) then
+         cells%n = cells%n + 1
+         m = cells%n
+         cells%point(:, m) = self%point(:, c)
+      end if
+      associate (v => self%vertex(:, c), at => cells%at(:, :, m), way => cells%way(:, :, m), &
+            weight => cells%weight(:, :, m))
+         column = [1, 2, 2 + v(1)]
+         if (is_new) then
+            at(:, 2:3) = sight%at(:, 3 + v(2:)) - spread(sight%at(:, 3 + v(1)), 2, 2)
+            way(:, 2:3) = sight%way(:, 3 + v(2:)) - spread(sight%way(:, 3 + v(1)), 2, 2)
+         end if
+         do l = 1, 3
+            at(:, 4) = at(:, 4) + part(l)*sight%at(:, 1 + column(l))
+            way(:, 4) = way(:, 4) + part(l)*sight%way(:, 1 + column(l))
+         end do
+         if (size(weight, 2) == 0) return
+         do l = 2, stencil%n_node
+            own(3) = dot_product(part, stencil%weight(l, column))
+            own(:2) = 0.0_wp
+            if (is_new) own(:2) = stencil%weight(l, 2 + v(2:)) - stencil%weight(l, 2 + v(1))
+            if (all(abs(own) <= 0.0_wp)) cycle
+            ! Ways count from the first node of a stencil.
+            weight(:, place(l)) = weight(:, place(l)) + own
+            weight(:, place(1)) = weight(:, place(1)) - own
+         end do
+      end associate
+   end subroutine add_cell
 
-         frame(:, 1) = 0.0_wp
-         frame(:, 2) = x(:, 3 + vertex(2)) - x(:, 3 + vertex(1))
-         frame(:, 3) = x(:, 3 + vertex(3)) - x(:, 3 + vertex(1))
-         associate (part => way_parts(moment))
-            frame(:, 4) = part(1)*x(:, 2) + part(2)*x(:, 3) + part(3)*x(:, 3 + vertex(1))
-         end associate
-      end function gathered
+   !> Room for the cells of constraint `i`.
+   pure subroutine begin_cells(cells, self, faces, i, n_node)
+      type(slip_cells_t), intent(out) :: cells
+      type(mortar_slip_t), intent(in) :: self(:)
+      type(mortar_faces_t), intent(in) :: faces
+      integer, intent(in) :: i, n_node
+      integer :: k, most
 
-   end function slip_of_cell
+      most = 0
+      do k = faces%start(i), faces%start(i + 1) - 1
+         most = most + size(self(faces%triangle(k))%vertex, 2)
+      end do
+      allocate(cells%point(3, most), source=0)
+      allocate(cells%at(3, 4, most), cells%way(3, 4, most), cells%weight(3, n_node, most), &
+         source=0.0_wp)
+   end subroutine begin_cells
 
    !> The slip of constraint `i` [L].
    pure function mortar_slip_of(self, faces, i, x, u0, du) result(slip)
@@ -225,8 +280,10 @@ contains
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       real(wp) :: slip(most_slips)
+      integer, parameter :: no_node(0) = 0
       real(wp) :: along(3), total
       type(slip_sight_t) :: sight
+      type(slip_cells_t) :: cells
       type(frame_slip_t) :: cell
       integer :: c, k
 
@@ -234,14 +291,17 @@ contains
       total = total_of(self, faces, i)
       if (.not. total > 0.0_wp) return
       along = mortar_faces_direction(faces, i, x, u0)
+      call begin_cells(cells, self, faces, i, 0)
       do k = faces%start(i), faces%start(i + 1) - 1
-         associate (t => faces%triangle(k), moment => moments_of(self, faces, k)/total)
+         associate (t => faces%triangle(k))
             call mortar_slip_sight(self(t), faces%stencil(t), x, u0, du, sight)
-            do c = 1, size(moment, 2)
-               cell = slip_of_cell(sight, self(t)%vertex(:, c), moment(:, c), along, .true.)
-               slip = slip + cell%f
-            end do
+            call add_cells(cells, self(t), faces%stencil(t), sight, moments_of(self, faces, k) &
+               /total, no_node)
          end associate
+      end do
+      do c = 1, cells%n
+         call frame_slip(cells%at(:, :, c), cells%way(:, :, c), along, .true., cell)
+         slip = slip + cell%f
       end do
    end function mortar_slip_of
 
@@ -254,48 +314,48 @@ contains
       type(slip_sight_t), intent(in) :: sight(:) !! (n_triangle)
       real(wp), intent(in) :: along(3)           !! of `mortar_faces_direction`
       type(condition_t), intent(inout) :: item
+      type(slip_cells_t) :: cells
+      type(frame_slip_t) :: cell
       real(wp) :: total
       integer :: c, k
 
       total = total_of(self, faces, i)
       if (.not. total > 0.0_wp) return
+      call begin_cells(cells, self, faces, i, item%n_node)
       do k = faces%start(i), faces%start(i + 1) - 1
-         associate (t => faces%triangle(k), moment => moments_of(self, faces, k)/total)
-            do c = 1, size(moment, 2)
-               call add_cell(slip_of_cell(sight(t), self(t)%vertex(:, c), moment(:, c), along, &
-                  item%leaves_second), faces%stencil(t), self(t)%vertex(:, c), &
-                  way_parts(moment(:, c)), item)
-            end do
+         associate (t => faces%triangle(k))
+            call add_cells(cells, self(t), faces%stencil(t), sight(t), moments_of(self, faces, k) &
+               /total, item%node(:item%n_node))
          end associate
+      end do
+      do c = 1, cells%n
+         call frame_slip(cells%at(:, :, c), cells%way(:, :, c), along, item%leaves_second, cell)
+         call spread_cell(cell, cells%weight(:, :, c), item)
       end do
    end subroutine mortar_slip_add
 
-   !> Add that of one cell.
-   pure subroutine add_cell(slip, stencil, vertex, part, item)
+   !> Add that of one triangle of the master, of ways with these weights of the nodes: their sums
+   !> are 0, so that of the first node says nothing more.
+   pure subroutine spread_cell(slip, weight, item)
       type(frame_slip_t), intent(in) :: slip
-      type(patch_stencil_t), intent(in) :: stencil
-      integer, intent(in) :: vertex(3)
-      real(wp), intent(in) :: part(3)            !! of `way_parts`
+      real(wp), intent(in) :: weight(:, :)       !! (3, n_node)
       type(condition_t), intent(inout) :: item
-      real(wp), allocatable :: weight(:, :)
-      integer, allocatable :: place(:), row(:)
+      logical :: is_used(size(weight, 2))
       integer :: j, s
 
-      row = pack([(j, j = 1, stencil%n_node)], patch_uses(stencil, vertex))
-      place = [(findloc(item%node(:item%n_node), stencil%node(row(j)), 1), j = 1, size(row))]
-      allocate(weight(size(row) - 1, n_frame_var/3))
-      associate (by => stencil%weight(row(2:), 2 + vertex), frame => stencil%weight(row(2:), :2))
-         weight(:, 1) = by(:, 2) - by(:, 1)
-         weight(:, 2) = by(:, 3) - by(:, 1)
-         weight(:, 3) = matmul(frame, part(:2)) + part(3)*by(:, 1)
+      is_used = any(abs(weight) > 0.0_wp, 1)
+      is_used(1) = .true.
+      associate (place => pack([(j, j = 1, size(is_used))], is_used))
+         associate (own => transpose(weight(:, place(2:))))
+            do s = 1, size(slip%f)
+               item%slip(s) = item%slip(s) + slip%f(s)
+               call node_sums_first(slip%g(:, s), own, 1.0_wp, place, item%t(:, :, s))
+               call node_sums_first(slip%c(:, s), own, 1.0_wp, place, item%t1(:, :, s))
+               if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), own, 1.0_wp, &
+                  place, item%ht(:, :, s))
+            end do
+         end associate
       end associate
-      do s = 1, size(slip%f)
-         item%slip(s) = item%slip(s) + slip%f(s)
-         call node_sums_first(slip%g(:, s), weight, 1.0_wp, place, item%t(:, :, s))
-         call node_sums_first(slip%c(:, s), weight, 1.0_wp, place, item%t1(:, :, s))
-         if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), weight, 1.0_wp, &
-            place, item%ht(:, :, s))
-      end do
-   end subroutine add_cell
+   end subroutine spread_cell
 
 end module emcon_mortar_slip_space
