@@ -5,8 +5,10 @@
 !> Source: docs/theory.md, section 15.2.
 module emcon_mortar_space
    use emcon_bulges_space, only : bulges_find
+   use emcon_condition_nodes, only : condition_resize_slip
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
+   use emcon_contact_law, only : contact_laws_rub
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : error_t
    use emcon_guards, only : touching_bar
@@ -15,7 +17,9 @@ module emcon_mortar_space
    use emcon_mortar_faces_space, only : mortar_faces_choose, mortar_faces_init, mortar_faces_t
    use emcon_mortar_rise_space, only : mortar_rise, mortar_rise_doubt, &
       mortar_rise_largest, mortar_rise_t
-   use emcon_mortar_slave_space, only : mortar_slave_weight
+   use emcon_mortar_slave_space, only : mortar_slave_direction, mortar_slave_weight
+   use emcon_mortar_slip_space, only : mortar_slip_add, mortar_slip_choose, mortar_slip_of, &
+      mortar_slip_shift, mortar_slip_sight, mortar_slip_t
    use emcon_mortar_sum_space, only : mortar_sight, mortar_sum, sight_t
    use emcon_near_list, only : near_list_update
    use emcon_patch_look_space, only : patch_basis, patch_basis_t
@@ -37,6 +41,7 @@ module emcon_mortar_space
       real(wp) :: chosen_reach = 0.0_wp               !! among facets up to there [L]
       type(mortar_rise_t), allocatable :: rise        !! of both sides; only if gaps follow arcs
       type(patch_basis_t), allocatable :: basis(:)    !! (n_triangle) as last measured
+      type(mortar_slip_t), allocatable :: slide(:)    !! (n_triangle) of the step; with friction
       !> (0:1, n_facet) how dual the multipliers of slave facets are at start and end
       real(wp), allocatable :: theta(:, :)
       real(wp), allocatable :: whole(:)               !! (n_constraint) reference area [L^2]
@@ -49,6 +54,7 @@ module emcon_mortar_space
       procedure :: begin_points => mortar_begin_step
       procedure :: measure_points => mortar_measure
       procedure :: evaluate_points => mortar_evaluate
+      procedure :: slip_points => mortar_slip
       procedure :: area_points => mortar_area
       procedure :: own_area => mortar_own_area
       procedure :: share => mortar_share
@@ -74,6 +80,7 @@ contains
       self%offset = pair%interaction%offset
       self%max_penetration_at_start = max_penetration_mean
       call contact_laws_of_surface(pair%interaction, self%laws)
+      if (contact_laws_rub(self%laws)) allocate(self%slide(size(self%faces%split%facet)))
    end subroutine mortar_space_init
 
    !> Room for what a step knows, and sizes in the reference.
@@ -141,10 +148,19 @@ contains
    pure subroutine mortar_begin_step(self, x, u0, du)
       class(mortar_space_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
-      integer :: f
 
       call near_list_update(self%faces%near, x, u0, du, self%reach)
       call self%has_looked(self%faces%near%clearance)
+      call choose_stencils(self, x, u0)
+      if (allocated(self%slide)) call choose_slips(self, x, u0, du)
+   end subroutine mortar_begin_step
+
+   !> From the same start and up to the same reach the choice is the same.
+   pure subroutine choose_stencils(self, x, u0)
+      type(mortar_space_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
+      integer :: f
+
       if (abs(self%chosen_reach - self%reach) <= 0.0_wp) then
          if (position_memo_holds(self%memo, self%faces%near%node, x, u0)) return
       end if
@@ -154,7 +170,22 @@ contains
          call mortar_faces_choose(self%faces, f, x, u0, self%reach)
       end do
       if (allocated(self%rise)) call find_sagittas(self, x, u0)
-   end subroutine mortar_begin_step
+   end subroutine choose_stencils
+
+   !> What slips are made of where forces are expected to act.
+   pure subroutine choose_slips(self, x, u0, du)
+      type(mortar_space_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      type(mortar_slip_t) :: before(size(self%slide))
+      integer :: i
+
+      before = self%slide
+      call mortar_slip_choose(self%slide, self%faces, x, u0, du, self%step%pushes_at_end)
+      if (.not. allocated(before(1)%vertex)) before = self%slide
+      do i = 1, self%n_constraint
+         self%state(i)%slip_shift = mortar_slip_shift(self%slide, before, self%faces, i)
+      end do
+   end subroutine choose_slips
 
    !> How far both surfaces rise over what gaps are measured between.
    pure subroutine find_sagittas(self, x, u0)
@@ -272,7 +303,7 @@ contains
          self%scale(i) = max(area(0), least)
          if (self%step%is_penalty) least = tiny(least)
          self%cover(i) = max(area(1), 0.0_wp)
-         state = gap_state_t(size=state%size, other_size=size_of)
+         state = gap_state_t(size=state%size, other_size=size_of, slip_shift=state%slip_shift)
          state%is_near = maxval(area) > 0.0_wp
          state%is_covered = way <= self%chosen_reach - self%faces%beyond
          state%is_over = area(1) >= least .or. (self%step%is_penalty .and. area(0) >= least)
@@ -296,7 +327,7 @@ contains
       type(condition_t), intent(inout) :: item(:)   !! (n)
       type(sight_t) :: sight(size(self%faces%stencil))
       logical :: is_asked(self%faces%sides%slave%n_facet)
-      integer :: f, k
+      integer :: f, k, t
 
       is_asked = .false.
       do k = 1, size(wanted)
@@ -308,14 +339,34 @@ contains
          associate (first => self%faces%split%start(f), last => self%faces%split%start(f + 1) - 1)
             call mortar_sight(self%faces, first, x, u0, du, all(item%leaves_second), &
                sight(first:last))
+            if (.not. any(item%has_friction)) cycle
+            do t = first, last
+               call mortar_slip_sight(self%slide(t), self%faces%stencil(t), x, u0, du, &
+                  sight(t)%slip)
+            end do
          end associate
       end do
       do k = 1, size(wanted)
          call mortar_sum(self%faces, wanted(k), sight, target(k) + self%offset &
             + self%sagitta(wanted(k)), self%scale(wanted(k)), item(k))
          item(k)%size = self%state(wanted(k))%size
+         if (.not. item(k)%has_friction) cycle
+         call condition_resize_slip(item(k))
+         call mortar_slip_add(self%slide, self%faces, wanted(k), sight%slip, mortar_slave_direction( &
+            self%faces, self%faces%sides%slave%node, wanted(k), x, u0), item(k))
       end do
    end subroutine mortar_evaluate
+
+   !> As `contact_t` has it.
+   pure function mortar_slip(self, i, x, u0, du) result(slip)
+      class(mortar_space_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      real(wp) :: slip(size(x, 1) - 1)           !! [L]
+
+      slip = 0.0_wp
+      if (allocated(self%slide)) slip = mortar_slip_of(self%slide, self%faces, i, x, u0, du)
+   end function mortar_slip
 
    !> The multipliers are forces by the scale of their constraints.
    pure subroutine mortar_area(self, x, u, area, length)

@@ -7,6 +7,7 @@ module emcon_mortar_sum_space
    use emcon_kinds, only : wp
    use emcon_mortar_faces_space, only : mortar_faces_t
    use emcon_mortar_slave_space, only : mortar_slave_weight
+   use emcon_mortar_slip_space, only : slip_sight_t
    use emcon_patch_gap_space, only : patch_gap_of, patch_gap_t, patch_open, patch_open_cover, &
       patch_open_t
    use emcon_patch_look_space, only : patch_t
@@ -26,6 +27,7 @@ module emcon_mortar_sum_space
       type(patch_gap_t) :: cover                      !! what of it is covered, of an area of 1/2
       logical :: is_full = .false.                    !! its facet is covered, but for round-off
       logical :: is_blended = .false.                 !! between the linear multipliers and the dual
+      type(slip_sight_t) :: slip                      !! with friction
    end type sight_t
 
 contains
@@ -154,10 +156,11 @@ contains
          n = 1
          do pass = 1, 2
             do k = 1, size(triangle)
-               associate (stencil => self%stencil(triangle(k)), open => sight(triangle(k))%open)
-                  if (open%n_vertex == 0) cycle
+               associate (stencil => self%stencil(triangle(k)), vertex => seen_by( &
+                     sight(triangle(k))))
+                  if (size(vertex) == 0) cycle
                   associate (is_slave => [(m <= stencil%n_slave, m = 1, stencil%n_node)], &
-                        is_used => patch_uses(stencil, open%vertex(:open%n_vertex)))
+                        is_used => patch_uses(stencil, vertex))
                      call nodes_append(pack(stencil%node(:stencil%n_node), is_used .and. &
                         (is_slave .eqv. pass == 1)), list, n)
                   end associate
@@ -169,5 +172,15 @@ contains
       call condition_start(item, list(:n), self%sides%slave%n_dim)
       item%is_mean = .true.
    end subroutine begin_condition
+
+   !> The vertices of a stencil that gap or slip depend on.
+   pure function seen_by(sight) result(vertex)
+      type(sight_t), intent(in) :: sight
+      integer, allocatable :: vertex(:)
+
+      allocate(vertex(0))
+      if (sight%open%n_vertex > 0) vertex = sight%open%vertex(:sight%open%n_vertex)
+      if (allocated(sight%slip%vertex)) vertex = [vertex, sight%slip%vertex]
+   end function seen_by
 
 end module emcon_mortar_sum_space

@@ -8,7 +8,7 @@ module emcon_patch_look_space
    implicit none
    private
    public :: patch_t, place_vertices, patch_look_t, patch_look, patch_basis_t, patch_basis, &
-      patch_shares
+      patch_shares, patch_cells
 
    !> Places at which a field is given, in the coordinates of the patch.
    real(wp), parameter, public :: unit_corner(2, 3) = reshape([0.0_wp, 0.0_wp, 1.0_wp, 0.0_wp, &
@@ -90,6 +90,30 @@ contains
       end do
       if (any(share > 0.0_wp)) share = share/sum(share)
    end function patch_shares
+
+   !> What each triangle covers of the patch of a slave facet, as much of it as it has of the field
+   !> there: the integrals of products of the weights that are 1 at one of the `unit_corner`.
+   pure subroutine patch_cells(patch, x, products, area)
+      type(patch_t), intent(in) :: patch         !! that looks
+      real(wp), intent(in) :: x(:, :)            !! (3, 3 + n_vertex) origin, frame, vertices [L]
+      real(wp), intent(out) :: products(:, :, :) !! (3, 3, n_triangle) [L^2]
+      real(wp), intent(out) :: area              !! of the patch [L^2]
+      real(wp) :: place(3, patch%n_vertex), middle(3)
+      integer :: k
+
+      call place_vertices(patch, x, place)
+      area = 0.5_wp*frame_size(x(:, :3))
+      products = 0.0_wp
+      do k = 1, patch%n_triangle
+         associate (t => patch%triangle(:, k), own => products(:, :, k))
+            if (patch_misses(patch%area, place(:2, t))) cycle
+            own = 2.0_wp*area*patch_products(patch%area, place(:2, t))
+            if (all(patch%chi(t) >= 1.0_wp) .or. .not. sum(own) > 0.0_wp) cycle
+            middle = sum(own, 1)/sum(own)
+            own = dot_product(patch%chi(t), barycentric(place(:2, t), middle(2:)))*own
+         end associate
+      end do
+   end subroutine patch_cells
 
    !> What a patch of a slave facet sees at both ends of a step, with each of the weights that are 1
    !> at one of the `unit_corner` and 0 at the others.

@@ -23,6 +23,7 @@ program main
    use test_edge_pair, only : collect_edge_pair
    use test_kept_factor, only : collect_kept_factor
    use test_cholmod, only : collect_cholmod
+   use test_contact_slips_space, only : collect_contact_slips_space
    use test_slips_space, only : collect_slips_space
    use test_supernodal, only : collect_supernodal
 #endif
@@ -236,6 +237,7 @@ program main
    call run("critical_step", collect_critical_step)
    call run("csr", collect_csr)
    call run("edge_pair", collect_edge_pair)
+   call run("contact_slips_space", collect_contact_slips_space)
    call run("slips_space", collect_slips_space)
    call run("triple_product", collect_triple_product)
    call run("row_elimination", collect_row_elimination)

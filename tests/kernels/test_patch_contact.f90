@@ -1,11 +1,11 @@
 !> Contact of nodes in space, and mortar, over stencils of meshes: gaps, identities, momenta, derivatives, ends.
 module test_patch_contact
+   use box_contacts, only : box_kind => kind, draw, evaluate, look, make_boxes, seen
    use check, only : check_near, check_true, test_case_t
    use emcon_constraint, only : condition_t
    use emcon_contact, only : contact_t
-   use emcon_contact_registry, only : new_contact
    use emcon_errors, only : error_t
-   use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts
+   use emcon_interactions, only : contact_pair_t
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_patch_contact_space, only : patch_contact_init, patch_contact_t
@@ -23,7 +23,6 @@ module test_patch_contact
    !> What closing terms leave out as round-off: 16 epsilon of a field that falls over a twentieth of a
    !> facet, by the least that is covered, 1/50; of four triangles with multipliers of up to 3.
    real(wp), parameter :: left_out = 16.0_wp*eps*20.0_wp*50.0_wp*4.0_wp*3.0_wp
-   character(len=4), parameter :: kind(2) = ["C3D8", "C3D4"]
 
 contains
 
@@ -54,32 +53,6 @@ contains
       if (.not. allocated(error)) call contact%suit_steps(.false.)
    end subroutine make
 
-   !> Two boxes of cells of 1/3, the upper one `gap` above the other and moved by `shift` from it.
-   subroutine make_boxes(name, gap, shift, depth, scene, pair)
-      character(len=*), intent(in) :: name
-      real(wp), intent(in) :: gap, shift(2), depth
-      type(scene_t), intent(out) :: scene
-      type(contact_pair_t), intent(out) :: pair
-      type(surface_t) :: surface(2), all_of_it
-      integer :: n
-
-      call space_begin(scene)
-      call add_box(scene, name, [shift, gap], [1.0_wp, 1.0_wp, 1.0_wp], [3, 3, 3])
-      n = size(scene%element%kind)
-      call add_box(scene, name, [0.0_wp, 0.0_wp, -depth], [1.0_wp, 1.0_wp, depth], [3, 3, 1])
-      all_of_it = skin(scene)
-      surface = all_of_it
-      surface(1)%element = pack(all_of_it%element, all_of_it%element <= n)
-      surface(1)%face = pack(all_of_it%face, all_of_it%element <= n)
-      surface(2)%element = pack(all_of_it%element, all_of_it%element > n)
-      surface(2)%face = pack(all_of_it%face, all_of_it%element > n)
-      scene%surface = surface
-      allocate(scene%u0, mold=scene%x)
-      scene%u0 = 0.0_wp
-      pair%slave = 1
-      pair%master = 2
-   end subroutine make_boxes
-
    !> Every node of the lower side sees the top; no other node sees anything within reach.
    subroutine test_flat(error)
       type(error_t), allocatable, intent(out) :: error
@@ -90,7 +63,7 @@ contains
 
       do j = 1, 2
          do k = 1, size(gap)
-            call make(kind(j), gap(k), [0.0_wp, 0.0_wp], 0.7_wp, scene, contact, error)
+            call make(box_kind(j), gap(k), [0.0_wp, 0.0_wp], 0.7_wp, scene, contact, error)
             if (allocated(error)) return
             call look(contact, scene, 0.0_wp*scene%x)
             do i = 1, contact%n_constraint
@@ -101,24 +74,13 @@ contains
                      call check_true(error, count(contact%state%is_over .and. &
                         contact%node == contact%node(i)) == 1, "one of its frames is over it")
                      if (state%is_over) call check_near(error, [state%gap0, state%gap1], &
-                        [gap(k), gap(k)], tol, 1.0_wp, kind(j) // " " // to_text(i))
+                        [gap(k), gap(k)], tol, 1.0_wp, box_kind(j) // " " // to_text(i))
                   end if
                end associate
             end do
          end do
       end do
    end subroutine test_flat
-
-   !> Begin a step and measure.
-   subroutine look(contact, scene, du)
-      class(contact_t), intent(inout) :: contact
-      type(scene_t), intent(in) :: scene
-      real(wp), intent(in), contiguous :: du(:, :)
-
-      contact%reach = 0.0_wp
-      call contact%begin_step(scene%x, scene%u0, du)
-      call contact%measure(scene%x, scene%u0, du)
-   end subroutine look
 
    !> A plate of a tenth of a facet: the lower side, as near, faces away.
    subroutine test_thin(error)
@@ -186,62 +148,6 @@ contains
          call check_true(error, seen == 2, "both lower corners see the wall: " // to_text(seen))
       end associate
    end subroutine test_hole
-
-   !> A rough scene and a step in which it slides, turns and is bent.
-   subroutine draw(number, size_of, scene, du, contact, error)
-      integer, intent(in) :: number              !! odd or even, and that of its half, choose kinds
-      real(wp), intent(in) :: size_of
-      type(scene_t), intent(out) :: scene
-      real(wp), allocatable, intent(out) :: du(:, :)
-      class(contact_t), allocatable, intent(out) :: contact
-      type(error_t), allocatable, intent(out) :: error
-      type(contact_pair_t) :: pair
-      real(wp) :: turn(3, 3), way(2)
-
-      call draw_random(way)
-      call make_boxes(kind(1 + mod(number, 2)), 0.02_wp, 0.4_wp*way, 0.7_wp, scene, pair)
-      pair%formulation = merge(formulation_nts, formulation_mortar, btest(number, 1))
-      call new_contact(scene, pair, contact, error)
-      if (allocated(error)) return
-      call contact%suit_steps(.false.)
-      allocate(du, mold=scene%x)
-      call draw_random(du)
-      scene%u0 = 0.03_wp*(2.0_wp*du - 1.0_wp)
-      call draw_random(du)
-      turn = 0.0_wp
-      turn(1, 2) = -size_of
-      turn(2, 1) = size_of
-      turn(1, 3) = 0.5_wp*size_of
-      turn(3, 1) = -0.5_wp*size_of
-      du = 0.1_wp*size_of*(2.0_wp*du - 1.0_wp) + matmul(turn, scene%x)
-      associate (last => 64)
-         du(1, :last) = du(1, :last) + size_of
-      end associate
-   end subroutine draw
-
-   !> The conditions of the nodes that are over the master.
-   subroutine evaluate(contact, scene, du, leaves_second, wanted, item)
-      class(contact_t), intent(inout) :: contact
-      type(scene_t), intent(in) :: scene
-      real(wp), intent(in), contiguous :: du(:, :)
-      logical, intent(in) :: leaves_second
-      integer, intent(in) :: wanted(:)
-      type(condition_t), allocatable, intent(out) :: item(:)
-      integer :: i
-
-      allocate(item(size(wanted)))
-      item%leaves_second = leaves_second
-      call contact%evaluate(wanted, scene%x, scene%u0, du, [(0.01_wp, i = 1, size(wanted))], item)
-   end subroutine evaluate
-
-   !> Those that are over the master at either end.
-   function seen(contact) result(wanted)
-      class(contact_t), intent(in) :: contact
-      integer, allocatable :: wanted(:)
-      integer :: i
-
-      wanted = pack([(i, i = 1, contact%n_constraint)], contact%state%is_near)
-   end function seen
 
    subroutine test_identity(error)
       type(error_t), allocatable, intent(out) :: error

@@ -1,0 +1,362 @@
+!> Slip of mortar contact in space over a step: how slave facets go over what they cover, in the
+!> mean with the weight of each of their vertices.
+!>
+!> Over each triangle of the master it is the slip of nodes, of the points of the slave's triangle
+!> above it, with the weights that the gap gives them; these are kept over the step. Source:
+!> docs/theory.md, section 15.3.
+module emcon_mortar_slip_space
+   use emcon_constraint, only : condition_t, most_slips
+   use emcon_frame_slip_space, only : frame_slip, frame_slip_t
+   use emcon_kinds, only : wp
+   use emcon_mortar_faces_space, only : mortar_faces_t
+   use emcon_mortar_slave_space, only : mortar_slave_direction, mortar_slave_weight
+   use emcon_node_sums, only : node_sums_first, node_sums_second
+   use emcon_patch_look_space, only : patch_cells
+   use emcon_patch_stencil_space, only : patch_stencil_gather, patch_stencil_t
+   implicit none
+   private
+   public :: mortar_slip_t, mortar_slip_choose, mortar_slip_shift, mortar_slip_of, &
+      slip_sight_t, mortar_slip_sight, mortar_slip_add
+
+   !> What the slip of a slave triangle is made of in a step: cells, where triangles of the master
+   !> are below it.
+   type :: mortar_slip_t
+      real(wp) :: theta = 0.0_wp                 !! how dual the multipliers of its facet are
+      integer, allocatable :: vertex(:, :)       !! (3, n_cell) of its stencil, those of each
+      integer, allocatable :: point(:, :)        !! (as `vertex`) of the master
+      !> (3, 3, n_cell) integrals of products of the weights that are 1 at one corner [L^2]
+      real(wp), allocatable :: products(:, :, :)
+   end type mortar_slip_t
+
+   !> Where the vertices of a triangle's stencil are.
+   type :: slip_sight_t
+      integer, allocatable :: vertex(:)          !! of the stencil, all that slip is over
+      real(wp), allocatable :: at(:, :), way(:, :)   !! of `patch_stencil_gather` [L]
+   end type slip_sight_t
+
+   !> The triangles of the master that a constraint slides over: frames, and the sum of ways from
+   !> their origins to points of the slave by weights.
+   type :: slip_cells_t
+      integer :: n = 0
+      integer, allocatable :: point(:, :)        !! (3, >= n)
+      real(wp), allocatable :: at(:, :, :), way(:, :, :)   !! (3, 4, >= n) as `frame_slip` [L]
+      real(wp), allocatable :: weight(:, :, :)   !! (3, n_node, >= n) of nodes in these vectors
+   end type slip_cells_t
+
+contains
+
+   !> What slips of the triangles of the slave are made of over a motion, with the weights of gaps:
+   !> the mean of those at its start and its end, or those at its end.
+   pure subroutine mortar_slip_choose(self, faces, x, u0, du, is_at_end)
+      type(mortar_slip_t), intent(inout) :: self(:)   !! (n_triangle)
+      type(mortar_faces_t), intent(in) :: faces       !! with their stencils
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      logical, intent(in) :: is_at_end                !! forces act at the end of the motion alone
+      real(wp) :: part, covered
+      integer :: f, t
+
+      do f = 1, faces%sides%slave%n_facet
+         associate (first => faces%split%start(f), last => faces%split%start(f + 1) - 1)
+            part = 0.0_wp
+            do t = first, last
+               call choose_triangle(self(t), faces%stencil(t), x, u0, du, is_at_end, covered)
+               part = part + covered/real(last - first + 1, wp)
+            end do
+            self(first:last)%theta = merge(part**3, 0.0_wp, faces%is_dual)
+         end associate
+      end do
+   end subroutine mortar_slip_choose
+
+   !> That of one triangle; none where nothing is near it.
+   pure subroutine choose_triangle(self, stencil, x, u0, du, is_at_end, covered)
+      type(mortar_slip_t), intent(inout) :: self
+      type(patch_stencil_t), intent(in) :: stencil
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
+      logical, intent(in) :: is_at_end
+      real(wp), intent(out) :: covered           !! a part of its area
+      real(wp), dimension(3, 3 + stencil%patch%n_vertex) :: at, way
+      real(wp), dimension(3, 3, stencil%patch%n_triangle) :: products, start
+      real(wp) :: area(2)
+      integer, allocatable :: cell(:)
+      integer :: k
+
+      products = 0.0_wp
+      area = 0.0_wp
+      covered = 0.0_wp
+      if (stencil%triangle > 0) then
+         call patch_stencil_gather(stencil, x, u0, du, at, way)
+         call patch_cells(stencil%patch, at + way, products, area(1))
+         if (.not. is_at_end) then
+            call patch_cells(stencil%patch, at, start, area(2))
+            products = 0.5_wp*(products + start)
+            area(1) = 0.5_wp*sum(area)
+         end if
+         if (area(1) > 0.0_wp) covered = sum(products)/area(1)
+      end if
+      cell = pack([(k, k = 1, size(products, 3))], &
+         [(sum(products(:, :, k)) > 0.0_wp, k = 1, size(products, 3))])
+      self%products = products(:, :, cell)
+      if (size(cell) == 0) then
+         self%vertex = reshape(cell, [3, 0])
+         self%point = self%vertex
+      else
+         self%vertex = stencil%patch%triangle(:, cell)
+         self%point = reshape(stencil%point([self%vertex]), shape(self%vertex))
+      end if
+   end subroutine choose_triangle
+
+   !> The integrals of the multiplier of constraint place `k` over the cells of its triangle, with
+   !> the weights that are 1 at one corner of that.
+   pure function moments_of(self, faces, k) result(moment)
+      type(mortar_slip_t), intent(in) :: self(:)
+      type(mortar_faces_t), intent(in) :: faces
+      integer, intent(in) :: k
+      real(wp) :: moment(3, size(self(faces%triangle(k))%vertex, 2))
+      integer :: c
+
+      associate (own => self(faces%triangle(k)))
+         do c = 1, size(moment, 2)
+            moment(:, c) = matmul(own%products(:, :, c), mortar_slave_weight(faces, k, own%theta))
+         end do
+      end associate
+   end function moments_of
+
+   !> What of the facets at constraint `i` is covered, with its weight [L^2].
+   pure real(wp) function total_of(self, faces, i) result(total)
+      type(mortar_slip_t), intent(in) :: self(:)
+      type(mortar_faces_t), intent(in) :: faces
+      integer, intent(in) :: i                   !! 1..n_constraint
+      integer :: k
+
+      total = 0.0_wp
+      do k = faces%start(i), faces%start(i + 1) - 1
+         total = total + sum(moments_of(self, faces, k))
+      end do
+   end function total_of
+
+   !> How much of the slip of constraint `i` is over other triangles of the master by one choice
+   !> than by the one before.
+   pure real(wp) function mortar_slip_shift(self, before, faces, i) result(shift)
+      type(mortar_slip_t), intent(in) :: self(:), before(:)
+      type(mortar_faces_t), intent(in) :: faces
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp) :: total, old_total
+      integer :: c, k, old
+
+      shift = 0.0_wp
+      total = total_of(self, faces, i)
+      old_total = total_of(before, faces, i)
+      if (.not. min(total, old_total) > 0.0_wp) return
+      do k = faces%start(i), faces%start(i + 1) - 1
+         associate (now => self(faces%triangle(k))%point, was => before(faces%triangle(k))%point, &
+               part => sum(moments_of(self, faces, k), 1)/total, &
+               old_part => sum(moments_of(before, faces, k), 1)/old_total)
+            ! Half of what comes and half of what goes.
+            do c = 1, size(part)
+               old = find_cell(was, now(:, c))
+               if (old > 0) shift = shift + 0.5_wp*abs(part(c) - old_part(old))
+               if (old == 0) shift = shift + 0.5_wp*abs(part(c))
+            end do
+            do c = 1, size(old_part)
+               if (find_cell(now, was(:, c)) == 0) shift = shift + 0.5_wp*abs(old_part(c))
+            end do
+         end associate
+      end do
+   end function mortar_slip_shift
+
+   !> The cell over some points; 0: none.
+   pure integer function find_cell(list, point) result(c)
+      integer, intent(in) :: list(:, :), point(3)
+
+      do c = size(list, 2), 1, -1
+         if (all(list(:, c) == point)) return
+      end do
+   end function find_cell
+
+   !> Where the vertices below a triangle are.
+   pure subroutine mortar_slip_sight(self, stencil, x, u0, du, sight)
+      type(mortar_slip_t), intent(in) :: self
+      type(patch_stencil_t), intent(in) :: stencil
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      type(slip_sight_t), intent(out) :: sight
+      integer :: j
+
+      if (size(self%vertex) == 0) return
+      associate (n => stencil%patch%n_vertex)
+         allocate(sight%at(3, 3 + n), sight%way(3, 3 + n))
+         call patch_stencil_gather(stencil, x, u0, du, sight%at, sight%way)
+         sight%vertex = pack([(j, j = 1, n)], [(any(self%vertex == j), j = 1, n)])
+      end associate
+   end subroutine mortar_slip_sight
+
+   !> Add the cells of place `k` of a constraint, as triangle `t` of the slave sees them, to those
+   !> of the places before it: of one triangle of the master the ways to all points of the slave
+   !> are summed up, as slip is linear in them.
+   pure subroutine add_cells(cells, self, stencil, sight, moment, node)
+      type(slip_cells_t), intent(inout) :: cells
+      type(mortar_slip_t), intent(in) :: self
+      type(patch_stencil_t), intent(in) :: stencil
+      type(slip_sight_t), intent(in) :: sight
+      real(wp), intent(in) :: moment(:, :)       !! (3, n_cell) of `moments_of`, by the total
+      integer, intent(in) :: node(:)             !! (n_node) of the condition; none: no weights
+      integer :: c, j, place(stencil%n_node)
+
+      place = 0
+      if (size(node) > 0) place = [(findloc(node, stencil%node(j), 1), j = 1, stencil%n_node)]
+      do c = 1, size(moment, 2)
+         call add_cell(cells, self, stencil, sight, place, c, [moment(2:, c) &
+            - sum(moment(:, c))/3.0_wp, -sum(moment(:, c))])
+      end do
+   end subroutine add_cells
+
+   !> Add cell `c` of a triangle of the slave.
+   pure subroutine add_cell(cells, self, stencil, sight, place, c, part)
+      type(slip_cells_t), intent(inout) :: cells
+      type(mortar_slip_t), intent(in) :: self
+      type(patch_stencil_t), intent(in) :: stencil
+      type(slip_sight_t), intent(in) :: sight
+      integer, intent(in) :: place(:)            !! of nodes of the stencil in the condition; 0: none
+      integer, intent(in) :: c
+      !> Of both vectors of the slave's triangle, from whose middle ways count, and of the first
+      !> corner of the master's
+      real(wp), intent(in) :: part(3)
+      real(wp) :: own(3)
+      integer :: l, m, column(3)
+      logical :: is_new
+
+      m = 0
+      ! Flanges are made of what one triangle of the slave sees.
+      if (all(self%point(:, c) > 0)) m = find_cell(cells%point(:, :cells%n), self%point(:, c))
+      is_new = m == 0
+      if (is_new) then
+         cells%n = cells%n + 1
+         m = cells%n
+         cells%point(:, m) = self%point(:, c)
+      end if
+      associate (v => self%vertex(:, c), at => cells%at(:, :, m), way => cells%way(:, :, m), &
+            weight => cells%weight(:, :, m))
+         column = [1, 2, 2 + v(1)]
+         if (is_new) then
+            at(:, 2:3) = sight%at(:, 3 + v(2:)) - spread(sight%at(:, 3 + v(1)), 2, 2)
+            way(:, 2:3) = sight%way(:, 3 + v(2:)) - spread(sight%way(:, 3 + v(1)), 2, 2)
+         end if
+         do l = 1, 3
+            at(:, 4) = at(:, 4) + part(l)*sight%at(:, 1 + column(l))
+            way(:, 4) = way(:, 4) + part(l)*sight%way(:, 1 + column(l))
+         end do
+         if (size(weight, 2) == 0) return
+         do l = 2, stencil%n_node
+            own(3) = dot_product(part, stencil%weight(l, column))
+            own(:2) = 0.0_wp
+            if (is_new) own(:2) = stencil%weight(l, 2 + v(2:)) - stencil%weight(l, 2 + v(1))
+            if (all(abs(own) <= 0.0_wp)) cycle
+            ! Ways count from the first node of a stencil.
+            weight(:, place(l)) = weight(:, place(l)) + own
+            weight(:, place(1)) = weight(:, place(1)) - own
+         end do
+      end associate
+   end subroutine add_cell
+
+   !> Room for the cells of constraint `i`.
+   pure subroutine begin_cells(cells, self, faces, i, n_node)
+      type(slip_cells_t), intent(out) :: cells
+      type(mortar_slip_t), intent(in) :: self(:)
+      type(mortar_faces_t), intent(in) :: faces
+      integer, intent(in) :: i, n_node
+      integer :: k, most
+
+      most = 0
+      do k = faces%start(i), faces%start(i + 1) - 1
+         most = most + size(self(faces%triangle(k))%vertex, 2)
+      end do
+      allocate(cells%point(3, most), source=0)
+      allocate(cells%at(3, 4, most), cells%way(3, 4, most), cells%weight(3, n_node, most), &
+         source=0.0_wp)
+   end subroutine begin_cells
+
+   !> The slip of constraint `i` [L].
+   pure function mortar_slip_of(self, faces, i, x, u0, du) result(slip)
+      type(mortar_slip_t), intent(in) :: self(:)
+      type(mortar_faces_t), intent(in) :: faces
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      real(wp) :: slip(most_slips)
+      integer, parameter :: no_node(0) = 0
+      real(wp) :: along(3), total
+      type(slip_sight_t) :: sight
+      type(slip_cells_t) :: cells
+      type(frame_slip_t) :: cell
+      integer :: c, k
+
+      slip = 0.0_wp
+      total = total_of(self, faces, i)
+      if (.not. total > 0.0_wp) return
+      along = mortar_slave_direction(faces, faces%sides%slave%node, i, x, u0)
+      call begin_cells(cells, self, faces, i, 0)
+      do k = faces%start(i), faces%start(i + 1) - 1
+         associate (t => faces%triangle(k))
+            call mortar_slip_sight(self(t), faces%stencil(t), x, u0, du, sight)
+            call add_cells(cells, self(t), faces%stencil(t), sight, moments_of(self, faces, k) &
+               /total, no_node)
+         end associate
+      end do
+      do c = 1, cells%n
+         call frame_slip(cells%at(:, :, c), cells%way(:, :, c), along, .true., cell)
+         slip = slip + cell%f
+      end do
+   end function mortar_slip_of
+
+   !> Add the slip of constraint `i` and its derivatives to its condition, which has all nodes of
+   !> it, and room for slip.
+   pure subroutine mortar_slip_add(self, faces, i, sight, along, item)
+      type(mortar_slip_t), intent(in) :: self(:)
+      type(mortar_faces_t), intent(in) :: faces
+      integer, intent(in) :: i                   !! 1..n_constraint
+      type(slip_sight_t), intent(in) :: sight(:) !! (n_triangle)
+      real(wp), intent(in) :: along(3)           !! of `mortar_slave_direction`
+      type(condition_t), intent(inout) :: item
+      type(slip_cells_t) :: cells
+      type(frame_slip_t) :: cell
+      real(wp) :: total
+      integer :: c, k
+
+      total = total_of(self, faces, i)
+      if (.not. total > 0.0_wp) return
+      call begin_cells(cells, self, faces, i, item%n_node)
+      do k = faces%start(i), faces%start(i + 1) - 1
+         associate (t => faces%triangle(k))
+            call add_cells(cells, self(t), faces%stencil(t), sight(t), moments_of(self, faces, k) &
+               /total, item%node(:item%n_node))
+         end associate
+      end do
+      do c = 1, cells%n
+         call frame_slip(cells%at(:, :, c), cells%way(:, :, c), along, item%leaves_second, cell)
+         call spread_cell(cell, cells%weight(:, :, c), item)
+      end do
+   end subroutine mortar_slip_add
+
+   !> Add that of one triangle of the master, of ways with these weights of the nodes: their sums
+   !> are 0, so that of the first node says nothing more.
+   pure subroutine spread_cell(slip, weight, item)
+      type(frame_slip_t), intent(in) :: slip
+      real(wp), intent(in) :: weight(:, :)       !! (3, n_node)
+      type(condition_t), intent(inout) :: item
+      logical :: is_used(size(weight, 2))
+      integer :: j, s
+
+      is_used = any(abs(weight) > 0.0_wp, 1)
+      is_used(1) = .true.
+      associate (place => pack([(j, j = 1, size(is_used))], is_used))
+         associate (own => transpose(weight(:, place(2:))))
+            do s = 1, size(slip%f)
+               item%slip(s) = item%slip(s) + slip%f(s)
+               call node_sums_first(slip%g(:, s), own, 1.0_wp, place, item%t(:, :, s))
+               call node_sums_first(slip%c(:, s), own, 1.0_wp, place, item%t1(:, :, s))
+               if (.not. item%leaves_second) call node_sums_second(slip%h(:, :, s), own, 1.0_wp, &
+                  place, item%ht(:, :, s))
+            end do
+         end associate
+      end associate
+   end subroutine spread_cell
+
+end module emcon_mortar_slip_space

@@ -1,0 +1,189 @@
+!> Slips of contact in space over meshes, of nodes and of mortar: identities, momenta, rigid motions, a block that slides,
+!> derivatives.
+module test_contact_slips_space
+   use box_contacts, only : draw, evaluate, kind, look, make_boxes, seen
+   use check, only : check_near, check_true, test_case_t
+   use emcon_constraint, only : condition_normal, condition_t
+   use emcon_contact, only : contact_t
+   use emcon_contact_registry, only : new_contact
+   use emcon_errors, only : error_t
+   use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts
+   use emcon_kinds, only : wp
+   use emcon_scene, only : scene_t
+   use emcon_text, only : to_text
+   use random_draws, only : draw_random
+   implicit none
+   private
+   public :: collect_contact_slips_space
+
+   real(wp), parameter :: eps = epsilon(1.0_wp)
+   !> Some hundred roundings, of places by the least part of a vertex that is covered here, 1/50.
+   real(wp), parameter :: tol = 1.0e4_wp*eps
+   integer, parameter :: formulation(2) = [formulation_nts, formulation_mortar]
+
+contains
+
+   subroutine collect_contact_slips_space(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("identity and momenta", test_identity), &
+         test_case_t("rigid motions are no slip", test_rigid), &
+         test_case_t("a block that slides slips by its way", test_slide), &
+         test_case_t("derivatives against differences", test_derivatives)]
+   end subroutine collect_contact_slips_space
+
+   !> Forces along slips do the work of friction on them, and have neither resultant nor moment.
+   subroutine test_identity(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      class(contact_t), allocatable :: contact
+      type(condition_t), allocatable :: item(:)
+      real(wp), allocatable :: du(:, :)
+      real(wp) :: work, total(3), moment(3), magnitude
+      integer :: a, i, j, k, s
+
+      do k = 1, 24
+         call draw(k, 0.3_wp*0.09_wp**(k/4), scene, du, contact, error)
+         if (allocated(error)) return
+         call look(contact, scene, du)
+         associate (wanted => seen(contact))
+            call evaluate(contact, scene, du, .true., wanted, item, .true.)
+            call check_true(error, size(item) > 2, "nodes are over it")
+            do i = 1, size(item)
+               associate (slip => contact%slip(wanted(i), scene%x, scene%u0, du))
+                  call check_near(error, slip, item(i)%slip, tol, maxval(abs(du)), "slip")
+               end associate
+               do s = 1, 2
+                  work = 0.0_wp
+                  total = 0.0_wp
+                  moment = 0.0_wp
+                  magnitude = 0.0_wp
+                  do j = 1, item(i)%n_node
+                     a = item(i)%node(j)
+                     associate (g => item(i)%t(:, j, s), at => scene%x(:, a) + scene%u0(:, a) &
+                           + 0.5_wp*du(:, a))
+                        work = work + dot_product(g, du(:, a))
+                        total = total + g
+                        moment = moment + cshift(at, 1)*cshift(g, -1) - cshift(at, -1)*cshift(g, 1)
+                        magnitude = magnitude + sum(abs(g))
+                     end associate
+                  end do
+                  call check_near(error, work, item(i)%slip(s), tol, magnitude*maxval(abs(du)), &
+                     "identity " // to_text(k))
+                  call check_near(error, [total, moment], [(0.0_wp, j = 1, 6)], tol, magnitude, &
+                     "momenta " // to_text(k))
+               end do
+            end do
+         end associate
+      end do
+   end subroutine test_identity
+
+   !> All turn together, by up to half a turn.
+   subroutine test_rigid(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      class(contact_t), allocatable :: contact
+      real(wp), allocatable :: du(:, :)
+      real(wp) :: turn(3, 3), angle
+      integer :: i, k
+
+      do k = 1, 8
+         call draw(k, 0.1_wp, scene, du, contact, error)
+         if (allocated(error)) return
+         call look(contact, scene, du)
+         angle = 0.35_wp*real(k, wp)
+         turn = 0.0_wp
+         turn(1, 1:2) = [cos(angle), -sin(angle)]
+         turn(2, 1:2) = [sin(angle), cos(angle)]
+         turn(3, 3) = 1.0_wp
+         turn = turn([1, 3, 2], [1, 3, 2])
+         associate (at => scene%x + scene%u0)
+            du = matmul(turn, at) - at + 0.3_wp
+         end associate
+         do i = 1, contact%n_constraint
+            if (contact%state(i)%is_near) call check_near(error, contact%slip(i, scene%x, scene%u0, &
+               du), [0.0_wp, 0.0_wp], tol, 1.0_wp, to_text(k) // " " // to_text(i))
+         end do
+      end do
+   end subroutine test_rigid
+
+   !> Over a flat surface, over some of its facets and partly past its end, turned as a whole: each
+   !> vertex slips by the way in length, and a push presses with what friction acts with.
+   subroutine test_slide(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: way(2) = [0.35_wp, 0.2_wp]
+      type(scene_t) :: scene
+      type(contact_pair_t) :: pair
+      class(contact_t), allocatable :: contact
+      type(condition_t), allocatable :: item(:)
+      real(wp), allocatable :: du(:, :)
+      integer :: i, k
+
+      do k = 1, 4
+         call make_boxes(kind(1 + mod(k, 2)), 0.0_wp, [0.1_wp, 0.07_wp], 0.7_wp, scene, pair)
+         pair%interaction%friction = 0.3_wp
+         pair%formulation = formulation(merge(1, 2, k <= 2))
+         call new_contact(scene, pair, contact, error)
+         if (allocated(error)) return
+         call contact%suit_steps(.false.)
+         du = 0.0_wp*scene%x
+         du(:2, :64) = spread(way, 2, 64)
+         call look(contact, scene, du)
+         associate (wanted => pack([(i, i = 1, contact%n_constraint)], contact%state%is_over &
+               .and. .not. contact%state%is_arriving .and. abs(contact%state%gap0) < 0.01_wp))
+            call evaluate(contact, scene, du, .true., wanted, item, .true.)
+            call check_true(error, size(item) > 5, "nodes are over it")
+            do i = 1, size(item)
+               call check_near(error, norm2(item(i)%slip), norm2(way), tol, 1.0_wp, to_text(k) // &
+                  " slip of " // to_text(i))
+               call check_near(error, norm2(sum(item(i)%g(:, :item(i)%n_slave), 2)), &
+                  condition_normal(item(i)), tol, 1.0_wp, to_text(k) // " push of " // to_text(i))
+            end do
+         end associate
+      end do
+   end subroutine test_slide
+
+   !> Central differences err by the square of their way, beside round-off by it.
+   subroutine test_derivatives(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(scene_t) :: scene
+      class(contact_t), allocatable :: contact
+      type(condition_t), allocatable :: item(:), up(:), down(:)
+      real(wp), allocatable :: du(:, :), way(:, :)
+      real(wp) :: step, bound
+      integer :: i, k, n, s, n_seen
+
+      step = eps**(1.0_wp/3.0_wp)
+      bound = 1.0e3_wp*step**2
+      n_seen = 0
+      do k = 1, 8
+         call draw(k, 0.1_wp, scene, du, contact, error)
+         if (allocated(error)) return
+         call look(contact, scene, du)
+         way = 0.0_wp*du
+         call draw_random(way)
+         way = 2.0_wp*way - 1.0_wp
+         call evaluate(contact, scene, du, .false., seen(contact), item, .true.)
+         call evaluate(contact, scene, du + step*way, .true., seen(contact), up, .true.)
+         call evaluate(contact, scene, du - step*way, .true., seen(contact), down, .true.)
+         do i = 1, size(item)
+            n = item(i)%n_node
+            if (n /= up(i)%n_node .or. n /= down(i)%n_node) cycle
+            if (any(item(i)%node(:n) /= up(i)%node(:n))) cycle
+            n_seen = n_seen + 1
+            associate (by => reshape(way(:, item(i)%node(:n)), [3*n]))
+               do s = 1, 2
+                  call check_near(error, dot_product(reshape(item(i)%t1(:, :n, s), [3*n]), by), &
+                     (up(i)%slip(s) - down(i)%slip(s))/(2.0_wp*step), bound, 1.0_wp, "gradient")
+                  call check_near(error, matmul(item(i)%ht(:3*n, :3*n, s), by), reshape((up(i)%t(:, &
+                     :n, s) - down(i)%t(:, :n, s))/(2.0_wp*step), [3*n]), bound, &
+                     max(1.0_wp, maxval(abs(item(i)%ht(:3*n, :3*n, s)))), "second derivative")
+               end do
+            end associate
+         end do
+      end do
+      call check_true(error, n_seen > 40, "conditions on the same nodes")
+   end subroutine test_derivatives
+
+end module test_contact_slips_space
