@@ -1,16 +1,19 @@
 !> How two edges in space lie to each other and to the faces beside them: what tells whether they
 !> may meet, before where they cross is found. Source: docs/theory.md, section 15, after eq. (51).
 module emcon_edge_sight_space
-   use emcon_edge_pair_space, only : n_edge_pair_node
+   use emcon_edge_pair_space, only : crossing_t, n_edge_pair_node
    use emcon_kinds, only : wp
    use emcon_rotation, only : cross_product
    implicit none
    private
-   public :: is_outside, is_past_ends, length_of, look_between, unit
+   public :: begins_beyond, is_at_end, is_outside, is_past_ends, is_within
+   public :: length_of, look_between, normal_of, unit
 
    !> An edge holds what comes from between its faces, and from so much outside: the sine of that
    !> angle by the sine of that between the faces. Edges that lie on faces would be on the limit.
    real(wp), parameter :: beside = 0.25_wp
+   !> So far inside its ends, by its length, an edge begins to hold, as nodes hold there.
+   real(wp), parameter :: begins_beyond = -1.0e-3_wp
 
 contains
 
@@ -57,6 +60,33 @@ contains
       end associate
       if (.not. dot_product(direction, sum(normal, 2)) > 0.0_wp) within = -1.0_wp
    end subroutine look_between
+
+   !> Do edges cross within their ends, and `beyond` of their lengths past them?
+   pure logical function is_within(crossing, beyond)
+      type(crossing_t), intent(in) :: crossing
+      real(wp), intent(in) :: beyond
+
+      is_within = crossing%sine > 0.0_wp .and. all(crossing%place > -beyond .and. &
+         crossing%place < 1.0_wp + beyond)
+   end function is_within
+
+   !> Does an edge cross the other one at its last end, or hardly beside it?
+   pure logical function is_at_end(crossing)
+      type(crossing_t), intent(in) :: crossing
+
+      associate (place => crossing%place)
+         is_at_end = crossing%sine > 0.0_wp .and. abs(place(2) - 1.0_wp) <= -begins_beyond .and. &
+            place(1) > -begins_beyond .and. place(1) < 1.0_wp + begins_beyond
+      end associate
+   end function is_at_end
+
+   !> Normal to both edges, of any length.
+   pure function normal_of(at) result(normal)
+      real(wp), intent(in) :: at(3, n_edge_pair_node)        !! [L]
+      real(wp) :: normal(3)
+
+      normal = cross_product(at(:, 2) - at(:, 1), at(:, 4) - at(:, 3))
+   end function normal_of
 
    pure function unit(vector)
       real(wp), intent(in) :: vector(3)          !! any unit

@@ -134,7 +134,7 @@ contains
       end do
    end subroutine add_couple
 
-   !> Does a guard hold a node, one of corners or the other side of a pair?
+   !> Does a guard hold something: a node, of corners or of the other side of a pair, or an edge?
    pure logical function guards_act(system, set)
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
@@ -143,7 +143,7 @@ contains
       guards_act = .false.
       do k = set%n_permanent + 1, set%n
          call constraint_index(system, set%id(k), pair, i)
-         guards_act = guards_act .or. system%contact(pair)%contact%slack > 0.0_wp
+         guards_act = guards_act .or. system%contact(pair)%contact%waits(i)
       end do
    end function guards_act
 

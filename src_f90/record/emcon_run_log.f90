@@ -1,6 +1,6 @@
 !> What a run tells of itself: the lines of the log.
 module emcon_run_log
-   use emcon_guards, only : corner_slack, guard_slack
+   use emcon_guards, only : corner_slack, crossing_slack, guard_slack
    use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_segment, &
       normal_nodal, smoothing_none
    use emcon_kinds, only : wp
@@ -119,6 +119,7 @@ contains
       type(scene_t), intent(in) :: scene
       type(system_t), intent(in) :: system
       type(notes_t), intent(inout) :: notes
+      character(len=:), allocatable :: text
       logical :: has_guards
       integer :: k
 
@@ -129,12 +130,13 @@ contains
             has_guards = has_guards .or. contact%slack > 0.0_wp
             if (contact%slack > 0.0_wp .or. contact%n_constraint == 0) cycle
             if (pair%slave == pair%master) then
-               call note_add(notes, "contact: sharp edges of " // scene%surface(pair%slave)%name &
-                  // " that cross each other are held")
+               text = scene%surface(pair%slave)%name // " that cross each other"
             else
-               call note_add(notes, "contact: sharp edges of " // scene%surface(pair%slave)%name &
-                  // " and " // scene%surface(pair%master)%name // " that cross are held")
+               text = scene%surface(pair%slave)%name // " and " // &
+                  scene%surface(pair%master)%name // " that cross"
             end if
+            call note_add(notes, "contact: edges of " // text // " are held: sharp ones at " // &
+               "once, others from " // to_text(crossing_slack) // " of a face on")
          end associate
       end do
       if (has_guards) call note_add(notes, "contact: guards hold nodes that the pairs do not: " // &

@@ -1,7 +1,7 @@
 !> What a scene consists of, what of the program it needs and what not, and advice: the head of a
 !> log and what `emcon check` prints.
 module emcon_scene_report
-   use emcon_contact, only : gap_state_t
+   use emcon_contact, only : contact_t, gap_state_t
    use emcon_deck_dimension, only : n_plane
    use emcon_gaps, only : gaps_forget, gaps_search
    use emcon_interactions, only : contact_pair_t, pressure_hard
@@ -163,7 +163,7 @@ contains
       associate (scene => stepper%scene, system => stepper%march%system)
          is_dynamic = any(step_is_dynamic(scene%step))
          call choose("contact", size(system%contact) > 0, "no *CONTACT PAIR, no *CONTACT")
-         call choose("guards", any([(system%contact(k)%contact%slack > 0.0_wp, k = 1, &
+         call choose("guards", any([(has_guards(system%contact(k)%contact), k = 1, &
             size(system%contact))]), trim(no_guards(scene)))
          call add_first_contact(stepper, rows)
          call choose("ties and equations", system%space%linear%n > 0, &
@@ -217,6 +217,14 @@ contains
          end if
       end associate
    end function no_guards
+
+   !> Does a contact have constraints that wait for others?
+   pure logical function has_guards(contact)
+      class(contact_t), intent(in) :: contact
+      integer :: i
+
+      has_guards = any([(contact%waits(i), i = 1, contact%n_constraint)])
+   end function has_guards
 
    !> How contact begins in dynamic steps, and who says so.
    subroutine add_first_contact(stepper, rows)

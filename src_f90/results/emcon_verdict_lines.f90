@@ -117,7 +117,7 @@ contains
          call add_checked(self, march, lines)
          if (self%count%guarded > 0) then
             call guard_advice(scene%pair, text)
-            call note_add(lines, "guards hold nodes in " // to_text(self%count%guarded) // &
+            call note_add(lines, "guards act in " // to_text(self%count%guarded) // &
                " increments; to need none: " // text)
          end if
          if (self%stand_off%largest > rounding) call note_add(lines, &

@@ -11,8 +11,8 @@ module emcon_guards
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
    implicit none
    private
-   public :: guards_find, guard_slack, corner_slack, overlap_bar, overlap_told, touching_bar, &
-      crossing_bar
+   public :: guards_find, guard_slack, corner_slack, crossing_slack, overlap_bar, overlap_told, &
+      touching_bar, crossing_bar
 
    !> So far, by the edge, bodies may be in each other where nodes are held themselves.
    real(wp), parameter :: touching_bar = 1.0e-3_wp
@@ -21,6 +21,8 @@ module emcon_guards
    !> So far a node may go in: a corner, and any other one. Polygons of coarse curved surfaces, and
    !> gaps that are closed in the mean, stay above it.
    real(wp), parameter :: corner_slack = 0.8_wp*touching_bar, guard_slack = 0.05_wp
+   !> So far edges that are not sharp may cross, in space, by the smaller face at both.
+   real(wp), parameter :: crossing_slack = 0.8_wp*crossing_bar
    !> So far bodies may be in each other where gaps are closed in the mean, or on one side, with
    !> guards for the rest; more than half of what guards let in is told.
    real(wp), parameter :: overlap_bar = 1.1_wp*guard_slack, overlap_told = 0.5_wp*guard_slack

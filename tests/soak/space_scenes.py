@@ -30,6 +30,8 @@ PATIENCE = 60
 BALANCE = 1.0e-10
 #: What a program may leave out of an overlap, by the edge: it looks at facets, the judge too, by another way.
 UNSEEN = 1.0e-3
+#: What of the straight way of an increment may lead past a corner, by the edge (docs/theory.md, 4.11).
+CORNER = 0.1
 WAYS = ["", "", "", "*CONSTRAINT METHOD, TYPE=SADDLE POINT\n", "*CONSTRAINT METHOD, TYPE=PENALTY\n", "*NEWTON, TYPE=FULL\n"]
 
 
@@ -74,12 +76,16 @@ def scene(seed):
 
 
 def deepest_overlap(run):
-    """At the ends of increments, and on the straight ways between of those that were not cut: the parts of others, which no
-    file has, are not on these."""
+    """At the ends of increments, and past a corner on the straight ways between of those that were not cut: the parts of
+    others, which no file has, are not on these."""
     fields, bodies = run.fields(), overlap.bodies_of(run.fields())
     x = fields.x + fields["displacement"]
     cut = [i for i in range(1, len(x)) if run.history["cuts"][i] > 0]
-    return max(bodies.worst(x[a:b], fields.time[a:b]) for a, b in zip([0, *cut], [*cut, len(x)], strict=True))
+    found = []
+    for a, b in zip([0, *cut], [*cut, len(x)], strict=True):
+        at_frame, on_way = bodies.looks(x[a:b], fields.time[a:b])
+        found += at_frame + [look for look in on_way if look.by_edge > CORNER]
+    return max(found)
 
 
 def judge(run, _deck):
