@@ -29,9 +29,12 @@ module emcon_contact_problem
    !> comes the method of Lemke.
    integer, parameter :: first_trials = 60, few_trials = 10, more_trials = 20, first_sweeps = 20, &
       most_turns = 8, pivot_turn = 2
-   !> Parts of W that places give way by about the forces so far, and how often.
-   integer, parameter :: most_nearings = 30, few_nearings = 8
-   real(wp), parameter :: first_part = 1.0e-3_wp, largest_part = 10.0_wp
+   !> Blur of the map where a path to the solution begins, by the largest force, and what is left of
+   !> it in turn; each is followed until no more than this part of the blur is missed; the part of a
+   !> step's promise that it is to gain there; steps in all.
+   real(wp), parameter :: first_blur = 1.0e-2_wp, next_blur = 0.3_wp, on_path = 0.1_wp, &
+      path_gain = 1.0e-2_wp
+   integer, parameter :: most_path = 150
    !> Halvings of a step of Newton's method, and the part of what is foreseen that it is to gain.
    integer, parameter :: most_halvings = 12
    real(wp), parameter :: least_gain = 1.0e-4_wp
@@ -69,7 +72,7 @@ module emcon_contact_problem
 
    !> What a solution has cost.
    type :: contact_effort_t
-      integer :: n_trial = 0, n_sweep = 0, n_pivot = 0, n_near = 0
+      integer :: n_trial = 0, n_sweep = 0, n_pivot = 0, n_path = 0
    end type contact_effort_t
 
 contains
@@ -107,19 +110,19 @@ contains
       associate (has_pushes => .not. any(self%mu > 0.0_wp .or. self%hold(0, :) > 0.0_wp), &
             has_direction => self%n_slip > 1 .and. any(self%mu > 0.0_wp))
          call solve_by_trials(self, push, merge(few_trials, first_trials, has_pushes &
-            .or. has_direction), is_one_of_several, effort%n_trial, is_solved)
+            .or. has_direction), effort%n_trial, is_solved)
          if (is_solved .or. .not. has_compliance(self)) return
          if (has_pushes) call solve_by_pushes(self, push, effort%n_pivot, is_solved)
          if (is_solved) return
-         if (has_direction) call solve_by_nearing(self, push, effort, is_one_of_several, is_solved)
-         is_solved = is_solved .or. (is_one_of_several .and. effort%n_near > 0)
+         if (has_direction) call solve_by_path(self, push, effort%n_path, is_one_of_several, &
+            is_solved)
          if (is_solved) return
          n_turn = merge(1, most_turns, has_direction .and. is_one_of_several)
       end associate
       do turn = 1, n_turn
          call solve_by_sweeps(self, push, first_sweeps*2**(turn - 1), effort%n_sweep, is_solved)
          if (is_solved) return
-         call solve_by_trials(self, push, more_trials, .false., effort%n_trial, is_solved)
+         call solve_by_trials(self, push, more_trials, effort%n_trial, is_solved)
          if (is_solved) return
          if (turn /= pivot_turn .or. self%n_slip /= 1 .or. any(self%hold > 0.0_wp)) cycle
          call contact_problem_pivot(self, push, effort%n_pivot, is_solved)
@@ -131,7 +134,7 @@ contains
       call contact_problem_pivot(apart, push, effort%n_pivot, is_solved)
       if (.not. is_solved) return
       call take_back(self, push)
-      call solve_by_trials(self, push, more_trials, .false., effort%n_trial, is_solved)
+      call solve_by_trials(self, push, more_trials, effort%n_trial, is_solved)
    end subroutine contact_problem_solve
 
    !> The same places without what holds them: what moves freely is held by round-off's root of it.
@@ -272,7 +275,7 @@ contains
       real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
       real(wp) :: defect(0:self%n_slip, size(self%mu))
 
-      call natural_map(self, push, defect)
+      call natural_map(self, push, 0.0_wp, defect)
       missed = missed_by(self, push, defect)
       if (missed > 0.0_wp) missed = missed/max(maxval(abs(contact_problem_force(self, push))), &
          tiny(missed))
@@ -298,9 +301,10 @@ contains
    end function missed_by
 
    !> Forces less those that the natural map makes of them.
-   pure subroutine natural_map(self, push, defect, slope)
+   pure subroutine natural_map(self, push, blur, defect, slope)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
+      real(wp), intent(in) :: blur                   !! of the map, >= 0 [M L/T^2]
       real(wp), intent(out) :: defect(0:, :)         !! (0:n_slip, n) [M L/T^2]
       real(dp), intent(out), optional :: slope(:, :) !! of `defect` by y, proximal
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: motion, force
@@ -314,7 +318,7 @@ contains
       do i = 1, size(self%mu)
          stiffness = contact_problem_stiffness(self, i)
          call coulomb_map(trial_of(self, force(:, i), motion(:, i), i), self%mu(i), stiffness, &
-            mapped, by)
+            blur, mapped, by)
          defect(:, i) = force(:, i) - mapped(:self%n_slip)
          if (.not. present(slope)) cycle
          associate (row => m*(i - 1) + 1)
@@ -336,11 +340,10 @@ contains
 
    !> By Newton's method for the natural map. `push` stays as it was if that does not end. Where
    !> slip has a direction the second step in a row of which no part gains is the last one.
-   subroutine solve_by_trials(self, push, most, near_enough, n_trial, is_solved)
+   subroutine solve_by_trials(self, push, most, n_trial, is_solved)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
       integer, intent(in) :: most                    !! trials
-      logical, intent(in) :: near_enough             !! where it stalls `nearly_met` will do
       integer, intent(inout) :: n_trial              !! counted on
       logical, intent(out) :: is_solved
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: trial, defect, new, step
@@ -354,7 +357,7 @@ contains
       n_stall = 0
       do i = 0, most
          was_solved = is_solved
-         call natural_map(self, trial, defect, slope)
+         call natural_map(self, trial, 0.0_wp, defect, slope)
          missed = missed_by(self, trial, defect)
          largest = maxval(abs(contact_problem_force(self, trial)))
          is_solved = missed <= met*largest
@@ -369,14 +372,14 @@ contains
          part = 1.0_wp
          do halving = 0, most_halvings
             new = trial + part*step
-            call natural_map(self, new, defect)
+            call natural_map(self, new, 0.0_wp, defect)
             if (norm2(defect) <= (1.0_wp - least_gain*part)*before) exit
             part = 0.5_wp*part
          end do
          if (.not. norm2(defect) < huge(before)) exit
          n_stall = merge(0, n_stall + 1, part > no_part .or. self%n_slip < 2)
          if (n_stall == most_stalls) then
-            is_solved = near_enough .and. missed <= nearly_met*largest
+            is_solved = .false.
             exit
          end if
          trial = new
@@ -416,49 +419,50 @@ contains
       x(row) = step(:, 1)
    end subroutine find_step
 
-   !> By trials of places that give way by a part of their own W about the forces so far, over and
-   !> over: forces that follow from others stay as near as can be to those before. The part grows
-   !> where the trials do not end, and falls where they do; where near enough will do not to what
-   !> they have failed at.
-   subroutine solve_by_nearing(self, push, effort, near_enough, is_solved)
+   !> Along a path to the solution from far inside of what the laws allow: of forces that follow from
+   !> others it leads to those farthest from all limits, however far these are from those before.
+   !> Trials would creep there, as none of their steps goes past the next limit.
+   subroutine solve_by_path(self, push, n_step, near_enough, is_solved)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
-      type(contact_effort_t), intent(inout) :: effort    !! counted on
-      logical, intent(in) :: near_enough             !! a few nearings do
-      logical, intent(out) :: is_solved
-      type(contact_problem_t) :: near
-      real(wp) :: found(0:self%n_slip, size(self%mu)), part, more, least_part
-      integer :: i, k, row, round
-      logical :: has_ended
+      integer, intent(inout) :: n_step               !! counted on
+      logical, intent(in) :: near_enough             !! what is nearer than at the start will do
+      logical, intent(out) :: is_solved              !! else `push` is as it was
+      real(wp), dimension(0:self%n_slip, size(self%mu)) :: at, defect, new
+      real(dp) :: slope(size(push), size(push)), x(size(push))
+      real(wp) :: blur, before, missed, part
+      integer :: i, halving
+      logical :: is_singular
 
       is_solved = .false.
-      least_part = 0.0_wp
-      near = self
-      part = first_part
-      do round = 1, most_nearings
-         do i = 1, size(self%mu)
-            do k = 0, self%n_slip
-               row = (1 + self%n_slip)*(i - 1) + 1 + k
-               more = part*abs(self%w(row, row))
-               near%w(row, row) = self%w(row, row) + more
-               near%free(k, i) = self%free(k, i) - more*push(k, i)
-            end do
+      at = push
+      missed = contact_problem_missed(self, push)
+      blur = first_blur*maxval(abs(contact_problem_force(self, push)))
+      do i = 1, most_path
+         call natural_map(self, at, blur, defect, slope)
+         n_step = n_step + 1
+         call find_step(slope, reshape(real(-defect, dp), [size(push)]), x, is_singular)
+         if (is_singular) exit
+         before = norm2(defect)
+         part = 1.0_wp
+         do halving = 0, most_halvings
+            new = at + part*reshape(real(x, wp), shape(at))
+            call natural_map(self, new, blur, defect)
+            if (norm2(defect) <= (1.0_wp - path_gain*part)*before) exit
+            part = 0.5_wp*part
          end do
-         found = push
-         call solve_by_trials(near, found, more_trials, near_enough, effort%n_trial, has_ended)
-         if (has_ended) then
-            effort%n_near = effort%n_near + 1
-            push = found
-            is_solved = contact_problem_missed(self, push) <= merge(nearly_met, met, near_enough)
-            if (is_solved .or. (near_enough .and. effort%n_near == few_nearings)) return
-            part = max(least_part, 0.1_wp*part)
-         else
-            part = 10.0_wp*part
-            if (near_enough) least_part = part
-            if (part > largest_part) return
-         end if
+         if (.not. norm2(defect) < huge(before)) exit
+         at = new
+         if (maxval(abs(defect)) > on_path*blur) cycle
+         is_solved = contact_problem_missed(self, at) <= met
+         if (is_solved) exit
+         blur = next_blur*blur
+         if (.not. blur > tiny(blur)) exit
       end do
-   end subroutine solve_by_nearing
+      if (.not. is_solved) is_solved = contact_problem_missed(self, at) <= merge(max(nearly_met, &
+         missed), nearly_met, near_enough)
+      if (is_solved) push = at
+   end subroutine solve_by_path
 
    !> Contact by contact, each exactly with the pushes of the others, over and over.
    subroutine solve_by_sweeps(self, push, most, n_sweep, is_solved)
