@@ -29,12 +29,16 @@ module emcon_contact_problem
    !> comes the method of Lemke.
    integer, parameter :: first_trials = 60, few_trials = 10, more_trials = 20, first_sweeps = 20, &
       most_turns = 8, pivot_turn = 2
+   !> Parts of W that places give way by about the forces so far, and how often.
+   integer, parameter :: most_nearings = 30, few_nearings = 8
+   real(wp), parameter :: first_part = 1.0e-3_wp, largest_part = 10.0_wp
    !> Blur of the map where a path to the solution begins, by the largest force, and what is left of
    !> it in turn; each is followed until no more than this part of the blur is missed; the part of a
-   !> step's promise that it is to gain there; steps in all.
+   !> step's promise that it is to gain there; steps of which no more than this part does that lead
+   !> nowhere after so many in a row; steps in all.
    real(wp), parameter :: first_blur = 1.0e-2_wp, next_blur = 0.3_wp, on_path = 0.1_wp, &
-      path_gain = 1.0e-2_wp
-   integer, parameter :: most_path = 150
+      path_gain = 1.0e-2_wp, path_part = 0.03_wp
+   integer, parameter :: path_stalls = 4, most_path = 100
    !> Halvings of a step of Newton's method, and the part of what is foreseen that it is to gain.
    integer, parameter :: most_halvings = 12
    real(wp), parameter :: least_gain = 1.0e-4_wp
@@ -72,7 +76,7 @@ module emcon_contact_problem
 
    !> What a solution has cost.
    type :: contact_effort_t
-      integer :: n_trial = 0, n_sweep = 0, n_pivot = 0, n_path = 0
+      integer :: n_trial = 0, n_sweep = 0, n_pivot = 0, n_near = 0, n_path = 0
    end type contact_effort_t
 
 contains
@@ -114,8 +118,10 @@ contains
          if (is_solved .or. .not. has_compliance(self)) return
          if (has_pushes) call solve_by_pushes(self, push, effort%n_pivot, is_solved)
          if (is_solved) return
-         if (has_direction) call solve_by_path(self, push, effort%n_path, is_one_of_several, &
-            is_solved)
+         if (has_direction) call solve_by_path(self, push, effort%n_path, is_solved)
+         if (is_solved) return
+         if (has_direction) call solve_by_nearing(self, push, effort, is_one_of_several, is_solved)
+         is_solved = is_solved .or. (is_one_of_several .and. effort%n_near > 0)
          if (is_solved) return
          n_turn = merge(1, most_turns, has_direction .and. is_one_of_several)
       end associate
@@ -419,25 +425,69 @@ contains
       x(row) = step(:, 1)
    end subroutine find_step
 
+   !> By trials of places that give way by a part of their own W about the forces so far, over and
+   !> over: forces that follow from others stay as near as can be to those before. The part grows
+   !> where the trials do not end, and falls where they do; where near enough will do not to what
+   !> they have failed at.
+   subroutine solve_by_nearing(self, push, effort, near_enough, is_solved)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
+      type(contact_effort_t), intent(inout) :: effort    !! counted on
+      logical, intent(in) :: near_enough             !! a few nearings do
+      logical, intent(out) :: is_solved
+      type(contact_problem_t) :: near
+      real(wp) :: found(0:self%n_slip, size(self%mu)), part, more, least_part
+      integer :: i, k, row, round
+      logical :: has_ended
+
+      is_solved = .false.
+      least_part = 0.0_wp
+      near = self
+      part = first_part
+      do round = 1, most_nearings
+         do i = 1, size(self%mu)
+            do k = 0, self%n_slip
+               row = (1 + self%n_slip)*(i - 1) + 1 + k
+               more = part*abs(self%w(row, row))
+               near%w(row, row) = self%w(row, row) + more
+               near%free(k, i) = self%free(k, i) - more*push(k, i)
+            end do
+         end do
+         found = push
+         call solve_by_trials(near, found, more_trials, effort%n_trial, has_ended)
+         if (has_ended) then
+            effort%n_near = effort%n_near + 1
+            push = found
+            is_solved = contact_problem_missed(self, push) <= met
+            if (is_solved .or. (near_enough .and. effort%n_near == few_nearings)) return
+            part = max(least_part, 0.1_wp*part)
+         else
+            part = 10.0_wp*part
+            if (near_enough) least_part = part
+            if (part > largest_part) return
+         end if
+      end do
+   end subroutine solve_by_nearing
+
    !> Along a path to the solution from far inside of what the laws allow: of forces that follow from
    !> others it leads to those farthest from all limits, however far these are from those before.
    !> Trials would creep there, as none of their steps goes past the next limit.
-   subroutine solve_by_path(self, push, n_step, near_enough, is_solved)
+   subroutine solve_by_path(self, push, n_step, is_solved)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
       integer, intent(inout) :: n_step               !! counted on
-      logical, intent(in) :: near_enough             !! what is nearer than at the start will do
       logical, intent(out) :: is_solved              !! else `push` is as it was
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: at, defect, new
       real(dp) :: slope(size(push), size(push)), x(size(push))
-      real(wp) :: blur, before, missed, part
-      integer :: i, halving
+      real(wp) :: blur, before, part
+      integer :: i, halving, n_stall
       logical :: is_singular
 
       is_solved = .false.
       at = push
-      missed = contact_problem_missed(self, push)
-      blur = first_blur*maxval(abs(contact_problem_force(self, push)))
+      n_stall = 0
+      call natural_map(self, push, 0.0_wp, defect)
+      blur = first_blur*max(maxval(abs(contact_problem_force(self, push))), maxval(abs(defect)))
       do i = 1, most_path
          call natural_map(self, at, blur, defect, slope)
          n_step = n_step + 1
@@ -453,14 +503,14 @@ contains
          end do
          if (.not. norm2(defect) < huge(before)) exit
          at = new
+         n_stall = merge(0, n_stall + 1, part > path_part)
+         if (n_stall == path_stalls) exit
          if (maxval(abs(defect)) > on_path*blur) cycle
          is_solved = contact_problem_missed(self, at) <= met
          if (is_solved) exit
          blur = next_blur*blur
          if (.not. blur > tiny(blur)) exit
       end do
-      if (.not. is_solved) is_solved = contact_problem_missed(self, at) <= merge(max(nearly_met, &
-         missed), nearly_met, near_enough)
       if (is_solved) push = at
    end subroutine solve_by_path
 
