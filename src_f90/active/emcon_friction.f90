@@ -202,23 +202,29 @@ contains
       end do
    end subroutine friction_look_back
 
-   !> Nodes that permanent conditions bind, as those of rigid bodies, and nodes that are held in all
-   !> directions.
+   !> Nodes that permanent conditions bind, as those of rigid bodies do their frames, nodes that follow
+   !> from these alone, and nodes that are held in all directions.
    pure subroutine find_bound(system, set, is_bound)
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       logical, intent(out) :: is_bound(:)        !! (n_node)
-      integer :: a, i, k
+      logical :: binds(0:system%space%numbering%n_unknown)   ! (0: what is prescribed)
+      integer :: i, k, n_dim
 
       associate (numbering => system%space%numbering)
+         n_dim = size(numbering%unknown, 1)
+         binds = .false.
+         binds(0) = .true.
+         do k = 1, set%n_permanent
+            associate (node => set%item(k)%node(:set%item(k)%n_node))
+               binds(pack(numbering%unknown(:, node), numbering%unknown(:, node) > 0)) = .true.
+            end associate
+         end do
          do i = 1, size(is_bound)
-            is_bound(i) = all([(numbering_fixes(numbering, a, i), &
-               a = 1, size(numbering%unknown, 1))])
+            is_bound(i) = all(binds(numbering%column(numbering%start(n_dim*(i - 1) + 1) + 1: &
+               numbering%start(n_dim*i + 1))))
          end do
       end associate
-      do k = 1, set%n_permanent
-         is_bound(set%item(k)%node(:set%item(k)%n_node)) = .true.
-      end do
    end subroutine find_bound
 
    !> Contacts whose slave node is held in some direction, and which nothing that is free to move

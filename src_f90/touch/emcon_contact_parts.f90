@@ -43,7 +43,8 @@ contains
          push(:, contact) = own_push
          is_solved = is_solved .and. is_own
          effort = contact_effort_t(effort%n_trial + more%n_trial, effort%n_sweep + more%n_sweep, &
-            effort%n_pivot + more%n_pivot, effort%n_near + more%n_near)
+            effort%n_pivot + more%n_pivot, effort%n_near + more%n_near, &
+            effort%n_path + more%n_path)
       end do
       ! A part of which all forces are round-off of the others may miss its own laws.
       if (.not. is_solved) is_solved = contact_problem_missed(self, push) <= nearly_met

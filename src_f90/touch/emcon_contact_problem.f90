@@ -32,6 +32,13 @@ module emcon_contact_problem
    !> Parts of W that places give way by about the forces so far, and how often.
    integer, parameter :: most_nearings = 30, few_nearings = 8
    real(wp), parameter :: first_part = 1.0e-3_wp, largest_part = 10.0_wp
+   !> Blur of the map where a path to the solution begins, by the largest force, and what is left of
+   !> it in turn; each is followed until no more than this part of the blur is missed; the part of a
+   !> step's promise that it is to gain there; steps of which no more than this part does that lead
+   !> nowhere after so many in a row; steps in all.
+   real(wp), parameter :: first_blur = 1.0e-2_wp, next_blur = 0.3_wp, on_path = 0.1_wp, &
+      path_gain = 1.0e-2_wp, path_part = 0.03_wp
+   integer, parameter :: path_stalls = 4, most_path = 100
    !> Halvings of a step of Newton's method, and the part of what is foreseen that it is to gain.
    integer, parameter :: most_halvings = 12
    real(wp), parameter :: least_gain = 1.0e-4_wp
@@ -69,7 +76,7 @@ module emcon_contact_problem
 
    !> What a solution has cost.
    type :: contact_effort_t
-      integer :: n_trial = 0, n_sweep = 0, n_pivot = 0, n_near = 0
+      integer :: n_trial = 0, n_sweep = 0, n_pivot = 0, n_near = 0, n_path = 0
    end type contact_effort_t
 
 contains
@@ -107,9 +114,11 @@ contains
       associate (has_pushes => .not. any(self%mu > 0.0_wp .or. self%hold(0, :) > 0.0_wp), &
             has_direction => self%n_slip > 1 .and. any(self%mu > 0.0_wp))
          call solve_by_trials(self, push, merge(few_trials, first_trials, has_pushes &
-            .or. has_direction), is_one_of_several, effort%n_trial, is_solved)
+            .or. has_direction), effort%n_trial, is_solved)
          if (is_solved .or. .not. has_compliance(self)) return
          if (has_pushes) call solve_by_pushes(self, push, effort%n_pivot, is_solved)
+         if (is_solved) return
+         if (has_direction) call solve_by_path(self, push, effort%n_path, is_solved)
          if (is_solved) return
          if (has_direction) call solve_by_nearing(self, push, effort, is_one_of_several, is_solved)
          is_solved = is_solved .or. (is_one_of_several .and. effort%n_near > 0)
@@ -119,7 +128,7 @@ contains
       do turn = 1, n_turn
          call solve_by_sweeps(self, push, first_sweeps*2**(turn - 1), effort%n_sweep, is_solved)
          if (is_solved) return
-         call solve_by_trials(self, push, more_trials, .false., effort%n_trial, is_solved)
+         call solve_by_trials(self, push, more_trials, effort%n_trial, is_solved)
          if (is_solved) return
          if (turn /= pivot_turn .or. self%n_slip /= 1 .or. any(self%hold > 0.0_wp)) cycle
          call contact_problem_pivot(self, push, effort%n_pivot, is_solved)
@@ -131,7 +140,7 @@ contains
       call contact_problem_pivot(apart, push, effort%n_pivot, is_solved)
       if (.not. is_solved) return
       call take_back(self, push)
-      call solve_by_trials(self, push, more_trials, .false., effort%n_trial, is_solved)
+      call solve_by_trials(self, push, more_trials, effort%n_trial, is_solved)
    end subroutine contact_problem_solve
 
    !> The same places without what holds them: what moves freely is held by round-off's root of it.
@@ -272,7 +281,7 @@ contains
       real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
       real(wp) :: defect(0:self%n_slip, size(self%mu))
 
-      call natural_map(self, push, defect)
+      call natural_map(self, push, 0.0_wp, defect)
       missed = missed_by(self, push, defect)
       if (missed > 0.0_wp) missed = missed/max(maxval(abs(contact_problem_force(self, push))), &
          tiny(missed))
@@ -298,9 +307,10 @@ contains
    end function missed_by
 
    !> Forces less those that the natural map makes of them.
-   pure subroutine natural_map(self, push, defect, slope)
+   pure subroutine natural_map(self, push, blur, defect, slope)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
+      real(wp), intent(in) :: blur                   !! of the map, >= 0 [M L/T^2]
       real(wp), intent(out) :: defect(0:, :)         !! (0:n_slip, n) [M L/T^2]
       real(dp), intent(out), optional :: slope(:, :) !! of `defect` by y, proximal
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: motion, force
@@ -314,7 +324,7 @@ contains
       do i = 1, size(self%mu)
          stiffness = contact_problem_stiffness(self, i)
          call coulomb_map(trial_of(self, force(:, i), motion(:, i), i), self%mu(i), stiffness, &
-            mapped, by)
+            blur, mapped, by)
          defect(:, i) = force(:, i) - mapped(:self%n_slip)
          if (.not. present(slope)) cycle
          associate (row => m*(i - 1) + 1)
@@ -336,11 +346,10 @@ contains
 
    !> By Newton's method for the natural map. `push` stays as it was if that does not end. Where
    !> slip has a direction the second step in a row of which no part gains is the last one.
-   subroutine solve_by_trials(self, push, most, near_enough, n_trial, is_solved)
+   subroutine solve_by_trials(self, push, most, n_trial, is_solved)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
       integer, intent(in) :: most                    !! trials
-      logical, intent(in) :: near_enough             !! where it stalls `nearly_met` will do
       integer, intent(inout) :: n_trial              !! counted on
       logical, intent(out) :: is_solved
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: trial, defect, new, step
@@ -354,7 +363,7 @@ contains
       n_stall = 0
       do i = 0, most
          was_solved = is_solved
-         call natural_map(self, trial, defect, slope)
+         call natural_map(self, trial, 0.0_wp, defect, slope)
          missed = missed_by(self, trial, defect)
          largest = maxval(abs(contact_problem_force(self, trial)))
          is_solved = missed <= met*largest
@@ -369,14 +378,14 @@ contains
          part = 1.0_wp
          do halving = 0, most_halvings
             new = trial + part*step
-            call natural_map(self, new, defect)
+            call natural_map(self, new, 0.0_wp, defect)
             if (norm2(defect) <= (1.0_wp - least_gain*part)*before) exit
             part = 0.5_wp*part
          end do
          if (.not. norm2(defect) < huge(before)) exit
          n_stall = merge(0, n_stall + 1, part > no_part .or. self%n_slip < 2)
          if (n_stall == most_stalls) then
-            is_solved = near_enough .and. missed <= nearly_met*largest
+            is_solved = .false.
             exit
          end if
          trial = new
@@ -445,11 +454,11 @@ contains
             end do
          end do
          found = push
-         call solve_by_trials(near, found, more_trials, near_enough, effort%n_trial, has_ended)
+         call solve_by_trials(near, found, more_trials, effort%n_trial, has_ended)
          if (has_ended) then
             effort%n_near = effort%n_near + 1
             push = found
-            is_solved = contact_problem_missed(self, push) <= merge(nearly_met, met, near_enough)
+            is_solved = contact_problem_missed(self, push) <= met
             if (is_solved .or. (near_enough .and. effort%n_near == few_nearings)) return
             part = max(least_part, 0.1_wp*part)
          else
@@ -459,6 +468,51 @@ contains
          end if
       end do
    end subroutine solve_by_nearing
+
+   !> Along a path to the solution from far inside of what the laws allow: of forces that follow from
+   !> others it leads to those farthest from all limits, however far these are from those before.
+   !> Trials would creep there, as none of their steps goes past the next limit.
+   subroutine solve_by_path(self, push, n_step, is_solved)
+      type(contact_problem_t), intent(in) :: self
+      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
+      integer, intent(inout) :: n_step               !! counted on
+      logical, intent(out) :: is_solved              !! else `push` is as it was
+      real(wp), dimension(0:self%n_slip, size(self%mu)) :: at, defect, new
+      real(dp) :: slope(size(push), size(push)), x(size(push))
+      real(wp) :: blur, before, part
+      integer :: i, halving, n_stall
+      logical :: is_singular
+
+      is_solved = .false.
+      at = push
+      n_stall = 0
+      call natural_map(self, push, 0.0_wp, defect)
+      blur = first_blur*max(maxval(abs(contact_problem_force(self, push))), maxval(abs(defect)))
+      do i = 1, most_path
+         call natural_map(self, at, blur, defect, slope)
+         n_step = n_step + 1
+         call find_step(slope, reshape(real(-defect, dp), [size(push)]), x, is_singular)
+         if (is_singular) exit
+         before = norm2(defect)
+         part = 1.0_wp
+         do halving = 0, most_halvings
+            new = at + part*reshape(real(x, wp), shape(at))
+            call natural_map(self, new, blur, defect)
+            if (norm2(defect) <= (1.0_wp - path_gain*part)*before) exit
+            part = 0.5_wp*part
+         end do
+         if (.not. norm2(defect) < huge(before)) exit
+         at = new
+         n_stall = merge(0, n_stall + 1, part > path_part)
+         if (n_stall == path_stalls) exit
+         if (maxval(abs(defect)) > on_path*blur) cycle
+         is_solved = contact_problem_missed(self, at) <= met
+         if (is_solved) exit
+         blur = next_blur*blur
+         if (.not. blur > tiny(blur)) exit
+      end do
+      if (is_solved) push = at
+   end subroutine solve_by_path
 
    !> Contact by contact, each exactly with the pushes of the others, over and over.
    subroutine solve_by_sweeps(self, push, most, n_sweep, is_solved)

@@ -200,7 +200,7 @@ contains
       do case = 1, 4000
          n = 1 + mod(case/2, 2)
          call draw_place(n, case, at)
-         call coulomb_map(at, mu, c, force, slope)
+         call coulomb_map(at, mu, c, 0.0_wp, force, slope)
          ! lam - c g and tau + c s stay as they are.
          at%gap = at%gap + (force(0) - at%lam)/c
          at%slip = at%slip - (force(1:) - at%tau)/c
@@ -236,8 +236,8 @@ contains
          turned%tau = matmul(turn, at%tau)
          turned%slip = matmul(turn, at%slip)
          turned%slip_target = matmul(turn, at%slip_target)
-         call coulomb_map(at, mu, c, force, slope)
-         call coulomb_map(turned, mu, c, again, slope_again)
+         call coulomb_map(at, mu, c, 0.0_wp, force, slope)
+         call coulomb_map(turned, mu, c, 0.0_wp, again, slope_again)
          call check_near(error, again, [force(0), matmul(turn, force(1:))], tol, 1.0_wp, "forces")
          call check_near(error, [slope_again(1:, 1:)], [matmul(matmul(turn, slope(1:, 1:)), &
             transpose(turn))], tol, 1.0_wp, "slopes")
@@ -269,7 +269,7 @@ contains
          do i = 0, n
             do k = -1, 1
                status(k) = coulomb_status(moved(k*small), mu, c)
-               call coulomb_map(moved(k*small), mu, c, force(:, k), slope(:, :, k))
+               call coulomb_map(moved(k*small), mu, c, 0.0_wp, force(:, k), slope(:, :, k))
             end do
             if (any(status%kind /= status(0)%kind)) cycle
             if (norm2(slope(:, :, 1) - slope(:, :, -1)) > 0.01_wp) cycle
