@@ -224,7 +224,7 @@ class Step(Cards):
         request       NODE, EL or CONTACT with FILE (fields) or PRINT (history); SECTION PRINT;
                       ENERGY PRINT
         variables     U, V, RF, UR, VR, RM; S, E, ENER, ELSE, ELKE, EVOL; CDIS, CSTR, CF, CSHEAR,
-                      CSLIP, CNUM; SOF, SOM, SOMC, SOCENTER, SOAREA
+                      CSLIP, CNAREA, CNUM; SOF, SOM, SOMC, SOCENTER, SOAREA
         set           of nodes or elements, for NODE and EL; the surface of SECTION PRINT
         frequency     every so many increments; 0: never
         time_points   name of times, instead

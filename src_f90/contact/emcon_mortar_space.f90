@@ -14,14 +14,14 @@ module emcon_mortar_space
    use emcon_guards, only : touching_bar
    use emcon_interactions, only : contact_options_t, contact_pair_t, multiplier_dual
    use emcon_kinds, only : wp
-   use emcon_mortar_faces_space, only : mortar_faces_choose, mortar_faces_init, mortar_faces_t
+   use emcon_mortar_faces_space, only : mortar_faces_choose, mortar_faces_init, mortar_faces_look, &
+      mortar_faces_t
    use emcon_mortar_rise_space, only : mortar_rise, mortar_rise_doubt, &
       mortar_rise_largest, mortar_rise_t
    use emcon_mortar_slave_space, only : mortar_slave_direction, mortar_slave_weight
    use emcon_mortar_slip_space, only : mortar_slip_add, mortar_slip_choose, mortar_slip_of, &
       mortar_slip_shift, mortar_slip_sight, mortar_slip_t
    use emcon_mortar_sum_space, only : mortar_sight, mortar_sum, sight_t
-   use emcon_near_list, only : near_list_update
    use emcon_patch_look_space, only : patch_basis, patch_basis_t
    use emcon_patch_stencil_space, only : patch_stencil_gather
    use emcon_position_memo, only : position_memo_holds, position_memo_t, position_memo_take
@@ -149,7 +149,7 @@ contains
       class(mortar_space_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
 
-      call near_list_update(self%faces%near, x, u0, du, self%reach)
+      call mortar_faces_look(self%faces, x, u0, du, self%reach)
       call self%has_looked(self%faces%near%clearance)
       call choose_stencils(self, x, u0)
       if (allocated(self%slide)) call choose_slips(self, x, u0, du)

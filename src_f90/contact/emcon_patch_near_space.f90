@@ -5,7 +5,7 @@ module emcon_patch_near_space
    use emcon_nearest_space, only : nearest_t, nearest_update
    use emcon_patch_sides_space, only : frame_normal, patch_sides_t, sides_place
    use emcon_rotation, only : cross_product
-   use emcon_touch_rule_space, only : touch_rule_space_is_through
+   use emcon_touch_rule_space, only : touch_rule_space_is_beyond, touch_rule_space_is_through
    implicit none
    private
    public :: patch_near_t, patch_near_find, patch_near_nearest, patch_near_list, &
@@ -47,13 +47,13 @@ contains
       real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
       logical, intent(in), optional :: is_beside(:)          !! as `facet`; none of them
       type(nearest_t) :: nearest
-      real(wp) :: origin(3)
-      integer :: f, t
+      real(wp) :: origin(3), own(3)
+      integer :: k, t
 
       near%point = i
       origin = point_origin(sides, i, x, u)
       associate (start => sides%triangles%split%start)
-         near%triangle = [((t, t = start(facet(f)), start(facet(f) + 1) - 1), f = 1, size(facet))]
+         near%triangle = [((t, t = start(facet(k)), start(facet(k) + 1) - 1), k = 1, size(facet))]
       end associate
       near%n = size(near%triangle)
       allocate(near%corner(3, 3, near%n), near%normal(3, near%n), near%distance(near%n))
@@ -61,13 +61,16 @@ contains
          source=.false.)
       if (present(is_beside)) then
          associate (start => sides%triangles%split%start)
-            near%is_beside = [((is_beside(f), t = start(facet(f)), start(facet(f) + 1) - 1), &
-               f = 1, size(facet))]
+            near%is_beside = [((is_beside(k), t = start(facet(k)), start(facet(k) + 1) - 1), &
+               k = 1, size(facet))]
          end associate
       end if
+      own = 0.0_wp
+      if (sides%frames%of_triangles .and. sides%rule%is_self) own = frame_normal(sides%frames, i, &
+         sides%frames%base(i), x, u)
       do t = 1, near%n
-         do f = 1, 3
-            near%corner(:, f, t) = sides_place(sides, sides%triangles%split%corner(f, &
+         do k = 1, 3
+            near%corner(:, k, t) = sides_place(sides, sides%triangles%split%corner(k, &
                near%triangle(t)), sides%frames%base(i), x, u) - origin
          end do
          associate (c => near%corner(:, :, t), n => near%normal(:, t))
@@ -76,8 +79,11 @@ contains
             near%distance(t) = sqrt(nearest%square)
             if (dot_product(n, n) > 0.0_wp) n = n/sqrt(dot_product(n, n))
             if (is_mirror(sides, i, near%triangle(t))) n = 0.0_wp
-            if (touch_rule_space_is_through(sides%rule, i, sides%triangles%split%facet( &
-               near%triangle(t)), n, -matmul(c, nearest%weight))) n = 0.0_wp
+            associate (f => sides%triangles%split%facet(near%triangle(t)), &
+                  way => matmul(c, nearest%weight))
+               if (touch_rule_space_is_through(sides%rule, i, f, n, -way)) n = 0.0_wp
+               if (touch_rule_space_is_beyond(sides%rule, i, f, own, way)) n = 0.0_wp
+            end associate
             nearest = nearest_t()
          end associate
       end do

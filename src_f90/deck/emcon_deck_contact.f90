@@ -306,27 +306,9 @@ contains
             if (allocated(master%wall) .and. pair%both_sides) call data_error(reader, data, &
                "surface " // master%name // " has a shape and no nodes; leave out SIDES=BOTH")
          end if
-         if (reader%n_dim == n_space .and. pair%formulation == formulation_mortar) &
-            call check_mortar_space(reader, data, scene, pair)
       end associate
       if (.not. data%ok) pair%master = 0
    end subroutine check_nodal
-
-   !> In space gaps are integrated between the faces of two surfaces.
-   subroutine check_mortar_space(reader, data, scene, pair)
-      type(reader_t), intent(inout) :: reader
-      type(data_t), intent(inout) :: data
-      type(scene_t), intent(in) :: scene
-      type(contact_pair_t), intent(in) :: pair
-
-      associate (master => scene%surface(pair%master))
-         if (pair%slave == pair%master) then
-            call data_error(reader, data, "surface " // master%name // " in contact with itself: " &
-               // "in three dimensions MORTAR is between two surfaces in this version; use " // &
-               "TYPE=NODE TO SURFACE")
-         end if
-      end associate
-   end subroutine check_mortar_space
 
    !> The last of `pair` must not be there already. Slave and master in turn is another pair.
    subroutine check_repeated(reader, data, scene, pair, line, given)

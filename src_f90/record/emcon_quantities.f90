@@ -262,9 +262,9 @@ contains
       square = step_square(stepper%scene%step(stepper%march%state%clock%i_step))
    end function square
 
-   !> CDIS gap, + open, NaN where not measured (1); CSTR pressure and active flag (2); CF force of
-   !> the pair on the slave node, or both at a joint (2); CSHEAR and CSLIP as `rubbing` has them;
-   !> second index the possible constraint.
+   !> CDIS gap, + open, NaN where not measured (1); CSTR pressure and active flag (2); CNAREA area
+   !> on which it acts, 0 where open (1); CF force of the pair on the slave node, or both at a joint
+   !> (2); CSHEAR and CSLIP as `rubbing` has them; second index the possible constraint.
    function contact_quantity(stepper, variable) result(values)
       type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: variable
@@ -286,6 +286,9 @@ contains
             if (allocated(state%pairs%jump_lam)) values(1, :) = values(1, :) &
                + pressures(stepper, state%pairs%jump_lam)
             values(2, :) = real(min(1, state%contacts%status([(i, i = 1, n)])), dp)
+         case ("CNAREA")
+            values = reshape(merge(real(state%pairs%area, dp), 0.0_dp, &
+               state%contacts%status([(i, i = 1, n)]) > 0), [1, n])
          case ("CSHEAR", "CSLIP")
             values = rubbing(stepper, variable)
          case ("CF")
@@ -351,9 +354,9 @@ contains
    end function rubbing
 
    !> The same on all nodes: of a node that is slave in several pairs the smallest gap, the sum of
-   !> the pressures, of the shears and slips, the largest status and path, and active if it is so in
-   !> one; off the slave nodes NaN gap, and 0. Both nodes at a joint of tied pieces have the values
-   !> of their constraint. CF (2): the contact forces of all pairs, on both sides.
+   !> the pressures, of the shears, slips and areas, the largest status and path, and active if it
+   !> is so in one; off the slave nodes NaN gap, and 0. Both nodes at a joint of tied pieces have
+   !> the values of their constraint. CF (2): the contact forces of all pairs, on both sides.
    function contact_field(stepper, variable) result(values)
       type(stepper_t), intent(inout) :: stepper
       character(len=*), intent(in) :: variable
@@ -378,9 +381,8 @@ contains
                id = system%first_constraint(pair) + i
                associate (node => system%contact(pair)%contact%node(i), &
                      duplicate => system%contact(pair)%contact%duplicate(i))
-                  call take_over(row%last /= "", at_slave(:, id), values(:, node))
-                  if (duplicate > 0) call take_over(row%last /= "", at_slave(:, id), &
-                     values(:, duplicate))
+                  call take_over(row, at_slave(:, id), values(:, node))
+                  if (duplicate > 0) call take_over(row, at_slave(:, id), values(:, duplicate))
                end associate
             end do
          end do
@@ -388,21 +390,23 @@ contains
    end function contact_field
 
    !> Add to the value of a node that of a constraint there.
-   pure subroutine take_over(has_last, more, value)
-      logical, intent(in) :: has_last            !! first values add up, the largest last counts
+   pure subroutine take_over(row, more, value)
+      type(quantity_row_t), intent(in) :: row    !! of gaps the smallest counts
       real(dp), intent(in) :: more(:)
       real(dp), intent(inout) :: value(:)
 
-      if (has_last) then
-         associate (n => size(value))
-            value(:n - 1) = value(:n - 1) + more(:n - 1)
-            value(n) = max(value(n), more(n))
-         end associate
-      else if (ieee_is_nan(value(1))) then
-         value = more
-      else if (.not. ieee_is_nan(more(1))) then
-         value = min(value, more)
+      if (row%variable == "CDIS") then
+         if (ieee_is_nan(value(1))) then
+            value = more
+         else if (.not. ieee_is_nan(more(1))) then
+            value = min(value, more)
+         end if
+         return
       end if
+      associate (n => size(value) - merge(1, 0, row%last /= ""))   ! of the last the largest
+         value(:n) = value(:n) + more(:n)
+         value(n + 1:) = max(value(n + 1:), more(n + 1:))
+      end associate
    end subroutine take_over
 
    !> Of each surface (second index) that a request of the step names: SOF force on its elements,

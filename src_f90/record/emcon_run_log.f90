@@ -1,5 +1,6 @@
 !> What a run tells of itself: the lines of the log.
 module emcon_run_log
+   use emcon_deck_dimension, only : n_plane
    use emcon_guards, only : corner_slack, crossing_slack, guard_slack
    use emcon_interactions, only : contact_options_t, formulation_mortar, formulation_segment, &
       normal_nodal, smoothing_none
@@ -81,7 +82,8 @@ contains
          end do
          call add_link_lines(scene, system, notes)
          do k = 1, size(scene%pair)
-            call formulation_text(scene%pair(k)%formulation, scene%step(1)%contact%options, how)
+            call formulation_text(scene%pair(k)%formulation, scene%step(1)%contact%options, &
+               scene%n_dim, how)
             call add_pair(scene, k, size(unique_sorted(system%contact(k)%contact%node)), how, notes)
          end do
          call add_watching(scene, system, notes)
@@ -173,8 +175,9 @@ contains
       if (k == 1) return
       do i = 1, size(scene%pair)
          associate (pair => scene%pair(i))
-            call formulation_text(pair%formulation, scene%step(k - 1)%contact%options, before)
-            call formulation_text(pair%formulation, scene%step(k)%contact%options, how)
+            call formulation_text(pair%formulation, scene%step(k - 1)%contact%options, &
+               scene%n_dim, before)
+            call formulation_text(pair%formulation, scene%step(k)%contact%options, scene%n_dim, how)
             if (how /= before) call note_add(notes, "   contact " // &
                scene%surface(pair%slave)%name // " on " // scene%surface(pair%master)%name // &
                ": " // how)
@@ -183,19 +186,23 @@ contains
    end subroutine add_step
 
    !> How contact is computed: of the options those that the formulation has use for.
-   pure subroutine formulation_text(formulation, options, text)
+   pure subroutine formulation_text(formulation, options, n_dim, text)
       integer, intent(in) :: formulation         !! one of the `formulation_` codes
       type(contact_options_t), intent(in) :: options
+      integer, intent(in) :: n_dim               !! in space gaps are integrated in one way
       character(len=:), allocatable, intent(out) :: text
+      logical :: is_plane
 
+      is_plane = n_dim == n_plane
       call option_text("formulation", formulation, text)
-      if (formulation == formulation_mortar) then
+      if (formulation == formulation_mortar .and. is_plane) then
          call add_option(text, "integration", options%integration)
          if (options%n_point > 0) text = text // " with " // to_text(options%n_point) // " points"
       end if
       if (any(formulation == [formulation_mortar, formulation_segment])) then
         call add_option(text, "multiplier", options%multiplier)
       end if
+      if (.not. is_plane) return
       if (formulation == formulation_mortar) then
          call add_option(text, "normal", options%normal)
          if (options%normal == normal_nodal) call add_corner(text, options%normal_angle)

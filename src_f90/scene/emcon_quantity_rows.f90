@@ -24,7 +24,7 @@ submodule (emcon_quantity_registry) emcon_quantity_rows
       quantity_row_t("ELKE", at_elements, 1, "kinetic_energy", card=at_elements), &
       quantity_row_t("EVOL", at_elements, 1, "volume", card=at_elements), &
       ! gap [L]; pressure, and is it active; force; vectors along the surface: traction
-      ! against slip, and status; slip, and path
+      ! against slip, and status; slip, and path; area on which pressure acts [L^2]
       quantity_row_t("CDIS", at_contacts, 1, "contact_gap", "", .true., at_contacts, "CDISP"), &
       quantity_row_t("CSTR", at_contacts, 2, "contact_pressure", "contact_active", .true., &
          at_contacts, "CSTRESS"), &
@@ -34,6 +34,7 @@ submodule (emcon_quantity_registry) emcon_quantity_rows
          at_contacts), &
       quantity_row_t("CSLIP", at_contacts, of_vector, "contact_slip", "slip_path", .true., &
          at_contacts), &
+      quantity_row_t("CNAREA", at_contacts, 1, "contact_area", "", .true., at_contacts), &
       ! of surfaces: force on them, moment about the origin, about their centre; centre, area
       quantity_row_t("SOF", at_sections, of_vector, card=at_sections), &
       quantity_row_t("SOM", at_sections, of_rotation, card=at_sections), &

@@ -13,7 +13,8 @@ module emcon_touch_rule_space
    implicit none
    private
    public :: touch_rule_space_t, touch_rule_space_init, touch_rule_space_sees, &
-      touch_rule_space_may, touch_rule_space_is_through
+      touch_rule_space_may, touch_rule_space_meet, touch_rule_space_is_through, &
+      touch_rule_space_is_beyond
 
    !> Classes of bodies at most, and with them constraints of a frame.
    integer, parameter :: most_classes = 4
@@ -27,6 +28,8 @@ module emcon_touch_rule_space
       integer, allocatable :: body(:)            !! (n_facet)
       integer, allocatable :: middle(:)          !! facets whose middles are points
       integer, allocatable :: body_of_point(:)   !! (n_node of the facets + size of `middle`)
+      !> Of points in the middle of facets: which facet each is on; not allocated: of none
+      integer, allocatable :: facet_of_point(:)
       real(wp), allocatable :: depth(:)          !! (n_facet) of the element behind it [L]
       logical, allocatable :: is_closed(:)       !! (n_facet) its connected part has no rim
    end type touch_rule_space_t
@@ -115,6 +118,17 @@ contains
       end do
    end function touch_rule_space_may
 
+   !> May a place on facet `own` ever touch facet `f`?
+   pure logical function touch_rule_space_meet(self, facets, own, f) result(meet)
+      type(touch_rule_space_t), intent(in) :: self
+      type(facets_t), intent(in) :: facets       !! that the rule is for
+      integer, intent(in) :: own, f              !! 1 to n_facet
+
+      meet = .true.
+      if (self%is_self .and. self%body(own) == self%body(f)) &
+         meet = may_facets_touch(self, facets, own, f)
+   end function touch_rule_space_meet
+
    !> May a point of facet `own` of a body touch facet `f` of it?
    pure logical function may_facets_touch(self, facets, own, f) result(may)
       type(touch_rule_space_t), intent(in) :: self
@@ -155,5 +169,22 @@ contains
       distance = sqrt(dot_product(way, way))
       is_through = distance > through*self%depth(f) .and. dot_product(way, normal) < under*distance
    end function touch_rule_space_is_through
+
+   !> Is facet `f` on the other side of its own body, seen from point `i` in the middle of a facet?
+   pure logical function touch_rule_space_is_beyond(self, i, f, normal, way) result(is_beyond)
+      type(touch_rule_space_t), intent(in) :: self
+      integer, intent(in) :: i                   !! point
+      integer, intent(in) :: f                   !! 1 to n_facet
+      real(wp), intent(in) :: normal(3)          !! of the facet of the point, of length 1, outwards
+      real(wp), intent(in) :: way(3)             !! from the point to the nearest place of `f` [L]
+      real(wp) :: distance
+
+      is_beyond = .false.
+      if (.not. self%is_self .or. .not. allocated(self%facet_of_point)) return
+      if (self%body_of_point(i) /= self%body(f)) return
+      distance = sqrt(dot_product(way, way))
+      is_beyond = distance > through*self%depth(self%facet_of_point(i)) &
+         .and. dot_product(way, normal) < under*distance
+   end function touch_rule_space_is_beyond
 
 end module emcon_touch_rule_space

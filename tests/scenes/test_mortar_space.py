@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from contact_space_scenes import bodies, dynamic, faces, impact, over_the_end, pair, press, slide, stack, turned, velocities
@@ -275,3 +276,26 @@ def test_a_rigid_side(kind: str, is_slave: bool, tmp_path: Path) -> None:
     for names in ("px py pz", "lx ly lz"):
         found = moments(run, names)
         assert np.abs(found - found[0]).max() <= BALANCE*np.abs(moments(run, "px py pz")).max()
+
+
+@pytest.mark.parametrize("over", [0.3, 0.75, 1.0])
+def test_covered_area(over: float, tmp_path: Path) -> None:
+    """A cube that sticks out over the edge of a block: what is over that, and a fortieth of its faces at most."""
+    one = Block("C3D8", (2, 2, 1), place=lambda x: x + np.array([1.0 - over, 0.0, 0.0]))
+    two = Block("C3D8", (4, 4, 1), place=lambda x: x - np.array([0.0, 0.0, 1.0]))
+    n = len(one.x)
+    text = bodies([one, two], [faces(one, 2, 0), faces(two, 2, 1)], "*ELASTIC\n1000., 0.\n")
+    text += "".join(f"*NSET, NSET={name}\n" + "".join(f"{k}\n" for k in on)
+                    for name, on in (("TOP", one.on(2, 1)), ("FOOT", two.on(2, 0) + n)))
+    text += pair(MORTAR) + "*BOUNDARY\nFOOT, 1, 3\n*STEP\n*STATIC, DIRECT\n1., 1.\n*BOUNDARY\nTOP, 1, 2\nTOP, 3, 3, -1e-6\n"
+    run = ran(tmp_path, text + "*NODE FILE\nU\n*CONTACT FILE\nCNAREA, CSTRESS, CF\n*CONTACT PRINT, TOTALS=YES\nCNAREA, CF\n*END STEP\n")
+    fields = run.fields()
+    area, pressure = (np.array(fields[name][-1]).ravel() for name in ("contact_area", "contact_pressure"))
+    assert (area[n:] == 0.0).all() and (area[:n][pressure[:n] > 0.0] > 0.0).all()
+    assert over - EVEN <= area.sum() <= over + (0.025*0.25 if over < 1.0 else EVEN)
+    # A vertex has one pressure here: over its area it is the force, but for what the bodies move meanwhile.
+    force = np.array(fields["contact_force"][-1])[:n, 2].sum()
+    assert area @ np.nan_to_num(pressure) == pytest.approx(force, rel=1.0e-5)
+    with h5py.File(run.file(".h5")) as file:
+        assert file["sets/PAIRS/CONTACT_AREA"][-1].sum() == pytest.approx(area.sum(), rel=EVEN)
+        assert file["sets/CONTACT/CNAREA"][-1].sum() == pytest.approx(area.sum(), rel=EVEN)

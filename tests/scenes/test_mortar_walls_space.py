@@ -27,7 +27,7 @@ def pressed(kind: str, cells: tuple[int, int, int], turn: np.ndarray, is_whole: 
     text += pair(MORTAR) + "*NSET, NSET=TOP\n" + "".join(f"{k}\n" for k in block.on(2, 1))
     text += f"*BOUNDARY\n{FIXED}*STEP\n*STATIC, DIRECT\n1., 1.\n{more}*BOUNDARY\n"
     text += "".join(f"TOP, {a}, {a}, {s!r}\n" for a, s in enumerate((-0.025*turn[:, 2]).tolist(), 1))
-    return text + "*NODE FILE\nU\n*EL FILE\nS\n*CONTACT FILE\nCSTRESS\n*END STEP\n", len(block.x)
+    return text + "*NODE FILE\nU\n*EL FILE\nS\n*CONTACT FILE\nCSTRESS, CNAREA\n*END STEP\n", len(block.x)
 
 
 @pytest.mark.each_value
@@ -50,6 +50,7 @@ def test_uniform_pressure(kind: str, cells: tuple[int, int, int], is_whole: bool
     pressure = pressure[np.isfinite(pressure)]
     assert np.count_nonzero(pressure) == (cells[0] + 1)*(cells[1] + 1)
     assert np.abs(pressure[pressure != 0.0] - 25.0).max() <= EVEN*25.0
+    assert fields["contact_area"][-1].sum() == pytest.approx(1.0, rel=EVEN)
 
 
 def check_balance(run: Run, slack: float) -> None:

@@ -33,9 +33,10 @@ def bent(x: np.ndarray) -> np.ndarray:
     return np.stack([straight - out*np.sin(turn), out*np.cos(turn), -x[:, 2]], axis=1)
 
 
-def u_strip(kind: str, contact: str, speed: float = 3.0, until: float = 0.6) -> tuple[str, Block, np.ndarray]:
+def u_strip(kind: str, contact: str, speed: float = 3.0, until: float = 0.6,
+            cells: tuple[int, int, int] = (16, 2, 2)) -> tuple[str, Block, np.ndarray]:
     """A free U whose arms fly at each other; the places of its nodes along it."""
-    block = Block(kind, (16, 2, 2), size=(LENGTH, THICK, WIDE))
+    block = Block(kind, cells, size=(LENGTH, THICK, WIDE))
     along = block.x[:, 0].copy()
     block.x = bent(block.x)
     v = -speed*np.sign(block.x[:, 1])*np.clip(block.x[:, 0]/ARM, 0.0, 1.0)
