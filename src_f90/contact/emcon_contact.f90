@@ -14,7 +14,7 @@ module emcon_contact
    implicit none
    private
    public :: contact_t, contact_box_t, contact_step_t, gap_state_t
-   public :: max_penetration_on_entry, gap_ratio
+   public :: max_penetration_on_entry, gap_ratio, push_place
 
    !> Corners of master surfaces are rounded over these fractions of an edge: with and without a
    !> static step among those to come.
@@ -159,6 +159,13 @@ module emcon_contact
    end interface
 
 contains
+
+   !> The part of the step after which contact forces act: in the mean at its middle, or its end.
+   pure real(wp) function push_place(step)
+      type(contact_step_t), intent(in) :: step
+
+      push_place = merge(1.0_wp, 0.5_wp, step%pushes_at_end)
+   end function push_place
 
    !> A gap by the shorter edge of both sides: how far apart they are as each of them sees it.
    pure real(wp) function gap_ratio(state, gap)

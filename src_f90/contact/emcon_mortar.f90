@@ -7,6 +7,7 @@ module emcon_mortar
    use emcon_arcs_plane, only : arc_rise, arcs_find
    use emcon_chain_plane, only : chain_corners, chain_distance, chain_shorter
    use emcon_condition_nodes, only : nodes_append
+   use emcon_contact, only : push_place
    use emcon_contact_law, only : contact_laws_reach
    use emcon_edge_moments, only : form_begin
    use emcon_errors, only : error_t
@@ -218,7 +219,7 @@ contains
 
       do pass = 1, 2
          at = 0.0_wp                             ! where nothing is covered there: at the start
-         if (pass == 1) at = merge(1.0_wp, 0.5_wp, self%step%pushes_at_end)
+         if (pass == 1) at = push_place(self%step)
          do k = 1, 2
             e = self%node_edge(k, i)
             if (e > 0) list%point = [list%point, edge_slips(self, e, 3 - k, x, u0, du, at)]

@@ -46,12 +46,12 @@ module emcon_mortar_slip_space
 contains
 
    !> What slips of the triangles of the slave are made of over a motion, with the weights of gaps:
-   !> the mean of those at its start and its end, or those at its end.
-   pure subroutine mortar_slip_choose(self, faces, x, u0, du, is_at_end)
-      type(mortar_slip_t), intent(inout) :: self(:)   !! (n_triangle)
+   !> between those at its start and those at its end.
+   pure subroutine mortar_slip_choose(self, faces, x, u0, du, place)
+      type(mortar_slip_t), intent(inout) :: self(:)   !! (n_triangle) of the slave
       type(mortar_faces_t), intent(in) :: faces       !! with their stencils
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
-      logical, intent(in) :: is_at_end                !! forces act at the end of the motion alone
+      real(wp), intent(in) :: place                   !! 0: at its start, 1: at its end; between
       real(wp) :: part, covered
       integer :: f, t
 
@@ -59,7 +59,7 @@ contains
          associate (first => faces%split%start(f), last => faces%split%start(f + 1) - 1)
             part = 0.0_wp
             do t = first, last
-               call choose_triangle(self(t), faces%stencil(t), x, u0, du, is_at_end, covered)
+               call choose_triangle(self(t), faces%stencil(t), x, u0, du, place, covered)
                part = part + covered/real(last - first + 1, wp)
             end do
             self(first:last)%theta = merge(part**3, 0.0_wp, faces%is_dual)
@@ -68,15 +68,15 @@ contains
    end subroutine mortar_slip_choose
 
    !> That of one triangle; none where nothing is near it.
-   pure subroutine choose_triangle(self, stencil, x, u0, du, is_at_end, covered)
+   pure subroutine choose_triangle(self, stencil, x, u0, du, place, covered)
       type(mortar_slip_t), intent(inout) :: self
       type(patch_stencil_t), intent(in) :: stencil
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)
-      logical, intent(in) :: is_at_end
+      real(wp), intent(in) :: place
       real(wp), intent(out) :: covered           !! a part of its area
       real(wp), dimension(3, 3 + stencil%patch%n_vertex) :: at, way
       real(wp), dimension(3, 3, stencil%patch%n_triangle) :: products, start
-      real(wp) :: area(2)
+      real(wp) :: area(0:1)
       integer, allocatable :: cell(:)
       integer :: k
 
@@ -85,12 +85,11 @@ contains
       covered = 0.0_wp
       if (stencil%triangle > 0) then
          call patch_stencil_gather(stencil, x, u0, du, at, way)
+         start = 0.0_wp
+         if (place < 1.0_wp) call patch_cells(stencil%patch, at, start, area(0))
          call patch_cells(stencil%patch, at + way, products, area(1))
-         if (.not. is_at_end) then
-            call patch_cells(stencil%patch, at, start, area(2))
-            products = 0.5_wp*(products + start)
-            area(1) = 0.5_wp*sum(area)
-         end if
+         products = (1.0_wp - place)*start + place*products
+         area(1) = (1.0_wp - place)*area(0) + place*area(1)
          if (area(1) > 0.0_wp) covered = sum(products)/area(1)
       end if
       cell = pack([(k, k = 1, size(products, 3))], &
@@ -137,7 +136,7 @@ contains
    !> How much of the slip of constraint `i` is over other triangles of the master by one choice
    !> than by the one before.
    pure real(wp) function mortar_slip_shift(self, before, faces, i) result(shift)
-      type(mortar_slip_t), intent(in) :: self(:), before(:)
+      type(mortar_slip_t), intent(in) :: self(:), before(:)   !! (n_triangle) of the slave
       type(mortar_faces_t), intent(in) :: faces
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp) :: total, old_total
@@ -215,7 +214,7 @@ contains
       type(mortar_slip_t), intent(in) :: self
       type(patch_stencil_t), intent(in) :: stencil
       type(slip_sight_t), intent(in) :: sight
-      integer, intent(in) :: place(:)            !! of nodes of the stencil in the condition; 0: none
+      integer, intent(in) :: place(:)            !! of its nodes in the condition; 0: none
       integer, intent(in) :: c
       !> Of both vectors of the slave's triangle, from whose middle ways count, and of the first
       !> corner of the master's
@@ -276,7 +275,7 @@ contains
 
    !> The slip of constraint `i` [L].
    pure function mortar_slip_of(self, faces, i, x, u0, du) result(slip)
-      type(mortar_slip_t), intent(in) :: self(:)
+      type(mortar_slip_t), intent(in) :: self(:) !! (n_triangle) of the slave
       type(mortar_faces_t), intent(in) :: faces
       integer, intent(in) :: i                   !! 1..n_constraint
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
@@ -309,7 +308,7 @@ contains
    !> Add the slip of constraint `i` and its derivatives to its condition, which has all nodes of
    !> it, and room for slip.
    pure subroutine mortar_slip_add(self, faces, i, sight, along, item)
-      type(mortar_slip_t), intent(in) :: self(:)
+      type(mortar_slip_t), intent(in) :: self(:) !! (n_triangle) of the slave
       type(mortar_faces_t), intent(in) :: faces
       integer, intent(in) :: i                   !! 1..n_constraint
       type(slip_sight_t), intent(in) :: sight(:) !! (n_triangle)

@@ -7,7 +7,7 @@ module emcon_mortar_space
    use emcon_bulges_space, only : bulges_find
    use emcon_condition_nodes, only : condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
+   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry, push_place
    use emcon_contact_law, only : contact_laws_rub
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : error_t
@@ -180,7 +180,7 @@ contains
       integer :: i
 
       before = self%slide
-      call mortar_slip_choose(self%slide, self%faces, x, u0, du, self%step%pushes_at_end)
+      call mortar_slip_choose(self%slide, self%faces, x, u0, du, push_place(self%step))
       if (.not. allocated(before(1)%vertex)) before = self%slide
       do i = 1, self%n_constraint
          self%state(i)%slip_shift = mortar_slip_shift(self%slide, before, self%faces, i)
