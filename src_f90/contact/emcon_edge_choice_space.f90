@@ -1,9 +1,9 @@
 !> Which edges of two surfaces in space cross each other in a step.
 !>
-!> Each side of faces has a few places for crossings, one for each class of edges of the other
-!> surface: of sharp ones, and of those along which a face bends outwards; sides that are not sharp
-!> are guarded. Which edge is crossed is chosen once per step. Source: docs/theory.md, section 15,
-!> after eq. (51).
+!> Each side of faces has a few places for crossings with edges of the other surface: sharp sides
+!> for those with sharp edges, and with those along which a face bends outwards; sides that are not
+!> sharp are guarded. Which edges are crossed is chosen once per step. Source: docs/theory.md,
+!> section 15, after eq. (51).
 module emcon_edge_choice_space
    use emcon_bodies, only : bodies_find_tied
    use emcon_csr, only : csr_list_users
@@ -23,8 +23,8 @@ module emcon_edge_choice_space
    public :: edge_choice_t, edge_choice_follow_arcs, edge_choice_init, edge_choice_is_guard, &
       edge_choice_slave, edge_choice_update, least_sine
 
-   !> Edges of the other surface that an edge may cross at once: a sharp one has a place for each
-   !> class of them, one that is guarded a place for those of odd and of even number.
+   !> Edges of the other surface that an edge may cross at once: a sharp one, and one that is
+   !> guarded.
    integer, parameter :: n_class = 8, n_guard_class = 2
    !> The sine of the angle between edges below which they run along each other, and nodes hold: of
    !> sharp ones, and of others.
@@ -53,7 +53,7 @@ module emcon_edge_choice_space
       type(position_memo_t) :: memo                   !! of the nodes as stencils were chosen:
       real(wp) :: reach = 0.0_wp                      !! among edges up to there [L]
       real(wp) :: offset = 0.0_wp                     !! gaps are counted from it on, >= 0 [L]
-      type(edge_stencil_t), allocatable :: stencil(:)    !! by slave and class
+      type(edge_stencil_t), allocatable :: stencil(:)    !! by slave
    end type edge_choice_t
 
 contains
@@ -133,8 +133,8 @@ contains
       end do
    end subroutine edge_choice_follow_arcs
 
-   !> Choose the edge that each one crosses in the step, for each class. From the same start and up
-   !> to the same reach the choice is the same.
+   !> Choose the edges that each one crosses in the step. From the same start and up to the same
+   !> reach the choice is the same.
    pure subroutine edge_choice_update(self, x, u0, du, reach)
       type(edge_choice_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
@@ -175,8 +175,8 @@ contains
       end do
    end subroutine find_partners
 
-   !> Let edge number `i` cross edge `m` in the step, if they may meet in it and no other one
-   !> of the class comes first.
+   !> Let edge number `i` cross edge `m` in the step, if they may meet in it and no others come
+   !> first.
    pure subroutine choose(self, i, m, of_slave, x, u0)
       type(edge_choice_t), intent(inout) :: self
       integer, intent(in) :: i, m
@@ -189,7 +189,7 @@ contains
       logical :: is_guard
 
       is_guard = i > self%n_sharp
-      new = edge_stencil_t(self%slave(i), m, 1.0_wp)
+      new = edge_stencil_t(self%slave(i), m)
       call edge_stencil_place(self%edges, new, x, u0, at)
       length(1) = length_of(at(:, 1), at(:, 2))
       length(2) = length_of(at(:, 3), at(:, 4))
@@ -215,22 +215,36 @@ contains
       call look_between(-normal, outline_edges_normals(self%edges, m, x, u0), &
          at(:, 4) - at(:, 3), within, turn)
       if (is_outside(within, turn, least)) return
-      associate (old => self%stencil(place_of(self, i, m)))
-         if (old%master > 0) then
-            if (.not. comes_first(self, new, crossing, old, x, u0)) return
-         end if
-         old = new
-      end associate
+      new%height = gap
+      new%beyond = beyond_ends(crossing)
+      call put(self, i, new)
    end subroutine choose
 
-   !> The place of slave `i` for edge `m`.
-   pure integer function place_of(self, i, m) result(place)
-      type(edge_choice_t), intent(in) :: self
-      integer, intent(in) :: i, m
+   !> Give a crossing of slave `i` a place: that of the class of its edge, or a later one. Where it
+   !> is taken, the crossing that comes first has it, and the other one goes on to the next: who has
+   !> which place does not depend on the order in which they are found.
+   pure subroutine put(self, i, crossing)
+      type(edge_choice_t), intent(inout) :: self
+      integer, intent(in) :: i                   !! 1 to the number of slaves
+      type(edge_stencil_t), intent(in) :: crossing
+      type(edge_stencil_t) :: new, old
+      integer :: k, n, home
 
-      place = places_before(self, i) + 1 + mod(self%class(m) - 1, merge(n_class, n_guard_class, &
-         i <= self%n_sharp))
-   end function place_of
+      n = merge(n_class, n_guard_class, i <= self%n_sharp)
+      home = self%class(crossing%master) - 1
+      new = crossing
+      do k = home, home + n - 1
+         associate (place => self%stencil(places_before(self, i) + 1 + mod(k, n)))
+            old = place
+            if (old%master > 0) then
+               if (.not. comes_first(new, old)) cycle
+            end if
+            place = new
+            if (old%master == 0) return
+            new = old
+         end associate
+      end do
+   end subroutine put
 
    !> How many places the slaves before `i` have.
    pure integer function places_before(self, i) result(n)
@@ -266,30 +280,25 @@ contains
       end associate
    end function may_cross
 
-   !> Is a crossing more within the ends of its edges than that of `old`, or as much and at a lower
+   !> Is a crossing more within the ends of its edges than another one, or as much and at a lower
    !> gap?
-   pure logical function comes_first(self, new, crossing, old, x, u0)
-      type(edge_choice_t), intent(in) :: self
+   pure logical function comes_first(new, old)
       type(edge_stencil_t), intent(in) :: new, old
-      type(crossing_t), intent(in) :: crossing   !! of the new one
-      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)
-      real(wp) :: at(3, n_edge_pair_node)
-      type(crossing_t) :: other
 
-      call edge_stencil_place(self%edges, old, x, u0, at)
-      other = edge_crossing(at)
-      associate (mine => beyond_ends(crossing), its => beyond_ends(other))
-         comes_first = mine < its
-         if (max(mine, its) <= 0.0_wp) comes_first = new%side*crossing%height &
-            < old%side*other%height
-      end associate
+      if (abs(new%beyond - old%beyond) > 0.0_wp) then
+         comes_first = new%beyond < old%beyond
+      else if (abs(new%height - old%height) > 0.0_wp) then
+         comes_first = new%height < old%height
+      else
+         comes_first = new%master < old%master
+      end if
    end function comes_first
 
-   !> How far past the ends of edges they cross, by their lengths; within them 0 or less.
+   !> How far past the ends of edges they cross, by their lengths; within them 0.
    pure real(wp) function beyond_ends(crossing) result(beyond)
       type(crossing_t), intent(in) :: crossing
 
-      beyond = maxval(max(-crossing%place, crossing%place - 1.0_wp)) - begins_beyond
+      beyond = max(0.0_wp, maxval(max(-crossing%place, crossing%place - 1.0_wp)) - begins_beyond)
    end function beyond_ends
 
    !> The ends of the edge that place `i` is of.

@@ -64,7 +64,7 @@ contains
    !> Do edges cross within their ends, and `beyond` of their lengths past them?
    pure logical function is_within(crossing, beyond)
       type(crossing_t), intent(in) :: crossing
-      real(wp), intent(in) :: beyond
+      real(wp), intent(in) :: beyond             !! of their lengths
 
       is_within = crossing%sine > 0.0_wp .and. all(crossing%place > -beyond .and. &
          crossing%place < 1.0_wp + beyond)

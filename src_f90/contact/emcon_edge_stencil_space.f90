@@ -18,7 +18,9 @@ module emcon_edge_stencil_space
    type :: edge_stencil_t
       integer :: edge = 0                        !! a side of faces
       integer :: master = 0                      !! edge that it crosses; 0: none
-      real(wp) :: side = 0.0_wp                  !! 1 or -1: heights are gaps
+      real(wp) :: side = 1.0_wp                  !! 1 or -1: heights are gaps
+      real(wp) :: height = 0.0_wp                !! gap as the step begins, without an offset [L]
+      real(wp) :: beyond = 0.0_wp                !! so far past its ends, by their lengths, >= 0
    end type edge_stencil_t
 
    !> The nodes that the four ends of a stencil are made of.

@@ -113,6 +113,7 @@ def edge_on_a_face(kind: str, cells: int, yaw: float, off: tuple[float, float]) 
     ("C3D8", 1, 0.3, (0., 0.), DEPTH),           # across the centre of a face
     ("C3D8", 1, 0.5, (0.1, 0.2), DEPTH), ("C3D8", 2, 0.3, (0.05, 0.1), DEPTH), ("C3D4", 2, 0.3, (0.05, 0.1), DEPTH),
     ("C3D20", 1, 0.3, (0.05, 0.1), DEPTH),
+    ("C3D10", 1, 0.2, (0., 0.), DEPTH),          # more crossings than classes of edges tell apart
     ("C3D8", 3, 0.3, (0.05, 0.1), 0.25*CROSSING)])   # some cross less than the step before tells
 def test_an_edge_on_a_face_that_bends(kind: str, cells: int, yaw: float, off: tuple[float, float], depth: float,
                                       tmp_path: Path) -> None:
