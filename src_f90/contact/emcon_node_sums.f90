@@ -36,9 +36,17 @@ contains
       n = size(place)
       n_dim = size(part, 1)/size(weight, 2)
       allocate(half(n_dim*(n - 1), size(part, 1)), full(n_dim*(n - 1), n_dim*(n - 1)))
-      do k = 1, size(part, 1)
-         half(:, k) = reshape(matmul(reshape(part(:, k), [n_dim, size(weight, 2)]), &
-            transpose(weight)), [size(half, 1)])
+      half = 0.0_wp
+      ! Most sums are of one node.
+      do j = 1, size(weight, 2)
+         do i = 1, n - 1
+            if (.not. abs(weight(i, j)) > 0.0_wp) cycle
+            do k = 1, size(part, 1)
+               associate (to => half(n_dim*(i - 1) + 1:n_dim*i, k))
+                  to = to + weight(i, j)*part(n_dim*(j - 1) + 1:n_dim*j, k)
+               end associate
+            end do
+         end do
       end do
       full = 0.0_wp
       do j = 1, size(weight, 2)
