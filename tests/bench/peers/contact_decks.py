@@ -101,6 +101,8 @@ REMARKS = {
     "contact4": (f"HARD of CalculiX is a pressure of 50 E by overclosure, here of 1E9; {FACES}, n = 1, 2, 3, 4",
                  split((1, 2, 3, 4), theirs=put("=HARD", "=LINEAR\n1.E9,1."))),
     "contact4_mortar": ("both with each element split into n x n x n, n = 1, 2, 3", split((1, 2, 3))),
+    "cubesmortar": ("both with each element split into n x n x n, n = 1, 2, 3", split((1, 2, 3))),
+    "cubesmortar2": ("both with each element split into n x n x n, n = 1, 2, 3", split((1, 2, 3))),
     "cubespring": (f"{FACES}, n = 2, 3, 4", split((2, 3, 4))),
     "punch1": (f"{RIM}, n = 1, 2, 3", split((1, 2, 3), chain(FLAT, SOFTER), chain(FLAT, SOFTER))),
     "punch2": ("as `punch1`", []),
