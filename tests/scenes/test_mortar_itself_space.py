@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import numpy as np
@@ -102,14 +103,19 @@ def test_many_cubes(n: tuple[int, int, int], tmp_path: Path) -> None:
     assert overlap.worst(run.fields()).depth <= 64*EPSILON
 
 
-def test_one_surface_is_a_pair(tmp_path: Path) -> None:
+@pytest.mark.parametrize("friction", ["", "*FRICTION\n0.3\n"])
+def test_one_surface_is_a_pair(friction: str, tmp_path: Path) -> None:
     """Two bodies: one surface in contact with itself takes the steps of the pair, whose slave is the finer one."""
-    ends = []
+    ends, losses = [], []
     for name, text in (("itself", one_surface((1, 1, 1))), ("pair", dropped((1, 1, 1), 0.01, 0.2).replace(
-            ALL, MORTAR.format("@").replace("@, @", "S1, S2")))):
+            ALL, MORTAR.format("@").replace("@, @", "S2, S1")))):
         folder = tmp_path/name
         folder.mkdir()
-        run = ran(folder, text)
+        text = re.sub(r"^(\d+), 3, -1\.$", r"\1, 3, -1.\n\1, 1, 0.5", text, flags=re.M)     # and sideways
+        run = ran(folder, text.replace("NAME=I\n", f"NAME=I\n{friction}", 1))
         assert run.history["active"].max() > 0
         ends.append(run.fields()["displacement"][-1])
+        losses.append(run.history["friction_loss"])
     assert np.abs(ends[0] - ends[1]).max() <= 1.0e-10
+    assert np.abs(losses[0] - losses[1]).max() <= 1.0e-10*run.history["total"].max()
+    assert np.diff(losses[0]).min() >= 0.0 and (losses[0][-1] > 0.0) == bool(friction)
