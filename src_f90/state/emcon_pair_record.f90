@@ -234,6 +234,12 @@ contains
             if (duplicate(i) > 0) force(:, duplicate(i)) = 0.0_wp
          end do
          do j = own%first, own%last
+            call clear(j)
+         end do
+         do j = by_law%first, by_law%last
+            call clear(j)
+         end do
+         do j = own%first, own%last
             call add_forces(j)
          end do
          do j = by_law%first, by_law%last
@@ -249,6 +255,15 @@ contains
       end associate
 
    contains
+
+      !> No force yet on the nodes of one condition, between vertices too.
+      subroutine clear(place)
+         integer, intent(in) :: place            !! in the set
+
+         associate (item => set%item(place))
+            force(:, item%node(:item%n_slave)) = 0.0_wp
+         end associate
+      end subroutine clear
 
       !> Those of one condition.
       subroutine add_forces(place)
