@@ -228,22 +228,19 @@ contains
 
       first = system%first_constraint(k)
       associate (node => system%contact(k)%contact%node, &
-            duplicate => system%contact(k)%contact%duplicate)
+            duplicate => system%contact(k)%contact%duplicate, &
+            acting => [(j, j = own%first, own%last), (j, j = by_law%first, by_law%last)])
          do i = 1, size(node)
             force(:, node(i)) = 0.0_wp
             if (duplicate(i) > 0) force(:, duplicate(i)) = 0.0_wp
          end do
-         do j = own%first, own%last
-            call clear(j)
+         do j = 1, size(acting)                           ! nodes between vertices, too
+            associate (item => set%item(acting(j)))
+               force(:, item%node(:item%n_slave)) = 0.0_wp
+            end associate
          end do
-         do j = by_law%first, by_law%last
-            call clear(j)
-         end do
-         do j = own%first, own%last
-            call add_forces(j)
-         end do
-         do j = by_law%first, by_law%last
-            call add_forces(j)
+         do j = 1, size(acting)
+            call add_forces(acting(j))
          end do
          do i = 1, size(node)
             self%force(:, first + i) = force(:, node(i))
@@ -255,15 +252,6 @@ contains
       end associate
 
    contains
-
-      !> No force yet on the nodes of one condition, between vertices too.
-      subroutine clear(place)
-         integer, intent(in) :: place            !! in the set
-
-         associate (item => set%item(place))
-            force(:, item%node(:item%n_slave)) = 0.0_wp
-         end associate
-      end subroutine clear
 
       !> Those of one condition.
       subroutine add_forces(place)
