@@ -228,16 +228,19 @@ contains
 
       first = system%first_constraint(k)
       associate (node => system%contact(k)%contact%node, &
-            duplicate => system%contact(k)%contact%duplicate)
+            duplicate => system%contact(k)%contact%duplicate, &
+            acting => [(j, j = own%first, own%last), (j, j = by_law%first, by_law%last)])
          do i = 1, size(node)
             force(:, node(i)) = 0.0_wp
             if (duplicate(i) > 0) force(:, duplicate(i)) = 0.0_wp
          end do
-         do j = own%first, own%last
-            call add_forces(j)
+         do j = 1, size(acting)                           ! nodes between vertices, too
+            associate (item => set%item(acting(j)))
+               force(:, item%node(:item%n_slave)) = 0.0_wp
+            end associate
          end do
-         do j = by_law%first, by_law%last
-            call add_forces(j)
+         do j = 1, size(acting)
+            call add_forces(acting(j))
          end do
          do i = 1, size(node)
             self%force(:, first + i) = force(:, node(i))
