@@ -202,8 +202,8 @@ contains
       end do
    end subroutine friction_look_back
 
-   !> Nodes that permanent conditions bind, as those of rigid bodies do their frames, nodes that follow
-   !> from these alone, and nodes that are held in all directions.
+   !> Nodes that permanent conditions bind, as those of rigid bodies do their frames, nodes that
+   !> follow from these alone, and nodes that are held in all directions.
    pure subroutine find_bound(system, set, is_bound)
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set

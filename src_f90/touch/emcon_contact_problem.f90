@@ -5,8 +5,10 @@
 !> as W was found where nothing else holds bodies. By Newton's method for the natural map of all of
 !> them at once, which is a trial of the law at every place; where that does not come to an end
 !> place by place, each exactly, until nothing changes (Gauss and Seidel), which needs no inverse,
-!> so that contacts that follow from others do no harm; the two take turns. After two of them, in
-!> the plane, by the method of Lemke for forces that push at a and at 0, whose matrix is copositive.
+!> so that contacts that follow from others do no harm; the two take turns. Where slip has a
+!> direction paths of blurred maps, and forces that stay near, come before that. After two turns,
+!> in the plane, by the method of Lemke for forces that push at a and at 0, whose matrix is
+!> copositive.
 !> Without friction, after a few trials, the least motion that closes no gap is found instead.
 !> Where W is positive definite there is a solution for any coefficient.
 !> Source: docs/theory.md, eq. (14i).
@@ -32,13 +34,13 @@ module emcon_contact_problem
    !> Parts of W that places give way by about the forces so far, and how often.
    integer, parameter :: most_nearings = 30, few_nearings = 8
    real(wp), parameter :: first_part = 1.0e-3_wp, largest_part = 10.0_wp
-   !> Blur of the map where a path to the solution begins, by the largest force, and what is left of
-   !> it in turn; each is followed until no more than this part of the blur is missed; the part of a
+   !> Blurs of the map that paths to the solution begin with, by the largest force, and what is left
+   !> in turn; each is followed until no more than this part of the blur is missed; the part of a
    !> step's promise that it is to gain there; steps of which no more than this part does that lead
    !> nowhere after so many in a row; steps in all.
-   real(wp), parameter :: first_blur = 1.0e-2_wp, next_blur = 0.3_wp, on_path = 0.1_wp, &
-      path_gain = 1.0e-2_wp, path_part = 0.03_wp
-   integer, parameter :: path_stalls = 4, most_path = 100
+   real(wp), parameter :: first_blur(*) = [1.0e-2_wp, 1.0_wp], next_blur = 0.3_wp, &
+      on_path = 0.1_wp, path_gain = 1.0e-2_wp, path_part = 0.03_wp
+   integer, parameter :: path_stalls = 8, most_path = 100
    !> Halvings of a step of Newton's method, and the part of what is foreseen that it is to gain.
    integer, parameter :: most_halvings = 12
    real(wp), parameter :: least_gain = 1.0e-4_wp
@@ -118,8 +120,10 @@ contains
          if (is_solved .or. .not. has_compliance(self)) return
          if (has_pushes) call solve_by_pushes(self, push, effort%n_pivot, is_solved)
          if (is_solved) return
-         if (has_direction) call solve_by_path(self, push, effort%n_path, is_solved)
-         if (is_solved) return
+         do turn = 1, merge(size(first_blur), 0, has_direction)
+            call solve_by_path(self, push, first_blur(turn), effort%n_path, is_solved)
+            if (is_solved) return
+         end do
          if (has_direction) call solve_by_nearing(self, push, effort, is_one_of_several, is_solved)
          is_solved = is_solved .or. (is_one_of_several .and. effort%n_near > 0)
          if (is_solved) return
@@ -469,12 +473,13 @@ contains
       end do
    end subroutine solve_by_nearing
 
-   !> Along a path to the solution from far inside of what the laws allow: of forces that follow from
-   !> others it leads to those farthest from all limits, however far these are from those before.
+   !> Along a path to the solution from far inside of what the laws allow: of forces that follow
+   !> from others it leads to those farthest from limits, however far these are from those before.
    !> Trials would creep there, as none of their steps goes past the next limit.
-   subroutine solve_by_path(self, push, n_step, is_solved)
+   subroutine solve_by_path(self, push, first, n_step, is_solved)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
+      real(wp), intent(in) :: first                  !! blur, by the largest force, > 0
       integer, intent(inout) :: n_step               !! counted on
       logical, intent(out) :: is_solved              !! else `push` is as it was
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: at, defect, new
@@ -487,7 +492,7 @@ contains
       at = push
       n_stall = 0
       call natural_map(self, push, 0.0_wp, defect)
-      blur = first_blur*max(maxval(abs(contact_problem_force(self, push))), maxval(abs(defect)))
+      blur = first*max(maxval(abs(contact_problem_force(self, push))), maxval(abs(defect)))
       do i = 1, most_path
          call natural_map(self, at, blur, defect, slope)
          n_step = n_step + 1

@@ -8,7 +8,7 @@ module test_contact_problem
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
       contact_problem_force, contact_problem_missed, contact_problem_pivot, &
       contact_problem_solve, &
-      contact_problem_status, contact_problem_t
+      contact_problem_status, contact_problem_t, met
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
       contact_sticks, contact_trial_t, coulomb_violation, slip_status_t
    use emcon_errors, only : error_t
@@ -46,7 +46,8 @@ contains
          test_case_t("by pivots as if nothing held them", test_held_pivots), &
          test_case_t("a body that its contacts alone hold", test_alone), &
          test_case_t("the same at random, with and without friction", test_at_rest), &
-         test_case_t("random problems of all kinds", test_kinds)]
+         test_case_t("random problems of all kinds", test_kinds), &
+         test_case_t("shares of one body that have far to go", test_shares)]
    end subroutine collect_contact_problem
 
    !> Two units of compliance along the normal, one along the slip; gap -2 without forces: lam = 1.
@@ -192,6 +193,48 @@ contains
             1.0e6_wp*eps, maxval(abs(force)), "forces")
       end do
    end subroutine test_turned
+
+   !> A rigid square plate on its corners, which friction strains, and which slip a little each by
+   !> itself, as no rigid motion does: friction goes round as far as it may. Trials end before that.
+   subroutine test_shares(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), parameter :: mu = 0.3_wp, apart = 1.0e-5_wp
+      real(wp), parameter :: corner(2, 4) = reshape([1.0_wp, 1.0_wp, -1.0_wp, 1.0_wp, -1.0_wp, &
+         -1.0_wp, 1.0_wp, -1.0_wp], [2, 4])
+      type(contact_problem_t) :: problem
+      type(contact_effort_t) :: effort
+      real(wp) :: rows(12, 6), push(0:2, 4), u(8)
+      integer :: i, k, n_path
+      logical :: is_solved
+
+      rows = 0.0_wp
+      do k = 1, 4
+         associate (row => 3*(k - 1) + 1, x => corner(1, k), y => corner(2, k))
+            rows(row, [1, 4, 5]) = [1.0_wp, x, y]
+            rows(row + 1, [2, 6]) = [1.0_wp, -y]
+            rows(row + 2, [3, 6]) = [1.0_wp, x]
+         end associate
+      end do
+      n_path = 0
+      do i = 1, 20
+         call contact_problem_create(problem, 2, 4)
+         problem%w = matmul(rows, transpose(rows))
+         problem%mu = mu
+         call draw_random(u)
+         problem%base(0, :) = 1.0_wp
+         do k = 1, 4
+            problem%base(1:, k) = (-1.0_wp)**k*0.2_wp*corner(:, k)/sqrt(2.0_wp)
+         end do
+         problem%free(1:, :) = apart*(reshape(u, [2, 4]) - 0.5_wp)
+         push = 0.0_wp
+         call contact_problem_solve(problem, push, effort, is_solved)
+         call check_true(error, is_solved, "solved")
+         call check_true(error, contact_problem_missed(problem, push) <= met, "law")
+         if (allocated(error)) return
+         n_path = n_path + merge(1, 0, effort%n_path > 0)
+      end do
+      call check_true(error, n_path > 10, "by a path")
+   end subroutine test_shares
 
    !> Two contacts each of which closes the other by more than itself opens, without friction or
    !> beside it; one whose friction closes it so; and what nothing moves: all are closed by 1
