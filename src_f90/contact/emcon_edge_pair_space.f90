@@ -21,6 +21,10 @@ module emcon_edge_pair_space
    integer, parameter :: weight(n_edge_pair_node, 3) = reshape( &
       [-1, 1, 0, 0, 0, 0, -1, 1, -1, 0, 1, 0], [n_edge_pair_node, 3])
 
+   !> Edges with a smaller sine are parallel: its square is lost in the round-off of what it is the
+   !> difference of, and with it the places.
+   real(wp), parameter :: parallel = sqrt(16.0_wp*epsilon(1.0_wp))
+
    !> Where two edges cross at one instant.
    type :: crossing_t
       real(wp) :: place(2) = 0.0_wp              !! on the slave, on the master: 0 to 1 within it
@@ -47,7 +51,7 @@ module emcon_edge_pair_space
 
 contains
 
-   !> The crossing of edges with the ends `at`; of parallel ones the sine is 0, and no more is told.
+   !> The crossing of edges with the ends `at`; of parallel ones the sine alone is told.
    pure type(crossing_t) function edge_crossing(at) result(crossing)
       real(wp), intent(in) :: at(n_dim, n_edge_pair_node)    !! ends of the slave, of the master [L]
       real(wp) :: frame(n_dim, 3), normal(n_dim), place(n_dim)
@@ -56,7 +60,7 @@ contains
       normal = cross_product(frame(:, 1), frame(:, 2))
       crossing%sine = sqrt(dot_product(normal, normal)/max(dot_product(frame(:, 1), &
          frame(:, 1))*dot_product(frame(:, 2), frame(:, 2)), tiny(1.0_wp)))
-      if (.not. crossing%sine > 0.0_wp) return
+      if (.not. crossing%sine > parallel) return
       place = frame_place(frame(:, 1), frame(:, 2), frame(:, 3))
       crossing%place = [place(at_xi), -place(at_eta)]
       crossing%height = place(at_height)
