@@ -16,7 +16,8 @@ module emcon_contact_sets
       candidates_select, candidates_solve
    use emcon_contact_conditions, only : noise_at
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
-      contact_problem_solve, contact_problem_status, contact_problem_t
+      contact_problem_status, contact_problem_t
+   use emcon_contact_solution, only : contact_problem_solve
    use emcon_contact_support, only : contact_support_find_jam
    use emcon_coulomb_law, only : contact_open, slip_status_t
    use emcon_errors, only : error_t

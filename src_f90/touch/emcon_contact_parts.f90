@@ -6,7 +6,8 @@
 !> Source: docs/theory.md, section 15.3.
 module emcon_contact_parts
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
-      contact_problem_missed, contact_problem_solve, contact_problem_t, nearly_met
+      contact_problem_missed, contact_problem_t, nearly_met
+   use emcon_contact_solution, only : contact_problem_solve
    use emcon_kinds, only : wp
    implicit none
    private

@@ -4,7 +4,8 @@ module test_contact_parts
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_contact_parts, only : contact_parts_solve
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
-      contact_problem_missed, contact_problem_solve, contact_problem_t, met
+      contact_problem_missed, contact_problem_t, met
+   use emcon_contact_solution, only : contact_problem_solve
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
@@ -79,7 +80,7 @@ contains
       integer :: case, n_missed
 
       n_missed = 0
-      do case = 1, 50
+      do case = 1, 100
          call draw(one, size(first))
          call draw(other, size(second))
          call join(one, other, whole)
@@ -94,7 +95,7 @@ contains
             "law of case " // to_text(case))
          if (allocated(error)) return
       end do
-      call check_true(error, n_missed > 0, "some were missed")
+      call check_true(error, n_missed > 10, to_text(n_missed) // " were missed")
    end subroutine test_coupled
 
    !> Of an elastic body: W is definite.

@@ -6,9 +6,9 @@ module test_contact_problem
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_constraint, only : most_slips
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
-      contact_problem_force, contact_problem_missed, contact_problem_pivot, &
-      contact_problem_solve, &
-      contact_problem_status, contact_problem_t, met
+      contact_problem_force, contact_problem_missed, contact_problem_status, contact_problem_t, &
+      met
+   use emcon_contact_solution, only : contact_problem_pivot, contact_problem_solve
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
       contact_sticks, contact_trial_t, coulomb_violation, slip_status_t
    use emcon_errors, only : error_t
