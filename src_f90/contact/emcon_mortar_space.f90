@@ -352,8 +352,9 @@ contains
          item(k)%size = self%state(wanted(k))%size
          if (.not. item(k)%has_friction) cycle
          call condition_resize_slip(item(k))
-         call mortar_slip_add(self%slide, self%faces, wanted(k), sight%slip, mortar_slave_direction( &
-            self%faces, self%faces%sides%slave%node, wanted(k), x, u0), item(k))
+         call mortar_slip_add(self%slide, self%faces, wanted(k), sight%slip, &
+            mortar_slave_direction(self%faces, self%faces%sides%slave%node, wanted(k), x, u0), &
+            item(k))
       end do
    end subroutine mortar_evaluate
 

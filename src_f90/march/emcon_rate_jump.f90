@@ -98,8 +98,9 @@ contains
          associate (s => jump%problem%n_slip)
             jump%rubbed = -sum(jump%impulse(1:s, :)*(jump%rate(1:s, :) + 0.5_wp*change(1:s, :)), 1)
          end associate
-         jump%lost = 0.0_wp
-         jump%is_done = sum(jump%rubbed) >= 0.0_wp
+         jump%lost = -sum(jump%impulse(0, :)*(jump%rate(0, :) + 0.5_wp*change(0, :)))
+         jump%is_done = sum(jump%rubbed) >= 0.0_wp .and. jump%lost >= -met*maxval(abs( &
+            jump%problem%base) + abs(jump%impulse))*sum(abs(jump%rate) + abs(change))
          return
       end if
       ! Slips are by half of the size of the step, so that they are twice their mean rates.

@@ -51,6 +51,7 @@ contains
       real(wp) :: v(size(self%end_state%v, 1), size(self%end_state%v, 2)), lost, gained
       type(impacts_t) :: impacts
       type(rate_jump_t) :: jump
+      integer :: turn
       logical :: is_done
 
       v = self%end_state%v
@@ -62,10 +63,14 @@ contains
          self%end_state%v - v)
       call change_pushes(self, impacts, is_done, notes, error)
       if (allocated(error) .or. is_done .or. .not. self%active%friction%stops) return
-      call find_impacts(self, impacts, jump)
-      call find_stops(self, jump)
-      call velocity_update_change(self%velocity_update, self%system, self%active%set, jump, &
-         self%end_state%v, error)
+      ! Pushes change so that no gap does; where that would make energy they stay.
+      do turn = 1, 2
+         call find_impacts(self, impacts, jump)
+         call find_stops(self, turn == 2, jump)
+         call velocity_update_change(self%velocity_update, self%system, self%active%set, jump, &
+            self%end_state%v, error)
+         if (allocated(error) .or. jump%is_done .or. jump%is_idle) exit
+      end do
       if (.not. allocated(error) .and. jump%is_done) call book_jump(self, jump)
    end subroutine take
 
@@ -210,16 +215,19 @@ contains
       end associate
    end subroutine find_rubbing
 
-   !> Where pushes stay friction alone stops what the step would turn back, by what they allow: its
-   !> impulses take all of the rate along the surface, or are opposite to what is left of that.
-   pure subroutine find_stops(self, jump)
+   !> Friction stops what the step would turn back, by what pushes allow: its impulses take all of
+   !> the rate along the surface, or are opposite to what is left of that. Pushes stay, or change
+   !> so that rates of gaps stay.
+   pure subroutine find_stops(self, pushes_stay, jump)
       type(march_t), intent(in) :: self
+      logical, intent(in) :: pushes_stay         !! else they change
       type(rate_jump_t), intent(inout) :: jump
       integer :: k
 
       jump%problem%free = 0.0_wp
       jump%problem%slip_target = 0.0_wp
       allocate(jump%stays(0:jump%problem%n_slip, size(jump%row)), source=.true.)
+      jump%stays(0, :) = pushes_stay
       do k = 1, size(jump%row)
          associate (law => self%active%friction%law(self%active%set%id(jump%row(k))))
             ! What is led to its stop in the step has it.

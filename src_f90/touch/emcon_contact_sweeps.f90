@@ -20,7 +20,7 @@ contains
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
       integer, intent(in) :: most                    !! sweeps
       integer, intent(inout) :: n_sweep              !! counted on
-      logical, intent(out) :: is_solved
+      logical, intent(out) :: is_solved           !! by the last sweep
       type(single_contact_t) :: place
       real(wp) :: new(0:most_slips), motion(0:self%n_slip, size(self%mu))
       real(wp), dimension(0:self%n_slip) :: force, change

@@ -38,7 +38,7 @@ contains
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
       integer, intent(in) :: most                    !! trials
       integer, intent(inout) :: n_trial              !! counted on
-      logical, intent(out) :: is_solved
+      logical, intent(out) :: is_solved           !! the law is met
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: trial, defect, new, step
       real(dp) :: slope(size(push), size(push)), x(size(push))
       real(wp) :: part, before, missed, largest
@@ -121,7 +121,7 @@ contains
       real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
       type(contact_effort_t), intent(inout) :: effort    !! counted on
       logical, intent(in) :: near_enough             !! a few nearings do
-      logical, intent(out) :: is_solved
+      logical, intent(out) :: is_solved           !! the law is met
       type(contact_problem_t) :: near
       real(wp) :: found(0:self%n_slip, size(self%mu)), part, more, least_part
       integer :: i, k, row, round
