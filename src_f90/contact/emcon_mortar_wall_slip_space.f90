@@ -51,9 +51,10 @@ contains
       type(wall_faces_t), intent(in) :: faces
       real(wp), intent(in) :: area(:)            !! (n_triangle) [L^2]
       integer, intent(in) :: k
-      real(wp) :: moment(n_point)
+      real(wp) :: moment(n_point), weight(n_corner)
 
-      moment = area(faces%triangle(k))*weight_of*matmul(wall_faces_weight(faces, k), point)
+      weight = wall_faces_weight(faces, k)
+      moment = area(faces%triangle(k))*weight_of*matmul(weight, point)
    end function moments_of
 
    !> All weights of constraint `i` [L^2].

@@ -177,6 +177,54 @@ def test_thrown_with_a_spin_on_a_wall(is_rigid: bool, tmp_path: Path) -> None:
     dissipates(run)
 
 
+def test_a_driven_wall_drags(tmp_path: Path) -> None:
+    """A plane moved at .8 below a slab at rest: that gains mu g per time, and the plane does mu m g times its way."""
+    mu, v, until = .3, .8, .2
+    text = on_plane(mu, until, (0, 0, 0)).replace(FIXED, f"{REFERENCE}, 2, 6\n").replace(
+        "*STEP", "*AMPLITUDE, NAME=RAMP\n0., 0., 1., 1.\n*STEP", 1)
+    run = ran(tmp_path, text.replace("*DLOAD", f"*BOUNDARY, AMPLITUDE=RAMP\n{REFERENCE}, 1, 1, {v}\n*DLOAD"))
+    push = mu*.5*GRAVITY
+    assert run.history["px"][-1] == pytest.approx(push*until, rel=1e-11)
+    assert run.history["external_work"][-1] == pytest.approx(push*v*until, rel=1e-11)
+    assert run.history["friction_loss"][-1] == pytest.approx(push*(v*until - .5*mu*GRAVITY*until**2), rel=1e-11)
+    dissipates(run)
+
+
+@pytest.mark.parametrize("slope", [.45, .499])
+def test_held_in_statics_on_a_wall(slope: float, tmp_path: Path) -> None:
+    angle = float(np.arctan(slope))
+    text = (bodies([slab()], [faces(slab(), 2, 0)], STIFF) + wall(plane()) + on_wall(MORTAR, "*FRICTION\n.5\n")
+            + f"*BOUNDARY\n{FIXED}*STEP\n*STATIC\n.5, 1.\n" + weight(angle) + "*NODE FILE\nU\n*END STEP\n")
+    run = ran(tmp_path, text)
+    assert run.verdict["verdict"] == "good"
+    force = columns(run, "pair1_force_x pair1_force_y pair1_force_z")[-1]
+    assert np.abs(np.abs(force) - .5*GRAVITY*np.array([np.sin(angle), 0.0, np.cos(angle)])).max() < 1e-8*GRAVITY
+
+
+def test_springs_of_stick_on_a_wall(tmp_path: Path) -> None:
+    """What they store comes back."""
+    law = "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1E5\n*FRICTION\n0.3, 1E4\n"
+    run = ran(tmp_path, on_free_wall(sphere(2., (0., 0., -2.)), law))
+    energy = columns(run, "kinetic strain friction_loss contact_energy").sum(1)
+    assert np.abs(energy - energy[0]).max() < 1e-11*energy[0]
+    dissipates(run)
+
+
+def test_traction_and_slip_on_a_wall(tmp_path: Path) -> None:
+    """Of all vertices: traction adds up to the force along the plane, and slip is the way."""
+    run = ran(tmp_path, on_plane(.3, .1, (1., .2, 0)).replace("*END STEP", "*CONTACT FILE\nCF, CSHEAR, CSLIP\n*END STEP"))
+    fields, low = run.fields(), np.array(slab().on(2, 0)) - 1
+    force = fields["contact_force"][1:, low].sum(1)
+    push = np.array([-1., -.2, 0])*.3*.5*GRAVITY/np.hypot(1, .2)
+    assert np.abs(force*[1, 1, 0] - push).max() < 1e-9*GRAVITY
+    surface = FieldsOf(run.file(".surfaces.vtkhdf"))
+    is_face = np.flatnonzero(np.isfinite(surface.cell["contact_status"][0]).ravel())[:4]
+    slip = surface.cell["contact_slip"][-1, is_face]
+    assert np.abs(slip - fields["displacement"][-1, low[0]]).max() < 1e-9
+    shear = surface.cell["contact_shear"][1:, is_face]
+    assert np.abs(.25*shear.sum(1) - push).max() < 1e-9*GRAVITY
+
+
 def on_free_plate(interaction: str, more: str = "", kinds: tuple[str, str] = ("C3D8", "C3D8"), options: str = MORTAR) -> str:
     """Thrown askew with a spin onto a free plate, and off."""
     turn = .3
