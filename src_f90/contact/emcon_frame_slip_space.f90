@@ -9,7 +9,7 @@ module emcon_frame_slip_space
    use emcon_rotation, only : cross_product
    implicit none
    private
-   public :: frame_slip_t, frame_slip, tangent_basis
+   public :: frame_slip_t, frame_slip, tangent_basis, tangent_axis
 
    !> A direction that is normal to a plane but for this part of it is no direction in the plane.
    real(wp), parameter :: no_direction = 0.1_wp
@@ -53,21 +53,29 @@ contains
    end subroutine frame_slip
 
    !> Two directions at right angles to `normal` and to each other, of length 1: the first one as
-   !> near to `along` as it can be, unless that is nearly normal.
+   !> near to `tangent_axis` as it can be.
    pure function tangent_basis(normal, along) result(basis)
       real(wp), intent(in) :: normal(3), along(3)   !! not 0, of any length
       real(wp) :: basis(3, 2)
       real(wp) :: unit(3), part(3)
 
       unit = normal/norm2(normal)
-      part = along - dot_product(along, unit)*unit
-      if (norm2(part) <= no_direction*norm2(along)) then
-         part = 0.0_wp
-         part(minloc(abs(unit), 1)) = 1.0_wp
-         part = part - dot_product(part, unit)*unit
-      end if
+      part = tangent_axis(unit, along)
+      part = part - dot_product(part, unit)*unit
       basis(:, 1) = part/norm2(part)
       basis(:, 2) = cross_product(unit, basis(:, 1))
    end function tangent_basis
+
+   !> `along`, unless that is nearly normal: then the axis that is least so.
+   pure function tangent_axis(unit, along) result(axis)
+      real(wp), intent(in) :: unit(3)            !! normal, of length 1
+      real(wp), intent(in) :: along(3)           !! of any length
+      real(wp) :: axis(3)
+
+      axis = along
+      if (norm2(along - dot_product(along, unit)*unit) > no_direction*norm2(along)) return
+      axis = 0.0_wp
+      axis(minloc(abs(unit), 1)) = 1.0_wp
+   end function tangent_axis
 
 end module emcon_frame_slip_space

@@ -18,6 +18,7 @@ module emcon_mortar_wall_faces_space
    use emcon_wall, only : wall_t
    use emcon_wall_distance_space, only : wall_at, wall_find, wall_spot_t
    use emcon_wall_gap_space, only : wall_gap_nodes
+   use emcon_wall_slip_space, only : n_wall_point
    implicit none
    private
    public :: wall_faces_t, wall_faces_init, wall_faces_choose, wall_faces_corners, &
@@ -125,7 +126,7 @@ contains
    end subroutine wall_faces_sum
 
    !> The nodes of the condition of constraint `i`: its own first, then others of the slave, then
-   !> those of the wall; and no derivatives yet.
+   !> those of the wall, all of these with friction; and no derivatives yet.
    pure subroutine begin_condition(self, i, item)
       type(wall_faces_t), intent(in) :: self
       integer, intent(in) :: i
@@ -143,7 +144,8 @@ contains
          end do
       end associate
       item%n_slave = n
-      call nodes_append(self%wall%node(:wall_gap_nodes(self%wall) - 1), list, n)
+      call nodes_append(self%wall%node(:merge(n_wall_point, wall_gap_nodes(self%wall), &
+         item%has_friction) - 1), list, n)
       call condition_start(item, list(:n), self%slave%n_dim)
       item%is_mean = .true.
    end subroutine begin_condition
@@ -170,7 +172,7 @@ contains
             weight(k, :n_corner) = self%corner(k, :, t)
          end do
       end associate
-      do k = 1, item%n_node - item%n_slave
+      do k = 1, min(item%n_node - item%n_slave, n_part_point - n_corner)
          n = n + 1
          place(n) = item%n_slave + k
          weight(n, n_corner + k) = 1.0_wp

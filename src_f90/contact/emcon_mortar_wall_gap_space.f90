@@ -39,7 +39,7 @@ module emcon_mortar_wall_gap_space
       1.0_wp - 2.0_wp*near_corner, near_corner, near_corner, near_corner, &
       1.0_wp - 2.0_wp*near_corner], [n_corner, n_point])
    !> Of the area 1/2 that a triangle has in its frame.
-   real(wp), parameter :: weight_of(n_point) = 0.5_wp*[share_side, share_side, share_side, &
+   real(wp), parameter, public :: weight_of(n_point) = 0.5_wp*[share_side, share_side, share_side, &
       share_corner, share_corner, share_corner]
 
    !> What a triangle sees of a wall over a step, for all that is asked of it.

@@ -2,8 +2,10 @@
 !> for each vertex of them. Source: docs/theory.md, section 15.2.
 module emcon_mortar_wall_space
    use emcon_bulges_space, only : bulges_doubt, bulges_find, bulges_largest, bulges_rise, bulges_t
+   use emcon_condition_nodes, only : condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry
+   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry, push_place
+   use emcon_contact_law, only : contact_laws_rub
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : error_t
    use emcon_facets, only : facets_length
@@ -16,6 +18,8 @@ module emcon_mortar_wall_space
       wall_faces_init, wall_faces_sum, wall_faces_t, wall_faces_weight
    use emcon_mortar_wall_gap_space, only : n_corner, n_part_point, n_point, point, &
       wall_triangle_heights, wall_triangle_look, wall_triangle_rise, wall_triangle_t
+   use emcon_mortar_wall_slip_space, only : mortar_wall_slip_add, mortar_wall_slip_areas, &
+      mortar_wall_slip_of
    use emcon_scene, only : scene_t
    use emcon_wall_distance_space, only : wall_at, wall_ends_here, wall_find, wall_is_solid, &
       wall_spot_t
@@ -39,6 +43,8 @@ module emcon_mortar_wall_space
       real(wp), allocatable :: size(:)                !! (n_constraint) mean facet there [L]
       real(wp), allocatable :: scale(:)               !! (n_constraint) that faces, at start [L^2]
       real(wp), allocatable :: cover(:)               !! (n_constraint) and at the end [L^2]
+      !> (n_triangle) twice the areas that slip is weighed with in the step; with friction [L^2]
+      real(wp), allocatable :: slide_area(:)
       real(wp) :: depth = 0.0_wp                      !! that pads and laws reach [L]
    contains
       procedure :: configure => mortar_wall_configure
@@ -47,6 +53,7 @@ module emcon_mortar_wall_space
       procedure :: begin_points => mortar_wall_begin_step
       procedure :: measure_points => mortar_wall_measure
       procedure :: evaluate_points => mortar_wall_evaluate
+      procedure :: slip_points => mortar_wall_slip
       procedure :: area_points => mortar_wall_area
       procedure :: own_area => mortar_wall_own_area
       procedure :: mean_size => mortar_wall_mean_size
@@ -75,6 +82,8 @@ contains
       self%max_penetration_at_start = merge(huge(1.0_wp), deepest_start, &
          wall_is_solid(self%faces%wall))
       call contact_laws_of_surface(pair%interaction, self%laws)
+      if (contact_laws_rub(self%laws)) allocate(self%slide_area(size(self%faces%is_facing)), &
+         source=0.0_wp)
    end subroutine mortar_wall_init
 
    !> Room for what a step knows, and sizes in the reference.
@@ -177,6 +186,8 @@ contains
       call self%has_looked(0.0_wp)
       call wall_faces_choose(self%faces, x, u0)
       if (allocated(self%bulges)) call find_sagittas(self, x, u0)
+      if (allocated(self%slide_area)) self%slide_area = mortar_wall_slip_areas(self%faces, x, u0, &
+         du, push_place(self%step))
    end subroutine mortar_wall_begin_step
 
    !> Mean gaps at both ends of the step.
@@ -271,8 +282,23 @@ contains
          call wall_faces_sum(self%faces, wanted(k), sight, target(k) + self%offset &
             + self%sagitta(wanted(k)), self%scale(wanted(k)), item(k))
          item(k)%size = self%size(wanted(k))
+         if (.not. item(k)%has_friction) cycle
+         call condition_resize_slip(item(k))
+         call mortar_wall_slip_add(self%faces, self%slide_area, wanted(k), x, u0, du, item(k))
       end do
    end subroutine mortar_wall_evaluate
+
+   !> As `contact_t` has it.
+   pure function mortar_wall_slip(self, i, x, u0, du) result(slip)
+      class(mortar_wall_t), intent(in) :: self
+      integer, intent(in) :: i                   !! 1..n_constraint
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      real(wp) :: slip(size(x, 1) - 1)           !! [L]
+
+      slip = 0.0_wp
+      if (allocated(self%slide_area)) slip = mortar_wall_slip_of(self%faces, self%slide_area, i, &
+         x, u0, du)
+   end function mortar_wall_slip
 
    !> The multipliers are forces by the scale of their constraints.
    pure subroutine mortar_wall_area(self, x, u, area, length)

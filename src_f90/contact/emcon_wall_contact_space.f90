@@ -22,7 +22,7 @@ module emcon_wall_contact_space
    use emcon_wall_distance_space, only : wall_at, wall_ends_here, wall_find, wall_is_solid, &
       wall_spot_t
    use emcon_wall_gap_space, only : dg_t, wall_gap, wall_gap_nodes
-   use emcon_wall_slip_space, only : n_wall_point, wall_slip, wall_slip_t
+   use emcon_wall_slip_space, only : n_wall_point, wall_slip, wall_slip_axis, wall_slip_t
    implicit none
    private
    public :: wall_contact_t, wall_contact_init
@@ -287,7 +287,7 @@ contains
       type(wall_slip_t) :: over
 
       call gather(self, i, x, u0, du, at, way)
-      call wall_slip(self%wall, at, way, .true., over)
+      call wall_slip(self%wall, at, way, wall_slip_axis(self%wall, at), .true., over)
       slip = over%f
    end function wall_slip_over
 
@@ -334,7 +334,7 @@ contains
       real(wp) :: weight(max_face_nodes)
       integer :: k, m, n, s, node(max_face_nodes)
 
-      call wall_slip(self%wall, at, way, item%leaves_second, slip)
+      call wall_slip(self%wall, at, way, wall_slip_axis(self%wall, at), item%leaves_second, slip)
       call find_parts(self, i, m, node, weight)
       call condition_resize_slip(item)
       n = item%n_node

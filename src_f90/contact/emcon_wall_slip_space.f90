@@ -8,13 +8,13 @@ module emcon_wall_slip_space
    use emcon_dgrad9_first, only : first_dot => dg_dot, first_t => dg_t, &
       first_difference => difference, operator(*)
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
-   use emcon_frame_slip_space, only : tangent_basis
+   use emcon_frame_slip_space, only : tangent_axis, tangent_basis
    use emcon_kinds, only : wp
    use emcon_wall, only : wall_t
    use emcon_wall_distance_space, only : wall_bend, wall_find, wall_spot_t
    implicit none
    private
-   public :: wall_slip_t, wall_slip, n_wall_point
+   public :: wall_slip_t, wall_slip, wall_slip_axis, n_wall_point
 
    !> The point, and the origin and tips of vectors of the wall.
    integer, parameter :: n_wall_point = 5, n_dim = 3
@@ -29,10 +29,12 @@ module emcon_wall_slip_space
 
 contains
 
-   pure subroutine wall_slip(wall, x, dx, leaves_second, slip)
+   !> The first direction is as near to `along` as it can be.
+   pure subroutine wall_slip(wall, x, dx, along, leaves_second, slip)
       type(wall_t), intent(in) :: wall
       !> Point, origin, tips: where they start, how they move [L]
       real(wp), intent(in) :: x(n_dim, n_wall_point), dx(n_dim, n_wall_point)
+      real(wp), intent(in) :: along(n_dim)       !! in the vectors of the wall, of any length
       logical, intent(in) :: leaves_second       !! no second derivatives
       type(wall_slip_t), intent(out) :: slip
       type(dg_t) :: place(n_dim)
@@ -56,7 +58,7 @@ contains
             end if
          end associate
       end do
-      call find_basis(wall, place%f0, place%df, basis, by_place)
+      call find_basis(wall, place%f0 + 0.5_wp*place%df, along, basis, by_place)
       do i = 1, n_dim
          part_g = 0.0_wp
          part_c = 0.0_wp
@@ -104,28 +106,48 @@ contains
       end do
    end subroutine add_second
 
-   !> Directions that touch the wall half way, in its vectors, and how they turn with the place at
-   !> the end.
-   pure subroutine find_basis(wall, from, way, basis, by_place)
+   !> The vector of the wall that is most along it at a point: a direction for its slip.
+   pure function wall_slip_axis(wall, x) result(along)
       type(wall_t), intent(in) :: wall
-      real(wp), intent(in) :: from(n_dim), way(n_dim)   !! in the vectors of the wall [L]
-      real(wp), intent(out) :: basis(n_dim, 2)
-      real(wp), intent(out) :: by_place(n_dim, n_dim, 2)   !! (of, by coordinate, which) [1/L]
-      real(wp) :: own(n_dim, n_wall_point - 1), along(n_dim), bend(n_dim, n_dim), lean
-      type(wall_spot_t) :: start, middle
+      real(wp), intent(in) :: x(n_dim, n_wall_point)   !! point, origin, tips [L]
+      real(wp) :: along(n_dim)
+      type(wall_spot_t) :: start
+
+      start = wall_find(wall, own_vectors(wall), matmul(x(:, 1) - x(:, 2), x(:, 3:) &
+         - spread(x(:, 2), 2, n_dim))/wall%arm)
+      along = 0.0_wp
+      along(minloc(abs(start%normal), 1)) = 1.0_wp
+   end function wall_slip_axis
+
+   !> Origin and tips of the wall in its vectors.
+   pure function own_vectors(wall) result(own)
+      type(wall_t), intent(in) :: wall
+      real(wp) :: own(n_dim, n_wall_point - 1)   !! [L]
       integer :: i
 
       own = 0.0_wp
       do i = 1, n_dim
          own(i, 1 + i) = wall%arm
       end do
-      start = wall_find(wall, own, from)
-      along = 0.0_wp
-      along(minloc(abs(start%normal), 1)) = 1.0_wp
-      middle = wall_find(wall, own, from + 0.5_wp*way)
-      basis = tangent_basis(middle%normal, along)
-      bend = 0.5_wp*wall_bend(wall, own, from + 0.5_wp*way)
-      lean = dot_product(middle%normal, along)/max(norm2(matmul(along, basis)), epsilon(lean))
+   end function own_vectors
+
+   !> Directions that touch the wall half way, in its vectors, and how they turn with the place at
+   !> the end.
+   pure subroutine find_basis(wall, half_way, along, basis, by_place)
+      type(wall_t), intent(in) :: wall
+      real(wp), intent(in) :: half_way(n_dim)    !! in the vectors of the wall [L]
+      real(wp), intent(in) :: along(n_dim)
+      real(wp), intent(out) :: basis(n_dim, 2)
+      real(wp), intent(out) :: by_place(n_dim, n_dim, 2)   !! (of, by coordinate, which) [1/L]
+      real(wp) :: axis(n_dim), bend(n_dim, n_dim), lean
+      type(wall_spot_t) :: middle
+      integer :: i
+
+      middle = wall_find(wall, own_vectors(wall), half_way)
+      axis = tangent_axis(middle%normal, along)
+      basis = tangent_basis(middle%normal, axis)
+      bend = 0.5_wp*wall_bend(wall, own_vectors(wall), half_way)
+      lean = dot_product(middle%normal, axis)/norm2(matmul(axis, basis))
       associate (turn => matmul(transpose(basis), bend))
          do i = 1, n_dim
             by_place(:, i, 1) = -turn(1, i)*middle%normal - lean*turn(2, i)*basis(:, 2)

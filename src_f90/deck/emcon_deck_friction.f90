@@ -5,8 +5,7 @@ module emcon_deck_friction
       refuse_lines
    use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
    use emcon_diagnostics, only : add_error, add_warning
-   use emcon_interactions, only : contact_pair_t, formulation_mortar, &
-      pressure_hard, smoothing_hermite
+   use emcon_interactions, only : contact_pair_t, pressure_hard, smoothing_hermite
    use emcon_kinds, only : wp
    use emcon_massless_surfaces, only : pair_keeps_mass
    use emcon_name_index, only : name_index_find, name_index_pair, name_index_put, name_index_t
@@ -82,14 +81,6 @@ contains
             if (pair(i)%slave == 0 .or. pair(i)%master == 0) cycle   ! unknown surfaces are told
             call check_other_way(reader, pair(:i), given)
             if (.not. pair(i)%interaction%friction > 0.0_wp .or. pair(i)%is_reverse) cycle
-            if (pair(i)%formulation == formulation_mortar .and. &
-               allocated(scene%surface(pair(i)%master)%wall)) then
-               call add_error(reader%log, pair(i)%origin, "*CONTACT PAIR: its surface " &
-                  // "interaction has *FRICTION, and " // scene%surface(pair(i)%master)%name &
-                  // " is a wall, on which MORTAR has none in this version; use TYPE=NODE TO " &
-                  // "SURFACE")
-               cycle
-            end if
             do k = 1, size(step)
                call check_step(reader, pair(i), step(k), k)
             end do

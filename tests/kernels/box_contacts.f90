@@ -10,9 +10,10 @@ module box_contacts
    use emcon_scene, only : scene_t
    use random_draws, only : draw_random
    use space_scenes, only : add_box, skin, space_begin
+   use wall_shapes, only : make_wall, turned
    implicit none
    private
-   public :: make_boxes, look, draw, evaluate, seen
+   public :: make_boxes, look, draw, draw_on_wall, evaluate, seen
 
    character(len=4), parameter, public :: kind(2) = ["C3D8", "C3D4"]
 
@@ -87,6 +88,55 @@ contains
          du(1, :last) = du(1, :last) + size_of
       end associate
    end subroutine draw
+
+   !> The same of a box on a plane or, by the number, on a ball, which moves as a rigid body: by
+   !> mortar.
+   subroutine draw_on_wall(number, size_of, scene, du, contact, error)
+      integer, intent(in) :: number
+      real(wp), intent(in) :: size_of
+      type(scene_t), intent(out) :: scene
+      real(wp), allocatable, intent(out) :: du(:, :)
+      class(contact_t), allocatable, intent(out) :: contact
+      type(error_t), allocatable, intent(out) :: error
+      type(contact_pair_t) :: pair
+      type(surface_t) :: surface(2)
+      real(wp) :: wall_at(3, 4), turn(3, 3)
+      integer :: n
+
+      call space_begin(scene)
+      call add_box(scene, kind(1 + mod(number/2, 2)), [0.0_wp, 0.0_wp, 0.02_wp], [1.0_wp, 1.0_wp, &
+         1.0_wp], [3, 3, 3])
+      n = size(scene%x, 2)
+      surface(1) = skin(scene)
+      allocate(surface(2)%wall)
+      call make_wall(1 + mod(number, 2), surface(2)%wall)
+      surface(2)%wall%node = [n + 1, n + 2, n + 3, n + 4]
+      wall_at = spread([0.5_wp, 0.4_wp, merge(0.0_wp, -1.0_wp, mod(number, 2) == 0)], 2, 4)
+      wall_at(3, 2) = wall_at(3, 2) + 1.0_wp
+      wall_at(1, 3) = wall_at(1, 3) + 1.0_wp
+      wall_at(2, 4) = wall_at(2, 4) + 1.0_wp
+      scene%x = reshape([scene%x, wall_at], [3, n + 4])
+      scene%surface = surface
+      pair%slave = 1
+      pair%master = 2
+      pair%interaction%friction = 0.3_wp
+      pair%formulation = formulation_mortar
+      call new_contact(scene, pair, contact, error)
+      if (allocated(error)) return
+      call contact%suit_steps(.false.)
+      allocate(du, mold=scene%x)
+      call draw_random(du)
+      scene%u0 = 0.03_wp*(2.0_wp*du - 1.0_wp)
+      scene%u0(:, n + 1:) = 0.0_wp
+      call draw_random(du)
+      turn = turned([size_of, 0.5_wp*size_of, 0.0_wp])
+      turn(1, 1) = turn(1, 1) - 1.0_wp
+      turn(2, 2) = turn(2, 2) - 1.0_wp
+      turn(3, 3) = turn(3, 3) - 1.0_wp
+      du = 0.1_wp*size_of*(2.0_wp*du - 1.0_wp) + matmul(turn, scene%x)
+      du(1, :n) = du(1, :n) + size_of
+      du(:, n + 1:) = matmul(turn, scene%x(:, n + 1:))
+   end subroutine draw_on_wall
 
    !> The conditions of the nodes that are over the master.
    subroutine evaluate(contact, scene, du, leaves_second, wanted, item, rubs)

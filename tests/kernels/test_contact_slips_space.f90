@@ -1,7 +1,7 @@
-!> Slips of contact in space over meshes, of nodes and of mortar: identities, momenta, rigid motions, a block that slides,
+!> Slips of contact in space over meshes, of nodes and of mortar, and of mortar on walls: identities, momenta, rigid motions, a block that slides,
 !> derivatives.
 module test_contact_slips_space
-   use box_contacts, only : draw, evaluate, kind, look, make_boxes, seen
+   use box_contacts, only : draw_meshes => draw, draw_on_wall, evaluate, kind, look, make_boxes, seen
    use check, only : check_near, check_true, test_case_t
    use emcon_constraint, only : condition_normal, condition_t
    use emcon_contact, only : contact_t
@@ -33,6 +33,22 @@ contains
          test_case_t("derivatives against differences", test_derivatives)]
    end subroutine collect_contact_slips_space
 
+   !> Two of three draws are meshes, and one is a wall.
+   subroutine draw(k, size_of, scene, du, contact, error)
+      integer, intent(in) :: k
+      real(wp), intent(in) :: size_of
+      type(scene_t), intent(out) :: scene
+      real(wp), allocatable, intent(out) :: du(:, :)
+      class(contact_t), allocatable, intent(out) :: contact
+      type(error_t), allocatable, intent(out) :: error
+
+      if (mod(k, 3) == 0) then
+         call draw_on_wall(k/3, size_of, scene, du, contact, error)
+      else
+         call draw_meshes(k, size_of, scene, du, contact, error)
+      end if
+   end subroutine draw
+
    !> Forces along slips do the work of friction on them, and have neither resultant nor moment.
    subroutine test_identity(error)
       type(error_t), allocatable, intent(out) :: error
@@ -43,8 +59,8 @@ contains
       real(wp) :: work, total(3), moment(3), magnitude
       integer :: a, i, j, k, s
 
-      do k = 1, 24
-         call draw(k, 0.3_wp*0.09_wp**(k/4), scene, du, contact, error)
+      do k = 1, 36
+         call draw(k, 0.3_wp*0.09_wp**(k/6), scene, du, contact, error)
          if (allocated(error)) return
          call look(contact, scene, du)
          associate (wanted => seen(contact))
@@ -88,7 +104,7 @@ contains
       real(wp) :: turn(3, 3), angle
       integer :: i, k
 
-      do k = 1, 8
+      do k = 1, 12
          call draw(k, 0.1_wp, scene, du, contact, error)
          if (allocated(error)) return
          call look(contact, scene, du)
@@ -157,7 +173,7 @@ contains
       step = eps**(1.0_wp/3.0_wp)
       bound = 1.0e3_wp*step**2
       n_seen = 0
-      do k = 1, 8
+      do k = 1, 12
          call draw(k, 0.1_wp, scene, du, contact, error)
          if (allocated(error)) return
          call look(contact, scene, du)

@@ -9,7 +9,7 @@ module test_slips_space
    use emcon_kinds, only : wp
    use emcon_text, only : to_text
    use emcon_wall, only : wall_t
-   use emcon_wall_slip_space, only : wall_slip, wall_slip_t
+   use emcon_wall_slip_space, only : wall_slip, wall_slip_axis, wall_slip_t
    use random_draws, only : draw_random
    use wall_shapes, only : make_wall, n_shape, turned
    implicit none
@@ -111,7 +111,7 @@ contains
          slips%c(:, :4, :) = edges%c
          slips%h(:12, :12, :) = edges%h
       case default
-         call wall_slip(wall, x, dx, .false., one)
+         call wall_slip(wall, x, dx, wall_slip_axis(wall, x), .false., one)
          slips = slips_t(one%f, one%g, one%c, one%h)
       end select
    end subroutine find

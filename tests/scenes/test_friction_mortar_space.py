@@ -7,12 +7,15 @@ from pathlib import Path
 import numpy as np
 import pytest
 from contact_blocks import FieldsOf
-from contact_space_scenes import ball, bodies, dynamic, faces, pair, velocities
+from contact_space_scenes import ball, bodies, dynamic, faces, pair, turned, velocities
 from scene_tools import Run
 from space_mesh import Block
 from test_contact_output import restart
 from test_contact_space_rigid import columns, rigid
 from test_friction_space import GRAVITY, STIFF, dissipates, ran, slab, weight
+from test_walls_space import DOME, TABLE
+from wall_space_scenes import FIXED, REFERENCE, plane, sphere, wall
+from wall_space_scenes import pair as on_wall
 
 MORTAR = ", TYPE=MORTAR"
 RUBS = "*FRICTION\n0.3\n"
@@ -122,6 +125,108 @@ def test_thrown_with_a_spin_through_the_stop(is_rigid: bool, tmp_path: Path) -> 
     dissipates(run)
 
 
+def on_plane(mu: float, until: float, v: tuple, slope: float = 0.0, is_rigid: bool = True, w: tuple = (0, 0, 0),
+             turn: np.ndarray | None = None) -> str:
+    """A slab on a plane wall, all of it turned."""
+    turn = np.eye(3) if turn is None else turn
+    one = slab()
+    one.x[:] = one.x@turn.T
+    v, w, pull = (tuple((turn@np.array(a)).tolist()) for a in (v, w, (np.sin(slope), 0.0, -np.cos(slope))))
+    flies = rigid(1, one, v=v, w=w) if is_rigid else velocities(one, np.array(v, float), np.array(w, float))
+    return (bodies([one], [faces(one, 2, 0)], STIFF) + wall(plane(normal=tuple(turn[:, 2].tolist()))) + flies
+            + on_wall(MORTAR, f"*FRICTION\n{mu!r}\n") + f"*BOUNDARY\n{FIXED}"
+            + dynamic(.01, until, f"*DLOAD\nB1, GRAV, {GRAVITY!r}, {', '.join(map(repr, pull))}\n"))
+
+
+def askew() -> np.ndarray:
+    c, s = np.cos(.7), np.sin(.7)
+    return turned(.4)@np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.]])
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), askew()], ids=["flat", "askew"])
+@pytest.mark.parametrize("slope", [.49, .499, .501])
+def test_slope_of_a_wall(slope: float, turn: np.ndarray, tmp_path: Path) -> None:
+    """A rigid slab with mu = .5 slides where the slope is above it, with the acceleration of a particle."""
+    angle, until = float(np.arctan(slope)), 0.1
+    run = ran(tmp_path, on_plane(.5, until, (0, 0, 0), angle, turn=turn))
+    p = columns(run, "px py pz")[-1]@turn/.5
+    wanted = max(0.0, np.sin(angle) - .5*np.cos(angle))*GRAVITY*until
+    assert np.abs(p - np.array([wanted, 0, 0])).max() < 1e-11*GRAVITY*until
+    dissipates(run)
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), askew()], ids=["flat", "askew"])
+def test_slides_to_a_stop_on_a_wall(turn: np.ndarray, tmp_path: Path) -> None:
+    """By v^2/(2 mu g), but for what the last increment is stopped in."""
+    mu, v, h = .3, 1.0, .01
+    run = ran(tmp_path, on_plane(mu, .4, (v, 0, 0), turn=turn))
+    moved = run.fields()["displacement"][-1, :len(slab().x)]@turn
+    assert np.abs(moved[:, 0] - v*v/(2*mu*GRAVITY)).max() < .5*mu*GRAVITY*h*h
+    assert np.abs(moved[:, 1:]).max() < 1e-12
+    assert run.history["friction_loss"][-1] == pytest.approx(.5*.5*v*v, rel=1e-12)
+    dissipates(run)
+
+
+@pytest.mark.parametrize("is_rigid", [True, False])
+def test_thrown_with_a_spin_on_a_wall(is_rigid: bool, tmp_path: Path) -> None:
+    run = ran(tmp_path, on_plane(.3, .5, (1., .2, 0), is_rigid=is_rigid, w=(0, 0, 1.)))
+    kept = columns(run, "kinetic strain friction_loss").sum(1) - run.history["external_work"]
+    assert np.abs(kept - kept[0]).max() < 1e-11*kept[0]
+    assert run.history["kinetic"][-1] < (1e-9 if is_rigid else .05)*kept[0]
+    assert max(run.history["cuts"]) == 0
+    assert run.verdict["verdict"] == "good"
+    assert run.verdict["law_violation"] < 1e-8
+    dissipates(run)
+
+
+def test_a_driven_wall_drags(tmp_path: Path) -> None:
+    """A plane moved at .8 below a slab at rest: that gains mu g per time, and the plane does mu m g times its way."""
+    mu, v, until = .3, .8, .2
+    text = on_plane(mu, until, (0, 0, 0)).replace(FIXED, f"{REFERENCE}, 2, 6\n").replace(
+        "*STEP", "*AMPLITUDE, NAME=RAMP\n0., 0., 1., 1.\n*STEP", 1)
+    run = ran(tmp_path, text.replace("*DLOAD", f"*BOUNDARY, AMPLITUDE=RAMP\n{REFERENCE}, 1, 1, {v}\n*DLOAD"))
+    push = mu*.5*GRAVITY
+    assert run.history["px"][-1] == pytest.approx(push*until, rel=1e-11)
+    assert run.history["external_work"][-1] == pytest.approx(push*v*until, rel=1e-11)
+    assert run.history["friction_loss"][-1] == pytest.approx(push*(v*until - .5*mu*GRAVITY*until**2), rel=1e-11)
+    dissipates(run)
+
+
+@pytest.mark.parametrize("slope", [.45, .499])
+def test_held_in_statics_on_a_wall(slope: float, tmp_path: Path) -> None:
+    angle = float(np.arctan(slope))
+    text = (bodies([slab()], [faces(slab(), 2, 0)], STIFF) + wall(plane()) + on_wall(MORTAR, "*FRICTION\n.5\n")
+            + f"*BOUNDARY\n{FIXED}*STEP\n*STATIC\n.5, 1.\n" + weight(angle) + "*NODE FILE\nU\n*END STEP\n")
+    run = ran(tmp_path, text)
+    assert run.verdict["verdict"] == "good"
+    force = columns(run, "pair1_force_x pair1_force_y pair1_force_z")[-1]
+    assert np.abs(np.abs(force) - .5*GRAVITY*np.array([np.sin(angle), 0.0, np.cos(angle)])).max() < 1e-8*GRAVITY
+
+
+def test_springs_of_stick_on_a_wall(tmp_path: Path) -> None:
+    """What they store comes back."""
+    law = "*SURFACE BEHAVIOR, PRESSURE-OVERCLOSURE=LINEAR\n1E5\n*FRICTION\n0.3, 1E4\n"
+    run = ran(tmp_path, on_free_wall(sphere(2., (0., 0., -2.)), law))
+    energy = columns(run, "kinetic strain friction_loss contact_energy").sum(1)
+    assert np.abs(energy - energy[0]).max() < 1e-11*energy[0]
+    dissipates(run)
+
+
+def test_traction_and_slip_on_a_wall(tmp_path: Path) -> None:
+    """Of all vertices: traction adds up to the force along the plane, and slip is the way."""
+    run = ran(tmp_path, on_plane(.3, .1, (1., .2, 0)).replace("*END STEP", "*CONTACT FILE\nCF, CSHEAR, CSLIP\n*END STEP"))
+    fields, low = run.fields(), np.array(slab().on(2, 0)) - 1
+    force = fields["contact_force"][1:, low].sum(1)
+    push = np.array([-1., -.2, 0])*.3*.5*GRAVITY/np.hypot(1, .2)
+    assert np.abs(force*[1, 1, 0] - push).max() < 1e-9*GRAVITY
+    surface = FieldsOf(run.file(".surfaces.vtkhdf"))
+    is_face = np.flatnonzero(np.isfinite(surface.cell["contact_status"][0]).ravel())[:4]
+    slip = surface.cell["contact_slip"][-1, is_face]
+    assert np.abs(slip - fields["displacement"][-1, low[0]]).max() < 1e-9
+    shear = surface.cell["contact_shear"][1:, is_face]
+    assert np.abs(.25*shear.sum(1) - push).max() < 1e-9*GRAVITY
+
+
 def on_free_plate(interaction: str, more: str = "", kinds: tuple[str, str] = ("C3D8", "C3D8"), options: str = MORTAR) -> str:
     """Thrown askew with a spin onto a free plate, and off."""
     turn = .3
@@ -143,6 +248,26 @@ def keeps(run: Run, more: str = "") -> None:
     assert run.history["friction_loss"][-1] > .05*energy[0]
     assert run.verdict["verdict"] == "good"
     dissipates(run)
+
+
+def on_free_wall(shape: str, interaction: str, more: str = "", kind: str = "C3D8") -> str:
+    """Thrown askew with a spin onto a free rigid body with a shape, and off."""
+    c, s = np.cos(.3), np.sin(.3)
+    one = Block(kind, (2, 2, 1), size=(1, 1, .5),
+                place=lambda x: (x - np.array([.5, .5, -.02]))@np.array([[c, s, 0], [-s, c, 0], [0, 0, 1]]))
+    two = Block("C3D8", (2, 2, 2), size=(2, 2, 1), place=lambda x: x - np.array([1., 1., 2.5]))
+    text = bodies([one, two], [faces(one), []], STIFF).replace("*SURFACE, NAME=S2\n", "")
+    return (text + wall(shape, (.1, 0., -.5), "ELSET=B2, ") + on_wall(MORTAR, interaction)
+            + velocities(one, np.array([1., .2, -1.]), np.array([0, 0, 1.])) + dynamic(.01, .3, more))
+
+
+@pytest.mark.parametrize(("shape", "kind"), [
+    (plane(), "C3D8"), (plane(), "C3D10"), (sphere(2., (0., 0., -2.)), "C3D8"), (DOME, "C3D4"), (TABLE, "C3D8")])
+def test_slab_on_a_free_wall(shape: str, kind: str, tmp_path: Path) -> None:
+    run = ran(tmp_path, on_free_wall(shape, RUBS, kind=kind))
+    keeps(run)
+    assert max(run.history["cuts"]) == 0
+    assert run.verdict["law_violation"] < 1e-8
 
 
 @pytest.mark.parametrize(("mu", "kinds"), [
@@ -223,6 +348,22 @@ def test_a_ball_slides_and_rolls(tmp_path: Path) -> None:
     speed = run.history["px"]/run.history["px"][0]
     assert speed[5] > .8
     # The centre rises and falls by .005: g times that is a tenth of v^2/2, of which 7/5 is that of the mass.
+    assert np.abs(speed[10:] - 5/7).max() < .07
+    assert run.verdict["verdict"] == "good"
+    dissipates(run)
+
+
+def test_a_ball_slides_and_rolls_on_a_wall(tmp_path: Path) -> None:
+    """As on faces."""
+    c, s = np.cos(.2), np.sin(.2)
+    turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])@np.array([[1, 0, 0], [0, c, -s], [0, s, c]])
+    one = Block("C3D8", (8, 8, 8), size=(2, 2, 2), place=lambda x: ball(x)@turn.T)
+    one.x[:, 2] -= one.x[:, 2].min()
+    low = [(e, f) for e, f in faces(one) if one.x[np.array(one.element[e - 1]) - 1, 2].min() < .2]
+    run = ran(tmp_path, bodies([one], [low], STIFF) + wall(plane()) + rigid(1, one, v=(1., 0, 0)) + on_wall(MORTAR, RUBS)
+              + f"*BOUNDARY\n{FIXED}" + dynamic(.01, .2, weight()))
+    speed = run.history["px"]/run.history["px"][0]
+    assert speed[5] > .8
     assert np.abs(speed[10:] - 5/7).max() < .07
     assert run.verdict["verdict"] == "good"
     dissipates(run)

@@ -192,4 +192,3 @@ def test_pin_in_a_hole(tmp_path: Path) -> None:
 def test_pairs_refused(tmp_path: Path) -> None:
     text = falling(cube(), plane(), (0., 0., -1.), options=MORTAR)
     assert "swap the two" in refusal(tmp_path, text.replace("S1, W\n", "W, S1\n"))
-    assert "MORTAR" in refusal(tmp_path, text.replace("NAME=I\n", "NAME=I\n*FRICTION\n.3\n", 1))
