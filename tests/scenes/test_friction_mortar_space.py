@@ -170,7 +170,7 @@ def test_slides_to_a_stop_on_a_wall(turn: np.ndarray, tmp_path: Path) -> None:
 @pytest.mark.parametrize("is_rigid", [True, False])
 def test_thrown_with_a_spin_on_a_wall(is_rigid: bool, tmp_path: Path) -> None:
     run = ran(tmp_path, on_plane(.3, .5, (1., .2, 0), is_rigid=is_rigid, w=(0, 0, 1.)))
-    kept = columns(run, "kinetic strain friction_loss").sum(1) - run.history["external_work"]
+    kept = columns(run, "kinetic strain friction_loss restitution_loss").sum(1) - run.history["external_work"]
     assert np.abs(kept - kept[0]).max() < 1e-11*kept[0]
     assert run.history["kinetic"][-1] < (1e-9 if is_rigid else .05)*kept[0]
     assert max(run.history["cuts"]) == 0
