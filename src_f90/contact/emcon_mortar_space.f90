@@ -7,7 +7,7 @@ module emcon_mortar_space
    use emcon_bulges_space, only : bulges_find
    use emcon_condition_nodes, only : condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry, push_place
+   use emcon_contact, only : gap_state_t, max_penetration_on_entry, push_place
    use emcon_contact_law, only : contact_laws_rub
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : error_t
@@ -16,6 +16,7 @@ module emcon_mortar_space
    use emcon_kinds, only : wp
    use emcon_mortar_faces_space, only : mortar_faces_choose, mortar_faces_init, mortar_faces_look, &
       mortar_faces_t
+   use emcon_mortar_means_space, only : mortar_means_init, mortar_means_t
    use emcon_mortar_rise_space, only : mortar_rise, mortar_rise_doubt, &
       mortar_rise_largest, mortar_rise_t
    use emcon_mortar_slave_space, only : mortar_slave_direction, mortar_slave_weight
@@ -35,7 +36,7 @@ module emcon_mortar_space
    !> So far, per facet, a mean gap may be closed where contact begins.
    real(wp), parameter :: max_penetration_mean = 0.2_wp
 
-   type, extends(contact_t) :: mortar_space_t
+   type, extends(mortar_means_t) :: mortar_space_t
       type(mortar_faces_t) :: faces
       type(position_memo_t) :: memo                   !! of the nodes as stencils were chosen:
       real(wp) :: chosen_reach = 0.0_wp               !! among facets up to there [L]
@@ -44,9 +45,6 @@ module emcon_mortar_space
       type(mortar_slip_t), allocatable :: slide(:)    !! (n_triangle) of the step; with friction
       !> (0:1, n_facet) how dual the multipliers of slave facets are at start and end
       real(wp), allocatable :: theta(:, :)
-      real(wp), allocatable :: whole(:)               !! (n_constraint) reference area [L^2]
-      real(wp), allocatable :: scale(:)               !! (n_constraint) covered at the start [L^2]
-      real(wp), allocatable :: cover(:)               !! (n_constraint) covered at the end [L^2]
    contains
       procedure :: configure => mortar_configure
       procedure :: follow_arcs => mortar_follow_arcs
@@ -55,10 +53,6 @@ module emcon_mortar_space
       procedure :: measure_points => mortar_measure
       procedure :: evaluate_points => mortar_evaluate
       procedure :: slip_points => mortar_slip
-      procedure :: area_points => mortar_area
-      procedure :: own_area => mortar_own_area
-      procedure :: share => mortar_share
-      procedure :: mean_gap => mortar_mean_gap
       procedure :: lets_in => mortar_lets_in
    end type mortar_space_t
 
@@ -86,19 +80,17 @@ contains
    !> Room for what a step knows, and sizes in the reference.
    pure subroutine make_room(self)
       type(mortar_space_t), intent(inout) :: self
+      real(wp) :: whole(self%n_constraint)
       integer :: i, k
 
-      associate (n => self%n_constraint, n_triangle => size(self%faces%split%facet))
-         allocate(self%basis(n_triangle), self%state(n))
-         allocate(self%duplicate(n), source=0)
-         allocate(self%theta(0:1, self%faces%sides%slave%n_facet), self%whole(n), self%cover(n), &
-            self%sagitta(n), source=0.0_wp)
-      end associate
+      allocate(self%basis(size(self%faces%split%facet)), self%state(self%n_constraint))
+      allocate(self%theta(0:1, self%faces%sides%slave%n_facet), source=0.0_wp)
+      whole = 0.0_wp
       associate (frames => self%faces%sides%frames)
          do i = 1, self%n_constraint
             do k = self%faces%start(i), self%faces%start(i + 1) - 1
                associate (t => self%faces%triangle(k))
-                  self%whole(i) = self%whole(i) + frames%area(t) &
+                  whole(i) = whole(i) + frames%area(t) &
                      *sum(self%faces%weights%linear(:, self%faces%vertex(k), t))/3.0_wp
                   self%state(i)%size = self%state(i)%size + frames%size(t) &
                      /real(self%faces%start(i + 1) - self%faces%start(i), wp)
@@ -106,8 +98,7 @@ contains
             end do
          end do
       end associate
-      self%scale = self%whole
-      self%thickness = sqrt(self%whole)
+      call mortar_means_init(self, whole)
    end subroutine make_room
 
    pure subroutine mortar_configure(self, x, options)
@@ -368,42 +359,6 @@ contains
       slip = 0.0_wp
       if (allocated(self%slide)) slip = mortar_slip_of(self%slide, self%faces, i, x, u0, du)
    end function mortar_slip
-
-   !> The multipliers are forces by the scale of their constraints.
-   pure subroutine mortar_area(self, x, u, area, length)
-      class(mortar_space_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
-      real(wp), intent(out) :: length(:)         !! (n_constraint) by the thickness [L]
-
-      area = self%scale
-      length = self%cover/self%thickness
-   end subroutine mortar_area
-
-   pure subroutine mortar_own_area(self, x, area)
-      class(mortar_space_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: x(:, :)    !! (3, n_node) [L]
-      real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
-
-      area = self%whole
-   end subroutine mortar_own_area
-
-   !> Integrals of gaps are functions of the positions alone; their means know what was covered.
-   pure real(wp) function mortar_share(self, i) result(share)
-      class(mortar_space_t), intent(in) :: self
-      integer, intent(in) :: i                   !! 1..n_constraint
-
-      share = self%scale(i)/self%whole(i)
-   end function mortar_share
-
-   pure real(wp) function mortar_mean_gap(self, i, gap) result(mean_gap)
-      class(mortar_space_t), intent(in) :: self
-      integer, intent(in) :: i                   !! 1..n_constraint
-      real(wp), intent(in) :: gap                !! integral by what was covered at the start [L]
-
-      mean_gap = 0.0_wp
-      if (self%cover(i) > 0.0_wp) mean_gap = gap*self%scale(i)/self%cover(i)
-   end function mortar_mean_gap
 
    !> Beside what a mean lets in, the chords of curved surfaces cross by their rises.
    pure real(wp) function mortar_lets_in(self) result(lets_in)

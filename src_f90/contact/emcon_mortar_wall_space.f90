@@ -4,7 +4,7 @@ module emcon_mortar_wall_space
    use emcon_bulges_space, only : bulges_doubt, bulges_find, bulges_largest, bulges_rise, bulges_t
    use emcon_condition_nodes, only : condition_resize_slip
    use emcon_constraint, only : condition_t
-   use emcon_contact, only : contact_t, gap_state_t, max_penetration_on_entry, push_place
+   use emcon_contact, only : gap_state_t, max_penetration_on_entry, push_place
    use emcon_contact_law, only : contact_laws_rub
    use emcon_contact_law_registry, only : contact_laws_of_surface
    use emcon_errors, only : error_t
@@ -14,6 +14,7 @@ module emcon_mortar_wall_space
    use emcon_interactions, only : contact_options_t, contact_pair_t, interaction_reach, &
       multiplier_dual
    use emcon_kinds, only : wp
+   use emcon_mortar_means_space, only : mortar_means_init, mortar_means_t
    use emcon_mortar_wall_faces_space, only : wall_faces_choose, wall_faces_corners, &
       wall_faces_init, wall_faces_sum, wall_faces_t, wall_faces_weight
    use emcon_mortar_wall_gap_space, only : n_corner, n_part_point, n_point, point, &
@@ -34,15 +35,12 @@ module emcon_mortar_wall_space
    !> the step.
    real(wp), parameter :: near_per_facet = 0.5_wp, near_per_motion = 2.0_wp
 
-   type, extends(contact_t) :: mortar_wall_t
+   type, extends(mortar_means_t) :: mortar_wall_t
       type(wall_faces_t) :: faces
       type(bulges_t), allocatable :: bulges           !! of the slave; only if gaps follow arcs
       !> (corner, 0:1, n_triangle) integrals with the weights that are 1 at one corner
       real(wp), allocatable :: height(:, :, :), area_of(:, :, :)
-      real(wp), allocatable :: whole(:)               !! (n_constraint) reference area [L^2]
       real(wp), allocatable :: size(:)                !! (n_constraint) mean facet there [L]
-      real(wp), allocatable :: scale(:)               !! (n_constraint) that faces, at start [L^2]
-      real(wp), allocatable :: cover(:)               !! (n_constraint) and at the end [L^2]
       !> (n_triangle) twice the areas that slip is weighed with in the step; with friction [L^2]
       real(wp), allocatable :: slide_area(:)
       real(wp) :: depth = 0.0_wp                      !! that pads and laws reach [L]
@@ -54,11 +52,7 @@ module emcon_mortar_wall_space
       procedure :: measure_points => mortar_wall_measure
       procedure :: evaluate_points => mortar_wall_evaluate
       procedure :: slip_points => mortar_wall_slip
-      procedure :: area_points => mortar_wall_area
-      procedure :: own_area => mortar_wall_own_area
       procedure :: mean_size => mortar_wall_mean_size
-      procedure :: share => mortar_wall_share
-      procedure :: mean_gap => mortar_wall_mean_gap
       procedure :: lets_in => mortar_wall_lets_in
    end type mortar_wall_t
 
@@ -89,19 +83,19 @@ contains
    !> Room for what a step knows, and sizes in the reference.
    pure subroutine make_room(self)
       type(mortar_wall_t), intent(inout) :: self
+      real(wp) :: whole(self%n_constraint)
       integer :: i, k
 
-      associate (n => self%n_constraint, split => self%faces%split, &
-            n_triangle => size(self%faces%split%facet))
-         allocate(self%state(n))
-         allocate(self%duplicate(n), source=0)
-         allocate(self%whole(n), self%size(n), self%cover(n), self%sagitta(n), source=0.0_wp)
+      allocate(self%state(self%n_constraint))
+      allocate(self%size(self%n_constraint), source=0.0_wp)
+      whole = 0.0_wp
+      associate (split => self%faces%split, n_triangle => size(self%faces%split%facet))
          allocate(self%height(n_corner, 0:1, n_triangle), self%area_of(n_corner, 0:1, &
             n_triangle), source=0.0_wp)
-         do i = 1, n
+         do i = 1, self%n_constraint
             do k = self%faces%start(i), self%faces%start(i + 1) - 1
                associate (f => split%facet(self%faces%triangle(k)))
-                  self%whole(i) = self%whole(i) + self%faces%slave%size(f)/real(split%start(f + 1) &
+                  whole(i) = whole(i) + self%faces%slave%size(f)/real(split%start(f + 1) &
                      - split%start(f), wp)*sum(self%faces%weights%linear(:, self%faces%vertex(k), &
                      self%faces%triangle(k)))/3.0_wp
                   self%size(i) = self%size(i) + facets_length(self%faces%slave, f) &
@@ -110,8 +104,7 @@ contains
             end do
          end do
       end associate
-      self%scale = self%whole
-      self%thickness = sqrt(self%whole)
+      call mortar_means_init(self, whole)
    end subroutine make_room
 
    pure subroutine mortar_wall_configure(self, x, options)
@@ -300,25 +293,6 @@ contains
          x, u0, du)
    end function mortar_wall_slip
 
-   !> The multipliers are forces by the scale of their constraints.
-   pure subroutine mortar_wall_area(self, x, u, area, length)
-      class(mortar_wall_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: x(:, :), u(:, :)   !! (3, n_node) [L]
-      real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
-      real(wp), intent(out) :: length(:)         !! (n_constraint) by the thickness [L]
-
-      area = self%scale
-      length = self%cover/self%thickness
-   end subroutine mortar_wall_area
-
-   pure subroutine mortar_wall_own_area(self, x, area)
-      class(mortar_wall_t), intent(in) :: self
-      real(wp), intent(in), contiguous :: x(:, :)    !! (3, n_node) [L]
-      real(wp), intent(out) :: area(:)           !! (n_constraint) [L^2]
-
-      area = self%whole
-   end subroutine mortar_wall_own_area
-
    pure real(wp) function mortar_wall_mean_size(self, x) result(length)
       class(mortar_wall_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :)   !! (3, n_node) reference positions [L]
@@ -326,23 +300,6 @@ contains
       length = huge(length)
       if (self%n_constraint > 0) length = sum(self%size)/self%n_constraint
    end function mortar_wall_mean_size
-
-   !> Integrals of gaps are functions of the positions alone; their means know the area.
-   pure real(wp) function mortar_wall_share(self, i) result(share)
-      class(mortar_wall_t), intent(in) :: self
-      integer, intent(in) :: i                   !! 1..n_constraint
-
-      share = self%scale(i)/self%whole(i)
-   end function mortar_wall_share
-
-   pure real(wp) function mortar_wall_mean_gap(self, i, gap) result(mean_gap)
-      class(mortar_wall_t), intent(in) :: self
-      integer, intent(in) :: i                   !! 1..n_constraint
-      real(wp), intent(in) :: gap                !! integral by the area at the start [L]
-
-      mean_gap = 0.0_wp
-      if (self%cover(i) > 0.0_wp) mean_gap = gap*self%scale(i)/self%cover(i)
-   end function mortar_wall_mean_gap
 
    !> Beside what a mean lets in, the chords of a curved surface cross a wall by their rises.
    pure real(wp) function mortar_wall_lets_in(self) result(lets_in)

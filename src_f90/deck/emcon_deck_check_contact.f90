@@ -2,7 +2,7 @@
 !>
 !> Which surface is the slave: docs/theory.md, section 4.12; in space no more than advice.
 module emcon_deck_check_contact
-   use emcon_deck_check_sides, only : find_advice
+   use emcon_deck_check_sides, only : advise_wall, find_advice
    use emcon_deck_check_surfaces, only : mark_nodes
    use emcon_deck_dimension, only : n_space
    use emcon_deck_reader, only : reader_t
@@ -107,10 +107,23 @@ contains
          if (scene%pair(i)%is_reverse) cycle
          call check_common_nodes(reader, scene, scene%pair(i), has_common)
          call check_freedom(reader, scene, scene%pair(i))
+         call check_wall(reader, scene, scene%pair(i))
          if (has_common .or. has_reverse(i)) cycle
          if (reader%log%n_errors == 0) call check_sides(reader, scene, scene%pair(i))
       end do
    end subroutine check_pairs
+
+   !> Warn of faces that are larger than the wall they meet.
+   subroutine check_wall(reader, scene, pair)
+      type(reader_t), intent(inout) :: reader
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      character(len=:), allocatable :: advice
+
+      call advise_wall(scene, pair, advice)
+      if (len(advice) > 0) call add_warning(reader%log, pair%origin, "*CONTACT PAIR: slave " &
+         // "surface " // scene%surface(pair%slave)%name // advice)
+   end subroutine check_wall
 
    !> Warn of a slave surface that should be the master, or a finer one.
    subroutine check_sides(reader, scene, pair)

@@ -9,9 +9,10 @@ module emcon_deck_check_sides
    use emcon_surface_shape_plane, only : surface_shape, surface_shape_t
    use emcon_surface_shape_space, only : surface_size
    use emcon_text, only : to_text
+   use emcon_wall, only : wall_breadth
    implicit none
    private
-   public :: find_advice, advise_tie
+   public :: find_advice, advise_tie, advise_wall
 
    !> A slave surface longer than this times its master: force leaks where it reaches beyond. The
    !> rest is room for curved surfaces on straight ones.
@@ -63,25 +64,6 @@ contains
       end associate
    end subroutine find_advice
 
-   !> Why the slave of a tie in space should be the master, to follow on its name; empty if it
-   !> should not, or could not, as the master is larger.
-   subroutine advise_tie(scene, slave, master, advice)
-      type(scene_t), intent(in) :: scene
-      integer, intent(in) :: slave, master       !! surfaces by their numbers
-      character(len=:), allocatable, intent(out) :: advice
-      real(wp) :: slave_area, slave_length, master_area, master_length
-
-      advice = ""
-      call surface_size(scene, scene%surface(slave), slave_area, slave_length)
-      call surface_size(scene, scene%surface(master), master_area, master_length)
-      if (.not. min(slave_area, master_area) > 0.0_wp) return
-      if (slave_length <= coarse_ratio*master_length) return
-      if (master_area > slave_area + 0.5_wp*slave_length*sqrt(slave_area)) return
-      advice = " has faces " // to_text(slave_length/master_length, 3) // " times as long as " &
-         // "those of master surface " // scene%surface(master)%name // ", which follow it in " &
-         // "the mean only; the finer one should be the slave: swap the two"
-   end subroutine advise_tie
-
    !> The same in space, by the sizes of the surfaces and of their faces.
    subroutine advise_space(scene, pair, advice)
       type(scene_t), intent(in) :: scene
@@ -103,5 +85,45 @@ contains
          end if
       end associate
    end subroutine advise_space
+
+   !> Why the slave of a tie in space should be the master, to follow on its name; empty if it
+   !> should not, or could not, as the master is larger.
+   subroutine advise_tie(scene, slave, master, advice)
+      type(scene_t), intent(in) :: scene
+      integer, intent(in) :: slave, master       !! surfaces by their numbers
+      character(len=:), allocatable, intent(out) :: advice
+      real(wp) :: slave_area, slave_length, master_area, master_length
+
+      advice = ""
+      call surface_size(scene, scene%surface(slave), slave_area, slave_length)
+      call surface_size(scene, scene%surface(master), master_area, master_length)
+      if (.not. min(slave_area, master_area) > 0.0_wp) return
+      if (slave_length <= coarse_ratio*master_length) return
+      if (master_area > slave_area + 0.5_wp*slave_length*sqrt(slave_area)) return
+      advice = " has faces " // to_text(slave_length/master_length, 3) // " times as long as " &
+         // "those of master surface " // scene%surface(master)%name // ", which follow it in " &
+         // "the mean only; the finer one should be the slave: swap the two"
+   end subroutine advise_tie
+
+   !> Why the slave of a pair whose master is a wall should be finer, to follow on its name; empty
+   !> if it need not be. Nodes meet walls: what is between those of a face goes through it.
+   subroutine advise_wall(scene, pair, advice)
+      type(scene_t), intent(in) :: scene
+      type(contact_pair_t), intent(in) :: pair
+      character(len=:), allocatable, intent(out) :: advice
+      real(wp) :: area, length
+
+      advice = ""
+      associate (master => scene%surface(pair%master))
+         if (.not. allocated(master%wall)) return
+         call surface_size(scene, scene%surface(pair%slave), area, length)
+         length = scale(length, exponent(maxval(abs(scene%x))))
+         if (length <= wall_breadth(master%wall)) return
+         advice = " has faces " // to_text(length, 3) // " long, and wall " // master%name &
+            // " is " // to_text(wall_breadth(master%wall), 3) // " wide: nodes meet walls, and " &
+            // "what is between the nodes of a face goes through it untold; take faces that are " &
+            // "smaller than the wall"
+      end associate
+   end subroutine advise_wall
 
 end module emcon_deck_check_sides

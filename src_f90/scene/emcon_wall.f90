@@ -9,7 +9,7 @@ module emcon_wall
    use emcon_profile_piece_plane, only : profile_piece_t
    implicit none
    private
-   public :: wall_t
+   public :: wall_t, wall_breadth
 
    !> A plane through the origin, its normal the first vector; a sphere about the origin; a profile
    !> that is turned about the first vector; one that is drawn along the third vector.
@@ -30,5 +30,26 @@ module emcon_wall
       logical :: is_open(n_end) = .false.        !! nothing is beyond its start, its end
       logical :: is_ring = .false.               !! its end is its start
    end type wall_t
+
+contains
+
+   !> How wide a wall is at least that bodies are outside of, by its profile: the diameter of a
+   !> sphere or of what is turned, the size of a profile that is drawn; huge of a plane and of a
+   !> sphere that bodies are inside of [L].
+   pure real(wp) function wall_breadth(self) result(breadth)
+      type(wall_t), intent(in) :: self
+      integer :: k
+
+      breadth = huge(breadth)
+      select case (self%kind)
+      case (wall_round)
+         if (self%bulge > 0.0_wp) breadth = 2.0_wp*self%radius
+      case (wall_turned)
+         breadth = 2.0_wp*maxval([(max(self%piece(k)%from(1), self%piece(k)%to(1)), &
+            k = 1, size(self%piece))])
+      case (wall_drawn)
+         breadth = self%extent
+      end select
+   end function wall_breadth
 
 end module emcon_wall

@@ -13,7 +13,7 @@ module box_contacts
    use wall_shapes, only : make_wall, turned
    implicit none
    private
-   public :: make_boxes, look, draw, draw_on_wall, evaluate, seen
+   public :: make_boxes, look, draw, draw_on_wall, evaluate, seen, sum_up
 
    character(len=4), parameter, public :: kind(2) = ["C3D8", "C3D4"]
 
@@ -163,5 +163,29 @@ contains
 
       wanted = pack([(i, i = 1, contact%n_constraint)], contact%state%is_near)
    end function seen
+
+   !> What forces along `g` do over the motion `du`, half way.
+   pure subroutine sum_up(scene, du, node, g, work, sums, magnitude)
+      type(scene_t), intent(in) :: scene
+      real(wp), intent(in) :: du(:, :)               !! (3, n_node) [L]
+      integer, intent(in) :: node(:)                 !! (n) that they act on
+      real(wp), intent(in) :: g(:, :)                !! (3, n)
+      real(wp), intent(out) :: work                  !! of all of them
+      real(wp), intent(out) :: sums(6)               !! resultant, and moment about the origin
+      real(wp), intent(out) :: magnitude             !! sum of sizes
+      real(wp) :: at(3)
+      integer :: j
+
+      work = 0.0_wp
+      sums = 0.0_wp
+      do j = 1, size(node)
+         associate (a => node(j), own => g(:, j))
+            at = scene%x(:, a) + scene%u0(:, a) + 0.5_wp*du(:, a)
+            work = work + dot_product(own, du(:, a))
+            sums = sums + [own, cshift(at, 1)*cshift(own, -1) - cshift(at, -1)*cshift(own, 1)]
+         end associate
+      end do
+      magnitude = sum(abs(g))
+   end subroutine sum_up
 
 end module box_contacts

@@ -1,7 +1,8 @@
-!> Slips of contact in space over meshes, of nodes and of mortar, and of mortar on walls: identities, momenta, rigid motions, a block that slides,
-!> derivatives.
+!> Slips of contact in space over meshes, of nodes and of mortar, and of mortar on walls:
+!> identities, momenta, rigid motions, a block that slides, derivatives.
 module test_contact_slips_space
-   use box_contacts, only : draw_meshes => draw, draw_on_wall, evaluate, kind, look, make_boxes, seen
+   use box_contacts, only : draw_meshes => draw, draw_on_wall, evaluate, kind, look, make_boxes, &
+      seen, sum_up
    use check, only : check_near, check_true, test_case_t
    use emcon_constraint, only : condition_normal, condition_t
    use emcon_contact, only : contact_t
@@ -56,8 +57,8 @@ contains
       class(contact_t), allocatable :: contact
       type(condition_t), allocatable :: item(:)
       real(wp), allocatable :: du(:, :)
-      real(wp) :: work, total(3), moment(3), magnitude
-      integer :: a, i, j, k, s
+      real(wp) :: work, sums(6), magnitude
+      integer :: i, k, s
 
       do k = 1, 36
          call draw(k, 0.3_wp*0.09_wp**(k/6), scene, du, contact, error)
@@ -71,23 +72,13 @@ contains
                   call check_near(error, slip, item(i)%slip, tol, maxval(abs(du)), "slip")
                end associate
                do s = 1, 2
-                  work = 0.0_wp
-                  total = 0.0_wp
-                  moment = 0.0_wp
-                  magnitude = 0.0_wp
-                  do j = 1, item(i)%n_node
-                     a = item(i)%node(j)
-                     associate (g => item(i)%t(:, j, s), at => scene%x(:, a) + scene%u0(:, a) &
-                           + 0.5_wp*du(:, a))
-                        work = work + dot_product(g, du(:, a))
-                        total = total + g
-                        moment = moment + cshift(at, 1)*cshift(g, -1) - cshift(at, -1)*cshift(g, 1)
-                        magnitude = magnitude + sum(abs(g))
-                     end associate
-                  end do
+                  associate (nodes => item(i)%n_node)
+                     call sum_up(scene, du, item(i)%node(:nodes), item(i)%t(:, :nodes, s), work, &
+                        sums, magnitude)
+                  end associate
                   call check_near(error, work, item(i)%slip(s), tol, magnitude*maxval(abs(du)), &
                      "identity " // to_text(k))
-                  call check_near(error, [total, moment], [(0.0_wp, j = 1, 6)], tol, magnitude, &
+                  call check_near(error, sums, 0.0_wp*sums, tol, magnitude, &
                      "momenta " // to_text(k))
                end do
             end do

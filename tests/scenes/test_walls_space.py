@@ -377,6 +377,20 @@ def test_past_the_end_of_a_profile(tmp_path: Path) -> None:
     assert np.ptp(total) <= BALANCE*(total.max() + run.history["external_work"].max())
 
 
+@pytest.mark.parametrize("shape", [
+    "TYPE=CYLINDER\n0., 0., 0., 1., 0., 0.\n0., 1., 0.\nSTART, -{0}, 0.\nLINE, {0}, 0.\n",
+    "TYPE=REVOLUTION\n0., 0., 0., 0., 0., 1.\nSTART, 0., 0.\nLINE, {0}, 0.\n",
+    "TYPE=SPHERE\n0., 0., -{0}, {0}\n"])
+def test_a_wall_that_is_smaller_than_a_face(shape: str, tmp_path: Path) -> None:
+    """It goes through a face of 1 between its nodes; the deck is told, and not of one that is wider."""
+    for radius, said in ((0.4, "has faces 1 long, and wall W is 0.8 wide"), (0.6, "")):
+        deck = tmp_path/"deck.inp"
+        deck.write_text(falling(cube((1, 1, 1), gap=0.5), shape.format(radius), (0., 0., -1.), until=0.1))
+        done = emcon("check", deck)
+        assert done.returncode == 0
+        assert said in done.stderr and ("wide" in done.stderr) == bool(said), done.stderr
+
+
 def test_all_exterior_meets_walls(tmp_path: Path) -> None:
     text = falling(cube(), plane(), (0., 0., -1.)).replace(
         pair(), "*CONTACT\n*CONTACT INCLUSIONS, ALL EXTERIOR\n")
