@@ -46,7 +46,7 @@ NEEDED = ("increment", "time", "kinetic", "strain", "external_work", "total")
 #: A total energy below this fraction of the largest single energy is taken for zero.
 ZERO_ENERGY = 64.0*float(np.finfo(np.float64).eps)
 
-_SUFFIXES = (".vtkhdf", ".h5", ".csv", ".log", ".png")
+_SUFFIXES = (".vtkhdf", ".h5", ".csv", ".log", ".png", ".pvd")
 
 
 @dataclass(frozen=True)
@@ -96,9 +96,10 @@ def locate(result: str | os.PathLike[str]) -> ResultPaths:
         raise ResultError(f"{path} is a deck, not a result; run it first, then give "
                           f"{path.with_suffix('')}")
     base = path.with_suffix("") if path.suffix in _SUFFIXES else path
-    if path.name.endswith(".surfaces.vtkhdf"):
-        base = base.with_suffix("")
     paths = ResultPaths(base)
+    if base.suffix == ".surfaces" and not (paths.table.is_file() or paths.history.is_file()):
+        base = base.with_suffix("")             # faces of contact beside the fields of a run
+        paths = ResultPaths(base)
     if base.name in ("", "..") or not any(
             p.is_file() for p in (paths.table, paths.history, paths.field)):
         hint = "; that is a folder, give FOLDER/NAME" if path.is_dir() else ""

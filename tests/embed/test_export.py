@@ -82,6 +82,14 @@ def test_what_cannot_be_written_is_told(fields: Path, arguments: list[str], mess
     assert [path.name for path in fields.parent.iterdir()] == ["box.v2.vtkhdf"]
 
 
+@pytest.mark.parametrize("name", ["box.v2.surfaces", "box.v2.surfaces.vtkhdf", "box.v2.surfaces.pvd", "box.v2.pvd"])
+def test_any_file_of_a_run_names_it(fields: Path, name: str) -> None:
+    write_fields(fields.with_name("box.v2.surfaces.vtkhdf"))
+    both = [fields.with_name("box.v2.pvd"), fields.with_name("box.v2.surfaces.pvd")]
+    assert export(fields.with_name(name)) == both
+    assert [len(listed(path)) for path in both] == [len(TIMES)]*2
+
+
 def test_a_result_without_fields(fields: Path) -> None:
     fields.with_name("box.v2.vtkhdf").rename(fields.with_name("box.v2.csv"))
     with pytest.raises(ResultError, match="no file .*box.v2.vtkhdf"):
