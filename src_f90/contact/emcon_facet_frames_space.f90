@@ -6,7 +6,7 @@ module emcon_facet_frames_space
    use emcon_element_kind, only : max_face_nodes
    use emcon_facet_split, only : facet_split_centre, facet_split_t
    use emcon_facets, only : facets_length, facets_t
-   use emcon_kinds, only : wp
+   use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_patch_sides_space, only : point_frames_t
    implicit none
@@ -142,27 +142,26 @@ contains
       real(wp), intent(in) :: x(:, :)
       integer, intent(in) :: f
       type(facet_weights_t), intent(inout) :: self
-      real(wp), dimension(self%n(f), self%n(f)) :: mass, dual
-      real(wp) :: whole(self%n(f), self%n(f))
+      real(dp), dimension(self%n(f), self%n(f)) :: mass, whole, dual
       logical :: is_singular
       integer :: k, m, n
 
       n = self%n(f)
-      mass = 0.0_wp
+      mass = 0.0_dp
       do k = split%start(f), split%start(f + 1) - 1
          associate (value => self%linear(:, :n, k))
-            mass = mass + triangle_area(facets, split, k, x)/12.0_wp*(matmul(transpose(value), &
-               value) + outer(sum(value, 1), sum(value, 1)))
+            mass = mass + real(triangle_area(facets, split, k, x)/12.0_wp*(matmul( &
+               transpose(value), value) + outer(sum(value, 1), sum(value, 1))), dp)
          end associate
       end do
-      whole = 0.0_wp
+      whole = 0.0_dp
       do m = 1, n
          whole(m, m) = sum(mass(:, m))
       end do
       call dense_solve(mass, whole, dual, is_singular)
       if (is_singular) return                    ! without area nothing acts there
       do k = split%start(f), split%start(f + 1) - 1
-         self%skew(:, :n, k) = matmul(self%linear(:, :n, k), dual) - self%linear(:, :n, k)
+         self%skew(:, :n, k) = matmul(self%linear(:, :n, k), real(dual, wp)) - self%linear(:, :n, k)
       end do
    end subroutine find_skew
 
