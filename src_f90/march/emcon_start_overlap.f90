@@ -25,7 +25,7 @@ contains
       type(scene_t), intent(in) :: scene
       type(error_t), allocatable, intent(out) :: error
       type(overlap_t) :: overlap
-      character(len=:), allocatable :: text, title
+      character(len=:), allocatable :: cure, text, title
       real(wp) :: bar
       integer :: k
 
@@ -39,24 +39,29 @@ contains
             overlap)
       end associate
       if (.not. overlap%depth > bar) return
-      k = pair_of(scene, overlap)
+      k = pair_of(scene, march%system%space%body, overlap)
       if (k == 0) return
       call overlap_text(overlap, scene%node%label, march%system%space%body, text)
       if (overlap%is_beside) text = text // "; no node of one need be in the other, as where " // &
          "edges cross or faces lie in one plane"
       associate (pair => scene%pair(k))
+         cure = "; move the bodies apart"
+         if (allocated(scene%surface(pair%master)%wall)) cure = cure // ", or turn the wall " // &
+            "round, so that its normal points to the other side"
          title = "surface " // scene%surface(pair%slave)%name
          if (pair%slave /= pair%master) title = title // " and of surface " // &
             scene%surface(pair%master)%name
          call raise(error, err_input, where_text(scene, pair%origin) // ": error: bodies of " // &
             title // " overlap at the start by " // to_text(overlap%depth, 3) // " of an edge: " &
-            // text // "; move the bodies apart")
+            // text // cure)
       end associate
    end subroutine start_overlap_check
 
-   !> The pair whose surfaces have what the overlap names; 0: none does.
-   pure integer function pair_of(scene, overlap) result(pair)
+   !> The pair whose surfaces have what the overlap names; 0: none does. Behind a wall any node of
+   !> the slave's body may be.
+   pure integer function pair_of(scene, body, overlap) result(pair)
       type(scene_t), intent(in) :: scene
+      integer, intent(in) :: body(:)             !! (n_node) of nodes, from 1; 0: of none
       type(overlap_t), intent(in) :: overlap
       integer, allocatable :: slave(:), master(:)
       logical :: is_here, is_there
@@ -64,8 +69,13 @@ contains
       do pair = 1, size(scene%pair)
          call surface_nodes(scene, scene%surface(scene%pair(pair)%slave), slave)
          call surface_nodes(scene, scene%surface(scene%pair(pair)%master), master)
-         is_here = find_sorted(slave, overlap%node) > 0 .and. &
-            find_sorted(master, overlap%facet(1)) > 0
+         if (allocated(scene%surface(scene%pair(pair)%master)%wall)) then
+            is_here = any(overlap%facet(1) == scene%surface(scene%pair(pair)%master)%wall%node) &
+               .and. any(body(slave) == body(overlap%node))
+         else
+            is_here = find_sorted(slave, overlap%node) > 0 .and. &
+               find_sorted(master, overlap%facet(1)) > 0
+         end if
          is_there = find_sorted(master, overlap%node) > 0 .and. &
             find_sorted(slave, overlap%facet(1)) > 0
          if (is_here .or. is_there) return

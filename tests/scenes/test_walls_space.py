@@ -403,6 +403,15 @@ def test_behind_at_the_start(tmp_path: Path) -> None:
     ran(tmp_path, falling(cube(gap=-0.01), plane(), (0., 0., -1.), options=", ADJUST=0."))
 
 
+def test_behind_a_wall_turned_away(tmp_path: Path) -> None:
+    """A cube that hangs below the plane: its upper side, which alone is the slave, has gap 0."""
+    block = cube(gap=-1.0)
+    text = (bodies([block], [faces(block, 2, 1)]) + wall(plane()) + pair() + f"*BOUNDARY\n{FIXED}" + dynamic(0.02, 0.1))
+    said = refusal(tmp_path, text)
+    assert "overlap at the start by 2 of an edge" in said and "turn the wall round" in said
+    ran(tmp_path, text.replace(plane(), plane(normal=(0., 0., -1.))))
+
+
 def test_fillets(tmp_path: Path) -> None:
     """The rim of a table, and a hollow corner, which is refused without one."""
     sharp = "TYPE=REVOLUTION, FILLET RADIUS=1.\n0., 0., -2., 0., 0., 1.\nSTART, 0., 2.\nLINE, 1.3, 2.\nLINE, 1.3, -1.\n"
