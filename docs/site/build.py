@@ -26,7 +26,7 @@ SITE = ROOT/"build"/"site"
 
 #: Titles of the contents at the left, and their pages.
 CONTENTS = {
-    "Begin": "tutorial howto gmsh gallery/index",
+    "Begin": "tutorial howto gmsh glossary gallery/index",
     "Use": "deck python embedding hosts",
     "Reference": "reference_python reference_c reference_fortran modules",
     "How it works": "theory energy",

@@ -1,6 +1,6 @@
 !> Products of conditions: what is covered of a facet, to the third power, times a gap of it.
 !>
-!> Source: docs/theory.md, section 15.
+!> Source: docs/theory.md, section 14.
 module emcon_condition_product
    use emcon_condition_nodes, only : condition_resize
    use emcon_constraint, only : condition_t

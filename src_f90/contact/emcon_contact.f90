@@ -463,7 +463,7 @@ contains
    end subroutine find_normals
 
    !> The gradients at the start in place of discrete ones: forces along them have no moment there,
-   !> docs/theory.md, section 14. Stencils that are others there keep the discrete ones.
+   !> docs/theory.md, section 13. Stencils that are others there keep the discrete ones.
    pure subroutine from_start(self, wanted, motion, target, item)
       class(contact_t), intent(inout) :: self
       integer, intent(in) :: wanted(:)                !! (n)

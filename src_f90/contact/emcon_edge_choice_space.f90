@@ -3,7 +3,7 @@
 !> Each side of faces has a few places for crossings with edges of the other surface: sharp sides
 !> for those with sharp edges, and with those along which a face bends outwards; sides that are not
 !> sharp are guarded. Which edges are crossed is chosen once per step. Source: docs/theory.md,
-!> section 15, after eq. (51).
+!> section 14, after eq. (51).
 module emcon_edge_choice_space
    use emcon_bodies, only : bodies_find_tied
    use emcon_csr, only : csr_list_users

@@ -1,7 +1,7 @@
 !> Contact of edges in space: edges of two bodies that cross, with no node in front of a face.
 !>
 !> Which edge a side of faces crosses is chosen once per step (`emcon_edge_choice_space`); here is
-!> what a crossing gives. Source: docs/theory.md, section 15, after eq. (51).
+!> what a crossing gives. Source: docs/theory.md, section 14, after eq. (51).
 module emcon_edge_contact_space
    use emcon_condition_nodes, only : condition_resize, condition_resize_slip
    use emcon_constraint, only : condition_t

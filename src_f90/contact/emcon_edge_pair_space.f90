@@ -2,7 +2,7 @@
 !>
 !> With the edges as the two vectors of a frame this is the height of the second edge in it, and the
 !> places of the crossing are the affine coordinates; slip is how these change. Source:
-!> docs/theory.md, section 15, eq. (51), and section 15.3.
+!> docs/theory.md, section 14, eq. (51), and section 14.3.
 module emcon_edge_pair_space
    use emcon_frame_slip_space, only : frame_slip, frame_slip_t
    use emcon_frame_vertex_space, only : at_eta, at_height, at_xi, frame_place, frame_vertex, &

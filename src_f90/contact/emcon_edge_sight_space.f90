@@ -1,5 +1,5 @@
 !> How two edges in space lie to each other and to the faces beside them: what tells whether they
-!> may meet, before where they cross is found. Source: docs/theory.md, section 15, after eq. (51).
+!> may meet, before where they cross is found. Source: docs/theory.md, section 14, after eq. (51).
 module emcon_edge_sight_space
    use emcon_edge_pair_space, only : crossing_t, n_edge_pair_node
    use emcon_kinds, only : wp

@@ -1,5 +1,5 @@
 !> A crossing of two edges in a step: what it is made of, where its ends are and how they move.
-!> Source: docs/theory.md, section 15, after eq. (51).
+!> Source: docs/theory.md, section 14, after eq. (51).
 module emcon_edge_stencil_space
    use emcon_condition_nodes, only : nodes_append
    use emcon_edge_pair_space, only : n_edge_pair_node

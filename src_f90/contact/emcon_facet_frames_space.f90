@@ -1,7 +1,7 @@
 !> The triangles that slave facets are split into: frames that move with them, and the multipliers
 !> of the facets' vertices on them.
 !>
-!> Source: docs/theory.md, section 15.
+!> Source: docs/theory.md, section 14.
 module emcon_facet_frames_space
    use emcon_element_kind, only : max_face_nodes
    use emcon_facet_split, only : facet_split_centre, facet_split_t

@@ -2,7 +2,7 @@
 !>
 !> The changes of its affine coordinates, times the vectors of the frame as the step begins. Each
 !> has forces without resultant and moment, and rigid turns are no slip. Source: docs/theory.md,
-!> section 15.3.
+!> section 14.3.
 module emcon_frame_slip_space
    use emcon_frame_vertex_space, only : at_eta, at_xi, frame_vertex, frame_vertex_t, n_frame_var
    use emcon_kinds, only : wp

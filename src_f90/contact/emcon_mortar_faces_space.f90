@@ -1,5 +1,5 @@
 !> Slave facets of mortar contact in space: their triangles, the multipliers of their vertices, and
-!> what of the master each triangle may see. Source: docs/theory.md, section 15.2.
+!> what of the master each triangle may see. Source: docs/theory.md, section 14.2.
 module emcon_mortar_faces_space
    use emcon_errors, only : error_t
    use emcon_facet_frames_space, only : facet_frames_init

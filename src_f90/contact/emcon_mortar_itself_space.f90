@@ -3,7 +3,7 @@
 !>
 !> Between bodies the one with the shorter facets is the slave; within a body what comes first along
 !> a direction that is none of a mesh. So a part of the surface that meets another one is the slave
-!> as a whole. Source: docs/theory.md, section 15.2.
+!> as a whole. Source: docs/theory.md, section 14.2.
 module emcon_mortar_itself_space
    use emcon_facets, only : facets_join_nodes, facets_length, facets_t
    use emcon_kinds, only : wp

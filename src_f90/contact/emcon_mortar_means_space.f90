@@ -1,5 +1,5 @@
 !> What mortar contact in space has in common, whatever its master is: gaps of vertices are means
-!> over what is covered of the slave facets around them. Source: docs/theory.md, section 15.2.
+!> over what is covered of the slave facets around them. Source: docs/theory.md, section 14.2.
 module emcon_mortar_means_space
    use emcon_contact, only : contact_t
    use emcon_kinds, only : wp

@@ -1,7 +1,7 @@
 !> How far the curved surfaces that facets stand for rise between a slave triangle and the master:
 !> what mortar gaps between facets are larger than those between the surfaces.
 !>
-!> Source: docs/theory.md, section 15.2.
+!> Source: docs/theory.md, section 14.2.
 module emcon_mortar_rise_space
    use emcon_bulges_space, only : bulges_doubt, bulges_largest, bulges_rise, bulges_t
    use emcon_frame_vertex_space, only : frame_place, frame_size

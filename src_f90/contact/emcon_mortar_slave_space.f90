@@ -1,5 +1,5 @@
 !> The slave's side of mortar contact in space: triangles of its facets, and the multipliers of
-!> their vertices. Source: docs/theory.md, section 15.2.
+!> their vertices. Source: docs/theory.md, section 14.2.
 module emcon_mortar_slave_space
    use emcon_facet_frames_space, only : facet_weights_init, facet_weights_t
    use emcon_facet_groups, only : facet_groups_init, facet_groups_t, group_angle

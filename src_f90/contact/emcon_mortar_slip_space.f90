@@ -3,7 +3,7 @@
 !>
 !> Over each triangle of the master it is the slip of nodes, of the points of the slave's triangle
 !> above it, with the weights that the gap gives them; these are kept over the step. Source:
-!> docs/theory.md, section 15.3.
+!> docs/theory.md, section 14.3.
 module emcon_mortar_slip_space
    use emcon_constraint, only : condition_t, most_slips
    use emcon_frame_slip_space, only : frame_slip, frame_slip_t

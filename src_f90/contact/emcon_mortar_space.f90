@@ -2,7 +2,7 @@
 !> with one weight for each vertex of the slave facets.
 !>
 !> Each triangle of the slave facets has a stencil of its own, that of a patch as large as it is.
-!> Source: docs/theory.md, section 15.2.
+!> Source: docs/theory.md, section 14.2.
 module emcon_mortar_space
    use emcon_bulges_space, only : bulges_find
    use emcon_condition_nodes, only : condition_resize_slip

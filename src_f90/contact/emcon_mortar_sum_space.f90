@@ -1,5 +1,5 @@
 !> Conditions of mortar contact in space: what the triangles of slave facets see over a step, and
-!> the sum of it over the facets of a vertex. Source: docs/theory.md, section 15.2.
+!> the sum of it over the facets of a vertex. Source: docs/theory.md, section 14.2.
 module emcon_mortar_sum_space
    use emcon_condition_nodes, only : nodes_append
    use emcon_condition_product, only : condition_add_cubed, condition_start

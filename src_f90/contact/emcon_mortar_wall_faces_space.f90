@@ -1,5 +1,5 @@
 !> Slave facets in front of a wall: what of them faces it, and the conditions of their vertices.
-!> Source: docs/theory.md, section 15.2.
+!> Source: docs/theory.md, section 14.2.
 module emcon_mortar_wall_faces_space
    use emcon_condition_nodes, only : nodes_append
    use emcon_condition_product, only : condition_start

@@ -2,7 +2,7 @@
 !> discrete gradient and second derivatives over a step.
 !>
 !> Distances are those of points of the triangle from the shape itself. There is nothing to clip:
-!> points of quadrature are enough. Source: docs/theory.md, section 15.2.
+!> points of quadrature are enough. Source: docs/theory.md, section 14.2.
 module emcon_mortar_wall_gap_space
    use emcon_dgrad_nodes, only : nodes_add_first, nodes_add_second
    use emcon_frame_vertex_space, only : frame_area, frame_area_t, frame_size

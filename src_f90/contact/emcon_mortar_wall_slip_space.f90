@@ -1,6 +1,6 @@
 !> Slip of mortar contact in space with a wall over a step: that of the points of slave facets that
 !> its distance is integrated at, in the mean with the weight of each of their vertices, which is
-!> kept over the step. Source: docs/theory.md, section 15.3.
+!> kept over the step. Source: docs/theory.md, section 14.3.
 module emcon_mortar_wall_slip_space
    use emcon_constraint, only : condition_t, most_slips
    use emcon_frame_vertex_space, only : frame_size

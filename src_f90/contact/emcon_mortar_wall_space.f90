@@ -1,5 +1,5 @@
 !> Mortar contact in space with a wall: its distance, integrated over slave facets with one weight
-!> for each vertex of them. Source: docs/theory.md, section 15.2.
+!> for each vertex of them. Source: docs/theory.md, section 14.2.
 module emcon_mortar_wall_space
    use emcon_bulges_space, only : bulges_doubt, bulges_find, bulges_largest, bulges_rise, bulges_t
    use emcon_condition_nodes, only : condition_resize_slip

@@ -2,7 +2,7 @@
 !> around it. A node of a smooth surface has one frame, one of a corner has several.
 !>
 !> The patch moves with the slave's surface, and its gap is the mean over what it covers of the
-!> master: smooth while the node slides over sides and corners. Source: docs/theory.md, section 15.
+!> master: smooth while the node slides over sides and corners. Source: docs/theory.md, section 14.
 module emcon_patch_contact_space
    use emcon_bulges_space, only : bulges_doubt, bulges_find, bulges_largest, bulges_t
    use emcon_condition_nodes, only : condition_fold, condition_resize, condition_resize_slip

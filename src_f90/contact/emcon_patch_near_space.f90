@@ -1,5 +1,5 @@
 !> The triangles of the master that are near a slave point: the nearest one that a frame is to see,
-!> and what hangs together with it. Source: docs/theory.md, section 15.
+!> and what hangs together with it. Source: docs/theory.md, section 14.
 module emcon_patch_near_space
    use emcon_kinds, only : wp
    use emcon_nearest_space, only : nearest_t, nearest_update

@@ -1,7 +1,7 @@
 !> Both sides of contact of nodes in space, as they are made once: frames that move with the nodes
 !> of the slave, and triangles of the master with what is beyond their sides.
 !>
-!> Source: docs/theory.md, section 15.
+!> Source: docs/theory.md, section 14.
 module emcon_patch_sides_space
    use emcon_csr, only : csr_list_users
    use emcon_element_kind, only : max_face_nodes

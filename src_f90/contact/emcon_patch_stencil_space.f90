@@ -1,7 +1,7 @@
 !> Which triangles of the master the patch of a slave node looks at in a step, and which nodes these
 !> are made of.
 !>
-!> Source: docs/theory.md, section 15.
+!> Source: docs/theory.md, section 14.
 module emcon_patch_stencil_space
    use emcon_bulges_space, only : bulges_rise, bulges_t
    use emcon_element_kind, only : max_face_nodes

@@ -1,6 +1,6 @@
 !> Contact of nodes in space with a wall: one constraint per node and per virtual centre of a facet
 !> with nodes between corners, its gap the distance from the shape itself. Source: docs/theory.md,
-!> section 15.1.
+!> section 14.1.
 module emcon_wall_contact_space
    use emcon_condition_nodes, only : condition_resize, condition_resize_slip
    use emcon_constraint, only : condition_t

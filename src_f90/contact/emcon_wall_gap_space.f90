@@ -2,7 +2,7 @@
 !>
 !> All of it is made of dot products of the way from the origin of the wall and of its vectors,
 !> which are linear in positions: forces have no resultant and no moment.
-!> Source: docs/theory.md, section 15.1.
+!> Source: docs/theory.md, section 14.1.
 module emcon_wall_gap_space
    use emcon_dgrad9, only : dg_dot, dg_sqrt, dg_t, difference, difference_t, &
       operator(+), operator(-), operator(*)

@@ -2,7 +2,7 @@
 !>
 !> The point in the vectors of the wall is three dot products; their changes along two directions
 !> that touch the wall half way are slip. So rigid turns of wall and point together are none, and
-!> its forces have no resultant and no moment. Source: docs/theory.md, section 15.3.
+!> its forces have no resultant and no moment. Source: docs/theory.md, section 14.3.
 module emcon_wall_slip_space
    use emcon_dgrad9, only : dg_dot, dg_t, difference, operator(*)
    use emcon_dgrad9_first, only : first_dot => dg_dot, first_t => dg_t, &

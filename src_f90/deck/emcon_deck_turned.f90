@@ -2,7 +2,7 @@
 !>
 !> Forces and terms of equations become their components. A displacement that is prescribed along
 !> an axis of the model stays one; any other is prescribed at the stand-in of its node, which is
-!> made for it. Source: docs/theory.md, section 11.
+!> made for it. Source: docs/theory.md, section 10.
 module emcon_deck_turned
    use emcon_couplings, only : equation_t
    use emcon_deck_reader, only : reader_t

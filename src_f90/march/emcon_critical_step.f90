@@ -2,7 +2,7 @@
 !>
 !> An element vibrates no slower by itself than in the company of others, which bounds the frequency
 !> by the fastest element. The value itself comes from Lanczos' method, in the inner product of the
-!> mass. Source: docs/theory.md, section 14.
+!> mass. Source: docs/theory.md, section 13.
 module emcon_critical_step
    use emcon_constraint, only : condition_add_field, condition_rate
    use emcon_constraints, only : constraint_set_t

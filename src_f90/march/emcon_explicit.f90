@@ -2,7 +2,7 @@
 !>
 !> Forces are those at the start of a step, which the step before has left. A step is half a push by
 !> them and by multipliers that hold its end, the way, and half a push by the forces at the end and
-!> by multipliers that hold velocities there. Source: docs/theory.md, section 14.
+!> by multipliers that hold velocities there. Source: docs/theory.md, section 13.
 module emcon_explicit
    use emcon_active_set, only : active_set_is_empty, active_set_select, step_done
    use emcon_contact_rounds, only : contact_rounds_stand

@@ -1,6 +1,6 @@
 !> The second half of an explicit step: the push by the forces at its end, with multipliers that
 !> hold velocities there: conditions that always hold, and contacts, which do not pull.
-!> Source: docs/theory.md, section 14.
+!> Source: docs/theory.md, section 13.
 module emcon_explicit_push
    use emcon_constraint, only : condition_add_field, condition_rate
    use emcon_constraints, only : constraint_set_t

@@ -1,6 +1,6 @@
 !> Which nodes of the slave surface of a tie in space have a multiplier.
 !>
-!> Source: docs/theory.md, section 11.10.
+!> Source: docs/theory.md, section 10.10.
 module emcon_tie_basket_space
    use emcon_facets, only : facets_normal, facets_rim, facets_t
    use emcon_kinds, only : wp

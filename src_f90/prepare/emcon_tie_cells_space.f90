@@ -3,7 +3,7 @@
 !>
 !> Each triangle of the slave facet is a plane. Triangles of the master that face it are projected
 !> along its normal and clipped by its sides; D and M are integrals over the same polygons, so that
-!> the rows of a tie sum up to 0. Source: docs/theory.md, section 11.10.
+!> the rows of a tie sum up to 0. Source: docs/theory.md, section 10.10.
 module emcon_tie_cells_space
    use emcon_box_tree, only : box_tree_find
    use emcon_facets, only : facets_length

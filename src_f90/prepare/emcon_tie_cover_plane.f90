@@ -1,7 +1,7 @@
 !> What the slave surface of a tie covers of its master surface, which may be larger.
 !>
 !> Master edges that are covered as a whole touch nothing any more; where the slave surface ends on
-!> an edge the rest of that is free. Source: docs/theory.md, section 11.1.
+!> an edge the rest of that is free. Source: docs/theory.md, section 10.1.
 module emcon_tie_cover_plane
    use emcon_couplings, only : tie_rows_t
    use emcon_kinds, only : wp

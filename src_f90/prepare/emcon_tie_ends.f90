@@ -1,6 +1,6 @@
 !> Ends of slave chains of ties: which give their multipliers to their neighbours.
 !>
-!> Source: docs/theory.md, section 11.
+!> Source: docs/theory.md, section 10.
 module emcon_tie_ends
    use emcon_couplings, only : tie_rows_t
    use emcon_kinds, only : wp

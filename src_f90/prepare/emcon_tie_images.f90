@@ -2,7 +2,7 @@
 !>
 !> While ties are prepared the image is there, elements and all, where the map of the tie has it;
 !> so it is measured as any other tie. Afterwards its nodes are those that they are images of.
-!> Source: docs/theory.md, section 11.11.
+!> Source: docs/theory.md, section 10.11.
 module emcon_tie_images
    use emcon_couplings, only : tie_rows_t, tie_t
    use emcon_deck_dimension, only : n_plane

@@ -1,6 +1,6 @@
 !> Slave nodes of ties moved onto the master surface: D x_slave = M x_master before the first step.
 !>
-!> Source: docs/theory.md, section 11.
+!> Source: docs/theory.md, section 10.
 module emcon_tie_moves
    use emcon_deck_jacobian, only : determinant
    use emcon_element_kind, only : element_kind_t

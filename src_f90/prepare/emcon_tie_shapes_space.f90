@@ -4,7 +4,7 @@
 !> Those with nodes between their corners have the shape functions of their elements, at natural
 !> coordinates that are linear in each triangle; of quadrilaterals that are no parallelograms at
 !> those of the bilinear map of their corners: exact where sides are straight.
-!> Source: docs/theory.md, section 11.10.
+!> Source: docs/theory.md, section 10.10.
 module emcon_tie_shapes_space
    use emcon_facet_split, only : facet_split_centre
    use emcon_kinds, only : wp

@@ -1,7 +1,7 @@
 !> The constraint rows of a tie in space: D x_s - M x_m = 0, one for each slave node that keeps its
 !> multiplier.
 !>
-!> Source: docs/theory.md, section 11.10.
+!> Source: docs/theory.md, section 10.10.
 module emcon_tie_space
    use emcon_couplings, only : tie_rows_t, tie_t
    use emcon_errors, only : error_t

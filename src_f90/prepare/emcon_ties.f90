@@ -1,7 +1,7 @@
 !> Ties before the first step: their rows are frozen, slave nodes are moved onto the master surface,
 !> and what ties cover is no exterior any more.
 !>
-!> Source: docs/theory.md, section 11.
+!> Source: docs/theory.md, section 10.
 module emcon_ties
    use emcon_couplings, only : tie_rows_t
    use emcon_deck_dimension, only : n_plane

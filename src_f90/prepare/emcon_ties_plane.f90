@@ -1,7 +1,7 @@
 !> Ties of the plane before the first step: frozen integrals, multipliers at crosspoints, slave
 !> nodes moved onto the master surface.
 !>
-!> Source: docs/theory.md, section 11.
+!> Source: docs/theory.md, section 10.
 module emcon_ties_plane
    use emcon_couplings, only : tie_rows_t, tie_t
    use emcon_errors, only : error_t

@@ -1,7 +1,7 @@
 !> The faces of contact surfaces in space, and what contact does to each.
 !>
 !> A force on a node belongs to the faces there, whichever side of a pair it is on: so both sides of
-!> a pair show all of the pressure between them. Source: docs/theory.md, section 15.
+!> a pair show all of the pressure between them. Source: docs/theory.md, section 14.
 module emcon_contact_faces
    use, intrinsic :: ieee_arithmetic, only : ieee_is_nan, ieee_quiet_nan, ieee_value
    use emcon_facet_values, only : facets_share

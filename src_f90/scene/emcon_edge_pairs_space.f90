@@ -1,5 +1,5 @@
 !> Contact of sharp edges beside pairs in space: what crosses with no node in front of a face.
-!> Source: docs/theory.md, section 15.
+!> Source: docs/theory.md, section 14.
 module emcon_edge_pairs_space
    use emcon_interactions, only : contact_pair_t, formulation_edges, formulation_user, &
       pair_is_reverse_of, pressure_hard

@@ -1,7 +1,7 @@
 !> Rigid bodies: elements that keep their shape, and the few nodes whose motion is that of all.
 !>
 !> A rigid motion is affine: where the n_dim + 1 nodes of a frame are tells where every other node
-!> is. Source: docs/theory.md, section 13.
+!> is. Source: docs/theory.md, section 12.
 module emcon_rigid_bodies
    use emcon_kinds, only : wp
    use emcon_origin, only : origin_t

@@ -1,5 +1,5 @@
 !> Central differences: forces at the start of a step, a diagonal mass.
-!> Source: docs/theory.md, section 14.
+!> Source: docs/theory.md, section 13.
 module emcon_scheme_central_difference
    use emcon_evaluation, only : instant_t, evaluation_moving, evaluation_t
    use emcon_kinds, only : wp

@@ -1,5 +1,5 @@
 !> How fast an element may vibrate by itself, its mass at its nodes.
-!> Source: docs/theory.md, section 14.
+!> Source: docs/theory.md, section 13.
 module emcon_element_frequency
    use emcon_kinds, only : wp
    implicit none

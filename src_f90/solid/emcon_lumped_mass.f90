@@ -1,5 +1,5 @@
 !> The mass of an element at its nodes.
-!> Source: docs/theory.md, section 14.
+!> Source: docs/theory.md, section 13.
 module emcon_lumped_mass
    use emcon_kinds, only : wp
    implicit none

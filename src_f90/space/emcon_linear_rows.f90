@@ -2,7 +2,7 @@
 !>
 !> Row k: the sum of weight times displacement over its entries is zero. There is a row in each
 !> direction for each node of a rigid body that is not in its frame, and for each of its arms, then
-!> for each row of each tie, then the equations. Source: docs/theory.md, sections 11 and 13.
+!> for each row of each tie, then the equations. Source: docs/theory.md, sections 10 and 12.
 module emcon_linear_rows
    use emcon_couplings, only : tie_t
    use emcon_kinds, only : wp

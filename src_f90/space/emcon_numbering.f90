@@ -3,7 +3,7 @@
 !>
 !> Every displacement is a sum over unknown and prescribed ones, u = T w with T constant: one term
 !> of weight 1, itself, or for a dependent freedom the terms that linear constraints give it.
-!> Source: docs/theory.md, section 11.
+!> Source: docs/theory.md, section 10.
 module emcon_numbering
    use emcon_csr, only : csr_t
    use emcon_kinds, only : dp, hp, wp

@@ -3,7 +3,7 @@
 !> Elements among independent freedoms add to the matrix as ever. What an element gives to the row
 !> or column of a dependent freedom goes to a small matrix on the side, which is brought in once per
 !> assembly. Freedoms are numbered here: unknowns, then dependent ones. Source: docs/theory.md,
-!> section 11.
+!> section 10.
 module emcon_reduction
    use emcon_csr, only : csr_find, csr_sort_columns, csr_t, csr_transpose
    use emcon_kinds, only : dp, int64

@@ -1,7 +1,7 @@
 !> How far rigid bodies of the plane have turned, and the moments that their supports exert.
 !>
 !> Where the rotation of a body is prescribed, forces on its arms turn it: their moment about the
-!> reference node is what the support has to give. Source: docs/theory.md, section 13.
+!> reference node is what the support has to give. Source: docs/theory.md, section 12.
 module emcon_rigid_rotation
    use emcon_kinds, only : wp
    use emcon_vectors_plane, only : cross

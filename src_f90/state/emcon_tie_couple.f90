@@ -2,7 +2,7 @@
 !> angular momentum.
 !>
 !> Forces on a slave node and on the master nodes that it follows sum up to 0, but act across the
-!> gap. Source: docs/theory.md, section 11.
+!> gap. Source: docs/theory.md, section 10.
 module emcon_tie_couple
    use emcon_kinds, only : wp
    use emcon_numbering, only : gather_dependent, numbering_t

@@ -6,7 +6,7 @@
 !> surface holds may be left out. Edges run with the body to the left, so the outward normal is the
 !> edge turned by -90 degrees; faces run counter-clockwise seen from outside. The plane has
 !> thickness 1. Rigid obstacles: surfaces of held nodes.
-!> Source: docs/theory.md, sections 4, 5 and 11.
+!> Source: docs/theory.md, sections 4, 5 and 10.
 module emcon_stepper_host
    use emcon_couplings, only : tie_t
    use emcon_csr, only : csr_from_values, csr_t

@@ -3,7 +3,7 @@
 !>
 !> At each node a surface of second order is put through the nodes around it. Along a side of a
 !> triangle the surface rises by the mean of the curvatures at its ends. Source: docs/theory.md,
-!> section 15.
+!> section 14.
 module emcon_bulges_space
    use emcon_facet_groups, only : facet_groups_init, facet_groups_t
    use emcon_facet_split, only : facet_split_centre, facet_split_t

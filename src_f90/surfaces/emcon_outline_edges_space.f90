@@ -2,7 +2,7 @@
 !> faces, and those of the triangles that faces are split into, along which a face bends.
 !>
 !> A surface may end where its body goes on: whether an edge of it is sharp, and which triangles
-!> meet in it, is told by the outer faces of the elements. Source: docs/theory.md, section 15.
+!> meet in it, is told by the outer faces of the elements. Source: docs/theory.md, section 14.
 module emcon_outline_edges_space
    use emcon_element_kind, only : max_face_nodes
    use emcon_errors, only : error_t

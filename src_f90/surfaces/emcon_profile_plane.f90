@@ -2,7 +2,7 @@
 !> of its pieces.
 !>
 !> In front, a piece has what lies between the normals at its ends; pieces that meet in a corner
-!> have what is nearer to them. Source: docs/theory.md, section 15.1.
+!> have what is nearer to them. Source: docs/theory.md, section 14.1.
 module emcon_profile_plane
    use emcon_kinds, only : wp
    use emcon_profile_piece_plane, only : profile_piece_t

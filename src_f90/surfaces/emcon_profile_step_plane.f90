@@ -1,7 +1,7 @@
 !> How far a point is from a profile over a step, with its discrete gradient by both coordinates.
 !>
 !> Along one piece it has a closed form. On a straight way past several of them each counts with its
-!> part of the way. Source: docs/theory.md, section 15.1.
+!> part of the way. Source: docs/theory.md, section 14.1.
 module emcon_profile_step_plane
    use emcon_kinds, only : wp
    use emcon_profile_piece_plane, only : profile_piece_t

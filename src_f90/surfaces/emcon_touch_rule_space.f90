@@ -4,7 +4,7 @@
 !> point may touch several of them at once, it has a constraint for each class of bodies. Of its own
 !> body it never touches the facets around it, nor those beside them, nor another closed surface,
 !> nor what it is behind with the body in between.
-!> Source: docs/theory.md, section 15.
+!> Source: docs/theory.md, section 14.
 module emcon_touch_rule_space
    use emcon_bodies, only : bodies_find_tied
    use emcon_facets, only : facets_normal, facets_t

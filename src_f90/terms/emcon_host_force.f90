@@ -2,7 +2,7 @@
 !> solid.
 !>
 !> What is given is the discrete gradient of an energy, so the scheme keeps it as it keeps the
-!> strain energy. Source: docs/theory.md, section 12.
+!> strain energy. Source: docs/theory.md, section 11.
 module emcon_host_force
    use emcon_csr, only : csr_t
    use emcon_kinds, only : dp, wp

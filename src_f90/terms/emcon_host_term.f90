@@ -1,7 +1,7 @@
 !> Forces that a model was given, as a term: which freedoms they connect, their place in the matrix,
 !> what they answer.
 !>
-!> Source: docs/theory.md, section 12.
+!> Source: docs/theory.md, section 11.
 module emcon_host_term
    use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use emcon_csr, only : csr_find, csr_t

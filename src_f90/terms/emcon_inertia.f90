@@ -2,7 +2,7 @@
 !> Inertia s M (b du - w v0), and what the past adds: the mass between nodes, the same in all
 !> directions, that of the elements and what is given.
 !>
-!> In explicit steps it stands at the nodes. Source: docs/theory.md, eqs. (2), (4) and section 14.
+!> In explicit steps it stands at the nodes. Source: docs/theory.md, eqs. (2), (4) and section 13.
 module emcon_inertia
    use emcon_csr, only : csr_find, csr_from_elements, csr_t
    use emcon_element_lists, only : element_lists

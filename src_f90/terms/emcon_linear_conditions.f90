@@ -1,5 +1,5 @@
 !> The linear rows of a scene, ties and equations, as conditions that a step can solve for by
-!> multipliers. Source: docs/theory.md, section 11.
+!> multipliers. Source: docs/theory.md, section 10.
 module emcon_linear_conditions
    use emcon_constraint, only : condition_t, constraint_t
    use emcon_kinds, only : wp

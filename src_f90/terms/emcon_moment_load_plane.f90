@@ -1,7 +1,7 @@
 !> A moment on a rigid body of the plane, as a couple of forces on two nodes of its frame.
 !>
 !> F = M J d/|d|^2 on the second node and -F on the first, d from the first to the second. Source:
-!> docs/theory.md, section 13.
+!> docs/theory.md, section 12.
 module emcon_moment_load_plane
    use emcon_kinds, only : dp, wp
    use emcon_turn_plane, only : turned_left

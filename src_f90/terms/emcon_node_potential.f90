@@ -1,7 +1,7 @@
 !> A potential V of the position of single nodes: gravity of a centre, a spring to a place, a soft
 !> wall. Its forces come from the function alone, as discrete gradients.
 !>
-!> Source: docs/theory.md, sections 2 and 12.
+!> Source: docs/theory.md, sections 2 and 11.
 module emcon_node_potential
    use emcon_csr, only : csr_from_elements
    use emcon_errors, only : err_input, error_t, raise

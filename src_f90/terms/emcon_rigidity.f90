@@ -2,7 +2,7 @@
 !>
 !> f = (|d|^2 - l^2)/(2 l) with the vector d between two nodes of a frame, l long at the start. It
 !> is quadratic: its discrete gradient is the gradient at the middle of the step, and keeps energy
-!> and momenta. Source: docs/theory.md, section 13.
+!> and momenta. Source: docs/theory.md, section 12.
 module emcon_rigidity
    use emcon_constraint, only : condition_t, constraint_t
    use emcon_kinds, only : wp

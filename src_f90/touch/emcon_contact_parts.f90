@@ -3,7 +3,7 @@
 !> Bodies that stand apart, or that touch something held alone, are not coupled by W. A problem
 !> costs the cube of its contacts in each trial, and one that is hard to solve makes all of its
 !> contacts try again. Only where slip has a direction: there all candidates of a step are rows.
-!> Source: docs/theory.md, section 15.3.
+!> Source: docs/theory.md, section 14.3.
 module emcon_contact_parts
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
       contact_problem_missed, contact_problem_t, nearly_met
