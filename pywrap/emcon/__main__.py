@@ -138,7 +138,7 @@ def _plot(options: argparse.Namespace) -> None:
 
     view = View(options.times, options.frame, options.field,
                 tuple(options.clim) if options.clim else None)
-    picture, notes = write_picture(locate(options.result), options.output, view)
+    _, picture, notes = write_picture(locate(options.result), options.output, view)
     for note in notes:
         print(f"note: {note}", file=sys.stderr)
     print(f"picture: {picture}")

@@ -35,6 +35,8 @@ MOST_STEPS, PARTS = 200, 100
 #: An angular momentum that changes by less than this part is kept.
 KEPT = 1e-6
 COLOURS = (BLACK, BLUE, ORANGE, "#3a7d44", "#7b4fa3")
+#: Curves beyond the colours have these again, in the next style.
+LINE_STYLES = ("-", "--", ":")
 
 _NUMBER = r"[-+]?[\d.]+(?:[DE][-+]?\d+)?"
 #: A line of an increment in the log: its time, and the residuals behind the energies.
@@ -99,7 +101,10 @@ def _force_of_pairs(paths: ResultPaths, history: NDArray[np.void]) -> Force:
         told = {frozenset(pair): pair for pair in reversed(
             re.findall(r"^contact (\S+) on (\S+):", _log(paths), re.MULTILINE))}
         pairs = list(told.values())[::-1] if len(told) == count else pairs
-    names = [f"on {name}" if name else f"pair {k + 1}" for k, (_, name) in enumerate(pairs)]
+    masters = [master for _, master in pairs]
+    names = [f"pair {k + 1}" if not master else
+             f"on {master}" if masters.count(master) == 1 else f"by {slave}"
+             for k, (slave, master) in enumerate(pairs)]
     alone = [k for k, (slave, master) in enumerate(pairs) if not master or slave != master]
     if not alone:
         return Force(history["time"], {names[k]: history[f"pair{k + 1}_active"].astype(float)
@@ -275,18 +280,21 @@ def draw_force(axes: Axes, force: Force) -> None:
     axes.axhline(0.0, color=GREY, linewidth=0.5)
     has_mean = False
     is_many = force.has_means and len(force.times) > MOST_STEPS + 1
-    for (name, values), colour in zip(force.curves.items(), COLOURS*len(force.curves)):
+    for n, (name, values) in enumerate(force.curves.items()):
+        colour = COLOURS[n % len(COLOURS)]
+        line = LINE_STYLES[n//len(COLOURS) % len(LINE_STYLES)]
         surface, comma, axis = name.partition(", ")
         shown = (surface if len(surface) <= NAME_LENGTH else f"{surface[:NAME_LENGTH - 1]}…") \
             + comma + axis
         style = "steps-pre" if force.has_means or force.is_count else "default"
-        axes.plot(force.times, values, color=colour, linewidth=0.5 if is_many else 0.8,
+        axes.plot(force.times, values, line, color=colour, linewidth=0.5 if is_many else 0.8,
                   marker="o" if force.is_sampled else "", markersize=1.8, markeredgewidth=0.0,
                   alpha=0.3 if is_many else 1.0, label=None if is_many else shown or None,
                   drawstyle=style)
         if is_many:
             ends, parts = part_means(force.times, values)
-            axes.stairs(parts, ends, baseline=None, color=colour, linewidth=0.9, label=shown)
+            axes.stairs(parts, ends, baseline=None, color=colour, linewidth=0.9, label=shown,
+                        linestyle=line)
         if force.has_means:
             is_alone = len(force.curves) == 1
             for k, (start, end, mean) in enumerate(means(force.times, values)):

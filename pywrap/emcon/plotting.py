@@ -192,9 +192,9 @@ def _add_panels(figure: Figure) -> list[Axes]:
 
 def plot(result: str | os.PathLike[str], output: str | os.PathLike[str] | None = None,
          times: Sequence[float] | None = None, *, frame: int | None = None,
-         field: str = "von_mises", clim: tuple[float, float] | None = None) -> Path:
+         field: str = "von_mises", clim: tuple[float, float] | None = None) -> Figure:
     """Draw a run: bodies at some times, energies, drift, contact forces, of statics load and
-    convergence; returns the picture's path.
+    convergence; writes the picture and returns it as a figure of matplotlib, which notebooks show.
 
     result   base name of the run, or any one of its files
     output   file to write, its suffix tells the format; default NAME.png
@@ -211,8 +211,8 @@ def plot(result: str | os.PathLike[str], output: str | os.PathLike[str] | None =
 
 
 def write_picture(paths: ResultPaths, output: Path | None = None,
-                  view: View = View()) -> tuple[Path, list[str]]:
-    """As `plot`; returns the path and notes on what is missing or left out."""
+                  view: View = View()) -> tuple[Figure, Path, list[str]]:
+    """As `plot`; returns the figure, its path, and notes on what is missing or left out."""
     output = paths.picture if output is None else output
     kind = output.suffix[1:].lower()
     known = sorted(Figure().canvas.get_supported_filetypes())
@@ -222,4 +222,4 @@ def write_picture(paths: ResultPaths, output: Path | None = None,
     figure, notes = draw(paths, view)
     with matplotlib.rc_context(STYLE):
         figure.savefig(output, dpi=RESOLUTION)
-    return output, notes
+    return figure, output, notes

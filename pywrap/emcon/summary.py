@@ -10,6 +10,9 @@ from .results import (Bodies, ResultPaths, cpu_seconds, energy_drift, read_bodie
 
 _QUANTITIES = (("kinetic", "kinetic energy"), ("strain", "strain energy"),
                ("external_work", "external work"), ("total", "total energy"),
+               ("friction_loss", "lost by friction"), ("damping_loss", "lost by damping"),
+               ("contact_damping_loss", "lost by contact damping"),
+               ("restitution_loss", "lost in impacts"), ("scheme_loss", "lost by the scheme"),
                ("px", "linear momentum x"), ("py", "linear momentum y"),
                ("pz", "linear momentum z"), ("lx", "angular momentum x"),
                ("ly", "angular momentum y"), ("lz", "angular momentum z"))
@@ -39,7 +42,9 @@ def _row(name: str, *values: str) -> str:
 def _balance_lines(history: NDArray[np.void]) -> list[str]:
     lines = [_row("", "start", "end")]
     for column, name in _QUANTITIES:
-        if column in (history.dtype.names or ()):
+        if column not in (history.dtype.names or ()):
+            continue
+        if np.any(history[column]) or not column.endswith("_loss"):
             lines.append(_row(name, *(f"{history[column][k]:.10g}" for k in (0, -1))))
     drift, scale = energy_drift(history)
     worst = int(np.nanargmax(drift)) if np.isfinite(drift).any() else 0

@@ -22,6 +22,7 @@ from emcon.panels import (  # noqa: E402
     MOST_STEPS, PARTS, PAUSE, Force, draw_force, means, part_means)
 from emcon.plotting import View, draw  # noqa: E402
 from emcon.scene import STYLE, UNITS, outer_sides, read_scene  # noqa: E402
+from emcon.summary import summary  # noqa: E402
 
 PROGRAM = ROOT/"build"/"release"/"emcon"
 
@@ -276,3 +277,27 @@ def test_titles_share_a_power_of_ten() -> None:
     assert titles([0.0, 1.25]) == ["$t = 0$", "$t = 1.25$"]
     assert titles([0.0, 3e-05, 1.3e-4]) == ["$t = 0$", r"$t = 30\times10^{-6}$",
                                             r"$t = 130\times10^{-6}$"]
+
+
+def test_curves_of_many_pairs_differ() -> None:
+    """More pairs than colours: no two curves have both colour and style in common."""
+    curves = {f"on S{k}": np.array([0.0, k + 1.0, 0.0]) for k in range(12)}
+    axes = Figure().add_subplot()
+    draw_force(axes, Force(np.array([0.0, 1.0, 2.0]), curves))
+    drawn = {(line.get_color(), line.get_linestyle()) for line in axes.lines if line.get_label()[0] != "_"}
+    assert len(drawn) == len(curves)
+
+
+def test_pairs_with_one_master_have_names_of_their_own(tmp_path: Path) -> None:
+    (*_, force), _ = panels(tmp_path, "ball_in_bowl", "--set", "t_end=0.1")
+    shown = {text.get_text() for text in force.get_legend().get_texts()}
+    assert {"by SKIN_ONE", "by SKIN_TWO"} <= shown and "on BOWL" not in shown
+
+
+def test_summary_tells_what_friction_took(tmp_path: Path) -> None:
+    """What was kinetic is lost by friction, but for what is left in the block; losses that are 0 are not told."""
+    _, run = panels(tmp_path, "sliding_block")
+    rows = dict(re.findall(r"^  (\S.*?)  +\S+ +(\S+)$", summary(locate(run)), re.MULTILINE))
+    history = read_history(locate(run))
+    assert float(rows["lost by friction"]) == pytest.approx(history["friction_loss"][-1], rel=1e-9)
+    assert history["friction_loss"][-1] > 3.9 and "lost by the scheme" not in rows
