@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from pathlib import Path
 
+import h5py
 import numpy as np
 import pytest
 from contact_space_scenes import RUBBER, ball, bodies, dynamic, faces, straight, turned, velocities
@@ -464,9 +465,28 @@ def assembled(in_part: str, in_assembly: str) -> str:
 
 
 def test_walls_of_assemblies(tmp_path: Path) -> None:
-    """Their lines are coordinates, whole numbers too; in a part that is moved they are refused."""
+    """Their lines are coordinates, whole numbers too."""
     shape = "*SURFACE, NAME=W, TYPE=SPHERE\n0, 0, -2, 2\n"
     run = ran(tmp_path, assembled("", f"{shape}*RIGID BODY, ANALYTICAL SURFACE=W, REF NODE=REF\n"))
     assert run.verdict["verdict"] == "good"
     assert run.history["active"].max() > 0
-    assert "not moved with the instance of a part" in refusal(tmp_path, assembled(shape, ""))
+
+
+@pytest.mark.parametrize(("shape", "moved"), [
+    ("PLANE\n1, 2, -7, 0, 2, 9\n", "PLANE\n-2., 2., -6.5, -2., 0., 9.\n"),
+    ("SPHERE\n1, 2, 3, 4., OUTSIDE\n", "SPHERE\n-2., 2., 3.5, 4., OUTSIDE\n"),
+    ("REVOLUTION\n1, 2, 3, 1, 3, 3\nSTART, 0., 2.\nLINE, 3., 1.\n", "REVOLUTION\n-2., 2., 3.5, -3., 2., 3.5\nSTART, 0., 2.\nLINE, 3., 1.\n"),
+    ("CYLINDER\n1, 2, 3, 2, 2, 3\n1, 3, 3\nSTART, 0., 2.\nLINE, 3., 1.\n",
+     "CYLINDER\n-2., 2., 3.5, -2., 3., 3.5\n-3., 2., 3.5\nSTART, 0., 2.\nLINE, 3., 1.\n"),
+    ("STL, SCALE=2.\n.5, 1., 1.5, 1.5, 1., 1.5, .5, 2., 1.5\n", "STL, SCALE=2.\n-1., 1., 1.75, -1., 2., 1.75, -2., 1., 1.75\n")])
+def test_walls_of_parts_move_with_their_instance(shape: str, moved: str, tmp_path: Path) -> None:
+    """By (1, 0, .5), then by a quarter turn about z, as written out by hand: (x, y, z) comes to (-y, x + 1, z + .5)."""
+    points = []
+    for name, text, motion in (("part", shape, "1., 0., .5\n0., 0., 0., 0., 0., 1., 90.\n"), ("moved", moved, "")):
+        wall_part = f"*PART, NAME=Q\n*SURFACE, NAME=W, TYPE={text}*END PART\n"
+        deck = wall_part + assembled("", f"*INSTANCE, NAME=K, PART=Q\n{motion}*END INSTANCE\n*RIGID BODY, ANALYTICAL SURFACE=K.W, REF NODE=REF\n")
+        (tmp_path/name).mkdir()
+        ran(tmp_path/name, deck.replace("0., 0., 0.1\n", "20., 0., 0.\n").replace("S1, W\n", "S1, K.W\n"))
+        with h5py.File(tmp_path/name/"deck.surfaces.vtkhdf") as file:
+            points.append(file["VTKHDF/Points"][...])
+    assert np.abs(points[0] - points[1]).max() <= 64*EPSILON*np.abs(points[1]).max()
