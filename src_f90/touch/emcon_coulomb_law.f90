@@ -16,7 +16,7 @@ module emcon_coulomb_law
    public :: coulomb_t, contact_trial_t, slip_status_t, coulomb_map, &
       coulomb_status, coulomb_violation
    public :: contact_open, contact_sticks, contact_slides, contact_free, contact_rests, &
-      slip_rounding
+      slip_rounding, has_way
 
    !> Slip is made of a dozen products of lengths of an edge: by so much of it slip is uncertain.
    real(wp), parameter :: slip_rounding = 16.0_wp*epsilon(1.0_wp)
