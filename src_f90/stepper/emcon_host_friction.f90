@@ -8,14 +8,20 @@ module emcon_host_friction
    use emcon_active_set, only : active_set_t
    use emcon_constraint, only : condition_t, most_slips
    use emcon_constraints, only : constraint_index
-   use emcon_coulomb_law, only : contact_slides, coulomb_t, has_way
-   use emcon_friction, only : friction_close, friction_keep, friction_look_back, friction_turn
+   use emcon_coulomb_law, only : contact_slides, coulomb_t, has_way, slip_status_t
+   use emcon_friction, only : friction_close, friction_keep, friction_look_back, friction_turn, &
+      friction_use, most_lagged, most_shift
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_system, only : system_t
    implicit none
    private
-   public :: host_friction_begin, host_friction_turn, host_friction_look_back, host_friction_ways
+   public :: host_friction_begin, host_friction_turn, host_friction_turn_few, &
+      host_friction_status, host_friction_lags, host_friction_look_back, host_friction_ways
+
+   !> Of contacts that would begin to slide those do whose friction is over what their push allows
+   !> by more than this part of the worst.
+   real(wp), parameter :: alike = 0.5_wp
 
 contains
 
@@ -63,6 +69,39 @@ contains
       end do
    end subroutine host_friction_turn
 
+   !> How all contacts hold; none without friction.
+   pure subroutine host_friction_status(active, status)
+      type(active_set_t), intent(in) :: active
+      type(slip_status_t), allocatable, intent(out) :: status(:)     !! (n_constraint or 0)
+
+      if (active%friction%is_on) then
+         status = active%friction%law%status
+      else
+         allocate(status(0))
+      end if
+   end subroutine host_friction_status
+
+   !> Contacts of the set that was solved have begun to slide: only the worst go on to do so.
+   pure subroutine host_friction_turn_few(active, before)
+      type(active_set_t), intent(inout) :: active
+      type(slip_status_t), intent(in) :: before(:)         !! (n_constraint) how they held there
+      real(wp) :: use(active%set%n), tau(most_slips)
+      integer :: k
+
+      use = 0.0_wp
+      do k = active%set%n_permanent + 1, active%set%n
+         associate (law => active%friction%law(active%set%id(k)), &
+               was => before(active%set%id(k)))
+            if (law%status%kind /= contact_slides .or. was%kind == contact_slides) cycle
+            call friction_use(active%friction, active%set, k, tau(:active%friction%n_slip), use(k))
+         end associate
+      end do
+      do k = active%set%n_permanent + 1, active%set%n
+         if (use(k) > 0.0_wp .and. use(k) < alike*maxval(use)) &
+            active%friction%law(active%set%id(k))%status = before(active%set%id(k))
+      end do
+   end subroutine host_friction_turn_few
+
    !> Of the trial: a contradiction at one end of the way that is led to leads to between both.
    pure real(wp) function stiffness_of(law, item, lam) result(stiffness)
       type(coulomb_t), intent(in) :: law
@@ -74,6 +113,28 @@ contains
       if (.not. length > 0.0_wp) length = item%size
       stiffness = max(law%mu*item%normal*lam/length, tiny(lam))
    end function stiffness_of
+
+   !> The set stands: does friction act where slip was expected, not where it is? Then the step is
+   !> to be solved again with the points that were found for it.
+   subroutine host_friction_lags(active, acts, system, lags)
+      type(active_set_t), intent(inout) :: active
+      logical, intent(in) :: acts(:)             !! (n_constraint)
+      type(system_t), intent(in) :: system       !! measured for the solution
+      logical, intent(out) :: lags
+      integer :: id, pair, i
+
+      lags = .false.
+      associate (friction => active%friction)
+         if (.not. friction%is_on) return
+         do id = system%first_constraint(1) + 1, system%n_constraint
+            if (.not. (acts(id) .and. friction%law(id)%mu > 0.0_wp)) cycle
+            call constraint_index(system, id, pair, i)
+            lags = lags .or. system%contact(pair)%contact%state(i)%slip_shift > most_shift
+         end do
+         lags = lags .and. friction%n_lagged < most_lagged
+         if (lags) friction%n_lagged = friction%n_lagged + 1
+      end associate
+   end subroutine host_friction_lags
 
    !> The set stands: where slip has a direction, does friction stop or turn something back? Then
    !> the step is to be solved again.

@@ -3,15 +3,18 @@
 !> What would penetrate is taken in, what pulls or has lost its surface is let go. If a set comes
 !> back, the union of those since then is taken and nothing is let go any more: where gaps of the
 !> start are held, which makes no energy, or where the host cannot cut the step; else it is to be
-!> tried with another size. A set is told by what acts and by how that sticks or slides. Source:
-!> docs/theory.md, section 6.1.
+!> tried with another size. A set is told by what acts and by how that sticks or slides; if one
+!> comes back, only that begins to slide which misses its law the most. Source: docs/theory.md,
+!> section 6.1.
 module emcon_host_set
    use emcon_active_set, only : active_set_note_stale, active_set_pass, active_set_t, &
       active_set_update_gaps, step_cycling, step_done, step_too_far, touch_tol
    use emcon_contact_conditions, only : begins_unseen, gap_to_hold, look_at_active, look_at_open, &
       noise_at
+   use emcon_coulomb_law, only : slip_status_t
    use emcon_friction, only : friction_close
-   use emcon_host_friction, only : host_friction_look_back, host_friction_turn, host_friction_ways
+   use emcon_host_friction, only : host_friction_lags, host_friction_look_back, &
+      host_friction_status, host_friction_turn, host_friction_turn_few, host_friction_ways
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_system, only : system_t
@@ -28,6 +31,7 @@ module emcon_host_set
       integer, allocatable :: way(:, :)          !! (n_constraint, most_sets) how these held
       integer :: n_tried = 0
       logical :: only_adds = .false.             !! nothing is let go any more
+      logical :: turns_few = .false.             !! of what would slide only the worst does
    end type host_set_t
 
 contains
@@ -79,10 +83,13 @@ contains
       logical, intent(out) :: is_done            !! else solve the step again with the next set
       integer, intent(out) :: status             !! one of the `step_` codes
       logical :: before(size(active%is_active)), turns
+      type(slip_status_t), allocatable :: held(:)
 
       before = active%is_active
+      call host_friction_status(active, held)
       call update(self, active, system, motion, status)
       call host_friction_turn(active, host_set_next(active), system, turns)
+      if (self%turns_few) call host_friction_turn_few(active, held)
       is_done = status /= step_done
       if (active%is_stale) then
          call active_set_note_stale(active, status)
@@ -92,13 +99,20 @@ contains
       end if
       if (is_done) return
       if (all(before .eqv. active%is_active) .and. .not. turns) then
-         call host_friction_look_back(active, before, system, motion, turns)
+         call host_friction_lags(active, before, system, turns)
+         if (.not. turns) call host_friction_look_back(active, before, system, motion, turns)
          is_done = .not. turns
          return
       end if
-      if (comes_again(self, active) .or. self%n_tried == most_sets) call end_cycle(self, active, &
-         status)
-      is_done = status /= step_done
+      if (.not. (comes_again(self, active) .or. self%n_tried == most_sets)) return
+      if (size(held) > 0 .and. .not. self%turns_few) then
+         self%turns_few = .true.
+         self%n_tried = 0
+         call host_friction_turn_few(active, held)
+      else
+         call end_cycle(self, active, status)
+         is_done = status /= step_done
+      end if
    end subroutine host_set_advance
 
    !> Of the conditions gap >= 0, lam >= 0, lam gap = 0 the set fulfils the last: what acts is let
