@@ -42,7 +42,8 @@ from . import _core
 from .arguments import flag_array, number, real_array
 from .csr import Csr
 from .errors import _KINDS, InputError
-from .memory import copied, csr, made, matrix, structure, structures, text, whole
+from .given_matrices import as_csr, check_csr
+from .memory import copied, csr, made, matrix, matrix_bytes, structure, structures, text, whole
 from .options import host_choices
 
 __all__ = ["Constraints", "Csr", "Gaps", "InputError", "Interface", "NullSpace", "Outcome", "Slips"]
@@ -423,6 +424,23 @@ class Interface:
     @_exclusive()
     def _changed(self, routine: Any, field: ArrayLike) -> Floats:
         return self._call(routine, self._field("field", field))
+
+    @_exclusive()
+    def set_map(self, map: Any) -> None:
+        """Unknowns w of the host's from here on: u = A w + what does not change.
+
+        `map`: A, (n_dim n_node, any), a sparse matrix of scipy, a `Csr` or an array, for points of
+        faces of higher order, hanging nodes, rigid bodies or control points. Rows of gradients, and
+        `curvature`, are by w: `lam @ g` is the force on the unknowns. Displacements and other
+        fields stay those of the nodes; `null_space` is refused.
+        """
+        n = self.n_dim*self.n_node
+        shape = tuple(map.shape) if hasattr(map, "shape") else np.shape(map)
+        if len(shape) != 2 or not shape[1]:
+            raise InputError(f"map has the shape {shape}, not ({n}, any)")
+        own = as_csr(map, n, "map", shape[1])
+        check_csr(own, "map")
+        self._call(_core.emcon_set_map, matrix_bytes(own))
 
     # ---- a step from the displacements u0 by du, (n_node, n_dim) each [L] ------------------------
 

@@ -605,6 +605,12 @@ int emcon_begin_contact(emcon_model *model, int n_node, const double *u0 /* n_no
                         const int *was_active /* n_constraint */,
                         int *active /* n_constraint */);
 
+/* From here on rows of gradients, and emcon_curvature, are by unknowns w of the host's, of which the
+ * displacements of the nodes are u = A w + what does not change: points of faces of higher order,
+ * hanging nodes, rigid bodies, control points. `map` is A, n_dim*n_node x any number; it is copied.
+ * Displacements and other arrays of nodes stay what they are; emcon_null_space is refused. */
+int emcon_set_map(emcon_model *model, const emcon_csr *map);
+
 /* After emcon_begin_contact, where pairs have friction: velocities along surfaces are to come to
  * rest; without this call, what sticks has them turned round, which takes no energy. `stop` is the
  * motion over the step with which all velocities end at zero: h/2 v0 where the velocity at the end

@@ -38,6 +38,8 @@ contains
       allocate(redundant(0))
       call check_that(self%has_set, "no step was evaluated since the model was made, its " // &
          "unknowns changed, or constraints were selected", error)
+      call check_that(.not. allocated(self%map), "P and DF are of the freedoms of the nodes, not " &
+         // "of the unknowns of a map: solve with the multipliers", error)
       if (allocated(error)) return
       associate (set => self%march%active%set, system => self%march%system, &
             null_space => self%null_space)

@@ -3,12 +3,14 @@ module emcon_stepper_report
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_select
    use emcon_contact, only : gap_state_t
-   use emcon_csr, only : csr_copy_filled, csr_t
+   use emcon_csr, only : csr_copy_filled, csr_t, csr_transpose
+   use emcon_csr_product, only : csr_product
    use emcon_curvature, only : curvature_add_times, curvature_matrix
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_numbering, only : numbering_init, numbering_t
    use emcon_evaluation, only : evaluation_t
+   use emcon_host_check, only : host_check_matrix
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_field, check_list, check_that
    use emcon_gaps, only : gaps_search
@@ -16,7 +18,8 @@ module emcon_stepper_report
    use emcon_steps, only : prescribed_t
    implicit none
    private
-   public :: contact_report_t, query_constraints, query_curvature, query_curvature_times
+   public :: contact_report_t, query_constraints, query_curvature, query_curvature_times, &
+      query_set_map
    public :: report_evaluate, report_check_list
 
    !> Constraints over a step, ascending by their numbers: f = mean gap - target. Linearised in the
@@ -42,6 +45,33 @@ module emcon_stepper_report
    end type contact_report_t
 
 contains
+
+   !> Gradients and second derivatives are from here on by unknowns of the host's: the freedoms of
+   !> the nodes are `map` times these, up to what does not change. Displacements and other fields
+   !> stay those of the nodes.
+   subroutine query_set_map(self, stepper, map, error)
+      type(query_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      type(csr_t), intent(in) :: map             !! (n_dim n_node x unknowns of the host)
+      type(error_t), allocatable, intent(out) :: error
+
+      call host_check_matrix(map, size(stepper%scene%x), map%n_col, "the map", &
+         "the freedoms of the nodes", error)
+      if (.not. allocated(error)) call check_that(allocated(map%value), "the map has no values", &
+         error)
+      if (.not. allocated(error)) self%map = map
+   end subroutine query_set_map
+
+   !> Rows by the freedoms of the nodes, as the host is to have them.
+   subroutine apply_map(self, rows)
+      type(query_t), intent(in) :: self
+      type(csr_t), intent(inout) :: rows
+      type(csr_t) :: mapped
+
+      if (.not. allocated(self%map)) return
+      call csr_product(rows, self%map, mapped)
+      rows = mapped
+   end subroutine apply_map
 
    !> All contact constraints near from displacements `u0` to `u1`. With `keeps_gap` they are those
    !> that hold the mean gap of `u0`, as persistent contact does: integrated gaps have other
@@ -122,6 +152,8 @@ contains
          call csr_copy_filled(set%force_rows, report%discrete_gradient)
          call csr_copy_filled(set%gap_rows, report%end_gradient)
       end associate
+      call apply_map(self, report%discrete_gradient)
+      call apply_map(self, report%end_gradient)
       self%has_set = .true.
       self%has_null_space = .false.
    end subroutine report_evaluate
@@ -131,12 +163,19 @@ contains
    subroutine query_curvature(self, factor, matrix, error)
       type(query_t), intent(inout) :: self
       real(wp), intent(in) :: factor(:)          !! (n) multipliers [M L/T^2]
-      type(csr_t), intent(out) :: matrix         !! (2 n_node x 2 n_node)
+      type(csr_t), intent(out) :: matrix         !! over freedoms of nodes, or by the map
       type(error_t), allocatable, intent(out) :: error
+
+      type(csr_t) :: own, turned
+      integer, allocatable :: from(:)
 
       call report_check_list(self, "factor", factor, error)
       if (allocated(error)) return
       call curvature_matrix(self%march%active%set, factor, size(self%march%motion%x), matrix)
+      if (.not. allocated(self%map)) return
+      call csr_product(matrix, self%map, own)
+      call csr_transpose(self%map, turned, from)
+      call csr_product(turned, own, matrix)
    end subroutine query_curvature
 
    !> The same times `direction`.
