@@ -82,34 +82,35 @@ def is_sparse(matrix: Any) -> bool:
     return isinstance(matrix, Csr) or hasattr(matrix, "tocsr")
 
 
-def as_csr(matrix: Any, n: int, what: str) -> Csr:
-    """A matrix (n, n) of scipy, as a `Csr`, or as an array, with sorted columns."""
+def as_csr(matrix: Any, n: int, what: str, n_column: int | None = None) -> Csr:
+    """A matrix (n, n_column) of scipy, as a `Csr`, or as an array, with sorted columns; None: n."""
+    m = n if n_column is None else n_column
     if not is_sparse(matrix):
-        dense = fitting(matrix, what, (n, n))
-        return Csr((n, n), np.arange(0, n*n + 1, n, dtype=np.int32),
-                   np.tile(np.arange(n, dtype=np.int32), n), np.ravel(dense).astype(float))
-    if tuple(matrix.shape) != (n, n):
-        raise InputError(f"{what} has the shape {matrix.shape}, not {(n, n)}")
+        dense = fitting(matrix, what, (n, m))
+        return Csr((n, m), np.arange(0, n*m + 1, m, dtype=np.int32),
+                   np.tile(np.arange(m, dtype=np.int32), n), np.ravel(dense).astype(float))
+    if tuple(matrix.shape) != (n, m):
+        raise InputError(f"{what} has the shape {matrix.shape}, not {(n, m)}")
     if not isinstance(matrix, Csr):
         matrix = matrix.tocsr()
         if not matrix.has_canonical_format:
             matrix = matrix.copy()
             matrix.sum_duplicates()
-    return Csr((n, n), np.asarray(matrix.indptr, dtype=np.int32),
+    return Csr((n, m), np.asarray(matrix.indptr, dtype=np.int32),
                np.asarray(matrix.indices, dtype=np.int32),
                fitting(matrix.data, what, np.shape(matrix.indices)).astype(float, copy=False))
 
 
 def check_csr(matrix: Csr, what: str) -> None:
     """The rows of `matrix` are what a `Csr` promises."""
-    n, start, column = matrix.shape[0], matrix.indptr, matrix.indices
+    (n, n_column), start, column = matrix.shape, matrix.indptr, matrix.indices
     if (start.shape != (n + 1,) or start[0] != 0 or start[-1] != len(column)
             or np.any(np.diff(start) < 0)):
         raise InputError(f"{what}: indptr does not run from 0 to the number of its entries, "
                          f"{len(column)}, in {n} rows")
-    if len(column) and (column.min() < 0 or column.max() >= n
+    if len(column) and (column.min() < 0 or column.max() >= n_column
                         or np.any(np.diff(keys_of(matrix)) <= 0)):
-        raise InputError(f"{what}: indices are not columns 0 to {n - 1} that ascend in each row")
+        raise InputError(f"{what}: indices are not columns 0 to {n_column - 1} that ascend in each row")
 
 
 def keys_of(matrix: Csr) -> NDArray[np.int64]:

@@ -42,10 +42,11 @@ from . import _core
 from .arguments import flag_array, number, real_array
 from .csr import Csr
 from .errors import _KINDS, InputError
-from .memory import copied, csr, made, matrix, structure, structures, text, whole
+from .given_matrices import as_csr, check_csr
+from .memory import copied, csr, made, matrix, matrix_bytes, structure, structures, text, whole
 from .options import host_choices
 
-__all__ = ["Constraints", "Csr", "Gaps", "InputError", "Interface", "NullSpace", "Outcome"]
+__all__ = ["Constraints", "Csr", "Gaps", "InputError", "Interface", "NullSpace", "Outcome", "Slips"]
 
 _Args = ParamSpec("_Args")
 _R = TypeVar("_R")
@@ -91,6 +92,10 @@ class Constraints:
     and `end` are f at the ends of the step, `change` is g du to relative accuracy, `defect` is what
     has to become 0. The force on the nodes is `lam @ g`, the linearised defect `c @ d(du)`. In
     statics the start is the end.
+
+    With friction a contact that sticks has rows of its slips, too, behind those of all gaps: there
+    f is the target less the slip, and `lam` the friction. One that slides has none: its friction is
+    in its row of `g`.
     """
 
     contact: Ints       #: (n,) numbers of contacts, ascending
@@ -102,11 +107,25 @@ class Constraints:
     edge: Floats        #: (n,) length of an edge, to which defects relate [L]
     g: Csr              #: (n, n_dim n_node) discrete gradients
     c: Csr              #: (n, n_dim n_node) gradients at the end, same pattern
+    slip: Ints          #: (n,) 0: a row of a gap; else of which slip, from 1
 
     @property
     def n(self) -> int:
-        """How many contacts are selected."""
+        """How many rows the selected contacts have."""
         return len(self.contact)
+
+
+@dataclass(frozen=True)
+class Slips:
+    """How all possible contacts hold along the surface in the step that was solved last.
+
+    `status`: 0 open, 1 acts and does not slide, 2 slides. Slips and friction are vectors along the
+    surface, (n_contact, n_dim - 1); friction times slip is what the step has lost, never below 0.
+    """
+
+    status: Ints        #: (n_contact,)
+    slip: Floats        #: (n_contact, n_dim - 1) [L]
+    friction: Floats    #: (n_contact, n_dim - 1), against the slip [M L/T^2]
 
 
 @dataclass(frozen=True)
@@ -179,7 +198,6 @@ class Interface:
         self._n_surface = self._n_tie = 0
         self._n_row = 0         # rows of ties, which the library counts before contacts
         self._x = x
-        self._selected: Ints = np.empty(0, np.int32)
         self._handle = _core.emcon_new(x)[1]
 
     # ---- life ------------------------------------------------------------------------------------
@@ -263,7 +281,8 @@ class Interface:
     def add_pair(self, slave: int, master: int, formulation: str = "mortar", *,
                  integration: str = "segments", n_point: int | None = None,
                  multiplier: str = "dual", normal: str = "nodal", smoothing: str = "none",
-                 normal_angle: float = 60.0, smoothing_angle: float = 60.0) -> None:
+                 normal_angle: float = 60.0, smoothing_angle: float = 60.0,
+                 friction: float = 0.0) -> None:
         """Add a contact pair of two surfaces by their numbers, or of one with itself.
 
         `formulation`: "node to segment", "segment", "mortar". `integration` of mortar contact:
@@ -271,7 +290,8 @@ class Interface:
         `multiplier`: "standard" or "dual". `normal` of slave nodes: "edge" or "nodal".
         `smoothing` of the master surface: "none" or "hermite". Turns sharper than the angles, 0 to
         180 degrees, are corners. Rigid obstacles are masters of held nodes. In space contact is
-        "node to segment", of the nodes of the slave; a pair the other way round holds the others.
+        "node to segment", of the nodes of the slave (a pair the other way round holds the others),
+        or "mortar". `friction`: the coefficient of Coulomb's law.
         """
         choice = [_choice("integration", integration),
                   0 if n_point is None else _number("n_point", n_point, 1, 10),
@@ -282,7 +302,7 @@ class Interface:
                   number(smoothing_angle, "smoothing_angle") or np.nextafter(0.0, 1.0)]
         sides = self._surfaces(slave, master)
         kind = _choice("formulation", formulation)
-        options = made("emcon_pair_options", *choice, *angles)
+        options = made("emcon_pair_options", *choice, *angles, number(friction, "friction"))
         self._call(_core.emcon_add_pair, *sides, kind, options)
 
     @_exclusive(False)
@@ -405,17 +425,42 @@ class Interface:
     def _changed(self, routine: Any, field: ArrayLike) -> Floats:
         return self._call(routine, self._field("field", field))
 
+    @_exclusive()
+    def set_map(self, map: Any) -> None:
+        """Unknowns w of the host's from here on: u = A w + what does not change.
+
+        `map`: A, (n_dim n_node, any), a sparse matrix of scipy, a `Csr` or an array, for points of
+        faces of higher order, hanging nodes, rigid bodies or control points. Rows of gradients, and
+        `curvature`, are by w: `lam @ g` is the force on the unknowns. Displacements and other
+        fields stay those of the nodes; `null_space` is refused.
+        """
+        n = self.n_dim*self.n_node
+        shape = tuple(map.shape) if hasattr(map, "shape") else np.shape(map)
+        if len(shape) != 2 or not shape[1]:
+            raise InputError(f"map has the shape {shape}, not ({n}, any)")
+        own = as_csr(map, n, "map", shape[1])
+        check_csr(own, "map")
+        self._call(_core.emcon_set_map, matrix_bytes(own))
+
     # ---- a step from the displacements u0 by du, (n_node, n_dim) each [L] ------------------------
 
     @_exclusive()
-    def begin_step(self, u0: ArrayLike, du: ArrayLike, was_active: ArrayLike) -> Flags:
+    def begin_step(self, u0: ArrayLike, du: ArrayLike, was_active: ArrayLike,
+                   stop: ArrayLike | None = None) -> Flags:
         """Begin a step with the motion `du` that is expected.
 
         `was_active`: contacts that acted at the end of the step before, (n_contact,) booleans.
-        Returns those that still can.
+        Returns those that still can. `stop`, where pairs have friction: the motion with which all
+        velocities end at zero, (n_node, n_dim), h/2 v0 where the velocity at the end is
+        2 du/h - v0: what sticks comes to rest. None: what sticks has its velocity along the surface
+        turned round, which takes no energy.
         """
         was = self._flags("was_active", was_active)
-        return self._contacts_of(self._call(_core.emcon_begin_contact, *self._motion(u0, du), was))
+        to_rest = None if stop is None else self._field("stop", stop)
+        found = self._call(_core.emcon_begin_contact, *self._motion(u0, du), was)
+        if to_rest is not None:
+            self._call(_core.emcon_begin_friction, to_rest)
+        return self._contacts_of(found)
 
     @_exclusive()
     def gaps(self, u0: ArrayLike, du: ArrayLike) -> Gaps:
@@ -427,7 +472,7 @@ class Interface:
 
     @_exclusive()
     def select(self, u0: ArrayLike, du: ArrayLike, active: ArrayLike) -> int:
-        """Select the contacts `active`, (n_contact,) booleans; return how many there are."""
+        """Select the contacts `active`, (n_contact,) booleans; return how many rows they have."""
         flags = self._flags("active", active)
         return self._call(_core.emcon_select, *self._motion(u0, du), flags)
 
@@ -446,11 +491,10 @@ class Interface:
     @_exclusive()
     def evaluate(self, u0: ArrayLike, du: ArrayLike) -> Constraints:
         """Values and gradients of the selected contacts."""
-        n, number, _, _, *values, g, c = structure("emcon_constraint_report", self._call(
+        n, number, _, _, *values, g, c, slip = structure("emcon_constraint_report", self._call(
             _core.emcon_evaluate_contact, *self._motion(u0, du))).values()
-        self._selected = whole(number, n)
-        return Constraints(self._selected - np.int32(self._n_row),
-                           *(copied(place, n) for place in values), csr(g), csr(c))
+        return Constraints(whole(number, n) - np.int32(self._n_row),
+                           *(copied(place, n) for place in values), csr(g), csr(c), whole(slip, n))
 
     @_exclusive()
     def curvature(self, lam: ArrayLike) -> Csr:
@@ -482,6 +526,12 @@ class Interface:
         flags, is_done, outcome = self._call(_core.emcon_update_active, u, d,
                                              self._of_selected("lam", lam), sizes, flags)
         return self._contacts_of(flags), Outcome(outcome) if is_done else None
+
+    @_exclusive()
+    def slips(self) -> Slips:
+        """How contacts stick and slide, by the multipliers that `update_active` was given."""
+        status, slip, friction = self._call(_core.emcon_get_slips, self.n_contact + self._n_row)
+        return Slips(status[self._n_row:], slip[self._n_row:], friction[self._n_row:])
 
     @_exclusive()
     def areas(self, u1: ArrayLike) -> tuple[Floats, Floats]:
@@ -533,8 +583,7 @@ class Interface:
     def multipliers(self, residual: ArrayLike) -> Floats:
         """lam, (n,), after `null_space`, from the residual without contact forces, a field."""
         force = self._field("residual", residual)
-        return self._call(_core.emcon_multipliers, self.n_node, force,
-                          self.n_contact + self._n_row)[self._selected]
+        return self._call(_core.emcon_row_multipliers, self.n_node, force, self._n_selected())
 
     @_exclusive()
     def particular(self, defect: ArrayLike) -> Floats:

@@ -354,15 +354,18 @@ contains
    end subroutine friction_close
 
    !> The way of contact `k` of the set, which acts and goes on to do so, by the trial that what
-   !> solves the step makes.
-   pure subroutine friction_turn(self, system, set, k, turns)
+   !> solves the step makes, with the mean stiffness of the system at its slave nodes unless one is
+   !> given.
+   pure subroutine friction_turn(self, system, set, k, turns, stiffness)
       type(friction_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       integer, intent(in) :: k                   !! > n_permanent
       logical, intent(inout) :: turns            !! becomes true if it is another one than before
+      real(wp), intent(in), optional :: stiffness          !! > 0 [M/T^2]
       type(contact_trial_t) :: at
       type(slip_status_t) :: next
+      real(wp) :: c
 
       associate (item => set%item(k), law => self%law(set%id(k)))
          if (.not. law%mu > 0.0_wp) return
@@ -370,7 +373,12 @@ contains
             set%lam(k)), item%slip, law%slip_target, slip_rounding*item%size)
          ! Where slip is held the solution has no other, but for round-off.
          if (law%holds_slip()) at%slip = law%slip_held()
-         next = coulomb_status(at, law%mu, friction_stiffness(system, item))
+         if (present(stiffness)) then
+            c = stiffness
+         else
+            c = friction_stiffness(system, item)
+         end if
+         next = coulomb_status(at, law%mu, c)
          ! What nothing pushes goes on as it was.
          if (next%kind == contact_open) return
          turns = turns .or. next%kind /= law%status%kind .or. &

@@ -68,7 +68,7 @@ typedef struct emcon_sizes {
    int i_step;       /* the present step of the deck; the first is 1, as in messages */
    int n_surface;
    int n_tie;
-   int n_selected;   /* constraints that were selected or evaluated last */
+   int n_selected;   /* rows of constraints that were selected or evaluated last */
    int n_dim;        /* 2: in the plane; 3: in space */
    int n_slip;       /* components of slips along surfaces: n_dim - 1 */
    int n_momentum;   /* momenta of a body: n_dim linear ones, then 1 angular one, in space 3 */
@@ -118,6 +118,9 @@ typedef struct emcon_csr {
  * their difference times the part of the surface that is covered, has to be 0. Its force on the
  * nodes is its multiplier times row k of `discrete_gradient`; Newton's method linearises f_k by row
  * k of `end_gradient`. In statics gap0 is that of the end, dgap is 0, and the gradients are one.
+ * With friction a contact that sticks has rows of its slips, too, behind the gaps of all: f_k is
+ * target[k] less the slip, the multiplier is friction. One that slides has its friction in the
+ * `discrete_gradient` of its gap, so that it is mu times the multiplier.
  * The arrays belong to the model, as those of a matrix. */
 typedef struct emcon_constraint_report {
    int n;
@@ -132,6 +135,7 @@ typedef struct emcon_constraint_report {
    const double *size;            /* length of an edge, to which defects relate */
    emcon_csr discrete_gradient;   /* n x n_dim*n_node, times the motion it is dgap */
    emcon_csr end_gradient;        /* n x n_dim*n_node, the gradient at the end */
+   const int *slip;               /* 0: a row of a gap; else of which slip, from 1 */
 } emcon_constraint_report;
 
 /* Where a possible contact stands at both ends of a step. */
@@ -160,6 +164,7 @@ typedef struct emcon_pair_options {
    int smoothing;           /* of the master surface; default EMCON_UNSMOOTHED */
    double normal_angle;     /* sharper turns are corners, 0..180 degrees; default 60 */
    double smoothing_angle;  /* the same for smoothing */
+   double friction;         /* coefficient of Coulomb's law, >= 0 */
 } emcon_pair_options;
 
 /* How contact begins in the steps of a host; 0 is the default. */
@@ -294,8 +299,9 @@ int emcon_add_faces(emcon_model *model, const char *name /* or NULL */, int n_fa
                     const int *node /* n_entry */, int *surface);
 
 /* Add a contact pair; a surface in contact with itself is its own master. `options` NULL: the
- * defaults. Rigid obstacles are masters of held nodes. In space: EMCON_NODE_TO_SEGMENT, of two
- * surfaces, the slaves' nodes held; a pair the other way round holds those of the master, too. */
+ * defaults. Rigid obstacles are masters of held nodes. In space: of two surfaces, EMCON_MORTAR, or
+ * EMCON_NODE_TO_SEGMENT, the slaves' nodes held; a pair the other way round holds those of the
+ * master, too. */
 int emcon_add_pair(emcon_model *model, int slave, int master, int formulation,
                    const emcon_pair_options *options /* or NULL */);
 
@@ -563,6 +569,11 @@ int emcon_multipliers(emcon_model *model, int n_node,
                       const double *residual /* n_node x n_dim, or NULL */, int n_constraint,
                       double *lam /* n_constraint */);
 
+/* The same for the n_selected rows, in their order. */
+int emcon_row_multipliers(emcon_model *model, int n_node,
+                          const double *residual /* n_node x n_dim, or NULL */, int n_selected,
+                          double *lam /* n_selected */);
+
 /* After emcon_null_space: the motion of dependent unknowns alone that closes the `defect` of the
  * n_selected constraints. Newton's step is this plus DF times that of the others. */
 int emcon_particular(emcon_model *model, int n_selected, const double *defect /* n_selected */,
@@ -594,12 +605,32 @@ int emcon_begin_contact(emcon_model *model, int n_node, const double *u0 /* n_no
                         const int *was_active /* n_constraint */,
                         int *active /* n_constraint */);
 
+/* From here on rows of gradients, and emcon_curvature, are by unknowns w of the host's, of which the
+ * displacements of the nodes are u = A w + what does not change: points of faces of higher order,
+ * hanging nodes, rigid bodies, control points. `map` is A, n_dim*n_node x any number; it is copied.
+ * Displacements and other arrays of nodes stay what they are; emcon_null_space is refused. */
+int emcon_set_map(emcon_model *model, const emcon_csr *map);
+
+/* After emcon_begin_contact, where pairs have friction: velocities along surfaces are to come to
+ * rest; without this call, what sticks has them turned round, which takes no energy. `stop` is the
+ * motion over the step with which all velocities end at zero: h/2 v0 where the velocity at the end
+ * is 2 du/h - v0. */
+int emcon_begin_friction(emcon_model *model, int n_node, const double *stop /* n_node x n_dim */);
+
+/* How each constraint holds along the surface by the step that was solved last: 0 where it is open,
+ * 1 where it acts and does not slide, 2 where it slides; its slip over the step, and the friction
+ * against it, vectors along the surface. Friction times slip is what the step loses, >= 0. */
+int emcon_get_slips(emcon_model *model, int n_constraint, int *way /* n_constraint */,
+                    double *slip /* n_constraint x n_slip */,
+                    double *friction /* n_constraint x n_slip */);
+
 /* All gaps; rows of ties and equations have none. */
 int emcon_get_gaps(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
                    const double *du /* n_node x n_dim */, int n_constraint,
                    emcon_gap *gap /* n_constraint */);
 
-/* Select the constraints that act, by flags; `*n` becomes their number. */
+/* Select the constraints that act, by flags; `*n` becomes the number of their rows: one of each
+ * gap, and those of slips that friction holds. */
 int emcon_select(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
                  const double *du /* n_node x n_dim */, int n_constraint,
                  const int *active /* n_constraint */, int *n);
@@ -615,7 +646,7 @@ int emcon_evaluate_contact(emcon_model *model, int n_node, const double *u0 /* n
                            const double *du /* n_node x n_dim */, emcon_constraint_report *report);
 
 /* The next active set from a solved step: takes in what would penetrate, releases what pulls.
- * `lam`: the multipliers of the n_selected constraints, forces, > 0 pressing. `active`: those
+ * `lam`: the multipliers of the n_selected rows, forces, of gaps > 0 pressing. `active`: those
  * selected, then the next ones. `*is_done`: the set stands, or `*outcome` is not EMCON_STEP_DONE
  * and the step cannot be ended. `magnitude`: sums of the sizes of the contributions to the
  * residual, which tell signs of round-off from tension; NULL: the contact forces themselves. */

@@ -46,7 +46,10 @@
 !> `stepper_build`. In each step `query_begin_contact`; then, until `query_update_active` is done,
 !> `query_select` or `query_choose`, and Newton's method on `query_contact`, `query_curvature`, with
 !> the multipliers or with `query_null_space`, `query_particular`, `query_multipliers`. Pressures
-!> are multipliers over `query_areas`; `query_overlap` judges the step by geometry alone.
+!> are multipliers over `query_areas`; `query_overlap` judges the step by geometry alone. Friction
+!> is that of `interaction_t`, given with the pair; in dynamic steps `query_begin_friction` brings
+!> velocities along surfaces to rest, and `query_slips` tells what slides. `query_set_map`: gradients
+!> by other unknowns than displacements of the nodes.
 module emcon_api
    use emcon_contact, only : gap_state_t
    use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
@@ -62,8 +65,8 @@ module emcon_api
       host_outside
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
       formulation_nts, formulation_segment, integration_elements, integration_segments, &
-      multiplier_dual, multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, &
-      smoothing_none
+      interaction_t, multiplier_dual, multiplier_standard, normal_edge, normal_nodal, &
+      smoothing_hermite, smoothing_none
    use emcon_overlap_check, only : overlap_t
    use emcon_kinds, only : dp, wp
    use emcon_ledger, only : ledger_t
@@ -87,8 +90,9 @@ module emcon_api
    use emcon_stepper_conditions, only : conditions_exchange, stepper_add_prescribed, &
       stepper_prescribe, stepper_remove_prescribed, &
       stepper_set_prescribed
-   use emcon_stepper_contact, only : query_areas, query_begin_contact, query_choose, &
-      query_contact, query_drop, query_gaps, query_overlap, query_select, query_update_active, &
+   use emcon_stepper_contact, only : query_areas, query_begin_contact, query_begin_friction, &
+      query_choose, query_contact, query_drop, query_gaps, query_overlap, query_select, &
+      query_slips, query_update_active, &
       step_cycling, step_done, step_stands_off, step_too_far
    use emcon_stepper_file, only : stepper_load, stepper_save
    use emcon_stepper_free, only : snapshot_t, stepper_next_step, stepper_restore, &
@@ -100,11 +104,11 @@ module emcon_api
       stepper_add_tie, stepper_hold, stepper_new, stepper_set_contact, stepper_tie_matrices
    use emcon_stepper_loads, only : stepper_add_loads, stepper_find_load, stepper_set_load
    use emcon_stepper_null_space, only : query_follow_links, query_gather_links, query_links, &
-      query_multipliers, query_null_space, query_particular
+      query_multipliers, query_null_space, query_particular, query_row_multipliers
    use emcon_stepper_query, only : query_evaluate, query_follow, query_free, query_guess, &
       query_mass, query_momenta, query_residual, query_t, query_tangent, query_unknowns
    use emcon_stepper_report, only : contact_report_t, query_constraints, query_curvature, &
-      query_curvature_times
+      query_curvature_times, query_set_map
    use emcon_steps, only : initiation_admissible, initiation_persistent, load_gravity, load_point, &
       load_pressure
    use emcon_text, only : string_t

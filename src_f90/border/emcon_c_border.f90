@@ -211,13 +211,15 @@ contains
          call show_matrix(report%discrete_gradient, to%discrete_gradient)
          call show_matrix(report%end_gradient, to%end_gradient)
          if (report%n == 0) return
-         model%c_place = reshape([report%id - 1, report%pair - 1, report%node - 1], [report%n, 3])
+         model%c_place = reshape([report%id - 1, report%pair - 1, report%node - 1, report%slip], &
+            [report%n, 4])
          model%c_gap = real(reshape([report%target, report%gap0, report%gap1, report%dgap, &
             report%defect, report%size], [report%n, 6]), c_double)
       end associate
       to%id = c_loc(model%c_place(1, 1))
       to%pair = c_loc(model%c_place(1, 2))
       to%node = c_loc(model%c_place(1, 3))
+      to%slip = c_loc(model%c_place(1, 4))
       to%target = c_loc(model%c_gap(1, 1))
       to%gap0 = c_loc(model%c_gap(1, 2))
       to%gap1 = c_loc(model%c_gap(1, 3))

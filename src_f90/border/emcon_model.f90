@@ -144,7 +144,7 @@ contains
          sizes%n_momentum = scene%n_dim + n_turn(scene%n_dim)
          sizes%n_pair_total = 2*sizes%n_momentum + 1
       end associate
-      sizes%n_selected = model%query%march%active%set%n
+      sizes%n_selected = model%query%march%active%set%n_row
       if (.not. allocated(model%stepper%march%scheme)) return
       associate (system => model%stepper%march%system)
          sizes%n_contact = system%n_constraint - system%first_constraint(1)

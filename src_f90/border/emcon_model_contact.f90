@@ -5,7 +5,7 @@ module emcon_model_contact
    use emcon_c_types, only : contact_settings_c, gap_c, pair_options_c
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
-   use emcon_interactions, only : contact_options_t
+   use emcon_interactions, only : contact_options_t, interaction_t
    use emcon_kinds, only : wp
    use emcon_model, only : model_t
    use emcon_overlap_check, only : overlap_t
@@ -24,9 +24,13 @@ contains
       type(pair_options_c), intent(in), optional :: options
       type(error_t), allocatable, intent(out) :: error
       type(contact_options_t) :: choice
+      type(interaction_t) :: interaction
 
-      if (present(options)) choice = chosen(options)
-      call stepper_add_pair(model%stepper, slave, master, formulation, choice, error)
+      if (present(options)) then
+         choice = chosen(options)
+         interaction%friction = real(options%friction, wp)
+      end if
+      call stepper_add_pair(model%stepper, slave, master, formulation, choice, error, interaction)
    end subroutine model_add_pair
 
    !> The options of a pair; 0 is the default.
@@ -85,8 +89,9 @@ contains
       integer, intent(out) :: n
       type(error_t), allocatable, intent(out) :: error
 
-      n = count(active)
       call query_select(model%query, model%stepper, u0, du, active, error)
+      n = 0
+      if (.not. allocated(error)) n = model%query%march%active%set%n_row
    end subroutine model_select
 
    subroutine model_overlap(model, u0, du, depth, node, error)

@@ -3,11 +3,18 @@
 !> What would penetrate is taken in, what pulls or has lost its surface is let go. If a set comes
 !> back, the union of those since then is taken and nothing is let go any more: where gaps of the
 !> start are held, which makes no energy, or where the host cannot cut the step; else it is to be
-!> tried with another size. Source: docs/theory.md, section 6.1.
+!> tried with another size. A set is told by what acts and by how that sticks or slides; if one
+!> comes back, only that begins to slide which misses its law the most. Source: docs/theory.md,
+!> section 6.1.
 module emcon_host_set
    use emcon_active_set, only : active_set_note_stale, active_set_pass, active_set_t, &
       active_set_update_gaps, step_cycling, step_done, step_too_far, touch_tol
-   use emcon_contact_conditions, only : begins_unseen, look_at_active, look_at_open, noise_at
+   use emcon_contact_conditions, only : begins_unseen, gap_to_hold, look_at_active, look_at_open, &
+      noise_at
+   use emcon_coulomb_law, only : slip_status_t
+   use emcon_friction, only : friction_close
+   use emcon_host_friction, only : host_friction_lags, host_friction_look_back, &
+      host_friction_status, host_friction_turn, host_friction_turn_few, host_friction_ways
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_system, only : system_t
@@ -21,8 +28,10 @@ module emcon_host_set
 
    type :: host_set_t
       logical, allocatable :: tried(:, :)        !! (n_constraint, most_sets)
+      integer, allocatable :: way(:, :)          !! (n_constraint, most_sets) how these held
       integer :: n_tried = 0
       logical :: only_adds = .false.             !! nothing is let go any more
+      logical :: turns_few = .false.             !! of what would slide only the worst does
    end type host_set_t
 
 contains
@@ -33,6 +42,7 @@ contains
       integer, intent(in) :: n                   !! constraints
 
       allocate(self%tried(n, most_sets), source=.false.)
+      allocate(self%way(n, most_sets), source=0)
    end subroutine host_set_begin
 
    !> The set that the host is to solve with.
@@ -60,6 +70,7 @@ contains
 
       self%n_tried = min(self%n_tried + 1, most_sets)
       self%tried(:, self%n_tried) = active%is_active
+      self%way(:, self%n_tried) = host_friction_ways(active, host_set_next(active))
    end subroutine host_set_try
 
    !> The next set from the motion and the multipliers that solve the step with the present one;
@@ -71,10 +82,14 @@ contains
       type(motion_t), intent(in) :: motion
       logical, intent(out) :: is_done            !! else solve the step again with the next set
       integer, intent(out) :: status             !! one of the `step_` codes
-      logical :: before(size(active%is_active))
+      logical :: before(size(active%is_active)), turns
+      type(slip_status_t), allocatable :: held(:)
 
       before = active%is_active
+      call host_friction_status(active, held)
       call update(self, active, system, motion, status)
+      call host_friction_turn(active, host_set_next(active), system, turns)
+      if (self%turns_few) call host_friction_turn_few(active, held)
       is_done = status /= step_done
       if (active%is_stale) then
          call active_set_note_stale(active, status)
@@ -82,11 +97,22 @@ contains
          self%n_tried = 0
          return
       end if
-      is_done = is_done .or. all(before .eqv. active%is_active)
       if (is_done) return
-      if (comes_again(self, active) .or. self%n_tried == most_sets) call end_cycle(self, active, &
-         status)
-      is_done = status /= step_done
+      if (all(before .eqv. active%is_active) .and. .not. turns) then
+         call host_friction_lags(active, before, system, turns)
+         if (.not. turns) call host_friction_look_back(active, before, system, motion, turns)
+         is_done = .not. turns
+         return
+      end if
+      if (.not. (comes_again(self, active) .or. self%n_tried == most_sets)) return
+      if (size(held) > 0 .and. .not. self%turns_few) then
+         self%turns_few = .true.
+         self%n_tried = 0
+         call host_friction_turn_few(active, held)
+      else
+         call end_cycle(self, active, status)
+         is_done = status /= step_done
+      end if
    end subroutine host_set_advance
 
    !> Of the conditions gap >= 0, lam >= 0, lam gap = 0 the set fulfils the last: what acts is let
@@ -124,6 +150,9 @@ contains
                   ! What the pairs take in may hold the bodies away from their guards.
                   changes = changes .and. .not. (contact%waits(i) .and. has_changed)
                   if (changes .and. begins_unseen(active, contact, i, motion)) status = step_too_far
+                  if (changes .and. active%friction%is_on) call friction_close(active%friction, &
+                     system, pair, i, motion, contact%state(i)%gap1 - gap_to_hold(active, &
+                     contact%state(i), id), .not. active%is_candidate(id))
                   active%is_candidate(id) = active%is_candidate(id) .or. changes
                end if
                has_changed = has_changed .or. changes
@@ -158,9 +187,19 @@ contains
 
       comes_again = .false.
       do k = 1, self%n_tried
-         comes_again = comes_again .or. all(self%tried(:, k) .eqv. active%is_active)
+         comes_again = comes_again .or. is_that(self, k, active)
       end do
    end function comes_again
+
+   !> Is what acts, and how, that of try `k`?
+   pure logical function is_that(self, k, active)
+      type(host_set_t), intent(in) :: self
+      integer, intent(in) :: k                   !! 1..n_tried
+      type(active_set_t), intent(in) :: active
+
+      is_that = all(self%tried(:, k) .eqv. active%is_active) .and. &
+         all(self%way(:, k) == host_friction_ways(active, host_set_next(active)))
+   end function is_that
 
    !> Go on with the union of the sets since the first coming of the present one, if that may be.
    pure subroutine end_cycle(self, active, status)
@@ -175,7 +214,7 @@ contains
       end if
       first = 1
       do k = self%n_tried, 1, -1
-         if (all(self%tried(:, k) .eqv. active%is_active)) first = k
+         if (is_that(self, k, active)) first = k
       end do
       active%is_active = any(self%tried(:, first:self%n_tried), dim=2)
       self%only_adds = .true.

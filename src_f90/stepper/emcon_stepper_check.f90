@@ -8,7 +8,8 @@ module emcon_stepper_check
    use emcon_text, only : to_text
    implicit none
    private
-   public :: stepper_check_open, stepper_check_smooth, check_that, check_field, check_list, &
+   public :: stepper_check_open, stepper_check_smooth, stepper_check_undamped
+   public :: check_that, check_field, check_list, &
       check_size, check_choice, check_number
 
 contains
@@ -23,17 +24,25 @@ contains
    end subroutine stepper_check_open
 
    !> There is no friction and no damping: what sticks, what slides and what is near is told by no
-   !> query.
+   !> query of a step from the state.
    pure subroutine stepper_check_smooth(self, error)
       type(stepper_t), intent(in) :: self
       type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
 
       call check_that(.not. any(self%scene%pair%interaction%friction > 0.0_wp), "contact with " &
          // "*FRICTION is not evaluated from outside: advance the model by increments", error)
+      call stepper_check_undamped(self, error)
+   end subroutine stepper_check_smooth
+
+   !> There is no damping.
+   pure subroutine stepper_check_undamped(self, error)
+      type(stepper_t), intent(in) :: self
+      type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
+
       call check_that(.not. any(self%scene%pair%interaction%damping%coefficient > 0.0_wp), &
          "contact with *CONTACT DAMPING is not evaluated from outside: advance the model by " // &
          "increments", error)
-   end subroutine stepper_check_smooth
+   end subroutine stepper_check_undamped
 
    !> An input error of this text, unless something holds.
    pure subroutine check_that(holds, text, error)

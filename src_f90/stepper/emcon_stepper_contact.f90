@@ -13,10 +13,14 @@
 module emcon_stepper_contact
    use emcon_active_set, only : active_set_begin, active_set_select, active_set_suit, &
       step_cycling, step_done, step_stands_off, step_too_far
-   use emcon_constraints, only : constraint_index, constraints_force, constraints_select
+   use emcon_constraint, only : condition_friction, most_slips
+   use emcon_constraints, only : constraint_index, constraints_force, constraints_select, &
+      constraints_take_lam
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
    use emcon_contact_support, only : contact_support_t
+   use emcon_friction, only : friction_begin
+   use emcon_host_friction, only : host_friction_begin
    use emcon_host_set, only : host_set_advance, host_set_begin, host_set_choose, &
       host_set_drop, host_set_next
    use emcon_overlap_check, only : overlap_check_step, overlap_t
@@ -24,7 +28,7 @@ module emcon_stepper_contact
    use emcon_evaluation, only : evaluation_at_end, evaluation_t
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_choice, check_field, check_list, check_size, check_that, &
-      stepper_check_smooth
+      stepper_check_undamped
    use emcon_gaps, only : gaps_forget, gaps_measure
    use emcon_stepper_query, only : query_forget, query_place, query_sync, query_t
    use emcon_stepper_report, only : contact_report_t, report_check_list, report_evaluate
@@ -32,8 +36,8 @@ module emcon_stepper_contact
    use emcon_text, only : to_text
    implicit none
    private
-   public :: query_begin_contact, query_gaps, query_select, query_choose, query_contact, &
-      query_update_active, query_drop, query_areas, query_overlap
+   public :: query_begin_contact, query_begin_friction, query_gaps, query_select, query_choose, &
+      query_contact, query_update_active, query_drop, query_areas, query_slips, query_overlap
    public :: step_done, step_cycling, step_too_far, step_stands_off
 
 contains
@@ -49,7 +53,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call query_sync(self, stepper, error)
-      if (.not. allocated(error)) call stepper_check_smooth(stepper, error)
+      if (.not. allocated(error)) call stepper_check_undamped(stepper, error)
       if (.not. allocated(error)) call take_options(self, stepper)
       call check_flags(self, "was_active", was_active, error)
       call query_place(self, stepper, u0, du, error)
@@ -64,11 +68,36 @@ contains
          march%active%rules%puts_off = .false.
          march%active%support = contact_support_t()
          call constraints_select(march%active%set, [integer ::])
+         if (march%active%friction%is_on) then
+            march%state%contacts%slides_along = 0.0_wp
+            march%state%contacts%drag = 0.0_wp
+         end if
+         march%motion%v0 = 0.0_wp
          call active_set_begin(march%active, march%system, march%motion, march%state)
          call host_set_begin(self%host_set, march%system%n_constraint)
          active = host_set_next(march%active)
+         call host_friction_begin(march%active, active, march%system, march%motion)
       end associate
    end subroutine query_begin_contact
+
+   !> After `query_begin_contact`: friction is to bring velocities along surfaces to rest, not to
+   !> turn them round. `stop` is the motion over the step with which all velocities end at zero:
+   !> h/2 v0 where the velocity at the end is 2 du/h - v0.
+   subroutine query_begin_friction(self, stepper, stop, error)
+      type(query_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(in), contiguous :: stop(:, :)           !! (n_dim, n_node) [L]
+      type(error_t), allocatable, intent(out) :: error
+
+      call check_that(self%has_begun, "no step of contact was begun", error)
+      call check_field("stop", stop, stepper%scene, error)
+      if (allocated(error)) return
+      associate (march => self%march, acts => host_set_next(self%march%active))
+         march%motion%v0 = stop
+         call friction_begin(march%active%friction, march%system, march%motion, acts)
+         call host_friction_begin(march%active, acts, march%system, march%motion)
+      end associate
+   end subroutine query_begin_friction
 
    !> Take over how contact begins, which may have changed.
    subroutine take_options(self, stepper)
@@ -80,8 +109,9 @@ contains
          call active_set_suit(active, step)
          active%rules%holds_gap = step_initiation(step) == initiation_persistent
          active%rules%may_cut = stepper%may_cut
-         self%march%motion%evaluation = merge(evaluation_t(), evaluation_at_end, &
-            step_is_dynamic(step))
+         ! Of velocities only the motion that brings them to rest is known, as if they were that.
+         self%march%motion%evaluation = merge(evaluation_t(lapse=1.0_wp, v_weight=2.0_wp), &
+            evaluation_at_end, step_is_dynamic(step))
       end associate
    end subroutine take_options
 
@@ -216,13 +246,13 @@ contains
       call report_check_list(self, "lam", lam, error)
       call check_flags(self, "active", active, error)
       if (present(magnitude)) call check_field("magnitude", magnitude, stepper%scene, error)
-      if (.not. allocated(error)) call check_that(count(active) == size(lam) .and. &
+      if (.not. allocated(error)) call check_that(count(active) == self%march%active%set%n .and. &
          all(active .eqv. host_set_next(self%march%active)), &
          "active is not the set that was selected", error)
       if (allocated(error)) return
       associate (march => self%march, own => self%march%active)
-         own%set%lam = lam
-         own%lam(own%set%id) = lam
+         call constraints_take_lam(own%set, lam)
+         own%lam(own%set%id) = lam(:own%set%n)
          march%system%response%magnitude = 0.0_wp
          if (present(magnitude)) then
             march%system%response%magnitude = magnitude
@@ -245,7 +275,10 @@ contains
 
       call check_that(self%has_begun, "no step of contact was begun", error)
       do k = 1, size(redundant)
-         call check_choice("redundant", redundant(k), 1, self%march%active%set%n, error)
+         call check_choice("redundant", redundant(k), 1, self%march%active%set%n_row, error)
+         call check_that(redundant(k) <= self%march%active%set%n, "row " // to_text(redundant(k)) &
+            // " holds a slip: it follows from others and cannot be left out; solve with the " // &
+            "multipliers", error)
       end do
       if (allocated(error)) return
       call host_set_drop(self%host_set, self%march%active, redundant)
@@ -277,6 +310,37 @@ contains
          end do
       end associate
    end subroutine query_areas
+
+   !> How each contact holds along the surface, by the step that was solved last: 0 where it is
+   !> open, 1 where it acts without sliding, 2 where it slides; its slip, and its friction.
+   subroutine query_slips(self, stepper, way, slip, friction, error)
+      type(query_t), intent(in) :: self
+      type(stepper_t), intent(in) :: stepper
+      integer, allocatable, intent(out) :: way(:)          !! (n_constraint)
+      real(wp), allocatable, intent(out) :: slip(:, :)     !! (n_slip, n_constraint) [L]
+      real(wp), allocatable, intent(out) :: friction(:, :) !! (n_slip, n_constraint) [M L/T^2]
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: drag(most_slips)
+      integer :: k
+
+      call check_that(self%has_begun .and. self%has_set, "no constraints were evaluated in this " &
+         // "step", error)
+      if (allocated(error)) return
+      associate (set => self%march%active%set, n => self%march%system%n_constraint, &
+            n_slip => stepper%scene%n_dim - 1)
+         allocate(way(n), source=0)
+         allocate(slip(n_slip, n), friction(n_slip, n), source=0.0_wp)
+         do k = set%n_permanent + 1, set%n
+            associate (item => set%item(k), id => set%id(k))
+               way(id) = merge(2, 1, any(abs(item%response%mu_sigma) > 0.0_wp))
+               if (.not. item%has_friction) cycle
+               drag = condition_friction(item, set%lam(k))
+               slip(:, id) = item%slip(:n_slip)
+               friction(:, id) = drag(:n_slip)
+            end associate
+         end do
+      end associate
+   end subroutine query_slips
 
    !> The deepest overlap of surfaces in the step from `u0` by `du`, found by geometry alone.
    subroutine query_overlap(self, stepper, u0, du, overlap, error)

@@ -15,8 +15,9 @@ module emcon_stepper_host
    use emcon_facets, only : facets_init, facets_t
    use emcon_host_faces, only : host_faces_in_turn
    use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
-      formulation_nts, integration_elements, integration_segments, multiplier_dual, &
-      multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, smoothing_none
+      formulation_nts, integration_elements, integration_segments, interaction_t, &
+      multiplier_dual, multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, &
+      smoothing_none
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_scene, only : scene_of_nodes
@@ -133,19 +134,23 @@ contains
       end do
    end subroutine check_edges
 
-   !> Add a contact pair; a surface in contact with itself is its own master.
-   subroutine stepper_add_pair(self, slave, master, formulation, options, error)
+   !> Add a contact pair; a surface in contact with itself is its own master. Of `interaction` hosts
+   !> have the friction.
+   subroutine stepper_add_pair(self, slave, master, formulation, options, error, interaction)
       type(stepper_t), intent(inout) :: self
       integer, intent(in) :: slave, master                 !! numbers of surfaces
       integer, intent(in) :: formulation                   !! one of `formulation_`
       type(contact_options_t), intent(in) :: options
       type(error_t), allocatable, intent(out) :: error
+      type(interaction_t), intent(in), optional :: interaction       !! none: without friction
       type(contact_pair_t) :: pair
 
+      if (present(interaction)) pair%interaction%friction = interaction%friction
       call check_surfaces(self, slave, master, error)
       call check_choice("formulation", formulation, formulation_nts, formulation_mortar, error)
       call check_options(options, error)
       if (self%scene%n_dim == 3) call check_space(slave == master, formulation, options, error)
+      call check_number("friction", pair%interaction%friction, error, 0.0_wp)
       call check_apart(self, slave, master, error)
       if (allocated(error)) return
       pair%slave = slave

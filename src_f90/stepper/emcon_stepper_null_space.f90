@@ -16,7 +16,7 @@ module emcon_stepper_null_space
    use emcon_stepper_query, only : query_t
    implicit none
    private
-   public :: query_null_space, query_multipliers, query_particular
+   public :: query_null_space, query_multipliers, query_row_multipliers, query_particular
    public :: query_links, query_follow_links, query_gather_links
 
 contains
@@ -38,6 +38,8 @@ contains
       allocate(redundant(0))
       call check_that(self%has_set, "no step was evaluated since the model was made, its " // &
          "unknowns changed, or constraints were selected", error)
+      call check_that(.not. allocated(self%map), "P and DF are of the freedoms of the nodes, not " &
+         // "of the unknowns of a map: solve with the multipliers", error)
       if (allocated(error)) return
       associate (set => self%march%active%set, system => self%march%system, &
             null_space => self%null_space)
@@ -73,7 +75,24 @@ contains
       real(wp), allocatable, intent(out) :: lam(:)             !! (n_constraint) [M L/T^2]
       type(error_t), allocatable, intent(out) :: error
       real(wp), intent(in), optional :: residual(:, :)         !! (2, n_node) [M L/T^2]
-      real(wp), allocatable :: of_unknown(:), active(:)
+      real(wp), allocatable :: row(:)
+
+      call query_row_multipliers(self, stepper, row, error, residual)
+      if (allocated(error)) return
+      associate (set => self%march%active%set)
+         allocate(lam(self%march%system%n_constraint), source=0.0_wp)
+         lam(set%id(:set%n)) = row(:set%n)
+      end associate
+   end subroutine query_multipliers
+
+   !> The same for the rows of the set, in their order.
+   subroutine query_row_multipliers(self, stepper, lam, error, residual)
+      type(query_t), intent(in) :: self
+      type(stepper_t), intent(in) :: stepper
+      real(wp), allocatable, intent(out) :: lam(:)             !! (n_row) [M L/T^2]
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), intent(in), optional :: residual(:, :)         !! (n_dim, n_node) [M L/T^2]
+      real(wp), allocatable :: of_unknown(:)
 
       call check_null_space(self, error)
       if (present(residual)) call check_field("residual", residual, stepper%scene, error)
@@ -81,19 +100,18 @@ contains
          "the last evaluation has no residual: give one", error)
       if (allocated(error)) return
       associate (set => self%march%active%set, system => self%march%system)
-         allocate(lam(system%n_constraint), source=0.0_wp)
-         if (set%n == 0) return
-         allocate(of_unknown(system%space%numbering%n_unknown), active(set%n))
+         allocate(lam(set%n_row), source=0.0_wp)
+         if (set%n_row == 0) return
+         allocate(of_unknown(system%space%numbering%n_unknown))
          if (present(residual)) then
             call pick_unknowns(system%space%numbering, residual, of_unknown)
          else
             call pick_unknowns(system%space%numbering, system%response%residual, of_unknown)
          end if
          call null_space_multipliers(self%null_space, set, system%space%numbering, of_unknown, &
-            active)
-         lam(set%id(:set%n)) = active
+            lam)
       end associate
-   end subroutine query_multipliers
+   end subroutine query_row_multipliers
 
    !> The motion of dependent unknowns alone that closes `defect` to first order, by the last null
    !> space; Newton's step is this plus DF times that of the others.
@@ -107,7 +125,7 @@ contains
       real(wp), allocatable :: dw(:), flat(:)
 
       call check_null_space(self, error)
-      call check_list("defect", defect, self%march%active%set%n, error)
+      call check_list("defect", defect, self%march%active%set%n_row, error)
       if (allocated(error)) return
       allocate(du, source=at_rest(stepper%scene%x))
       if (size(defect) == 0) return

@@ -45,6 +45,7 @@ module emcon_stepper_query
       logical :: has_begun = .false.             !! a step of contact, by `query_begin_contact`
       type(host_set_t) :: host_set               !! of that step
       type(null_space_t) :: null_space           !! of the last `query_null_space`
+      type(csr_t), allocatable :: map            !! freedoms of the nodes by the host's unknowns
       logical :: has_tangent = .false.           !! of the last evaluation
       logical :: has_null_space = .false.
       integer, private :: revision = -1          !! of the model that the numbering is that of

@@ -3,12 +3,14 @@ module emcon_stepper_report
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_select
    use emcon_contact, only : gap_state_t
-   use emcon_csr, only : csr_copy_filled, csr_t
+   use emcon_csr, only : csr_copy_filled, csr_t, csr_transpose
+   use emcon_csr_product, only : csr_product
    use emcon_curvature, only : curvature_add_times, curvature_matrix
    use emcon_errors, only : error_t
    use emcon_kinds, only : wp
    use emcon_numbering, only : numbering_init, numbering_t
    use emcon_evaluation, only : evaluation_t
+   use emcon_host_check, only : host_check_matrix
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_field, check_list, check_that
    use emcon_gaps, only : gaps_search
@@ -16,14 +18,18 @@ module emcon_stepper_report
    use emcon_steps, only : prescribed_t
    implicit none
    private
-   public :: contact_report_t, query_constraints, query_curvature, query_curvature_times
+   public :: contact_report_t, query_constraints, query_curvature, query_curvature_times, &
+      query_set_map
    public :: report_evaluate, report_check_list
 
    !> Constraints over a step, ascending by their numbers: f = mean gap - target. Linearised in the
    !> motion at the end: force lam_k times row k of the discrete gradients, defect by the gradients
-   !> at the end. In statics the start is the end: gap0 = gap1, dgap = 0, one gradient.
+   !> at the end. In statics the start is the end: gap0 = gap1, dgap = 0, one gradient. What sticks
+   !> has rows of its slips behind those of all gaps: f = target - slip, the multiplier is friction.
+   !> What slides has none: its friction is in the force of its gap's row.
    type :: contact_report_t
-      integer :: n = 0
+      integer :: n = 0                           !! rows
+      integer, allocatable :: slip(:)            !! (n) 0: a row of a gap; else of which slip
       integer, allocatable :: id(:)              !! (n) 1..n_constraint, as in `state_t`
       integer, allocatable :: pair(:)            !! (n) 1..n_pair; 0: a row of a tie or an equation
       integer, allocatable :: node(:)            !! (n) slave node, 1..n_node; 0 likewise
@@ -39,6 +45,33 @@ module emcon_stepper_report
    end type contact_report_t
 
 contains
+
+   !> Gradients and second derivatives are from here on by unknowns of the host's: the freedoms of
+   !> the nodes are `map` times these, up to what does not change. Displacements and other fields
+   !> stay those of the nodes.
+   subroutine query_set_map(self, stepper, map, error)
+      type(query_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      type(csr_t), intent(in) :: map             !! (n_dim n_node x unknowns of the host)
+      type(error_t), allocatable, intent(out) :: error
+
+      call host_check_matrix(map, size(stepper%scene%x), map%n_col, "the map", &
+         "the freedoms of the nodes", error)
+      if (.not. allocated(error)) call check_that(allocated(map%value), "the map has no values", &
+         error)
+      if (.not. allocated(error)) self%map = map
+   end subroutine query_set_map
+
+   !> Rows by the freedoms of the nodes, as the host is to have them.
+   subroutine apply_map(self, rows)
+      type(query_t), intent(in) :: self
+      type(csr_t), intent(inout) :: rows
+      type(csr_t) :: mapped
+
+      if (.not. allocated(self%map)) return
+      call csr_product(rows, self%map, mapped)
+      rows = mapped
+   end subroutine apply_map
 
    !> All contact constraints near from displacements `u0` to `u1`. With `keeps_gap` they are those
    !> that hold the mean gap of `u0`, as persistent contact does: integrated gaps have other
@@ -92,44 +125,62 @@ contains
       associate (system => self%march%system, set => self%march%active%set)
          call constraints_evaluate(set, system, self%march%motion)
          call constraints_rows(set, freedoms)
-         report%n = set%n
-         report%id = set%id
-         allocate(report%pair(set%n), report%node(set%n), source=0)
-         do k = 1, set%n
-            call constraint_index(system, set%id(k), pair, i)
+         report%n = set%n_row
+         report%id = set%id(set%condition)
+         report%slip = set%slip
+         allocate(report%pair(set%n_row), report%node(set%n_row), source=0)
+         do k = 1, set%n_row
+            call constraint_index(system, report%id(k), pair, i)
             if (pair == 0) cycle
             report%pair(k) = abs(system%contact(pair)%of_pair)
             report%node(k) = system%contact(pair)%contact%node(i)
          end do
-         report%target = set%target
-         report%gap0 = set%item%gap0
-         report%gap1 = set%item%gap1
-         report%dgap = set%item%dgap
-         report%size = set%item%size
+         report%target = set%target(set%condition)
+         report%gap0 = set%item(set%condition)%gap0
+         report%gap1 = set%item(set%condition)%gap1
+         report%dgap = set%item(set%condition)%dgap
+         report%size = set%item(set%condition)%size
          report%defect = set%defect
+         do k = set%n + 1, set%n_row
+            associate (item => set%item(set%condition(k)), s => set%slip(k))
+               report%target(k) = item%slip_target(s)
+               report%gap0(k) = item%slip_target(s)
+               report%gap1(k) = set%defect(k)
+               report%dgap(k) = -item%slip(s)
+            end associate
+         end do
          call csr_copy_filled(set%force_rows, report%discrete_gradient)
          call csr_copy_filled(set%gap_rows, report%end_gradient)
       end associate
+      call apply_map(self, report%discrete_gradient)
+      call apply_map(self, report%end_gradient)
       self%has_set = .true.
       self%has_null_space = .false.
    end subroutine report_evaluate
 
-   !> Sum over the constraints of the last evaluation of `factor` times the derivative of the
-   !> discrete gradient by the end: the tangent of a step gets minus this.
+   !> Sum over the rows of the last evaluation of `factor` times the derivative of the force of its
+   !> unit by the end: the tangent of a step gets minus this. What slides turns with its slip.
    subroutine query_curvature(self, factor, matrix, error)
-      type(query_t), intent(in) :: self
+      type(query_t), intent(inout) :: self
       real(wp), intent(in) :: factor(:)          !! (n) multipliers [M L/T^2]
-      type(csr_t), intent(out) :: matrix         !! (2 n_node x 2 n_node)
+      type(csr_t), intent(out) :: matrix         !! over freedoms of nodes, or by the map
       type(error_t), allocatable, intent(out) :: error
 
+      type(csr_t) :: own, turned
+      integer, allocatable :: from(:)
+
       call report_check_list(self, "factor", factor, error)
-      if (.not. allocated(error)) call curvature_matrix(self%march%active%set, factor, &
-         size(self%march%motion%x), matrix)
+      if (allocated(error)) return
+      call curvature_matrix(self%march%active%set, factor, size(self%march%motion%x), matrix)
+      if (.not. allocated(self%map)) return
+      call csr_product(matrix, self%map, own)
+      call csr_transpose(self%map, turned, from)
+      call csr_product(turned, own, matrix)
    end subroutine query_curvature
 
    !> The same times `direction`.
    subroutine query_curvature_times(self, stepper, factor, direction, product, error)
-      type(query_t), intent(in) :: self
+      type(query_t), intent(inout) :: self
       type(stepper_t), intent(in) :: stepper
       real(wp), intent(in) :: factor(:)              !! (n)
       real(wp), intent(in) :: direction(:, :)        !! (2, n_node)
@@ -153,7 +204,7 @@ contains
 
       call check_that(self%has_set, "no constraints were evaluated since they were selected, " // &
          "or the unknowns changed", error)
-      call check_list(name, list, self%march%active%set%n, error)
+      call check_list(name, list, self%march%active%set%n_row, error)
    end subroutine report_check_list
 
 end module emcon_stepper_report

@@ -18,7 +18,8 @@ module emcon_constraints
    implicit none
    private
    public :: constraint_set_t, constraints_select, constraints_evaluate, constraints_force
-   public :: constraints_stick, constraints_take_hold, constraints_gives_back
+   public :: constraints_stick, constraints_take_hold, constraints_take_lam, &
+      constraints_gives_back
    public :: constraints_add_law_forces, constraints_add_row_forces, constraints_lam, &
       constraints_dissipated
    public :: constraint_index, constraints_rounding, constraints_add_rounding
@@ -123,6 +124,19 @@ contains
          self%item(self%condition(k))%response%stick(self%slip(k)) = self%lam(k)
       end do
    end subroutine constraints_take_hold
+
+   !> Multipliers from outside, for the motion that was evaluated: friction answers to them.
+   subroutine constraints_take_lam(self, lam)
+      type(constraint_set_t), intent(inout) :: self
+      real(wp), intent(in) :: lam(:)             !! (n_row) [M L/T^2]
+      integer :: k
+
+      self%lam = lam
+      call constraints_take_hold(self)
+      do k = self%n_permanent + 1, self%n_condition
+         call respond(self, k)
+      end do
+   end subroutine constraints_take_lam
 
    !> Has condition `k` stored energy in steps before, which it gives back in this one?
    pure logical function constraints_gives_back(self, k) result(gives_back)

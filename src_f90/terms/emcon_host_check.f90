@@ -12,7 +12,7 @@ module emcon_host_check
    use emcon_text, only : to_text
    implicit none
    private
-   public :: host_check_force, host_check_mass, host_check_scene, host_name
+   public :: host_check_force, host_check_mass, host_check_matrix, host_check_scene, host_name
 
    !> Entries of an assembled mass are rounded by less than this part of what they are sums of.
    real(dp), parameter :: noise = 64.0_dp*epsilon(1.0_dp)
@@ -41,7 +41,7 @@ contains
       integer, intent(in) :: n_dim, n_node       !! of the model
       type(error_t), allocatable, intent(out) :: error
 
-      call check_pattern(force%pattern, n_dim*n_node, host_name(force) // ": its pattern", &
+      call host_check_matrix(force%pattern, n_dim*n_node, n_dim*n_node, host_name(force) // ": its pattern", &
          to_text(n_dim) // " freedoms for each of " // to_text(n_node) // " nodes", error)
    end subroutine host_check_force
 
@@ -52,7 +52,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: i, j, k
 
-      call check_pattern(mass, size(scene%x, 2), "the given mass", to_text(size(scene%x, 2)) // &
+      call host_check_matrix(mass, size(scene%x, 2), size(scene%x, 2), "the given mass", to_text(size(scene%x, 2)) // &
          " nodes", error)
       if (allocated(error)) return
       if (.not. allocated(mass%value)) then
@@ -107,15 +107,16 @@ contains
 
    end subroutine host_check_mass
 
-   !> A square matrix of `n` rows in the form that `csr_t` promises.
-   subroutine check_pattern(pattern, n, title, extent, error)
-      type(csr_t), intent(in) :: pattern
-      integer, intent(in) :: n
-      character(len=*), intent(in) :: title, extent
+   !> A matrix of `n` by `n_column` in the form that `csr_t` promises.
+   subroutine host_check_matrix(pattern, n, n_column, title, extent, error)
+      type(csr_t), intent(in) :: pattern                 !! values are not looked at
+      integer, intent(in) :: n, n_column                 !! rows and columns that it is to have
+      character(len=*), intent(in) :: title              !! what it is, for messages
+      character(len=*), intent(in) :: extent             !! and what its rows and columns are of
       type(error_t), allocatable, intent(out) :: error
       integer :: i, k
 
-      if (pattern%n_row /= n .or. pattern%n_col /= n) then
+      if (pattern%n_row /= n .or. pattern%n_col /= n_column) then
          call raise(error, err_input, title // " has " // to_text(pattern%n_row) // " rows and " &
             // to_text(pattern%n_col) // " columns, not those of " // extent)
       else if (.not. (allocated(pattern%row_start) .and. allocated(pattern%column))) then
@@ -139,17 +140,17 @@ contains
       end do
       do i = 1, n
          do k = pattern%row_start(i) + 1, pattern%row_start(i + 1)
-            if (pattern%column(k) >= 0 .and. pattern%column(k) < n) then
+            if (pattern%column(k) >= 0 .and. pattern%column(k) < n_column) then
                if (k == pattern%row_start(i) + 1) cycle
                if (pattern%column(k) > pattern%column(k - 1)) cycle
             end if
             call raise(error, err_input, title // ": column " // to_text(pattern%column(k)) // &
-               " in row " // to_text(i) // " is not in 0.." // to_text(n - 1) // &
+               " in row " // to_text(i) // " is not in 0.." // to_text(n_column - 1) // &
                " or not above the one before it")
             return
          end do
       end do
-   end subroutine check_pattern
+   end subroutine host_check_matrix
 
    !> There is something to compute, each node that the deck says is given has forces or mass, and
    !> solvers that it names are there.

@@ -16,7 +16,7 @@ module emcon_coulomb_law
    public :: coulomb_t, contact_trial_t, slip_status_t, coulomb_map, &
       coulomb_status, coulomb_violation
    public :: contact_open, contact_sticks, contact_slides, contact_free, contact_rests, &
-      slip_rounding
+      slip_rounding, has_way
 
    !> Slip is made of a dozen products of lengths of an edge: by so much of it slip is uncertain.
    real(wp), parameter :: slip_rounding = 16.0_wp*epsilon(1.0_wp)
@@ -114,7 +114,7 @@ contains
       type(contact_response_t), intent(inout) :: response
 
       type(remainder_t) :: rest
-      real(wp) :: size, direction(most_slips), across(most_slips, most_slips)
+      real(wp) :: size, drag, direction(most_slips), across(most_slips, most_slips)
       integer :: s
 
       response%mu_sigma = self%mu*self%status%direction
@@ -124,11 +124,13 @@ contains
       if (size <= has_way*at%size .or. dot_product(rest%over, self%status%direction) <= 0.0_wp) &
          return
       direction = rest%over/size
+      ! Below 0 where what is to be let go pulls.
+      drag = sign(norm2(at%friction), dot_product(at%friction, self%status%direction))
       self%status%direction = direction
       response%mu_sigma = self%mu*direction
       across = across_of(rest)
       do s = 1, most_slips
-         response%stiffness(1:, s) = norm2(at%friction)/size*(across(:, s) &
+         response%stiffness(1:, s) = drag/size*(across(:, s) &
             - dot_product(direction, across(:, s))*direction)
       end do
    end subroutine coulomb_respond

@@ -96,6 +96,7 @@ static void without_model(void)
    TELL(emcon_tangent(m, 1, &matrix));
    TELL(emcon_null_space(m, &matrix, &matrix, NULL, NULL));
    TELL(emcon_multipliers(m, 1, x, 1, x));
+   TELL(emcon_row_multipliers(m, 1, x, 1, x));
    TELL(emcon_particular(m, 1, x, 1, x));
    TELL(emcon_curvature(m, 1, x, &matrix));
    TELL(emcon_follow(m, 1, x));
@@ -109,6 +110,9 @@ static void without_model(void)
    TELL(emcon_hold(m, 1, i));
    TELL(emcon_set_contact(m, &settings));
    TELL(emcon_begin_contact(m, 1, x, x, 1, i, i));
+   TELL(emcon_begin_friction(m, 1, x));
+   TELL(emcon_set_map(m, &matrix));
+   TELL(emcon_get_slips(m, 1, i, x, x));
    TELL(emcon_get_gaps(m, 1, x, x, 1, &gap));
    TELL(emcon_select(m, 1, x, x, 1, i, i));
    TELL(emcon_choose(m, 1, x, x, 1, i, x));

@@ -56,8 +56,9 @@ static void refuse_to_build(double *x)
    }
 }
 
-static void build(int formulation)
+static void build(int formulation, double friction)
 {
+   emcon_pair_options options = {0};
    double *x = numbers(2*n_node);
    int *edge = integers(6, 0), *held = integers(2*n_node, 0), surface[4];
    for (int i = 0; i < 2*n_node; ++i) x[i] = scene[i];
@@ -73,7 +74,8 @@ static void build(int formulation)
    REFUSED(emcon_add_faces(face, "none", INT_MAX, NULL, NULL, 1, edge, NULL));
    REFUSED(emcon_add_faces(face, "none", 1, edge, edge, INT_MIN, edge, NULL));
    REFUSED_ALL(n, emcon_add_pair(face, n, surface[0], formulation, NULL));
-   WORKS(emcon_add_pair(face, surface[1], surface[0], formulation, NULL));
+   options.friction = friction;
+   WORKS(emcon_add_pair(face, surface[1], surface[0], formulation, friction > 0 ? &options : NULL));
    WORKS(emcon_add_tie(face, surface[3], surface[2], EMCON_DUAL, -1));
    REFUSED(emcon_set_contact(face, NULL));
    REFUSED_ALL(n, emcon_hold(face, n, held));
@@ -97,17 +99,20 @@ static void eliminate(const emcon_sizes *sizes, int n)
    const int m = sizes->n_constraint;
    int n_redundant;
    double *lam = numbers(m), *defect = numbers(n), *force = numbers(2*n_node),
-          *motion = numbers(2*n_node);
+          *motion = numbers(2*n_node), *row = numbers(n);
    WORKS(emcon_null_space(face, &p, &df, &n_redundant, &redundant));
    need(n_redundant == 0 && p.n_row == 2*n_node && p.n_column == sizes->n_unknown - n, "P", "size");
    WORKS(emcon_multipliers(face, n_node, force, m, lam));
+   WORKS(emcon_row_multipliers(face, n_node, force, n, row));
    WORKS(emcon_particular(face, n, defect, n_node, motion));
+   REFUSED_ALL(k, emcon_row_multipliers(face, n_node, force, k, row));
    REFUSED(emcon_multipliers(face, n_node, NULL, m, lam));
    REFUSED_ALL(k, emcon_multipliers(face, n_node, force, k, lam));
    REFUSED_ALL(k, emcon_multipliers(face, k, force, m, lam));
    REFUSED_ALL(k, emcon_particular(face, k, defect, n_node, motion));
    REFUSED_ALL(k, emcon_particular(face, n, defect, k, motion));
    free(lam);
+   free(row);
    free(defect);
    free(force);
    free(motion);
@@ -117,8 +122,8 @@ static void differentiate(double *u0, double *du, int n, int m, int *active)
 {
    emcon_csr curvature;
    double *lam = numbers(n), *product = numbers(2*n_node), *area = numbers(m),
-          *length = numbers(m);
-   int is_done, outcome;
+          *length = numbers(m), *slip = numbers(m), *friction = numbers(m);
+   int is_done, outcome, *way = integers(m, 0);
    WORKS(emcon_curvature(face, n, lam, &curvature));
    WORKS(emcon_curvature_times(face, n, lam, n_node, du, product));
    WORKS(emcon_get_areas(face, n_node, u0, m, area, length));
@@ -132,13 +137,18 @@ static void differentiate(double *u0, double *du, int n, int m, int *active)
    REFUSED_ALL(k, emcon_update_active(face, k, u0, du, n, lam, product, m, active, &is_done,
                                       &outcome));
    WORKS(emcon_update_active(face, n_node, u0, du, n, lam, product, m, active, &is_done, &outcome));
+   WORKS(emcon_get_slips(face, m, way, slip, friction));
+   REFUSED_ALL(k, emcon_get_slips(face, k, way, slip, friction));
+   free(way);
+   free(slip);
+   free(friction);
    free(lam);
    free(product);
    free(area);
    free(length);
 }
 
-static void step(void)
+static void step(int has_friction)
 {
    emcon_sizes sizes;
    emcon_constraint_report values;
@@ -151,6 +161,8 @@ static void step(void)
         "not those of the scene");
    WORKS(emcon_get_contact(face, n_contact, NULL, NULL, node, pair));
    WORKS(emcon_begin_contact(face, n_node, u0, du, m, active, active));
+   WORKS(emcon_begin_friction(face, n_node, du));
+   REFUSED_ALL(k, emcon_begin_friction(face, k, du));
    WORKS(emcon_get_gaps(face, n_node, u0, du, m, gap));
    WORKS(emcon_overlap(face, n_node, u0, du, &depth, &behind));
    need(depth == 0 && behind == -1, "emcon_overlap", "there is none");
@@ -160,7 +172,7 @@ static void step(void)
    for (int i = 0; i < m; ++i) active[i] = gap[i].is_near;
    WORKS(emcon_select(face, n_node, u0, du, m, active, &n));
    REFUSED_ALL(k, emcon_select(face, n_node, u0, du, k, active, &n));
-   need(n == n_contact, "emcon_select", "a contact is not near");
+   need(n == (has_friction ? 2 : 1)*n_contact, "emcon_select", "a contact is not near");
    REFUSED(emcon_null_space(face, NULL, NULL, NULL, NULL));
    WORKS(emcon_evaluate_contact(face, n_node, u0, du, &values));
    WORKS(emcon_evaluate_contact(face, n_node, u0, du, NULL));
@@ -185,9 +197,11 @@ static void step(void)
 int main(void)
 {
    for (int formulation = EMCON_NODE_TO_SEGMENT; formulation <= EMCON_MORTAR; ++formulation) {
-      build(formulation);
-      step();
-      emcon_close(face);
+      for (int has_friction = 0; has_friction < 2; ++has_friction) {
+         build(formulation, 0.3*has_friction);
+         step(has_friction);
+         emcon_close(face);
+      }
    }
    puts("done");
    return 0;

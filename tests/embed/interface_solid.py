@@ -1,0 +1,172 @@
+"""Two elastic blocks collide and rub in space: a finite element code in numpy that takes contact from EMCON.
+
+The code has hexahedra of St. Venant and Kirchhoff's law, conserving steps and a dense solver. Its
+forces over a step are a discrete gradient: the stress of the mean of the strains at both ends, on
+the deformation gradient in the middle. Lines that contact adds are marked by `emcon`.
+
+    python interface_solid.py
+"""
+
+from __future__ import annotations
+
+from itertools import product
+
+import numpy as np
+from numpy.typing import NDArray
+
+from emcon.interface import Interface, Outcome
+
+Floats = NDArray[np.float64]
+CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
+#: Corners of the faces that lie below and above, counter-clockwise as seen from outside.
+BELOW, ABOVE = [0, 3, 2, 1], [4, 5, 6, 7]
+
+
+def block(n: tuple[int, int, int], low: Floats, size: Floats, first: int = 0) -> tuple[Floats, NDArray[np.int64]]:
+    """Nodes of a block of n cells from its corner `low`, and the cells, of nodes from `first` on."""
+    place = np.array(list(product(*(range(k + 1) for k in n))))
+    number = {tuple(p): first + k for k, p in enumerate(place)}
+    cells = [[number[tuple(p)] for p in cell + CORNERS] for cell in product(*map(range, n))]
+    return low + place/n*size, np.array(cells)
+
+
+class Solid:
+    """Elastic hexahedra with 2 x 2 x 2 points; `lame` constants, density."""
+
+    def __init__(self, x: Floats, cells: NDArray[np.int64], lame: tuple[float, float], density: float) -> None:
+        self.x, self.cells, self.lame = x, cells, lame
+        self.dof = (3*cells[:, :, None] + np.arange(3)).reshape(len(cells), -1)
+        slope, volume, shape = [], [], []
+        for p in product(0.5 + np.array([-1, 1])/12**0.5, repeat=3):
+            part = np.where(CORNERS, p, 1 - np.array(p))
+            n = part.prod(1)
+            dn = np.stack([np.delete(part, a, 1).prod(1)*(2*CORNERS[:, a] - 1) for a in range(3)], 1)
+            jacobian = np.einsum("ia,eib->eab", dn, x[cells])
+            slope.append(np.einsum("eba,ia->eib", np.linalg.inv(jacobian), dn))
+            volume.append(np.linalg.det(jacobian)/8)
+            shape.append(n)
+        self.slope, self.volume = np.stack(slope, 1), np.stack(volume, 1)     # (cell, point, ...)
+        own = density*np.einsum("ep,pi,pj->eij", self.volume, np.array(shape), np.array(shape))
+        mass = np.zeros((len(x), len(x)))
+        np.add.at(mass, (cells[:, :, None], cells[:, None, :]), own)
+        self.mass = np.kron(mass, np.eye(3))
+
+    def gradient(self, u: Floats) -> Floats:
+        return np.einsum("eia,epib->epab", u[self.cells], self.slope)
+
+    def stress(self, strain: Floats) -> Floats:
+        lam, mu = self.lame
+        return lam*np.einsum("epaa,bc->epbc", strain, np.eye(3)) + 2*mu*strain
+
+    def energy(self, u: Floats) -> float:
+        e = strain(self.gradient(u))
+        return 0.5*float(np.einsum("epab,epab,ep->", e, self.stress(e), self.volume))
+
+    def respond(self, u0: Floats, du: Floats) -> tuple[Floats, Floats]:
+        """Forces over the step and their derivative by du."""
+        d0, d1 = self.gradient(u0), self.gradient(u0 + du)
+        s = self.stress(0.5*(strain(d0) + strain(d1)))
+        g, w, one, (lam, mu) = self.slope, self.volume, np.eye(3), self.lame
+        middle, end = one + 0.5*(d0 + d1), one + d1
+        force = np.zeros(self.x.size)
+        np.add.at(force, self.dof, np.einsum("epab,epbc,epic,ep->eia", middle, s, g, w, optimize=True).reshape(self.dof.shape))
+        by_middle, by_end = (np.einsum("epab,epib->epia", f, g) for f in (middle, end))
+        k = 0.5*lam*np.einsum("epia,epjb,ep->eiajb", by_middle, by_end, w, optimize=True)
+        k += 0.5*mu*np.einsum("epac,epbc,epid,epjd,ep->eiajb", middle, end, g, g, w, optimize=True)
+        k += 0.5*mu*np.einsum("epja,epib,ep->eiajb", by_middle, by_end, w, optimize=True)
+        k += 0.5*np.einsum("epic,epcd,epjd,ab,ep->eiajb", g, s, g, one, w, optimize=True)
+        tangent = np.zeros((self.x.size, self.x.size))
+        np.add.at(tangent, (self.dof[:, :, None], self.dof[:, None, :]), k.reshape(len(k), 24, 24))
+        return force, tangent
+
+
+def strain(d: Floats) -> Floats:
+    """Of displacement gradients."""
+    turned = d.swapaxes(-1, -2)
+    return 0.5*(d + turned + turned @ d)
+
+
+class Host:
+    """Where a collision stands: displacements, velocities, what contact knows."""
+
+    def __init__(self, solid: Solid, face: Interface, held: NDArray[np.bool_]) -> None:
+        self.solid, self.face, self.free = solid, face, np.flatnonzero(~held.ravel())
+        self.u, self.v = np.zeros(solid.x.shape), np.zeros(solid.x.shape)
+        self.active = np.zeros(face.n_contact, bool)                             # emcon
+        self.lost, self.n_sliding, self.n_sticking = 0.0, 0, 0
+
+    def energy(self) -> float:
+        """Of motion and strain, and what friction has taken."""
+        v = self.v.ravel()
+        return 0.5*v @ self.solid.mass @ v + self.solid.energy(self.u) + self.lost
+
+    def step(self, h: float) -> None:
+        """One step, solved with the multipliers as unknowns."""
+        face, du, outcome = self.face, h*self.v, None
+        self.active = face.begin_step(self.u, du, self.active, stop=0.5*h*self.v)    # emcon
+        while outcome is None:
+            lam = np.zeros(face.select(self.u, du, self.active))                     # emcon
+            du = self.newton(h, du, lam)
+            self.active, outcome = face.update_active(self.u, du, lam, self.active)  # emcon
+        if outcome is not Outcome.DONE:
+            raise ArithmeticError(f"the step cannot be ended: {outcome.name}")
+        slips = face.slips()                                                     # emcon, to the end
+        self.lost += float((slips.friction*slips.slip).sum())
+        self.n_sliding += int((slips.status == 2).sum())
+        self.n_sticking += int((slips.status == 1).sum())
+        self.u, self.v = self.u + du, 2/h*du - self.v
+
+    def newton(self, h: float, du: Floats, lam: Floats) -> Floats:
+        """The motion for the selected contacts; `lam` becomes their multipliers."""
+        free, n, last = self.free, len(self.free), np.inf
+        for _ in range(30):
+            force, tangent = self.solid.respond(self.u, du)
+            rows = self.face.evaluate(self.u, du)                                # emcon
+            g, c = rows.g.toarray()[:, free], rows.c.toarray()[:, free]          # emcon
+            residual = (self.solid.mass @ (2/h*(du/h - self.v)).ravel() + force)[free] - g.T @ lam
+            tangent += 2/h**2*self.solid.mass - self.face.curvature(lam).toarray()   # emcon
+            matrix = np.block([[tangent[np.ix_(free, free)], -g.T], [c, np.zeros((len(lam), len(lam)))]])
+            found = np.linalg.solve(matrix, -np.concatenate([residual, rows.defect]))
+            du = du.copy()
+            du.ravel()[free] += found[:n]
+            lam += found[n:]
+            size = np.abs(found[:n]).max()
+            if size <= 1e-15 or last <= size < 1e-11:
+                return du
+            last = size
+        raise ArithmeticError(f"Newton's method still moves by {size:g}")
+
+
+def collision(kind: str = "node to segment", friction: float = 0.3) -> Host:
+    """A block that flies askew at a plate, which is held below."""
+    below, lower = block((3, 3, 1), np.array([-1.5, -1.5, -0.5]), np.array([3.0, 3.0, 0.5]))
+    above, upper = block((2, 2, 1), np.array([-0.7, -0.6, 0.03]), np.array([1.2, 1.0, 0.6]), len(below))
+    x = np.concatenate([below, above])
+    x[len(below):] = x[len(below):] @ turn(0.4).T
+    face = Interface(x)                                                          # emcon, to prepare
+    plate = face.add_faces("plate", lower[:, ABOVE])
+    sole = face.add_faces("sole", upper[:, BELOW])
+    face.add_pair(sole, plate, kind, friction=friction)
+    held = np.isclose(x[:, 2], -0.5)[:, None] & np.ones(3, bool)
+    face.prepare(held)
+    host = Host(Solid(x, np.concatenate([lower, upper]), (600.0, 400.0), 1.0), face, held)
+    host.v[len(below):] = [1.0, 0.4, -1.0]
+    return host
+
+
+def turn(angle: float) -> Floats:
+    """About the vertical."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
+
+
+if __name__ == "__main__":
+    for name in ("node to segment", "mortar"):
+        bodies = collision(name)
+        start = bodies.energy()
+        drift = 0.0
+        for _ in range(20):
+            bodies.step(0.01)
+            drift = max(drift, abs(bodies.energy() - start)/start)
+        print(f"{name:16} energy and losses {drift:.0e}, friction took {bodies.lost/start:.3f} of it; contacts "
+              f"that slid {bodies.n_sliding}, stuck {bodies.n_sticking}")
