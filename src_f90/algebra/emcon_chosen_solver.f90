@@ -116,7 +116,7 @@ contains
          call self%iterative%factorise(value, error)
          if (allocated(error)) return
          call take_figures(self, self%iterative)
-         if (self%is_singular .and. self%iterative%is_filled) call factorise_exactly(self, error)
+         if (self%is_singular .and. self%iterative%is_filled) call factorise_after_all(self, error)
       else
          call self%direct%factorise(value, error)
          call take_figures(self, self%direct)
@@ -124,7 +124,7 @@ contains
    end subroutine chosen_factorise
 
    !> Factors after all, of what the iterations hold.
-   subroutine factorise_exactly(self, error)
+   subroutine factorise_after_all(self, error)
       class(chosen_solver_t), intent(inout) :: self
       type(error_t), allocatable, intent(out) :: error
       type(csr_t) :: matrix
@@ -133,22 +133,19 @@ contains
       self%is_incomplete = .false.
       self%by = by_factors
       call iterative_matrix(self%iterative, matrix)
-      call try(self%direct)
-      if (allocated(error) .or. .not. self%is_singular .or. self%needs_halves) return
-      self%by = by_general
-      call try(self%general)
+      call take_factors(self, self%direct, matrix, error)
+   end subroutine factorise_after_all
 
-   contains
+   subroutine take_factors(self, solver, matrix, error)
+      class(chosen_solver_t), intent(inout) :: self
+      class(sparse_solver_t), intent(inout) :: solver
+      type(csr_t), intent(in) :: matrix
+      type(error_t), allocatable, intent(out) :: error
 
-      subroutine try(solver)
-         class(sparse_solver_t), intent(inout) :: solver
-
-         call solver%analyse(matrix, error)
-         if (.not. allocated(error)) call solver%factorise(matrix%value, error)
-         call take_figures(self, solver)
-      end subroutine try
-
-   end subroutine factorise_exactly
+      call solver%analyse(matrix, error)
+      if (.not. allocated(error)) call solver%factorise(matrix%value, error)
+      call take_figures(self, solver)
+   end subroutine take_factors
 
    !> What the last factorisation tells.
    subroutine take_figures(self, solver)
@@ -166,15 +163,20 @@ contains
       real(wp), intent(in), contiguous :: rhs(:)
       real(wp), intent(out), contiguous :: x(:)
       type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: matrix
 
       self%is_converged = .true.
       if (self%by == by_iterations) then
          call self%iterative%solve(rhs, x, error)
          if (allocated(error) .or. self%iterative%is_converged) return
-         call factorise_exactly(self, error)
-         if (allocated(error)) return
+         call factorise_after_all(self, error)
+         if (self%is_singular .and. .not. allocated(error)) then
+            self%by = by_general
+            call iterative_matrix(self%iterative, matrix)
+            call take_factors(self, self%general, matrix, error)
+         end if
          self%is_converged = .not. self%is_singular
-         if (self%is_singular) return
+         if (self%is_singular .or. allocated(error)) return
       end if
       if (self%by == by_factors) call self%direct%solve(rhs, x, error)
       if (self%by == by_general) call self%general%solve(rhs, x, error)
