@@ -562,7 +562,7 @@ class Model(Source):
         nlgeom         large displacements; stays on for later steps
         increments     most increments of the step; default no limit
         amplitude      RAMP in static steps, STEP in dynamic ones: what holds anyway
-        solver         DEFAULT, UMFPACK or MUMPS
+        solver         DEFAULT, DIRECT, ITERATIVE, UMFPACK or MUMPS
         """
         options: dict[str, object] = {
             "NLGEOM": "NO" if nlgeom is False else nlgeom, "INC": increments,

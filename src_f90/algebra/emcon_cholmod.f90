@@ -102,10 +102,11 @@ module emcon_cholmod
          integer(c_int) :: status
       end function emcon_cholmod_reach
 
-      real(c_double) function emcon_cholmod_density(handle) bind(c)
+      subroutine emcon_cholmod_counts(handle, work, n_factor) bind(c)
          import :: c_double, c_ptr
          type(c_ptr), value :: handle
-      end function emcon_cholmod_density
+         real(c_double), intent(inout) :: work, n_factor
+      end subroutine emcon_cholmod_counts
 
       integer(c_int) function emcon_cholmod_nodes(handle, n, ap, ai, n_node, n_row) bind(c)
          import :: c_int, c_ptr
@@ -134,6 +135,7 @@ contains
       type(csr_t), intent(in) :: matrix
       type(error_t), allocatable, intent(out) :: error
       integer(c_int) :: status
+      real(c_double) :: n_factor
 
       if (c_associated(self%handle)) then
          if (csr_is_same(self%scaled, matrix)) return
@@ -150,8 +152,11 @@ contains
          status = emcon_cholmod_analyse(self%handle, int(matrix%n_row, c_int), &
             self%scaled%row_start, self%scaled%column)
       end if
-      if (status == cholmod_ok .and. self%needs_halves .and. self%may_be_rough) then
-         if (emcon_cholmod_density(self%handle) >= least_density) call find_nodes(self, status)
+      if (status == cholmod_ok) then
+         call emcon_cholmod_counts(self%handle, self%n_operation, n_factor)
+         self%n_factor = int(n_factor, int64)
+         if (self%needs_halves .and. self%may_be_rough .and. self%n_operation >= least_density*n_factor) &
+            call find_nodes(self, status)
       end if
       self%n_analysis = self%n_analysis + 1
       if (status /= cholmod_ok) call solver_raise(error, "CHOLMOD", "ordering", int(status), &

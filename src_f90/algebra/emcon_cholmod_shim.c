@@ -57,11 +57,12 @@ int emcon_cholmod_analyse(void *handle, int n, int *ap, int *ai)
    return h->c.status;
 }
 
-/* Operations of a factorisation for each entry of the factor, as analysed. */
-double emcon_cholmod_density(void *handle)
+/* Operations of a factorisation, and entries of the factor, as analysed. */
+void emcon_cholmod_counts(void *handle, double *work, double *n_factor)
 {
    const emcon_cholmod_t *h = handle;
-   return h->c.lnz > 0 ? h->c.fl/h->c.lnz : 0;
+   *work = h->c.fl;
+   *n_factor = h->c.lnz;
 }
 
 /* The pattern of the factor in the same order, by columns that are taken together: how many of these

@@ -14,7 +14,7 @@ module emcon_diagonal_blocks
    implicit none
    private
    public :: diagonal_blocks_t, blocks_analyse, blocks_factorise, blocks_solve, blocks_reach, &
-      blocks_free
+      blocks_multiply, blocks_free
 
    !> Parts of fewer than the n-th part of the unknowns are put together.
    integer, parameter :: smallest_part = 64
@@ -35,6 +35,8 @@ module emcon_diagonal_blocks
    type :: diagonal_blocks_t
       class(sparse_solver_t), allocatable :: kind      !! solvers are copies of it; it has halves
       logical :: may_be_rough = .false.          !! as of solvers, set before `blocks_analyse`
+      real(dp) :: accuracy = 0.0_dp              !! the same
+      logical :: is_incomplete = .false.         !! some block's factors are
       integer :: n_thread = 1                    !! that may work on the blocks
       integer :: n_block = 0
       integer :: n_factor = 0                    !! factors of blocks made of this pattern
@@ -67,6 +69,7 @@ contains
          allocate(self%block(b)%solver, source=self%kind)
          self%block(b)%solver%needs_halves = .true.
          self%block(b)%solver%may_be_rough = self%may_be_rough
+         self%block(b)%solver%accuracy = self%accuracy
          self%block(b)%solver%is_scaled = .true.
          call self%block(b)%solver%analyse(self%block(b)%matrix, error)
          if (allocated(error)) return
@@ -258,7 +261,9 @@ contains
       !$omp end parallel do
       call take_error(self, error)
       self%n_factor = 0
+      self%is_incomplete = .false.
       do b = 1, self%n_block
+         self%is_incomplete = self%is_incomplete .or. self%block(b)%solver%is_incomplete
          is_singular = is_singular .or. .not. self%block(b)%has_factor
          self%n_factor = self%n_factor + self%block(b)%n_factor
       end do
@@ -372,6 +377,48 @@ contains
          call block%solver%solve_half(is_second, block%b, x(at + 1:at + n), block%error)
       end if
    end subroutine solve
+
+   !> y = scale A x
+   subroutine blocks_multiply(self, x, y, error)
+      type(diagonal_blocks_t), intent(inout) :: self
+      real(dp), intent(in), contiguous :: x(:)         !! (n)
+      real(dp), intent(out), contiguous :: y(:)        !! (n)
+      type(error_t), allocatable, intent(out) :: error
+      integer :: b
+
+      !$omp parallel do default(none) shared(self, x, y) num_threads(self%n_thread) &
+      !$omp schedule(static, 1)
+      do b = 1, self%n_block
+         call multiply(self%block(b), x, y)
+      end do
+      !$omp end parallel do
+      call take_error(self, error)
+   end subroutine blocks_multiply
+
+   !> The part of a block.
+   subroutine multiply(block, x, y)
+      type(block_t), intent(inout) :: block
+      real(dp), intent(in), contiguous :: x(:)
+      real(dp), intent(inout), contiguous :: y(:)
+      real(dp), allocatable :: image(:)
+      integer :: i, k
+
+      if (block%solver%is_incomplete) then
+         allocate(image(size(block%unknown)))
+         call block%solver%multiply(x(block%unknown), image, block%error)
+         y(block%unknown) = image
+         return
+      end if
+      associate (rows => block%matrix)
+         do i = 1, rows%n_row
+            y(block%unknown(i)) = 0.0_dp
+            do k = rows%row_start(i) + 1, rows%row_start(i + 1)
+               y(block%unknown(i)) = y(block%unknown(i)) &
+                  + rows%value(k)*x(block%unknown(rows%column(k) + 1))
+            end do
+         end do
+      end associate
+   end subroutine multiply
 
    !> L^-1 P rhs of a sparse right-hand side: what of it is not zero.
    subroutine blocks_reach(self, column, value, n_reached, index, x, error)

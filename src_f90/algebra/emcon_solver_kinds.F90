@@ -1,4 +1,4 @@
-!> The kinds of direct solvers. A new one is one file, one row of `rows` and one case of
+!> The kinds of solvers. A new one is one file, one row of `rows` and one case of
 !> `allocate_solver`.
 !>
 !> EMCON_PERMISSIVE: built without SuiteSparse, whose solvers are under the GPL.
@@ -7,24 +7,28 @@ submodule (emcon_solver_registry) emcon_solver_kinds
    use emcon_cholmod, only : cholmod_t
    use emcon_umfpack, only : umfpack_t
 #endif
+   use emcon_chosen_solver, only : chosen_solver_t
    use emcon_mumps, only : mumps_t
-   use emcon_sparse_solver, only : matrix_definite
+   use emcon_sparse_solver, only : matrix_definite, matrix_general, sparse_solver_t
    implicit none
 
    !> Besides those of the registry.
-   integer, parameter :: solver_umfpack = 1
+   integer, parameter :: solver_umfpack = 1, solver_direct = 3, solver_iterative = 4
 
 #ifdef EMCON_PERMISSIVE
    logical, parameter :: has_suitesparse = .false.
-   character(len=*), parameter :: default_text = "MUMPS"
+   character(len=*), parameter :: default_text = "MUMPS or iterative", direct_text = "MUMPS"
 #else
    logical, parameter :: has_suitesparse = .true.
-   character(len=*), parameter :: default_text = "CHOLMOD, UMFPACK"
+   character(len=*), parameter :: default_text = "CHOLMOD, UMFPACK or iterative", &
+      direct_text = "CHOLMOD, UMFPACK"
 #endif
    type(solver_row_t), parameter :: rows(*) = [ &
       solver_row_t("DEFAULT", solver_default, .true., default_text), &
       solver_row_t("UMFPACK", solver_umfpack, has_suitesparse, "UMFPACK"), &
-      solver_row_t("MUMPS", solver_mumps, .true., "MUMPS")]
+      solver_row_t("MUMPS", solver_mumps, .true., "MUMPS"), &
+      solver_row_t("DIRECT", solver_direct, .true., direct_text), &
+      solver_row_t("ITERATIVE", solver_iterative, .true., "conjugate gradients where they can be")]
 
 contains
 
@@ -37,22 +41,50 @@ contains
    end procedure solver_row
 
    module procedure factors_symmetric
-      factors_symmetric = choice == solver_mumps .or. (choice == solver_default &
-         .and. .not. has_suitesparse)
+      factors_symmetric = choice == solver_mumps .or. (choice /= solver_umfpack &
+         .and. choice <= solver_user .and. .not. has_suitesparse)
    end procedure factors_symmetric
 
    module procedure allocate_solver
+      if (symmetry == matrix_definite .and. (choice == solver_default &
+         .or. choice == solver_iterative)) then
+         call allocate_chosen(choice, solver)
+      else
+         call allocate_direct(choice, symmetry, solver)
+      end if
+   end procedure allocate_solver
+
+   !> One that chooses between iterations and factors.
+   subroutine allocate_chosen(choice, solver)
+      integer, intent(in) :: choice
+      class(sparse_solver_t), allocatable, intent(out) :: solver
+      type(chosen_solver_t), allocatable :: chosen
+
+      allocate(chosen)
+      chosen%prefers_iterations = choice == solver_iterative
+      call allocate_direct(choice, matrix_definite, chosen%direct)
+      call allocate_direct(choice, matrix_general, chosen%general)
+      chosen%direct%symmetry = matrix_definite
+      chosen%general%symmetry = matrix_general
+      call move_alloc(chosen, solver)
+   end subroutine allocate_chosen
+
+   !> One that factorises.
+   subroutine allocate_direct(choice, symmetry, solver)
+      integer, intent(in) :: choice, symmetry
+      class(sparse_solver_t), allocatable, intent(out) :: solver
+
 #ifdef EMCON_PERMISSIVE
       allocate(mumps_t :: solver)
 #else
       if (choice == solver_mumps) then
          allocate(mumps_t :: solver)
-      else if (choice == solver_default .and. symmetry == matrix_definite) then
+      else if (choice /= solver_umfpack .and. symmetry == matrix_definite) then
          allocate(cholmod_t :: solver)
       else
          allocate(umfpack_t :: solver)
       end if
 #endif
-   end procedure allocate_solver
+   end subroutine allocate_direct
 
 end submodule emcon_solver_kinds

@@ -1,4 +1,4 @@
-!> The registry of direct solvers, by what decks call them: what others see of it. Which kinds there
+!> The registry of solvers, by what decks call them: what others see of it. Which kinds there
 !> are is known to `emcon_solver_kinds` alone.
 module emcon_solver_registry
    use emcon_sparse_solver, only : sparse_solver_t
@@ -7,20 +7,21 @@ module emcon_solver_registry
    public :: solver_row_t, solver_row, n_solver_row, find_solver_row, solver_names, solver_create
    public :: is_foreign_solver, factors_symmetric, solver_default, solver_mumps, solver_user
 
-   !> The default: CHOLMOD for definite matrices, UMFPACK for others; MUMPS where these are not.
+   !> The default: CHOLMOD or iterations for definite matrices, UMFPACK for others; MUMPS for
+   !> CHOLMOD and UMFPACK where these are not.
    !> Codes above `solver_user` are those that a program gives, in their order.
    integer, parameter :: solver_default = 0, solver_mumps = 2, solver_user = 100
 
    !> A choice: what decks call it, and whether this build has it.
    type :: solver_row_t
-      character(len=8) :: word
+      character(len=9) :: word
       integer :: code
       logical :: is_built
       character(len=40) :: text                  !! in the log
    end type solver_row_t
 
    !> What decks of other programs ask for, without blanks.
-   character(len=*), parameter :: foreign_solvers = ",DIRECT,ITERATIVE,ITERATIVECHOLESKY," // &
+   character(len=*), parameter :: foreign_solvers = ",ITERATIVECHOLESKY," // &
       "ITERATIVESCALING,MATRIXSTORAGE,PARDISO,PASTIX,SGI,SPOOLES,TAUCS,"
 
    interface

@@ -1,7 +1,8 @@
-!> What every direct solver of sparse systems offers.
+!> What every solver of sparse systems offers.
 !>
 !> Order of use: `analyse` once per pattern, `factorise` for each set of values, `solve` for each
-!> right-hand side. A matrix that cannot be factorised is a result (`is_singular`), not an error.
+!> right-hand side. A matrix that cannot be factorised is a result (`is_singular`), not an error, and
+!> so is a solution that has not become as good as was asked for (`is_converged`).
 !> An object owns memory of a C library: never assign one to another, and `free` it at the end (at
 !> any time, also twice). There is no finaliser: gfortran 12 loses other components of an object
 !> that holds one. Copies are made of an object that has analysed nothing: it owns no memory yet.
@@ -29,12 +30,20 @@ module emcon_sparse_solver
       logical :: is_singular = .false.
       real(dp) :: rcond = 0.0_dp              !! smallest over largest pivot, or 0: an indicator
       integer :: n_negative = -1              !! pivots < 0 of a symmetric matrix; < 0: not counted
-      integer(int64) :: n_factor = 0_int64    !! nonzeros of the factors
+      !> Nonzeros of the factors, as predicted from `analyse` on where that tells operations
+      integer(int64) :: n_factor = 0_int64
+      real(dp) :: n_operation = 0.0_dp        !! operations of a factorisation; 0: not predicted
       logical :: needs_halves = .false.       !! set before `analyse`, if it `has_halves`
       !> Set before `analyse`, with `needs_halves`: those of a matrix near to it will do
       logical :: may_be_rough = .false.
       logical :: is_scaled = .false.          !! set before `factorise`: `half_scale` stays 1
       real(dp) :: half_scale = 1.0_dp         !! > 0, L L^T of the halves is that times A
+      !> Set before `analyse`: solutions may be wrong by so much of themselves; 0: by round-off only
+      real(dp) :: accuracy = 0.0_dp
+      !> The last `solve` met that; else `x` is as near as it came
+      logical :: is_converged = .true.
+      !> Known after `analyse`: its halves are of a factor that half_scale*A is near to, no more
+      logical :: is_incomplete = .false.
       integer :: n_analysis = 0               !! analyses made: tells whether a pattern was reused
       integer, private :: of_analysis = 0     !! `n_analysis` when `factored` was factorised
       real(dp), allocatable, private :: factored(:)      !! values of the last `solver_renew`
@@ -46,6 +55,7 @@ module emcon_sparse_solver
       procedure :: has_halves
       procedure :: solve_half
       procedure :: reach_half
+      procedure :: multiply
    end type sparse_solver_t
 
    !> For arrays of solvers.
@@ -121,6 +131,16 @@ contains
       n_reached = 0
       call raise(error, err_internal, "a solver without halves was asked to solve by one")
    end subroutine reach_half
+
+   !> y = half_scale*A x; for who `is_incomplete`.
+   subroutine multiply(self, x, y, error)
+      class(sparse_solver_t), intent(inout) :: self
+      real(dp), intent(in), contiguous :: x(:)           !! (n)
+      real(dp), intent(inout), contiguous :: y(:)        !! (n)
+      type(error_t), allocatable, intent(out) :: error
+
+      call raise(error, err_internal, "a solver that has factors was asked for the matrix")
+   end subroutine multiply
 
    !> Factorise `value`, of the analysed pattern, unless the last factors are those of these values:
    !> matrices of linear bodies stay the same.

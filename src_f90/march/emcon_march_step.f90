@@ -12,7 +12,7 @@ module emcon_march_step
    use emcon_guards, only : guard_slack
    use emcon_overlap_check, only : overlap_check_step, overlap_t
    use emcon_factor_policy, only : factor_policy_forget, factor_policy_step
-   use emcon_kept_factor, only : kept_factor_renew
+   use emcon_kept_factor, only : kept_factor_let_iterate, kept_factor_renew
    use emcon_kinds, only : wp
    use emcon_march_accuracy, only : accuracy_judge
    use emcon_march_commit, only : march_commit
@@ -162,6 +162,8 @@ contains
             .and. (correction%method == method_null_space .or. self%system%n_constraint == 0)
          if (self%active%friction%is_on) factor_policy%is_allowed = factor_policy%is_allowed &
             .and. active_set_may_turn(self%active, self%system)
+         call kept_factor_let_iterate(correction%kept, factor_policy%is_wanted .and. &
+            .not. (self%active%friction%is_on .or. self%active%penalty%is_on))
          call factor_policy_step(factor_policy, correction, self%state%base, part%start, part%h, &
             self%state%clock%increment, is_lost)
          if (.not. is_lost) return

@@ -26,6 +26,9 @@ module emcon_correction
       correction_multipliers, correction_reset, correction_free, correction_reason, &
       correction_ticks, correction_work
 
+   !> Of a correction by Newton's method, where the solver iterates.
+   real(dp), parameter :: newton_accuracy = 1.0e-4_dp
+
    !> Patterns, and the constraint rows that they are for.
    type :: layout_t
       type(csr_t) :: merged                      !! N with constraints
@@ -46,10 +49,12 @@ module emcon_correction
       logical :: fell_back = .false.             !! last factorisation: asked for, but not possible
       integer :: obstacle = obstacle_none        !! and why
       integer :: n_factorisation = 0             !! made so far
+      logical :: is_lost = .false.               !! last solution: the matrix turned out singular
       integer :: choice = solver_default         !! of the direct solver, as the deck asks
       class(sparse_solver_t), allocatable :: user              !! by a program, for that choice
       class(sparse_solver_t), allocatable :: solver            !! no active constraint
       class(sparse_solver_t), allocatable :: definite_solver   !! the same, positive definite
+      class(sparse_solver_t), allocatable, private :: minimum_solver   !! tells whether it is
       logical, private :: is_definite = .false.  !! last factorisation: by that one
       type(layout_t), private :: layout
       type(null_space_t) :: null_space
@@ -81,6 +86,8 @@ contains
 
       call solver_create(self%choice, matrix_general, self%solver, self%user)
       call solver_create(self%choice, matrix_definite, self%definite_solver, self%user)
+      self%definite_solver%accuracy = newton_accuracy
+      call solver_create(self%choice, matrix_definite, self%minimum_solver, self%user)
       call kept_factor_set_up(self%kept, self%choice, self%user)
       call solver_create(self%choice, matrix_general, self%null_space%solver, self%user)
       call saddle_point_reset(self%saddle_point, self%choice, self%user)
@@ -93,6 +100,7 @@ contains
       if (.not. allocated(self%solver)) return
       call self%solver%free()
       call self%definite_solver%free()
+      call self%minimum_solver%free()
       call kept_factor_free(self%kept)
       call self%null_space%solver%free()
       call saddle_point_free(self%saddle_point)
@@ -340,9 +348,9 @@ contains
 
       is_definite = .true.
       self%n_factorisation = self%n_factorisation + 1
-      call self%definite_solver%analyse(matrix, error)
-      if (.not. allocated(error)) call solver_renew(self%definite_solver, matrix%value, error)
-      if (.not. allocated(error)) is_definite = .not. self%definite_solver%is_singular
+      call self%minimum_solver%analyse(matrix, error)
+      if (.not. allocated(error)) call solver_renew(self%minimum_solver, matrix%value, error)
+      if (.not. allocated(error)) is_definite = .not. self%minimum_solver%is_singular
    end subroutine try_matrix
 
    !> The multipliers that belong to `residual` (without contact forces), by null space only: the
@@ -406,9 +414,11 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       dlam = 0.0_wp
+      self%is_lost = .false.
       if (set%n == 0) then
          if (self%is_definite) then
             call self%definite_solver%solve(residual, dq, error)
+            self%is_lost = .not. self%definite_solver%is_converged
          else
             call self%solver%solve(residual, dq, error)
          end if

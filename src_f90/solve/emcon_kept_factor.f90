@@ -15,14 +15,17 @@ module emcon_kept_factor
    use emcon_diagonal_blocks, only : blocks_analyse, blocks_factorise, blocks_free, blocks_reach, &
       blocks_solve, diagonal_blocks_t
    use emcon_errors, only : error_t
+   use emcon_factor_rows, only : factor_rows_add, factor_rows_begin, factor_rows_fill_products, &
+      factor_rows_make_room, factor_rows_subtract_products, factor_rows_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_cholesky, dense_cholesky_solve
    use emcon_numbering, only : numbering_t
+   use emcon_projected_gradients, only : projected_begin, projected_gradients_t, projected_solve
    use emcon_solver_registry, only : solver_create
    use emcon_sparse_solver, only : matrix_definite, sparse_solver_t
    implicit none
    private
-   public :: kept_factor_t, kept_factor_set_up, kept_factor_renew, kept_factor_take, &
+   public :: kept_factor_t, kept_factor_set_up, kept_factor_let_iterate, kept_factor_renew, kept_factor_take, &
       kept_factor_look, kept_factor_serves, kept_factor_correct, kept_factor_forget, &
       kept_factor_free, kept_factor_is_possible, kept_factor_has_room, kept_factor_multipliers, &
       kept_factor_reach, kept_factor_condense
@@ -34,6 +37,8 @@ module emcon_kept_factor
    real(dp), parameter :: most_curved_far = 4.0_dp*most_curved
    !> A contact that gives way is that much softer or stiffer than what it pushes at, at most.
    real(dp), parameter :: rounding = 64.0_dp*epsilon(1.0_dp)
+   !> Of a correction by conjugate gradients: about what the age of a factor leaves.
+   real(dp), parameter :: correction_accuracy = 1.0e-2_dp
 
    type :: kept_factor_t
       logical :: is_made = .false.               !! there is a factor
@@ -44,11 +49,8 @@ module emcon_kept_factor
       integer :: n_forward = 0                   !! columns of W made so far
       integer, private :: n_slot = 0                 !! of the matrix
       real(dp), allocatable, private :: diagonal(:)  !! (n_unknown)
-      ! W of the constraints last taken, by its entries that are not zero:
-      integer, allocatable, private :: start(:)      !! (n + 1) entries before each column
-      integer, allocatable, private :: index(:)      !! (>= start(n + 1)) rows, from 0
-      real(dp), allocatable, private :: w(:)         !! (>= start(n + 1))
-      real(dp), allocatable, private :: l(:, :)      !! (n, n) Cholesky factor of W^T W
+      type(factor_rows_t), private :: rows           !! the constraints last taken
+      type(projected_gradients_t), private :: gradients      !! where the factor is incomplete
       ! Of contacts that give way: W^T W, and what is added to its diagonal
       real(dp), allocatable, private :: product(:, :)   !! (n, n)
       real(dp), allocatable, private :: compliance(:)   !! (n)
@@ -71,7 +73,18 @@ contains
       call solver_create(choice, matrix_definite, self%blocks%kind, user)
       self%blocks%may_be_rough = .true.
       call kept_factor_forget(self)
+      call kept_factor_let_iterate(self, .false.)
    end subroutine kept_factor_set_up
+
+   !> May the factor be an incomplete one, by which corrections take conjugate gradients?
+   subroutine kept_factor_let_iterate(self, may_iterate)
+      type(kept_factor_t), intent(inout) :: self !! set up
+      logical, intent(in) :: may_iterate
+
+      if (may_iterate .eqv. self%blocks%accuracy > 0.0_dp) return
+      call kept_factor_free(self)
+      self%blocks%accuracy = merge(correction_accuracy, 0.0_dp, may_iterate)
+   end subroutine kept_factor_let_iterate
 
    !> Can the solver make such factors?
    pure logical function kept_factor_is_possible(self)
@@ -115,6 +128,8 @@ contains
       call blocks_factorise(self%blocks, matrix, is_singular, error)
       if (allocated(error)) return
       self%is_made = .not. is_singular
+      if (self%is_made .and. self%blocks%is_incomplete) call projected_begin(self%gradients, &
+         self%diagonal)
       self%n_renewal = self%n_renewal + 1
    end subroutine kept_factor_renew
 
@@ -124,9 +139,10 @@ contains
       type(csr_t), intent(in) :: matrix
 
       self%n_slot = size(matrix%column)
-      if (allocated(self%y)) deallocate(self%y, self%x, self%diagonal, self%index, self%w)
+      if (allocated(self%y)) deallocate(self%y, self%x, self%diagonal)
       associate (n => matrix%n_row)
-         allocate(self%y(n), self%x(n), self%diagonal(n), self%index(n), self%w(n))
+         allocate(self%y(n), self%x(n), self%diagonal(n))
+         call factor_rows_make_room(self%rows, n)
       end associate
    end subroutine lay_out
 
@@ -146,21 +162,22 @@ contains
       logical, intent(out) :: is_fit             !! there is a factor, and one of W^T W, not t
       type(error_t), allocatable, intent(out) :: error
 
-      is_fit = self%is_made .and. kept_factor_has_room(self, set%n_row, self%n_slot)
+      is_fit = self%is_made .and. kept_factor_has_room(self, set%n_row, self%n_slot) &
+         .and. .not. (self%blocks%is_incomplete .and. set%penalty%is_on)
       if (.not. is_fit) return
       call reach_rows(self, set, error)
       if (allocated(error)) return
       if (set%penalty%is_on) then
-         self%product = self%l
+         self%product = self%rows%l
          self%compliance = spread(0.0_dp, 1, set%n_row)
          call add_penalty(self, set, is_fit)
       else
-         call dense_cholesky(self%l, is_fit)
+         call dense_cholesky(self%rows%l, is_fit)
       end if
    end subroutine kept_factor_take
 
    !> The constraints of `set` in their multipliers alone, by the factor there is: their values
-   !> after a correction are free + w lam.
+   !> after a correction are free + w lam. By an incomplete factor w is near to that only.
    subroutine kept_factor_condense(self, set, residual, w, free, error)
       type(kept_factor_t), intent(inout) :: self         !! with a factor that has room for the set
       type(constraint_set_t), intent(in) :: set
@@ -168,48 +185,105 @@ contains
       real(wp), intent(out) :: w(:, :)                   !! (n, n) [T^2/M]
       real(wp), intent(out) :: free(:)                   !! (n) [L]
       type(error_t), allocatable, intent(out) :: error
-      integer :: k, j
+      real(dp) :: rate(set%n_row)
+      integer :: k
 
+      self%x = -real(residual, dp)
+      if (self%blocks%is_incomplete) then
+         call condense_by_solutions(self, set, w, free, error)
+         return
+      end if
       call reach_rows(self, set, error)
       if (allocated(error)) return
-      self%x = -real(residual, dp)
       call blocks_solve(self%blocks, .false., self%x, self%y, error)
       if (allocated(error)) return
+      rate = 0.0_dp
+      call factor_rows_subtract_products(self%rows, -self%y, rate)
       do k = 1, set%n_row
-         w(k:, k) = real(self%blocks%scale*self%l(k:, k), wp)
+         w(k:, k) = real(self%blocks%scale*self%rows%l(k:, k), wp)
          w(k, k:) = w(k:, k)
-         free(k) = set%defect(k)
-         do j = self%start(k) + 1, self%start(k + 1)
-            free(k) = free(k) + real(self%blocks%scale*self%w(j)*self%y(self%index(j) + 1), wp)
-         end do
+         free(k) = set%defect(k) + real(self%blocks%scale*rate(k), wp)
       end do
    end subroutine kept_factor_condense
 
-   !> W of the constraints at their present gradients, and W^T W.
+   !> The same by the motion of each multiplier, where the factor is incomplete.
+   subroutine condense_by_solutions(self, set, w, free, error)
+      type(kept_factor_t), intent(inout) :: self         !! `x` is the load
+      type(constraint_set_t), intent(in) :: set
+      real(wp), intent(out) :: w(:, :)                   !! (n, n) [T^2/M]
+      real(wp), intent(out) :: free(:)                   !! (n) [L]
+      type(error_t), allocatable, intent(out) :: error
+      real(dp) :: load(size(self%x))
+      integer :: k
+
+      associate (gap_rows => set%gap_rows)
+         call factor_rows_begin(self%rows, 0)
+         load = self%x
+         call projected_solve(self%gradients, self%blocks, self%rows, [real(dp) ::], load, self%x, &
+            error)
+         if (allocated(error)) return
+         call multiply_rows(gap_rows, set%n_row, self%x, free)
+         free = set%defect(:set%n_row) + free
+         do k = 1, set%n_row
+            load = 0.0_dp
+            associate (first => gap_rows%row_start(k) + 1, last => gap_rows%row_start(k + 1))
+               load(gap_rows%column(first:last) + 1) = self%blocks%scale*gap_rows%value(first:last)
+            end associate
+            call blocks_solve(self%blocks, .false., load, self%y, error)
+            if (.not. allocated(error)) call blocks_solve(self%blocks, .true., self%y, self%x, error)
+            if (allocated(error)) return
+            call multiply_rows(gap_rows, set%n_row, self%x, w(:, k))
+         end do
+      end associate
+   end subroutine condense_by_solutions
+
+   !> G x of the first `n` rows.
+   pure subroutine multiply_rows(rows, n, x, y)
+      type(csr_t), intent(in) :: rows
+      integer, intent(in) :: n
+      real(dp), intent(in) :: x(:)
+      real(wp), intent(out) :: y(:)              !! (n)
+      integer :: k
+
+      do k = 1, n
+         associate (first => rows%row_start(k) + 1, last => rows%row_start(k + 1))
+            y(k) = real(dot_product(rows%value(first:last), x(rows%column(first:last) + 1)), wp)
+         end associate
+      end do
+   end subroutine multiply_rows
+
+   !> W of the constraints at their present gradients, and W^T W: in the measure of the factor, or
+   !> of the diagonal where that is incomplete.
    subroutine reach_rows(self, set, error)
       type(kept_factor_t), intent(inout) :: self         !! with a factor
       type(constraint_set_t), intent(in) :: set
       type(error_t), allocatable, intent(out) :: error
       integer :: k, n
 
-      if (allocated(self%l)) then
-         if (size(self%mu) /= set%n_row) deallocate(self%l, self%mu, self%start, self%bend)
+      call factor_rows_begin(self%rows, set%n_row)
+      if (allocated(self%mu)) then
+         if (size(self%mu) /= set%n_row) deallocate(self%mu, self%bend)
       end if
-      if (.not. allocated(self%l)) allocate(self%l(set%n_row, set%n_row), self%mu(set%n_row), &
-         self%start(set%n_row + 1), self%bend(set%n_row))
-      self%start(1) = 0
+      if (.not. allocated(self%mu)) allocate(self%mu(set%n_row), self%bend(set%n_row))
       do k = 1, set%n_row
-         call make_room(self, self%start(k) + size(self%y))
+         call factor_rows_make_room(self%rows, self%rows%start(k) + size(self%y))
          associate (rows => set%gap_rows, first => set%gap_rows%row_start(k) + 1, &
-               last => set%gap_rows%row_start(k + 1), at => self%start(k) + 1)
-            call blocks_reach(self%blocks, rows%column(first:last), rows%value(first:last), n, &
-               self%index(at:), self%w(at:), error)
+               last => set%gap_rows%row_start(k + 1), at => self%rows%start(k) + 1)
+            if (self%blocks%is_incomplete) then
+               n = last - first + 1
+               self%rows%index(at:at + n - 1) = rows%column(first:last)
+               self%rows%w(at:at + n - 1) = rows%value(first:last) &
+                  /self%gradients%root(rows%column(first:last) + 1)
+            else
+               call blocks_reach(self%blocks, rows%column(first:last), rows%value(first:last), n, &
+                  self%rows%index(at:), self%rows%w(at:), error)
+            end if
          end associate
          if (allocated(error)) return
-         self%start(k + 1) = self%start(k) + n
+         self%rows%start(k + 1) = self%rows%start(k) + n
       end do
       self%n_forward = self%n_forward + set%n_row
-      call fill_products(self)
+      call factor_rows_fill_products(self%rows, self%y)
    end subroutine reach_rows
 
    !> Factorise W^T W with the compliance of contacts that give way, for their present slopes: none
@@ -221,56 +295,16 @@ contains
       real(dp) :: stiffness
       integer :: k
 
-      self%l = self%product
+      self%rows%l = self%product
       do k = set%n_permanent + 1, set%n
-         associate (diagonal => self%l(k, k))
+         associate (diagonal => self%rows%l(k, k))
             stiffness = real(set%penalty%slope(k), dp)*self%blocks%scale*diagonal
             self%compliance(k) = diagonal*max(rounding, 1.0_dp/max(stiffness, rounding))
             diagonal = diagonal + self%compliance(k)
          end associate
       end do
-      call dense_cholesky(self%l, is_fit)
+      call dense_cholesky(self%rows%l, is_fit)
    end subroutine add_penalty
-
-   !> Room for `n` entries of W; what there is stays.
-   pure subroutine make_room(self, n)
-      type(kept_factor_t), intent(inout) :: self
-      integer, intent(in) :: n
-      integer, allocatable :: index(:)
-      real(dp), allocatable :: w(:)
-
-      if (n <= size(self%w)) return
-      allocate(index(2*n), source=0)
-      allocate(w(2*n), source=0.0_dp)
-      index(:size(self%index)) = self%index
-      w(:size(self%w)) = self%w
-      call move_alloc(index, self%index)
-      call move_alloc(w, self%w)
-   end subroutine make_room
-
-   !> W^T W, its lower triangle.
-   pure subroutine fill_products(self)
-      type(kept_factor_t), intent(inout) :: self
-      integer :: k, i, j
-      real(dp) :: total
-
-      self%y = 0.0_dp
-      do k = 1, size(self%mu)
-         do j = self%start(k) + 1, self%start(k + 1)
-            self%y(self%index(j) + 1) = self%w(j)
-         end do
-         do i = k, size(self%mu)
-            total = 0.0_dp
-            do j = self%start(i) + 1, self%start(i + 1)
-               total = total + self%w(j)*self%y(self%index(j) + 1)
-            end do
-            self%l(i, k) = total
-         end do
-         do j = self%start(k) + 1, self%start(k + 1)
-            self%y(self%index(j) + 1) = 0.0_dp
-         end do
-      end do
-   end subroutine fill_products
 
    !> Look at the second derivatives of the constraints last taken.
    pure subroutine kept_factor_look(self, set, numbering)
@@ -353,9 +387,16 @@ contains
       real(wp), intent(in), contiguous :: residual(:)      !! (n_unknown)
       real(wp), intent(out), contiguous :: dq(:)           !! (n_unknown)
       type(error_t), allocatable, intent(out) :: error
-      integer :: k, j
+      integer :: k
       logical :: is_fit
 
+      if (self%blocks%is_incomplete) then
+         self%y = -real(residual, dp)
+         call projected_solve(self%gradients, self%blocks, self%rows, &
+            real(set%defect(:set%n_row), dp), self%y, self%x, error)
+         if (.not. allocated(error)) dq = real(self%x, wp)
+         return
+      end if
       if (set%penalty%is_on) call add_penalty(self, set, is_fit)
       self%x = -real(residual, dp)
       call blocks_solve(self%blocks, .false., self%x, self%y, error)
@@ -364,16 +405,10 @@ contains
          self%mu(k) = -real(set%defect(k), dp)/self%blocks%scale
          if (set%penalty%is_on) self%mu(k) = self%mu(k) &
             + self%compliance(k)*real(set%penalty%lack(k), dp)
-         do j = self%start(k) + 1, self%start(k + 1)
-            self%mu(k) = self%mu(k) - self%w(j)*self%y(self%index(j) + 1)
-         end do
       end do
-      call dense_cholesky_solve(self%l, self%mu)
-      do k = 1, set%n_row
-         do j = self%start(k) + 1, self%start(k + 1)
-            self%y(self%index(j) + 1) = self%y(self%index(j) + 1) + self%mu(k)*self%w(j)
-         end do
-      end do
+      call factor_rows_subtract_products(self%rows, self%y, self%mu)
+      call dense_cholesky_solve(self%rows%l, self%mu)
+      call factor_rows_add(self%rows, self%mu, self%y)
       call blocks_solve(self%blocks, .true., self%y, self%x, error)
       if (allocated(error)) return
       dq = real(self%blocks%scale*self%x, wp)

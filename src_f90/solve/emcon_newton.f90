@@ -287,7 +287,8 @@ contains
          end select
          call correct(self, system, set, motion, error)
          if (allocated(error)) return
-         if (evaluation_is_equilibrium(motion%evaluation) .and. is_too_far(self, motion%x)) then
+         if (self%correction%is_lost .or. (evaluation_is_equilibrium(motion%evaluation) &
+            .and. is_too_far(self, motion%x))) then
             status = newton_singular
             return
          end if

@@ -19,6 +19,7 @@ program main
    use test_check, only : collect_check
    use test_circles, only : collect_circles
 #ifndef EMCON_PERMISSIVE
+   use test_iterative, only : collect_iterative
    use test_diagonal_blocks, only : collect_diagonal_blocks
    use test_edge_pair, only : collect_edge_pair
    use test_kept_factor, only : collect_kept_factor
@@ -257,6 +258,7 @@ program main
    call run("step_begin", collect_step_begin)
 #ifndef EMCON_PERMISSIVE
    call run("diagonal_blocks", collect_diagonal_blocks)
+   call run("iterative", collect_iterative)
    call run("kept_factor", collect_kept_factor)
    call run("cholmod", collect_cholmod)
    call run("supernodal", collect_supernodal)

@@ -4,11 +4,11 @@ module test_kept_factor
    use emcon_csr, only : csr_from_entries, csr_t
    use emcon_errors, only : error_t
    use emcon_kept_factor, only : kept_factor_condense, kept_factor_correct, kept_factor_free, &
-      kept_factor_has_room, kept_factor_look, kept_factor_multipliers, kept_factor_renew, &
-      kept_factor_serves, kept_factor_set_up, kept_factor_t, kept_factor_take
+      kept_factor_has_room, kept_factor_let_iterate, kept_factor_look, kept_factor_multipliers, &
+      kept_factor_renew, kept_factor_serves, kept_factor_set_up, kept_factor_t, kept_factor_take
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
-   use emcon_solver_registry, only : solver_default
+   use emcon_solver_registry, only : find_solver_row, solver_default, solver_row, solver_row_t
    use random_constraints, only : make_problem, problem_t, tol_dp
    use sparse_samples, only : dense_of
    implicit none
@@ -22,6 +22,7 @@ contains
 
       tests = [ &
          test_case_t("the correction of the saddle point", test_correction), &
+         test_case_t("the same by iterations", test_iterations), &
          test_case_t("no correction where nothing is left", test_fixed_point), &
          test_case_t("multipliers of contacts that give way are unknowns too", test_soft), &
          test_case_t("constraints in their multipliers alone", test_condense), &
@@ -60,6 +61,68 @@ contains
       call check_near(error, dq, real(x(:n, 1), wp), tol_dp, maxval(abs(dq)), "dq")
       call kept_factor_free(kept)
    end subroutine test_correction
+
+   !> The same with an incomplete factor: asked for two digits it meets the constraints to round-off,
+   !> corrections of what is left come to the end, and of many digits one is enough. Contacts that
+   !> give way are not for it.
+   subroutine test_iterations(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(problem_t) :: problem
+      type(kept_factor_t) :: kept
+      real(dp), allocatable :: k(:, :), g(:, :), full(:, :), rhs(:, :), x(:, :)
+      real(wp), allocatable :: dq(:), more(:), residual(:)
+      type(solver_row_t) :: row
+      logical :: is_fit, is_singular
+      integer :: n, m, i
+
+      row = solver_row(find_solver_row("ITERATIVE"))
+      call make_symmetric(problem)
+      n = problem%numbering%n_unknown
+      m = problem%set%n
+      k = 0.5_dp*(dense_of(problem%base) + transpose(dense_of(problem%base)))
+      g = dense_of(problem%set%gap_rows)
+      allocate(full(n + m, n + m), rhs(n + m, 1), x(n + m, 1), source=0.0_dp)
+      allocate(dq(n), more(n))
+      full(:n, :n) = k
+      full(n + 1:, :n) = g
+      full(:n, n + 1:) = transpose(g)
+      rhs(:n, 1) = -real(problem%residual, dp)
+      rhs(n + 1:, 1) = -real(problem%set%defect, dp)
+      call dense_solve(full, rhs, x, is_singular)
+      call kept_factor_set_up(kept, row%code)
+      call kept_factor_let_iterate(kept, .true.)
+      call kept_factor_renew(kept, problem%base, error)
+      if (.not. allocated(error)) call kept_factor_take(kept, problem%set, is_fit, error)
+      if (allocated(error)) return
+      call check_true(error, is_fit .and. kept%blocks%is_incomplete, "it is an incomplete factor")
+      if (.not. allocated(error)) call kept_factor_correct(kept, problem%set, problem%residual, dq, &
+         error)
+      if (allocated(error)) return
+      call check_near(error, real(matmul(g, real(dq, dp)), wp), -problem%set%defect, tol_dp, &
+         maxval(abs(dq)), "constraints")
+      residual = problem%residual
+      problem%set%defect = 0.0_wp
+      ! Forces along the rows are of no use: as many digits as each is asked for.
+      do i = 1, 8
+         if (allocated(error)) return
+         residual = real(matmul(k, real(dq, dp)) - rhs(:n, 1) + matmul(x(n + 1:, 1), g), wp)
+         call kept_factor_correct(kept, problem%set, residual, more, error)
+         dq = dq + more
+      end do
+      if (allocated(error)) return
+      call check_near(error, dq, real(x(:n, 1), wp), tol_dp, maxval(abs(dq)), "dq in the end")
+      if (allocated(error)) return
+      kept%blocks%accuracy = 1.0e-13_dp
+      problem%set%defect = -real(rhs(n + 1:, 1), wp)
+      call kept_factor_correct(kept, problem%set, problem%residual, more, error)
+      if (.not. allocated(error)) call check_near(error, more, real(x(:n, 1), wp), tol_dp, &
+         maxval(abs(dq)), "dq at once")
+      if (allocated(error)) return
+      problem%set%penalty%is_on = .true.
+      call kept_factor_take(kept, problem%set, is_fit, error)
+      if (.not. allocated(error)) call check_true(error, .not. is_fit, "contacts that give way")
+      call kept_factor_free(kept)
+   end subroutine test_iterations
 
    !> A residual that the constraints bear, and no defect.
    subroutine test_fixed_point(error)

@@ -1,0 +1,238 @@
+!> Iterations or factors for symmetric definite matrices: whichever is predicted to take less.
+!>
+!> Iterations come into question where solutions need not be exact (`accuracy`). The order in which a
+!> matrix would be factorised tells what that takes; counts decide, not seconds, so that a run
+!> chooses alike whenever it is repeated. Where iterations do not come to an end, or the matrix turns
+!> out not to be definite, it is factorised after all, until the next values.
+!> Source: docs/theory.md, section 8.
+module emcon_chosen_solver
+   use emcon_csr, only : csr_t
+   use emcon_errors, only : error_t
+   use emcon_iterative_solver, only : iterative_matrix, iterative_solver_t
+   use emcon_kinds, only : dp, wp
+   use emcon_sparse_solver, only : sparse_solver_t
+   implicit none
+   private
+   public :: chosen_solver_t
+
+   !> Operations on dense blocks take that much less time than those of iterations.
+   real(dp), parameter :: dense_gain = 10.0_dp
+   !> Solutions for each factorisation, and steps for each solution: of one that is kept, asked for
+   !> two digits or so, and of Newton's method, for four.
+   integer, parameter :: kept_solutions = 50, newton_solutions = 2
+   integer, parameter :: kept_steps = 10, newton_steps = 100
+   !> A solution may take as many steps as a factor costs, and these at any rate.
+   integer, parameter :: least_steps = 200, most_steps = 10000
+
+   !> Which one does the work.
+   integer, parameter :: by_factors = 0, by_iterations = 1, by_general = 2
+
+   type, extends(sparse_solver_t) :: chosen_solver_t
+      logical :: prefers_iterations = .false.    !! wherever these can be
+      logical :: iterates = .false.              !! chosen for the pattern
+      integer :: n_failure = 0                   !! matrices that iterations did not solve, so far
+      class(sparse_solver_t), allocatable :: direct      !! of definite matrices
+      class(sparse_solver_t), allocatable :: general     !! of those that turn out otherwise
+      type(iterative_solver_t) :: iterative
+      integer, private :: by = by_factors
+   contains
+      procedure :: analyse => chosen_analyse
+      procedure :: factorise => chosen_factorise
+      procedure :: solve => chosen_solve
+      procedure :: has_halves => chosen_has_halves
+      procedure :: solve_half => chosen_solve_half
+      procedure :: reach_half => chosen_reach_half
+      procedure :: multiply => chosen_multiply
+      procedure :: free => chosen_free
+   end type chosen_solver_t
+
+contains
+
+   subroutine chosen_analyse(self, matrix, error)
+      class(chosen_solver_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      type(error_t), allocatable, intent(out) :: error
+      integer :: before
+
+      before = self%iterative%n_analysis
+      if (self%iterates) then
+         call self%iterative%analyse(matrix, error)
+         if (self%iterative%n_analysis == before .or. allocated(error)) return
+         call self%iterative%free()              ! another pattern, which may be for factors
+      end if
+      before = self%direct%n_analysis
+      call prepare_direct(self)
+      call self%direct%analyse(matrix, error)
+      if (allocated(error) .or. self%direct%n_analysis == before) return
+      self%n_analysis = self%n_analysis + 1
+      call choose(self, matrix)
+      self%is_incomplete = self%iterates
+      if (.not. self%iterates) return
+      call self%direct%free()
+      call self%iterative%analyse(matrix, error)
+   end subroutine chosen_analyse
+
+   !> Hand on what was set.
+   subroutine prepare_direct(self)
+      class(chosen_solver_t), intent(inout) :: self
+
+      self%direct%symmetry = self%symmetry
+      self%direct%seeks_less_fill = self%seeks_less_fill
+      self%direct%needs_halves = self%needs_halves
+      self%direct%may_be_rough = self%may_be_rough
+      self%direct%is_scaled = self%is_scaled
+      self%iterative%symmetry = self%symmetry
+      self%iterative%is_scaled = self%is_scaled
+      self%iterative%accuracy = self%accuracy
+   end subroutine prepare_direct
+
+   !> Iterations or factors? By what a factorisation and its solutions take.
+   subroutine choose(self, matrix)
+      class(chosen_solver_t), intent(inout) :: self      !! `direct` has analysed the pattern
+      type(csr_t), intent(in) :: matrix
+      real(dp) :: step, factor, solution
+      integer :: n_solution, n_step
+
+      self%iterates = .false.
+      if (.not. self%accuracy > 0.0_dp) return
+      n_solution = merge(kept_solutions, newton_solutions, self%needs_halves)
+      n_step = merge(kept_steps, newton_steps, self%needs_halves)
+      step = 4.0_dp*size(matrix%column)
+      factor = self%direct%n_operation/dense_gain
+      solution = 4.0_dp*real(self%direct%n_factor, dp)
+      self%iterates = self%prefers_iterations .or. n_solution*n_step*step &
+         < factor + n_solution*solution
+      self%iterative%most_steps = max(least_steps, int(min(real(most_steps, dp), factor/step)))
+   end subroutine choose
+
+   subroutine chosen_factorise(self, value, error)
+      class(chosen_solver_t), intent(inout) :: self
+      real(dp), intent(in), contiguous :: value(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      self%by = merge(by_iterations, by_factors, self%iterates)
+      self%is_incomplete = self%iterates
+      if (self%iterates) then
+         call self%iterative%factorise(value, error)
+         if (allocated(error)) return
+         call take_figures(self, self%iterative)
+         if (self%is_singular .and. self%iterative%is_filled) call factorise_after_all(self, error)
+      else
+         call self%direct%factorise(value, error)
+         call take_figures(self, self%direct)
+      end if
+   end subroutine chosen_factorise
+
+   !> Factors after all, of what the iterations hold.
+   subroutine factorise_after_all(self, error)
+      class(chosen_solver_t), intent(inout) :: self
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: matrix
+
+      self%n_failure = self%n_failure + 1
+      self%is_incomplete = .false.
+      self%by = by_factors
+      call iterative_matrix(self%iterative, matrix)
+      call take_factors(self, self%direct, matrix, error)
+   end subroutine factorise_after_all
+
+   subroutine take_factors(self, solver, matrix, error)
+      class(chosen_solver_t), intent(inout) :: self
+      class(sparse_solver_t), intent(inout) :: solver
+      type(csr_t), intent(in) :: matrix
+      type(error_t), allocatable, intent(out) :: error
+
+      call solver%analyse(matrix, error)
+      if (.not. allocated(error)) call solver%factorise(matrix%value, error)
+      call take_figures(self, solver)
+   end subroutine take_factors
+
+   !> What the last factorisation tells.
+   subroutine take_figures(self, solver)
+      class(chosen_solver_t), intent(inout) :: self
+      class(sparse_solver_t), intent(in) :: solver
+
+      self%is_singular = solver%is_singular
+      self%rcond = solver%rcond
+      self%n_factor = solver%n_factor
+      self%half_scale = solver%half_scale
+   end subroutine take_figures
+
+   subroutine chosen_solve(self, rhs, x, error)
+      class(chosen_solver_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: rhs(:)
+      real(wp), intent(out), contiguous :: x(:)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: matrix
+
+      self%is_converged = .true.
+      if (self%by == by_iterations) then
+         call self%iterative%solve(rhs, x, error)
+         if (allocated(error) .or. self%iterative%is_converged) return
+         call factorise_after_all(self, error)
+         if (self%is_singular .and. .not. allocated(error)) then
+            self%by = by_general
+            call iterative_matrix(self%iterative, matrix)
+            call take_factors(self, self%general, matrix, error)
+         end if
+         self%is_converged = .not. self%is_singular
+         if (self%is_singular .or. allocated(error)) return
+      end if
+      if (self%by == by_factors) call self%direct%solve(rhs, x, error)
+      if (self%by == by_general) call self%general%solve(rhs, x, error)
+   end subroutine chosen_solve
+
+   pure logical function chosen_has_halves(self)
+      class(chosen_solver_t), intent(in) :: self
+
+      chosen_has_halves = self%direct%has_halves()
+   end function chosen_has_halves
+
+   subroutine chosen_solve_half(self, is_second, rhs, x, error)
+      class(chosen_solver_t), intent(inout) :: self
+      logical, intent(in) :: is_second
+      real(dp), intent(in), contiguous :: rhs(:)
+      real(dp), intent(inout), contiguous :: x(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      if (self%by == by_iterations) then
+         call self%iterative%solve_half(is_second, rhs, x, error)
+      else
+         call self%direct%solve_half(is_second, rhs, x, error)
+      end if
+   end subroutine chosen_solve_half
+
+   subroutine chosen_reach_half(self, column, value, n_reached, index, x, error)
+      class(chosen_solver_t), intent(inout) :: self
+      integer, intent(in), contiguous :: column(:)
+      real(dp), intent(in), contiguous :: value(:)
+      integer, intent(out) :: n_reached
+      integer, intent(inout), contiguous :: index(:)
+      real(dp), intent(inout), contiguous :: x(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      call self%direct%reach_half(column, value, n_reached, index, x, error)
+   end subroutine chosen_reach_half
+
+   subroutine chosen_multiply(self, x, y, error)
+      class(chosen_solver_t), intent(inout) :: self
+      real(dp), intent(in), contiguous :: x(:)
+      real(dp), intent(inout), contiguous :: y(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      call self%iterative%multiply(x, y, error)
+   end subroutine chosen_multiply
+
+   subroutine chosen_free(self)
+      class(chosen_solver_t), intent(inout) :: self
+
+      if (allocated(self%direct)) call self%direct%free()
+      if (allocated(self%general)) call self%general%free()
+      call self%iterative%free()
+      self%iterates = .false.
+      self%is_incomplete = .false.
+      self%is_singular = .false.
+      self%by = by_factors
+   end subroutine chosen_free
+
+end module emcon_chosen_solver

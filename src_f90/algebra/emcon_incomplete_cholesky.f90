@@ -1,0 +1,178 @@
+! build: streams
+!> Incomplete Cholesky factors of a symmetric definite matrix by blocks: L has the pattern of the
+!> matrix, and L L^T about its values.
+!>
+!> In single precision: it is a preconditioner, of which memory is what counts. Where a pivot is not
+!> positive, which what is left out may do to a definite matrix, the diagonal is made larger and
+!> it is tried again. Source: T. A. Manteuffel, Math. Comp. 34 (1980) 473-497.
+module emcon_incomplete_cholesky
+   use, intrinsic :: iso_fortran_env, only : sp => real32
+   use emcon_kinds, only : dp
+   use emcon_node_blocks, only : n_side, node_blocks_t
+   implicit none
+   private
+   public :: incomplete_cholesky_t, incomplete_cholesky_factorise, incomplete_cholesky_forward, &
+      incomplete_cholesky_backward
+
+   !> The diagonal is raised by this part of itself, then by four times as much, up to one.
+   real(dp), parameter :: first_shift = 2.0_dp**(-10), next_shift = 4.0_dp
+
+   type :: incomplete_cholesky_t
+      !> (n_side, n_side, blocks) as of the matrix; of its own block the inverse triangle
+      real(sp), allocatable :: value(:, :, :)
+      real(dp) :: shift = 0.0_dp                 !! >= 0, the part by which the diagonal was raised
+   end type incomplete_cholesky_t
+
+contains
+
+   !> Factorise a matrix whose values are filled in; its entries are in the range of single precision.
+   pure subroutine incomplete_cholesky_factorise(self, matrix, is_definite)
+      type(incomplete_cholesky_t), intent(inout) :: self
+      type(node_blocks_t), intent(in) :: matrix
+      logical, intent(out) :: is_definite        !! else there is no factor
+
+      if (allocated(self%value)) then
+         if (size(self%value, 3) /= size(matrix%column)) deallocate(self%value)
+      end if
+      if (.not. allocated(self%value)) allocate(self%value(n_side, n_side, size(matrix%column)))
+      self%shift = 0.0_dp
+      do
+         call try(self, matrix, is_definite)
+         if (is_definite .or. .not. self%shift < 1.0_dp) return
+         self%shift = max(first_shift, next_shift*self%shift)
+      end do
+   end subroutine incomplete_cholesky_factorise
+
+   !> Factorise with the present shift.
+   pure subroutine try(self, matrix, is_definite)
+      type(incomplete_cholesky_t), intent(inout) :: self
+      type(node_blocks_t), intent(in) :: matrix
+      logical, intent(out) :: is_definite
+      real(dp), allocatable :: row(:, :, :)      ! of L, by columns
+      logical, allocatable :: is_here(:)
+      real(dp) :: block(n_side, n_side)
+      integer :: b, c, i, k, l
+
+      allocate(row(n_side, n_side, matrix%n_block))
+      allocate(is_here(matrix%n_block), source=.false.)
+      associate (start => matrix%row_start, column => matrix%column)
+         do b = 1, matrix%n_block
+            do k = start(b) + 1, start(b + 1) - 1
+               c = column(k)
+               block = matrix%value(:, :, k)
+               do l = start(c) + 1, start(c + 1) - 1
+                  if (is_here(column(l))) block = block - times_transposed(row(:, :, column(l)), &
+                     real(self%value(:, :, l), dp))
+               end do
+               row(:, :, c) = times_transposed(block, real(self%value(:, :, start(c + 1)), dp))
+               self%value(:, :, k) = real(row(:, :, c), sp)
+               is_here(c) = .true.
+            end do
+            block = matrix%value(:, :, start(b + 1))
+            do i = 1, n_side
+               block(i, i) = block(i, i) + self%shift*block(i, i)
+            end do
+            do k = start(b) + 1, start(b + 1) - 1
+               block = block - times_transposed(row(:, :, column(k)), row(:, :, column(k)))
+               is_here(column(k)) = .false.
+            end do
+            call invert(block, is_definite)
+            if (.not. is_definite) return
+            self%value(:, :, start(b + 1)) = real(block, sp)
+         end do
+      end associate
+   end subroutine try
+
+   !> A B^T
+   pure function times_transposed(a, b) result(c)
+      real(dp), intent(in) :: a(n_side, n_side), b(n_side, n_side)
+      real(dp) :: c(n_side, n_side)
+      integer :: j
+
+      do j = 1, n_side
+         c(:, j) = a(:, 1)*b(j, 1) + a(:, 2)*b(j, 2) + a(:, 3)*b(j, 3)
+      end do
+   end function times_transposed
+
+   !> The inverse of the lower triangle whose square the block is.
+   pure subroutine invert(a, is_definite)
+      real(dp), intent(inout) :: a(n_side, n_side)
+      logical, intent(out) :: is_definite
+      real(dp) :: l(n_side, n_side), least
+      integer :: i, j
+
+      l = 0.0_dp
+      is_definite = .false.
+      do j = 1, n_side
+         ! A pivot of round-off makes a factor that is worse than none.
+         least = 2.0_dp**(-20)*abs(a(j, j))
+         l(j, j) = a(j, j) - dot_product(l(j, :j - 1), l(j, :j - 1))
+         if (.not. l(j, j) > least) return
+         l(j, j) = sqrt(l(j, j))
+         do i = j + 1, n_side
+            l(i, j) = (a(i, j) - dot_product(l(i, :j - 1), l(j, :j - 1)))/l(j, j)
+         end do
+      end do
+      is_definite = .true.
+      a = 0.0_dp
+      do j = 1, n_side
+         a(j, j) = 1.0_dp/l(j, j)
+         do i = j + 1, n_side
+            a(i, j) = -dot_product(l(i, j:i - 1), a(j:i - 1, j))/l(i, i)
+         end do
+      end do
+   end subroutine invert
+
+   !> y = L^-1 y, a vector of blocks.
+   pure subroutine incomplete_cholesky_forward(self, matrix, y)
+      type(incomplete_cholesky_t), intent(in) :: self
+      type(node_blocks_t), intent(in) :: matrix
+      real(dp), intent(inout) :: y(n_side, matrix%n_block)
+      real(dp) :: total(n_side)
+      integer :: b, c, k
+
+      do b = 1, matrix%n_block
+         total = y(:, b)
+         do k = matrix%row_start(b) + 1, matrix%row_start(b + 1) - 1
+            c = matrix%column(k)
+            associate (l => self%value(:, :, k))
+               total(1) = total(1) - (l(1, 1)*y(1, c) + l(1, 2)*y(2, c) + l(1, 3)*y(3, c))
+               total(2) = total(2) - (l(2, 1)*y(1, c) + l(2, 2)*y(2, c) + l(2, 3)*y(3, c))
+               total(3) = total(3) - (l(3, 1)*y(1, c) + l(3, 2)*y(2, c) + l(3, 3)*y(3, c))
+            end associate
+         end do
+         associate (m => self%value(:, :, matrix%row_start(b + 1)))
+            y(1, b) = m(1, 1)*total(1)
+            y(2, b) = m(2, 1)*total(1) + m(2, 2)*total(2)
+            y(3, b) = m(3, 1)*total(1) + m(3, 2)*total(2) + m(3, 3)*total(3)
+         end associate
+      end do
+   end subroutine incomplete_cholesky_forward
+
+   !> y = L^-T y, a vector of blocks.
+   pure subroutine incomplete_cholesky_backward(self, matrix, y)
+      type(incomplete_cholesky_t), intent(in) :: self
+      type(node_blocks_t), intent(in) :: matrix
+      real(dp), intent(inout) :: y(n_side, matrix%n_block)
+      real(dp) :: x(n_side)
+      integer :: b, c, k
+
+      do b = matrix%n_block, 1, -1
+         associate (m => self%value(:, :, matrix%row_start(b + 1)))
+            x(1) = m(1, 1)*y(1, b) + m(2, 1)*y(2, b) + m(3, 1)*y(3, b)
+            x(2) = m(2, 2)*y(2, b) + m(3, 2)*y(3, b)
+            x(3) = m(3, 3)*y(3, b)
+         end associate
+         y(:, b) = x
+         do k = matrix%row_start(b) + 1, matrix%row_start(b + 1) - 1
+            c = matrix%column(k)
+            associate (l => self%value(:, :, k))
+               y(1, c) = y(1, c) - (l(1, 1)*x(1) + l(2, 1)*x(2) + l(3, 1)*x(3))
+               y(2, c) = y(2, c) - (l(1, 2)*x(1) + l(2, 2)*x(2) + l(3, 2)*x(3))
+               y(3, c) = y(3, c) - (l(1, 3)*x(1) + l(2, 3)*x(2) + l(3, 3)*x(3))
+            end associate
+         end do
+      end do
+   end subroutine incomplete_cholesky_backward
+
+end module emcon_incomplete_cholesky

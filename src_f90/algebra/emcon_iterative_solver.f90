@@ -1,0 +1,190 @@
+! build: streams
+!> Conjugate gradients with incomplete Cholesky factors by blocks, for symmetric definite matrices.
+!>
+!> Takes the memory of half the matrix and half as much again, where a factor of a body in space
+!> takes many times that. A solution is as good as was asked for, or `is_converged` tells that
+!> `most_steps` did not do.
+module emcon_iterative_solver
+   use, intrinsic :: iso_fortran_env, only : sp => real32
+   use emcon_conjugate_gradients, only : gradients_are_done, gradients_begin, gradients_move, &
+      gradients_t, gradients_turn
+   use emcon_csr, only : csr_find, csr_t
+   use emcon_errors, only : err_internal, error_t, raise
+   use emcon_incomplete_cholesky, only : incomplete_cholesky_backward, &
+      incomplete_cholesky_factorise, incomplete_cholesky_forward, incomplete_cholesky_t
+   use emcon_kinds, only : dp, int64, wp
+   use emcon_node_blocks, only : n_side, node_blocks_fill, node_blocks_init, node_blocks_is_of, &
+      node_blocks_matrix, node_blocks_multiply, node_blocks_t
+   use emcon_power_scaling, only : power_of_two
+   use emcon_sparse_solver, only : matrix_definite, solver_check_square, sparse_solver_t
+   use emcon_text, only : to_text
+   implicit none
+   private
+   public :: iterative_solver_t, iterative_matrix, iterative_work
+
+   !> Where no accuracy was asked for, that of a factor.
+   real(dp), parameter :: best_accuracy = 64.0_dp*epsilon(1.0_dp)
+   !> Entries are below it: sums of their squares in the range of single precision.
+   real(dp), parameter :: largest = 2.0_dp**(maxexponent(1.0_sp)/4)
+
+   type, extends(sparse_solver_t) :: iterative_solver_t
+      integer :: most_steps = 1000               !! of a solve
+      integer :: n_step = 0                      !! of the last one
+      logical :: is_filled = .false.             !! the blocks have values
+      type(node_blocks_t), private :: blocks     !! half_scale times the matrix
+      type(incomplete_cholesky_t), private :: factor
+      integer, private :: first_slot = 0         !! of the entry (1, 1); 0: not there
+      type(gradients_t), private :: gradients
+      real(dp), allocatable, private :: x(:), r(:), z(:)     !! vectors of blocks
+   contains
+      procedure :: analyse => iterative_analyse
+      procedure :: factorise => iterative_factorise
+      procedure :: solve => iterative_solve
+      procedure :: has_halves => iterative_has_halves
+      procedure :: solve_half => iterative_solve_half
+      procedure :: multiply => iterative_multiply
+      procedure :: free => iterative_free
+   end type iterative_solver_t
+
+contains
+
+   subroutine iterative_analyse(self, matrix, error)
+      class(iterative_solver_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      type(error_t), allocatable, intent(out) :: error
+
+      if (node_blocks_is_of(self%blocks, matrix)) return
+      call self%free()
+      call solver_check_square(matrix, error)
+      if (allocated(error)) return
+      call node_blocks_init(self%blocks, matrix)
+      self%first_slot = csr_find(matrix, 1, 1)
+      self%is_incomplete = .true.
+      self%n_analysis = self%n_analysis + 1
+      associate (n => n_side*self%blocks%n_block)
+         allocate(self%x(n), self%r(n), self%z(n), source=0.0_dp)
+      end associate
+   end subroutine iterative_analyse
+
+   subroutine iterative_factorise(self, value, error)
+      class(iterative_solver_t), intent(inout) :: self
+      real(dp), intent(in), contiguous :: value(:)
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_definite
+
+      self%is_singular = .true.
+      self%is_filled = .false.
+      if (self%blocks%n == 0 .or. size(value) /= self%blocks%n_slot) then
+         call raise(error, err_internal, "an iterative solver got " // to_text(size(value)) // &
+            " values for " // to_text(self%blocks%n_slot) // " entries")
+         return
+      end if
+      if (self%first_slot == 0) return
+      if (.not. value(self%first_slot) > 0.0_dp) return
+      if (.not. self%is_scaled) self%half_scale = power_of_two(-exponent(value(self%first_slot)))
+      if (.not. all(abs(self%half_scale*value) < largest)) return
+      call node_blocks_fill(self%blocks, self%half_scale, value)
+      self%is_filled = .true.
+      call incomplete_cholesky_factorise(self%factor, self%blocks, is_definite)
+      self%is_singular = .not. is_definite
+      self%n_factor = size(self%factor%value, kind=int64)
+   end subroutine iterative_factorise
+
+   !> Steps until the residual is small enough, from x = 0.
+   subroutine iterative_solve(self, rhs, x, error)
+      class(iterative_solver_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: rhs(:)
+      real(wp), intent(out), contiguous :: x(:)
+      type(error_t), allocatable, intent(out) :: error
+      real(dp) :: accuracy
+
+      if (self%is_singular .or. .not. self%is_filled) then
+         call raise(error, err_internal, "iterative_solve: there is no factorisation")
+         return
+      end if
+      accuracy = max(self%accuracy, best_accuracy)
+      self%x = 0.0_dp
+      self%r(self%blocks%place) = self%half_scale*real(rhs, dp)
+      self%z = self%r
+      call precondition(self, self%z)
+      call gradients_begin(self%gradients, self%r, self%z)
+      do
+         self%is_converged = gradients_are_done(self%gradients, accuracy)
+         if (self%is_converged .or. .not. self%gradients%is_definite &
+            .or. self%gradients%n >= self%most_steps) exit
+         call node_blocks_multiply(self%blocks, self%gradients%direction, self%z)
+         call gradients_move(self%gradients, self%z, self%x, self%r)
+         if (.not. self%gradients%is_definite) exit
+         self%z = self%r
+         call precondition(self, self%z)
+         call gradients_turn(self%gradients, self%r, self%z)
+      end do
+      self%n_step = self%gradients%n
+      x = real(self%x(self%blocks%place), wp)
+   end subroutine iterative_solve
+
+   !> z = (L L^T)^-1 z
+   subroutine precondition(self, z)
+      type(iterative_solver_t), intent(in) :: self
+      real(dp), intent(inout), contiguous :: z(:)        !! a vector of blocks
+
+      call incomplete_cholesky_forward(self%factor, self%blocks, z)
+      call incomplete_cholesky_backward(self%factor, self%blocks, z)
+   end subroutine precondition
+
+   pure logical function iterative_has_halves(self)
+      class(iterative_solver_t), intent(in) :: self
+
+      iterative_has_halves = self%symmetry == matrix_definite
+   end function iterative_has_halves
+
+   subroutine iterative_solve_half(self, is_second, rhs, x, error)
+      class(iterative_solver_t), intent(inout) :: self
+      logical, intent(in) :: is_second
+      real(dp), intent(in), contiguous :: rhs(:)
+      real(dp), intent(inout), contiguous :: x(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      self%z(self%blocks%place) = rhs
+      if (is_second) call incomplete_cholesky_backward(self%factor, self%blocks, self%z)
+      if (.not. is_second) call incomplete_cholesky_forward(self%factor, self%blocks, self%z)
+      x = self%z(self%blocks%place)
+   end subroutine iterative_solve_half
+
+   subroutine iterative_multiply(self, x, y, error)
+      class(iterative_solver_t), intent(inout) :: self
+      real(dp), intent(in), contiguous :: x(:)
+      real(dp), intent(inout), contiguous :: y(:)
+      type(error_t), allocatable, intent(out) :: error
+
+      self%x(self%blocks%place) = x
+      call node_blocks_multiply(self%blocks, self%x, self%z)
+      y = self%z(self%blocks%place)
+   end subroutine iterative_multiply
+
+   !> The matrix as it was given, by single entries.
+   pure subroutine iterative_matrix(self, matrix)
+      type(iterative_solver_t), intent(in) :: self       !! it is filled
+      type(csr_t), intent(out) :: matrix
+
+      call node_blocks_matrix(self%blocks, 1.0_dp/self%half_scale, matrix)
+   end subroutine iterative_matrix
+
+   !> Operations of a step: each block of the triangle is multiplied and substituted twice.
+   pure real(dp) function iterative_work(self)
+      type(iterative_solver_t), intent(in) :: self       !! that has analysed a matrix
+
+      iterative_work = 8.0_dp*n_side**2*size(self%blocks%column)
+   end function iterative_work
+
+   subroutine iterative_free(self)
+      class(iterative_solver_t), intent(inout) :: self
+
+      self%blocks = node_blocks_t()
+      self%factor = incomplete_cholesky_t()
+      self%is_filled = .false.
+      self%is_singular = .false.
+      if (allocated(self%x)) deallocate(self%x, self%r, self%z)
+   end subroutine iterative_free
+
+end module emcon_iterative_solver

@@ -1,0 +1,327 @@
+! build: streams
+!> Symmetric sparse matrices by blocks of up to three unknowns, and their products with vectors.
+!>
+!> Unknowns that follow each other and meet the same others, as those of a node do, are a block,
+!> filled up by unknowns of their own where they are fewer. Blocks are numbered breadth first from an
+!> end of the mesh, so that neighbours are near in memory and an incomplete factor is a good one.
+!> Only the lower triangle of blocks is kept: a third of what rows of single entries take.
+module emcon_node_blocks
+   use emcon_csr, only : csr_t
+   use emcon_kinds, only : dp
+   use emcon_sort, only : find_sorted
+   implicit none
+   private
+   public :: node_blocks_t, node_blocks_init, node_blocks_fill, node_blocks_multiply, &
+      node_blocks_is_of, node_blocks_matrix, n_side
+
+   !> Unknowns of a block.
+   integer, parameter :: n_side = 3
+
+   type :: node_blocks_t
+      integer :: n = 0                           !! unknowns
+      integer :: n_block = 0
+      integer :: n_slot = 0                      !! of the matrix by single entries
+      integer, allocatable :: place(:)           !! (n) of each unknown in a vector of blocks
+      integer, allocatable :: row_start(:)       !! (n_block + 1) blocks before each row
+      integer, allocatable :: column(:)          !! ascending in each row, its own block last
+      real(dp), allocatable :: value(:, :, :)    !! (n_side, n_side, blocks)
+      ! In the order of the unknowns:
+      integer, allocatable, private :: first(:)  !! (n_block + 1) unknowns before each block
+      integer, allocatable, private :: start(:)  !! (n_block + 1) before those that it meets
+      integer, allocatable, private :: met(:)    !! ascending, itself among them
+      integer, allocatable, private :: number(:) !! (n_block) of each as numbered above
+   end type node_blocks_t
+
+   !> Blocks as they are walked through.
+   type :: walk_t
+      integer, allocatable :: block(:)           !! (n_block) in this order
+      logical, allocatable :: is_listed(:)       !! (n_block)
+      integer :: n = 0                           !! listed so far
+      integer :: last = 0                        !! of them
+   end type walk_t
+
+contains
+
+   !> Find the blocks of a symmetric pattern, and lay out their lower triangle.
+   pure subroutine node_blocks_init(self, matrix)
+      type(node_blocks_t), intent(out) :: self
+      type(csr_t), intent(in) :: matrix
+      integer, allocatable :: order(:)
+      integer :: b, i
+
+      self%n = matrix%n_row
+      self%n_slot = matrix%row_start(self%n + 1)
+      call find_blocks(self, matrix)
+      call order_blocks(self, order)
+      allocate(self%number(self%n_block), self%place(self%n), source=0)
+      self%number(order) = [(b, b = 1, self%n_block)]
+      do b = 1, self%n_block
+         do i = self%first(b) + 1, self%first(b + 1)
+            self%place(i) = n_side*(self%number(b) - 1) + i - self%first(b)
+         end do
+      end do
+      call lay_out(self, order)
+      allocate(self%value(n_side, n_side, self%row_start(self%n_block + 1)), source=0.0_dp)
+   end subroutine node_blocks_init
+
+   !> Unknowns that follow each other with the same columns, three at most, and what they meet.
+   pure subroutine find_blocks(self, matrix)
+      type(node_blocks_t), intent(inout) :: self
+      type(csr_t), intent(in) :: matrix
+      integer, allocatable :: of(:), first(:)
+      integer :: b, c, i, k, n, pass
+      logical :: is_new
+
+      allocate(of(self%n), first(self%n + 1), source=0)
+      n = 0
+      do i = 1, self%n
+         is_new = i == 1
+         if (.not. is_new) is_new = i - first(n) > n_side .or. .not. has_same_columns(matrix, i - 1, i)
+         if (is_new) n = n + 1
+         if (is_new) first(n) = i - 1
+         of(i) = n
+      end do
+      first(n + 1) = self%n
+      self%n_block = n
+      self%first = first(:n + 1)
+      allocate(self%start(n + 1), source=0)
+      do pass = 1, 2
+         n = 0
+         do b = 1, self%n_block
+            c = 0
+            do k = matrix%row_start(first(b) + 1) + 1, matrix%row_start(first(b) + 2)
+               if (of(matrix%column(k) + 1) == c) cycle
+               c = of(matrix%column(k) + 1)
+               n = n + 1
+               if (pass == 2) self%met(n) = c
+            end do
+            self%start(b + 1) = n
+         end do
+         if (pass == 1) allocate(self%met(n), source=0)
+      end do
+   end subroutine find_blocks
+
+   pure logical function has_same_columns(matrix, i, j)
+      type(csr_t), intent(in) :: matrix
+      integer, intent(in) :: i, j
+
+      associate (start => matrix%row_start, column => matrix%column)
+         has_same_columns = start(i + 1) - start(i) == start(j + 1) - start(j)
+         if (has_same_columns) has_same_columns = all(column(start(i) + 1:start(i + 1)) &
+            == column(start(j) + 1:start(j + 1)))
+      end associate
+   end function has_same_columns
+
+   !> Breadth first, part by part, from what is reached last from what is reached last.
+   pure subroutine order_blocks(self, order)
+      type(node_blocks_t), intent(in) :: self
+      integer, allocatable, intent(out) :: order(:)      !! (n_block)
+      type(walk_t) :: way
+      integer :: b, before, pass
+
+      allocate(way%block(self%n_block), source=0)
+      allocate(way%is_listed(self%n_block), source=.false.)
+      before = 0
+      do b = 1, self%n_block
+         if (way%is_listed(b)) cycle
+         call walk(way, self, b)
+         do pass = 1, 2
+            way%is_listed(way%block(before + 1:way%n)) = .false.
+            way%n = before
+            call walk(way, self, way%last)
+         end do
+         before = way%n
+      end do
+      call move_alloc(way%block, order)
+   end subroutine order_blocks
+
+   !> List the blocks that hang together with `seed` behind those listed so far.
+   pure subroutine walk(self, blocks, seed)
+      type(walk_t), intent(inout) :: self
+      type(node_blocks_t), intent(in) :: blocks
+      integer, intent(in), value :: seed
+      integer :: at, k, c
+
+      at = self%n
+      self%n = at + 1
+      self%block(self%n) = seed
+      self%is_listed(seed) = .true.
+      do while (at < self%n)
+         at = at + 1
+         do k = blocks%start(self%block(at)) + 1, blocks%start(self%block(at) + 1)
+            c = blocks%met(k)
+            if (self%is_listed(c)) cycle
+            self%is_listed(c) = .true.
+            self%n = self%n + 1
+            self%block(self%n) = c
+         end do
+      end do
+      self%last = self%block(self%n)
+   end subroutine walk
+
+   !> The pattern of the lower triangle.
+   pure subroutine lay_out(self, order)
+      type(node_blocks_t), intent(inout) :: self
+      integer, intent(in) :: order(:)            !! (n_block)
+      integer :: b, k, m, n
+
+      ! Each pair of blocks that meet is once in the triangle.
+      allocate(self%row_start(self%n_block + 1), source=0)
+      allocate(self%column((size(self%met) + self%n_block)/2), source=0)
+      n = 0
+      do b = 1, self%n_block
+         m = n
+         do k = self%start(order(b)) + 1, self%start(order(b) + 1)
+            if (self%number(self%met(k)) > b) cycle
+            n = n + 1
+            self%column(n) = self%number(self%met(k))
+         end do
+         self%column(m + 1:n) = sorted(self%column(m + 1:n))
+         self%row_start(b + 1) = n
+      end do
+   end subroutine lay_out
+
+   !> A short list in ascending order.
+   pure function sorted(list)
+      integer, intent(in) :: list(:)
+      integer :: sorted(size(list))
+      integer :: i, j
+
+      do i = 1, size(list)
+         do j = i, 2, -1
+            if (sorted(j - 1) <= list(i)) exit
+            sorted(j) = sorted(j - 1)
+         end do
+         sorted(j) = list(i)
+      end do
+   end function sorted
+
+   !> Is the pattern of a matrix the one that was laid out?
+   pure logical function node_blocks_is_of(self, matrix) result(is_same)
+      type(node_blocks_t), intent(in) :: self
+      type(csr_t), intent(in) :: matrix
+      integer :: b, c, i, k, t
+
+      is_same = self%n == matrix%n_row .and. self%n == matrix%n_col .and. self%n > 0
+      if (is_same) is_same = self%n_slot == matrix%row_start(self%n + 1)
+      if (.not. is_same) return
+      k = 0
+      do b = 1, self%n_block
+         do i = self%first(b) + 1, self%first(b + 1)
+            do t = self%start(b) + 1, self%start(b + 1)
+               do c = self%first(self%met(t)), self%first(self%met(t) + 1) - 1
+                  k = k + 1
+                  is_same = k <= self%n_slot
+                  if (is_same) is_same = matrix%column(k) == c
+                  if (.not. is_same) return
+               end do
+            end do
+            is_same = matrix%row_start(i + 1) == k
+            if (.not. is_same) return
+         end do
+      end do
+   end function node_blocks_is_of
+
+   !> Take `factor` times the values of a matrix of the pattern.
+   pure subroutine node_blocks_fill(self, factor, value)
+      type(node_blocks_t), intent(inout) :: self
+      real(dp), intent(in) :: factor
+      real(dp), intent(in), contiguous :: value(:)       !! (n_slot) of the pattern
+      integer, allocatable :: at(:)
+      integer :: b, c, k, p, t, n
+
+      allocate(at(self%n_block))
+      k = 0
+      do b = 1, self%n_block
+         associate (row => self%number(b))
+            do t = self%row_start(row) + 1, self%row_start(row + 1)
+               at(self%column(t)) = t
+               self%value(:, :, t) = 0.0_dp
+            end do
+            do p = 1, self%first(b + 1) - self%first(b)
+               do t = self%start(b) + 1, self%start(b + 1)
+                  c = self%number(self%met(t))
+                  n = self%first(self%met(t) + 1) - self%first(self%met(t))
+                  if (c <= row) self%value(p, :n, at(c)) = factor*value(k + 1:k + n)
+                  k = k + n
+               end do
+            end do
+            do p = self%first(b + 1) - self%first(b) + 1, n_side
+               self%value(p, p, self%row_start(row + 1)) = 1.0_dp
+            end do
+         end associate
+      end do
+   end subroutine node_blocks_fill
+
+   !> `factor` times the matrix by single entries, in full.
+   pure subroutine node_blocks_matrix(self, factor, matrix)
+      type(node_blocks_t), intent(in) :: self
+      real(dp), intent(in) :: factor
+      type(csr_t), intent(out) :: matrix
+      integer :: b, c, i, k, p, q, t, at
+
+      matrix%n_row = self%n
+      matrix%n_col = self%n
+      allocate(matrix%row_start(self%n + 1), matrix%column(self%n_slot), source=0)
+      allocate(matrix%value(self%n_slot), source=0.0_dp)
+      k = 0
+      do b = 1, self%n_block
+         do i = self%first(b) + 1, self%first(b + 1)
+            p = i - self%first(b)
+            do t = self%start(b) + 1, self%start(b + 1)
+               c = self%met(t)
+               at = slot_of(self, max(self%number(b), self%number(c)), &
+                  min(self%number(b), self%number(c)))
+               do q = 1, self%first(c + 1) - self%first(c)
+                  k = k + 1
+                  matrix%column(k) = self%first(c) + q - 1
+                  if (self%number(c) <= self%number(b)) matrix%value(k) = factor*self%value(p, q, at)
+                  if (self%number(c) > self%number(b)) matrix%value(k) = factor*self%value(q, p, at)
+               end do
+            end do
+            matrix%row_start(i + 1) = k
+         end do
+      end do
+   end subroutine node_blocks_matrix
+
+   !> The place of a block of the lower triangle.
+   pure integer function slot_of(self, row, column)
+      type(node_blocks_t), intent(in) :: self
+      integer, intent(in) :: row, column
+
+      associate (first => self%row_start(row))
+         slot_of = first + find_sorted(self%column(first + 1:self%row_start(row + 1)), column)
+      end associate
+   end function slot_of
+
+   !> y = A x, vectors of blocks.
+   pure subroutine node_blocks_multiply(self, x, y)
+      type(node_blocks_t), intent(in) :: self
+      real(dp), intent(in) :: x(n_side, self%n_block)
+      real(dp), intent(out) :: y(n_side, self%n_block)
+      real(dp) :: own(n_side), total(n_side)
+      integer :: b, c, k
+
+      do b = 1, self%n_block
+         own = x(:, b)
+         total = 0.0_dp
+         do k = self%row_start(b) + 1, self%row_start(b + 1) - 1
+            c = self%column(k)
+            associate (a => self%value(:, :, k))
+               total(1) = total(1) + a(1, 1)*x(1, c) + a(1, 2)*x(2, c) + a(1, 3)*x(3, c)
+               total(2) = total(2) + a(2, 1)*x(1, c) + a(2, 2)*x(2, c) + a(2, 3)*x(3, c)
+               total(3) = total(3) + a(3, 1)*x(1, c) + a(3, 2)*x(2, c) + a(3, 3)*x(3, c)
+               y(1, c) = y(1, c) + a(1, 1)*own(1) + a(2, 1)*own(2) + a(3, 1)*own(3)
+               y(2, c) = y(2, c) + a(1, 2)*own(1) + a(2, 2)*own(2) + a(3, 2)*own(3)
+               y(3, c) = y(3, c) + a(1, 3)*own(1) + a(2, 3)*own(2) + a(3, 3)*own(3)
+            end associate
+         end do
+         associate (a => self%value(:, :, self%row_start(b + 1)))
+            y(1, b) = total(1) + a(1, 1)*own(1) + a(2, 1)*own(2) + a(3, 1)*own(3)
+            y(2, b) = total(2) + a(2, 1)*own(1) + a(2, 2)*own(2) + a(3, 2)*own(3)
+            y(3, b) = total(3) + a(3, 1)*own(1) + a(3, 2)*own(2) + a(3, 3)*own(3)
+         end associate
+      end do
+   end subroutine node_blocks_multiply
+
+end module emcon_node_blocks

@@ -1,0 +1,118 @@
+! build: streams
+!> Gradients G of constraints in the measure of a factor L L^T, W = L^-1 G^T by its entries that are
+!> not zero, and the Cholesky factor of W^T W.
+module emcon_factor_rows
+   use emcon_kinds, only : dp
+   use emcon_lapack, only : dense_cholesky_solve
+   implicit none
+   private
+   public :: factor_rows_t, factor_rows_begin, factor_rows_make_room, factor_rows_fill_products, &
+      factor_rows_subtract_products, factor_rows_add, factor_rows_project
+
+   type :: factor_rows_t
+      integer :: n = 0
+      integer, allocatable :: start(:)           !! (n + 1) entries before each row
+      integer, allocatable :: index(:)           !! (>= start(n + 1)) unknowns, from 0
+      real(dp), allocatable :: w(:)              !! (>= start(n + 1))
+      real(dp), allocatable :: l(:, :)           !! (n, n) W^T W, or its factor
+      real(dp), allocatable, private :: mu(:)    !! (n)
+   end type factor_rows_t
+
+contains
+
+   !> `n` rows are to come.
+   pure subroutine factor_rows_begin(self, n)
+      type(factor_rows_t), intent(inout) :: self
+      integer, intent(in) :: n                   !! >= 0
+
+      if (allocated(self%l)) then
+         if (self%n /= n) deallocate(self%l, self%start, self%mu)
+      end if
+      if (.not. allocated(self%l)) allocate(self%l(n, n), self%start(n + 1), self%mu(n))
+      self%n = n
+      self%start(1) = 0
+   end subroutine factor_rows_begin
+
+   !> Room for `n` entries of W; what there is stays.
+   pure subroutine factor_rows_make_room(self, n)
+      type(factor_rows_t), intent(inout) :: self
+      integer, intent(in) :: n
+      integer, allocatable :: index(:)
+      real(dp), allocatable :: w(:)
+
+      if (.not. allocated(self%w)) allocate(self%index(0), self%w(0))
+      if (n <= size(self%w)) return
+      allocate(index(2*n), source=0)
+      allocate(w(2*n), source=0.0_dp)
+      index(:size(self%index)) = self%index
+      w(:size(self%w)) = self%w
+      call move_alloc(index, self%index)
+      call move_alloc(w, self%w)
+   end subroutine factor_rows_make_room
+
+   !> W^T W, its lower triangle.
+   pure subroutine factor_rows_fill_products(self, y)
+      type(factor_rows_t), intent(inout) :: self
+      real(dp), intent(out), contiguous :: y(:)  !! (n_unknown) work space
+      integer :: k, i, j
+      real(dp) :: total
+
+      y = 0.0_dp
+      do k = 1, self%n
+         do j = self%start(k) + 1, self%start(k + 1)
+            y(self%index(j) + 1) = self%w(j)
+         end do
+         do i = k, self%n
+            total = 0.0_dp
+            do j = self%start(i) + 1, self%start(i + 1)
+               total = total + self%w(j)*y(self%index(j) + 1)
+            end do
+            self%l(i, k) = total
+         end do
+         do j = self%start(k) + 1, self%start(k + 1)
+            y(self%index(j) + 1) = 0.0_dp
+         end do
+      end do
+   end subroutine factor_rows_fill_products
+
+   !> mu = mu - W^T y
+   pure subroutine factor_rows_subtract_products(self, y, mu)
+      type(factor_rows_t), intent(in) :: self
+      real(dp), intent(in) :: y(:)               !! (n_unknown)
+      real(dp), intent(inout) :: mu(:)           !! (n)
+      integer :: k, j
+
+      do k = 1, self%n
+         do j = self%start(k) + 1, self%start(k + 1)
+            mu(k) = mu(k) - self%w(j)*y(self%index(j) + 1)
+         end do
+      end do
+   end subroutine factor_rows_subtract_products
+
+   !> y = y + W mu
+   pure subroutine factor_rows_add(self, mu, y)
+      type(factor_rows_t), intent(in) :: self
+      real(dp), intent(in) :: mu(:)              !! (n)
+      real(dp), intent(inout) :: y(:)            !! (n_unknown)
+      integer :: k, j
+
+      do k = 1, self%n
+         do j = self%start(k) + 1, self%start(k + 1)
+            y(self%index(j) + 1) = y(self%index(j) + 1) + mu(k)*self%w(j)
+         end do
+      end do
+   end subroutine factor_rows_add
+
+   !> y = y - W (W^T W)^-1 W^T y: what of it is along no row.
+   subroutine factor_rows_project(self, y)
+      type(factor_rows_t), intent(inout) :: self !! with the factor of W^T W
+      real(dp), intent(inout) :: y(:)            !! (n_unknown)
+
+      if (self%n == 0) return
+      self%mu = 0.0_dp
+      call factor_rows_subtract_products(self, y, self%mu)
+      call dense_cholesky_solve(self%l, self%mu)
+      call factor_rows_add(self, self%mu, y)
+   end subroutine factor_rows_project
+
+end module emcon_factor_rows

@@ -1,0 +1,479 @@
+!> Conjugate gradients with incomplete factors by blocks: products, factors without fill, solutions
+!> as good as was asked for, and what happens where there are none.
+module test_iterative
+   use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
+   use check, only : check_equal, check_near, check_true, test_case_t
+   use emcon_chosen_solver, only : chosen_solver_t
+   use emcon_csr, only : csr_from_entries, csr_multiply, csr_t
+   use emcon_errors, only : error_t
+   use emcon_incomplete_cholesky, only : incomplete_cholesky_backward, &
+      incomplete_cholesky_factorise, incomplete_cholesky_forward, incomplete_cholesky_t
+   use emcon_iterative_solver, only : iterative_solver_t
+   use emcon_kinds, only : dp, wp
+   use emcon_lapack, only : dense_solve
+   use emcon_node_blocks, only : node_blocks_fill, node_blocks_init, node_blocks_is_of, &
+      node_blocks_matrix, node_blocks_multiply, node_blocks_t
+   use emcon_solver_registry, only : solver_create, solver_default
+   use emcon_sparse_solver, only : matrix_definite, sparse_solver_t
+   use sparse_samples, only : dense_of
+   implicit none
+   private
+   public :: collect_iterative
+
+   !> Round-off of products and of solutions that were asked for all digits, by conditions below 1e3.
+   real(dp), parameter :: tol = 1.0e4_dp*epsilon(1.0_dp)
+   !> Of factors in single precision.
+   real(dp), parameter :: rough_tol = 1.0e3_dp*epsilon(1.0)
+   !> Nodes of a small lattice.
+   integer, parameter :: n_x = 4, n_y = 3, n_z = 3
+
+contains
+
+   subroutine collect_iterative(tests)
+      type(test_case_t), allocatable, intent(out) :: tests(:)
+
+      tests = [ &
+         test_case_t("products and entries of blocks", test_blocks), &
+         test_case_t("without fill the factor is complete", test_complete), &
+         test_case_t("as good as was asked for", test_accuracy), &
+         test_case_t("both halves are the preconditioner", test_halves), &
+         test_case_t("powers of two keep the bits", test_powers_of_two), &
+         test_case_t("a pivot that is lost to the pattern", test_shift), &
+         test_case_t("where steps do not do factors are taken", test_not_converged), &
+         test_case_t("not definite, not a number", test_indefinite), &
+         test_case_t("counts choose", test_choice), &
+         test_case_t("another pattern", test_pattern)]
+   end subroutine collect_iterative
+
+   !> Springs between the neighbours of a lattice, those across diagonals too.
+   subroutine lattice(nx, ny, nz, mass, a)
+      integer, intent(in) :: nx, ny, nz
+      real(dp), intent(in) :: mass               !! added to the diagonal
+      type(csr_t), intent(out) :: a
+      integer :: b, c, at(3), to(3), n, pair(2, 13*nx*ny*nz)
+      real(dp) :: way(3, 13*nx*ny*nz)
+
+      n = 0
+      do b = 1, nx*ny*nz
+         at = [modulo(b - 1, nx), modulo((b - 1)/nx, ny), (b - 1)/(nx*ny)]
+         do c = b + 1, min(nx*ny*nz, b + nx*ny + nx + 1)
+            to = [modulo(c - 1, nx), modulo((c - 1)/nx, ny), (c - 1)/(nx*ny)]
+            if (any(abs(to - at) > 1)) cycle
+            n = n + 1
+            pair(:, n) = [b, c]
+            way(:, n) = real(to - at, dp)
+         end do
+      end do
+      call join(nx*ny*nz, pair(:, :n), way(:, :n), mass, a)
+   end subroutine lattice
+
+   !> Springs from each of `m` nodes to others anywhere: whatever the order, factors fill.
+   subroutine tangle(m, mass, a)
+      integer, intent(in) :: m
+      real(dp), intent(in) :: mass
+      type(csr_t), intent(out) :: a
+      integer :: b, k, n, c(3), pair(2, 3*m)
+      real(dp) :: way(3, 3*m)
+
+      n = 0
+      do b = 1, m
+         c = 1 + modulo([17*b + 5, modulo(b*b, m) + 7, 331*b + 1], m)
+         do k = 1, 3
+            if (c(k) == b .or. any(c(:k - 1) == c(k))) cycle
+            n = n + 1
+            pair(:, n) = [b, c(k)]
+            way(:, n) = real([k, modulo(b, 3), 1], dp)
+         end do
+      end do
+      call join(m, pair(:, :n), way(:, :n), mass, a)
+   end subroutine tangle
+
+   !> Springs of several stiffnesses along `way` between pairs of nodes: the first two have one
+   !> unknown, the next two have two, all others three.
+   subroutine join(m, pair, way, mass, a)
+      integer, intent(in) :: m, pair(:, :)       !! (2, n)
+      real(dp), intent(in) :: way(:, :)          !! (3, n)
+      real(dp), intent(in) :: mass
+      type(csr_t), intent(out) :: a
+      integer :: held(m), first(m + 1), i, p, q, s, t, k
+      integer, allocatable :: slot(:)
+      integer, dimension(36*size(pair, 2) + 3*m) :: row, column
+      real(dp) :: value(36*size(pair, 2) + 3*m), stiffness(3, 3)
+
+      held = [(merge(2, merge(1, 0, i <= 4), i <= 2), i = 1, m)]
+      first(1) = 0
+      do i = 1, m
+         first(i + 1) = first(i) + 3 - held(i)
+      end do
+      row = 0
+      column = 0
+      value = 0.0_dp
+      k = 0
+      do i = 1, size(pair, 2)
+         stiffness = (1.0_dp + 0.1_dp*modulo(7*pair(1, i) + 3*pair(2, i), 11)) &
+            *spread(way(:, i), 2, 3)*spread(way(:, i), 1, 3)/dot_product(way(:, i), way(:, i))
+         do t = 1, 2
+            do s = 1, 2
+               do q = 1, 3
+                  do p = 1, 3
+                     call add(pair(s, i), pair(t, i), p, q, merge(1, -1, s == t)*stiffness(p, q))
+                  end do
+               end do
+            end do
+         end do
+      end do
+      do i = 1, m
+         do p = 1, 3
+            call add(i, i, p, p, mass)
+         end do
+      end do
+      call csr_from_entries(a, first(m + 1), first(m + 1), row, column, slot)
+      do i = 1, k
+         if (slot(i) > 0) a%value(slot(i)) = a%value(slot(i)) + value(i)
+      end do
+
+   contains
+
+      subroutine add(b, c, p, q, x)
+         integer, intent(in) :: b, c, p, q
+         real(dp), intent(in) :: x
+
+         k = k + 1
+         if (p > 3 - held(b) .or. q > 3 - held(c)) return
+         row(k) = first(b) + p
+         column(k) = first(c) + q
+         value(k) = x
+      end subroutine add
+
+   end subroutine join
+
+   subroutine test_blocks(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: a, back
+      type(node_blocks_t) :: blocks
+      real(dp), allocatable :: x(:), v(:), image(:)
+      real(wp), allocatable :: y(:)
+
+      call lattice(n_x, n_y, n_z, 1.0_dp, a)
+      call node_blocks_init(blocks, a)
+      call check_equal(error, blocks%n_block, n_x*n_y*n_z, "a block for each node")
+      if (allocated(error)) return
+      call node_blocks_fill(blocks, 0.5_dp, a%value)
+      allocate(x(a%n_row), y(a%n_row), v(3*blocks%n_block), image(3*blocks%n_block))
+      call random_number(x)
+      v = 0.0_dp
+      v(blocks%place) = x
+      call node_blocks_multiply(blocks, v, image)
+      call csr_multiply(a, real(x, wp), y)
+      call check_near(error, real(image(blocks%place), wp), 0.5_wp*y, real(tol, wp), &
+         maxval(abs(y)), "y")
+      if (allocated(error)) return
+      call node_blocks_matrix(blocks, 2.0_dp, back)
+      call check_true(error, all(back%row_start == a%row_start) .and. all(back%column == a%column), &
+         "the pattern again")
+      if (.not. allocated(error)) call check_true(error, .not. any(abs(back%value - a%value) &
+         > 0.0_dp), "the values again")
+      if (.not. allocated(error)) call check_true(error, node_blocks_is_of(blocks, a), "it is known")
+   end subroutine test_blocks
+
+   !> A chain of nodes fills nothing: L L^T = A.
+   subroutine test_complete(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(csr_t) :: a
+      type(node_blocks_t) :: blocks
+      type(incomplete_cholesky_t) :: factor
+      real(dp), allocatable :: x(:), v(:), image(:)
+      logical :: is_definite
+
+      call lattice(20, 1, 1, 1.0_dp, a)
+      call node_blocks_init(blocks, a)
+      call node_blocks_fill(blocks, 1.0_dp, a%value)
+      call incomplete_cholesky_factorise(factor, blocks, is_definite)
+      call check_true(error, is_definite .and. .not. factor%shift > 0.0_dp, "definite as it is")
+      if (allocated(error)) return
+      allocate(x(a%n_row), v(3*blocks%n_block), image(3*blocks%n_block))
+      call random_number(x)
+      v = 0.0_dp
+      v(blocks%place) = x
+      call node_blocks_multiply(blocks, v, image)
+      call incomplete_cholesky_forward(factor, blocks, image)
+      call incomplete_cholesky_backward(factor, blocks, image)
+      call check_near(error, real(image, wp), real(v, wp), real(rough_tol, wp), 1.0_wp, "x")
+   end subroutine test_complete
+
+   !> Against LAPACK, by more digits with more steps.
+   subroutine test_accuracy(error)
+      type(error_t), allocatable, intent(out) :: error
+      real(dp), parameter :: accuracy(3) = [1.0e-2_dp, 1.0e-6_dp, 0.0_dp]
+      type(iterative_solver_t) :: solver
+      type(csr_t) :: a
+      real(dp), allocatable :: exact(:, :), b(:, :)
+      real(wp), allocatable :: x(:)
+      real(dp) :: wrong, whole
+      logical :: is_singular
+      integer :: i, before
+
+      call lattice(n_x, n_y, n_z, 0.5_dp, a)
+      allocate(b(a%n_row, 1), exact(a%n_row, 1), x(a%n_row))
+      call random_number(b)
+      call dense_solve(dense_of(a), b, exact, is_singular)
+      before = 0
+      do i = 1, size(accuracy)
+         solver%accuracy = accuracy(i)
+         call start(solver, a, error)
+         if (.not. allocated(error)) call solver%solve(real(b(:, 1), wp), x, error)
+         if (allocated(error)) return
+         ! The energy of the error beside that of the solution: the residual's size is an upper bound
+         ! but for what the factor lacks, a factor below ten here.
+         wrong = energy(a, real(x, dp) - exact(:, 1))
+         whole = energy(a, exact(:, 1))
+         call check_true(error, solver%is_converged, "converged")
+         if (.not. allocated(error)) call check_true(error, &
+            wrong <= (10.0_dp*max(accuracy(i), tol))**2*whole, "as good as was asked for")
+         if (.not. allocated(error)) call check_true(error, solver%n_step > before, "more steps")
+         if (allocated(error)) return
+         before = solver%n_step
+      end do
+      call solver%free()
+   end subroutine test_accuracy
+
+   !> x.A x
+   real(dp) function energy(a, x)
+      type(csr_t), intent(in) :: a
+      real(dp), intent(in) :: x(:)
+      real(wp) :: y(size(x))
+
+      call csr_multiply(a, real(x, wp), y)
+      energy = dot_product(x, real(y, dp))
+   end function energy
+
+   subroutine start(solver, a, error)
+      class(sparse_solver_t), intent(inout) :: solver
+      type(csr_t), intent(in) :: a
+      type(error_t), allocatable, intent(out) :: error
+
+      solver%symmetry = matrix_definite
+      call solver%analyse(a, error)
+      if (.not. allocated(error)) call solver%factorise(a%value, error)
+   end subroutine start
+
+   !> (L^-T L^-1) is symmetric, and near A^-1 where there is little fill.
+   subroutine test_halves(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(iterative_solver_t) :: solver
+      type(csr_t) :: a
+      real(dp), allocatable :: b(:, :), x(:, :), y(:), image(:)
+      integer :: i
+
+      call lattice(n_x, n_y, n_z, 20.0_dp, a)
+      call start(solver, a, error)
+      if (allocated(error)) return
+      allocate(b(a%n_row, 2), x(a%n_row, 2), y(a%n_row), image(a%n_row))
+      call random_number(b)
+      do i = 1, 2
+         call solver%solve_half(.false., b(:, i), y, error)
+         if (.not. allocated(error)) call solver%solve_half(.true., y, x(:, i), error)
+         if (allocated(error)) return
+      end do
+      call check_near(error, real(dot_product(b(:, 1), x(:, 2)), wp), &
+         real(dot_product(b(:, 2), x(:, 1)), wp), real(rough_tol, wp), &
+         real(abs(dot_product(b(:, 1), x(:, 2))), wp), "symmetric")
+      if (allocated(error)) return
+      call solver%multiply(x(:, 1), image, error)
+      if (.not. allocated(error)) call check_near(error, real(image, wp), &
+         real(b(:, 1), wp), 0.1_wp, real(maxval(abs(b)), wp), "near the inverse")
+   end subroutine test_halves
+
+   subroutine test_powers_of_two(error)
+      type(error_t), allocatable, intent(out) :: error
+      type(iterative_solver_t) :: solver
+      type(csr_t) :: a
+      real(wp), allocatable :: b(:), x(:), y(:)
+
+      call lattice(n_x, n_y, n_z, 0.5_dp, a)
+      allocate(b(a%n_row), x(a%n_row), y(a%n_row))
+      call random_number(b)
+      solver%accuracy = 1.0e-3_dp
+      call start(solver, a, error)
+      if (.not. allocated(error)) call solver%solve(b, x, error)
+      a%value = 2.0_dp**70*a%value
+      if (.not. allocated(error)) call solver%factorise(a%value, error)
+      if (.not. allocated(error)) call solver%solve(b, y, error)
+      if (.not. allocated(error)) call check_true(error, .not. any(abs(x - 2.0_wp**70*y) > 0.0_wp), &
+         "the same bits")
+   end subroutine test_powers_of_two
+
+   !> A definite matrix of which what is left out takes the last pivot: four unknowns in a ring,
+   !> after D. S. Kershaw, J. Comput. Phys. 26 (1978) 43-65, each with a block of its own.
+   subroutine test_shift(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: row(12) = [1, 1, 1, 2, 2, 2, 3, 3, 3, 4, 4, 4], &
+         column(12) = [1, 2, 4, 1, 2, 3, 2, 3, 4, 1, 3, 4]
+      real(dp), parameter :: value(12) = [3.0_dp, -2.0_dp, 2.0_dp, -2.0_dp, 3.0_dp, -2.0_dp, &
+         -2.0_dp, 3.0_dp, -2.0_dp, 2.0_dp, -2.0_dp, 3.0_dp]
+      type(csr_t) :: a
+      type(node_blocks_t) :: blocks
+      type(incomplete_cholesky_t) :: factor
+      type(iterative_solver_t) :: solver
+      real(dp) :: exact(4, 1)
+      real(wp) :: x(4)
+      integer, allocatable :: slot(:)
+      logical :: is_definite, is_singular
+
+      call csr_from_entries(a, 4, 4, row, column, slot)
+      a%value(slot) = value
+      call node_blocks_init(blocks, a)
+      call node_blocks_fill(blocks, 1.0_dp, a%value)
+      call incomplete_cholesky_factorise(factor, blocks, is_definite)
+      call check_true(error, is_definite .and. factor%shift > 0.0_dp, "the diagonal was raised")
+      if (allocated(error)) return
+      call start(solver, a, error)
+      if (.not. allocated(error)) call solver%solve([1.0_wp, 0.0_wp, 0.0_wp, 2.0_wp], x, error)
+      if (allocated(error)) return
+      call dense_solve(dense_of(a), reshape([1.0_dp, 0.0_dp, 0.0_dp, 2.0_dp], [4, 1]), exact, &
+         is_singular)
+      call check_near(error, x, real(exact(:, 1), wp), real(tol, wp), maxval(abs(x)), "x")
+   end subroutine test_shift
+
+   !> One step at most: the solution is the factor's, and of the next matrix iterations are tried again.
+   subroutine test_not_converged(error)
+      type(error_t), allocatable, intent(out) :: error
+      class(sparse_solver_t), allocatable :: solver
+      type(csr_t) :: a
+      real(dp), allocatable :: exact(:, :), b(:, :)
+      real(wp), allocatable :: x(:)
+      logical :: is_singular
+      integer :: i
+
+      call lattice(n_x, n_y, n_z, 0.5_dp, a)
+      allocate(b(a%n_row, 1), exact(a%n_row, 1), x(a%n_row))
+      call random_number(b)
+      call dense_solve(dense_of(a), b, exact, is_singular)
+      call make_chosen(solver, 1.0e-4_dp, .true.)
+      call solver%analyse(a, error)
+      if (allocated(error)) return
+      select type (solver)
+      type is (chosen_solver_t)
+         call check_true(error, solver%iterates, "it iterates")
+         solver%iterative%most_steps = 1
+      end select
+      do i = 1, 2
+         if (.not. allocated(error)) call solver%factorise(a%value, error)
+         if (.not. allocated(error)) call solver%solve(real(b(:, 1), wp), x, error)
+         if (allocated(error)) return
+         call check_near(error, x, real(exact(:, 1), wp), real(tol, wp), maxval(abs(x)), "x")
+         if (.not. allocated(error)) call check_true(error, solver%is_converged, "a solution")
+         if (allocated(error)) return
+         select type (solver)
+         type is (chosen_solver_t)
+            call check_equal(error, solver%n_failure, i, "matrices that were factorised")
+         end select
+      end do
+      call solver%free()
+   end subroutine test_not_converged
+
+   !> What a deck gets by SOLVER=ITERATIVE or by none.
+   subroutine make_chosen(solver, accuracy, prefers_iterations)
+      class(sparse_solver_t), allocatable, intent(out) :: solver
+      real(dp), intent(in) :: accuracy
+      logical, intent(in) :: prefers_iterations
+
+      call solver_create(solver_default, matrix_definite, solver)
+      solver%accuracy = accuracy
+      select type (solver)
+      type is (chosen_solver_t)
+         solver%prefers_iterations = prefers_iterations
+      end select
+   end subroutine make_chosen
+
+   !> A symmetric matrix that is not definite may have an incomplete factor: it is solved by what
+   !> solves any matrix, or told to have no factor. So is what has a negative first pivot, or no value.
+   subroutine test_indefinite(error)
+      type(error_t), allocatable, intent(out) :: error
+      class(sparse_solver_t), allocatable :: solver
+      type(csr_t) :: a
+      real(wp), allocatable :: x(:), b(:), y(:)
+      integer :: i, k
+
+      call lattice(n_x, n_y, n_z, 0.5_dp, a)
+      allocate(x(a%n_row), b(a%n_row), y(a%n_row))
+      call random_number(b)
+      call make_chosen(solver, 1.0e-4_dp, .true.)
+      call solver%analyse(a, error)
+      if (allocated(error)) return
+      ! Each unknown by itself is held, but a rigid motion is pushed on.
+      do i = 1, a%n_row
+         k = a%row_start(i) + findloc(a%column(a%row_start(i) + 1:a%row_start(i + 1)), i - 1, 1)
+         a%value(k) = a%value(k) - 0.6_dp
+      end do
+      call solver%factorise(a%value, error)
+      if (allocated(error)) return
+      call check_true(error, .not. solver%is_singular, "its incomplete factor tells nothing")
+      if (.not. allocated(error)) call solver%solve(b, x, error)
+      if (allocated(error)) return
+      call csr_multiply(a, x, y)
+      call check_near(error, y, b, real(tol, wp), maxval(abs(b)), "A x")
+      if (.not. allocated(error)) call solver%factorise(-a%value, error)
+      if (.not. allocated(error)) call check_true(error, solver%is_singular, "a negative pivot")
+      a%value(5) = ieee_value(1.0_dp, ieee_quiet_nan)
+      if (.not. allocated(error)) call solver%factorise(a%value, error)
+      if (.not. allocated(error)) call check_true(error, solver%is_singular, "not a number")
+      call solver%free()
+   end subroutine test_indefinite
+
+   !> Exact solutions are those of factors, and so are those of a strip, whose factors have few
+   !> entries; not so those of a tangle.
+   subroutine test_choice(error)
+      type(error_t), allocatable, intent(out) :: error
+      class(sparse_solver_t), allocatable :: solver
+      type(csr_t) :: strip, knot
+      integer :: i
+
+      call lattice(100, 6, 1, 1.0_dp, strip)
+      call tangle(2500, 1.0_dp, knot)
+      do i = 1, 3
+         call make_chosen(solver, merge(0.0_dp, 0.1_dp, i == 1), .false.)
+         solver%needs_halves = .true.
+         if (i /= 2) call solver%analyse(knot, error)
+         if (i == 2) call solver%analyse(strip, error)
+         if (allocated(error)) return
+         call check_true(error, solver%is_incomplete .eqv. i == 3, "what counts say")
+         if (allocated(error)) return
+         call solver%free()
+      end do
+   end subroutine test_choice
+
+   subroutine test_pattern(error)
+      type(error_t), allocatable, intent(out) :: error
+      class(sparse_solver_t), allocatable :: solver
+      type(csr_t) :: a, other
+      real(wp), allocatable :: x(:), b(:), y(:)
+      integer :: i
+
+      call lattice(n_x, n_y, n_z, 2.0_dp, a)
+      call lattice(n_y, n_z, n_x, 2.0_dp, other)
+      call make_chosen(solver, 1.0e-8_dp, .true.)
+      do i = 1, 3
+         if (i == 2) call solver%analyse(other, error)
+         if (i /= 2) call solver%analyse(a, error)
+         if (allocated(error)) return
+         call check_equal(error, solver%n_analysis, i, "patterns analysed")
+         if (allocated(error)) return
+         if (allocated(b)) deallocate(b, x, y)
+         allocate(b(a%n_row), x(a%n_row), y(a%n_row))
+         call random_number(b)
+         if (i == 2) call solver%factorise(other%value, error)
+         if (i /= 2) call solver%factorise(a%value, error)
+         if (.not. allocated(error)) call solver%solve(b, x, error)
+         if (allocated(error)) return
+         if (i == 2) call csr_multiply(other, x, y)
+         if (i /= 2) call csr_multiply(a, x, y)
+         call check_near(error, y, b, 1.0e-6_wp, maxval(abs(b)), "A x")
+         if (allocated(error)) return
+      end do
+      call solver%analyse(a, error)
+      if (.not. allocated(error)) call check_equal(error, solver%n_analysis, 3, "it is known")
+      call solver%free()
+   end subroutine test_pattern
+
+end module test_iterative
