@@ -434,17 +434,17 @@ class Model(Source):
                                            "ADJUST": adjust, "INITIATION": initiation},
                           [(slave, master)])
 
-    def contact(self, *surfaces: str | tuple[str, str],
-                interaction: str | None = None) -> Model:
+    def contact(self, *surfaces: str | tuple[str, str], interaction: str | None = None,
+                type: str | None = None) -> Model:
         """`*CONTACT`: all free faces of the model with all, or what `surfaces` names.
 
         surfaces      names of surfaces, each in contact with itself, or pairs of names
+        type          NODE TO SURFACE (default) or, in three dimensions, MORTAR
         interaction   of all of them; default frictionless
         """
         rows = [(s, s) if isinstance(s, str) else tuple(s) for s in surfaces]
-        everything = {} if rows else {"ALL EXTERIOR": True}
         self._card("CONTACT", {})
-        self._card("CONTACT INCLUSIONS", everything, rows)
+        self._card("CONTACT INCLUSIONS", {"ALL EXTERIOR": not rows, "TYPE": type}, rows)
         if interaction is not None:
             self._card("CONTACT PROPERTY ASSIGNMENT", {}, [("GLOBAL", "GLOBAL", interaction)])
         return self

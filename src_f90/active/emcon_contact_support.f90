@@ -304,9 +304,10 @@ contains
          call gaps_evaluate(system, motion, may .and. .not. gaps_of_guards(system), set)
          call gaps_next_to_close(set, direction, time, is_next)
          turn = turn_of(bodies, free, rigid)
-         if (.not. any(is_next) .and. turn*maxval(bodies%size(free%member)) &
+         ! A tip is stopped by its guard before what lies around it meets in the mean; where nothing
+         ! that pairs hold is in the way guards hold a body that tips.
+         if (any(is_next) .or. turn*maxval(bodies%size(free%member)) &
             > in_the_way*maxval(abs(direction))) then
-            ! Nothing that pairs hold is in the way, and a body tips.
             call gaps_evaluate(system, motion, may .and. gaps_of_guards(system), set)
             call gaps_next_guards(set, direction, time, is_next)
          end if

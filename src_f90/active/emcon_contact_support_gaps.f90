@@ -132,20 +132,29 @@ contains
       end do
    end subroutine gaps_next_to_close
 
-   !> Guards that close first on a way, within an edge of their nodes: what slides along a surface
-   !> they do not hold.
+   !> Guards that close on a way before the contacts that are next, in place of these; within an
+   !> edge of their nodes: what slides along a surface they do not hold.
    pure subroutine gaps_next_guards(set, direction, time, is_next)
-      type(constraint_set_t), intent(in) :: set
+      type(constraint_set_t), intent(in) :: set  !! guards
       real(wp), intent(in) :: direction(:, :)    !! (n_dim, n_node) per time
-      real(wp), intent(out) :: time              !! as `gaps_next_to_close` has it
-      logical, intent(out) :: is_next(:)         !! (n_constraint)
+      real(wp), intent(inout) :: time            !! as `gaps_next_to_close` has it, of the others
+      logical, intent(inout) :: is_next(:)       !! (n_constraint)
+      real(wp) :: first, far
+      logical :: is_first(size(is_next))
       integer :: k
 
-      call gaps_next_to_close(set, direction, time, is_next)
+      call gaps_next_to_close(set, direction, first, is_first)
+      if (.not. any(is_first)) return
+      far = maxval(abs(direction))
       do k = 1, set%n
-         if (time*maxval(abs(direction)) > set%item(k)%size) is_next(set%id(k)) = .false.
+         associate (size_of => set%item(k)%size)
+            if (first*far > size_of .or. time - first <= together*(size_of/far)) &
+               is_first(set%id(k)) = .false.
+         end associate
       end do
-      if (.not. any(is_next)) time = huge(time)
+      if (.not. any(is_first)) return
+      time = first
+      is_next = is_first
    end subroutine gaps_next_guards
 
    !> Of the contacts `set` those with the smallest gap that prevent a motion that is left.

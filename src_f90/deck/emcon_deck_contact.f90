@@ -27,7 +27,7 @@ module emcon_deck_contact
    use emcon_text, only : read_real, to_text
    implicit none
    private
-   public :: read_interactions, read_pairs
+   public :: read_interactions, read_pairs, read_formulation
 
 contains
 

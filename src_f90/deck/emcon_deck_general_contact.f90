@@ -1,18 +1,20 @@
 !> *CONTACT, *CONTACT INCLUSIONS and *CONTACT PROPERTY ASSIGNMENT: all with all.
 !>
-!> What is included becomes pairs with both sides held: a surface with itself, on one body or on
-!> many, or with another one. All exterior is one surface, of every free face, in contact with every
-!> analytical surface, too; faces that ties cover go out of it when the ties are known
-!> (`emcon_ties`).
+!> What is included becomes pairs: a surface with itself, on one body or on many, or with another
+!> one; both sides are held, unless gaps are integrated. All exterior is one surface, of every free
+!> face, in contact with every analytical surface, too; faces that ties cover go out of it when the
+!> ties are known (`emcon_ties`).
 module emcon_deck_general_contact
    use emcon_deck_adjacency, only : adjacency_init, adjacency_t, n_neighbours
+   use emcon_deck_contact, only : read_formulation
+   use emcon_deck_dimension, only : n_space
    use emcon_deck_fields, only : check_count, data_error, data_open, data_t, get_name, is_blank, &
       next_line
    use emcon_deck_named, only : refuse_name
    use emcon_deck_reader, only : card_error, card_t, has_option, reader_t
    use emcon_deck_surfaces, only : need_facets, surface_names
    use emcon_diagnostics, only : quoted, suggestion
-   use emcon_interactions, only : contact_pair_t, formulation_nts, pressure_hard
+   use emcon_interactions, only : contact_pair_t, formulation_mortar, formulation_nts, pressure_hard
    use emcon_kinds, only : wp
    use emcon_mesh, only : surface_t
    use emcon_name_index, only : name_index_find, name_index_put
@@ -61,10 +63,11 @@ contains
       type(card_t), intent(in) :: card
       type(scene_t), intent(inout) :: scene
       type(data_t) :: data
-      integer :: side, surface(2), n
+      integer :: formulation, side, surface(2), n
       logical :: is_ok
 
-      if (has_option(card, "ALLEXTERIOR")) call include_exterior(reader, card, scene)
+      call read_type(reader, card, formulation)
+      if (has_option(card, "ALLEXTERIOR")) call include_exterior(reader, card, formulation, scene)
       n = 0
       call data_open(data, card)
       do while (next_line(reader, data))
@@ -76,7 +79,7 @@ contains
          call check_count(reader, data, 0, 2, "surface, surface")
          is_ok = data%ok
          if (is_blank(data, 1) .and. is_blank(data, 2) .and. is_ok) then
-            call include_exterior(reader, card, scene)
+            call include_exterior(reader, card, formulation, scene)
             cycle
          end if
          do side = 1, 2
@@ -84,11 +87,29 @@ contains
             if (surface(side) == 0 .and. side == 2 .and. is_blank(data, 2)) surface(2) = surface(1)
             is_ok = is_ok .and. surface(side) > 0
          end do
-         if (is_ok) call include_pair(reader, data, scene, surface)
+         if (is_ok) call include_pair(reader, data, scene, surface, formulation)
       end do
       if (n == 0 .and. .not. has_option(card, "ALLEXTERIOR")) call card_error(reader, card, &
          "no surface is given; name them, or use ALL EXTERIOR")
    end subroutine read_inclusions
+
+   !> TYPE of a card: nodes, or integrated gaps in space.
+   subroutine read_type(reader, card, formulation)
+      type(reader_t), intent(inout) :: reader
+      type(card_t), intent(in) :: card
+      integer, intent(out) :: formulation          !! one of `formulation_`
+
+      call read_formulation(reader, card, formulation)
+      if (any(formulation == [formulation_nts, 0])) return
+      if (formulation == formulation_mortar .and. reader%n_dim == n_space) return
+      if (formulation == formulation_mortar) then
+         call card_error(reader, card, "here TYPE=MORTAR is for three dimensions; list " &
+            // "pairs by *CONTACT PAIR")
+      else
+         call card_error(reader, card, "here TYPE is NODE TO SURFACE or MORTAR; list other " &
+            // "pairs by *CONTACT PAIR")
+      end if
+   end subroutine read_type
 
    !> Number of the surface of faces or edges in field `side`; 0: blank or wrong.
    subroutine get_surface(reader, data, scene, side, surface)
@@ -115,11 +136,11 @@ contains
    end subroutine get_surface
 
    !> Contact between two surfaces, or of one with itself; each once.
-   subroutine include_pair(reader, data, scene, surface)
+   subroutine include_pair(reader, data, scene, surface, formulation)
       type(reader_t), intent(inout) :: reader
       type(data_t), intent(inout) :: data
       type(scene_t), intent(inout) :: scene
-      integer, intent(in) :: surface(2)
+      integer, intent(in) :: surface(2), formulation
       integer :: i
 
       do i = 1, size(scene%pair)
@@ -132,48 +153,44 @@ contains
             return
          end associate
       end do
-      call append_pairs(scene, data%card, surface)
+      call append_pairs(scene, data%card, surface, formulation)
    end subroutine include_pair
 
-   !> Two surfaces, the nodes of both of them held, or one, with itself; with a shape, which has no
-   !> nodes, those of the other one.
-   subroutine append_pairs(scene, card, surface)
+   !> Two surfaces, or one, with itself: by nodes those of both sides are held; with a shape, which
+   !> has no nodes, those of the other one.
+   subroutine append_pairs(scene, card, surface, formulation)
       type(scene_t), intent(inout) :: scene
       type(card_t), intent(in) :: card
-      integer, intent(in) :: surface(:)
-
-      associate (slave => surface(1), master => surface(size(surface)))
-         if (allocated(scene%surface(slave)%wall)) then
-            call append_pair(scene, card, master, slave, is_reverse=.false.)
-            return
-         end if
-         call append_pair(scene, card, slave, master, is_reverse=.false.)
-         if (allocated(scene%surface(master)%wall)) return
-         if (slave /= master) call append_pair(scene, card, master, slave, is_reverse=.true.)
-      end associate
-   end subroutine append_pairs
-
-   subroutine append_pair(scene, card, slave, master, is_reverse)
-      type(scene_t), intent(inout) :: scene
-      type(card_t), intent(in) :: card
-      integer, intent(in) :: slave, master
-      logical, intent(in) :: is_reverse
+      integer, intent(in) :: surface(:), formulation
       type(contact_pair_t) :: pair
 
       pair%origin = card%origin
-      pair%slave = slave
-      pair%master = master
-      pair%formulation = formulation_nts
-      pair%both_sides = .not. allocated(scene%surface(master)%wall)
-      pair%is_guarded = .false.
-      pair%is_reverse = is_reverse
+      pair%slave = surface(1)
+      pair%master = surface(size(surface))
+      if (allocated(scene%surface(pair%slave)%wall)) then
+         pair%slave = surface(size(surface))
+         pair%master = surface(1)
+      end if
+      pair%formulation = formulation
+      associate (by_nodes => formulation == formulation_nts, &
+            has_shape => allocated(scene%surface(pair%master)%wall))
+         pair%both_sides = by_nodes .and. .not. has_shape
+         pair%may_choose = .not. (by_nodes .or. has_shape)
+         pair%is_guarded = .not. by_nodes
+         scene%pair = [scene%pair, pair]
+         if (.not. by_nodes .or. has_shape .or. pair%slave == pair%master) return
+      end associate
+      pair%slave = scene%pair(size(scene%pair))%master
+      pair%master = scene%pair(size(scene%pair))%slave
+      pair%is_reverse = .true.
       scene%pair = [scene%pair, pair]
-   end subroutine append_pair
+   end subroutine append_pairs
 
    !> Every free face, in contact with every other and with the analytical surfaces.
-   subroutine include_exterior(reader, card, scene)
+   subroutine include_exterior(reader, card, formulation, scene)
       type(reader_t), intent(inout) :: reader
       type(card_t), intent(in) :: card
+      integer, intent(in) :: formulation
       type(scene_t), intent(inout) :: scene
       type(surface_t) :: surface
       integer :: all, i
@@ -193,10 +210,10 @@ contains
       end if
       call add_surface(reader, card, surface, scene)
       all = size(scene%surface)
-      call append_pairs(scene, card, [all])
+      call append_pairs(scene, card, [all], formulation)
       do i = 1, all
          if (scene%surface(i)%is_profile .or. allocated(scene%surface(i)%wall)) &
-            call append_pairs(scene, card, [all, i])
+            call append_pairs(scene, card, [all, i], formulation)
       end do
    end subroutine include_exterior
 

@@ -94,7 +94,7 @@ module emcon_deck_keywords
          // "~MECHANICALCONSTRAINT:KINEMATIC,~CPSET,~WEIGHT,~TRACKING,~GEOMETRICCORRECTION," &
          // "~SUPPLEMENTARYCONSTRAINTS,~HCRIT,~EXTENSIONZONE,~OP:NEW"), &
       keyword_t("CONTACT", in_model, "~OP:NEW", has_data=.false.), &
-      keyword_t("CONTACT INCLUSIONS", in_model, "ALLEXTERIOR"), &
+      keyword_t("CONTACT INCLUSIONS", in_model, "ALLEXTERIOR,TYPE="), &
       keyword_t("CONTACT PROPERTY ASSIGNMENT", in_model), &
       keyword_t("TIE", in_model, "NAME=,POSITIONTOLERANCE=,MULTIPLIER=,ADJUST=,TYPE=," &
          // "CYCLICSYMMETRY?,TRANSLATION,REFNODE=,~NOROTATION,~NOTHICKNESS,!MULTISTAGE," &
@@ -202,7 +202,7 @@ module emcon_deck_keywords
       refusal_t("give this mass to solid elements by their *DENSITY", "MASS,ROTARY INERTIA"), &
       refusal_t(gap_instead, "GAP"), &
       refusal_t("list what touches by *CONTACT INCLUSIONS", "CONTACT EXCLUSIONS"), &
-      refusal_t("all with all holds the nodes of both sides", "CONTACT FORMULATION"), &
+      refusal_t("use TYPE of *CONTACT INCLUSIONS", "CONTACT FORMULATION"), &
       refusal_t("use ADJUST of *CONTACT PAIR", "CLEARANCE,CONTACT INITIALIZATION DATA," &
          // "CONTACT INITIALIZATION ASSIGNMENT"), &
       refusal_t("use *CONTACT CONTROLS, STABILIZE", "CONTACT STABILIZATION,CONTACT CONTROLS " &

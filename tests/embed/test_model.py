@@ -252,7 +252,7 @@ def everything() -> Model:
                       restitution=0.5, damping=(0.0, 0.1, 0.5), tangent_fraction=0.5)
     model.contact_pair("S1", "S2", interaction="I", adjust=0.1, sides="BOTH", guard="NO", edges="YES",
                        initiation="PERSISTENT")
-    model.contact(interaction="I").contact("S1", ("S1", "S2"))
+    model.contact(interaction="I", type="NODE TO SURFACE").contact("S1", ("S1", "S2"), type="MORTAR")
     model.tie("T", "S1", "S2", position_tolerance=0.1, multiplier="DUAL")
     model.tie("CELL", "S1", "S2", translation=(1.0, 0.0), reference=1)
     model.tie("CUT", "S1", "S2", cyclic_symmetry=True).sectors(6, (0.0, 0.0), (0.0, 0.0), tie="CUT")

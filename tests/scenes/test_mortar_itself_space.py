@@ -12,6 +12,7 @@ from contact_space_scenes import RUBBER, bodies, dynamic
 from scene_tools import EPSILON, Run
 from space_mesh import Block
 from test_self_contact_space import ALL, THICK, arms_in_each_other, check_books, dropped, ran, skin, u_strip
+from wall_space_scenes import cube, falling, pair, plane
 
 MORTAR = "*SURFACE INTERACTION, NAME=I\n*CONTACT PAIR, INTERACTION=I, TYPE=MORTAR\n{0}, {0}\n"
 #: Energy and momenta, of the largest of each.
@@ -101,6 +102,23 @@ def test_many_cubes(n: tuple[int, int, int], tmp_path: Path) -> None:
     assert np.ptp(history["total"]) <= BALANCE*history["total"].max()
     assert history["active"].max() > 0
     assert overlap.worst(run.fields()).depth <= 64*EPSILON
+
+
+def test_all_exterior(tmp_path: Path) -> None:
+    """It is the one surface of all bodies, bit by bit; a wall meets it, too."""
+    everything, ends = ALL.replace("ALL EXTERIOR", "ALL EXTERIOR, TYPE=MORTAR"), []
+    for name, text in (("named", one_surface((2, 1, 2))), ("all", dropped((2, 1, 2), 0.01, 0.2).replace(ALL, everything))):
+        folder = tmp_path/name
+        folder.mkdir()
+        run = ran(folder, text)
+        assert run.history["active"].max() > 0
+        ends.append(run.fields()["displacement"][-1])
+    assert np.array_equal(*ends)
+    run = ran(tmp_path, falling(cube(), plane(), (0., 0., -1.)).replace(pair(), everything))
+    assert run.verdict["verdict"] == "good"
+    assert np.ptp(run.history["total"]) <= BALANCE*run.history["total"].max()
+    assert run.history["pair2_active"].max() > 0 and run.history["pair1_active"].max() == 0
+    assert "mortar" in next(line for line in run.log.splitlines() if "ALL_EXTERIOR (" in line and " W" in line)
 
 
 @pytest.mark.parametrize("friction", ["", "*FRICTION\n0.3\n"])
