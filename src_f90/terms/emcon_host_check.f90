@@ -42,7 +42,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call host_check_matrix(force%pattern, n_dim*n_node, n_dim*n_node, host_name(force) // &
-         ": its pattern", to_text(n_dim) // " freedoms for each of " // to_text(n_node) // " nodes", error)
+         ": its pattern", to_text(n_dim) // " freedoms for each of " // to_text(n_node) // &
+         " nodes", error)
    end subroutine host_check_force
 
    !> `mass` is a matrix between `n_node` nodes that can be one: finite, symmetric, not negative.
