@@ -25,7 +25,7 @@ ROOMS = (
 # The program knows runs and the stepper only; texts and errors of base are common to all.
 ONLY = {"app": {"app", "record", "stepper", "base"}}
 TOP = set("Makefile src_f90 pywrap input_decks tests docs".split())
-TOP |= set("README.md LICENSE CHANGELOG.md CITATION.cff pyproject.toml".split())
+TOP |= set("README.md LICENSE CHANGELOG.md CITATION.cff pyproject.toml CMakeLists.txt".split())
 
 #: Where the kinds of each abstract type are made: nobody else knows one of them by name.
 REGISTRY = {

@@ -477,6 +477,29 @@ class Interface:
         return self._call(_core.emcon_select, *self._motion(u0, du), flags)
 
     @_exclusive()
+    def select_candidates(self, u0: ArrayLike, du: ArrayLike, active: ArrayLike) -> int:
+        """In place of `select`: contacts of which any may act, stick or slide; how many rows.
+
+        All candidates have rows of their gaps and slips, and `solve_contacts` gives multipliers in
+        each iterate of Newton's method. `update_active` adds candidates until none is missing, and
+        lets go those that do not push once the step is solved.
+        """
+        flags = self._flags("active", active)
+        return self._call(_core.emcon_select_candidates, *self._motion(u0, du), flags)
+
+    @_exclusive()
+    def solve_contacts(self, w: ArrayLike, free: ArrayLike) -> Floats:
+        """The multipliers that obey the laws of all candidates, (n,).
+
+        `w`: c K^-1 g^T, (n, n), with the host's tangent K; `free`: the defect less c K^-1 times the
+        residual without contact forces, (n,). Newton's step is then K^-1 (g^T lam - residual).
+        Raises `AnalysisError` where none are found.
+        """
+        n = self._n_selected()
+        return self._call(_core.emcon_solve_contacts, real_array(w, "w", (n, n)),
+                          real_array(free, "free", (n,)))
+
+    @_exclusive()
     def choose(self, u0: ArrayLike, du: ArrayLike, contact: ArrayLike, target: ArrayLike) -> None:
         """Select contacts by their numbers, (n,) ascending, with gaps to hold, (n,) [L].
 

@@ -635,6 +635,21 @@ int emcon_select(emcon_model *model, int n_node, const double *u0 /* n_node x n_
                  const double *du /* n_node x n_dim */, int n_constraint,
                  const int *active /* n_constraint */, int *n);
 
+/* In place of emcon_select: `active` are candidates, any of which may act, stick or slide; `*n` counts
+ * the rows of all gaps and slips. Their multipliers come from emcon_solve_contacts in each iterate of
+ * Newton's method: for friction of any size, where sets would come back. emcon_update_active then
+ * lets go what does not push once the step is solved. */
+int emcon_select_candidates(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
+                            const double *du /* n_node x n_dim */, int n_constraint,
+                            const int *active /* n_constraint */, int *n);
+
+/* The multipliers that obey the laws of all candidates. With the end gradients C, the directions G
+ * and the tangent K of the host `w` is C K^-1 G^T, by rows; `free` is the defect less C K^-1 times the
+ * residual without contact forces. Newton's step is then K^-1 (G^T lam - residual). */
+int emcon_solve_contacts(emcon_model *model, int n_selected,
+                         const double *w /* n_selected x n_selected */,
+                         const double *free /* n_selected */, double *lam /* n_selected */);
+
 /* Select n constraints by their numbers, ascending, with gaps to hold of the caller's own choice.
  * emcon_update_active does not go with these. */
 int emcon_choose(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,

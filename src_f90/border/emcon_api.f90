@@ -48,8 +48,9 @@
 !> the multipliers or with `query_null_space`, `query_particular`, `query_multipliers`. Pressures
 !> are multipliers over `query_areas`; `query_overlap` judges the step by geometry alone. Friction
 !> is that of `interaction_t`, given with the pair; in dynamic steps `query_begin_friction` brings
-!> velocities along surfaces to rest, and `query_slips` tells what slides. `query_set_map`: gradients
-!> by other unknowns than displacements of the nodes.
+!> velocities along surfaces to rest, and `query_slips` tells what slides. For friction of any size
+!> solve with `query_select_candidates` and `query_solve_contacts`. `query_set_map`: gradients by
+!> other unknowns than displacements of the nodes.
 module emcon_api
    use emcon_contact, only : gap_state_t
    use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
@@ -105,6 +106,7 @@ module emcon_api
    use emcon_stepper_loads, only : stepper_add_loads, stepper_find_load, stepper_set_load
    use emcon_stepper_null_space, only : query_follow_links, query_gather_links, query_links, &
       query_multipliers, query_null_space, query_particular, query_row_multipliers
+   use emcon_stepper_problem, only : query_select_candidates, query_solve_contacts
    use emcon_stepper_query, only : query_evaluate, query_follow, query_free, query_guess, &
       query_mass, query_momenta, query_residual, query_t, query_tangent, query_unknowns
    use emcon_stepper_report, only : contact_report_t, query_constraints, query_curvature, &

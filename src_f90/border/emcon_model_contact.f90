@@ -11,10 +11,12 @@ module emcon_model_contact
    use emcon_overlap_check, only : overlap_t
    use emcon_stepper_contact, only : query_gaps, query_overlap, query_select
    use emcon_stepper_host, only : stepper_add_pair, stepper_set_contact
+   use emcon_stepper_problem, only : query_select_candidates
    use emcon_steps, only : initiation_persistent
    implicit none
    private
    public :: model_add_pair, model_set_contact, model_gaps, model_select, model_overlap
+   public :: model_select_candidates
 
 contains
 
@@ -93,6 +95,18 @@ contains
       n = 0
       if (.not. allocated(error)) n = model%query%march%active%set%n_row
    end subroutine model_select
+
+   subroutine model_select_candidates(model, u0, du, active, n, error)
+      type(model_t), intent(inout) :: model
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :) !! (n_dim, n_node)
+      logical, intent(in) :: active(:)                       !! (n_constraint)
+      integer, intent(out) :: n
+      type(error_t), allocatable, intent(out) :: error
+
+      call query_select_candidates(model%query, model%stepper, u0, du, active, error)
+      n = 0
+      if (.not. allocated(error)) n = model%query%march%active%set%n_row
+   end subroutine model_select_candidates
 
    subroutine model_overlap(model, u0, du, depth, node, error)
       type(model_t), intent(inout) :: model

@@ -8,7 +8,8 @@ module emcon_host_friction
    use emcon_active_set, only : active_set_t
    use emcon_constraint, only : condition_t, most_slips
    use emcon_constraints, only : constraint_index
-   use emcon_coulomb_law, only : contact_slides, coulomb_t, has_way, slip_status_t
+   use emcon_contact_problem, only : contact_problem_t
+   use emcon_coulomb_law, only : contact_open, contact_slides, coulomb_t, has_way, slip_status_t
    use emcon_friction, only : friction_close, friction_keep, friction_look_back, friction_turn, &
       friction_use, most_lagged, most_shift
    use emcon_kinds, only : wp
@@ -18,6 +19,7 @@ module emcon_host_friction
    private
    public :: host_friction_begin, host_friction_turn, host_friction_turn_few, &
       host_friction_status, host_friction_lags, host_friction_look_back, host_friction_ways
+   public :: host_friction_slides, host_friction_hold, host_friction_lay_out, host_friction_take
 
    !> Of contacts that would begin to slide those do whose friction is over what their push allows
    !> by more than this part of the worst.
@@ -68,6 +70,55 @@ contains
          end associate
       end do
    end subroutine host_friction_turn
+
+   !> Does constraint `id` slide, as it holds now?
+   pure logical function host_friction_slides(active, id) result(slides)
+      type(active_set_t), intent(in) :: active
+      integer, intent(in) :: id                  !! 1..n_constraint
+
+      slides = active%friction%is_on
+      if (slides) slides = active%friction%law(id)%mu > 0.0_wp .and. &
+         active%friction%law(id)%status%kind == contact_slides
+   end function host_friction_slides
+
+   !> All candidates are to have rows of their slips, whichever way they go.
+   pure subroutine host_friction_hold(active)
+      type(active_set_t), intent(inout) :: active
+
+      active%friction%follows = .false.
+      if (active%friction%is_on) active%friction%law%status = slip_status_t()
+   end subroutine host_friction_hold
+
+   !> Coefficients and slips of a problem of the contacts of the set.
+   pure subroutine host_friction_lay_out(active, problem)
+      type(active_set_t), intent(in) :: active
+      type(contact_problem_t), intent(inout) :: problem
+      integer :: k
+
+      if (problem%n_slip == 0) return
+      do k = active%set%n_permanent + 1, active%set%n
+         associate (item => active%set%item(k), law => active%friction%law(active%set%id(k)))
+            if (.not. item%has_friction) cycle
+            problem%mu(k) = law%mu*item%normal
+            problem%slip_target(:, k) = law%slip_target(:problem%n_slip)
+            problem%free(1:, k) = problem%free(1:, k) - problem%slip_target(:, k)
+         end associate
+      end do
+   end subroutine host_friction_lay_out
+
+   !> How the contacts of the set hold by the solution of their problem.
+   pure subroutine host_friction_take(active, status)
+      type(active_set_t), intent(inout) :: active
+      type(slip_status_t), intent(in) :: status(:)         !! (n)
+      integer :: k
+
+      if (.not. active%friction%is_on) return
+      do k = active%set%n_permanent + 1, active%set%n
+         active%friction%law(active%set%id(k))%status = status(k)
+         if (status(k)%kind == contact_open) active%friction%law(active%set%id(k))%status = &
+            slip_status_t()
+      end do
+   end subroutine host_friction_take
 
    !> How all contacts hold; none without friction.
    pure subroutine host_friction_status(active, status)

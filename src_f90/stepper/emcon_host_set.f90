@@ -20,8 +20,8 @@ module emcon_host_set
    use emcon_system, only : system_t
    implicit none
    private
-   public :: host_set_t, host_set_begin, host_set_choose, host_set_try, host_set_advance, &
-      host_set_drop, host_set_next
+   public :: host_set_t, host_set_begin, host_set_choose, host_set_condense, host_set_try, &
+      host_set_advance, host_set_drop, host_set_next
 
    !> Sets of one step at most.
    integer, parameter :: most_sets = 40
@@ -32,6 +32,7 @@ module emcon_host_set
       integer :: n_tried = 0
       logical :: only_adds = .false.             !! nothing is let go any more
       logical :: turns_few = .false.             !! of what would slide only the worst does
+      logical :: is_problem = .false.            !! its contacts are candidates, solved as one
    end type host_set_t
 
 contains
@@ -60,8 +61,16 @@ contains
       logical, intent(in) :: acts(:)             !! (n_constraint)
 
       active%is_active = acts
+      self%is_problem = .false.
       call host_set_try(self, active)
    end subroutine host_set_choose
+
+   !> What was chosen are candidates: which of them act is told by their multipliers.
+   pure subroutine host_set_condense(self)
+      type(host_set_t), intent(inout) :: self
+
+      self%is_problem = .true.
+   end subroutine host_set_condense
 
    !> The host solves with what acts.
    pure subroutine host_set_try(self, active)
@@ -88,8 +97,11 @@ contains
       before = active%is_active
       call host_friction_status(active, held)
       call update(self, active, system, motion, status)
-      call host_friction_turn(active, host_set_next(active), system, turns)
-      if (self%turns_few) call host_friction_turn_few(active, held)
+      turns = .false.
+      if (.not. self%is_problem) then
+         call host_friction_turn(active, host_set_next(active), system, turns)
+         if (self%turns_few) call host_friction_turn_few(active, held)
+      end if
       is_done = status /= step_done
       if (active%is_stale) then
          call active_set_note_stale(active, status)
@@ -102,8 +114,10 @@ contains
          call host_friction_lags(active, before, system, turns)
          if (.not. turns) call host_friction_look_back(active, before, system, motion, turns)
          is_done = .not. turns
+         if (is_done .and. self%is_problem) call let_go(active)
          return
       end if
+      if (self%is_problem .and. self%n_tried < most_sets) return
       if (.not. (comes_again(self, active) .or. self%n_tried == most_sets)) return
       if (size(held) > 0 .and. .not. self%turns_few) then
          self%turns_few = .true.
@@ -141,8 +155,10 @@ contains
                id = first + i
                if (active%is_active(id)) then
                   k = k + 1
-                  call look_at_active(active, contact, i, k, motion, status)
-                  changes = contact%state(i)%is_leaving .or. .not. (self%only_adds .or. &
+                  changes = contact%state(i)%is_leaving
+                  if (.not. (self%is_problem .and. .not. active%set%lam(k) > 0.0_wp)) &
+                     call look_at_active(active, contact, i, k, motion, status)
+                  if (.not. self%is_problem) changes = changes .or. .not. (self%only_adds .or. &
                      active%set%lam(k) >= -noise_at(active, system, contact%node(i)))
                else
                   call look_at_left_out(active, system, pair, i, status)
@@ -178,6 +194,16 @@ contains
             + gap%closed) - touch_tol*gap%size) status = step_too_far
       end associate
    end subroutine look_at_left_out
+
+   !> The step is solved with all candidates: those that do not push do not act.
+   pure subroutine let_go(active)
+      type(active_set_t), intent(inout) :: active
+      integer :: k
+
+      do k = active%set%n_permanent + 1, active%set%n
+         active%is_active(active%set%id(k)) = active%set%lam(k) > 0.0_wp
+      end do
+   end subroutine let_go
 
    !> Was the next set tried before?
    pure logical function comes_again(self, active)

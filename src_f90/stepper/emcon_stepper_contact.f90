@@ -20,7 +20,7 @@ module emcon_stepper_contact
    use emcon_errors, only : error_t
    use emcon_contact_support, only : contact_support_t
    use emcon_friction, only : friction_begin
-   use emcon_host_friction, only : host_friction_begin
+   use emcon_host_friction, only : host_friction_begin, host_friction_slides
    use emcon_host_set, only : host_set_advance, host_set_begin, host_set_choose, &
       host_set_drop, host_set_next
    use emcon_overlap_check, only : overlap_check_step, overlap_t
@@ -327,12 +327,14 @@ contains
          // "step", error)
       if (allocated(error)) return
       associate (set => self%march%active%set, n => self%march%system%n_constraint, &
-            n_slip => stepper%scene%n_dim - 1)
+            n_slip => stepper%scene%n_dim - 1, acts => host_set_next(self%march%active))
          allocate(way(n), source=0)
          allocate(slip(n_slip, n), friction(n_slip, n), source=0.0_wp)
          do k = set%n_permanent + 1, set%n
             associate (item => set%item(k), id => set%id(k))
-               way(id) = merge(2, 1, any(abs(item%response%mu_sigma) > 0.0_wp))
+               ! A candidate that does not push does not act.
+               if (.not. acts(id)) cycle
+               way(id) = merge(2, 1, host_friction_slides(self%march%active, id))
                if (.not. item%has_friction) cycle
                drag = condition_friction(item, set%lam(k))
                slip(:, id) = item%slip(:n_slip)

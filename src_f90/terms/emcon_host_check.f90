@@ -41,8 +41,9 @@ contains
       integer, intent(in) :: n_dim, n_node       !! of the model
       type(error_t), allocatable, intent(out) :: error
 
-      call host_check_matrix(force%pattern, n_dim*n_node, n_dim*n_node, host_name(force) // ": its pattern", &
-         to_text(n_dim) // " freedoms for each of " // to_text(n_node) // " nodes", error)
+      call host_check_matrix(force%pattern, n_dim*n_node, n_dim*n_node, host_name(force) // &
+         ": its pattern", to_text(n_dim) // " freedoms for each of " // to_text(n_node) // &
+         " nodes", error)
    end subroutine host_check_force
 
    !> `mass` is a matrix between `n_node` nodes that can be one: finite, symmetric, not negative.
@@ -52,8 +53,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
       integer :: i, j, k
 
-      call host_check_matrix(mass, size(scene%x, 2), size(scene%x, 2), "the given mass", to_text(size(scene%x, 2)) // &
-         " nodes", error)
+      call host_check_matrix(mass, size(scene%x, 2), size(scene%x, 2), "the given mass", &
+         to_text(size(scene%x, 2)) // " nodes", error)
       if (allocated(error)) return
       if (.not. allocated(mass%value)) then
          call raise(error, err_input, "the given mass has no values")

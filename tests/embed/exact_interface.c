@@ -148,6 +148,22 @@ static void differentiate(double *u0, double *du, int n, int m, int *active)
    free(length);
 }
 
+static void condense(double *u0, double *du, int m, const int *active)
+{
+   int n;
+   WORKS(emcon_select_candidates(face, n_node, u0, du, m, active, &n));
+   REFUSED_ALL(k, emcon_select_candidates(face, n_node, u0, du, k, active, &n));
+   WORKS(emcon_evaluate_contact(face, n_node, u0, du, NULL));
+   double *w = numbers(n*n), *opening = numbers(n), *lam = numbers(n);
+   for (int i = 0; i < n; ++i) w[(n + 1)*i] = opening[i] = 1;
+   WORKS(emcon_solve_contacts(face, n, w, opening, lam));
+   need(lam[0] == 0, "emcon_solve_contacts", "what opens pushes");
+   REFUSED_ALL(k, emcon_solve_contacts(face, k, w, opening, lam));
+   free(w);
+   free(opening);
+   free(lam);
+}
+
 static void step(int has_friction)
 {
    emcon_sizes sizes;
@@ -177,6 +193,9 @@ static void step(int has_friction)
    WORKS(emcon_evaluate_contact(face, n_node, u0, du, &values));
    WORKS(emcon_evaluate_contact(face, n_node, u0, du, NULL));
    eliminate(&sizes, n);
+   condense(u0, du, m, active);
+   WORKS(emcon_select(face, n_node, u0, du, m, active, &n));
+   WORKS(emcon_evaluate_contact(face, n_node, u0, du, &values));
    differentiate(u0, du, n, m, active);
    WORKS(emcon_begin_contact(face, n_node, u0, du, m, active, active));
    for (int i = n_row; i < m; ++i) active[i] = 1;

@@ -101,12 +101,12 @@ class Host:
         return 0.5*v @ self.solid.mass @ v + self.solid.energy(self.u) + self.lost
 
     def step(self, h: float) -> None:
-        """One step, solved with the multipliers as unknowns."""
+        """One step, solved with all candidates until none is missing."""
         face, du, outcome = self.face, h*self.v, None
         self.active = face.begin_step(self.u, du, self.active, stop=0.5*h*self.v)    # emcon
         while outcome is None:
-            lam = np.zeros(face.select(self.u, du, self.active))                     # emcon
-            du = self.newton(h, du, lam)
+            n = face.select_candidates(self.u, du, self.active)                      # emcon
+            du, lam = self.newton(h, du, np.zeros(n))
             self.active, outcome = face.update_active(self.u, du, lam, self.active)  # emcon
         if outcome is not Outcome.DONE:
             raise ArithmeticError(f"the step cannot be ended: {outcome.name}")
@@ -116,23 +116,28 @@ class Host:
         self.n_sticking += int((slips.status == 1).sum())
         self.u, self.v = self.u + du, 2/h*du - self.v
 
-    def newton(self, h: float, du: Floats, lam: Floats) -> Floats:
-        """The motion for the selected contacts; `lam` becomes their multipliers."""
-        free, n, last = self.free, len(self.free), np.inf
-        for _ in range(30):
+    def newton(self, h: float, du: Floats, lam: Floats) -> tuple[Floats, Floats]:
+        """The motion, and the multipliers that obey the laws of contact.
+
+        In each iterate the equations are condensed to the rows of contact: w is their compliance.
+        """
+        free, last = self.free, np.inf
+        for _ in range(40):
             force, tangent = self.solid.respond(self.u, du)
             rows = self.face.evaluate(self.u, du)                                # emcon
             g, c = rows.g.toarray()[:, free], rows.c.toarray()[:, free]          # emcon
-            residual = (self.solid.mass @ (2/h*(du/h - self.v)).ravel() + force)[free] - g.T @ lam
+            residual = (self.solid.mass @ (2/h*(du/h - self.v)).ravel() + force)[free]
             tangent += 2/h**2*self.solid.mass - self.face.curvature(lam).toarray()   # emcon
-            matrix = np.block([[tangent[np.ix_(free, free)], -g.T], [c, np.zeros((len(lam), len(lam)))]])
-            found = np.linalg.solve(matrix, -np.concatenate([residual, rows.defect]))
+            solved = np.linalg.solve(tangent[np.ix_(free, free)], np.column_stack([g.T, residual]))
+            by_lam, alone = solved[:, :-1], solved[:, -1]
+            if len(lam):
+                lam = self.face.solve_contacts(c @ by_lam, rows.defect - c @ alone)  # emcon
+            motion = by_lam @ lam - alone
             du = du.copy()
-            du.ravel()[free] += found[:n]
-            lam += found[n:]
-            size = np.abs(found[:n]).max()
+            du.ravel()[free] += motion
+            size = np.abs(motion).max()
             if size <= 1e-15 or last <= size < 1e-11:
-                return du
+                return du, lam
             last = size
         raise ArithmeticError(f"Newton's method still moves by {size:g}")
 
