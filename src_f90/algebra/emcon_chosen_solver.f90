@@ -16,11 +16,12 @@ module emcon_chosen_solver
    public :: chosen_solver_t
 
    !> Operations on dense blocks take that much less time than those of iterations.
-   real(dp), parameter :: dense_gain = 10.0_dp
-   !> Solutions for each factorisation, and steps for each solution: of one that is kept, asked for
-   !> two digits or so, and of Newton's method, for four.
+   real(dp), parameter :: dense_gain = 4.0_dp
+   !> Solutions for each factorisation, of one that is kept and of Newton's method.
    integer, parameter :: kept_solutions = 50, newton_solutions = 2
-   integer, parameter :: kept_steps = 10, newton_steps = 100
+   !> Steps for two digits of a body with mass, and for four of one without: with the number of
+   !> unknowns along a side of it. A cube takes half as many, a slender body more.
+   real(dp), parameter :: kept_steps = 7.0_dp, newton_steps = 4.0_dp
    !> A solution may take as many steps as a factor costs, and these at any rate.
    integer, parameter :: least_steps = 200, most_steps = 10000
 
@@ -90,13 +91,14 @@ contains
    subroutine choose(self, matrix)
       class(chosen_solver_t), intent(inout) :: self      !! `direct` has analysed the pattern
       type(csr_t), intent(in) :: matrix
-      real(dp) :: step, factor, solution
-      integer :: n_solution, n_step
+      real(dp) :: step, n_step, factor, solution
+      integer :: n_solution
 
       self%iterates = .false.
       if (.not. self%accuracy > 0.0_dp) return
       n_solution = merge(kept_solutions, newton_solutions, self%needs_halves)
-      n_step = merge(kept_steps, newton_steps, self%needs_halves)
+      n_step = kept_steps
+      if (.not. self%needs_halves) n_step = newton_steps*real(matrix%n_row, dp)**(1.0_dp/3.0_dp)
       step = 4.0_dp*size(matrix%column)
       factor = self%direct%n_operation/dense_gain
       solution = 4.0_dp*real(self%direct%n_factor, dp)
