@@ -8,7 +8,7 @@
 module emcon_chosen_solver
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
-   use emcon_iterative_solver, only : iterative_matrix, iterative_solver_t
+   use emcon_iterative_solver, only : iterative_matrix, iterative_solver_t, iterative_work
    use emcon_kinds, only : dp, wp
    use emcon_sparse_solver, only : sparse_solver_t
    implicit none
@@ -66,11 +66,8 @@ contains
       call self%direct%analyse(matrix, error)
       if (allocated(error) .or. self%direct%n_analysis == before) return
       self%n_analysis = self%n_analysis + 1
-      call choose(self, matrix)
+      call choose(self, matrix, error)
       self%is_incomplete = self%iterates
-      if (.not. self%iterates) return
-      call self%direct%free()
-      call self%iterative%analyse(matrix, error)
    end subroutine chosen_analyse
 
    !> Hand on what was set.
@@ -87,25 +84,46 @@ contains
       self%iterative%accuracy = self%accuracy
    end subroutine prepare_direct
 
-   !> Iterations or factors? By what a factorisation and its solutions take.
-   subroutine choose(self, matrix)
+   !> Iterations or factors? First by the entries of the matrix, then by those of its blocks, which
+   !> are filled up where nodes have fewer than three unknowns.
+   subroutine choose(self, matrix, error)
       class(chosen_solver_t), intent(inout) :: self      !! `direct` has analysed the pattern
       type(csr_t), intent(in) :: matrix
-      real(dp) :: step, n_step, factor, solution
-      integer :: n_solution
+      type(error_t), allocatable, intent(out) :: error
+      real(dp) :: step
 
-      self%iterates = .false.
-      if (.not. self%accuracy > 0.0_dp) return
-      n_solution = merge(kept_solutions, newton_solutions, self%needs_halves)
-      n_step = kept_steps
-      if (.not. self%needs_halves) n_step = newton_steps*real(matrix%n_row, dp)**(1.0_dp/3.0_dp)
+      self%n_factor = self%direct%n_factor
+      self%n_operation = self%direct%n_operation
       step = 4.0_dp*size(matrix%column)
-      factor = self%direct%n_operation/dense_gain
-      solution = 4.0_dp*real(self%direct%n_factor, dp)
-      self%iterates = self%prefers_iterations .or. n_solution*n_step*step &
-         < factor + n_solution*solution
-      self%iterative%most_steps = max(least_steps, int(min(real(most_steps, dp), factor/step)))
+      self%iterates = self%accuracy > 0.0_dp .and. (self%prefers_iterations &
+         .or. takes_less(self, matrix%n_row, step))
+      if (.not. self%iterates) return
+      call self%iterative%analyse(matrix, error)
+      if (allocated(error)) return
+      step = iterative_work(self%iterative)
+      self%iterates = self%prefers_iterations .or. takes_less(self, matrix%n_row, step)
+      if (self%iterates) then
+         call self%direct%free()
+      else
+         call self%iterative%free()
+      end if
+      self%iterative%most_steps = max(least_steps, int(min(real(most_steps, dp), &
+         self%n_operation/dense_gain/step)))
    end subroutine choose
+
+   !> Do iterations whose steps take `step` operations take fewer of them than factors?
+   pure logical function takes_less(self, n, step)
+      class(chosen_solver_t), intent(in) :: self
+      integer, intent(in) :: n                   !! unknowns
+      real(dp), intent(in) :: step
+      real(dp) :: n_step, n_solution
+
+      n_solution = real(merge(kept_solutions, newton_solutions, self%needs_halves), dp)
+      n_step = kept_steps
+      if (.not. self%needs_halves) n_step = newton_steps*real(n, dp)**(1.0_dp/3.0_dp)
+      takes_less = n_solution*n_step*step < self%n_operation/dense_gain &
+         + n_solution*4.0_dp*real(self%n_factor, dp)
+   end function takes_less
 
    subroutine chosen_factorise(self, value, error)
       class(chosen_solver_t), intent(inout) :: self
@@ -156,7 +174,7 @@ contains
 
       self%is_singular = solver%is_singular
       self%rcond = solver%rcond
-      self%n_factor = solver%n_factor
+      if (.not. solver%is_incomplete) self%n_factor = solver%n_factor
       self%half_scale = solver%half_scale
    end subroutine take_figures
 

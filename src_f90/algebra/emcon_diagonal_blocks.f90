@@ -37,6 +37,8 @@ module emcon_diagonal_blocks
       logical :: may_be_rough = .false.          !! as of solvers, set before `blocks_analyse`
       real(dp) :: accuracy = 0.0_dp              !! the same
       logical :: is_incomplete = .false.         !! some block's factors are
+      !> Entries and operations of complete factors, as far as solvers predict them
+      real(dp) :: n_entry = 0.0_dp, n_operation = 0.0_dp
       integer :: n_thread = 1                    !! that may work on the blocks
       integer :: n_block = 0
       integer :: n_factor = 0                    !! factors of blocks made of this pattern
@@ -61,6 +63,8 @@ contains
       if (.not. is_new) return
       call blocks_free(self)
       call find_blocks(self, matrix)
+      self%n_entry = 0.0_dp
+      self%n_operation = 0.0_dp
       self%is_symmetric = .true.
       do b = 1, self%n_block
          call extract(self, self%block(b), matrix)
@@ -73,6 +77,8 @@ contains
          self%block(b)%solver%is_scaled = .true.
          call self%block(b)%solver%analyse(self%block(b)%matrix, error)
          if (allocated(error)) return
+         self%n_entry = self%n_entry + real(self%block(b)%solver%n_factor, dp)
+         self%n_operation = self%n_operation + self%block(b)%solver%n_operation
       end do
    end subroutine blocks_analyse
 
