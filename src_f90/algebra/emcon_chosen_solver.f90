@@ -1,9 +1,9 @@
 !> Iterations or factors for symmetric definite matrices: whichever is predicted to take less.
 !>
-!> Iterations come into question where solutions need not be exact (`accuracy`). The order in which a
-!> matrix would be factorised tells what that takes; counts decide, not seconds, so that a run
-!> chooses alike whenever it is repeated. Where iterations do not come to an end, or the matrix turns
-!> out not to be definite, it is factorised after all, until the next values.
+!> Iterations come into question where solutions need not be exact (`accuracy`). The order in which
+!> a matrix would be factorised tells what that takes; counts decide, not seconds, so that a run
+!> chooses alike whenever it is repeated. Where iterations do not come to an end, or the matrix
+!> turns out not to be definite, it is factorised after all, until the next values.
 !> Source: docs/theory.md, section 8.
 module emcon_chosen_solver
    use emcon_csr, only : csr_t
@@ -79,7 +79,6 @@ contains
       self%direct%needs_halves = self%needs_halves
       self%direct%may_be_rough = self%may_be_rough
       self%direct%is_scaled = self%is_scaled
-      self%iterative%symmetry = self%symmetry
       self%iterative%is_scaled = self%is_scaled
       self%iterative%accuracy = self%accuracy
    end subroutine prepare_direct
@@ -135,7 +134,8 @@ contains
       if (self%iterates) then
          call self%iterative%factorise(value, error)
          if (allocated(error)) return
-         call take_figures(self, self%iterative)
+         self%is_singular = self%iterative%is_singular
+         self%half_scale = self%iterative%half_scale
          if (self%is_singular .and. self%iterative%is_filled) call factorise_after_all(self, error)
       else
          call self%direct%factorise(value, error)
@@ -174,7 +174,7 @@ contains
 
       self%is_singular = solver%is_singular
       self%rcond = solver%rcond
-      if (.not. solver%is_incomplete) self%n_factor = solver%n_factor
+      self%n_factor = solver%n_factor
       self%half_scale = solver%half_scale
    end subroutine take_figures
 
@@ -216,7 +216,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       if (self%by == by_iterations) then
-         call self%iterative%solve_half(is_second, rhs, x, error)
+         call self%iterative%solve_half(is_second, rhs, x)
       else
          call self%direct%solve_half(is_second, rhs, x, error)
       end if
@@ -240,7 +240,7 @@ contains
       real(dp), intent(inout), contiguous :: y(:)
       type(error_t), allocatable, intent(out) :: error
 
-      call self%iterative%multiply(x, y, error)
+      call self%iterative%multiply(x, y)
    end subroutine chosen_multiply
 
    subroutine chosen_free(self)

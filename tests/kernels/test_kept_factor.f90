@@ -62,9 +62,9 @@ contains
       call kept_factor_free(kept)
    end subroutine test_correction
 
-   !> The same with an incomplete factor: asked for two digits it meets the constraints to round-off,
-   !> corrections of what is left come to the end, and of many digits one is enough. Contacts that
-   !> give way are not for it.
+   !> The same with an incomplete factor: asked for two digits it meets the constraints to
+   !> round-off, corrections of what is left come to the end, and of many digits one is enough.
+   !> Contacts that give way are not for it.
    subroutine test_iterations(error)
       type(error_t), allocatable, intent(out) :: error
       type(problem_t) :: problem
@@ -95,8 +95,8 @@ contains
       if (.not. allocated(error)) call kept_factor_take(kept, problem%set, is_fit, error)
       if (allocated(error)) return
       call check_true(error, is_fit .and. kept%blocks%is_incomplete, "it is an incomplete factor")
-      if (.not. allocated(error)) call kept_factor_correct(kept, problem%set, problem%residual, dq, &
-         error)
+      if (allocated(error)) return
+      call kept_factor_correct(kept, problem%set, problem%residual, dq, error)
       if (allocated(error)) return
       call check_near(error, real(matmul(g, real(dq, dp)), wp), -problem%set%defect, tol_dp, &
          maxval(abs(dq)), "constraints")
