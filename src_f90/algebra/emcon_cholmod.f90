@@ -155,8 +155,8 @@ contains
       if (status == cholmod_ok) then
          call emcon_cholmod_counts(self%handle, self%n_operation, n_factor)
          self%n_factor = int(n_factor, int64)
-         if (self%needs_halves .and. self%may_be_rough .and. self%n_operation >= least_density*n_factor) &
-            call find_nodes(self, status)
+         if (self%needs_halves .and. self%may_be_rough &
+            .and. self%n_operation >= least_density*n_factor) call find_nodes(self, status)
       end if
       self%n_analysis = self%n_analysis + 1
       if (status /= cholmod_ok) call solver_raise(error, "CHOLMOD", "ordering", int(status), &

@@ -1,14 +1,14 @@
 !> Iterations or factors for symmetric definite matrices: whichever is predicted to take less.
 !>
-!> Iterations come into question where solutions need not be exact (`accuracy`). The order in which a
-!> matrix would be factorised tells what that takes; counts decide, not seconds, so that a run
-!> chooses alike whenever it is repeated. Where iterations do not come to an end, or the matrix turns
-!> out not to be definite, it is factorised after all, until the next values.
+!> Iterations come into question where solutions need not be exact (`accuracy`). The order in which
+!> a matrix would be factorised tells what that takes; counts decide, not seconds, so that a run
+!> chooses alike whenever it is repeated. Where iterations do not come to an end, or the matrix
+!> turns out not to be definite, it is factorised after all, until the next values.
 !> Source: docs/theory.md, section 8.
 module emcon_chosen_solver
    use emcon_csr, only : csr_t
    use emcon_errors, only : error_t
-   use emcon_iterative_solver, only : iterative_matrix, iterative_solver_t
+   use emcon_iterative_solver, only : iterative_matrix, iterative_solver_t, iterative_work
    use emcon_kinds, only : dp, wp
    use emcon_sparse_solver, only : sparse_solver_t
    implicit none
@@ -16,11 +16,12 @@ module emcon_chosen_solver
    public :: chosen_solver_t
 
    !> Operations on dense blocks take that much less time than those of iterations.
-   real(dp), parameter :: dense_gain = 10.0_dp
-   !> Solutions for each factorisation, and steps for each solution: of one that is kept, asked for
-   !> two digits or so, and of Newton's method, for four.
+   real(dp), parameter :: dense_gain = 4.0_dp
+   !> Solutions for each factorisation, of one that is kept and of Newton's method.
    integer, parameter :: kept_solutions = 50, newton_solutions = 2
-   integer, parameter :: kept_steps = 10, newton_steps = 100
+   !> Steps for two digits of a body with mass, and for four of one without: with the number of
+   !> unknowns along a side of it. A cube takes half as many, a slender body more.
+   real(dp), parameter :: kept_steps = 7.0_dp, newton_steps = 4.0_dp
    !> A solution may take as many steps as a factor costs, and these at any rate.
    integer, parameter :: least_steps = 200, most_steps = 10000
 
@@ -65,11 +66,8 @@ contains
       call self%direct%analyse(matrix, error)
       if (allocated(error) .or. self%direct%n_analysis == before) return
       self%n_analysis = self%n_analysis + 1
-      call choose(self, matrix)
+      call choose(self, matrix, error)
       self%is_incomplete = self%iterates
-      if (.not. self%iterates) return
-      call self%direct%free()
-      call self%iterative%analyse(matrix, error)
    end subroutine chosen_analyse
 
    !> Hand on what was set.
@@ -81,29 +79,50 @@ contains
       self%direct%needs_halves = self%needs_halves
       self%direct%may_be_rough = self%may_be_rough
       self%direct%is_scaled = self%is_scaled
-      self%iterative%symmetry = self%symmetry
       self%iterative%is_scaled = self%is_scaled
       self%iterative%accuracy = self%accuracy
    end subroutine prepare_direct
 
-   !> Iterations or factors? By what a factorisation and its solutions take.
-   subroutine choose(self, matrix)
+   !> Iterations or factors? First by the entries of the matrix, then by those of its blocks, which
+   !> are filled up where nodes have fewer than three unknowns.
+   subroutine choose(self, matrix, error)
       class(chosen_solver_t), intent(inout) :: self      !! `direct` has analysed the pattern
       type(csr_t), intent(in) :: matrix
-      real(dp) :: step, factor, solution
-      integer :: n_solution, n_step
+      type(error_t), allocatable, intent(out) :: error
+      real(dp) :: step
 
-      self%iterates = .false.
-      if (.not. self%accuracy > 0.0_dp) return
-      n_solution = merge(kept_solutions, newton_solutions, self%needs_halves)
-      n_step = merge(kept_steps, newton_steps, self%needs_halves)
+      self%n_factor = self%direct%n_factor
+      self%n_operation = self%direct%n_operation
       step = 4.0_dp*size(matrix%column)
-      factor = self%direct%n_operation/dense_gain
-      solution = 4.0_dp*real(self%direct%n_factor, dp)
-      self%iterates = self%prefers_iterations .or. n_solution*n_step*step &
-         < factor + n_solution*solution
-      self%iterative%most_steps = max(least_steps, int(min(real(most_steps, dp), factor/step)))
+      self%iterates = self%accuracy > 0.0_dp .and. (self%prefers_iterations &
+         .or. takes_less(self, matrix%n_row, step))
+      if (.not. self%iterates) return
+      call self%iterative%analyse(matrix, error)
+      if (allocated(error)) return
+      step = iterative_work(self%iterative)
+      self%iterates = self%prefers_iterations .or. takes_less(self, matrix%n_row, step)
+      if (self%iterates) then
+         call self%direct%free()
+      else
+         call self%iterative%free()
+      end if
+      self%iterative%most_steps = max(least_steps, int(min(real(most_steps, dp), &
+         self%n_operation/dense_gain/step)))
    end subroutine choose
+
+   !> Do iterations whose steps take `step` operations take fewer of them than factors?
+   pure logical function takes_less(self, n, step)
+      class(chosen_solver_t), intent(in) :: self
+      integer, intent(in) :: n                   !! unknowns
+      real(dp), intent(in) :: step
+      real(dp) :: n_step, n_solution
+
+      n_solution = real(merge(kept_solutions, newton_solutions, self%needs_halves), dp)
+      n_step = kept_steps
+      if (.not. self%needs_halves) n_step = newton_steps*real(n, dp)**(1.0_dp/3.0_dp)
+      takes_less = n_solution*n_step*step < self%n_operation/dense_gain &
+         + n_solution*4.0_dp*real(self%n_factor, dp)
+   end function takes_less
 
    subroutine chosen_factorise(self, value, error)
       class(chosen_solver_t), intent(inout) :: self
@@ -115,7 +134,8 @@ contains
       if (self%iterates) then
          call self%iterative%factorise(value, error)
          if (allocated(error)) return
-         call take_figures(self, self%iterative)
+         self%is_singular = self%iterative%is_singular
+         self%half_scale = self%iterative%half_scale
          if (self%is_singular .and. self%iterative%is_filled) call factorise_after_all(self, error)
       else
          call self%direct%factorise(value, error)
@@ -196,7 +216,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       if (self%by == by_iterations) then
-         call self%iterative%solve_half(is_second, rhs, x, error)
+         call self%iterative%solve_half(is_second, rhs, x)
       else
          call self%direct%solve_half(is_second, rhs, x, error)
       end if
@@ -220,7 +240,7 @@ contains
       real(dp), intent(inout), contiguous :: y(:)
       type(error_t), allocatable, intent(out) :: error
 
-      call self%iterative%multiply(x, y, error)
+      call self%iterative%multiply(x, y)
    end subroutine chosen_multiply
 
    subroutine chosen_free(self)

@@ -2,7 +2,7 @@
 !> The method of conjugate gradients for symmetric definite systems, one step after the other: who
 !> calls knows the matrix and the preconditioner.
 !>
-!> Sizes of residuals are those of the preconditioner, r.M^-1 r, which are energies where it is good.
+!> Sizes of residuals are those of the preconditioner, r.M^-1 r: energies where it is good.
 !> Source: M. R. Hestenes, E. Stiefel, J. Res. Nat. Bur. Stand. 49 (1952) 409-436.
 module emcon_conjugate_gradients
    use emcon_kinds, only : dp

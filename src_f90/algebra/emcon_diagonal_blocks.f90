@@ -25,7 +25,7 @@ module emcon_diagonal_blocks
       logical :: is_range = .false.              !! which follow each other
       type(csr_t) :: matrix                      !! scale times the symmetric part
       integer, allocatable :: upper(:)           !! (n) work space: places in the rows
-      real(dp), allocatable :: b(:)              !! (n) work space
+      real(dp), allocatable :: b(:), image(:)    !! (n) work space, where they do not
       class(sparse_solver_t), allocatable :: solver
       logical :: has_factor = .false.            !! of these values
       integer :: n_factor = 0                    !! factors made so far
@@ -37,6 +37,8 @@ module emcon_diagonal_blocks
       logical :: may_be_rough = .false.          !! as of solvers, set before `blocks_analyse`
       real(dp) :: accuracy = 0.0_dp              !! the same
       logical :: is_incomplete = .false.         !! some block's factors are
+      !> Entries and operations of complete factors, as far as solvers predict them
+      real(dp) :: n_entry = 0.0_dp, n_operation = 0.0_dp
       integer :: n_thread = 1                    !! that may work on the blocks
       integer :: n_block = 0
       integer :: n_factor = 0                    !! factors of blocks made of this pattern
@@ -61,6 +63,8 @@ contains
       if (.not. is_new) return
       call blocks_free(self)
       call find_blocks(self, matrix)
+      self%n_entry = 0.0_dp
+      self%n_operation = 0.0_dp
       self%is_symmetric = .true.
       do b = 1, self%n_block
          call extract(self, self%block(b), matrix)
@@ -73,6 +77,8 @@ contains
          self%block(b)%solver%is_scaled = .true.
          call self%block(b)%solver%analyse(self%block(b)%matrix, error)
          if (allocated(error)) return
+         self%n_entry = self%n_entry + real(self%block(b)%solver%n_factor, dp)
+         self%n_operation = self%n_operation + self%block(b)%solver%n_operation
       end do
    end subroutine blocks_analyse
 
@@ -218,7 +224,7 @@ contains
          end do
       end do
       allocate(block%upper(n), source=0)
-      if (.not. block%is_range) allocate(block%b(n), source=0.0_dp)
+      if (.not. block%is_range) allocate(block%b(n), block%image(n), source=0.0_dp)
    end subroutine extract
 
    !> Has each entry of the block one across the diagonal, which has no gaps?
@@ -382,10 +388,17 @@ contains
    subroutine blocks_multiply(self, x, y, error)
       type(diagonal_blocks_t), intent(inout) :: self
       real(dp), intent(in), contiguous :: x(:)         !! (n)
-      real(dp), intent(out), contiguous :: y(:)        !! (n)
+      real(dp), intent(inout), contiguous :: y(:)      !! (n)
       type(error_t), allocatable, intent(out) :: error
       integer :: b
 
+      if (self%n_thread == 1) then
+         do b = 1, self%n_block
+            call multiply(self%block(b), x, y)
+         end do
+         call take_error(self, error)
+         return
+      end if
       !$omp parallel do default(none) shared(self, x, y) num_threads(self%n_thread) &
       !$omp schedule(static, 1)
       do b = 1, self%n_block
@@ -400,25 +413,41 @@ contains
       type(block_t), intent(inout) :: block
       real(dp), intent(in), contiguous :: x(:)
       real(dp), intent(inout), contiguous :: y(:)
-      real(dp), allocatable :: image(:)
+      integer :: n, from
+
+      n = size(block%unknown)
+      from = block%unknown(1) - 1                ! of the unknowns, where they are a range
+      if (block%is_range) then
+         call multiply_part(block, x(from + 1:from + n), y(from + 1:from + n))
+      else
+         block%b = x(block%unknown)
+         call multiply_part(block, block%b, block%image)
+         y(block%unknown) = block%image
+      end if
+   end subroutine multiply
+
+   !> The same, of the unknowns of the block.
+   subroutine multiply_part(block, x, y)
+      type(block_t), intent(inout) :: block
+      real(dp), intent(in), contiguous :: x(:)
+      real(dp), intent(inout), contiguous :: y(:)
+      real(dp) :: total
       integer :: i, k
 
       if (block%solver%is_incomplete) then
-         allocate(image(size(block%unknown)))
-         call block%solver%multiply(x(block%unknown), image, block%error)
-         y(block%unknown) = image
+         call block%solver%multiply(x, y, block%error)
          return
       end if
       associate (rows => block%matrix)
          do i = 1, rows%n_row
-            y(block%unknown(i)) = 0.0_dp
+            total = 0.0_dp
             do k = rows%row_start(i) + 1, rows%row_start(i + 1)
-               y(block%unknown(i)) = y(block%unknown(i)) &
-                  + rows%value(k)*x(block%unknown(rows%column(k) + 1))
+               total = total + rows%value(k)*x(rows%column(k) + 1)
             end do
+            y(i) = total
          end do
       end associate
-   end subroutine multiply
+   end subroutine multiply_part
 
    !> L^-1 P rhs of a sparse right-hand side: what of it is not zero.
    subroutine blocks_reach(self, column, value, n_reached, index, x, error)

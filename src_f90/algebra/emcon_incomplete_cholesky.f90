@@ -25,7 +25,7 @@ module emcon_incomplete_cholesky
 
 contains
 
-   !> Factorise a matrix whose values are filled in; its entries are in the range of single precision.
+   !> Factorise a matrix whose values are filled in, in the range of single precision.
    pure subroutine incomplete_cholesky_factorise(self, matrix, is_definite)
       type(incomplete_cholesky_t), intent(inout) :: self
       type(node_blocks_t), intent(in) :: matrix
@@ -87,10 +87,13 @@ contains
    pure function times_transposed(a, b) result(c)
       real(dp), intent(in) :: a(n_side, n_side), b(n_side, n_side)
       real(dp) :: c(n_side, n_side)
-      integer :: j
+      integer :: i, j
 
-      do j = 1, n_side
-         c(:, j) = a(:, 1)*b(j, 1) + a(:, 2)*b(j, 2) + a(:, 3)*b(j, 3)
+      c = 0.0_dp
+      do i = 1, n_side
+         do j = 1, n_side
+            c(:, j) = c(:, j) + a(:, i)*b(j, i)
+         end do
       end do
    end function times_transposed
 
@@ -129,23 +132,21 @@ contains
       type(node_blocks_t), intent(in) :: matrix
       real(dp), intent(inout) :: y(n_side, matrix%n_block)
       real(dp) :: total(n_side)
-      integer :: b, c, k
+      integer :: b, c, j, k
 
       do b = 1, matrix%n_block
          total = y(:, b)
          do k = matrix%row_start(b) + 1, matrix%row_start(b + 1) - 1
             c = matrix%column(k)
-            associate (l => self%value(:, :, k))
-               total(1) = total(1) - (l(1, 1)*y(1, c) + l(1, 2)*y(2, c) + l(1, 3)*y(3, c))
-               total(2) = total(2) - (l(2, 1)*y(1, c) + l(2, 2)*y(2, c) + l(2, 3)*y(3, c))
-               total(3) = total(3) - (l(3, 1)*y(1, c) + l(3, 2)*y(2, c) + l(3, 3)*y(3, c))
-            end associate
+            do j = 1, n_side
+               total = total - self%value(:, j, k)*y(j, c)
+            end do
          end do
-         associate (m => self%value(:, :, matrix%row_start(b + 1)))
-            y(1, b) = m(1, 1)*total(1)
-            y(2, b) = m(2, 1)*total(1) + m(2, 2)*total(2)
-            y(3, b) = m(3, 1)*total(1) + m(3, 2)*total(2) + m(3, 3)*total(3)
-         end associate
+         k = matrix%row_start(b + 1)
+         y(:, b) = 0.0_dp
+         do j = 1, n_side                        ! the triangle has zeros above its diagonal
+            y(:, b) = y(:, b) + self%value(:, j, k)*total(j)
+         end do
       end do
    end subroutine incomplete_cholesky_forward
 
@@ -155,22 +156,19 @@ contains
       type(node_blocks_t), intent(in) :: matrix
       real(dp), intent(inout) :: y(n_side, matrix%n_block)
       real(dp) :: x(n_side)
-      integer :: b, c, k
+      integer :: b, c, j, k
 
       do b = matrix%n_block, 1, -1
-         associate (m => self%value(:, :, matrix%row_start(b + 1)))
-            x(1) = m(1, 1)*y(1, b) + m(2, 1)*y(2, b) + m(3, 1)*y(3, b)
-            x(2) = m(2, 2)*y(2, b) + m(3, 2)*y(3, b)
-            x(3) = m(3, 3)*y(3, b)
-         end associate
+         k = matrix%row_start(b + 1)
+         do j = 1, n_side
+            x(j) = dot_product(self%value(:, j, k), y(:, b))
+         end do
          y(:, b) = x
          do k = matrix%row_start(b) + 1, matrix%row_start(b + 1) - 1
             c = matrix%column(k)
-            associate (l => self%value(:, :, k))
-               y(1, c) = y(1, c) - (l(1, 1)*x(1) + l(2, 1)*x(2) + l(3, 1)*x(3))
-               y(2, c) = y(2, c) - (l(1, 2)*x(1) + l(2, 2)*x(2) + l(3, 2)*x(3))
-               y(3, c) = y(3, c) - (l(1, 3)*x(1) + l(2, 3)*x(2) + l(3, 3)*x(3))
-            end associate
+            do j = 1, n_side
+               y(j, c) = y(j, c) - dot_product(self%value(:, j, k), x)
+            end do
          end do
       end do
    end subroutine incomplete_cholesky_backward

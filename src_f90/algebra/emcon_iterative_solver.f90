@@ -1,5 +1,6 @@
 ! build: streams
-!> Conjugate gradients with incomplete Cholesky factors by blocks, for symmetric definite matrices.
+!> Conjugate gradients with incomplete Cholesky factors by blocks, for symmetric definite matrices:
+!> what `emcon_chosen_solver` takes in place of factors.
 !>
 !> Takes the memory of half the matrix and half as much again, where a factor of a body in space
 !> takes many times that. A solution is as good as was asked for, or `is_converged` tells that
@@ -12,11 +13,11 @@ module emcon_iterative_solver
    use emcon_errors, only : err_internal, error_t, raise
    use emcon_incomplete_cholesky, only : incomplete_cholesky_backward, &
       incomplete_cholesky_factorise, incomplete_cholesky_forward, incomplete_cholesky_t
-   use emcon_kinds, only : dp, int64, wp
+   use emcon_kinds, only : dp, wp
    use emcon_node_blocks, only : n_side, node_blocks_fill, node_blocks_init, node_blocks_is_of, &
       node_blocks_matrix, node_blocks_multiply, node_blocks_t
    use emcon_power_scaling, only : power_of_two
-   use emcon_sparse_solver, only : matrix_definite, solver_check_square, sparse_solver_t
+   use emcon_sparse_solver, only : solver_check_square
    use emcon_text, only : to_text
    implicit none
    private
@@ -27,7 +28,12 @@ module emcon_iterative_solver
    !> Entries are below it: sums of their squares in the range of single precision.
    real(dp), parameter :: largest = 2.0_dp**(maxexponent(1.0_sp)/4)
 
-   type, extends(sparse_solver_t) :: iterative_solver_t
+   type :: iterative_solver_t
+      ! As those of a solver:
+      real(dp) :: accuracy = 0.0_dp
+      real(dp) :: half_scale = 1.0_dp
+      logical :: is_scaled = .false., is_singular = .false., is_converged = .true.
+      integer :: n_analysis = 0
       integer :: most_steps = 1000               !! of a solve
       integer :: n_step = 0                      !! of the last one
       logical :: is_filled = .false.             !! the blocks have values
@@ -40,7 +46,6 @@ module emcon_iterative_solver
       procedure :: analyse => iterative_analyse
       procedure :: factorise => iterative_factorise
       procedure :: solve => iterative_solve
-      procedure :: has_halves => iterative_has_halves
       procedure :: solve_half => iterative_solve_half
       procedure :: multiply => iterative_multiply
       procedure :: free => iterative_free
@@ -59,7 +64,6 @@ contains
       if (allocated(error)) return
       call node_blocks_init(self%blocks, matrix)
       self%first_slot = csr_find(matrix, 1, 1)
-      self%is_incomplete = .true.
       self%n_analysis = self%n_analysis + 1
       associate (n => n_side*self%blocks%n_block)
          allocate(self%x(n), self%r(n), self%z(n), source=0.0_dp)
@@ -87,7 +91,6 @@ contains
       self%is_filled = .true.
       call incomplete_cholesky_factorise(self%factor, self%blocks, is_definite)
       self%is_singular = .not. is_definite
-      self%n_factor = size(self%factor%value, kind=int64)
    end subroutine iterative_factorise
 
    !> Steps until the residual is small enough, from x = 0.
@@ -132,18 +135,12 @@ contains
       call incomplete_cholesky_backward(self%factor, self%blocks, z)
    end subroutine precondition
 
-   pure logical function iterative_has_halves(self)
-      class(iterative_solver_t), intent(in) :: self
-
-      iterative_has_halves = self%symmetry == matrix_definite
-   end function iterative_has_halves
-
-   subroutine iterative_solve_half(self, is_second, rhs, x, error)
+   !> (L^-1 or L^-T) rhs
+   subroutine iterative_solve_half(self, is_second, rhs, x)
       class(iterative_solver_t), intent(inout) :: self
       logical, intent(in) :: is_second
       real(dp), intent(in), contiguous :: rhs(:)
       real(dp), intent(inout), contiguous :: x(:)
-      type(error_t), allocatable, intent(out) :: error
 
       self%z(self%blocks%place) = rhs
       if (is_second) call incomplete_cholesky_backward(self%factor, self%blocks, self%z)
@@ -151,11 +148,11 @@ contains
       x = self%z(self%blocks%place)
    end subroutine iterative_solve_half
 
-   subroutine iterative_multiply(self, x, y, error)
+   !> y = half_scale*A x
+   subroutine iterative_multiply(self, x, y)
       class(iterative_solver_t), intent(inout) :: self
       real(dp), intent(in), contiguous :: x(:)
       real(dp), intent(inout), contiguous :: y(:)
-      type(error_t), allocatable, intent(out) :: error
 
       self%x(self%blocks%place) = x
       call node_blocks_multiply(self%blocks, self%x, self%z)

@@ -2,8 +2,8 @@
 !> Symmetric sparse matrices by blocks of up to three unknowns, and their products with vectors.
 !>
 !> Unknowns that follow each other and meet the same others, as those of a node do, are a block,
-!> filled up by unknowns of their own where they are fewer. Blocks are numbered breadth first from an
-!> end of the mesh, so that neighbours are near in memory and an incomplete factor is a good one.
+!> filled up by unknowns of their own where they are fewer. Blocks are numbered breadth first from
+!> an end of the mesh, so that neighbours are near in memory and incomplete factors are good.
 !> Only the lower triangle of blocks is kept: a third of what rows of single entries take.
 module emcon_node_blocks
    use emcon_csr, only : csr_t
@@ -76,7 +76,8 @@ contains
       n = 0
       do i = 1, self%n
          is_new = i == 1
-         if (.not. is_new) is_new = i - first(n) > n_side .or. .not. has_same_columns(matrix, i - 1, i)
+         if (.not. is_new) is_new = i - first(n) > n_side &
+            .or. .not. has_same_columns(matrix, i - 1, i)
          if (is_new) n = n + 1
          if (is_new) first(n) = i - 1
          of(i) = n
@@ -275,8 +276,11 @@ contains
                do q = 1, self%first(c + 1) - self%first(c)
                   k = k + 1
                   matrix%column(k) = self%first(c) + q - 1
-                  if (self%number(c) <= self%number(b)) matrix%value(k) = factor*self%value(p, q, at)
-                  if (self%number(c) > self%number(b)) matrix%value(k) = factor*self%value(q, p, at)
+                  if (self%number(c) <= self%number(b)) then
+                     matrix%value(k) = factor*self%value(p, q, at)
+                  else
+                     matrix%value(k) = factor*self%value(q, p, at)
+                  end if
                end do
             end do
             matrix%row_start(i + 1) = k
@@ -300,27 +304,22 @@ contains
       real(dp), intent(in) :: x(n_side, self%n_block)
       real(dp), intent(out) :: y(n_side, self%n_block)
       real(dp) :: own(n_side), total(n_side)
-      integer :: b, c, k
+      integer :: b, c, j, k
 
       do b = 1, self%n_block
          own = x(:, b)
          total = 0.0_dp
          do k = self%row_start(b) + 1, self%row_start(b + 1) - 1
             c = self%column(k)
-            associate (a => self%value(:, :, k))
-               total(1) = total(1) + a(1, 1)*x(1, c) + a(1, 2)*x(2, c) + a(1, 3)*x(3, c)
-               total(2) = total(2) + a(2, 1)*x(1, c) + a(2, 2)*x(2, c) + a(2, 3)*x(3, c)
-               total(3) = total(3) + a(3, 1)*x(1, c) + a(3, 2)*x(2, c) + a(3, 3)*x(3, c)
-               y(1, c) = y(1, c) + a(1, 1)*own(1) + a(2, 1)*own(2) + a(3, 1)*own(3)
-               y(2, c) = y(2, c) + a(1, 2)*own(1) + a(2, 2)*own(2) + a(3, 2)*own(3)
-               y(3, c) = y(3, c) + a(1, 3)*own(1) + a(2, 3)*own(2) + a(3, 3)*own(3)
-            end associate
+            do j = 1, n_side
+               total = total + self%value(:, j, k)*x(j, c)
+               y(j, c) = y(j, c) + dot_product(self%value(:, j, k), own)
+            end do
          end do
-         associate (a => self%value(:, :, self%row_start(b + 1)))
-            y(1, b) = total(1) + a(1, 1)*own(1) + a(2, 1)*own(2) + a(3, 1)*own(3)
-            y(2, b) = total(2) + a(2, 1)*own(1) + a(2, 2)*own(2) + a(3, 2)*own(3)
-            y(3, b) = total(3) + a(3, 1)*own(1) + a(3, 2)*own(2) + a(3, 3)*own(3)
-         end associate
+         k = self%row_start(b + 1)
+         do j = 1, n_side
+            y(j, b) = total(j) + dot_product(self%value(:, j, k), own)
+         end do
       end do
    end subroutine node_blocks_multiply
 

@@ -1,8 +1,8 @@
 !> What every solver of sparse systems offers.
 !>
 !> Order of use: `analyse` once per pattern, `factorise` for each set of values, `solve` for each
-!> right-hand side. A matrix that cannot be factorised is a result (`is_singular`), not an error, and
-!> so is a solution that has not become as good as was asked for (`is_converged`).
+!> right-hand side. A matrix that cannot be factorised is a result (`is_singular`), not an error,
+!> and so is a solution that has not become as good as was asked for (`is_converged`).
 !> An object owns memory of a C library: never assign one to another, and `free` it at the end (at
 !> any time, also twice). There is no finaliser: gfortran 12 loses other components of an object
 !> that holds one. Copies are made of an object that has analysed nothing: it owns no memory yet.

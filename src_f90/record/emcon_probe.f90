@@ -192,10 +192,27 @@ contains
       associate (correction => stepper%march%newton%correction)
          n_factor = max(correction%solver%n_factor, correction%definite_solver%n_factor)
       end associate
-      if (n_factor > 0) call row_put(row, "factor_entries", real(n_factor, wp), &
-         ", # entries of the factor")
+      associate (kept => stepper%march%newton%correction%kept%blocks, &
+            solver => stepper%march%newton%correction%definite_solver)
+         if (kept%is_incomplete) then
+            call put_iterations(row, real(kept%n_entry, wp), real(kept%n_operation, wp))
+         else if (solver%is_incomplete) then
+            call put_iterations(row, real(n_factor, wp), real(solver%n_operation, wp))
+         else if (n_factor > 0) then
+            call row_put(row, "factor_entries", real(n_factor, wp), ", # entries of the factor")
+         end if
+      end associate
       call row_put(row, "probe_increments", probe%n, "; by the first # increments")
    end subroutine put_figures
+
+   !> Solved by iterations, and what factors would take.
+   subroutine put_iterations(row, n_entry, n_operation)
+      type(report_row_t), intent(inout) :: row
+      real(wp), intent(in) :: n_entry, n_operation       !! of complete factors
+
+      call row_put(row, "spared_entries", n_entry, ", by iterations: a factor would have # entries")
+      call row_put(row, "spared_operations", n_operation, " and take # operations")
+   end subroutine put_iterations
 
    !> Entries of the matrix of the first step; 0: there is none.
    pure integer function n_entry(stepper)

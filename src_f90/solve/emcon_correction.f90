@@ -22,7 +22,7 @@ module emcon_correction
    implicit none
    private
    public :: correction_t, correction_lay_out, correction_factorise, correction_solve, &
-      correction_try_minimum, &
+      correction_try_minimum, correction_is_lost, &
       correction_multipliers, correction_reset, correction_free, correction_reason, &
       correction_ticks, correction_work
 
@@ -49,12 +49,10 @@ module emcon_correction
       logical :: fell_back = .false.             !! last factorisation: asked for, but not possible
       integer :: obstacle = obstacle_none        !! and why
       integer :: n_factorisation = 0             !! made so far
-      logical :: is_lost = .false.               !! last solution: the matrix turned out singular
       integer :: choice = solver_default         !! of the direct solver, as the deck asks
       class(sparse_solver_t), allocatable :: user              !! by a program, for that choice
       class(sparse_solver_t), allocatable :: solver            !! no active constraint
       class(sparse_solver_t), allocatable :: definite_solver   !! the same, positive definite
-      class(sparse_solver_t), allocatable, private :: minimum_solver   !! tells whether it is
       logical, private :: is_definite = .false.  !! last factorisation: by that one
       type(layout_t), private :: layout
       type(null_space_t) :: null_space
@@ -87,7 +85,6 @@ contains
       call solver_create(self%choice, matrix_general, self%solver, self%user)
       call solver_create(self%choice, matrix_definite, self%definite_solver, self%user)
       self%definite_solver%accuracy = newton_accuracy
-      call solver_create(self%choice, matrix_definite, self%minimum_solver, self%user)
       call kept_factor_set_up(self%kept, self%choice, self%user)
       call solver_create(self%choice, matrix_general, self%null_space%solver, self%user)
       call saddle_point_reset(self%saddle_point, self%choice, self%user)
@@ -100,7 +97,6 @@ contains
       if (.not. allocated(self%solver)) return
       call self%solver%free()
       call self%definite_solver%free()
-      call self%minimum_solver%free()
       call kept_factor_free(self%kept)
       call self%null_space%solver%free()
       call saddle_point_free(self%saddle_point)
@@ -240,6 +236,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       self%n_factorisation = self%n_factorisation + 1
+      self%is_definite = .false.
       if (.not. allocated(self%solver)) call make_solvers(self)
       if (set%n_condition == 0) then
          call factorise_free(self, system, system%matrix, system%is_symmetric, is_singular, error)
@@ -339,19 +336,29 @@ contains
          error)
    end subroutine correction_try_minimum
 
-   !> Is a symmetric matrix positive definite?
+   !> Is a symmetric matrix positive definite? Only factors tell.
    subroutine try_matrix(self, matrix, is_definite, error)
       type(correction_t), intent(inout) :: self
       type(csr_t), intent(in) :: matrix
       logical, intent(out) :: is_definite        !! also where there is an error
       type(error_t), allocatable, intent(out) :: error
+      class(sparse_solver_t), allocatable :: factors
 
       is_definite = .true.
       self%n_factorisation = self%n_factorisation + 1
-      call self%minimum_solver%analyse(matrix, error)
-      if (.not. allocated(error)) call solver_renew(self%minimum_solver, matrix%value, error)
-      if (.not. allocated(error)) is_definite = .not. self%minimum_solver%is_singular
+      call solver_create(self%choice, matrix_definite, factors, self%user)
+      call factors%analyse(matrix, error)
+      if (.not. allocated(error)) call factors%factorise(matrix%value, error)
+      if (.not. allocated(error)) is_definite = .not. factors%is_singular
+      call factors%free()
    end subroutine try_matrix
+
+   !> Has the last solution found out that the matrix is singular?
+   pure logical function correction_is_lost(self)
+      type(correction_t), intent(in) :: self
+
+      correction_is_lost = self%is_definite .and. .not. self%definite_solver%is_converged
+   end function correction_is_lost
 
    !> The multipliers that belong to `residual` (without contact forces), by null space only: the
    !> saddle point has them as unknowns.
@@ -414,11 +421,9 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       dlam = 0.0_wp
-      self%is_lost = .false.
       if (set%n == 0) then
          if (self%is_definite) then
             call self%definite_solver%solve(residual, dq, error)
-            self%is_lost = .not. self%definite_solver%is_converged
          else
             call self%solver%solve(residual, dq, error)
          end if

@@ -36,7 +36,7 @@ contains
    !> Room for `n` entries of W; what there is stays.
    pure subroutine factor_rows_make_room(self, n)
       type(factor_rows_t), intent(inout) :: self
-      integer, intent(in) :: n
+      integer, intent(in) :: n                   !! >= 0
       integer, allocatable :: index(:)
       real(dp), allocatable :: w(:)
 

@@ -25,7 +25,8 @@ module emcon_kept_factor
    use emcon_sparse_solver, only : matrix_definite, sparse_solver_t
    implicit none
    private
-   public :: kept_factor_t, kept_factor_set_up, kept_factor_let_iterate, kept_factor_renew, kept_factor_take, &
+   public :: kept_factor_t, kept_factor_set_up, kept_factor_renew, kept_factor_take, &
+      kept_factor_let_iterate, &
       kept_factor_look, kept_factor_serves, kept_factor_correct, kept_factor_forget, &
       kept_factor_free, kept_factor_is_possible, kept_factor_has_room, kept_factor_multipliers, &
       kept_factor_reach, kept_factor_condense
@@ -79,7 +80,7 @@ contains
    !> May the factor be an incomplete one, by which corrections take conjugate gradients?
    subroutine kept_factor_let_iterate(self, may_iterate)
       type(kept_factor_t), intent(inout) :: self !! set up
-      logical, intent(in) :: may_iterate
+      logical, intent(in) :: may_iterate         !! else it is a complete one
 
       if (may_iterate .eqv. self%blocks%accuracy > 0.0_dp) return
       call kept_factor_free(self)
@@ -230,7 +231,8 @@ contains
                load(gap_rows%column(first:last) + 1) = self%blocks%scale*gap_rows%value(first:last)
             end associate
             call blocks_solve(self%blocks, .false., load, self%y, error)
-            if (.not. allocated(error)) call blocks_solve(self%blocks, .true., self%y, self%x, error)
+            if (.not. allocated(error)) call blocks_solve(self%blocks, .true., self%y, self%x, &
+               error)
             if (allocated(error)) return
             call multiply_rows(gap_rows, set%n_row, self%x, w(:, k))
          end do

@@ -12,8 +12,8 @@ module emcon_newton
    use emcon_convergence, only : convergence_begin, convergence_init, convergence_judge, &
       convergence_nears_end, convergence_t, most_rounding, next_done, next_give_up, next_tangent, &
       round_off
-   use emcon_correction, only : correction_factorise, correction_lay_out, correction_multipliers, &
-      correction_solve, correction_t, correction_ticks, correction_work
+   use emcon_correction, only : correction_factorise, correction_is_lost, correction_lay_out, &
+      correction_multipliers, correction_solve, correction_t, correction_ticks, correction_work
    use emcon_early_set, only : early_enough, predicts_new_set
    use emcon_errors, only : err_interrupt, error_t, raise
    use emcon_evaluation, only : evaluation_is_equilibrium
@@ -287,8 +287,8 @@ contains
          end select
          call correct(self, system, set, motion, error)
          if (allocated(error)) return
-         if (self%correction%is_lost .or. (evaluation_is_equilibrium(motion%evaluation) &
-            .and. is_too_far(self, motion%x))) then
+         if (correction_is_lost(self%correction) .or. &
+            (evaluation_is_equilibrium(motion%evaluation) .and. is_too_far(self, motion%x))) then
             status = newton_singular
             return
          end if

@@ -1,10 +1,10 @@
 ! build: streams
-!> Corrections under constraints by conjugate gradients, where the kept factor of the tangent A is an
-!> incomplete one, M.
+!> Corrections under constraints by conjugate gradients, where the kept factor of the tangent A is
+!> an incomplete one, M.
 !>
-!> With D the diagonal of A, rows are measured by W = D^-1/2 G^T, and P = 1 - W (W^T W)^-1 W^T takes out
-!> what would change a constraint. The preconditioner is D^-1/2 P D^1/2 M^-1 D^1/2 P D^-1/2: every
-!> step keeps the constraints to round-off, and no row is spread over the body as by a factor.
+!> With D the diagonal of A, rows are measured by W = D^-1/2 G^T, and P = 1 - W (W^T W)^-1 W^T takes
+!> out what would change a constraint. The preconditioner is D^-1/2 P D^1/2 M^-1 D^1/2 P D^-1/2:
+!> every step keeps the constraints to round-off, and no row spreads over the body as by a factor.
 !> Source: N. I. M. Gould, M. E. Hribar, J. Nocedal, SIAM J. Sci. Comput. 23 (2001) 1376-1395.
 module emcon_projected_gradients
    use emcon_conjugate_gradients, only : gradients_are_done, gradients_begin, gradients_move, &
@@ -46,7 +46,7 @@ contains
    subroutine projected_solve(self, blocks, rows, defect, rhs, x, error)
       type(projected_gradients_t), intent(inout) :: self
       type(diagonal_blocks_t), intent(inout) :: blocks
-      type(factor_rows_t), intent(inout) :: rows         !! D^-1/2 G^T, with the factor of its square
+      type(factor_rows_t), intent(inout) :: rows         !! of D, with the factor of W^T W
       real(dp), intent(in) :: defect(:)                  !! (n)
       real(dp), intent(in), contiguous :: rhs(:)         !! (n_unknown)
       real(dp), intent(out), contiguous :: x(:)          !! (n_unknown)
@@ -96,8 +96,8 @@ contains
 
       !> Of a motion what keeps the constraints, of forces what is along none.
       subroutine project(v, is_motion)
-         real(dp), intent(inout) :: v(:)
-         logical, intent(in) :: is_motion
+         real(dp), intent(inout) :: v(:)         !! (n_unknown)
+         logical, intent(in) :: is_motion        !! else forces
 
          if (is_motion) v = v*self%root
          if (.not. is_motion) v = v/self%root

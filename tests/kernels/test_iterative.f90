@@ -20,7 +20,7 @@ module test_iterative
    private
    public :: collect_iterative
 
-   !> Round-off of products and of solutions that were asked for all digits, by conditions below 1e3.
+   !> Round-off of products, and of solutions to all digits with conditions below 1e3.
    real(dp), parameter :: tol = 1.0e4_dp*epsilon(1.0_dp)
    !> Of factors in single precision.
    real(dp), parameter :: rough_tol = 1.0e3_dp*epsilon(1.0)
@@ -169,11 +169,12 @@ contains
          maxval(abs(y)), "y")
       if (allocated(error)) return
       call node_blocks_matrix(blocks, 2.0_dp, back)
-      call check_true(error, all(back%row_start == a%row_start) .and. all(back%column == a%column), &
-         "the pattern again")
+      call check_true(error, all(back%row_start == a%row_start) &
+         .and. all(back%column == a%column), "the pattern again")
       if (.not. allocated(error)) call check_true(error, .not. any(abs(back%value - a%value) &
          > 0.0_dp), "the values again")
-      if (.not. allocated(error)) call check_true(error, node_blocks_is_of(blocks, a), "it is known")
+      if (.not. allocated(error)) call check_true(error, node_blocks_is_of(blocks, a), &
+         "it is known")
    end subroutine test_blocks
 
    !> A chain of nodes fills nothing: L L^T = A.
@@ -223,8 +224,8 @@ contains
          call start(solver, a, error)
          if (.not. allocated(error)) call solver%solve(real(b(:, 1), wp), x, error)
          if (allocated(error)) return
-         ! The energy of the error beside that of the solution: the residual's size is an upper bound
-         ! but for what the factor lacks, a factor below ten here.
+         ! The energy of the error beside that of the solution: the residual's size bounds it but
+         ! for what the factor lacks, less than a factor of ten here.
          wrong = energy(a, real(x, dp) - exact(:, 1))
          whole = energy(a, exact(:, 1))
          call check_true(error, solver%is_converged, "converged")
@@ -248,11 +249,10 @@ contains
    end function energy
 
    subroutine start(solver, a, error)
-      class(sparse_solver_t), intent(inout) :: solver
+      type(iterative_solver_t), intent(inout) :: solver
       type(csr_t), intent(in) :: a
       type(error_t), allocatable, intent(out) :: error
 
-      solver%symmetry = matrix_definite
       call solver%analyse(a, error)
       if (.not. allocated(error)) call solver%factorise(a%value, error)
    end subroutine start
@@ -271,16 +271,15 @@ contains
       allocate(b(a%n_row, 2), x(a%n_row, 2), y(a%n_row), image(a%n_row))
       call random_number(b)
       do i = 1, 2
-         call solver%solve_half(.false., b(:, i), y, error)
-         if (.not. allocated(error)) call solver%solve_half(.true., y, x(:, i), error)
-         if (allocated(error)) return
+         call solver%solve_half(.false., b(:, i), y)
+         call solver%solve_half(.true., y, x(:, i))
       end do
       call check_near(error, real(dot_product(b(:, 1), x(:, 2)), wp), &
          real(dot_product(b(:, 2), x(:, 1)), wp), real(rough_tol, wp), &
          real(abs(dot_product(b(:, 1), x(:, 2))), wp), "symmetric")
       if (allocated(error)) return
-      call solver%multiply(x(:, 1), image, error)
-      if (.not. allocated(error)) call check_near(error, real(image, wp), &
+      call solver%multiply(x(:, 1), image)
+      call check_near(error, real(image, wp), &
          real(b(:, 1), wp), 0.1_wp, real(maxval(abs(b)), wp), "near the inverse")
    end subroutine test_halves
 
@@ -299,8 +298,8 @@ contains
       a%value = 2.0_dp**70*a%value
       if (.not. allocated(error)) call solver%factorise(a%value, error)
       if (.not. allocated(error)) call solver%solve(b, y, error)
-      if (.not. allocated(error)) call check_true(error, .not. any(abs(x - 2.0_wp**70*y) > 0.0_wp), &
-         "the same bits")
+      if (.not. allocated(error)) call check_true(error, &
+         .not. any(abs(x - 2.0_wp**70*y) > 0.0_wp), "the same bits")
    end subroutine test_powers_of_two
 
    !> A definite matrix of which what is left out takes the last pivot: four unknowns in a ring,
@@ -335,7 +334,7 @@ contains
       call check_near(error, x, real(exact(:, 1), wp), real(tol, wp), maxval(abs(x)), "x")
    end subroutine test_shift
 
-   !> One step at most: the solution is the factor's, and of the next matrix iterations are tried again.
+   !> One step at most: the solution is the factor's, and the next matrix is tried by iterations.
    subroutine test_not_converged(error)
       type(error_t), allocatable, intent(out) :: error
       class(sparse_solver_t), allocatable :: solver
@@ -387,7 +386,7 @@ contains
    end subroutine make_chosen
 
    !> A symmetric matrix that is not definite may have an incomplete factor: it is solved by what
-   !> solves any matrix, or told to have no factor. So is what has a negative first pivot, or no value.
+   !> solves any matrix. What has a negative first pivot, or no value, has no factor.
    subroutine test_indefinite(error)
       type(error_t), allocatable, intent(out) :: error
       class(sparse_solver_t), allocatable :: solver

@@ -62,9 +62,9 @@ contains
       call kept_factor_free(kept)
    end subroutine test_correction
 
-   !> The same with an incomplete factor: asked for two digits it meets the constraints to round-off,
-   !> corrections of what is left come to the end, and of many digits one is enough. Contacts that
-   !> give way are not for it.
+   !> The same with an incomplete factor: asked for two digits it meets the constraints to
+   !> round-off, corrections of what is left come to the end, and of many digits one is enough.
+   !> Contacts that give way are not for it.
    subroutine test_iterations(error)
       type(error_t), allocatable, intent(out) :: error
       type(problem_t) :: problem
@@ -95,8 +95,8 @@ contains
       if (.not. allocated(error)) call kept_factor_take(kept, problem%set, is_fit, error)
       if (allocated(error)) return
       call check_true(error, is_fit .and. kept%blocks%is_incomplete, "it is an incomplete factor")
-      if (.not. allocated(error)) call kept_factor_correct(kept, problem%set, problem%residual, dq, &
-         error)
+      if (allocated(error)) return
+      call kept_factor_correct(kept, problem%set, problem%residual, dq, error)
       if (allocated(error)) return
       call check_near(error, real(matmul(g, real(dq, dp)), wp), -problem%set%defect, tol_dp, &
          maxval(abs(dq)), "constraints")
@@ -118,11 +118,35 @@ contains
       if (.not. allocated(error)) call check_near(error, more, real(x(:n, 1), wp), tol_dp, &
          maxval(abs(dq)), "dq at once")
       if (allocated(error)) return
+      call check_condensed(problem, kept, k, g, error)
+      if (allocated(error)) return
       problem%set%penalty%is_on = .true.
       call kept_factor_take(kept, problem%set, is_fit, error)
       if (.not. allocated(error)) call check_true(error, .not. is_fit, "contacts that give way")
       call kept_factor_free(kept)
    end subroutine test_iterations
+
+   !> Condensed by an incomplete factor that was asked for all digits: values by no multipliers are
+   !> right, and what they gain by these is within a half.
+   subroutine check_condensed(problem, kept, k, g, error)
+      type(problem_t), intent(in) :: problem
+      type(kept_factor_t), intent(inout) :: kept
+      real(dp), intent(in) :: k(:, :), g(:, :)
+      type(error_t), allocatable, intent(out) :: error
+      real(dp) :: rhs(size(k, 1), 1 + size(g, 1)), x(size(k, 1), 1 + size(g, 1))
+      real(wp) :: w(size(g, 1), size(g, 1)), free(size(g, 1))
+      logical :: is_singular
+
+      call kept_factor_condense(kept, problem%set, problem%residual, w, free, error)
+      if (allocated(error)) return
+      rhs(:, 1) = -real(problem%residual, dp)
+      rhs(:, 2:) = transpose(g)
+      call dense_solve(k, rhs, x, is_singular)
+      call check_near(error, free, problem%set%defect + real(matmul(g, x(:, 1)), wp), tol_dp, &
+         1.0_wp + maxval(abs(free)), "values")
+      if (.not. allocated(error)) call check_near(error, w, real(matmul(g, x(:, 2:)), wp), 0.5_wp, &
+         maxval(abs(w)), "gains")
+   end subroutine check_condensed
 
    !> A residual that the constraints bear, and no defect.
    subroutine test_fixed_point(error)
