@@ -380,25 +380,6 @@ def test_dominoes_fall_one_after_the_other(count: int, until: float, tmp_path: P
     assert (run.fields().x + run.fields()["displacement"][-1])[:8*count, 2].max() < (.8 if count == 3 else 1.0)
 
 
-@pytest.mark.long
-def test_a_pile_of_thirty_blocks_comes_to_rest(tmp_path: Path) -> None:
-    """Rows of eight to four, each block over two of the row below, fall by .05 a row: the lowest row lands first. At rest
-    they stay, each about where it stood."""
-    blocks, place = [], []
-    for k, n in enumerate((8, 7, 6, 5, 4)):
-        for i in range(n):
-            at = np.array([(i - .5*n)*1.02, -.25, .05 + .55*k])
-            blocks.append(Block("C3D8", (1, 1, 1), size=(1, .5, .5), place=lambda x, at=at: x + at))
-            place.append(at)
-    pairs = [(a + 1, b + 1) for b in range(30) for a in range(b)
-             if np.isclose((place[b] - place[a])[2], 0) and (place[b] - place[a])[0] < 1.5
-             or np.isclose((place[b] - place[a])[2], .55) and abs((place[b] - place[a])[0]) < 1.0]
-    run = on_each_other(tmp_path, blocks, pairs, .5, 2.0)
-    history = run.history
-    assert history["kinetic"][history["time"] > 1.8].max() < 1e-15*history["kinetic"].max()
-    assert np.abs(run.fields()["displacement"][-1][:240, :2]).max() < .05
-
-
 def test_what_slides_down_has_no_rest(tmp_path: Path) -> None:
     (tmp_path/"deck.inp").write_text(at_rest(.51, 1.0))
     run = run_deck(tmp_path/"deck.inp", tmp_path, 3)
