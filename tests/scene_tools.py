@@ -85,13 +85,13 @@ def overrides(parameters):
     return [f"--set={name}={value}" for name, value in parameters.items()]
 
 
-def attempt(deck, folder, options, parameters):
+def attempt(deck, folder, options, parameters, timeout=120):
     """Run `deck`, a path or a `Deck`, with results in `folder`: what the call gave, and the run."""
     folder = pathlib.Path(folder)
     if isinstance(deck, Deck):
         folder.mkdir(parents=True, exist_ok=True)
         deck = deck.write(folder / f"{deck.name}.inp")
-    done = emcon(deck, "--quiet", "--output", folder, *options, *overrides(parameters))
+    done = emcon(deck, "--quiet", "--output", folder, *options, *overrides(parameters), timeout=timeout)
     return done, Run(folder / deck.stem, done.stderr)
 
 
@@ -107,9 +107,9 @@ def has_fused_products():
         "prescott", "core2", "penryn", "dunnington", "nehalem", "atom", "nano", "sandybridge", "barcelona", "bobcat"}
 
 
-def run_deck(deck, folder, code=0, options=(), **parameters):
+def run_deck(deck, folder, code=0, options=(), timeout=120, **parameters):
     """Run `deck`, a path or a `Deck`, with results in `folder`; the exit code must be `code`."""
-    done, run = attempt(deck, folder, options, parameters)
+    done, run = attempt(deck, folder, options, parameters, timeout)
     assert done.returncode == code, f"exit code {done.returncode}\n{done.stderr}"
     return run
 

@@ -22,7 +22,7 @@ CHAPTERS = {
     "Impacts": "ring two_bodies three_bodies self_contact bouncing_bar bar_on_wall rigid_bar "
                "bouncing_ball ball_in_bowl thrown_ring caught_ring linked_rings "
                "hertz_ball snap_fit",
-    "Friction": "sliding_block",
+    "Friction": "sliding_block dominoes",
     "Contact at rest": "hertz press_fit roller ironing two_blocks_static patch_pressure "
                        "contact_patch pressed_ball",
     "Ties": "tied_ring tied_spin tied_rotation tied_cantilever tied_patch tied_smooth",

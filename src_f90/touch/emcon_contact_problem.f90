@@ -148,10 +148,10 @@ contains
       real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
       real(wp) :: defect(0:self%n_slip, size(self%mu))
 
-      call contact_problem_map(self, push, 0.0_wp, defect)
+      call contact_problem_map(self, push, defect)
       missed = contact_problem_missed_by(self, push, defect)
       if (missed > 0.0_wp) missed = missed/max(maxval(abs(contact_problem_force(self, push))), &
-         tiny(missed))
+         epsilon(missed)*missed)
    end function contact_problem_missed
 
    !> The same of a natural map that is known, as a force [M L/T^2]. What W rounds is no miss: where
@@ -174,10 +174,9 @@ contains
    end function contact_problem_missed_by
 
    !> Forces less those that the natural map makes of them.
-   pure subroutine contact_problem_map(self, push, blur, defect, slope)
+   pure subroutine contact_problem_map(self, push, defect, slope)
       type(contact_problem_t), intent(in) :: self
       real(wp), intent(in) :: push(0:, :)            !! (0:n_slip, n) y [M L/T^2]
-      real(wp), intent(in) :: blur                   !! of the map, >= 0 [M L/T^2]
       real(wp), intent(out) :: defect(0:, :)         !! (0:n_slip, n) [M L/T^2]
       real(dp), intent(out), optional :: slope(:, :) !! of `defect` by y, proximal
       real(wp), dimension(0:self%n_slip, size(self%mu)) :: motion, force
@@ -191,7 +190,7 @@ contains
       do i = 1, size(self%mu)
          stiffness = contact_problem_stiffness(self, i)
          call coulomb_map(trial_of(self, force(:, i), motion(:, i), i), self%mu(i), stiffness, &
-            blur, mapped, by)
+            mapped, by)
          defect(:, i) = force(:, i) - mapped(:self%n_slip)
          if (.not. present(slope)) cycle
          associate (row => m*(i - 1) + 1)

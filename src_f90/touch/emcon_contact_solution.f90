@@ -1,15 +1,16 @@
 !> Forces that obey the law of a problem of contacts: which method comes when.
 !>
 !> Newton's method for the natural map of all places at once; where that does not come to an end
-!> place by place; the two take turns. Where slip has a direction paths of blurred maps, and forces
+!> place by place; the two take turns. Where slip has a direction the central path, and forces
 !> that stay near, come before that. After two turns, in the plane, by the method of Lemke for
 !> forces that push at a and at 0, whose matrix is copositive. Without friction, after a few trials,
 !> the least motion that closes no gap is found instead. Source: docs/theory.md, eq. (14i).
 module emcon_contact_solution
+   use emcon_contact_path, only : contact_path
    use emcon_contact_problem, only : contact_effort_t, contact_problem_forces, &
       contact_problem_missed, contact_problem_motion, contact_problem_t, freely, nearly_met
    use emcon_contact_sweeps, only : contact_sweeps
-   use emcon_contact_trials, only : contact_nearing, contact_path, contact_trials
+   use emcon_contact_trials, only : contact_nearing, contact_trials
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_lemke, only : lemke_solve
@@ -23,8 +24,6 @@ module emcon_contact_solution
    !> comes the method of Lemke.
    integer, parameter :: first_trials = 60, few_trials = 10, more_trials = 20, first_sweeps = 20, &
       most_turns = 8, pivot_turn = 2
-   !> Blurs of the map that paths to the solution begin with, by the largest force.
-   real(wp), parameter :: first_blur(*) = [1.0e-2_wp, 1.0_wp]
 
 contains
 
@@ -52,10 +51,8 @@ contains
          if (is_solved .or. .not. has_compliance(self)) return
          if (has_pushes) call solve_by_pushes(self, push, effort%n_pivot, is_solved)
          if (is_solved) return
-         do turn = 1, merge(size(first_blur), 0, has_direction)
-            call contact_path(self, push, first_blur(turn), effort%n_path, is_solved)
-            if (is_solved) return
-         end do
+         if (has_direction) call contact_path(self, push, effort%n_path, effort%n_trial, is_solved)
+         if (is_solved) return
          if (has_direction) call contact_nearing(self, push, effort, is_one_of_several, is_solved)
          is_solved = is_solved .or. (is_one_of_several .and. effort%n_near > 0)
          if (is_solved) return

@@ -1,7 +1,7 @@
 !> Solutions of a problem of contacts by Newton's method for its natural map: all places at once.
 !>
-!> From the forces so far; near them, where places give way by a part of their own W; or along a
-!> path of maps that are blurred less and less. Source: docs/theory.md, eq. (14i).
+!> From the forces so far, or near them, where places give way by a part of their own W.
+!> Source: docs/theory.md, eq. (14i).
 module emcon_contact_trials
    use emcon_contact_problem, only : contact_effort_t, contact_problem_force, contact_problem_map, &
       contact_problem_missed, contact_problem_missed_by, contact_problem_t, met
@@ -9,19 +9,13 @@ module emcon_contact_trials
    use emcon_lapack, only : dense_solve
    implicit none
    private
-   public :: contact_trials, contact_nearing, contact_path
+   public :: contact_trials, contact_nearing
 
    !> Trials of a nearing.
    integer, parameter :: near_trials = 20
    !> Parts of W that places give way by about the forces so far, and how often.
    integer, parameter :: most_nearings = 30, few_nearings = 8
    real(wp), parameter :: first_part = 1.0e-3_wp, largest_part = 10.0_wp
-   !> Of a path: what is left of the blur in turn; the part of a blur that no more is missed than
-   !> when the next one comes; the part of a step's promise that it is to gain; the part of a step
-   !> that leads nowhere after so many in a row; steps in all.
-   real(wp), parameter :: next_blur = 0.3_wp, on_path = 0.1_wp, path_gain = 1.0e-2_wp, &
-      path_part = 0.03_wp
-   integer, parameter :: path_stalls = 8, most_path = 100
    !> Halvings of a step of Newton's method, and the part of what is foreseen that it is to gain.
    integer, parameter :: most_halvings = 12
    real(wp), parameter :: least_gain = 1.0e-4_wp
@@ -50,7 +44,7 @@ contains
       n_stall = 0
       do i = 0, most
          was_solved = is_solved
-         call contact_problem_map(self, trial, 0.0_wp, defect, slope)
+         call contact_problem_map(self, trial, defect, slope)
          missed = contact_problem_missed_by(self, trial, defect)
          largest = maxval(abs(contact_problem_force(self, trial)))
          is_solved = missed <= met*largest
@@ -65,7 +59,7 @@ contains
          part = 1.0_wp
          do halving = 0, most_halvings
             new = trial + part*step
-            call contact_problem_map(self, new, 0.0_wp, defect)
+            call contact_problem_map(self, new, defect)
             if (norm2(defect) <= (1.0_wp - least_gain*part)*before) exit
             part = 0.5_wp*part
          end do
@@ -155,51 +149,5 @@ contains
          end if
       end do
    end subroutine contact_nearing
-
-   !> Along a path to the solution from far inside of what the laws allow: of forces that follow
-   !> from others it leads to those farthest from limits, however far these are from those before.
-   !> Trials would creep there, as none of their steps goes past the next limit.
-   subroutine contact_path(self, push, first, n_step, is_solved)
-      type(contact_problem_t), intent(in) :: self
-      real(wp), intent(inout) :: push(0:, :)         !! (0:n_slip, n) y [M L/T^2]
-      real(wp), intent(in) :: first                  !! blur, by the largest force, > 0
-      integer, intent(inout) :: n_step               !! counted on
-      logical, intent(out) :: is_solved              !! else `push` is as it was
-      real(wp), dimension(0:self%n_slip, size(self%mu)) :: at, defect, new
-      real(dp) :: slope(size(push), size(push)), x(size(push))
-      real(wp) :: blur, before, part
-      integer :: i, halving, n_stall
-      logical :: is_singular
-
-      is_solved = .false.
-      at = push
-      n_stall = 0
-      call contact_problem_map(self, push, 0.0_wp, defect)
-      blur = first*max(maxval(abs(contact_problem_force(self, push))), maxval(abs(defect)))
-      do i = 1, most_path
-         call contact_problem_map(self, at, blur, defect, slope)
-         n_step = n_step + 1
-         call find_step(slope, reshape(real(-defect, dp), [size(push)]), x, is_singular)
-         if (is_singular) exit
-         before = norm2(defect)
-         part = 1.0_wp
-         do halving = 0, most_halvings
-            new = at + part*reshape(real(x, wp), shape(at))
-            call contact_problem_map(self, new, blur, defect)
-            if (norm2(defect) <= (1.0_wp - path_gain*part)*before) exit
-            part = 0.5_wp*part
-         end do
-         if (.not. norm2(defect) < huge(before)) exit
-         at = new
-         n_stall = merge(0, n_stall + 1, part > path_part)
-         if (n_stall == path_stalls) exit
-         if (maxval(abs(defect)) > on_path*blur) cycle
-         is_solved = contact_problem_missed(self, at) <= met
-         if (is_solved) exit
-         blur = next_blur*blur
-         if (.not. blur > tiny(blur)) exit
-      end do
-      if (is_solved) push = at
-   end subroutine contact_path
 
 end module emcon_contact_trials

@@ -21,9 +21,6 @@ module emcon_coulomb_law
    !> Slip is made of a dozen products of lengths of an edge: by so much of it slip is uncertain.
    real(wp), parameter :: slip_rounding = 16.0_wp*epsilon(1.0_wp)
 
-   !> Bounds of a length that is looked for are narrowed so often at most, by a half at worst.
-   integer, parameter :: most_roots = 2*digits(1.0_wp)
-
    !> Slip has a way that forces can be found by above so many times what it is rounded to.
    real(wp), parameter :: has_way = 1.0e3_wp*slip_rounding
 
@@ -231,82 +228,35 @@ contains
 
    !> The natural map, whose fixed points obey the law: the push (0) and the friction that a trial
    !> (n, p) stands for, and their derivatives (row, by) by that: with the gap they fall by c times
-   !> those, with slips they grow. At kinks the derivative is that of one side. With a blur e > 0 it
-   !> has none: lam > 0 and |tau| < mu lam, with lam c g = e^2 and slips in proportion to tau.
-   pure subroutine coulomb_map(at, mu, stiffness, blur, force, slope)
+   !> those, with slips they grow. At kinks the derivative is that of one side.
+   pure subroutine coulomb_map(at, mu, stiffness, force, slope)
       type(contact_trial_t), intent(in) :: at
       real(wp), intent(in) :: mu, stiffness          !! as in `coulomb_status`
-      real(wp), intent(in) :: blur                   !! e >= 0 [M L/T^2]
       real(wp), intent(out) :: force(0:most_slips)   !! [M L/T^2]
       real(wp), intent(out) :: slope(0:most_slips, 0:most_slips)   !! (row, by)
       type(remainder_t) :: rest
-      real(wp) :: most, size, direction(most_slips), length, by_size, by_most
+      real(wp) :: most, size, direction(most_slips)
       integer :: s
 
       slope = 0.0_wp
       force = 0.0_wp
-      call push_of(at%lam - stiffness*at%gap, blur, force(0), slope(0, 0))
+      force(0) = max(0.0_wp, at%lam - stiffness*at%gap)
       if (.not. force(0) > 0.0_wp) return
+      slope(0, 0) = 1.0_wp
       rest = remainder_of(at%tau + stiffness*at%slip, stiffness*at%slip_target)
       most = mu*force(0)
       size = norm2(rest%over)
       force(1:) = rest%over
       slope(1:, 1:) = across_of(rest)
-      if (size <= most .and. .not. blur > 0.0_wp) return
-      call length_of(size, most, mu*blur, length, by_size, by_most)
-      direction = rest%over/max(size, tiny(size))
-      force(1:) = length*direction
-      slope(1:, 0) = by_most*mu*slope(0, 0)*direction
+      if (size <= most) return
+      direction = rest%over/size
+      force(1:) = most*direction
+      slope(1:, 0) = mu*direction
       do s = 1, most_slips
-         slope(1:, s) = (length/max(size, tiny(size)))*slope(1:, s) + (by_size - length/max(size, &
-            tiny(size)))*dot_product(direction, slope(1:, s))*direction
+         slope(1:, s) = (most/size)*slope(1:, s) - (most/size)*dot_product(direction, &
+            slope(1:, s))*direction
       end do
    end subroutine coulomb_map
-
-   !> The push that a trial stands for: the positive part of it, or the larger root of
-   !> lam (lam - n) = e^2.
-   pure subroutine push_of(trial, blur, push, slope)
-      real(wp), intent(in) :: trial, blur            !! n and e [M L/T^2]
-      real(wp), intent(out) :: push, slope           !! lam, and its derivative
-      real(wp) :: root
-
-      push = max(0.0_wp, trial)
-      slope = merge(1.0_wp, 0.0_wp, trial > 0.0_wp)
-      if (.not. blur > 0.0_wp) return
-      root = hypot(trial, 2.0_wp*blur)
-      push = 0.5_wp*(trial + root)
-      if (trial < 0.0_wp) push = 2.0_wp*blur**2/(root - trial)
-      slope = push/root
-   end subroutine push_of
-
-   !> The length t of the friction of a trial of length p: p cut to r, or what lies below both with
-   !> p - t = 2 (mu e)^2 t/(r^2 - t^2), by Newton's method between bounds.
-   pure subroutine length_of(size, most, blur, length, by_size, by_most)
-      real(wp), intent(in) :: size, most, blur       !! p >= 0, r >= 0, mu e >= 0 [M L/T^2]
-      real(wp), intent(out) :: length                !! t [M L/T^2]
-      real(wp), intent(out) :: by_size, by_most      !! its derivatives
-      real(wp) :: least, largest, left, slope, next
-      integer :: i
-
-      length = min(size, most)
-      by_size = 0.0_wp
-      by_most = 1.0_wp
-      if (.not. blur > 0.0_wp .or. .not. most > 0.0_wp) return
-      least = 0.0_wp
-      largest = length
-      do i = 1, most_roots
-         left = (size - length)*(most - length)*(most + length) - 2.0_wp*blur**2*length
-         slope = -(most - length)*(most + length) - 2.0_wp*length*(size - length) - 2.0_wp*blur**2
-         if (left > 0.0_wp) least = length
-         if (.not. left > 0.0_wp) largest = length
-         next = length - left/slope
-         if (next <= least .or. next >= largest) next = 0.5_wp*(least + largest)
-         if (abs(next - length) <= epsilon(next)*most) exit
-         length = next
-      end do
-      by_size = -(most - length)*(most + length)/slope
-      by_most = -2.0_wp*most*(size - length)/slope
-   end subroutine length_of
 
    !> How far the law is missed, as a force, by more than slip is rounded to.
    pure real(wp) function coulomb_violation(at, mu, stiffness) result(missed)
@@ -318,7 +268,7 @@ contains
       ! Friction by the push that there is.
       pushed = at
       pushed%gap = 0.0_wp
-      call coulomb_map(pushed, mu, stiffness, 0.0_wp, force, slope)
+      call coulomb_map(pushed, mu, stiffness, force, slope)
       missed = max(abs(at%lam - max(0.0_wp, at%lam - stiffness*at%gap)), &
          norm2(at%tau - force(1:)) - stiffness*at%rounding)
    end function coulomb_violation

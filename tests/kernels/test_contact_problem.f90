@@ -5,6 +5,7 @@ module test_contact_problem
    use, intrinsic :: iso_fortran_env, only : output_unit
    use check, only : check_equal, check_near, check_true, test_case_t
    use emcon_constraint, only : most_slips
+   use emcon_contact_path, only : contact_path
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
       contact_problem_force, contact_problem_missed, contact_problem_status, contact_problem_t, &
       met
@@ -47,7 +48,8 @@ contains
          test_case_t("a body that its contacts alone hold", test_alone), &
          test_case_t("the same at random, with and without friction", test_at_rest), &
          test_case_t("random problems of all kinds", test_kinds), &
-         test_case_t("shares of one body that have far to go", test_shares)]
+         test_case_t("shares of one body that have far to go", test_shares), &
+         test_case_t("a row of rigid bodies by the central path", test_row)]
    end subroutine collect_contact_problem
 
    !> Two units of compliance along the normal, one along the slip; gap -2 without forces: lam = 1.
@@ -235,6 +237,103 @@ contains
       end do
       call check_true(error, n_path > 10, "by a path")
    end subroutine test_shares
+
+   !> Rigid bodies in a row, each on the one before by four corners, the first one on a floor: twelve
+   !> forces hold six motions. They come with velocities of all sizes, and some are led to a stop. By
+   !> the path alone, whose end no trial is near; forces are judged by the law of each contact.
+   subroutine test_row(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: n_body = 5, n = 4*n_body
+      type(contact_problem_t) :: problem
+      real(wp) :: push(0:2, n), u(6, n_body), rows(3*n, 6*n_body)
+      integer :: i, n_step, n_trial, n_solved
+      logical :: is_solved
+
+      n_solved = 0
+      do i = 1, 40
+         call draw_row(rows)
+         call contact_problem_create(problem, 2, n)
+         problem%w = matmul(rows, transpose(rows))
+         problem%mu = 0.3_wp
+         call draw_random(u)
+         problem%free = reshape(matmul(rows, reshape((u - 0.5_wp)*spread(10.0_wp**[(-2*n_step, &
+            n_step=1, n_body)], 1, 6), [6*n_body])), [3, n])
+         problem%base(0, :) = 1.0_wp
+         if (mod(i, 2) == 0) problem%slip_target(:, ::4) = 0.5_wp*problem%free(1:, ::4)
+         push = 0.0_wp
+         n_step = 0
+         n_trial = 0
+         call contact_path(problem, push, n_step, n_trial, is_solved)
+         n_solved = n_solved + merge(1, 0, is_solved)
+         if (is_solved) call check_true(error, contact_problem_missed(problem, push) <= met, "law")
+         if (is_solved .and. mod(i, 2) == 1) call check_each(error, problem, push)
+         if (allocated(error)) return
+      end do
+      call check_true(error, n_solved >= 39, "solved: " // to_text(n_solved))
+   end subroutine test_row
+
+   !> No contact pulls or is closed, none pushes where it is open, friction is within its limit, and
+   !> at that against slip where there is slip: products of forces and motions by stiffnesses.
+   subroutine check_each(error, problem, push)
+      type(error_t), allocatable, intent(inout) :: error
+      type(contact_problem_t), intent(in) :: problem
+      real(wp), intent(in) :: push(0:, :)
+      real(wp), dimension(0:2, size(problem%mu)) :: force, motion
+      real(wp) :: largest, slip
+      integer :: i, k
+
+      force = problem%base + push
+      motion = problem%free + reshape(matmul(problem%w, reshape(push, [size(push)])), shape(push))
+      largest = maxval(abs(force))
+      do i = 1, size(problem%mu)
+         motion(:, i) = 3.0_wp*motion(:, i)/sum([(problem%w(k, k), k = 3*i - 2, 3*i)])
+         slip = norm2(motion(1:, i))
+         associate (lam => force(0, i), gap => motion(0, i), tau => force(1:, i))
+            call check_true(error, min(lam, gap) >= -met*largest .and. min(lam, gap) &
+               <= met*largest, "push")
+            call check_true(error, norm2(tau) <= 0.3_wp*lam + met*largest, "limit")
+            call check_true(error, 0.3_wp*lam*slip + dot_product(tau, motion(1:, i)) &
+               <= met*largest*(slip + largest), "against slip")
+         end associate
+      end do
+   end subroutine check_each
+
+   !> Gaps and slips of the corners by the motions of the bodies, turned a little from each other.
+   subroutine draw_row(rows)
+      real(wp), intent(out) :: rows(:, :)
+      real(wp) :: u(3), x(3), at(3, 3)
+      integer :: body, corner, k, first
+
+      rows = 0.0_wp
+      do body = 1, size(rows, 2)/6
+         call draw_random(u)
+         do corner = 1, 4
+            x = [real(2*mod(corner, 2) - 1, wp), real(2*(corner/3) - 1, wp), 0.0_wp]
+            at = reshape([0.0_wp, 1.0_wp, 0.0_wp, 0.0_wp, 0.0_wp, 1.0_wp, 1.0_wp, 0.0_wp, &
+               0.0_wp], [3, 3])
+            at(:, 1) = at(:, 1) + 0.3_wp*(u(1) - 0.5_wp)*at(:, 3)
+            at(:, 3) = at(:, 3) + 0.3_wp*(u(2) - 0.5_wp)*at(:, 2)
+            first = 3*(4*(body - 1) + corner - 1)
+            do k = 1, 3
+               associate (row => rows(first + k, :), d => at(k, :))
+                  call add_motion(row(6*body - 5:6*body), d, x, 1.0_wp)
+                  if (body > 1) call add_motion(row(6*body - 11:6*body - 6), d, x &
+                     + [0.0_wp, 0.0_wp, 1.0_wp + u(3)], -1.0_wp)
+               end associate
+            end do
+         end do
+      end do
+   end subroutine draw_row
+
+   !> How a point of a rigid body moves along d, by its translation and its turn.
+   pure subroutine add_motion(row, d, x, factor)
+      real(wp), intent(inout) :: row(6)
+      real(wp), intent(in) :: d(3), x(3), factor
+
+      row(:3) = row(:3) + factor*d
+      row(4:) = row(4:) + factor*[x(2)*d(3) - x(3)*d(2), x(3)*d(1) - x(1)*d(3), &
+         x(1)*d(2) - x(2)*d(1)]
+   end subroutine add_motion
 
    !> Two contacts each of which closes the other by more than itself opens, without friction or
    !> beside it; one whose friction closes it so; and what nothing moves: all are closed by 1

@@ -38,7 +38,6 @@ contains
          test_case_t("vectors of slips: the cone, work, and trials that stand", test_vectors), &
          test_case_t("vectors of slips turn with the surface", test_turned), &
          test_case_t("the slope of the natural map is its derivative", test_slope), &
-         test_case_t("a blurred map stays inside the law", test_blur), &
          test_case_t("as a law beside the rows of a condition", test_law), &
          test_case_t("slip: work, rigid motions, differences", test_slip), &
          test_case_t("a disc rolls: work, rigid motions, differences", test_roll), &
@@ -201,7 +200,7 @@ contains
       do case = 1, 4000
          n = 1 + mod(case/2, 2)
          call draw_place(n, case, at)
-         call coulomb_map(at, mu, c, 0.0_wp, force, slope)
+         call coulomb_map(at, mu, c, force, slope)
          ! lam - c g and tau + c s stay as they are.
          at%gap = at%gap + (force(0) - at%lam)/c
          at%slip = at%slip - (force(1:) - at%tau)/c
@@ -237,8 +236,8 @@ contains
          turned%tau = matmul(turn, at%tau)
          turned%slip = matmul(turn, at%slip)
          turned%slip_target = matmul(turn, at%slip_target)
-         call coulomb_map(at, mu, c, 0.0_wp, force, slope)
-         call coulomb_map(turned, mu, c, 0.0_wp, again, slope_again)
+         call coulomb_map(at, mu, c, force, slope)
+         call coulomb_map(turned, mu, c, again, slope_again)
          call check_near(error, again, [force(0), matmul(turn, force(1:))], tol, 1.0_wp, "forces")
          call check_near(error, [slope_again(1:, 1:)], [matmul(matmul(turn, slope(1:, 1:)), &
             transpose(turn))], tol, 1.0_wp, "slopes")
@@ -251,33 +250,6 @@ contains
       end do
    end subroutine test_turned
 
-   !> A blurred map leaves the trial by what holds the push above 0 and friction below its limit,
-   !> and is the map itself but for that.
-   subroutine test_blur(error)
-      type(error_t), allocatable, intent(out) :: error
-      real(wp), parameter :: mu = 0.5_wp, c = 3.0_wp, blur = 1.0e-2_wp
-      type(contact_trial_t) :: at
-      real(wp), dimension(0:most_slips) :: force, sharp
-      real(wp) :: slope(0:most_slips, 0:most_slips), left(most_slips), most
-      integer :: case
-
-      do case = 1, 1000
-         call draw_place(2, 2*case + 1, at)
-         call coulomb_map(at, mu, c, blur, force, slope)
-         call coulomb_map(at, mu, c, 0.0_wp, sharp, slope)
-         most = mu*force(0)
-         left = at%tau + c*at%slip - force(1:)
-         call check_true(error, force(0) > 0.0_wp .and. norm2(force(1:)) < most, "inside")
-         call check_near(error, force(0)*(force(0) - at%lam + c*at%gap), blur**2, tol, 1.0_wp, &
-            "push")
-         call check_near(error, left*(most**2 - sum(force(1:)**2)), &
-            2.0_wp*(mu*blur)**2*force(1:), tol, 1.0_wp, "friction")
-         ! By e of the push, mu e of the limit, and as much again inside it.
-         call check_true(error, norm2(force - sharp) <= (1.0_wp + 2.0_wp*mu)*blur, "near the map")
-         if (allocated(error)) return
-      end do
-   end subroutine test_blur
-
    !> Central differences by the trial, exact but for their square and for rounding over it, away
    !> from kinks: steps over one are left out.
    subroutine test_slope(error)
@@ -286,7 +258,7 @@ contains
       real(wp), parameter :: small = epsilon(1.0_wp)**(1.0_wp/3.0_wp)
       type(contact_trial_t) :: at
       type(slip_status_t) :: status(-1:1)
-      real(wp) :: force(0:most_slips, -1:1), slope(0:most_slips, 0:most_slips, -1:1), worst, blur
+      real(wp) :: force(0:most_slips, -1:1), slope(0:most_slips, 0:most_slips, -1:1), worst
       integer :: case, i, k, n, n_seen
 
       worst = 0.0_wp
@@ -294,13 +266,12 @@ contains
       do case = 1, 1000
          n = 1 + mod(case/2, 2)
          call draw_place(n, case, at)
-         blur = merge(0.3_wp, 0.0_wp, mod(case, 3) == 0)
          do i = 0, n
             do k = -1, 1
                status(k) = coulomb_status(moved(k*small), mu, c)
-               call coulomb_map(moved(k*small), mu, c, blur, force(:, k), slope(:, :, k))
+               call coulomb_map(moved(k*small), mu, c, force(:, k), slope(:, :, k))
             end do
-            if (.not. blur > 0.0_wp .and. any(status%kind /= status(0)%kind)) cycle
+            if (any(status%kind /= status(0)%kind)) cycle
             if (norm2(slope(:, :, 1) - slope(:, :, -1)) > 0.01_wp) cycle
             n_seen = n_seen + 1
             worst = max(worst, maxval(abs((force(:, 1) - force(:, -1))/(2.0_wp*small) &

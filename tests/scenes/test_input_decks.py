@@ -20,6 +20,7 @@ SHORT = {
     "ball_in_bowl": {"t_end": 0.4},
     "hertz_ball": {"t_end": 0.05},
     "caught_ring": {"t_end": 0.1},
+    "dominoes": {"t_end": 0.4},
     "linked_rings": {"h": 0.02, "t_end": 0.3},
     "snap_fit": {"h": 0.05, "t_end": 1.5},
     "ironing": {"h_press": 0.25, "h": 0.1, "path": 0.5},
@@ -144,6 +145,21 @@ def test_snap_fit(tmp_path):
     fields = run.fields()
     nose = np.isclose(fields.x[:, 0], 0.85) & (fields.x[:, 2] < 0)
     assert (fields.x + fields["displacement"][-1])[nose, 0].min() > 1.17
+
+
+def test_dominoes(tmp_path):
+    """All have fallen: the highest corner of the last one is as high as it is thick, and a gap to the floor more, with which
+    it landed within an increment. All lie still, for as long as the run goes on."""
+    run = run_deck(DECKS/"dominoes.inp", tmp_path, t_end=4.5)
+    history, fields = run.history, run.fields()
+    (still,) = figures(DECKS/"dominoes.inp", r"kinetic energy below (\S+) of the largest")
+    assert run.verdict["law_violation"] < 1e-9
+    assert history["kinetic"][history["time"] > 4.4].max() < still*history["kinetic"].max()
+    assert np.diff(history["friction_loss"]).min() >= -1e-13*history["kinetic"].max()
+    total = history["total"] - history["contact_work"] + history["friction_loss"]
+    assert np.ptp(total) < 1e-11*history["kinetic"].max()
+    last = (fields.x + fields["displacement"][-1])[8*9:8*10, 2]
+    assert last.min() > -1e-12 and 0.2 <= last.max() < 0.21
 
 
 @pytest.mark.parametrize(("deck", "pair", "until"), [("ball_in_bowl", 3, 2.0), ("thrown_ring", 1, 1.2)])
