@@ -60,12 +60,14 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      logical :: goes_on, has_failed, is_early, is_driven, obeys
+      logical :: goes_on, has_failed, is_early, is_driven, obeys, repeats
+      logical :: solved(size(self%is_active), most_by_trials)
       logical, allocatable :: gripped(:)
-      integer :: i
+      integer :: i, n_solved
 
       is_driven = .true.
       has_failed = .false.
+      n_solved = 0
       call active_set_open_sets(self)
       do i = 1, most_by_trials
          if (i > most_tried .and. self%rules%has_impacts &
@@ -105,12 +107,34 @@ contains
          self%candidates%is_settled = obeys .and. (status /= step_done .or. &
             .not. (self%candidates%have_changed .or. self%candidates%one_closes))
          if (self%candidates%is_settled .or. status /= step_done) return
+         if (.not. is_early) then
+            call note_solved(self, solved, n_solved, repeats)
+            if (repeats) return
+         end if
          call choose(self, system, newton, motion, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
          ! The same set again: where it was left before its end, or has other stencils.
          if (.not. (self%candidates%is_new_set .or. is_early .or. self%is_stale)) return
       end do
    end subroutine contact_sets_solve
+
+   !> A set was solved to its end and does not stand. `repeats`: it was before, and leads to the same
+   !> ones again, as nothing else has changed.
+   pure subroutine note_solved(self, solved, n_solved, repeats)
+      type(active_set_t), intent(in) :: self
+      logical, intent(inout) :: solved(:, :)     !! (n_constraint, sets) what has acted
+      integer, intent(inout) :: n_solved         !! of these
+      logical, intent(out) :: repeats
+      integer :: k
+
+      repeats = .false.
+      if (self%friction%is_on .or. self%support%is_needed .or. self%is_stale) return
+      do k = 1, n_solved
+         repeats = repeats .or. all(solved(:, k) .eqv. self%candidates%acted)
+      end do
+      n_solved = n_solved + 1
+      solved(:, n_solved) = self%candidates%acted
+   end subroutine note_solved
 
    !> Does something stay free that contact is to hold? What no load works on in a set that was
    !> tried on the way tells of that set alone, and so does what slides where slip has a direction:

@@ -533,26 +533,29 @@ contains
       type(patch_stencil_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       real(wp), intent(out) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) [L]
-      real(wp) :: from(3), motion(3)
+      real(wp), dimension(3, self%n_node) :: from, motion
       integer :: i, j
 
-      at = 0.0_wp
-      way = 0.0_wp
       associate (slave => self%node(1))
          do i = 2, self%n_node
-            from = (x(:, self%node(i)) - x(:, slave)) + (u0(:, self%node(i)) - u0(:, slave))
-            motion = du(:, self%node(i)) - du(:, slave)
-            if (self%flip(i) > 0) then
-               from = flip_signs(self%flip(i))*from
-               motion = flip_signs(self%flip(i))*motion
-            end if
-            do j = 1, 2 + self%patch%n_vertex
-               if (.not. abs(self%weight(i, j)) > 0.0_wp) cycle
-               at(:, 1 + j) = at(:, 1 + j) + self%weight(i, j)*from
-               way(:, 1 + j) = way(:, 1 + j) + self%weight(i, j)*motion
-            end do
+            from(:, i) = (x(:, self%node(i)) - x(:, slave)) + (u0(:, self%node(i)) - u0(:, slave))
+            motion(:, i) = du(:, self%node(i)) - du(:, slave)
+            if (self%flip(i) == 0) cycle
+            from(:, i) = flip_signs(self%flip(i))*from(:, i)
+            motion(:, i) = flip_signs(self%flip(i))*motion(:, i)
          end do
       end associate
+      at = 0.0_wp
+      way = 0.0_wp
+      do j = 1, 2 + self%patch%n_vertex
+         do i = 2, self%n_node
+            associate (weight => self%weight(i, j))
+               if (.not. abs(weight) > 0.0_wp) cycle
+               at(:, 1 + j) = at(:, 1 + j) + weight*from(:, i)
+               way(:, 1 + j) = way(:, 1 + j) + weight*motion(:, i)
+            end associate
+         end do
+      end do
    end subroutine patch_stencil_gather
 
    !> How far the contact point of a stencil is from the curved surface that the nearest triangle
