@@ -61,13 +61,11 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
       logical :: goes_on, has_failed, is_early, is_driven, obeys, repeats
-      logical :: solved(size(self%is_active), most_by_trials)
       logical, allocatable :: gripped(:)
-      integer :: i, n_solved
+      integer :: i
 
       is_driven = .true.
       has_failed = .false.
-      n_solved = 0
       call active_set_open_sets(self)
       do i = 1, most_by_trials
          if (i > most_tried .and. self%rules%has_impacts &
@@ -107,10 +105,8 @@ contains
          self%candidates%is_settled = obeys .and. (status /= step_done .or. &
             .not. (self%candidates%have_changed .or. self%candidates%one_closes))
          if (self%candidates%is_settled .or. status /= step_done) return
-         if (.not. is_early) then
-            call note_solved(self, solved, n_solved, repeats)
-            if (repeats) return
-         end if
+         call note_solved(self, is_early, repeats)
+         if (repeats) return
          call choose(self, system, newton, motion, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
          ! The same set again: where it was left before its end, or has other stencils.
@@ -118,22 +114,24 @@ contains
       end do
    end subroutine contact_sets_solve
 
-   !> A set was solved to its end and does not stand. `repeats`: it was before, and leads to the same
-   !> ones again, as nothing else has changed.
-   pure subroutine note_solved(self, solved, n_solved, repeats)
-      type(active_set_t), intent(in) :: self
-      logical, intent(inout) :: solved(:, :)     !! (n_constraint, sets) what has acted
-      integer, intent(inout) :: n_solved         !! of these
+   !> A set does not stand. `repeats`: it was solved to its end, and was before in this step: it
+   !> leads to the same ones again, as nothing else has changed.
+   pure subroutine note_solved(self, is_early, repeats)
+      type(active_set_t), intent(inout) :: self
+      logical, intent(in) :: is_early            !! it was left before its end
       logical, intent(out) :: repeats
       integer :: k
 
       repeats = .false.
-      if (self%friction%is_on .or. self%support%is_needed .or. self%is_stale) return
-      do k = 1, n_solved
-         repeats = repeats .or. all(solved(:, k) .eqv. self%candidates%acted)
-      end do
-      n_solved = n_solved + 1
-      solved(:, n_solved) = self%candidates%acted
+      if (is_early .or. self%friction%is_on .or. self%support%is_needed .or. self%is_stale) return
+      associate (own => self%candidates)
+         if (.not. allocated(own%solved)) allocate(own%solved(size(own%acted), most_by_trials))
+         do k = 1, own%n_solved
+            repeats = repeats .or. all(own%solved(:, k) .eqv. own%acted)
+         end do
+         own%n_solved = own%n_solved + 1
+         own%solved(:, own%n_solved) = own%acted
+      end associate
    end subroutine note_solved
 
    !> Does something stay free that contact is to hold? What no load works on in a set that was
