@@ -62,8 +62,6 @@ module emcon_active_set
       logical, allocatable :: began(:)           !! (n_constraint) and in the first one
       logical, allocatable :: has_left(:)        !! (n_constraint) it lost its surface,
       logical, allocatable :: is_back(:)         !! (n_constraint) and has come back
-      logical, allocatable :: solved(:, :)       !! (n_constraint, any) sets that do not stand,
-      integer :: n_solved = 0                    !! so many
       integer, allocatable :: n_change(:)        !! (n_constraint) tries in which it begins to
                                                  !! act, no longer acts or slides another way
       logical, allocatable :: is_blamed(:)       !! (n_constraint) the step cannot stand on it
@@ -172,7 +170,6 @@ contains
       self%is_back = .false.
       self%is_blamed = .false.
       self%n_change = 0
-      self%n_solved = 0
       self%is_measured = .false.
       self%have_changed = .false.
       self%is_settled = .false.

@@ -60,7 +60,7 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
       type(error_t), allocatable, intent(out) :: error
-      logical :: goes_on, has_failed, is_early, is_driven, obeys, repeats
+      logical :: goes_on, has_failed, is_early, is_driven, obeys
       logical, allocatable :: gripped(:)
       integer :: i
 
@@ -105,34 +105,12 @@ contains
          self%candidates%is_settled = obeys .and. (status /= step_done .or. &
             .not. (self%candidates%have_changed .or. self%candidates%one_closes))
          if (self%candidates%is_settled .or. status /= step_done) return
-         call note_solved(self, is_early, repeats)
-         if (repeats) return
          call choose(self, system, newton, motion, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
          ! The same set again: where it was left before its end, or has other stencils.
          if (.not. (self%candidates%is_new_set .or. is_early .or. self%is_stale)) return
       end do
    end subroutine contact_sets_solve
-
-   !> A set does not stand. `repeats`: it was solved to its end, and was before in this step: it
-   !> leads to the same ones again, as nothing else has changed.
-   pure subroutine note_solved(self, is_early, repeats)
-      type(active_set_t), intent(inout) :: self
-      logical, intent(in) :: is_early            !! it was left before its end
-      logical, intent(out) :: repeats
-      integer :: k
-
-      repeats = .false.
-      if (is_early .or. self%friction%is_on .or. self%support%is_needed .or. self%is_stale) return
-      associate (own => self%candidates)
-         if (.not. allocated(own%solved)) allocate(own%solved(size(own%acted), most_by_trials))
-         do k = 1, own%n_solved
-            repeats = repeats .or. all(own%solved(:, k) .eqv. own%acted)
-         end do
-         own%n_solved = own%n_solved + 1
-         own%solved(:, own%n_solved) = own%acted
-      end associate
-   end subroutine note_solved
 
    !> Does something stay free that contact is to hold? What no load works on in a set that was
    !> tried on the way tells of that set alone, and so does what slides where slip has a direction:
