@@ -5,7 +5,7 @@
 !> section 6.1.
 module emcon_contact_candidates
    use emcon_active_set, only : active_set_note_stale, active_set_pass, active_set_select, &
-      active_set_t, active_set_update_gaps, step_done, step_too_far
+      active_set_t, active_set_update_gaps, step_done, step_too_far, touch_tol
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate
    use emcon_contact, only : contact_t
@@ -273,7 +273,8 @@ contains
    end subroutine look_at_acting
 
    !> Has the `i`-th constraint of `contact`, a candidate that does not act, closed? One that would
-   !> hold the gap of its start may end below that, without a force, as long as it is not in.
+   !> hold the gap of its start may end below that, without a force, as long as it is not in. One
+   !> that begins closed too far, which is never pushed out, has not if it opens.
    pure logical function has_closed(self, contact, i, id)
       type(active_set_t), intent(in) :: self
       class(contact_t), intent(in) :: contact
@@ -283,6 +284,8 @@ contains
       associate (gap => contact%state(i))
          held = min(gap_to_hold(self, gap, id), self%start%left(1)*self%start%overclosure(id) &
             + gap%closed)
+         if (.not. self%rules%pushes_out .and. gap%gap0 < held - touch_tol*gap%size) &
+            held = gap%gap0
          has_closed = gap%is_near .and. gap%is_over .and. gap%gap1 - held < -gap_noise*gap%size
       end associate
    end function has_closed

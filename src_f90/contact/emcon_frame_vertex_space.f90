@@ -21,8 +21,8 @@ module emcon_frame_vertex_space
       real(wp) :: df(3) = 0.0_wp                 !! how they change, to relative accuracy
       real(wp) :: g(n_frame_var, 3) = 0.0_wp     !! discrete gradients
       real(wp) :: c(n_frame_var, 3) = 0.0_wp     !! gradients at the end
-      !> (i, j, which) derivative of g(i, which) by variable j at the end; 0 if not asked for
-      real(wp) :: h(n_frame_var, n_frame_var, 3) = 0.0_wp
+      !> (i, j, which) derivative of g(i, which) by variable j at the end; only if asked for
+      real(wp) :: h(n_frame_var, n_frame_var, 3)
    end type frame_vertex_t
 
    !> The area that both vectors of a frame span.

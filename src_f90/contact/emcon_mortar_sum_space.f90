@@ -24,6 +24,8 @@ module emcon_mortar_sum_space
    !> What a triangle sees in a step, for all that is asked of it.
    type :: sight_t
       type(patch_open_t) :: open
+      logical, allocatable :: is_used(:)              !! (n_node of the stencil) open depends on it
+      integer, allocatable :: node(:)                 !! these
       type(patch_gap_t) :: cover                      !! what of it is covered, of an area of 1/2
       logical :: is_full = .false.                    !! its facet is covered, but for round-off
       logical :: is_blended = .false.                 !! between the linear multipliers and the dual
@@ -52,6 +54,10 @@ contains
             call patch_stencil_gather(stencil, x, u0, du, at, way)
             call patch_open(stencil%patch, at, way, leaves_second, sight(k)%open)
             part = part + 2.0_wp*patch_open_cover(sight(k)%open)/real(size(sight), wp)
+            associate (open => sight(k)%open)
+               sight(k)%is_used = patch_uses(stencil, open%vertex(:open%n_vertex))
+            end associate
+            sight(k)%node = pack(stencil%node(:stencil%n_node), sight(k)%is_used)
          end associate
       end do
       if (.not. self%is_dual) return
@@ -109,12 +115,13 @@ contains
                associate (open => sight(t)%open, patch => self%stencil(t)%patch)
                   call gap_of(patch, open, mortar_slave_weight(self, k, merge(1.0_wp, 0.0_wp, &
                      sight(t)%is_full)), .false., target, item%leaves_second, gap)
-                  call add_gap(self%stencil(t), gap, scale, item)
+                  call add_gap(self%stencil(t), sight(t), gap, scale, item)
                   if (sight(t)%is_blended) then
                      call gap_of(patch, open, self%weights%skew(:, self%vertex(k), t), .false., &
                         target, item%leaves_second, gap)
-                     call add_gap(self%stencil(t), gap, scale, skew)
-                     call add_gap(self%stencil(t), sight(t)%cover, 0.5_wp*real(n, wp), cover)
+                     call add_gap(self%stencil(t), sight(t), gap, scale, skew)
+                     call add_gap(self%stencil(t), sight(t), sight(t)%cover, 0.5_wp*real(n, wp), &
+                        cover)
                   end if
                end associate
             end if
@@ -125,19 +132,18 @@ contains
    end subroutine mortar_sum
 
    !> Add a gap of a triangle by `scale` to a condition that has its nodes.
-   pure subroutine add_gap(stencil, gap, scale, item)
+   pure subroutine add_gap(stencil, sight, gap, scale, item)
       type(patch_stencil_t), intent(in) :: stencil
+      type(sight_t), intent(in) :: sight
       type(patch_gap_t), intent(in) :: gap
       real(wp), intent(in) :: scale
       type(condition_t), intent(inout) :: item
-      integer :: j
+      integer :: j, place(size(sight%node))
 
-      associate (is_used => patch_uses(stencil, gap%vertex))
-         associate (node => pack(stencil%node(:stencil%n_node), is_used))
-            call patch_spread(stencil, gap, is_used, scale, [(findloc( &
-               item%node(:item%n_node), node(j), 1), j = 1, size(node))], item)
-         end associate
-      end associate
+      do j = 1, size(place)
+         place(j) = findloc(item%node(:item%n_node), sight%node(j), 1)
+      end do
+      call patch_spread(stencil, gap, sight%is_used, scale, place, item)
    end subroutine add_gap
 
    !> The nodes of the condition of constraint `i`, its own first, then others of the slave, and no
@@ -156,13 +162,11 @@ contains
          n = 1
          do pass = 1, 2
             do k = 1, size(triangle)
-               associate (stencil => self%stencil(triangle(k)), vertex => seen_by( &
-                     sight(triangle(k))))
-                  if (size(vertex) == 0) cycle
-                  associate (is_slave => [(m <= stencil%n_slave, m = 1, stencil%n_node)], &
-                        is_used => patch_uses(stencil, vertex))
-                     call nodes_append(pack(stencil%node(:stencil%n_node), is_used .and. &
-                        (is_slave .eqv. pass == 1)), list, n)
+               associate (stencil => self%stencil(triangle(k)), of => sight(triangle(k)))
+                  if (.not. (of%open%n_vertex > 0 .or. allocated(of%slip%vertex))) cycle
+                  associate (is_slave => [(m <= stencil%n_slave, m = 1, stencil%n_node)])
+                     call nodes_append(pack(stencil%node(:stencil%n_node), uses(stencil, of) &
+                        .and. (is_slave .eqv. pass == 1)), list, n)
                   end associate
                end associate
             end do
@@ -173,14 +177,15 @@ contains
       item%is_mean = .true.
    end subroutine begin_condition
 
-   !> The vertices of a stencil that gap or slip depend on.
-   pure function seen_by(sight) result(vertex)
+   !> Which nodes of a stencil gap or slip depend on.
+   pure function uses(stencil, sight) result(is_used)
+      type(patch_stencil_t), intent(in) :: stencil
       type(sight_t), intent(in) :: sight
-      integer, allocatable :: vertex(:)
+      logical :: is_used(stencil%n_node)
 
-      allocate(vertex(0))
-      if (sight%open%n_vertex > 0) vertex = sight%open%vertex(:sight%open%n_vertex)
-      if (allocated(sight%slip%vertex)) vertex = [vertex, sight%slip%vertex]
-   end function seen_by
+      is_used = sight%is_used
+      if (allocated(sight%slip%vertex)) is_used = is_used .or. patch_uses(stencil, &
+         sight%slip%vertex)
+   end function uses
 
 end module emcon_mortar_sum_space

@@ -31,7 +31,7 @@ contains
       integer, intent(in) :: place(:)            !! (n) of the nodes among those of `of_node`
       real(wp), intent(inout) :: of_node(:, :)   !! components of nodes, twice
       real(wp), allocatable :: half(:, :), full(:, :)
-      integer :: i, j, k, n, n_dim
+      integer :: a, i, j, k, n, n_dim
 
       n = size(place)
       n_dim = size(part, 1)/size(weight, 2)
@@ -42,9 +42,10 @@ contains
          do i = 1, n - 1
             if (.not. abs(weight(i, j)) > 0.0_wp) cycle
             do k = 1, size(part, 1)
-               associate (to => half(n_dim*(i - 1) + 1:n_dim*i, k))
-                  to = to + weight(i, j)*part(n_dim*(j - 1) + 1:n_dim*j, k)
-               end associate
+               do a = 1, n_dim
+                  half(n_dim*(i - 1) + a, k) = half(n_dim*(i - 1) + a, k) &
+                     + weight(i, j)*part(n_dim*(j - 1) + a, k)
+               end do
             end do
          end do
       end do
@@ -52,9 +53,10 @@ contains
       do j = 1, size(weight, 2)
          do i = 1, n - 1
             if (.not. abs(weight(i, j)) > 0.0_wp) cycle
-            associate (to => full(:, n_dim*(i - 1) + 1:n_dim*i))
-               to = to + weight(i, j)*half(:, n_dim*(j - 1) + 1:n_dim*j)
-            end associate
+            do a = 1, n_dim
+               full(:, n_dim*(i - 1) + a) = full(:, n_dim*(i - 1) + a) &
+                  + weight(i, j)*half(:, n_dim*(j - 1) + a)
+            end do
          end do
       end do
       call nodes_add_second(factor, n_dim, full, place, of_node)

@@ -73,7 +73,7 @@ contains
          associate (node => [1, 2, 3, 3 + open%vertex(j)])
             call frame_vertex(x(:, node), dx(:, node), leaves_second, open%at(j))
          end associate
-         call to_patch(patch, open%at(j))
+         call to_patch(patch, leaves_second, open%at(j))
       end do
       open%chi = patch%chi(open%vertex(:open%n_vertex))
       do k = 1, size(open%field)
@@ -156,8 +156,9 @@ contains
    end subroutine times_area
 
    !> Coordinates in the patch in place of those in the frame.
-   pure subroutine to_patch(patch, at)
+   pure subroutine to_patch(patch, leaves_second, at)
       type(patch_t), intent(in) :: patch
+      logical, intent(in) :: leaves_second
       type(frame_vertex_t), intent(inout) :: at
 
       associate (length => patch%length)
@@ -165,7 +166,7 @@ contains
          at%df(:at_eta) = at%df(:at_eta)/length
          at%g(:, :at_eta) = at%g(:, :at_eta)/length
          at%c(:, :at_eta) = at%c(:, :at_eta)/length
-         at%h(:, :, :at_eta) = at%h(:, :, :at_eta)/length
+         if (.not. leaves_second) at%h(:, :, :at_eta) = at%h(:, :, :at_eta)/length
       end associate
    end subroutine to_patch
 

@@ -51,6 +51,10 @@ module emcon_patch_stencil_space
       integer :: planes = 0                      !! of symmetry that it is in, a bit for each axis
       !> (>= n_node, >= 2 + n_vertex) of nodes in the vectors of the frame and in vertices
       real(wp), allocatable :: weight(:, :)
+      !> (>= 3 + n_vertex) entries before each of these columns; (any) what is not 0 there, side by
+      !> side in memory, and its rows
+      integer, allocatable, private :: start(:), row(:)
+      real(wp), allocatable, private :: entry(:)
    end type patch_stencil_t
 
 contains
@@ -135,6 +139,7 @@ contains
       end do
       self%corner = self%corner([1, 3, 2])
       call end_list(self, sides, near, ends, is_seen, x, u)
+      call list_weights(self)
 
    contains
 
@@ -151,6 +156,33 @@ contains
       end function goes_on
 
    end subroutine make_patch
+
+   !> Where weights are not 0: few are.
+   pure subroutine list_weights(self)
+      type(patch_stencil_t), intent(inout) :: self
+      integer :: i, j, n
+
+      associate (of => abs(self%weight(2:self%n_node, :2 + self%patch%n_vertex)) > 0.0_wp)
+         n = count(of)
+         if (allocated(self%row)) then
+            if (size(self%start) <= size(of, 2) .or. size(self%row) < n) deallocate(self%start, &
+               self%row, self%entry)
+         end if
+         if (.not. allocated(self%row)) allocate(self%start(size(self%weight, 2) + 1), &
+            self%row(2*n), self%entry(2*n))
+         n = 0
+         do j = 1, size(of, 2)
+            self%start(j) = n
+            do i = 1, size(of, 1)
+               if (.not. of(i, j)) cycle
+               n = n + 1
+               self%row(n) = 1 + i
+               self%entry(n) = self%weight(1 + i, j)
+            end do
+         end do
+         self%start(size(of, 2) + 1) = n
+      end associate
+   end subroutine list_weights
 
    !> Flanges where the list ends as the surface does, and is seen; else it fades there.
    pure subroutine end_list(self, sides, near, ends, is_seen, x, u)
@@ -533,26 +565,26 @@ contains
       type(patch_stencil_t), intent(in) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
       real(wp), intent(out) :: at(:, :), way(:, :)   !! (3, 3 + n_vertex) [L]
-      real(wp) :: from(3), motion(3)
-      integer :: i, j
+      real(wp), dimension(3, self%n_node) :: from, motion
+      integer :: i, j, k
 
-      at = 0.0_wp
-      way = 0.0_wp
       associate (slave => self%node(1))
          do i = 2, self%n_node
-            from = (x(:, self%node(i)) - x(:, slave)) + (u0(:, self%node(i)) - u0(:, slave))
-            motion = du(:, self%node(i)) - du(:, slave)
-            if (self%flip(i) > 0) then
-               from = flip_signs(self%flip(i))*from
-               motion = flip_signs(self%flip(i))*motion
-            end if
-            do j = 1, 2 + self%patch%n_vertex
-               if (.not. abs(self%weight(i, j)) > 0.0_wp) cycle
-               at(:, 1 + j) = at(:, 1 + j) + self%weight(i, j)*from
-               way(:, 1 + j) = way(:, 1 + j) + self%weight(i, j)*motion
-            end do
+            from(:, i) = (x(:, self%node(i)) - x(:, slave)) + (u0(:, self%node(i)) - u0(:, slave))
+            motion(:, i) = du(:, self%node(i)) - du(:, slave)
+            if (self%flip(i) == 0) cycle
+            from(:, i) = flip_signs(self%flip(i))*from(:, i)
+            motion(:, i) = flip_signs(self%flip(i))*motion(:, i)
          end do
       end associate
+      at = 0.0_wp
+      way = 0.0_wp
+      do j = 1, 2 + self%patch%n_vertex
+         do k = self%start(j) + 1, self%start(j + 1)
+            at(:, 1 + j) = at(:, 1 + j) + self%entry(k)*from(:, self%row(k))
+            way(:, 1 + j) = way(:, 1 + j) + self%entry(k)*motion(:, self%row(k))
+         end do
+      end do
    end subroutine patch_stencil_gather
 
    !> How far the contact point of a stencil is from the curved surface that the nearest triangle

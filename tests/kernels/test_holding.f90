@@ -81,11 +81,19 @@ contains
          call check_near(error, time, 0.05_wp, 4.0_wp*eps, 0.1_wp, "time of the way back")
          call check_equal(error, [count(is_next), findloc(is_next, .true., 1)], [1, 4], "on it")
          set%item([1, 2])%size = [0.11_wp, 0.09_wp]*units(k)
+         time = 0.10005_wp
+         is_next = [.false., .false., .false., .false., .true., .false.]
+         call gaps_next_guards(set, way, time, is_next)
+         call check_near(error, time, 0.10005_wp, 0.0_wp, 0.1_wp, "about the time of others")
+         call check_equal(error, [count(is_next), findloc(is_next, .true., 1)], [1, 5], "others")
+         time = 0.2_wp
          call gaps_next_guards(set, way, time, is_next)
          call check_near(error, time, 0.1_wp, 4.0_wp*eps, 0.1_wp, "time of guards")
          call check_true(error, all(is_next .eqv. [.true., .false., .true., .false., .false., &
             .false.]), "within an edge")
          set%item(:3)%size = 0.09_wp*units(k)
+         time = huge(time)
+         is_next = .false.
          call gaps_next_guards(set, way, time, is_next)
          call check_true(error, time >= huge(time) .and. .not. any(is_next), "none is so near")
          set%target(2) = -0.01_wp*units(k)
