@@ -5,7 +5,7 @@ module emcon_version
    private
    public :: version, precision_names, this_precision
 
-   character(len=*), parameter :: version = "0.4.0"
+   character(len=*), parameter :: version = "0.5.0"
    !> Words of `make PRECISION=`, the coarsest first.
    character(len=*), parameter :: precision_names(3) = [character(len=6) :: "single", "double", &
       "quad"]
