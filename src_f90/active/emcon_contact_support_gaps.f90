@@ -16,6 +16,9 @@ module emcon_contact_support_gaps
 
    !> Contacts that close at the same time, by this fraction of an edge, are taken in together.
    real(wp), parameter :: together = 1.0e-3_wp
+   !> So far in, by its edge, a tip may be when what lies around it meets in the mean; deeper ones
+   !> end a run.
+   real(wp), parameter :: deepest_tip = 0.1_wp
    !> A contact that closes by less than this, per unit of a motion, is not in its way.
    real(wp), parameter :: in_the_way = sqrt(epsilon(1.0_wp))
 
@@ -132,8 +135,9 @@ contains
       end do
    end subroutine gaps_next_to_close
 
-   !> Guards that close on a way before the contacts that are next, in place of these; within an
-   !> edge of their nodes: what slides along a surface they do not hold.
+   !> Guards that close on a way before the contacts that are next, in place of these, if a tip
+   !> would go too deep until then; within an edge of their nodes: what slides along a surface they
+   !> do not hold.
    pure subroutine gaps_next_guards(set, direction, time, is_next)
       type(constraint_set_t), intent(in) :: set  !! guards
       real(wp), intent(in) :: direction(:, :)    !! (n_dim, n_node) per time
@@ -148,7 +152,7 @@ contains
       far = maxval(abs(direction))
       do k = 1, set%n
          associate (size_of => set%item(k)%size)
-            if (first*far > size_of .or. time - first <= together*(size_of/far)) &
+            if (first*far > size_of .or. time - first <= deepest_tip*(size_of/far)) &
                is_first(set%id(k)) = .false.
          end associate
       end do

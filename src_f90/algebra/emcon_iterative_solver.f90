@@ -6,6 +6,7 @@
 !> takes many times that. A solution is as good as was asked for, or `is_converged` tells that
 !> `most_steps` did not do.
 module emcon_iterative_solver
+   use, intrinsic :: ieee_arithmetic, only : ieee_is_finite
    use, intrinsic :: iso_fortran_env, only : sp => real32
    use emcon_conjugate_gradients, only : gradients_are_done, gradients_begin, gradients_move, &
       gradients_t, gradients_turn
@@ -83,7 +84,7 @@ contains
             " values for " // to_text(self%blocks%n_slot) // " entries")
          return
       end if
-      if (self%first_slot == 0) return
+      if (self%first_slot == 0 .or. .not. all(ieee_is_finite(value))) return
       if (.not. value(self%first_slot) > 0.0_dp) return
       if (.not. self%is_scaled) self%half_scale = power_of_two(-exponent(value(self%first_slot)))
       if (.not. all(abs(self%half_scale*value) < largest)) return

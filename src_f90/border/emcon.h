@@ -28,7 +28,7 @@ extern "C" {
 /* Numbers follow semantic versioning: a program runs with every library of its major version (of
  * its minor version as long as the major one is 0) that is not older than the header it saw. */
 #define EMCON_VERSION_MAJOR 0
-#define EMCON_VERSION_MINOR 4
+#define EMCON_VERSION_MINOR 5
 #define EMCON_VERSION_PATCH 0
 
 /* What functions return; the same numbers as the exit codes of the program. */

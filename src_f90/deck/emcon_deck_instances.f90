@@ -177,7 +177,7 @@ contains
          end do
          if (.not. all(ok)) exit
          x = instance_moves(instance, x)
-         line = line // coordinates(x(:n_ends))
+         call add_point(x(:n_ends), line)
       end do
       if (i < data%n) line = data%text           ! the reader tells what is no number
    end subroutine instance_profile_line
@@ -207,7 +207,7 @@ contains
          else
             x = instance_moves(instance, scale*x)/scale
          end if
-         line = line // coordinates(x)
+         call add_point(x, line)
       end do
       do k = i, data%n
          line = line // ", " // field(data, k)
@@ -262,22 +262,21 @@ contains
       wrong = 0
       x = instance_moves(instance, x)
       call instance_field(self, field(data, 1), instance, .true., line)
-      line = line // coordinates(x(:merge(n_axis, n_axis - 1, data%n > n_axis .or. &
-         abs(x(n_axis)) > 0.0_wp)))
+      call add_point(x(:merge(n_axis, n_axis - 1, data%n > n_axis .or. abs(x(n_axis)) > 0.0_wp)), &
+         line)
    end subroutine instance_node_line
 
-   !> The fields of a point, each behind a comma.
-   pure function coordinates(x) result(text)
+   !> Add the fields of a point, each behind a comma.
+   pure subroutine add_point(x, line)
       real(wp), intent(in) :: x(:)               !! [L]
-      character(len=:), allocatable :: text
+      character(len=:), allocatable, intent(inout) :: line
       character(len=26) :: number
       integer :: i
 
-      text = ""
       do i = 1, size(x)
          write(number, "(es26.17e3)") x(i)
-         text = text // ", " // trim(adjustl(number))
+         line = line // ", " // trim(adjustl(number))
       end do
-   end function coordinates
+   end subroutine add_point
 
 end module emcon_deck_instances

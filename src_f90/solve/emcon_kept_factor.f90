@@ -51,7 +51,8 @@ module emcon_kept_factor
       integer, private :: n_slot = 0                 !! of the matrix
       real(dp), allocatable, private :: diagonal(:)  !! (n_unknown)
       type(factor_rows_t), private :: rows           !! the constraints last taken
-      type(projected_gradients_t), private :: gradients      !! where the factor is incomplete
+      !> Where the factor is incomplete:
+      type(projected_gradients_t), allocatable, private :: gradients
       ! Of contacts that give way: W^T W, and what is added to its diagonal
       real(dp), allocatable, private :: product(:, :)   !! (n, n)
       real(dp), allocatable, private :: compliance(:)   !! (n)
@@ -129,8 +130,10 @@ contains
       call blocks_factorise(self%blocks, matrix, is_singular, error)
       if (allocated(error)) return
       self%is_made = .not. is_singular
-      if (self%is_made .and. self%blocks%is_incomplete) call projected_begin(self%gradients, &
-         self%diagonal)
+      if (self%is_made .and. self%blocks%is_incomplete) then
+         if (.not. allocated(self%gradients)) allocate(self%gradients)
+         call projected_begin(self%gradients, self%diagonal)
+      end if
       self%n_renewal = self%n_renewal + 1
    end subroutine kept_factor_renew
 

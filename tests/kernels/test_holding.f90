@@ -86,7 +86,7 @@ contains
          call gaps_next_guards(set, way, time, is_next)
          call check_near(error, time, 0.10005_wp, 0.0_wp, 0.1_wp, "about the time of others")
          call check_equal(error, [count(is_next), findloc(is_next, .true., 1)], [1, 5], "others")
-         time = 0.2_wp
+         time = 0.25_wp
          call gaps_next_guards(set, way, time, is_next)
          call check_near(error, time, 0.1_wp, 4.0_wp*eps, 0.1_wp, "time of guards")
          call check_true(error, all(is_next .eqv. [.true., .false., .true., .false., .false., &
