@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import re
 import shlex
@@ -74,8 +75,9 @@ def test_the_build_gives_the_same_bits(configured: Path, tmp_path: Path) -> None
         folder.mkdir()
         shutil.copy(deck, folder)
         run(place/"emcon", folder/deck.name, "--set", "t_end=0.1", cwd=folder)
-        tables.append((folder/"bouncing_ball.csv").read_bytes())
-    assert tables[0] == tables[1]
+        with (folder/"bouncing_ball.csv").open() as file:
+            tables.append([{name: text for name, text in row.items() if name != "cpu"} for row in csv.DictReader(file)])
+    assert tables[0] == tables[1] and len(tables[0]) > 1
     run("cmake", "-S", HERE/"cmake", "-B", tmp_path/"host", f"-DCMAKE_PREFIX_PATH={prefix}")
     run("cmake", "--build", tmp_path/"host")
     shared, static = (run(tmp_path/"host"/name, ROOT/"input_decks"/"ring.inp") for name in ("host", "host_static"))
