@@ -15,7 +15,6 @@ module emcon_march_parts
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_t
    use emcon_penalty, only : most_augmentations
-   use emcon_steps, only : method_saddle_point
    use emcon_system, only : system_may_hold, system_t
    use emcon_term_registry, only : terms_solid
    use emcon_text, only : joined, note_add, notes_append, notes_t, string_t, to_text
@@ -279,10 +278,6 @@ contains
          end associate
       case (step_singular)
          call singular_text(terms_solid(self%system%term), scene, text)
-         if (scene%step(self%state%clock%i_step)%contact%method == method_saddle_point .and. &
-            size(scene%rigid) > 0) text = text // "; by SADDLE POINT it is so where more " &
-            // "contacts hold a rigid body than it has motions: use *CONSTRAINT METHOD, " &
-            // "TYPE=NULL SPACE"
       case (step_cycling)
          call cycling_text(self, scene, text)
       case (step_too_far)

@@ -2,7 +2,9 @@
 !>
 !> With the tangent A, the residual r, the directions F of forces and the gradients G of the values
 !> of rows, the unknowns follow dq = A^-1 (F^T y - r), and the rows G dq + defect = free + W y. With
-!> c F^T G in A, of rows that hold what nothing else does, multipliers gain y - c G dq, else y.
+!> c F^T G in A, of rows that hold what nothing else does, multipliers gain y - c G dq, else y. By
+!> the saddle point these are also all rows that always hold: a node of a rigid body that only they
+!> hold has no mass.
 !> Rows that always hold are eliminated first: their multipliers follow. Source: docs/theory.md,
 !> eq. (14i).
 module emcon_condensation
@@ -15,6 +17,7 @@ module emcon_condensation
    use emcon_lapack, only : dense_solve
    use emcon_solver_registry, only : solver_create
    use emcon_sparse_solver, only : matrix_general, sparse_solver_t
+   use emcon_steps, only : method_saddle_point
    use emcon_system, only : system_t
    implicit none
    private
@@ -36,6 +39,8 @@ module emcon_condensation
       real(dp), allocatable, private :: held_rate(:, :)
       class(sparse_solver_t), allocatable, private :: solver
       type(csr_t), private :: tangent
+      !> c of rows that always hold [M/T^2]
+      real(wp), private :: support = 0.0_wp
    end type condensation_t
 
 contains
@@ -53,7 +58,7 @@ contains
       integer :: k
 
       self%n_permanent = set%n_permanent
-      call assemble(self, system, set, has_curvature)
+      call assemble(self, system, set, has_curvature, correction%method == method_saddle_point)
       call factorise(self, correction, error)
       if (allocated(error) .or. self%is_singular) return
       if (allocated(self%motion)) deallocate(self%motion, self%held, self%permanent, self%w)
@@ -106,19 +111,27 @@ contains
    end subroutine find_held_rate
 
    !> The tangent of the terms, of laws, and of rows as far as it is wanted.
-   subroutine assemble(self, system, set, has_curvature)
+   subroutine assemble(self, system, set, has_curvature, supports)
       type(condensation_t), intent(inout) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(in) :: set
       logical, intent(in) :: has_curvature
+      logical, intent(in) :: supports            !! what always holds is stiff in the tangent
       integer, allocatable :: slot(:)
       integer :: k
 
-      call constraints_merge_pattern(set, system%matrix, self%tangent, slot)
+      call constraints_merge_pattern(set, system%matrix, self%tangent, slot, supports)
       do k = 1, size(slot)
          self%tangent%value(slot(k)) = system%matrix%value(k)
       end do
       if (has_curvature) call constraints_add_curvature(set, system%space%numbering, self%tangent)
+      self%support = 0.0_wp
+      if (supports .and. set%n_permanent > 0) then
+         self%support = real(maxval(abs(self%tangent%value)), wp)
+         do k = 1, set%n_permanent
+            call hold_row(set, k, self%support, self%tangent)
+         end do
+      end if
       if (.not. allocated(self%hold)) return
       do k = set%n_permanent + 1, set%n_row
          if (self%hold(k) > 0.0_wp) call hold_row(set, k, self%hold(k), self%tangent)
@@ -176,6 +189,8 @@ contains
             self%motion(:, first:last) = self%motion(:, first:last) - matmul(self%held, &
                real(lam, wp))
             self%permanent(:, first:last) = -real(lam, wp)
+            if (first == 0) self%permanent(:, 0) = self%permanent(:, 0) &
+               + self%support*set%defect(:n)
          end if
          if (first == 0) self%free = set%defect(n + 1:set%n_row) + rates(set, n + 1, set%n_row, &
             self%motion(:, 0))

@@ -169,16 +169,19 @@ contains
 
    !> The pattern of `base` widened by all pairs of unknowns that meet in a constraint with
    !> curvature, and where the entries of `base` went.
-   subroutine constraints_merge_pattern(self, base, merged, slot)
+   subroutine constraints_merge_pattern(self, base, merged, slot, has_linear)
       type(constraint_set_t), intent(in) :: self
       type(csr_t), intent(in) :: base
       type(csr_t), intent(out) :: merged
       integer, allocatable, intent(out) :: slot(:)       !! (entries of `base`)
+      logical, intent(in), optional :: has_linear        !! with what linear constraints join, too
       integer, allocatable :: row_start(:), column(:), user_start(:), user(:)
-      integer :: i, j, k, l, n, pass
+      integer :: first, i, j, k, l, n, pass
       integer, allocatable :: seen(:)
 
-      call curved_rows(self, row_start, column)
+      first = self%n_linear + 1
+      if (present(has_linear)) first = merge(1, first, has_linear)
+      call joined_columns(self, first, row_start, column)
       call csr_list_users(base%n_row, row_start + 1, column + 1, user_start, user)
       allocate(seen(base%n_row), slot(size(base%column)))
       merged%n_row = base%n_row
@@ -229,18 +232,19 @@ contains
 
    end subroutine constraints_merge_pattern
 
-   !> The unknowns of what is in the tangent: constraints with curvature, and what laws give.
-   pure subroutine curved_rows(self, row_start, column)
+   !> The unknowns of what is in the tangent: constraints from `first` on, and what laws give.
+   pure subroutine joined_columns(self, first, row_start, column)
       type(constraint_set_t), intent(in) :: self
+      integer, intent(in) :: first
       integer, allocatable, intent(out) :: row_start(:)    !! (rows + 1)
       integer, allocatable, intent(out) :: column(:)       !! from 0
 
       allocate(row_start(1), source=0)
       allocate(column(0))
-      associate (start => self%force_rows%row_start, before => self%n_linear + 1)
+      associate (start => self%force_rows%row_start)
          if (self%n > 0) then
-            row_start = start(before:) - start(before)
-            column = self%force_rows%column(start(before) + 1:start(size(start)))
+            row_start = start(first:) - start(first)
+            column = self%force_rows%column(start(first) + 1:start(size(start)))
          end if
       end associate
       if (self%n_condition == self%n) return
@@ -248,7 +252,7 @@ contains
          row_start = [row_start, size(column) + start(2:)]
          column = [column, self%law_rows%column(:start(size(start)))]
       end associate
-   end subroutine curved_rows
+   end subroutine joined_columns
 
    !> Subtract the derivatives of the forces of all conditions by q1 from the matrix `merged`, with
    !> multipliers of rows as they are.

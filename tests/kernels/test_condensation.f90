@@ -8,7 +8,7 @@ module test_condensation
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_solver_registry, only : solver_default
-   use emcon_steps, only : method_null_space
+   use emcon_steps, only : method_null_space, method_saddle_point
    use emcon_system, only : system_t
    use random_constraints, only : make_problem, make_rows, problem_t, tol_dp
    use sparse_samples, only : dense_of
@@ -29,7 +29,7 @@ contains
 
    !> N dq = F^T lam - r with the rows that always hold at 0 after it, whose multipliers are
    !> unknowns too: by LAPACK, for none, two and all but one of such rows, with curvature and
-   !> without, and with rows that are held.
+   !> without, with rows that are held, and by the saddle point, whose tangent is stiff along them.
    subroutine test_motion(error)
       type(error_t), allocatable, intent(out) :: error
       type(problem_t) :: problem
@@ -38,19 +38,21 @@ contains
       type(condensation_t) :: condensation
       real(dp), allocatable :: full(:, :), rhs(:, :), x(:, :), force(:, :), gap(:, :)
       real(wp), allocatable :: lam(:), hold(:)
-      integer :: n, m, k, case
+      integer :: n, m, k, case, kind
       logical :: is_singular
 
       call make_problem(problem)
       call make_rows(problem)
       system%space%numbering = problem%numbering
       system%matrix = problem%base
-      call correction_reset(correction, method_null_space, solver_default)
       n = problem%numbering%n_unknown
       associate (set => problem%set)
          force = dense_of(set%force_rows)
          gap = dense_of(set%gap_rows)
-         do case = 0, 7
+         do kind = 0, 15
+            case = modulo(kind, 8)
+            call correction_reset(correction, merge(method_saddle_point, method_null_space, &
+               kind > 7), solver_default)
             m = min(set%n - 1, 2*(modulo(case, 6)/2))
             if (any(case == [4, 5])) m = set%n - 1
             set%n_permanent = m
