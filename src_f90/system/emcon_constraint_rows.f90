@@ -176,14 +176,14 @@ contains
       integer, allocatable, intent(out) :: slot(:)       !! (entries of `base`)
       logical, intent(in), optional :: has_linear        !! with what linear constraints join, too
       integer, allocatable :: row_start(:), column(:), user_start(:), user(:)
-      integer :: first, i, j, k, l, n, pass
+      integer :: first, i, k, l, n, pass
       integer, allocatable :: seen(:)
 
       first = self%n_linear + 1
       if (present(has_linear)) first = merge(1, first, has_linear)
       call joined_columns(self, first, row_start, column)
       call csr_list_users(base%n_row, row_start + 1, column + 1, user_start, user)
-      allocate(seen(base%n_row), slot(size(base%column)))
+      allocate(seen(base%n_row))
       merged%n_row = base%n_row
       merged%n_col = base%n_col
       allocate(merged%row_start(base%n_row + 1), source=0)
@@ -209,15 +209,7 @@ contains
          if (pass == 1) allocate(merged%column(n))
       end do
       allocate(merged%value(n), source=0.0_dp)
-      do i = 1, base%n_row
-         j = merged%row_start(i) + 1
-         do k = base%row_start(i) + 1, base%row_start(i + 1)
-            do while (merged%column(j) /= base%column(k))
-               j = j + 1
-            end do
-            slot(k) = j
-         end do
-      end do
+      call find_slots(base, merged, slot)
 
    contains
 
@@ -231,6 +223,24 @@ contains
       end subroutine add_column
 
    end subroutine constraints_merge_pattern
+
+   !> Where the entries of `base` are in a pattern with more of them.
+   pure subroutine find_slots(base, merged, slot)
+      type(csr_t), intent(in) :: base, merged
+      integer, allocatable, intent(out) :: slot(:)       !! (entries of `base`)
+      integer :: i, j, k
+
+      allocate(slot(size(base%column)))
+      do i = 1, base%n_row
+         j = merged%row_start(i) + 1
+         do k = base%row_start(i) + 1, base%row_start(i + 1)
+            do while (merged%column(j) /= base%column(k))
+               j = j + 1
+            end do
+            slot(k) = j
+         end do
+      end do
+   end subroutine find_slots
 
    !> The unknowns of what is in the tangent: constraints from `first` on, and what laws give.
    pure subroutine joined_columns(self, first, row_start, column)
