@@ -19,7 +19,6 @@ module emcon_contact_newton
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
       contact_trial_t, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
    use emcon_errors, only : error_t
-   use emcon_evaluation, only : evaluation_is_equilibrium
    use emcon_friction, only : friction_stiffness
    use emcon_kinds, only : wp
    use emcon_lane_sums, only : relative_size
@@ -65,7 +64,7 @@ module emcon_contact_newton
       logical :: is_rounding = .false.           !! nothing but round-off is left
       integer :: n_stall = 0
       integer :: least_soft = 0                  !! first of `softer` that is tried, 0: none
-      logical :: is_static = .false.             !! nothing has inertia
+      logical :: is_hung = .false.               !! contact alone holds a body
       logical :: is_searching = .false.          !! no tangent is wanted
       logical :: turns = .false.                 !! something rubs, and slip has a direction
       logical :: keeps_tangent = .false.         !! the last one does for the next correction
@@ -87,7 +86,7 @@ contains
       integer :: k
 
       call begin(self, newton, set, law)
-      self%is_static = evaluation_is_equilibrium(motion%evaluation)
+      self%is_hung = newton%is_hung
       call iterate(self, newton, system, set, motion, status, error)
       call condensation_free(self%condensation)
       if (allocated(error)) return
@@ -427,7 +426,7 @@ contains
          .or. (self%turns .and. self%size < enough_kept*self%last)
    end function does_keep_tangent
 
-   !> In statics contacts may be all that holds a body: they are held as the tangent is factorised.
+   !> Where contacts are all that holds a body they are held as the tangent is factorised.
    pure subroutine find_hold(self, system, set)
       type(solve_t), intent(inout) :: self
       type(system_t), intent(in) :: system
@@ -438,7 +437,7 @@ contains
          do k = 1, size(problem%stiffness)
             problem%stiffness(k) = friction_stiffness(system, set%item(first + k))
          end do
-         if (.not. self%is_static) return
+         if (.not. self%is_hung) return
          do k = first + 1, set%n_row
             self%condensation%hold(k) = problem%stiffness(set%condition(k) - first)
          end do

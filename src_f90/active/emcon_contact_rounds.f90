@@ -178,6 +178,7 @@ contains
 
       self%friction%follows = .false.
       newton%looks_early = .false.
+      newton%is_hung = self%support%is_needed
       newton%convergence%largest_move = huge(1.0_wp)
       if (.not. self%rules%has_impacts) newton%convergence%largest_move = self%rules%largest_move
       do i = 1, most_rounds
