@@ -14,6 +14,7 @@ module emcon_contact_candidates
    use emcon_coulomb_law, only : slip_status_t
    use emcon_errors, only : error_t
    use emcon_friction, only : friction_close, friction_keep, most_lagged, most_shift
+   use emcon_kept_factor, only : kept_factor_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_near_laws, only : near_laws_are_none, near_laws_update
@@ -34,10 +35,13 @@ module emcon_contact_candidates
 contains
 
    !> Are there so many candidates that trials find the next set of them sooner than their problem?
-   pure logical function candidates_are_many(self)
+   !> That is dense: it takes more operations than a factor does where they are more than its root.
+   pure logical function candidates_are_many(self, kept)
       type(active_set_t), intent(in) :: self
+      type(kept_factor_t), intent(in) :: kept    !! of the step
 
-      candidates_are_many = are_beyond(self, most_condensed)
+      candidates_are_many = are_beyond(self, max(most_condensed, &
+         int(min(kept%blocks%n_operation, real(most_together, wp)**3)**(1.0_wp/3.0_wp))))
    end function candidates_are_many
 
    !> Are there too many candidates for a problem of all of them?

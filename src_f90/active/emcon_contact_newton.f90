@@ -6,8 +6,8 @@
 !> the method converges as Newton's does. The end is told by the laws, not by the set: where rows
 !> follow from others motions stand while forces still trade. Source: docs/theory.md, eq. (14i).
 module emcon_contact_newton
-   use emcon_condensation, only : condensation_free, condensation_make, condensation_renew, &
-      condensation_t
+   use emcon_condensation, only : condensation_free, condensation_make, condensation_move, &
+      condensation_renew, condensation_t, condensation_take
    use emcon_constraint, only : condition_rate
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_set_t, constraints_evaluate, constraints_rounding, &
@@ -19,7 +19,9 @@ module emcon_contact_newton
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
       contact_trial_t, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
    use emcon_errors, only : error_t
+   use emcon_factor_policy, only : factor_policy_may_provide, factor_policy_provide
    use emcon_friction, only : friction_stiffness
+   use emcon_kept_factor, only : kept_factor_has_room, kept_factor_may_condense
    use emcon_kinds, only : wp
    use emcon_lane_sums, only : relative_size
    use emcon_motion, only : motion_evaluate, motion_t
@@ -46,8 +48,9 @@ module emcon_contact_newton
    !> Parts of its W by which a row gives way where the condensed problem has no solution, in turn;
    !> by the last ones an iterate goes a part of the way only.
    real(wp), parameter :: softer(*) = [1.0e-7_wp, 1.0e-5_wp, 1.0e-3_wp, 1.0e-1_wp, 10.0_wp]
-   !> The tangent of an iterate does for the next one if that leaves less than this part.
-   real(wp), parameter :: enough_kept = 0.1_wp
+   !> The tangent of an iterate does for the next one if that leaves less than this part; a factor
+   !> that is kept does with new rows if less than that is left.
+   real(wp), parameter :: enough_kept = 0.1_wp, enough_by_kept = 0.5_wp
    !> Once it is within the tolerance an iterate that leaves more than this part is the last.
    real(wp), parameter :: polish_gain = 0.3_wp
 
@@ -66,8 +69,10 @@ module emcon_contact_newton
       integer :: least_soft = 0                  !! first of `softer` that is tried, 0: none
       logical :: is_hung = .false.               !! contact alone holds a body
       logical :: is_searching = .false.          !! no tangent is wanted
+      logical :: is_driven = .false.             !! the next correction meets prescribed motion
       logical :: turns = .false.                 !! something rubs, and slip has a direction
       logical :: keeps_tangent = .false.         !! the last one does for the next correction
+      logical :: by_kept = .false.               !! it is a factor that is kept
    end type solve_t
 
 contains
@@ -128,50 +133,102 @@ contains
       type(motion_t), intent(inout) :: motion
       integer, intent(out) :: status             !! one of the `newton_` codes
       type(error_t), allocatable, intent(out) :: error
-      logical :: is_driven
       integer :: i, most_iterates
 
       most_iterates = more_iterates*newton%convergence%maximum
-      is_driven = any(abs(newton%driven) > 0.0_wp)
-      if (is_driven) motion%du = motion%du - newton%driven
+      self%is_driven = any(abs(newton%driven) > 0.0_wp)
+      self%by_kept = may_keep(self, newton, system, set)
+      if (self%is_driven) motion%du = motion%du - newton%driven
       do i = 0, most_iterates
          call newton_check_interrupt(newton, status, error)
          if (allocated(error)) return
          ! The correction to come from here may be the last one, or by the tangent that there is.
-         self%is_searching = i > 0 .and. (self%size <= no_search .or. self%turns)
+         self%is_searching = (i > 0 .and. (self%size <= no_search .or. self%turns)) .or. &
+            (self%by_kept .and. newton%correction%kept%is_made)
          call measure_damped(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
          if (i > 0 .and. is_done(self, newton)) return
          if (i == most_iterates .and. self%size <= newton%convergence%tolerance) return
          status = newton_diverged
          if (i == most_iterates .or. .not. self%size < huge(self%size)) return
-         self%keeps_tangent = does_keep_tangent(self, newton)
-         if (self%is_searching .and. .not. self%keeps_tangent) then
-            self%is_searching = .false.
-            call measure(self, newton, system, set, motion, status, error)
-            if (allocated(error) .or. status /= newton_converged) return
-         end if
-         call count_stall(self)
-         if (is_driven) call add_driven(newton, system, set, motion)
-         call condense(self, newton, system, set, status, error)
+         call find_correction(self, newton, system, set, motion, status, error)
          if (allocated(error) .or. status /= newton_converged) return
-         call correct(self, newton, system, set)
-         if (.not. is_driven .and. goes_far(newton)) then
+         if (.not. self%is_driven .and. goes_far(newton)) then
             call take(self, newton, system, set, motion, newton%convergence%largest_move &
                /maxval(abs(newton%dq)))
             status = newton_early
             return
          end if
-         if (i > 0 .and. .not. is_driven .and. self%size > no_search) then
+         if (i > 0 .and. .not. self%is_driven .and. self%size > no_search) then
             call search(self, newton, system, set, motion, error)
          else
             call take(self, newton, system, set, motion, 1.0_wp)
          end if
          if (allocated(error)) return
-         if (is_driven) motion%du = motion%du + newton%driven
-         is_driven = .false.
+         if (self%is_driven) motion%du = motion%du + newton%driven
+         self%is_driven = .false.
       end do
    end subroutine iterate
+
+   !> May corrections come from a factor that is kept?
+   pure logical function may_keep(self, newton, system, set)
+      type(solve_t), intent(in) :: self
+      type(newton_t), intent(in) :: newton
+      type(system_t), intent(in) :: system
+      type(constraint_set_t), intent(in) :: set
+
+      may_keep = factor_policy_may_provide(newton%factor_policy) .and. .not. (self%is_hung .or. &
+         self%is_driven) .and. kept_factor_has_room(newton%correction%kept, set%n_row, &
+         size(system%matrix%column))
+   end function may_keep
+
+   !> The correction from here: by the last tangent, by a factor that is kept, or by a new tangent.
+   subroutine find_correction(self, newton, system, set, motion, status, error)
+      type(solve_t), intent(inout) :: self
+      type(newton_t), intent(inout) :: newton
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(inout) :: set
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status             !! one of the `newton_` codes
+      type(error_t), allocatable, intent(out) :: error
+      logical :: is_found
+
+      self%keeps_tangent = does_keep_tangent(self, newton)
+      is_found = self%by_kept .and. (self%keeps_tangent .or. self%size < enough_by_kept*self%last)
+      if (is_found) call condense_by_kept(self, newton, system, set, motion, is_found, error)
+      if (allocated(error)) return
+      status = newton_converged
+      if (.not. is_found) then
+         if (self%by_kept) then
+            self%best = self%size
+            self%by_kept = .false.
+            self%keeps_tangent = .false.
+         end if
+         call find_tangent(self, newton, system, set, motion, status, error)
+         if (allocated(error) .or. status /= newton_converged) return
+         if (self%is_driven) call add_driven(newton, system, set, motion)
+         call condense(self, newton, system, set, status, error)
+         if (allocated(error) .or. status /= newton_converged) return
+      end if
+      call count_stall(self)
+      call correct(self, newton, system, set, error)
+   end subroutine find_correction
+
+   !> Let there be a tangent, unless the last one is kept.
+   subroutine find_tangent(self, newton, system, set, motion, status, error)
+      type(solve_t), intent(inout) :: self
+      type(newton_t), intent(inout) :: newton
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(inout) :: set
+      type(motion_t), intent(inout) :: motion
+      integer, intent(out) :: status             !! one of the `newton_` codes
+      type(error_t), allocatable, intent(out) :: error
+
+      status = newton_converged
+      if (.not. self%is_searching .or. self%keeps_tangent) return
+      self%is_searching = .false.
+      call measure(self, newton, system, set, motion, status, error)
+   end subroutine find_tangent
 
    !> Does the correction move something farther than contacts that are no candidates allow?
    pure logical function goes_far(newton)
@@ -397,6 +454,40 @@ contains
       if (is_solved) self%status = contact_problem_status(self%problem, self%push)
    end subroutine condense
 
+   !> The same by a factor that is kept. `is_found`: there is one, and it leads to forces.
+   subroutine condense_by_kept(self, newton, system, set, motion, is_found, error)
+      type(solve_t), intent(inout) :: self
+      type(newton_t), intent(inout) :: newton
+      type(system_t), intent(inout) :: system
+      type(constraint_set_t), intent(in) :: set
+      type(motion_t), intent(in) :: motion
+      logical, intent(out) :: is_found
+      type(error_t), allocatable, intent(out) :: error
+      integer :: left
+
+      call phase_enter(system%phases, phase_factorise, left)
+      is_found = .true.
+      associate (kept => newton%correction%kept)
+         if (.not. kept%is_made) then
+            call factor_policy_provide(newton%factor_policy, newton%correction, system, motion, &
+               error)
+            system%phases%n_factorisation = system%phases%n_factorisation + 1
+         end if
+         call phase_leave(system%phases, phase_eliminate)
+         if (.not. allocated(error)) is_found = kept_factor_may_condense(kept, set%n_row)
+         if (is_found .and. .not. allocated(error)) call condensation_take(self%condensation, &
+            kept, set, newton%residual, .not. self%keeps_tangent, error)
+      end associate
+      is_found = is_found .and. .not. (allocated(error) .or. self%condensation%is_singular)
+      if (is_found) then
+         newton%convergence%n_iteration = newton%convergence%n_iteration + 1
+         call find_hold(self, system, set)
+         call solve_condensed(self, set, is_found)
+      end if
+      if (is_found) self%status = contact_problem_status(self%problem, self%push)
+      call phase_leave(system%phases, left)
+   end subroutine condense_by_kept
+
    !> Forces that obey the laws as the step is condensed; softer where there are none.
    subroutine solve_condensed(self, set, is_solved)
       type(solve_t), intent(inout) :: self
@@ -496,24 +587,27 @@ contains
    end subroutine soften
 
    !> The correction of the unknowns, and the multipliers after it.
-   subroutine correct(self, newton, system, set)
+   subroutine correct(self, newton, system, set, error)
       type(solve_t), intent(inout) :: self
       type(newton_t), intent(inout) :: newton
       type(system_t), intent(inout) :: system
       type(constraint_set_t), intent(in) :: set
-      real(wp) :: more(set%n_row - set%n_permanent), force(0:self%problem%n_slip, size(self%status))
+      type(error_t), allocatable, intent(out) :: error
+      real(wp), dimension(0:self%problem%n_slip, size(self%status)) :: force
+      real(wp) :: more(set%n_row - set%n_permanent), held(set%n_permanent)
       integer :: k
 
       self%old = set%lam
       force = contact_problem_force(self%problem, self%push)
-      associate (first => set%n_permanent, condensation => self%condensation)
+      associate (first => set%n_permanent)
          do k = first + 1, set%n_row
             self%new(k) = force(set%slip(k), set%condition(k) - first)
             more(k - first) = self%push(set%slip(k), set%condition(k) - first)
          end do
-         newton%dq = condensation%motion(:, 0) + matmul(condensation%motion(:, 1:), more)
-         self%new(:first) = self%old(:first) + condensation%permanent(:, 0) &
-            + matmul(condensation%permanent(:, 1:), more)
+         call condensation_move(self%condensation, newton%correction%kept, more, newton%dq, held, &
+            error)
+         if (allocated(error)) return
+         self%new(:first) = self%old(:first) + held
       end associate
       newton%n_solve = newton%n_solve + 1
       system%phases%n_solve = system%phases%n_solve + 1

@@ -19,7 +19,7 @@ module emcon_contact_rounds
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_evaluate, motion_t
    use emcon_newton, only : newton_converged, newton_early, newton_measure_forces, &
-      newton_refused, newton_solve, newton_t
+      newton_redundant, newton_refused, newton_solve, newton_t
    use emcon_scene, only : scene_t
    use emcon_system, only : system_respond, system_stiffen, system_t
    implicit none
@@ -80,10 +80,14 @@ contains
       type(scene_t), intent(in) :: scene
       type(newton_t), intent(inout) :: newton
       type(motion_t), intent(inout) :: motion
-      integer, intent(out) :: status             !! one of the `step_` codes
+      !> In: why none stands, one of the `newton_` codes; out: one of the `step_` codes
+      integer, intent(inout) :: status
       type(error_t), allocatable, intent(out) :: error
       character(len=:), allocatable :: slides    ! what friction at its limit leaves free
+      logical, allocatable :: known(:)           ! candidates so far
+      logical :: follows                         ! rows of the last set follow from others
 
+      follows = status == newton_redundant
       status = step_cycling
       if (candidates_are_too_many(self)) return
       if (self%support%is_needed) then
@@ -92,10 +96,12 @@ contains
          status = step_not_held
          if (allocated(self%support%text)) return
          call begin_again(self, system, motion)
-      else if (candidates_are_many(self)) then
+      else if (follows .or. candidates_are_many(self, newton%correction%kept)) then
+         known = self%candidates%takes_part
          call contact_sets_begin_anew(self, newton, motion)
          self%is_active = self%candidates%began
          call begin_again(self, system, motion)
+         if (follows) self%candidates%takes_part = known .and. .not. self%is_left_out
       end if
       if (self%friction%looks_back) then
          ! Sets share forces of rows that follow from others as it comes; friction turns by that.

@@ -84,9 +84,9 @@ contains
          if (allocated(error)) return
          ! Rows that lose their rank on the way are those of a motion that goes astray.
          if (status == newton_redundant .and. (newton%convergence%n_iteration == 0 &
-            .or. candidates_are_many(self))) then
+            .or. candidates_are_many(self, newton%correction%kept))) then
             call candidates_leave_out(self, newton%correction%redundant, goes_on)
-            if (goes_on) cycle
+            if (goes_on .and. i == 1) cycle
             return
          else if (.not. any(status == [newton_converged, newton_early])) then
             has_failed = status == newton_diverged .and. .not. self%rules%has_impacts
@@ -245,21 +245,22 @@ contains
       type(motion_t), intent(inout) :: motion
       logical, intent(out) :: goes_on            !! there is such a set
       type(error_t), allocatable, intent(out) :: error
-      logical :: turns
+      logical :: turns, are_many
       integer :: n_row
 
       turns = .false.
       n_row = (1 + merge(self%friction%n_slip, 0, self%friction%is_on)) &
          *count(self%candidates%takes_part)
+      are_many = candidates_are_many(self, newton%correction%kept)
       goes_on = newton%factor_policy%is_allowed .and. newton%correction%kept%is_made &
-         .and. .not. (candidates_are_many(self) .or. (self%friction%is_on .and. n_row > most_rows))
+         .and. .not. (are_many .or. (self%friction%is_on .and. n_row > most_rows))
       if (goes_on) goes_on = kept_factor_has_room(newton%correction%kept, n_row, &
          size(system%matrix%column))
       if (goes_on) then
          call choose_by_problem(self, system, newton, motion, turns, goes_on, error)
          if (allocated(error) .or. .not. goes_on) return
       else
-         goes_on = .not. self%rules%has_impacts .or. candidates_are_many(self) .or. &
+         goes_on = .not. self%rules%has_impacts .or. are_many .or. &
             active_set_may_turn(self, system)
          if (.not. goes_on) return
          call choose_by_trials(self, system, turns)

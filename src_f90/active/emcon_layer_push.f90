@@ -3,11 +3,12 @@
 !>
 !> Source: docs/theory.md, eq. (22c).
 module emcon_layer_push
+   use emcon_condensation, only : condensation_free, condensation_make, condensation_move, &
+      condensation_t
    use emcon_constraint, only : condition_add_field, condition_row_force, condition_stiffness
    use emcon_constraint_rows, only : constraints_rows
    use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate, &
       constraints_force, constraints_select
-   use emcon_correction, only : correction_factorise, correction_lay_out, correction_solve
    use emcon_errors, only : error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
@@ -22,6 +23,8 @@ module emcon_layer_push
    !> What is left on z of the largest force: the energy that it would give to what has no mass goes
    !> with its square, which is round-off.
    real(wp), parameter :: uncondensed = sqrt(epsilon(1.0_wp))
+   !> Rows that follow from others give way by this part of what they gain: forces have an end.
+   real(dp), parameter :: dependent = 1.0e4_dp*epsilon(1.0_dp)
 
 contains
 
@@ -33,17 +36,16 @@ contains
       logical, intent(out) :: is_singular        !! there are none
       type(error_t), allocatable, intent(out) :: error
       type(constraint_set_t) :: opened
+      integer, allocatable :: id(:)
       real(wp), allocatable :: y(:), mu(:)
       real(wp) :: field(size(self%du, 1), size(self%du, 2))
       integer :: k
 
       associate (system => self%system, set => self%active%set)
-         call constraints_select(opened, pack([(k, k = 1, size(weight))], &
-            abs(weight) > 0.0_wp .and. .not. self%acts))
-         ! After a step that is far too large a contact may have nothing in front of it any more.
-         is_singular = .not. all(have_gaps(system, opened%id))
+         ! What has nothing in front of it any more, as an edge past the end of another, is no row.
+         id = pack([(k, k = 1, size(weight))], abs(weight) > 0.0_wp .and. .not. self%acts)
+         call constraints_select(opened, pack(id, have_gaps(system, id)))
          self%push = 0.0_wp
-         if (is_singular) return
          opened%lam = weight(opened%id)
          call constraints_evaluate(opened, system, self%motion)
          call constraints_force(opened, 1, self%push)
@@ -78,7 +80,7 @@ contains
    end function have_gaps
 
    !> How z moves, and which multipliers of the set that takes: those of contacts that have closed
-   !> are `weight`, the others close no gap and open none.
+   !> are `weight`, the others close no gap and open none. Of these some may follow from others.
    subroutine respond_to(self, weight, y, mu, is_singular, error)
       type(layer_t), intent(inout) :: self
       real(wp), intent(in) :: weight(:)
@@ -86,41 +88,50 @@ contains
       real(wp), intent(inout), contiguous :: y(:), mu(:)
       logical, intent(out) :: is_singular
       type(error_t), allocatable, intent(out) :: error
-      integer, allocatable :: closed(:)
-      real(wp), allocatable :: ways(:, :), forces(:, :), residual(:)
-      real(dp), allocatable :: opening(:, :)     !! of the contacts that have closed
-      integer :: i, k, n
+      type(condensation_t) :: condensation
+      real(wp) :: residual(size(y))
 
-      is_singular = .false.
       associate (set => self%active%set, system => self%system, &
-            correction => self%newton%correction)
+            correction => self%newton%correction, first => self%active%set%n_permanent)
          call constraints_evaluate(set, system, self%motion)
          call constraints_rows(set, system%space%numbering)
-         call correction_lay_out(correction, system, set)
-         call correction_factorise(correction, system, set, is_singular, error)
-         if (allocated(error) .or. is_singular) return
-         closed = pack([(k, k = 1, set%n)], abs(weight(set%id(:set%n))) > 0.0_wp)
-         n = size(closed)
-         allocate(residual(size(y)), ways(size(y), 0:n), forces(set%n_row, 0:n))
          call pick_unknowns(system%space%numbering, self%push, residual)
-         residual = -residual
          set%defect = 0.0_wp
-         call correction_solve(correction, set, residual, ways(:, 0), forces(:, 0), error)
-         residual = 0.0_wp
-         do i = 1, n
-            if (allocated(error)) return
-            set%defect = 0.0_wp
-            set%defect(closed(i)) = -1.0_wp
-            call correction_solve(correction, set, residual, ways(:, i), forces(:, i), error)
-         end do
-         if (allocated(error)) return
-         allocate(opening(n, 1))
-         call dense_solve(real(forces(closed, 1:), dp), real(reshape( &
-            weight(set%id(closed)) - forces(closed, 0), [n, 1]), dp), opening, is_singular)
-         y = ways(:, 0) + matmul(ways(:, 1:), real(opening(:, 1), wp))
-         mu = forces(:, 0) + matmul(forces(:, 1:), real(opening(:, 1), wp))
+         call condensation_make(condensation, system, set, correction, -residual, .true., error)
+         is_singular = condensation%is_singular
+         mu = 0.0_wp
+         if (.not. (is_singular .or. allocated(error))) then
+            mu(first + 1:set%n) = weight(set%id(first + 1:set%n))
+            call hold_others(condensation, mu(first + 1:), is_singular)
+            call condensation_move(condensation, correction%kept, mu(first + 1:), y, mu(:first), &
+               error)
+         end if
       end associate
+      call condensation_free(condensation)
    end subroutine respond_to
+
+   !> Multipliers of the rows that have none so far, so that their values stay as they are.
+   subroutine hold_others(condensation, mu, is_singular)
+      type(condensation_t), intent(in) :: condensation
+      real(wp), intent(inout) :: mu(:)           !! (rows) [M L/T^2]
+      logical, intent(out) :: is_singular
+      real(dp), allocatable :: w(:, :), rate(:, :), held(:, :)
+      integer, allocatable :: other(:)
+      integer :: k
+
+      is_singular = .false.
+      other = pack([(k, k = 1, size(mu))], .not. abs(mu) > 0.0_wp)
+      if (size(other) == 0) return
+      w = real(condensation%w(other, other), dp)
+      do k = 1, size(other)
+         w(k, k) = (1.0_dp + dependent)*w(k, k)
+      end do
+      rate = real(reshape(-condensation%free(other) - matmul(condensation%w(other, :), mu), &
+         [size(other), 1]), dp)
+      held = rate
+      call dense_solve(w, rate, held, is_singular)
+      mu(other) = real(held(:, 1), wp)
+   end subroutine hold_others
 
    !> Add what the forces on all freedoms change by where z moves by `y`, and the rows of the set
    !> push with `mu` more.

@@ -5,14 +5,17 @@
 !> c F^T G in A, of rows that hold what nothing else does, multipliers gain y - c G dq, else y. By
 !> the saddle point these are also all rows that always hold: a node of a rigid body that only they
 !> hold has no mass.
-!> Rows that always hold are eliminated first: their multipliers follow. Source: docs/theory.md,
-!> eq. (14i).
+!> Rows that always hold are eliminated first: their multipliers follow. A factor that is kept does
+!> for A as well as its age lets it: the way to the end is longer then, and costs no factor.
+!> Source: docs/theory.md, eq. (14i).
 module emcon_condensation
    use emcon_constraint_rows, only : constraints_add_curvature, constraints_merge_pattern
    use emcon_constraints, only : constraint_set_t
    use emcon_correction, only : correction_t
    use emcon_csr, only : csr_find, csr_t
    use emcon_errors, only : error_t
+   use emcon_kept_factor, only : kept_factor_condense, kept_factor_move, kept_factor_settle, &
+      kept_factor_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
    use emcon_solver_registry, only : solver_create
@@ -21,19 +24,23 @@ module emcon_condensation
    use emcon_system, only : system_t
    implicit none
    private
-   public :: condensation_t, condensation_make, condensation_renew, condensation_free
+   public :: condensation_t, condensation_make, condensation_renew, condensation_take, &
+      condensation_move, condensation_free
 
    type :: condensation_t
       !> (n_row) c, the stiffness that rows have in A; not allocated: none [M/T^2]
       real(wp), allocatable :: hold(:)
       logical :: is_singular = .true.            !! something moves freely: nothing is known
       integer :: n_permanent = 0                 !! rows that always hold, the first ones
-      !> (n_unknown, 0:rows) what moves by no other multipliers (0), and by one more of each row
-      real(wp), allocatable :: motion(:, :)
       real(wp), allocatable :: free(:)           !! (rows) values by no other multipliers [L]
       real(wp), allocatable :: w(:, :)           !! (rows, rows) and what they gain by them [T^2/M]
+      !> (n_unknown, 0:rows) what moves by no other multipliers (0), and by one more of each row
+      real(wp), allocatable, private :: motion(:, :)
       !> (n_permanent, 0:rows) multipliers of what always holds, as `motion`
-      real(wp), allocatable :: permanent(:, :)
+      real(wp), allocatable, private :: permanent(:, :)
+      logical, private :: is_by_kept = .false.   !! by a factor that is kept
+      !> (n_row, n_row) what all rows gain by all by that factor [T^2/M]
+      real(wp), allocatable, private :: all_w(:, :)
       !> (n_unknown, n_permanent) what moves by those rows alone, and their rates by it
       real(wp), allocatable, private :: held(:, :)
       real(dp), allocatable, private :: held_rate(:, :)
@@ -58,10 +65,12 @@ contains
       integer :: k
 
       self%n_permanent = set%n_permanent
+      self%is_by_kept = .false.
       call assemble(self, system, set, has_curvature, correction%method == method_saddle_point)
       call factorise(self, correction, error)
       if (allocated(error) .or. self%is_singular) return
-      if (allocated(self%motion)) deallocate(self%motion, self%held, self%permanent, self%w)
+      if (allocated(self%motion)) deallocate(self%motion, self%held)
+      if (allocated(self%w)) deallocate(self%permanent, self%w)
       associate (n => size(residual), first => set%n_permanent, last => set%n_row - set%n_permanent)
          allocate(self%held(n, first), self%motion(n, 0:last), self%permanent(first, 0:last), &
             self%w(last, last))
@@ -94,6 +103,69 @@ contains
       call self%solver%solve(-residual, self%motion(:, 0), error)
       if (.not. allocated(error)) call eliminate(self, set, 0, 0)
    end subroutine condensation_renew
+
+   !> The same by a factor that is kept, without the curvature of rows.
+   subroutine condensation_take(self, kept, set, residual, is_new, error)
+      type(condensation_t), intent(inout) :: self
+      type(kept_factor_t), intent(inout) :: kept         !! with a factor that may condense the set
+      type(constraint_set_t), intent(in) :: set          !! evaluated, with rows
+      real(wp), intent(in), contiguous :: residual(:)    !! (n_unknown)
+      logical, intent(in) :: is_new              !! else what rows gain is that of the last call
+      type(error_t), allocatable, intent(out) :: error
+      real(wp) :: free(set%n_row)
+
+      associate (n => set%n_permanent, n_row => set%n_row)
+         if (is_new) then
+            self%n_permanent = n
+            self%is_by_kept = .true.
+            if (allocated(self%all_w)) deallocate(self%all_w)
+            if (allocated(self%w)) deallocate(self%permanent, self%w)
+            allocate(self%all_w(n_row, n_row), self%w(n_row - n, n_row - n), &
+               self%permanent(n, 0:n_row - n))
+            call kept_factor_condense(kept, set, residual, self%all_w, free, error)
+         else
+            call kept_factor_settle(kept, set, residual, free, error)
+         end if
+         if (.not. allocated(error)) call eliminate_from(self, free, n)
+      end associate
+   end subroutine condensation_take
+
+   !> Let the first `n` rows hold, of which all have the values `free` by no more multipliers.
+   subroutine eliminate_from(self, free, n)
+      type(condensation_t), intent(inout) :: self
+      real(wp), intent(in) :: free(:)            !! (n_row) [L]
+      integer, intent(in) :: n
+      real(dp), dimension(n, 0:size(free) - n) :: rate, lam
+
+      self%is_singular = .false.
+      self%free = free(n + 1:)
+      self%w(:, :) = self%all_w(n + 1:, n + 1:)
+      if (n == 0) return
+      rate(:, 0) = real(free(:n), dp)
+      rate(:, 1:) = real(self%all_w(:n, n + 1:), dp)
+      call dense_solve(real(self%all_w(:n, :n), dp), rate, lam, self%is_singular)
+      if (self%is_singular) return
+      self%permanent = -real(lam, wp)
+      self%free = self%free + matmul(self%all_w(n + 1:, :n), self%permanent(:, 0))
+      self%w = self%w + matmul(self%all_w(n + 1:, :n), self%permanent(:, 1:))
+   end subroutine eliminate_from
+
+   !> The correction that `more` multipliers of contacts lead to, and those of what always holds.
+   subroutine condensation_move(self, kept, more, dq, held, error)
+      type(condensation_t), intent(in) :: self           !! not singular
+      type(kept_factor_t), intent(inout) :: kept         !! that it was taken by, if by one
+      real(wp), intent(in) :: more(:)                    !! (rows) [M L/T^2]
+      real(wp), intent(out), contiguous :: dq(:)         !! (n_unknown) [L]
+      real(wp), intent(out) :: held(:)                   !! (n_permanent) [M L/T^2]
+      type(error_t), allocatable, intent(out) :: error
+
+      held = self%permanent(:, 0) + matmul(self%permanent(:, 1:), more)
+      if (self%is_by_kept) then
+         call kept_factor_move(kept, [held, more], dq, error)
+      else
+         dq = self%motion(:, 0) + matmul(self%motion(:, 1:), more)
+      end if
+   end subroutine condensation_move
 
    !> What the rows that always hold gain by their own multipliers.
    subroutine find_held_rate(self, set)

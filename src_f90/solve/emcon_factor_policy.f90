@@ -22,7 +22,8 @@ module emcon_factor_policy
    private
    public :: factor_policy_t, factor_policy_step, factor_policy_begin, factor_policy_make, &
       factor_policy_renew, factor_policy_correct, factor_policy_break_off, factor_policy_give_up, &
-      factor_policy_commit, factor_policy_forget, factor_policy_looks
+      factor_policy_commit, factor_policy_forget, factor_policy_looks, factor_policy_provide, &
+      factor_policy_may_provide
 
    !> A factor serves so many increments at most, and until its solves have taken so many
    !> corrections more than short ones: about as many as a new one costs.
@@ -145,16 +146,9 @@ contains
       is_fit = self%knows_set
       if (.not. is_fit) then
          if (.not. correction%knows_multipliers) return
-         if (.not. correction%kept%is_made) then
-            call kept_factor_renew(correction%kept, system%matrix, error)
-            if (allocated(error)) return
-            self%n_least = self%n_least + 1
-            self%base = factor_base_t(correction%kept%is_made, self%increment, self%n_least, 0, &
-               self%start, self%h, motion%u0, motion%du)
-            self%is_new = .true.
-            self%n_correction = 0
-            self%n_excess = 0
-         end if
+         if (.not. correction%kept%is_made) call factor_policy_provide(self, correction, system, &
+            motion, error)
+         if (allocated(error)) return
          call kept_factor_take(correction%kept, set, is_fit, error)
          if (allocated(error)) return
          self%knows_set = is_fit
@@ -165,6 +159,31 @@ contains
          self%n_look = self%n_look + 1
       end if
    end subroutine factor_policy_make
+
+   !> Make a factor of the present tangent, if it is definite.
+   subroutine factor_policy_provide(self, correction, system, motion, error)
+      type(factor_policy_t), intent(inout) :: self
+      type(correction_t), intent(inout) :: correction
+      type(system_t), intent(in) :: system       !! with the tangent
+      type(motion_t), intent(in) :: motion       !! that it is of
+      type(error_t), allocatable, intent(out) :: error
+
+      call kept_factor_renew(correction%kept, system%matrix, error)
+      if (allocated(error)) return
+      self%n_least = self%n_least + 1
+      self%base = factor_base_t(correction%kept%is_made, self%increment, self%n_least, 0, &
+         self%start, self%h, motion%u0, motion%du)
+      self%is_new = .true.
+      self%n_correction = 0
+      self%n_excess = 0
+   end subroutine factor_policy_provide
+
+   !> May a factor be kept in the present step, whether or not sets have found it to serve?
+   pure logical function factor_policy_may_provide(self)
+      type(factor_policy_t), intent(in) :: self
+
+      factor_policy_may_provide = self%is_tried
+   end function factor_policy_may_provide
 
    !> The next factor is to be of the tangent at the present place.
    pure subroutine factor_policy_renew(self, correction)

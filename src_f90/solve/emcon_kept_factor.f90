@@ -29,7 +29,8 @@ module emcon_kept_factor
       kept_factor_let_iterate, &
       kept_factor_look, kept_factor_serves, kept_factor_correct, kept_factor_forget, &
       kept_factor_free, kept_factor_is_possible, kept_factor_has_room, kept_factor_multipliers, &
-      kept_factor_reach, kept_factor_condense
+      kept_factor_reach, kept_factor_condense, kept_factor_may_condense, kept_factor_settle, &
+      kept_factor_move
 
    !> The stiffness that a constraint has by its curvature may be so large a part of that of the
    !> unknowns it stands on: at a kink, which has as much as one likes, no kept factor converges.
@@ -189,26 +190,60 @@ contains
       real(wp), intent(out) :: w(:, :)                   !! (n, n) [T^2/M]
       real(wp), intent(out) :: free(:)                   !! (n) [L]
       type(error_t), allocatable, intent(out) :: error
-      real(dp) :: rate(set%n_row)
       integer :: k
 
-      self%x = -real(residual, dp)
       if (self%blocks%is_incomplete) then
+         self%x = -real(residual, dp)
          call condense_by_solutions(self, set, w, free, error)
          return
       end if
       call reach_rows(self, set, error)
       if (allocated(error)) return
+      do k = 1, set%n_row
+         w(k:, k) = real(self%blocks%scale*self%rows%l(k:, k), wp)
+         w(k, k:) = w(k:, k)
+      end do
+      call kept_factor_settle(self, set, residual, free, error)
+   end subroutine kept_factor_condense
+
+   !> Can `n` rows be condensed, and be given more multipliers by `kept_factor_move`?
+   pure logical function kept_factor_may_condense(self, n)
+      type(kept_factor_t), intent(in) :: self
+      integer, intent(in) :: n                   !! >= 0
+
+      kept_factor_may_condense = self%is_made .and. .not. self%blocks%is_incomplete
+      if (kept_factor_may_condense) kept_factor_may_condense = kept_factor_has_room(self, n, &
+         self%n_slot)
+   end function kept_factor_may_condense
+
+   !> The values of the rows last condensed after a correction by no more multipliers.
+   subroutine kept_factor_settle(self, set, residual, free, error)
+      type(kept_factor_t), intent(inout) :: self         !! no incomplete factor
+      type(constraint_set_t), intent(in) :: set          !! with as many rows
+      real(wp), intent(in), contiguous :: residual(:)    !! (n_unknown)
+      real(wp), intent(out) :: free(:)                   !! (n) [L]
+      type(error_t), allocatable, intent(out) :: error
+      real(dp) :: rate(set%n_row)
+
+      self%x = -real(residual, dp)
       call blocks_solve(self%blocks, .false., self%x, self%y, error)
       if (allocated(error)) return
       rate = 0.0_dp
       call factor_rows_subtract_products(self%rows, -self%y, rate)
-      do k = 1, set%n_row
-         w(k:, k) = real(self%blocks%scale*self%rows%l(k:, k), wp)
-         w(k, k:) = w(k:, k)
-         free(k) = set%defect(k) + real(self%blocks%scale*rate(k), wp)
-      end do
-   end subroutine kept_factor_condense
+      free = set%defect(:set%n_row) + real(self%blocks%scale*rate, wp)
+   end subroutine kept_factor_settle
+
+   !> The correction by the rows last condensed, with `more` multipliers.
+   subroutine kept_factor_move(self, more, dq, error)
+      type(kept_factor_t), intent(inout) :: self         !! settled
+      real(wp), intent(in) :: more(:)                    !! (n) [M L/T^2]
+      real(wp), intent(out), contiguous :: dq(:)         !! (n_unknown) [L]
+      type(error_t), allocatable, intent(out) :: error
+
+      call factor_rows_add(self%rows, real(more, dp), self%y)
+      call blocks_solve(self%blocks, .true., self%y, self%x, error)
+      if (.not. allocated(error)) dq = real(self%blocks%scale*self%x, wp)
+   end subroutine kept_factor_move
 
    !> The same by the motion of each multiplier, where the factor is incomplete.
    subroutine condense_by_solutions(self, set, w, free, error)
