@@ -12,14 +12,14 @@ solver are the host's:
         face.add_pair(upper, lower, "mortar")
         face.prepare(held)
 
-        active = face.begin_step(u0, du, was_active)        # a step from u0 by du
-        outcome = None
-        while outcome is None:
-            face.select(u0, du, active)
+        def newton(du, n):                                  # for the n rows that are selected
             ...                                             # Newton's method on face.evaluate
-            active, outcome = face.update_active(u0, du, lam, active)
+            return du, lam
 
-In space nodes are (n_node, 3), and surfaces are faces: `add_faces`.
+        du, lam, active = face.solve_step(u0, du, was_active, newton)
+
+`solve_step` calls `begin_step`, `select`, `newton` and `update_active` in turn; a host whose loop
+is another one does so itself. In space nodes are (n_node, 3), and surfaces are faces: `add_faces`.
 `tests/embed/interface_springs.py` is a complete host. Numbers count from 0; freedom a of node i is
 n_dim i + a; the plane has thickness 1. Units are any consistent set, [L] [M] [T]. Wrong arguments
 and calls out of order raise `InputError`; the interface stays usable.
@@ -41,7 +41,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from .arguments import flag_array, number, real_array
 from .csr import Csr
-from .errors import _KINDS, InputError
+from .errors import _KINDS, AnalysisError, InputError
 from .given_matrices import as_csr, check_csr
 from .memory import copied, csr, made, matrix, matrix_bytes, structure, structures, text, whole
 from .options import host_choices
@@ -282,7 +282,7 @@ class Interface:
                  integration: str = "segments", n_point: int | None = None,
                  multiplier: str = "dual", normal: str = "nodal", smoothing: str = "none",
                  normal_angle: float = 60.0, smoothing_angle: float = 60.0,
-                 friction: float = 0.0) -> None:
+                 friction: float = 0.0, adjust: float = 0.0) -> None:
         """Add a contact pair of two surfaces by their numbers, or of one with itself.
 
         `formulation`: "node to segment", "segment", "mortar". `integration` of mortar contact:
@@ -291,7 +291,9 @@ class Interface:
         `smoothing` of the master surface: "none" or "hermite". Turns sharper than the angles, 0 to
         180 degrees, are corners. Rigid obstacles are masters of held nodes. In space contact is
         "node to segment", of the nodes of the slave (a pair the other way round holds the others),
-        or "mortar". `friction`: the coefficient of Coulomb's law.
+        or "mortar". `friction`: the coefficient of Coulomb's law. `adjust` [L]: `prepare` moves
+        slave nodes no farther from the master than this, and those behind it, onto it; take over
+        `positions`.
         """
         choice = [_choice("integration", integration),
                   0 if n_point is None else _number("n_point", n_point, 1, 10),
@@ -302,7 +304,8 @@ class Interface:
                   number(smoothing_angle, "smoothing_angle") or np.nextafter(0.0, 1.0)]
         sides = self._surfaces(slave, master)
         kind = _choice("formulation", formulation)
-        options = made("emcon_pair_options", *choice, *angles, number(friction, "friction"))
+        options = made("emcon_pair_options", *choice, *angles, number(friction, "friction"),
+                       number(adjust, "adjust"))
         self._call(_core.emcon_add_pair, *sides, kind, options)
 
     @_exclusive(False)
@@ -462,6 +465,28 @@ class Interface:
             self._call(_core.emcon_begin_friction, to_rest)
         return self._contacts_of(found)
 
+    def solve_step(self, u0: ArrayLike, du: ArrayLike, was_active: ArrayLike,
+                   newton: Callable[[Floats, int], tuple[Floats, ...]], *,
+                   stop: ArrayLike | None = None, together: bool = False
+                   ) -> tuple[Floats, Floats, Flags]:
+        """Solve a step with one set of contacts after the other: du, multipliers, active flags.
+
+        `newton(du, n)` solves with the n rows that are selected, from the motion du on; it returns
+        the motion and the multipliers, and sums of sizes of the residual for `update_active` if it
+        has them. `together`: with all candidates (`select_candidates`). The rest is as in
+        `begin_step`. Raises `AnalysisError` where no set ends the step: try a smaller one.
+        """
+        motion = np.array(self._field("du", du))
+        active, outcome = self.begin_step(u0, motion, was_active, stop), None
+        select = self.select_candidates if together else self.select
+        while outcome is None:
+            n = select(u0, motion, active)
+            motion, lam, *sizes = newton(motion, n)
+            active, outcome = self.update_active(u0, motion, lam, active, *sizes)
+        if outcome is not Outcome.DONE:
+            raise AnalysisError(f"the step cannot be ended with these contacts: {outcome.name}")
+        return motion, lam, active
+
     @_exclusive()
     def gaps(self, u0: ArrayLike, du: ArrayLike) -> Gaps:
         """All gaps at both ends of the step."""
@@ -498,6 +523,16 @@ class Interface:
         n = self._n_selected()
         return self._call(_core.emcon_solve_contacts, real_array(w, "w", (n, n)),
                           real_array(free, "free", (n,)))
+
+    @_exclusive()
+    def pattern(self, u0: ArrayLike, du: ArrayLike) -> Csr:
+        """What contact may couple in the step that was begun, before it is solved.
+
+        Values of 1, n_dim n_node each way, or by the unknowns of `set_map`, over all contacts that
+        have a surface near, whether they act, stick or slide: `curvature`, and products of rows of
+        one contact, have entries there only. `update_active` may look farther: ask again.
+        """
+        return matrix(self._call(_core.emcon_pattern, *self._motion(u0, du)))
 
     @_exclusive()
     def choose(self, u0: ArrayLike, du: ArrayLike, contact: ArrayLike, target: ArrayLike) -> None:

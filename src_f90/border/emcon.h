@@ -165,6 +165,9 @@ typedef struct emcon_pair_options {
    double normal_angle;     /* sharper turns are corners, 0..180 degrees; default 60 */
    double smoothing_angle;  /* the same for smoothing */
    double friction;         /* coefficient of Coulomb's law, >= 0 */
+   double adjust;           /* slave nodes no farther from the master than this, and those behind it,
+                               are moved onto it by emcon_build: the host takes over
+                               emcon_get_positions; 0: none */
 } emcon_pair_options;
 
 /* How contact begins in the steps of a host; 0 is the default. */
@@ -299,7 +302,7 @@ int emcon_add_faces(emcon_model *model, const char *name /* or NULL */, int n_fa
                     const int *node /* n_entry */, int *surface);
 
 /* Add a contact pair; a surface in contact with itself is its own master. `options` NULL: the
- * defaults. Rigid obstacles are masters of held nodes. In space: of two surfaces, EMCON_MORTAR, or
+ * defaults. Rigid obstacles are masters of held nodes. In space EMCON_MORTAR, or
  * EMCON_NODE_TO_SEGMENT, the slaves' nodes held; a pair the other way round holds those of the
  * master, too. */
 int emcon_add_pair(emcon_model *model, int slave, int master, int formulation,
@@ -634,6 +637,13 @@ int emcon_get_gaps(emcon_model *model, int n_node, const double *u0 /* n_node x 
 int emcon_select(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
                  const double *du /* n_node x n_dim */, int n_constraint,
                  const int *active /* n_constraint */, int *n);
+
+/* Which freedoms contact may couple in the step that was begun, before it is solved: the union over
+ * all contacts that have a surface near, whether they act, stick or slide. A pattern with values of
+ * 1, n_dim*n_node each way, or by the unknowns of emcon_set_map; emcon_curvature, and products of the
+ * rows of a contact, have entries there only. emcon_update_active may look farther: ask again. */
+int emcon_pattern(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
+                  const double *du /* n_node x n_dim */, emcon_csr *pattern);
 
 /* In place of emcon_select: `active` are candidates, any of which may act, stick or slide; `*n` counts
  * the rows of all gaps and slips. Their multipliers come from emcon_solve_contacts in each iterate of

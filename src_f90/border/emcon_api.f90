@@ -50,7 +50,7 @@
 !> is that of `interaction_t`, given with the pair; in dynamic steps `query_begin_friction` brings
 !> velocities along surfaces to rest, and `query_slips` tells what slides. For friction of any size
 !> solve with `query_select_candidates` and `query_solve_contacts`. `query_set_map`: gradients by
-!> other unknowns than displacements of the nodes.
+!> other unknowns than displacements of the nodes. `query_pattern`: what contact may couple.
 module emcon_api
    use emcon_contact, only : gap_state_t
    use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
@@ -110,7 +110,7 @@ module emcon_api
    use emcon_stepper_query, only : query_evaluate, query_follow, query_free, query_guess, &
       query_mass, query_momenta, query_residual, query_t, query_tangent, query_unknowns
    use emcon_stepper_report, only : contact_report_t, query_constraints, query_curvature, &
-      query_curvature_times, query_set_map
+      query_curvature_times, query_pattern, query_set_map
    use emcon_steps, only : initiation_admissible, initiation_persistent, load_gravity, load_point, &
       load_pressure
    use emcon_text, only : string_t

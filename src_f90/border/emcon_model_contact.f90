@@ -28,11 +28,16 @@ contains
       type(contact_options_t) :: choice
       type(interaction_t) :: interaction
 
+      real(wp) :: adjust
+
+      adjust = 0.0_wp
       if (present(options)) then
          choice = chosen(options)
          interaction%friction = real(options%friction, wp)
+         adjust = real(options%adjust, wp)
       end if
-      call stepper_add_pair(model%stepper, slave, master, formulation, choice, error, interaction)
+      call stepper_add_pair(model%stepper, slave, master, formulation, choice, error, interaction, &
+         adjust)
    end subroutine model_add_pair
 
    !> The options of a pair; 0 is the default.

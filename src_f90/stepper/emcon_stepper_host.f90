@@ -136,21 +136,26 @@ contains
 
    !> Add a contact pair; a surface in contact with itself is its own master. Of `interaction` hosts
    !> have the friction.
-   subroutine stepper_add_pair(self, slave, master, formulation, options, error, interaction)
+   subroutine stepper_add_pair(self, slave, master, formulation, options, error, interaction, &
+      adjust)
       type(stepper_t), intent(inout) :: self
       integer, intent(in) :: slave, master                 !! numbers of surfaces
       integer, intent(in) :: formulation                   !! one of `formulation_`
       type(contact_options_t), intent(in) :: options
       type(error_t), allocatable, intent(out) :: error
       type(interaction_t), intent(in), optional :: interaction       !! none: without friction
+      !> Slave nodes no farther from the master than this, and those behind it, are moved onto it
+      !> before the first step; none, or 0: none are [L]
+      real(wp), intent(in), optional :: adjust
       type(contact_pair_t) :: pair
 
       if (present(interaction)) pair%interaction%friction = interaction%friction
       call check_surfaces(self, slave, master, error)
       call check_choice("formulation", formulation, formulation_nts, formulation_mortar, error)
       call check_options(options, error)
-      if (self%scene%n_dim == 3) call check_space(slave == master, formulation, options, error)
+      if (self%scene%n_dim == 3) call check_space(formulation, options, error)
       call check_number("friction", pair%interaction%friction, error, 0.0_wp)
+      if (present(adjust)) call check_number("adjust", adjust, error, 0.0_wp)
       call check_apart(self, slave, master, error)
       if (allocated(error)) return
       pair%slave = slave
@@ -158,6 +163,7 @@ contains
       pair%formulation = formulation
       pair%has_options = .true.
       pair%options = options
+      if (present(adjust)) pair%adjust%distance = merge(adjust, -1.0_wp, adjust > 0.0_wp)
       self%scene%pair = [self%scene%pair, pair]
    end subroutine stepper_add_pair
 
@@ -178,8 +184,7 @@ contains
    end subroutine check_options
 
    !> In space contact is of nodes on faces as they are, or mortar between these.
-   pure subroutine check_space(is_own, formulation, options, error)
-      logical, intent(in) :: is_own              !! a surface is its own master
+   pure subroutine check_space(formulation, options, error)
       integer, intent(in) :: formulation
       type(contact_options_t), intent(in) :: options
       type(error_t), allocatable, intent(inout) :: error
@@ -188,8 +193,6 @@ contains
          "formulation is " // to_text(formulation) // ": contact in three dimensions is node to " &
          // "segment (" // to_text(formulation_nts) // ") or mortar (" // &
          to_text(formulation_mortar) // ")", error)
-      call check_that(.not. is_own, "a surface that is its own master is not in this version in " &
-         // "three dimensions", error)
       call check_that(options%smoothing == smoothing_none, "smoothing is of the plane: surfaces " &
          // "in three dimensions are taken as they are", error)
    end subroutine check_space
