@@ -55,7 +55,7 @@ module emcon_api
    use emcon_contact, only : gap_state_t
    use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
    use emcon_constraint, only : condition_t, constraint_t, contact_response_t
-   use emcon_csr, only : csr_from_elements, csr_from_entries, csr_multiply, &
+   use emcon_csr, only : csr_from_elements, csr_from_entries, csr_from_values, csr_multiply, &
       csr_multiply_transposed, csr_t, csr_transpose
    use emcon_csr_product, only : csr_product
    use emcon_deck_source, only : passage_t
