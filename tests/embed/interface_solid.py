@@ -69,21 +69,26 @@ class Solid:
         e = strain(self.gradient(u))
         return 0.5*float(np.einsum("epab,epab,ep->", e, self.stress(e), self.volume))
 
-    def respond(self, u0: Floats, du: Floats) -> tuple[Floats, Floats]:
-        """Forces over the step and their derivative by du."""
+    def elements(self, u0: Floats, du: Floats) -> tuple[Floats, Floats]:
+        """Forces of each cell over the step, and their derivative by du."""
         d0, d1 = self.gradient(u0), self.gradient(u0 + du)
         s = self.stress(0.5*(strain(d0) + strain(d1)))
         g, w, one, (lam, mu) = self.slope, self.volume, np.eye(3), self.lame
         middle, end = one + 0.5*(d0 + d1), one + d1
-        force = np.zeros(self.x.size)
-        np.add.at(force, self.dof, np.einsum("epab,epbc,epic,ep->eia", middle, s, g, w, optimize=True).reshape(self.dof.shape))
+        force = np.einsum("epab,epbc,epic,ep->eia", middle, s, g, w, optimize=True).reshape(self.dof.shape)
         by_middle, by_end = (np.einsum("epab,epib->epia", f, g) for f in (middle, end))
         k = 0.5*lam*np.einsum("epia,epjb,ep->eiajb", by_middle, by_end, w, optimize=True)
         k += 0.5*mu*np.einsum("epac,epbc,epid,epjd,ep->eiajb", middle, end, g, g, w, optimize=True)
         k += 0.5*mu*np.einsum("epja,epib,ep->eiajb", by_middle, by_end, w, optimize=True)
         k += 0.5*np.einsum("epic,epcd,epjd,ab,ep->eiajb", g, s, g, one, w, optimize=True)
-        tangent = np.zeros((self.x.size, self.x.size))
-        np.add.at(tangent, (self.dof[:, :, None], self.dof[:, None, :]), k.reshape(len(k), 24, 24))
+        return force, k.reshape(len(k), 24, 24)
+
+    def respond(self, u0: Floats, du: Floats) -> tuple[Floats, Floats]:
+        """The sums of these over all cells."""
+        of_cells, tangents = self.elements(u0, du)
+        force, tangent = np.zeros(self.x.size), np.zeros((self.x.size, self.x.size))
+        np.add.at(force, self.dof, of_cells)
+        np.add.at(tangent, (self.dof[:, :, None], self.dof[:, None, :]), tangents)
         return force, tangent
 
 
