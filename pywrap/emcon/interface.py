@@ -282,7 +282,8 @@ class Interface:
                  integration: str = "segments", n_point: int | None = None,
                  multiplier: str = "dual", normal: str = "nodal", smoothing: str = "none",
                  normal_angle: float = 60.0, smoothing_angle: float = 60.0,
-                 friction: float = 0.0, adjust: float = 0.0) -> None:
+                 friction: float = 0.0, adjust: float = 0.0,
+                 damping: ArrayLike = 0.0, tangent_fraction: float = 0.0) -> None:
         """Add a contact pair of two surfaces by their numbers, or of one with itself.
 
         `formulation`: "node to segment", "segment", "mortar". `integration` of mortar contact:
@@ -293,7 +294,9 @@ class Interface:
         "node to segment", of the nodes of the slave (a pair the other way round holds the others),
         or "mortar". `friction`: the coefficient of Coulomb's law. `adjust` [L]: `prepare` moves
         slave nodes no farther from the master than this, and those behind it, onto it; take over
-        `positions`.
+        `positions`. `damping`: the pressure by the velocity of approach [M/(L^2 T)], or this,
+        the clearance from which on there is none [L] and the part of that, 0 to 1, up to which it
+        does not fall; `tangent_fraction`: the part of it against slip.
         """
         choice = [_choice("integration", integration),
                   0 if n_point is None else _number("n_point", n_point, 1, 10),
@@ -305,7 +308,8 @@ class Interface:
         sides = self._surfaces(slave, master)
         kind = _choice("formulation", formulation)
         options = made("emcon_pair_options", *choice, *angles, number(friction, "friction"),
-                       number(adjust, "adjust"))
+                       number(adjust, "adjust"), *_damping(damping),
+                       number(tangent_fraction, "tangent_fraction"))
         self._call(_core.emcon_add_pair, *sides, kind, options)
 
     @_exclusive(False)
@@ -449,25 +453,27 @@ class Interface:
 
     @_exclusive()
     def begin_step(self, u0: ArrayLike, du: ArrayLike, was_active: ArrayLike,
-                   stop: ArrayLike | None = None) -> Flags:
+                   stop: ArrayLike | None = None, h: float | None = None) -> Flags:
         """Begin a step with the motion `du` that is expected.
 
         `was_active`: contacts that acted at the end of the step before, (n_contact,) booleans.
         Returns those that still can. `stop`, where pairs have friction: the motion with which all
         velocities end at zero, (n_node, n_dim), h/2 v0 where the velocity at the end is
         2 du/h - v0: what sticks comes to rest. None: what sticks has its velocity along the surface
-        turned round, which takes no energy.
+        turned round, which takes no energy. `h`, where pairs have damping: the size of the step [T].
         """
         was = self._flags("was_active", was_active)
         to_rest = None if stop is None else self._field("stop", stop)
         found = self._call(_core.emcon_begin_contact, *self._motion(u0, du), was)
         if to_rest is not None:
             self._call(_core.emcon_begin_friction, to_rest)
+        if h is not None:
+            self._call(_core.emcon_begin_damping, number(h, "h"))
         return self._contacts_of(found)
 
     def solve_step(self, u0: ArrayLike, du: ArrayLike, was_active: ArrayLike,
                    newton: Callable[[Floats, int], tuple[Floats, ...]], *,
-                   stop: ArrayLike | None = None, together: bool = False
+                   stop: ArrayLike | None = None, h: float | None = None, together: bool = False
                    ) -> tuple[Floats, Floats, Flags]:
         """Solve a step with one set of contacts after the other: du, multipliers, active flags.
 
@@ -477,7 +483,7 @@ class Interface:
         `begin_step`. Raises `AnalysisError` where no set ends the step: try a smaller one.
         """
         motion = np.array(self._field("du", du))
-        active, outcome = self.begin_step(u0, motion, was_active, stop), None
+        active, outcome = self.begin_step(u0, motion, was_active, stop, h), None
         select = self.select_candidates if together else self.select
         while outcome is None:
             n = select(u0, motion, active)
@@ -592,6 +598,15 @@ class Interface:
         return Slips(status[self._n_row:], slip[self._n_row:], friction[self._n_row:])
 
     @_exclusive()
+    def law_forces(self) -> tuple[Floats, float]:
+        """What damping pushes at the nodes in the step evaluated last, and the energy it takes, >= 0.
+
+        (n_node, n_dim), to be added to contact forces; its derivative is in `curvature`.
+        """
+        force, taken = self._call(_core.emcon_law_forces, self.n_node)
+        return force, taken
+
+    @_exclusive()
     def areas(self, u1: ArrayLike) -> tuple[Floats, Floats]:
         """Areas that the multipliers of the step to `u1` act on, (n_contact,) [L^2], and lengths.
 
@@ -693,6 +708,13 @@ def _whole(name: str, values: ArrayLike, n_axis: int, n: int) -> Ints:
         place = tuple(map(int, bad[0]))
         raise InputError(f"{name}{list(place)} is {array[place]}, not in 0..{n - 1}")
     return np.ascontiguousarray(array, np.int32)
+
+
+def _damping(values: ArrayLike) -> list[float]:
+    found = np.atleast_1d(np.asarray(values, float))
+    if found.ndim != 1 or not 1 <= len(found) <= 3:
+        raise InputError(f"damping is {values!r}, not one to three numbers")
+    return [number(value, "damping") for value in found] + [0.0]*(3 - len(found))
 
 
 def _number(name: str, value: int, least: int, most: int) -> int:

@@ -168,6 +168,10 @@ typedef struct emcon_pair_options {
    double adjust;           /* slave nodes no farther from the master than this, and those behind it,
                                are moved onto it by emcon_build: the host takes over
                                emcon_get_positions; 0: none */
+   double damping;          /* pressure by the velocity of approach, >= 0 */
+   double damping_clearance;   /* gap from which on there is none, >= 0 */
+   double damping_flat;     /* part of the clearance where damping is the whole, 0 to 1 */
+   double tangent_fraction; /* part of it against slip, >= 0 */
 } emcon_pair_options;
 
 /* How contact begins in the steps of a host; 0 is the default. */
@@ -619,6 +623,14 @@ int emcon_set_map(emcon_model *model, const emcon_csr *map);
  * motion over the step with which all velocities end at zero: h/2 v0 where the velocity at the end
  * is 2 du/h - v0. */
 int emcon_begin_friction(emcon_model *model, int n_node, const double *stop /* n_node x n_dim */);
+
+/* After emcon_begin_contact, where pairs have damping: the size of the step. */
+int emcon_begin_damping(emcon_model *model, double h);
+
+/* What damping pushes at the nodes in the step that was evaluated last, to be added to contact forces,
+ * and the energy that it takes, >= 0. Its derivative is in emcon_curvature. */
+int emcon_law_forces(emcon_model *model, int n_node, double *force /* n_node x n_dim */,
+                     double *dissipated);
 
 /* How each constraint holds along the surface by the step that was solved last: 0 where it is open,
  * 1 where it acts and does not slide, 2 where it slides; its slip over the step, and the friction

@@ -51,6 +51,7 @@
 !> velocities along surfaces to rest, and `query_slips` tells what slides. For friction of any size
 !> solve with `query_select_candidates` and `query_solve_contacts`. `query_set_map`: gradients by
 !> other unknowns than displacements of the nodes. `query_pattern`: what contact may couple.
+!> Damping, given with the pair too, needs `query_begin_damping`; its forces are `query_law_forces`.
 module emcon_api
    use emcon_contact, only : gap_state_t
    use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
@@ -64,7 +65,8 @@ module emcon_api
    use emcon_host_contact, only : host_contact_t
    use emcon_host_force, only : force_response_t, host_failed, host_force_t, host_ok, &
       host_outside
-   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
+   use emcon_interactions, only : contact_damping_t, contact_options_t, contact_pair_t, &
+      formulation_mortar, &
       formulation_nts, formulation_segment, integration_elements, integration_segments, &
       interaction_t, multiplier_dual, multiplier_standard, normal_edge, normal_nodal, &
       smoothing_hermite, smoothing_none
@@ -91,8 +93,9 @@ module emcon_api
    use emcon_stepper_conditions, only : conditions_exchange, stepper_add_prescribed, &
       stepper_prescribe, stepper_remove_prescribed, &
       stepper_set_prescribed
-   use emcon_stepper_contact, only : query_areas, query_begin_contact, query_begin_friction, &
-      query_choose, query_contact, query_drop, query_gaps, query_overlap, query_select, &
+   use emcon_stepper_contact, only : query_areas, query_begin_contact, query_begin_damping, &
+      query_begin_friction, query_choose, query_contact, query_drop, query_gaps, &
+      query_law_forces, query_overlap, query_select, &
       query_slips, query_update_active, &
       step_cycling, step_done, step_stands_off, step_too_far
    use emcon_stepper_file, only : stepper_load, stepper_save

@@ -5,7 +5,7 @@ module emcon_model_contact
    use emcon_c_types, only : contact_settings_c, gap_c, pair_options_c
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
-   use emcon_interactions, only : contact_options_t, interaction_t
+   use emcon_interactions, only : contact_damping_t, contact_options_t, interaction_t
    use emcon_kinds, only : wp
    use emcon_model, only : model_t
    use emcon_overlap_check, only : overlap_t
@@ -34,6 +34,9 @@ contains
       if (present(options)) then
          choice = chosen(options)
          interaction%friction = real(options%friction, wp)
+         interaction%damping = contact_damping_t(real(options%damping, wp), &
+            real(options%damping_clearance, wp), real(options%damping_flat, wp), &
+            real(options%tangent_fraction, wp))
          adjust = real(options%adjust, wp)
       end if
       call stepper_add_pair(model%stepper, slave, master, formulation, choice, error, interaction, &

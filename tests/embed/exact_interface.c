@@ -138,6 +138,9 @@ static void differentiate(double *u0, double *du, int n, int m, int *active)
                                       &outcome));
    WORKS(emcon_update_active(face, n_node, u0, du, n, lam, product, m, active, &is_done, &outcome));
    WORKS(emcon_get_slips(face, m, way, slip, friction));
+   WORKS(emcon_begin_damping(face, 0.1));
+   WORKS(emcon_law_forces(face, n_node, product, length));
+   REFUSED_ALL(k, emcon_law_forces(face, k, product, length));
    REFUSED_ALL(k, emcon_get_slips(face, k, way, slip, friction));
    free(way);
    free(slip);

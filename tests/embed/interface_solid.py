@@ -10,6 +10,7 @@ the deformation gradient in the middle. Lines that contact adds are marked by `e
 from __future__ import annotations
 
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -146,7 +147,7 @@ class Host:
         raise ArithmeticError(f"Newton's method still moves by {size:g}")
 
 
-def collision(kind: str = "node to segment", friction: float = 0.3, itself: bool = False) -> Host:
+def collision(kind: str = "node to segment", friction: float = 0.3, itself: bool = False, **more: Any) -> Host:
     """A block that flies askew at a plate, which is held below; as two surfaces or as one of both bodies."""
     below, lower = block((3, 3, 1), np.array([-1.5, -1.5, -0.5]), np.array([3.0, 3.0, 0.5]))
     above, upper = block((2, 2, 1), np.array([-0.7, -0.6, 0.03]), np.array([1.2, 1.0, 0.6]), len(below))
@@ -157,7 +158,7 @@ def collision(kind: str = "node to segment", friction: float = 0.3, itself: bool
         slave = master = face.add_faces("skin", skin(cells))
     else:
         slave, master = face.add_faces("sole", upper[:, FACES[0]]), face.add_faces("plate", lower[:, FACES[1]])
-    face.add_pair(slave, master, kind, friction=friction)
+    face.add_pair(slave, master, kind, friction=friction, **more)
     held = np.isclose(x[:, 2], -0.5)[:, None] & np.ones(3, bool)
     face.prepare(held)
     host = Host(Solid(x, cells, (600.0, 400.0), 1.0), face, held)

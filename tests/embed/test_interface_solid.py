@@ -18,7 +18,7 @@ H, N_STEP = 0.01, 20
 NUMBERS = (1, 2, 3, 4, 5, 6)
 
 
-def own_model(host: Host, kind: str, friction: float, itself: bool) -> Model:
+def own_model(host: Host, kind: str, friction: float, itself: bool, **more: object) -> Model:
     """The model of the same bodies: elements of the library, contact of the same nodes, no edges."""
     x, cells, (lam, mu) = host.solid.x, host.solid.cells, host.solid.lame
     model = Model.from_arrays(x, {"C3D8": cells})
@@ -29,7 +29,7 @@ def own_model(host: Host, kind: str, friction: float, itself: bool) -> Model:
     outer = set(map(frozenset, skin(cells).tolist()))
     model.surface("SKIN", faces=[(k, n) for k, cell in enumerate(cells) for n, own in zip(NUMBERS, FACES, strict=True)
                                  if frozenset(cell[own].tolist()) in outer])
-    model.interaction("I", **({"friction": friction} if friction > 0 else {}))
+    model.interaction("I", **({"friction": friction} if friction > 0 else {}), **more)
     # A surface by nodes holds all of these; of mortar guards would hold what it lets in.
     rules = {} if itself and kind != "mortar" else {"guard": "NO"}
     model.contact_pair(*(("SKIN", "SKIN") if itself else ("SOLE", "PLATE")), interaction="I", edges="NO",

@@ -45,7 +45,7 @@ def foot(n: int = 2, size: float = 1.4, height: float = 0.0
 
 
 def over_the_floor(height: float = 0.02, is_end: bool = False, kind: str = "node to segment",
-                   friction: float = 0.0) -> tuple[Interface, int]:
+                   friction: float = 0.0, **more: object) -> tuple[Interface, int]:
     """A foot over a floor of quadrilaterals and triangles; and the number of nodes of the floor."""
     lower, quads, triangles = floor()
     upper, own = foot(height=height)
@@ -53,7 +53,7 @@ def over_the_floor(height: float = 0.02, is_end: bool = False, kind: str = "node
     face.configure(is_end=is_end)
     master = face.add_faces("floor", quads, triangles)
     slave = face.add_faces("foot", own + len(lower))
-    face.add_pair(slave, master, kind, friction=friction)
+    face.add_pair(slave, master, kind, friction=friction, **more)
     face.prepare()
     return face, len(lower)
 
