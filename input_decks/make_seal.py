@@ -39,8 +39,8 @@ A seal: an O-ring of rubber is pressed into its groove, static, plane strain, no
 
 The section is a disc of {DIAMETER:g} mm, of CPE4H: neo-Hooke, shear modulus {SHEAR:g} MPa, hardly compressible.
 Groove and lid are rigid profiles; the groove is {WIDTH:g} mm wide. The lid comes down by
-{100*SQUEEZE:g} percent of the diameter. Contact alone holds the ring, but that nodes inside it stay on the
-middle line.
+{100*SQUEEZE:g} percent of the diameter. Contact holds the ring; its inner nodes on the middle line move up and
+down only.
 Units: mm, N, MPa; forces of a millimetre of the ring.
 
 What to look at: the contact pressure, which is what seals: zero at the ends of the flat faces and
