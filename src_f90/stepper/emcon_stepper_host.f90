@@ -1,3 +1,4 @@
+! build: holder
 !> A model without solids, for a host code that has its own: nodes, surfaces as edges, in space as
 !> faces, pairs, ties.
 !>
