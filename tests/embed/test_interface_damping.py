@@ -98,8 +98,6 @@ def test_a_rigid_mass_keeps_its_law() -> None:
         u, v, active, found = np.zeros((4, 2)), np.zeros((4, 2)), np.zeros(face.n_contact, bool), []
         v[2:, 1] = -0.5
         for _ in range(40):
-            force = np.zeros((4, 2))
-
             def newton(du: Floats, n: int, u: Floats = u, v: Floats = v, h: float = h) -> tuple[Floats, Floats]:
                 assert n == 0
                 for _ in range(20):
