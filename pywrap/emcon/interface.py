@@ -51,6 +51,9 @@ __all__ = ["Constraints", "Csr", "Gaps", "InputError", "Interface", "NullSpace",
 _Args = ParamSpec("_Args")
 _R = TypeVar("_R")
 
+_EPSILON = float(np.finfo(float).eps)
+_MOST_ITERATES = 40
+
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
 Ints = NDArray[np.int32]
@@ -460,7 +463,8 @@ class Interface:
         Returns those that still can. `stop`, where pairs have friction: the motion with which all
         velocities end at zero, (n_node, n_dim), h/2 v0 where the velocity at the end is
         2 du/h - v0: what sticks comes to rest. None: what sticks has its velocity along the surface
-        turned round, which takes no energy. `h`, where pairs have damping: the size of the step [T].
+        turned round, which takes no energy. `h`, where pairs have damping: the size of the step
+        [T].
         """
         was = self._flags("was_active", was_active)
         to_rest = None if stop is None else self._field("stop", stop)
@@ -492,6 +496,51 @@ class Interface:
         if outcome is not Outcome.DONE:
             raise AnalysisError(f"the step cannot be ended with these contacts: {outcome.name}")
         return motion, lam, active
+
+    def newton(self, u0: ArrayLike, respond: Callable[[Floats], tuple[Any, Any]],
+               free: ArrayLike | None = None) -> Callable[[Floats, int], tuple[Floats, Floats]]:
+        """Newton's method for `solve_step(..., together=True)`, of a residual and a tangent.
+
+        `respond(du)` gives the residual of the step without contact, a field, and its derivative by
+        du, an array or a sparse matrix of scipy over the freedoms of the nodes; `free`: the numbers
+        of those that are solved for, None: all. In each iterate the equations are condensed to the
+        rows of contact. It ends where the motion is round-off of the positions, or no more grows
+        less. Raises `AnalysisError` where it does not.
+        """
+        own = np.arange(self.n_node*self.n_dim) if free is None else np.asarray(free)
+        reach = float(np.abs(self._x).max())
+
+        def solve(du: Floats, n: int) -> tuple[Floats, Floats]:
+            lam, last = np.zeros(n), np.inf
+            for _ in range(_MOST_ITERATES):
+                residual, tangent = respond(du)
+                motion, lam = self._correct(u0, du, lam, np.asarray(residual).ravel(), tangent, own)
+                du.ravel()[own] += motion
+                size = float(np.abs(motion).max(initial=0.0))
+                if size <= 4*_EPSILON*reach or last <= size < 1e-10*reach:
+                    return du, lam
+                last = size
+            raise AnalysisError(f"Newton's method still moves by {size:g}: try a smaller step")
+
+        return solve
+
+    def _correct(self, u0: ArrayLike, du: Floats, lam: Floats, residual: Floats, tangent: Any,
+                 free: Any) -> tuple[Floats, Floats]:
+        """The motion of the free freedoms, and the multipliers that obey the laws of contact."""
+        rows = self.evaluate(u0, du)
+        g, c = rows.g.toarray()[:, free], rows.c.toarray()[:, free]
+        second = self.curvature(lam)
+        right = np.column_stack([g.T, residual[free]])
+        if isinstance(tangent, np.ndarray):
+            solved = np.linalg.solve((tangent - second.toarray())[np.ix_(free, free)], right)
+        else:
+            from scipy.sparse import csc_array
+            from scipy.sparse.linalg import splu
+            solved = splu(csc_array(tangent - second.to_scipy())[free][:, free]).solve(right)
+        by_lam, alone = solved[:, :-1], solved[:, -1]
+        if len(lam):
+            lam = self.solve_contacts(c @ by_lam, rows.defect - c @ alone)
+        return by_lam @ lam - alone, lam
 
     @_exclusive()
     def gaps(self, u0: ArrayLike, du: ArrayLike) -> Gaps:
@@ -599,9 +648,10 @@ class Interface:
 
     @_exclusive()
     def law_forces(self) -> tuple[Floats, float]:
-        """What damping pushes at the nodes in the step evaluated last, and the energy it takes, >= 0.
+        """What damping pushes at the nodes in the step evaluated last, and the energy it takes.
 
-        (n_node, n_dim), to be added to contact forces; its derivative is in `curvature`.
+        Forces, (n_node, n_dim), to be added to those of contact; their derivative is in
+        `curvature`. The energy is >= 0.
         """
         force, taken = self._call(_core.emcon_law_forces, self.n_node)
         return force, taken

@@ -11,6 +11,7 @@ and unknowns: the bits do not depend on how many processes there are. Lines that
 from __future__ import annotations
 
 import sys
+from collections.abc import Callable
 
 import numpy as np
 from interface_solid import Floats, Host, Solid, collision
@@ -46,7 +47,10 @@ class SpreadHost(Host):
         self.solid = Spread(host.solid)
         self.own = np.array_split(self.free, WORLD.size)[WORLD.rank]                     # mpi
 
-    def newton(self, h: float, du: Floats, lam: Floats) -> tuple[Floats, Floats]:
+    def newton(self, h: float) -> Callable[[Floats, int], tuple[Floats, Floats]]:
+        return lambda du, n: self.solve(h, du, np.zeros(n))
+
+    def solve(self, h: float, du: Floats, lam: Floats) -> tuple[Floats, Floats]:
         own, free, last = self.own, self.free, np.inf
         for _ in range(40):
             force, tangent = self.solid.respond(self.u, du)

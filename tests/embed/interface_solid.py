@@ -9,6 +9,7 @@ the deformation gradient in the middle. Lines that contact adds are marked by `e
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
 from typing import Any
 
@@ -114,37 +115,21 @@ class Host:
         v = self.v.ravel()
         return 0.5*v @ self.solid.mass @ v + self.solid.energy(self.u) + self.lost
 
+    def respond(self, h: float, du: Floats) -> tuple[Floats, Floats]:
+        """Residual of a step without contact, and its derivative."""
+        force, tangent = self.solid.respond(self.u, du)
+        return force + self.solid.mass @ (2/h*(du/h - self.v)).ravel(), tangent + 2/h**2*self.solid.mass
+
     def step(self, h: float) -> None:
         du, _, self.active = self.face.solve_step(                               # emcon
-            self.u, h*self.v, self.active, lambda du, n: self.newton(h, du, np.zeros(n)), stop=0.5*h*self.v, together=True)
+            self.u, h*self.v, self.active, self.newton(h), stop=0.5*h*self.v, together=True)
         slips = self.face.slips()                                                # emcon
         self.lost += float((slips.friction*slips.slip).sum())
         self.n_status += np.bincount(slips.status, minlength=3)
         self.u, self.v = self.u + du, 2/h*du - self.v
 
-    def newton(self, h: float, du: Floats, lam: Floats) -> tuple[Floats, Floats]:
-        """The motion, and the multipliers that obey the laws of contact.
-
-        In each iterate the equations are condensed to the rows of contact: w is their compliance.
-        """
-        free, last = self.free, np.inf
-        for _ in range(40):
-            force, tangent = self.solid.respond(self.u, du)
-            rows = self.face.evaluate(self.u, du)                                # emcon
-            g, c = rows.g.toarray()[:, free], rows.c.toarray()[:, free]          # emcon
-            residual = (self.solid.mass @ (2/h*(du/h - self.v)).ravel() + force)[free]
-            tangent += 2/h**2*self.solid.mass - self.face.curvature(lam).toarray()   # emcon
-            solved = np.linalg.solve(tangent[np.ix_(free, free)], np.column_stack([g.T, residual]))
-            by_lam, alone = solved[:, :-1], solved[:, -1]
-            if len(lam):
-                lam = self.face.solve_contacts(c @ by_lam, rows.defect - c @ alone)  # emcon
-            motion = by_lam @ lam - alone
-            du.ravel()[free] += motion
-            size = np.abs(motion).max()
-            if size <= 1e-15 or last <= size < 1e-11:
-                return du, lam
-            last = size
-        raise ArithmeticError(f"Newton's method still moves by {size:g}")
+    def newton(self, h: float) -> Callable[[Floats, int], tuple[Floats, Floats]]:
+        return self.face.newton(self.u, lambda du: self.respond(h, du), self.free)     # emcon
 
 
 def collision(kind: str = "node to segment", friction: float = 0.3, itself: bool = False, **more: Any) -> Host:

@@ -1,7 +1,7 @@
 """Two bodies of scikit-fem in space, with contact and friction of EMCON: static, and in steps that keep the energy.
 
-scikit-fem meshes and assembles; the equations are condensed to the rows of contact by a sparse factor of its
-matrix. In statics forces and gradients are those at the end of the step, else discrete gradients over it.
+scikit-fem meshes and assembles; EMCON's Newton's method condenses its sparse equations to the rows of contact.
+In statics forces and gradients are those at the end of the step, else discrete gradients over it.
 Lines that contact adds are marked by `emcon`.
 
     python scikit_fem_space.py
@@ -14,8 +14,6 @@ from typing import Any
 import numpy as np
 import skfem
 from numpy.typing import NDArray
-from scipy.sparse import csc_matrix
-from scipy.sparse.linalg import splu
 from skfem.helpers import ddot, eye, grad, mul, transpose
 
 from emcon.interface import Interface
@@ -89,33 +87,18 @@ class Host:
         force = skfem.LinearForm(lambda v, w: ddot(mul(middle, stress), grad(v))).assemble(self.basis)
         return force, skfem.BilinearForm(change).assemble(self.basis)
 
-    def newton(self, du: Floats, n: int, h: float) -> tuple[Floats, Floats]:
-        """The motion, and the multipliers of the n rows of contact that obey their laws."""
-        lam, last, free = np.zeros(n), np.inf, self.free
-        for _ in range(30):
-            residual, tangent = self.respond(du)
-            if not self.is_static:
-                residual, tangent = residual + self.mass @ (2/h*(du/h - self.v)).ravel(), tangent + 2/h**2*self.mass
-            rows = self.face.evaluate(self.u, du)                                    # emcon
-            g, c = rows.g.toarray()[:, free], rows.c.toarray()[:, free]
-            tangent = csc_matrix(tangent - self.face.curvature(lam).to_scipy())
-            solved = splu(tangent[free][:, free]).solve(np.column_stack([g.T, residual[free]]))
-            by_lam, alone = solved[:, :-1], solved[:, -1]
-            if n:
-                lam = self.face.solve_contacts(c @ by_lam, rows.defect - c @ alone)  # emcon
-            motion = by_lam @ lam - alone
-            du.ravel()[free] += motion
-            size = np.abs(motion).max()
-            if size <= 1e-15 or last <= size < 1e-11:
-                return du, lam
-            last = size
-        raise ArithmeticError(f"Newton's method still moves by {size:g}")
-
     def step(self, du: Floats, h: float = 1.0) -> None:
         """From the expected motion on, with what is prescribed in it."""
+
+        def respond(du: Floats) -> tuple[Floats, Any]:
+            residual, tangent = self.respond(du)
+            if self.is_static:
+                return residual, tangent
+            return residual + self.mass @ (2/h*(du/h - self.v)).ravel(), tangent + 2/h**2*self.mass
+
         stop = None if self.is_static else 0.5*h*self.v
-        du, self.lam, self.active = self.face.solve_step(                            # emcon
-            self.u, du, self.active, lambda motion, n: self.newton(motion, n, h), stop=stop, together=True)
+        newton = self.face.newton(self.u, respond, self.free)                        # emcon
+        du, self.lam, self.active = self.face.solve_step(self.u, du, self.active, newton, stop=stop, together=True)
         slips = self.face.slips()                                                    # emcon
         self.lost += float((slips.friction*slips.slip).sum())
         self.u, self.v = self.u + du, self.v if self.is_static else 2/h*du - self.v

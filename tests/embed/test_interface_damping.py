@@ -21,13 +21,13 @@ class Damped(Host):
     def step(self, h: float) -> None:
         self.taken = 0.0
         du, _, self.active = self.face.solve_step(
-            self.u, h*self.v, self.active, lambda du, n: self.newton(h, du, np.zeros(n)), stop=0.5*h*self.v, h=h, together=True)
+            self.u, h*self.v, self.active, lambda du, n: self.solve(h, du, np.zeros(n)), stop=0.5*h*self.v, h=h, together=True)
         slips = self.face.slips()
         self.lost += float((slips.friction*slips.slip).sum()) + self.taken
         self.n_status += np.bincount(slips.status, minlength=3)
         self.u, self.v = self.u + du, 2/h*du - self.v
 
-    def newton(self, h: float, du: Floats, lam: Floats) -> tuple[Floats, Floats]:
+    def solve(self, h: float, du: Floats, lam: Floats) -> tuple[Floats, Floats]:
         free, last = self.free, np.inf
         for _ in range(40):
             force, tangent = self.solid.respond(self.u, du)
