@@ -321,7 +321,11 @@ def python_cycles(root):
 def theory_numbers(root):
     """Equations and sections that sources cite and docs/theory.md does not have."""
     theory = (root / "docs/theory.md").read_text()
-    numbers = set(re.findall(r"\\tag\{(\w+)\}", theory))
+    tags = re.findall(r"\\tag\{(\w+)\}", theory)
+    numbers = set(tags)
+    for number in sorted(numbers):
+        if tags.count(number) > 1:
+            yield f"docs/theory.md: equation ({number}) is there {tags.count(number)} times"
     sections = set(re.findall(r"^##+ ([\d.]+) ", theory, re.M))
     for path in sources(root):
         comments = " ".join(re.findall(r"!+[<>]?\s?(.*)", path.read_text()))
@@ -504,6 +508,7 @@ BAD = {
         "base/emcon_a.f90": "module emcon_a\n   type, public :: a_t\n" + "      real :: a(2), b = f(1, 2)\n"*10
         + "      type(a_t), pointer :: next => null()\n   end type a_t\nend module\n"
     },
+    "theory, twice": {"../docs/theory.md": "## 4 X\n$$x \\tag{1}$$\n$$y \\tag{1}$$\n"},
     "stop": {"march/emcon_a.f90": "module emcon_a\n   if (x > 0) error stop 'no'\nend module\n"},
     "stop, exit": {"stepper/emcon_a.f90": "module emcon_a\n   call exit(1)\nend module emcon_a\n"},
     "print": {"deck/emcon_a.f90": "module emcon_a\n   write (*, *) x\nend module emcon_a\n"},
@@ -520,7 +525,9 @@ def build(root, files):
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
     (root / "docs").mkdir(exist_ok=True)
-    (root / "docs/theory.md").write_text("## 4 X\n$$x = 1 \\tag{1}$$\n$$y = 2, \\tag{2b}$$\n")
+    theory = root / "docs/theory.md"
+    if not theory.exists():
+        theory.write_text("## 4 X\n$$x = 1 \\tag{1}$$\n$$y = 2, \\tag{2b}$$\n")
     return root
 
 

@@ -5,6 +5,7 @@ Runs stay in build/site/runs, and are made anew where the program or the deck is
 
 from __future__ import annotations
 
+import csv
 import re
 import shutil
 import subprocess
@@ -19,17 +20,16 @@ PROGRAM = ROOT/"build"/"release"/"emcon"
 
 #: Decks by what they show; those that are not named stand last.
 CHAPTERS = {
+    "Parts of machines": "snap_fit seal press_fit roller pressed_ball linked_rings",
     "Impacts": "ring two_bodies three_bodies self_contact bouncing_bar bar_on_wall rigid_bar "
-               "bouncing_ball ball_in_bowl thrown_ring caught_ring linked_rings "
-               "hertz_ball snap_fit",
+               "bouncing_ball ball_in_bowl thrown_ring caught_ring hertz_ball",
     "Friction": "sliding_block dominoes",
-    "Contact at rest": "hertz press_fit roller ironing two_blocks_static patch_pressure "
-                       "contact_patch pressed_ball",
+    "Contact at rest": "hertz ironing two_blocks_static patch_pressure contact_patch",
     "Ties": "tied_ring tied_spin tied_rotation tied_cantilever tied_patch tied_smooth",
     "Bodies alone": "spinning_ring tumbling_block cantilever",
 }
 #: Decks of which a second picture shows another field.
-FIELDS = {"sliding_block": "contact_shear", "hertz": "contact_pressure"}
+FIELDS = {"sliding_block": "contact_shear", "hertz": "contact_pressure", "seal": "contact_pressure"}
 #: Rows of a block of data that are shown.
 SHOWN_ROWS = 4
 
@@ -91,7 +91,14 @@ def run(name: str, runs: Path) -> Path:
     return picture
 
 
-def page(name: str) -> str:
+def seconds(name: str, runs: Path) -> str:
+    """What the run of a deck has taken, by the last line of its history."""
+    with (runs/f"{name}.csv").open() as file:
+        *_, last = csv.DictReader(file)
+    return f"The run takes {float(last['cpu']):.2g} s of processor time."
+
+
+def page(name: str, time: str) -> str:
     """The page of a deck, whose picture stands beside it."""
     text = (DECKS/f"{name}.inp").read_text(encoding="utf-8")
     title, more = heading(text)
@@ -99,6 +106,7 @@ def page(name: str) -> str:
             f"    emcon input_decks/{name}.inp --output run\n    emcon plot run/{name}",
             *([f"    emcon plot run/{name} --field {FIELDS[name]}",
                f"![{FIELDS[name].replace('_', ' ')}]({name}_field.png)"] if name in FIELDS else []),
+            time,
             f"```text\n{more}\n```" if more else "",
             f"The deck, without most of its mesh ([all of it](../input_decks/{name}.inp)):",
             f"```text\n{excerpt(text)}\n```"]
@@ -123,9 +131,10 @@ def build(pages: Path, runs: Path) -> None:
             shutil.copy(run(name, runs), folder/f"{name}.png")
             if name in FIELDS:
                 shutil.copy(runs/f"{name}_field.png", folder)
-            (folder/f"{name}.md").write_text(page(name), encoding="utf-8")
+            time = seconds(name, runs)
+            (folder/f"{name}.md").write_text(page(name, time), encoding="utf-8")
             first, _ = heading((DECKS/f"{name}.inp").read_text(encoding="utf-8"))
-            made.append(f"### [{name}]({name}.md)\n\n{escape(first)}\n\n"
+            made.append(f"### [{name}]({name}.md)\n\n{escape(first)} {time}\n\n"
                         f"[![{first}]({name}.png)]({name}.md)")
         made.append("```{toctree}\n:hidden:\n\n" + "\n".join(names) + "\n```")
     (folder/"index.md").write_text("\n\n".join(made) + "\n", encoding="utf-8")

@@ -12,14 +12,14 @@ solver are the host's:
         face.add_pair(upper, lower, "mortar")
         face.prepare(held)
 
-        active = face.begin_step(u0, du, was_active)        # a step from u0 by du
-        outcome = None
-        while outcome is None:
-            face.select(u0, du, active)
+        def newton(du, n):                                  # for the n rows that are selected
             ...                                             # Newton's method on face.evaluate
-            active, outcome = face.update_active(u0, du, lam, active)
+            return du, lam
 
-In space nodes are (n_node, 3), and surfaces are faces: `add_faces`.
+        du, lam, active = face.solve_step(u0, du, was_active, newton)
+
+`solve_step` calls `begin_step`, `select`, `newton` and `update_active` in turn; a host whose loop
+is another one does so itself. In space nodes are (n_node, 3), and surfaces are faces: `add_faces`.
 `tests/embed/interface_springs.py` is a complete host. Numbers count from 0; freedom a of node i is
 n_dim i + a; the plane has thickness 1. Units are any consistent set, [L] [M] [T]. Wrong arguments
 and calls out of order raise `InputError`; the interface stays usable.
@@ -41,7 +41,7 @@ from numpy.typing import ArrayLike, NDArray
 from . import _core
 from .arguments import flag_array, number, real_array
 from .csr import Csr
-from .errors import _KINDS, InputError
+from .errors import _KINDS, AnalysisError, InputError
 from .given_matrices import as_csr, check_csr
 from .memory import copied, csr, made, matrix, matrix_bytes, structure, structures, text, whole
 from .options import host_choices
@@ -50,6 +50,9 @@ __all__ = ["Constraints", "Csr", "Gaps", "InputError", "Interface", "NullSpace",
 
 _Args = ParamSpec("_Args")
 _R = TypeVar("_R")
+
+_EPSILON = float(np.finfo(float).eps)
+_MOST_ITERATES = 40
 
 Floats = NDArray[np.float64]
 Flags = NDArray[np.bool_]
@@ -282,7 +285,8 @@ class Interface:
                  integration: str = "segments", n_point: int | None = None,
                  multiplier: str = "dual", normal: str = "nodal", smoothing: str = "none",
                  normal_angle: float = 60.0, smoothing_angle: float = 60.0,
-                 friction: float = 0.0) -> None:
+                 friction: float = 0.0, adjust: float = 0.0,
+                 damping: ArrayLike = 0.0, tangent_fraction: float = 0.0) -> None:
         """Add a contact pair of two surfaces by their numbers, or of one with itself.
 
         `formulation`: "node to segment", "segment", "mortar". `integration` of mortar contact:
@@ -291,7 +295,11 @@ class Interface:
         `smoothing` of the master surface: "none" or "hermite". Turns sharper than the angles, 0 to
         180 degrees, are corners. Rigid obstacles are masters of held nodes. In space contact is
         "node to segment", of the nodes of the slave (a pair the other way round holds the others),
-        or "mortar". `friction`: the coefficient of Coulomb's law.
+        or "mortar". `friction`: the coefficient of Coulomb's law. `adjust` [L]: `prepare` moves
+        slave nodes no farther from the master than this, and those behind it, onto it; take over
+        `positions`. `damping`: the pressure by the velocity of approach [M/(L^2 T)], or this,
+        the clearance from which on there is none [L] and the part of that, 0 to 1, up to which it
+        does not fall; `tangent_fraction`: the part of it against slip.
         """
         choice = [_choice("integration", integration),
                   0 if n_point is None else _number("n_point", n_point, 1, 10),
@@ -302,7 +310,9 @@ class Interface:
                   number(smoothing_angle, "smoothing_angle") or np.nextafter(0.0, 1.0)]
         sides = self._surfaces(slave, master)
         kind = _choice("formulation", formulation)
-        options = made("emcon_pair_options", *choice, *angles, number(friction, "friction"))
+        options = made("emcon_pair_options", *choice, *angles, number(friction, "friction"),
+                       number(adjust, "adjust"), *_damping(damping),
+                       number(tangent_fraction, "tangent_fraction"))
         self._call(_core.emcon_add_pair, *sides, kind, options)
 
     @_exclusive(False)
@@ -446,21 +456,91 @@ class Interface:
 
     @_exclusive()
     def begin_step(self, u0: ArrayLike, du: ArrayLike, was_active: ArrayLike,
-                   stop: ArrayLike | None = None) -> Flags:
+                   stop: ArrayLike | None = None, h: float | None = None) -> Flags:
         """Begin a step with the motion `du` that is expected.
 
         `was_active`: contacts that acted at the end of the step before, (n_contact,) booleans.
         Returns those that still can. `stop`, where pairs have friction: the motion with which all
         velocities end at zero, (n_node, n_dim), h/2 v0 where the velocity at the end is
         2 du/h - v0: what sticks comes to rest. None: what sticks has its velocity along the surface
-        turned round, which takes no energy.
+        turned round, which takes no energy. `h`, where pairs have damping: the size of the step
+        [T].
         """
         was = self._flags("was_active", was_active)
         to_rest = None if stop is None else self._field("stop", stop)
         found = self._call(_core.emcon_begin_contact, *self._motion(u0, du), was)
         if to_rest is not None:
             self._call(_core.emcon_begin_friction, to_rest)
+        if h is not None:
+            self._call(_core.emcon_begin_damping, number(h, "h"))
         return self._contacts_of(found)
+
+    def solve_step(self, u0: ArrayLike, du: ArrayLike, was_active: ArrayLike,
+                   newton: Callable[[Floats, int], tuple[Floats, ...]], *,
+                   stop: ArrayLike | None = None, h: float | None = None, together: bool = False
+                   ) -> tuple[Floats, Floats, Flags]:
+        """Solve a step with one set of contacts after the other: du, multipliers, active flags.
+
+        `newton(du, n)` solves with the n rows that are selected, from the motion du on; it returns
+        the motion and the multipliers, and sums of sizes of the residual for `update_active` if it
+        has them. `together`: with all candidates (`select_candidates`). The rest is as in
+        `begin_step`. Raises `AnalysisError` where no set ends the step: try a smaller one.
+        """
+        motion = np.array(self._field("du", du))
+        active, outcome = self.begin_step(u0, motion, was_active, stop, h), None
+        select = self.select_candidates if together else self.select
+        while outcome is None:
+            n = select(u0, motion, active)
+            motion, lam, *sizes = newton(motion, n)
+            active, outcome = self.update_active(u0, motion, lam, active, *sizes)
+        if outcome is not Outcome.DONE:
+            raise AnalysisError(f"the step cannot be ended with these contacts: {outcome.name}")
+        return motion, lam, active
+
+    def newton(self, u0: ArrayLike, respond: Callable[[Floats], tuple[Any, Any]],
+               free: ArrayLike | None = None) -> Callable[[Floats, int], tuple[Floats, Floats]]:
+        """Newton's method for `solve_step(..., together=True)`, of a residual and a tangent.
+
+        `respond(du)` gives the residual of the step without contact, a field, and its derivative by
+        du, an array or a sparse matrix of scipy over the freedoms of the nodes; `free`: the numbers
+        of those that are solved for, None: all. In each iterate the equations are condensed to the
+        rows of contact. It ends where the motion is round-off of the positions, or no more grows
+        less. Raises `AnalysisError` where it does not.
+        """
+        own = np.arange(self.n_node*self.n_dim) if free is None else np.asarray(free)
+        reach = float(np.abs(self._x).max())
+
+        def solve(du: Floats, n: int) -> tuple[Floats, Floats]:
+            lam, last = np.zeros(n), np.inf
+            for _ in range(_MOST_ITERATES):
+                residual, tangent = respond(du)
+                motion, lam = self._correct(u0, du, lam, np.asarray(residual).ravel(), tangent, own)
+                du.ravel()[own] += motion
+                size = float(np.abs(motion).max(initial=0.0))
+                if size <= 4*_EPSILON*reach or last <= size < 1e-10*reach:
+                    return du, lam
+                last = size
+            raise AnalysisError(f"Newton's method still moves by {size:g}: try a smaller step")
+
+        return solve
+
+    def _correct(self, u0: ArrayLike, du: Floats, lam: Floats, residual: Floats, tangent: Any,
+                 free: Any) -> tuple[Floats, Floats]:
+        """The motion of the free freedoms, and the multipliers that obey the laws of contact."""
+        rows = self.evaluate(u0, du)
+        g, c = rows.g.toarray()[:, free], rows.c.toarray()[:, free]
+        second = self.curvature(lam)
+        right = np.column_stack([g.T, residual[free]])
+        if isinstance(tangent, np.ndarray):
+            solved = np.linalg.solve((tangent - second.toarray())[np.ix_(free, free)], right)
+        else:
+            from scipy.sparse import csc_array
+            from scipy.sparse.linalg import splu
+            solved = splu(csc_array(tangent - second.to_scipy())[free][:, free]).solve(right)
+        by_lam, alone = solved[:, :-1], solved[:, -1]
+        if len(lam):
+            lam = self.solve_contacts(c @ by_lam, rows.defect - c @ alone)
+        return by_lam @ lam - alone, lam
 
     @_exclusive()
     def gaps(self, u0: ArrayLike, du: ArrayLike) -> Gaps:
@@ -498,6 +578,16 @@ class Interface:
         n = self._n_selected()
         return self._call(_core.emcon_solve_contacts, real_array(w, "w", (n, n)),
                           real_array(free, "free", (n,)))
+
+    @_exclusive()
+    def pattern(self, u0: ArrayLike, du: ArrayLike) -> Csr:
+        """What contact may couple in the step that was begun, before it is solved.
+
+        Values of 1, n_dim n_node each way, or by the unknowns of `set_map`, over all contacts that
+        have a surface near, whether they act, stick or slide: `curvature`, and products of rows of
+        one contact, have entries there only. `update_active` may look farther: ask again.
+        """
+        return matrix(self._call(_core.emcon_pattern, *self._motion(u0, du)))
 
     @_exclusive()
     def choose(self, u0: ArrayLike, du: ArrayLike, contact: ArrayLike, target: ArrayLike) -> None:
@@ -555,6 +645,16 @@ class Interface:
         """How contacts stick and slide, by the multipliers that `update_active` was given."""
         status, slip, friction = self._call(_core.emcon_get_slips, self.n_contact + self._n_row)
         return Slips(status[self._n_row:], slip[self._n_row:], friction[self._n_row:])
+
+    @_exclusive()
+    def law_forces(self) -> tuple[Floats, float]:
+        """What damping pushes at the nodes in the step evaluated last, and the energy it takes.
+
+        Forces, (n_node, n_dim), to be added to those of contact; their derivative is in
+        `curvature`. The energy is >= 0.
+        """
+        force, taken = self._call(_core.emcon_law_forces, self.n_node)
+        return force, taken
 
     @_exclusive()
     def areas(self, u1: ArrayLike) -> tuple[Floats, Floats]:
@@ -658,6 +758,13 @@ def _whole(name: str, values: ArrayLike, n_axis: int, n: int) -> Ints:
         place = tuple(map(int, bad[0]))
         raise InputError(f"{name}{list(place)} is {array[place]}, not in 0..{n - 1}")
     return np.ascontiguousarray(array, np.int32)
+
+
+def _damping(values: ArrayLike) -> list[float]:
+    found = np.atleast_1d(np.asarray(values, float))
+    if found.ndim != 1 or not 1 <= len(found) <= 3:
+        raise InputError(f"damping is {values!r}, not one to three numbers")
+    return [number(value, "damping") for value in found] + [0.0]*(3 - len(found))
 
 
 def _number(name: str, value: int, least: int, most: int) -> int:

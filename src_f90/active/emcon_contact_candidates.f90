@@ -13,7 +13,9 @@ module emcon_contact_candidates
       look_at_open
    use emcon_coulomb_law, only : slip_status_t
    use emcon_errors, only : error_t
-   use emcon_friction, only : friction_close, friction_keep, most_lagged, most_shift
+   use emcon_friction, only : friction_close, friction_keep, friction_waits, most_lagged, &
+      most_shift
+   use emcon_gaps, only : gaps_follow_slips
    use emcon_kept_factor, only : kept_factor_t
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
@@ -174,11 +176,12 @@ contains
 
    !> Measure all gaps for the motion. Who joins, who has lost its surface, who closes although it
    !> does not act, which stencils were chosen for another motion?
-   subroutine candidates_look(self, system, motion, status)
+   subroutine candidates_look(self, system, motion, status, obeys)
       type(active_set_t), intent(inout) :: self
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
       integer, intent(out) :: status             !! one of the `step_` codes
+      logical, intent(in) :: obeys               !! what acts pushes, friction is as its law says
       integer :: pair, k, left
 
       call phase_enter(system%phases, phase_gaps, left)
@@ -209,8 +212,10 @@ contains
          call active_set_note_stale(self, status)
          self%candidates%have_changed = .true.
       else if (self%friction%lags .and. .not. self%candidates%have_changed) then
+         if (friction_waits(self%friction, obeys .and. .not. self%candidates%one_closes)) return
          self%friction%n_lagged = self%friction%n_lagged + 1
          self%candidates%have_changed = self%friction%n_lagged <= most_lagged
+         if (self%candidates%have_changed) call gaps_follow_slips(system)
       end if
    end subroutine candidates_look
 

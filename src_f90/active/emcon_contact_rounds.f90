@@ -166,7 +166,7 @@ contains
       integer, intent(out) :: status             !! one of the `step_` codes
 
       call candidates_clear(self%candidates)
-      call candidates_look(self, system, motion, status)
+      call candidates_look(self, system, motion, status, .true.)
       is_solved = status /= step_done .or. .not. self%candidates%have_changed
    end subroutine contact_rounds_stand
 
@@ -204,7 +204,7 @@ contains
          if (status == newton_early) then
             newton%driven = 0.0_wp
             call keep(self, law)
-            call candidates_look(self, system, motion, status)
+            call candidates_look(self, system, motion, status, .false.)
             if (status /= step_done) return
             cycle
          end if
@@ -214,7 +214,7 @@ contains
          ! Before stencils are chosen anew: the step was solved with these.
          call finish(self, system, newton, motion, error)
          if (allocated(error)) return
-         call candidates_look(self, system, motion, status)
+         call candidates_look(self, system, motion, status, .true.)
          if (status /= step_done) return
          if (self%candidates%have_changed) cycle
          leads = .false.

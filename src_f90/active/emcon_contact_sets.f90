@@ -101,7 +101,7 @@ contains
          call candidates_keep_forces(self)
          obeys = .not. is_early
          if (obeys) obeys = obeys_laws(self, system)
-         call candidates_look(self, system, motion, status)
+         call candidates_look(self, system, motion, status, obeys)
          self%candidates%is_settled = obeys .and. (status /= step_done .or. &
             .not. (self%candidates%have_changed .or. self%candidates%one_closes))
          if (self%candidates%is_settled .or. status /= step_done) return
@@ -433,7 +433,7 @@ contains
          call penalty_augment(self%penalty, self%set, is_done)
          is_left = .not. is_done
          call candidates_keep_forces(self)
-         call candidates_look(self, system, motion, status)
+         call candidates_look(self, system, motion, status, .true.)
          if (status /= step_done) return
          call let_go(self, system)
          self%is_active = self%candidates%acts

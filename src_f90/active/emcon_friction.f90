@@ -21,7 +21,7 @@ module emcon_friction
    private
    public :: friction_t, friction_init, friction_begin, friction_select, friction_keep, &
       friction_close, friction_turn, friction_use, friction_missed, friction_holds, &
-      friction_look_back, friction_stiffness, friction_suit
+      friction_look_back, friction_stiffness, friction_suit, friction_waits
 
    !> So much of the friction of a contact may act on another node than its push, and a step is
    !> solved again so often at most for more.
@@ -386,6 +386,15 @@ contains
          law%status = next
       end associate
    end subroutine friction_turn
+
+   !> Is friction left where it was expected to act although it lags? Where slip has a direction it
+   !> follows the motion of a set that stands alone: others depend on what was tried before.
+   pure logical function friction_waits(self, stands) result(waits)
+      type(friction_t), intent(in) :: self
+      logical, intent(in) :: stands              !! the set, but for that
+
+      waits = self%looks_back .and. .not. stands
+   end function friction_waits
 
    !> Friction of a contact of a set, and how much it is over what its push allows.
    pure subroutine friction_use(self, set, k, tau, use)

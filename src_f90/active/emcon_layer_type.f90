@@ -1,3 +1,4 @@
+! build: holder
 !> What the layer of massless contact nodes holds: `emcon_layer` balances it, `emcon_layer_push`
 !> finds the forces that what it gives up goes back along.
 module emcon_layer_type

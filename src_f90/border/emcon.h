@@ -165,6 +165,13 @@ typedef struct emcon_pair_options {
    double normal_angle;     /* sharper turns are corners, 0..180 degrees; default 60 */
    double smoothing_angle;  /* the same for smoothing */
    double friction;         /* coefficient of Coulomb's law, >= 0 */
+   double adjust;           /* slave nodes no farther from the master than this, and those behind it,
+                               are moved onto it by emcon_build: the host takes over
+                               emcon_get_positions; 0: none */
+   double damping;          /* pressure by the velocity of approach, >= 0 */
+   double damping_clearance;   /* gap from which on there is none, >= 0 */
+   double damping_flat;     /* part of the clearance where damping is the whole, 0 to 1 */
+   double tangent_fraction; /* part of it against slip, >= 0 */
 } emcon_pair_options;
 
 /* How contact begins in the steps of a host; 0 is the default. */
@@ -299,7 +306,7 @@ int emcon_add_faces(emcon_model *model, const char *name /* or NULL */, int n_fa
                     const int *node /* n_entry */, int *surface);
 
 /* Add a contact pair; a surface in contact with itself is its own master. `options` NULL: the
- * defaults. Rigid obstacles are masters of held nodes. In space: of two surfaces, EMCON_MORTAR, or
+ * defaults. Rigid obstacles are masters of held nodes. In space EMCON_MORTAR, or
  * EMCON_NODE_TO_SEGMENT, the slaves' nodes held; a pair the other way round holds those of the
  * master, too. */
 int emcon_add_pair(emcon_model *model, int slave, int master, int formulation,
@@ -617,6 +624,14 @@ int emcon_set_map(emcon_model *model, const emcon_csr *map);
  * is 2 du/h - v0. */
 int emcon_begin_friction(emcon_model *model, int n_node, const double *stop /* n_node x n_dim */);
 
+/* After emcon_begin_contact, where pairs have damping: the size of the step. */
+int emcon_begin_damping(emcon_model *model, double h);
+
+/* What damping pushes at the nodes in the step that was evaluated last, to be added to contact forces,
+ * and the energy that it takes, >= 0. Its derivative is in emcon_curvature. */
+int emcon_law_forces(emcon_model *model, int n_node, double *force /* n_node x n_dim */,
+                     double *dissipated);
+
 /* How each constraint holds along the surface by the step that was solved last: 0 where it is open,
  * 1 where it acts and does not slide, 2 where it slides; its slip over the step, and the friction
  * against it, vectors along the surface. Friction times slip is what the step loses, >= 0. */
@@ -634,6 +649,13 @@ int emcon_get_gaps(emcon_model *model, int n_node, const double *u0 /* n_node x 
 int emcon_select(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
                  const double *du /* n_node x n_dim */, int n_constraint,
                  const int *active /* n_constraint */, int *n);
+
+/* Which freedoms contact may couple in the step that was begun, before it is solved: the union over
+ * all contacts that have a surface near, whether they act, stick or slide. A pattern with values of
+ * 1, n_dim*n_node each way, or by the unknowns of emcon_set_map; emcon_curvature, and products of the
+ * rows of a contact, have entries there only. emcon_update_active may look farther: ask again. */
+int emcon_pattern(emcon_model *model, int n_node, const double *u0 /* n_node x n_dim */,
+                  const double *du /* n_node x n_dim */, emcon_csr *pattern);
 
 /* In place of emcon_select: `active` are candidates, any of which may act, stick or slide; `*n` counts
  * the rows of all gaps and slips. Their multipliers come from emcon_solve_contacts in each iterate of

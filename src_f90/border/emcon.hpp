@@ -274,6 +274,42 @@ public:
    void prescribe(int label, int dof, double value) { call(emcon_prescribe, label, dof, value); }
    void set_free(int label, int dof) { call(emcon_remove_prescribed, label, dof); }
 
+   // ---- contact over the steps of a host, of a model of its nodes ----
+
+   // A surface of faces of one kind, as VTK numbers it, of so many nodes each; its number.
+   int add_faces(const std::string &name, int kind, int n_of_face, const std::vector<int> &node)
+   {
+      const int n = static_cast<int>(node.size())/n_of_face;
+      std::vector<int> kinds(static_cast<std::size_t>(n), kind), offset;
+      int surface = 0;
+      for (int i = 1; i <= n; ++i) offset.push_back(i*n_of_face);
+      call(emcon_add_faces, name.c_str(), n, kinds.data(), offset.data(),
+           static_cast<int>(node.size()), node.data(), &surface);
+      return surface;
+   }
+
+   // A step from the displacements `u0`, solved with all candidates until none is missing. Before,
+   // `du` is the expected motion, and `active` has the flags of the step before; after it, those of
+   // this one. `newton(du, n)` solves with the n rows that are selected: it changes du, and returns
+   // their multipliers. `stop` is that of emcon_begin_friction; empty: none.
+   template <class Newton>
+   void solve_step(const std::vector<double> &u0, std::vector<double> &du, std::vector<int> &active,
+                   const std::vector<double> &stop, Newton newton)
+   {
+      const int n_node = sizes().n_node, m = static_cast<int>(active.size());
+      int n = 0, is_done = 0, outcome = EMCON_STEP_DONE;
+      call(emcon_begin_contact, n_node, u0.data(), du.data(), m, active.data(), active.data());
+      if (!stop.empty()) call(emcon_begin_friction, n_node, stop.data());
+      while (!is_done) {
+         call(emcon_select_candidates, n_node, u0.data(), du.data(), m, active.data(), &n);
+         const std::vector<double> lam = newton(du, n);
+         call(emcon_update_active, n_node, u0.data(), du.data(), n, lam.data(), nullptr, m,
+              active.data(), &is_done, &outcome);
+      }
+      if (outcome != EMCON_STEP_DONE)
+         throw AnalysisError(outcome, "no set of contacts ends the step: try a smaller one");
+   }
+
    // ---- what is given, between reading and building ----
 
    // What is thrown by a function that was given ends the call that reached it, and is thrown on.

@@ -50,12 +50,13 @@
 !> is that of `interaction_t`, given with the pair; in dynamic steps `query_begin_friction` brings
 !> velocities along surfaces to rest, and `query_slips` tells what slides. For friction of any size
 !> solve with `query_select_candidates` and `query_solve_contacts`. `query_set_map`: gradients by
-!> other unknowns than displacements of the nodes.
+!> other unknowns than displacements of the nodes. `query_pattern`: what contact may couple.
+!> Damping, given with the pair too, needs `query_begin_damping`; its forces are `query_law_forces`.
 module emcon_api
    use emcon_contact, only : gap_state_t
    use emcon_contact_law, only : contact_law_t, contact_place_t, contact_values_t
    use emcon_constraint, only : condition_t, constraint_t, contact_response_t
-   use emcon_csr, only : csr_from_elements, csr_from_entries, csr_multiply, &
+   use emcon_csr, only : csr_from_elements, csr_from_entries, csr_from_values, csr_multiply, &
       csr_multiply_transposed, csr_t, csr_transpose
    use emcon_csr_product, only : csr_product
    use emcon_deck_source, only : passage_t
@@ -64,7 +65,8 @@ module emcon_api
    use emcon_host_contact, only : host_contact_t
    use emcon_host_force, only : force_response_t, host_failed, host_force_t, host_ok, &
       host_outside
-   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
+   use emcon_interactions, only : contact_damping_t, contact_options_t, contact_pair_t, &
+      formulation_mortar, &
       formulation_nts, formulation_segment, integration_elements, integration_segments, &
       interaction_t, multiplier_dual, multiplier_standard, normal_edge, normal_nodal, &
       smoothing_hermite, smoothing_none
@@ -91,8 +93,9 @@ module emcon_api
    use emcon_stepper_conditions, only : conditions_exchange, stepper_add_prescribed, &
       stepper_prescribe, stepper_remove_prescribed, &
       stepper_set_prescribed
-   use emcon_stepper_contact, only : query_areas, query_begin_contact, query_begin_friction, &
-      query_choose, query_contact, query_drop, query_gaps, query_overlap, query_select, &
+   use emcon_stepper_contact, only : query_areas, query_begin_contact, query_begin_damping, &
+      query_begin_friction, query_choose, query_contact, query_drop, query_gaps, &
+      query_law_forces, query_overlap, query_select, &
       query_slips, query_update_active, &
       step_cycling, step_done, step_stands_off, step_too_far
    use emcon_stepper_file, only : stepper_load, stepper_save
@@ -110,7 +113,7 @@ module emcon_api
    use emcon_stepper_query, only : query_evaluate, query_follow, query_free, query_guess, &
       query_mass, query_momenta, query_residual, query_t, query_tangent, query_unknowns
    use emcon_stepper_report, only : contact_report_t, query_constraints, query_curvature, &
-      query_curvature_times, query_set_map
+      query_curvature_times, query_pattern, query_set_map
    use emcon_steps, only : initiation_admissible, initiation_persistent, load_gravity, load_point, &
       load_pressure
    use emcon_text, only : string_t

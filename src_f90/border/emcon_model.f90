@@ -35,7 +35,7 @@ module emcon_model
       real(c_double), allocatable :: c_gap(:, :)         !! the gaps in it
       integer(c_int), allocatable :: c_redundant(:)      !! of the last null space, from 0
       type(csr_t) :: p, df                               !! of the last null space
-      type(csr_t) :: matrix(6)                           !! asked for last, each kind in its place
+      type(csr_t) :: matrix(7)                           !! asked for last, each kind in its place
       type(c_text_t) :: text(4)                          !! likewise
       real(c_double), allocatable :: c_field(:, :)       !! asked for last
       type(record_t), allocatable :: record              !! of a run that is written down

@@ -5,7 +5,7 @@ module emcon_model_contact
    use emcon_c_types, only : contact_settings_c, gap_c, pair_options_c
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
-   use emcon_interactions, only : contact_options_t, interaction_t
+   use emcon_interactions, only : contact_damping_t, contact_options_t, interaction_t
    use emcon_kinds, only : wp
    use emcon_model, only : model_t
    use emcon_overlap_check, only : overlap_t
@@ -28,11 +28,19 @@ contains
       type(contact_options_t) :: choice
       type(interaction_t) :: interaction
 
+      real(wp) :: adjust
+
+      adjust = 0.0_wp
       if (present(options)) then
          choice = chosen(options)
          interaction%friction = real(options%friction, wp)
+         interaction%damping = contact_damping_t(real(options%damping, wp), &
+            real(options%damping_clearance, wp), real(options%damping_flat, wp), &
+            real(options%tangent_fraction, wp))
+         adjust = real(options%adjust, wp)
       end if
-      call stepper_add_pair(model%stepper, slave, master, formulation, choice, error, interaction)
+      call stepper_add_pair(model%stepper, slave, master, formulation, choice, error, interaction, &
+         adjust)
    end subroutine model_add_pair
 
    !> The options of a pair; 0 is the default.

@@ -97,6 +97,7 @@ module emcon_contact
       procedure :: could_hold
       procedure :: lets_in
       procedure :: waits
+      procedure :: follow_slips
       ! To be called, with the displacements of nodes:
       procedure, non_overridable :: begin_step
       procedure, non_overridable :: measure
@@ -232,6 +233,12 @@ contains
       u = 0.0_wp
       call self%area_points(x, u, area, length)
    end subroutine own_area
+
+   !> What slips are made of in the step is to be as the motion of the last `begin_step` has it;
+   !> nothing where that is so anyway.
+   pure subroutine follow_slips(self)
+      class(contact_t), intent(inout) :: self
+   end subroutine follow_slips
 
    !> What the values of constraint `i` are to be multiplied by to be the same function in all
    !> steps.

@@ -43,6 +43,9 @@ module emcon_mortar_space
       type(mortar_rise_t), allocatable :: rise        !! of both sides; only if gaps follow arcs
       type(patch_basis_t), allocatable :: basis(:)    !! (n_triangle) as last measured
       type(mortar_slip_t), allocatable :: slide(:)    !! (n_triangle) of the step; with friction
+      type(mortar_slip_t), allocatable :: next_slide(:)    !! of the last motion that was looked at
+      !> (3, nodes that are looked at) the motions that both are of [L]
+      real(wp), allocatable :: slide_du(:, :), next_du(:, :)
       !> (0:1, n_facet) how dual the multipliers of slave facets are at start and end
       real(wp), allocatable :: theta(:, :)
    contains
@@ -54,6 +57,7 @@ module emcon_mortar_space
       procedure :: evaluate_points => mortar_evaluate
       procedure :: slip_points => mortar_slip
       procedure :: lets_in => mortar_lets_in
+      procedure :: follow_slips => mortar_follow_slips
    end type mortar_space_t
 
 contains
@@ -74,7 +78,9 @@ contains
       self%offset = pair%interaction%offset
       self%max_penetration_at_start = max_penetration_mean
       call contact_laws_of_surface(pair%interaction, self%laws)
-      if (contact_laws_rub(self%laws)) allocate(self%slide(size(self%faces%split%facet)))
+      if (.not. contact_laws_rub(self%laws)) return
+      allocate(self%slide(size(self%faces%split%facet)))
+      allocate(self%next_slide(size(self%faces%split%facet)))
    end subroutine mortar_space_init
 
    !> Room for what a step knows, and sizes in the reference.
@@ -139,22 +145,37 @@ contains
    pure subroutine mortar_begin_step(self, x, u0, du)
       class(mortar_space_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
+      logical :: begins, is_new
+      integer :: i
 
+      begins = .not. self%reach > 0.0_wp
       call mortar_faces_look(self%faces, x, u0, du, self%reach)
       call self%has_looked(self%faces%near%clearance)
-      call choose_stencils(self, x, u0)
-      if (allocated(self%slide)) call choose_slips(self, x, u0, du)
+      call choose_stencils(self, x, u0, is_new)
+      if (.not. allocated(self%slide)) return
+      call choose_next_slips(self, x, u0, du)
+      if (begins .or. .not. allocated(self%slide_du)) then
+         call self%follow_slips()
+      else if (is_new) then
+         call choose_slips_again(self, x, u0)
+      end if
+      do i = 1, self%n_constraint
+         self%state(i)%slip_shift = mortar_slip_shift(self%next_slide, self%slide, self%faces, i)
+      end do
    end subroutine mortar_begin_step
 
    !> From the same start and up to the same reach the choice is the same.
-   pure subroutine choose_stencils(self, x, u0)
+   pure subroutine choose_stencils(self, x, u0, is_new)
       type(mortar_space_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
+      logical, intent(out) :: is_new             !! they may be others than before
       integer :: f
 
+      is_new = .false.
       if (abs(self%chosen_reach - self%reach) <= 0.0_wp) then
          if (position_memo_holds(self%memo, self%faces%near%node, x, u0)) return
       end if
+      is_new = .true.
       call position_memo_take(self%memo, self%faces%near%node, x, u0)
       self%chosen_reach = self%reach
       do f = 1, self%faces%sides%slave%n_facet
@@ -163,20 +184,35 @@ contains
       if (allocated(self%rise)) call find_sagittas(self, x, u0)
    end subroutine choose_stencils
 
-   !> What slips are made of where forces are expected to act.
-   pure subroutine choose_slips(self, x, u0, du)
+   !> What slips would be made of where forces act by this motion. It is taken over as a step begins
+   !> and by `follow_slips`, so that what is solved does not depend on motions tried on the way.
+   pure subroutine choose_next_slips(self, x, u0, du)
       type(mortar_space_t), intent(inout) :: self
       real(wp), intent(in), contiguous :: x(:, :), u0(:, :), du(:, :)   !! (3, n_node) [L]
-      type(mortar_slip_t) :: before(size(self%slide))
-      integer :: i
 
-      before = self%slide
+      self%next_du = du(:, self%faces%near%node)
+      call mortar_slip_choose(self%next_slide, self%faces, x, u0, du, push_place(self%step))
+   end subroutine choose_next_slips
+
+   !> The same slips by new stencils.
+   pure subroutine choose_slips_again(self, x, u0)
+      type(mortar_space_t), intent(inout) :: self
+      real(wp), intent(in), contiguous :: x(:, :), u0(:, :)   !! (3, n_node) [L]
+      real(wp) :: du(size(u0, 1), size(u0, 2))
+
+      du = 0.0_wp
+      du(:, self%faces%near%node) = self%slide_du
       call mortar_slip_choose(self%slide, self%faces, x, u0, du, push_place(self%step))
-      if (.not. allocated(before(1)%vertex)) before = self%slide
-      do i = 1, self%n_constraint
-         self%state(i)%slip_shift = mortar_slip_shift(self%slide, before, self%faces, i)
-      end do
-   end subroutine choose_slips
+   end subroutine choose_slips_again
+
+   !> Slips are made of what the last motion goes over.
+   pure subroutine mortar_follow_slips(self)
+      class(mortar_space_t), intent(inout) :: self
+
+      if (.not. allocated(self%slide)) return
+      self%slide = self%next_slide
+      self%slide_du = self%next_du
+   end subroutine mortar_follow_slips
 
    !> How far both surfaces rise over what gaps are measured between.
    pure subroutine find_sagittas(self, x, u0)

@@ -1,3 +1,4 @@
+! build: holder
 !> The grid of increments of a step: times are counted in integers, and meet its end exactly.
 module emcon_march_grid
    use emcon_kinds, only : int64, wp

@@ -1,3 +1,4 @@
+! build: holder
 !> What a march through time holds, what one increment took, and what a step is.
 module emcon_march_types
    use emcon_active_set, only : active_set_t

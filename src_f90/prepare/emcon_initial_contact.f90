@@ -19,7 +19,7 @@ module emcon_initial_contact
    use emcon_waiting_sides, only : find_waiting
    implicit none
    private
-   public :: initial_contact_prepare
+   public :: initial_contact_adjust, initial_contact_prepare
 
    !> Nodes looked at to see on which side of the other surface they are.
    integer, parameter :: most_samples = 64
@@ -103,6 +103,22 @@ contains
          end associate
       end do
    end subroutine initial_contact_prepare
+
+   !> Of a host's pairs nothing is checked: slave nodes move onto masters where that is wanted.
+   subroutine initial_contact_adjust(scene, notes, error)
+      type(scene_t), intent(inout) :: scene
+      type(notes_t), intent(inout) :: notes
+      type(error_t), allocatable, intent(out) :: error
+      class(start_gaps_t), allocatable :: contact
+      integer :: i
+
+      do i = 1, size(scene%pair)
+         if (.not. scene%pair(i)%adjust%distance >= 0.0_wp) cycle
+         call new_start_gaps(scene, scene%pair(i), contact, error, scene%pair(i)%options)
+         if (allocated(error)) return
+         call adjust_pair(scene, scene%pair(i), contact, notes)
+      end do
+   end subroutine initial_contact_adjust
 
    !> Neither of two surfaces crosses itself, and both face each other.
    subroutine check_two(scene, pair, contact, noise, is_checked, error)
@@ -300,6 +316,7 @@ contains
       type(notes_t), intent(inout) :: notes
       type(gap_state_t) :: state
       real(wp) :: offset(size(scene%x, 1)), largest
+      character(len=:), allocatable :: text
       logical :: is_meant, is_last
       integer :: i, k, n_moved
 
@@ -324,8 +341,11 @@ contains
             if (is_last) exit
          end do
       end do
-      call note_add(notes, where_text(scene, pair%origin) // ": ADJUST moves " // &
-         to_text(n_moved) // " slave nodes, by " // to_text(largest) // " at most")
+      text = where_text(scene, pair%origin) // ": ADJUST"
+      if (pair%origin%file == 0) text = "contact of surfaces " // &
+         scene%surface(pair%slave)%name // " and " // scene%surface(pair%master)%name // ": adjust"
+      call note_add(notes, text // " moves " // to_text(n_moved) // " slave nodes, by " // &
+         to_text(largest) // " at most")
    end subroutine adjust_pair
 
    !> Slave nodes behind the master surface.

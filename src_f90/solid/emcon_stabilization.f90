@@ -3,7 +3,7 @@
 !>
 !> In the time of a static step they are a small part of the forces, but where the motion has no
 !> equilibrium to follow: there they hold what is on its way to the next one. They are derivatives,
-!> by the end, of a potential of the increment, docs/theory.md, eq. (11g).
+!> by the end, of a potential of the increment, docs/theory.md, eq. (11l).
 module emcon_stabilization
    use emcon_csr, only : csr_t
    use emcon_element, only : element_geometry_t

@@ -12,6 +12,7 @@ module emcon_host_friction
    use emcon_coulomb_law, only : contact_open, contact_slides, coulomb_t, has_way, slip_status_t
    use emcon_friction, only : friction_close, friction_keep, friction_look_back, friction_turn, &
       friction_use, most_lagged, most_shift
+   use emcon_gaps, only : gaps_follow_slips
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
    use emcon_system, only : system_t
@@ -170,7 +171,7 @@ contains
    subroutine host_friction_lags(active, acts, system, lags)
       type(active_set_t), intent(inout) :: active
       logical, intent(in) :: acts(:)             !! (n_constraint)
-      type(system_t), intent(in) :: system       !! measured for the solution
+      type(system_t), intent(inout) :: system    !! measured for the solution
       logical, intent(out) :: lags
       integer :: id, pair, i
 
@@ -184,6 +185,7 @@ contains
          end do
          lags = lags .and. friction%n_lagged < most_lagged
          if (lags) friction%n_lagged = friction%n_lagged + 1
+         if (lags) call gaps_follow_slips(system)
       end associate
    end subroutine host_friction_lags
 

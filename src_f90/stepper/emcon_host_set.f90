@@ -17,6 +17,7 @@ module emcon_host_set
       host_friction_status, host_friction_turn, host_friction_turn_few, host_friction_ways
    use emcon_kinds, only : wp
    use emcon_motion, only : motion_t
+   use emcon_near_laws, only : near_laws_are_none, near_laws_update
    use emcon_system, only : system_t
    implicit none
    private
@@ -91,12 +92,12 @@ contains
       type(motion_t), intent(in) :: motion
       logical, intent(out) :: is_done            !! else solve the step again with the next set
       integer, intent(out) :: status             !! one of the `step_` codes
-      logical :: before(size(active%is_active)), turns
+      logical :: before(size(active%is_active)), turns, grows
       type(slip_status_t), allocatable :: held(:)
 
       before = active%is_active
       call host_friction_status(active, held)
-      call update(self, active, system, motion, status)
+      call update(self, active, system, motion, grows, status)
       turns = .false.
       if (.not. self%is_problem) then
          call host_friction_turn(active, host_set_next(active), system, turns)
@@ -111,6 +112,8 @@ contains
       end if
       if (is_done) return
       if (all(before .eqv. active%is_active) .and. .not. turns) then
+         ! What has come near is damped from now on: the same set again.
+         if (grows) return
          call host_friction_lags(active, before, system, turns)
          if (.not. turns) call host_friction_look_back(active, before, system, motion, turns)
          is_done = .not. turns
@@ -131,16 +134,19 @@ contains
 
    !> Of the conditions gap >= 0, lam >= 0, lam gap = 0 the set fulfils the last: what acts is let
    !> go where lam < 0, what does not is taken in where gap < 0.
-   subroutine update(self, active, system, motion, status)
+   subroutine update(self, active, system, motion, grows, status)
       type(host_set_t), intent(in) :: self
       type(active_set_t), intent(inout) :: active
       type(system_t), intent(inout) :: system
       type(motion_t), intent(in) :: motion
+      logical, intent(out) :: grows              !! laws beside the rows act on more
       integer, intent(out) :: status             !! one of the `step_` codes
-      logical :: has_changed, changes
+      logical :: has_changed, changes, pushes(size(active%is_active))
       integer :: pair, i, id, k
 
       status = step_done
+      grows = .false.
+      call find_pushes(self, active, pushes)
       active%is_stale = .false.
       has_changed = .false.
       k = count(active%is_active(:system%first_constraint(1)))
@@ -151,6 +157,8 @@ contains
             if (active%skip_until(pair)%passes .and. &
                .not. any(active%is_active(first + 1:system%first_constraint(pair + 1)))) cycle
             call active_set_update_gaps(active, system, pair, motion, motion%du)
+            if (.not. near_laws_are_none(active%near_laws, contact)) call near_laws_update( &
+               active%near_laws, system, pair, pushes, grows)
             do i = 1, contact%n_constraint
                id = first + i
                if (active%is_active(id)) then
@@ -177,6 +185,20 @@ contains
          end associate
       end do
    end subroutine update
+
+   !> What acts; of candidates those that push.
+   pure subroutine find_pushes(self, active, pushes)
+      type(host_set_t), intent(in) :: self
+      type(active_set_t), intent(in) :: active
+      logical, intent(out) :: pushes(:)          !! (n_constraint)
+      integer :: k
+
+      pushes = active%is_active
+      if (.not. self%is_problem) return
+      do k = active%set%n_permanent + 1, active%set%n
+         pushes(active%set%id(k)) = active%set%lam(k) > 0.0_wp
+      end do
+   end subroutine find_pushes
 
    !> A contact that was dropped and closes all the same does not follow from others: it had lost
    !> its surface.

@@ -13,7 +13,7 @@ module emcon_stepper
    use emcon_host, only : host_t
    use emcon_host_check, only : host_check_scene
    use emcon_heap, only : heap_adapt
-   use emcon_initial_contact, only : initial_contact_prepare
+   use emcon_initial_contact, only : initial_contact_adjust, initial_contact_prepare
    use emcon_kinds, only : wp
    use emcon_march, only : increment_t, march_begin_step, march_free, march_increment, march_init, &
       march_is_done, march_set_threads, march_t
@@ -148,7 +148,7 @@ contains
       if (allocated(error)) return
       call discs_prepare(self%scene, self%notes)
       call ties_prepare(self%scene, self%notes, error)
-      if (.not. (allocated(error) .or. self%scene%host%is_whole)) call prepare_contact(self, error)
+      if (.not. allocated(error)) call prepare_contact(self, error)
       if (allocated(error)) return
       call march_init(self%march, self%scene, error, self%host)
       if (allocated(error)) return
@@ -179,6 +179,10 @@ contains
 
       real(wp), allocatable :: before(:, :)
 
+      if (self%scene%host%is_whole) then
+         call initial_contact_adjust(self%scene, self%notes, error)
+         return
+      end if
       if (any(tie_map_is_given(self%scene%tie%map))) allocate(before, source=self%scene%x)
       call initial_contact_prepare(self%scene, self%notes, error, self%host)
       if (.not. allocated(error)) call ties_move_nodes(self%scene, self%notes, error, before)

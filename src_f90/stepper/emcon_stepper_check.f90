@@ -5,10 +5,11 @@ module emcon_stepper_check
    use emcon_kinds, only : wp
    use emcon_scene, only : scene_t
    use emcon_stepper, only : stepper_t
+   use emcon_steps, only : step_is_dynamic
    use emcon_text, only : to_text
    implicit none
    private
-   public :: stepper_check_open, stepper_check_smooth, stepper_check_undamped
+   public :: stepper_check_open, stepper_check_smooth, stepper_is_damped
    public :: check_that, check_field, check_list, &
       check_size, check_choice, check_number
 
@@ -31,18 +32,17 @@ contains
 
       call check_that(.not. any(self%scene%pair%interaction%friction > 0.0_wp), "contact with " &
          // "*FRICTION is not evaluated from outside: advance the model by increments", error)
-      call stepper_check_undamped(self, error)
+      call check_that(.not. stepper_is_damped(self), "contact with *CONTACT DAMPING is not " // &
+         "evaluated from outside: advance the model by increments", error)
    end subroutine stepper_check_smooth
 
-   !> There is no damping.
-   pure subroutine stepper_check_undamped(self, error)
+   !> Does contact have damping, in steps with inertia?
+   pure logical function stepper_is_damped(self) result(is_damped)
       type(stepper_t), intent(in) :: self
-      type(error_t), allocatable, intent(inout) :: error   !! of an earlier check: nothing is done
 
-      call check_that(.not. any(self%scene%pair%interaction%damping%coefficient > 0.0_wp), &
-         "contact with *CONTACT DAMPING is not evaluated from outside: advance the model by " // &
-         "increments", error)
-   end subroutine stepper_check_undamped
+      is_damped = any(self%scene%pair%interaction%damping%coefficient > 0.0_wp) .and. &
+         step_is_dynamic(self%scene%step(self%march%state%clock%i_step))
+   end function stepper_is_damped
 
    !> An input error of this text, unless something holds.
    pure subroutine check_that(holds, text, error)

@@ -14,8 +14,9 @@ module emcon_stepper_contact
    use emcon_active_set, only : active_set_begin, active_set_select, active_set_suit, &
       step_cycling, step_done, step_stands_off, step_too_far
    use emcon_constraint, only : condition_friction, most_slips
-   use emcon_constraints, only : constraint_index, constraints_force, constraints_select, &
-      constraints_take_lam
+   use emcon_constraints, only : constraint_index, constraints_add_law_forces, &
+      constraints_dissipated, constraints_force, constraints_select, constraints_take_lam
+   use emcon_contact_law, only : loss_damping
    use emcon_contact, only : gap_state_t
    use emcon_errors, only : error_t
    use emcon_contact_support, only : contact_support_t
@@ -27,8 +28,8 @@ module emcon_stepper_contact
    use emcon_kinds, only : wp
    use emcon_evaluation, only : evaluation_at_end, evaluation_t
    use emcon_stepper, only : stepper_t
-   use emcon_stepper_check, only : check_choice, check_field, check_list, check_size, check_that, &
-      stepper_check_undamped
+   use emcon_stepper_check, only : check_choice, check_field, check_list, check_number, &
+      check_size, check_that, stepper_is_damped
    use emcon_gaps, only : gaps_forget, gaps_measure
    use emcon_stepper_query, only : query_forget, query_place, query_sync, query_t
    use emcon_stepper_report, only : contact_report_t, report_check_list, report_evaluate
@@ -36,7 +37,8 @@ module emcon_stepper_contact
    use emcon_text, only : to_text
    implicit none
    private
-   public :: query_begin_contact, query_begin_friction, query_gaps, query_select, query_choose, &
+   public :: query_begin_contact, query_begin_friction, query_begin_damping, query_law_forces
+   public :: query_gaps, query_select, query_choose, &
       query_contact, query_update_active, query_drop, query_areas, query_slips, query_overlap
    public :: step_done, step_cycling, step_too_far, step_stands_off
 
@@ -53,7 +55,7 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call query_sync(self, stepper, error)
-      if (.not. allocated(error)) call stepper_check_undamped(stepper, error)
+      self%frequency = 0.0_wp
       if (.not. allocated(error)) call take_options(self, stepper)
       call check_flags(self, "was_active", was_active, error)
       call query_place(self, stepper, u0, du, error)
@@ -99,6 +101,48 @@ contains
       end associate
    end subroutine query_begin_friction
 
+   !> After `query_begin_contact`, where pairs have damping, whose forces go by velocities: the size
+   !> of the step.
+   subroutine query_begin_damping(self, stepper, h, error)
+      type(query_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(in) :: h                  !! > 0 [T]
+      type(error_t), allocatable, intent(out) :: error
+
+      call check_that(self%has_begun, "no step of contact was begun", error)
+      call check_number("h", h, error, 0.0_wp)
+      call check_that(h > 0.0_wp, "h is 0: a step has a size", error)
+      if (allocated(error)) return
+      self%frequency = 1.0_wp/h
+      call take_options(self, stepper)
+   end subroutine query_begin_damping
+
+   !> What laws beside the rows, as damping, push at the nodes in the step that was evaluated last,
+   !> and what they take, >= 0. Their derivative is in `query_curvature`.
+   subroutine query_law_forces(self, stepper, force, dissipated, error)
+      type(query_t), intent(in) :: self
+      type(stepper_t), intent(in) :: stepper
+      real(wp), allocatable, intent(out) :: force(:, :)    !! (n_dim, n_node) [M L/T^2]
+      real(wp), intent(out) :: dissipated                  !! [M L^2/T^2]
+      type(error_t), allocatable, intent(out) :: error
+      logical :: are_some
+      integer :: k
+
+      dissipated = 0.0_wp
+      allocate(force, mold=stepper%scene%x)
+      force = 0.0_wp
+      call check_that(self%has_begun .and. self%has_set, "no constraints were evaluated in this " &
+         // "step", error)
+      if (allocated(error)) return
+      associate (set => self%march%active%set)
+         call constraints_add_law_forces(set, force, are_some)
+         if (.not. are_some) return
+         do k = set%n_permanent + 1, set%n_condition
+            dissipated = dissipated + constraints_dissipated(set, k, loss_damping)
+         end do
+      end associate
+   end subroutine query_law_forces
+
    !> Take over how contact begins, which may have changed.
    subroutine take_options(self, stepper)
       type(query_t), intent(inout) :: self
@@ -112,6 +156,7 @@ contains
          ! Of velocities only the motion that brings them to rest is known, as if they were that.
          self%march%motion%evaluation = merge(evaluation_t(lapse=1.0_wp, v_weight=2.0_wp), &
             evaluation_at_end, step_is_dynamic(step))
+         if (step_is_dynamic(step)) self%march%motion%evaluation%mass_scale = self%frequency
       end associate
    end subroutine take_options
 
@@ -218,6 +263,8 @@ contains
       type(error_t), allocatable, intent(out) :: error
 
       call begin_query(self, stepper, u0, du, error)
+      call check_that(self%frequency > 0.0_wp .or. .not. stepper_is_damped(stepper), "pairs have " &
+         // "damping: the size of the step is to be told after it was begun", error)
       if (.not. allocated(error)) call report_evaluate(self, report)
    end subroutine query_contact
 

@@ -1,3 +1,4 @@
+! build: holder
 !> A stepper in a restart file: the deck, the state, and what its last increment has measured.
 !>
 !> What is exchanged is saved, or loaded; each array is named once, and keeps its bits.

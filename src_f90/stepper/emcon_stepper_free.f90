@@ -1,3 +1,4 @@
+! build: holder
 !> Steps of any size, and the state in and out: what scripts need beyond the grid of the deck.
 !>
 !> The state is read from `stepper%march%state`, energies and momenta from `stepper%march%ledger`.

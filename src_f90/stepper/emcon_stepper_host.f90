@@ -1,3 +1,4 @@
+! build: holder
 !> A model without solids, for a host code that has its own: nodes, surfaces as edges, in space as
 !> faces, pairs, ties.
 !>
@@ -14,7 +15,8 @@ module emcon_stepper_host
    use emcon_errors, only : error_t
    use emcon_facets, only : facets_init, facets_t
    use emcon_host_faces, only : host_faces_in_turn
-   use emcon_interactions, only : contact_options_t, contact_pair_t, formulation_mortar, &
+   use emcon_interactions, only : contact_damping_t, contact_options_t, contact_pair_t, &
+      formulation_mortar, &
       formulation_nts, integration_elements, integration_segments, interaction_t, &
       multiplier_dual, multiplier_standard, normal_edge, normal_nodal, smoothing_hermite, &
       smoothing_none
@@ -135,22 +137,31 @@ contains
    end subroutine check_edges
 
    !> Add a contact pair; a surface in contact with itself is its own master. Of `interaction` hosts
-   !> have the friction.
-   subroutine stepper_add_pair(self, slave, master, formulation, options, error, interaction)
+   !> have friction and damping.
+   subroutine stepper_add_pair(self, slave, master, formulation, options, error, interaction, &
+      adjust)
       type(stepper_t), intent(inout) :: self
       integer, intent(in) :: slave, master                 !! numbers of surfaces
       integer, intent(in) :: formulation                   !! one of `formulation_`
       type(contact_options_t), intent(in) :: options
       type(error_t), allocatable, intent(out) :: error
-      type(interaction_t), intent(in), optional :: interaction       !! none: without friction
+      type(interaction_t), intent(in), optional :: interaction       !! none: without either
+      !> Slave nodes no farther from the master than this, and those behind it, are moved onto it
+      !> before the first step; none, or 0: none are [L]
+      real(wp), intent(in), optional :: adjust
       type(contact_pair_t) :: pair
 
-      if (present(interaction)) pair%interaction%friction = interaction%friction
+      if (present(interaction)) then
+         pair%interaction%friction = interaction%friction
+         pair%interaction%damping = interaction%damping
+      end if
       call check_surfaces(self, slave, master, error)
       call check_choice("formulation", formulation, formulation_nts, formulation_mortar, error)
       call check_options(options, error)
-      if (self%scene%n_dim == 3) call check_space(slave == master, formulation, options, error)
+      if (self%scene%n_dim == 3) call check_space(formulation, options, error)
       call check_number("friction", pair%interaction%friction, error, 0.0_wp)
+      call check_damping(pair%interaction%damping, self%scene%n_dim, error)
+      if (present(adjust)) call check_number("adjust", adjust, error, 0.0_wp)
       call check_apart(self, slave, master, error)
       if (allocated(error)) return
       pair%slave = slave
@@ -158,8 +169,22 @@ contains
       pair%formulation = formulation
       pair%has_options = .true.
       pair%options = options
+      if (present(adjust)) pair%adjust%distance = merge(adjust, -1.0_wp, adjust > 0.0_wp)
       self%scene%pair = [self%scene%pair, pair]
    end subroutine stepper_add_pair
+
+   pure subroutine check_damping(damping, n_dim, error)
+      type(contact_damping_t), intent(in) :: damping
+      integer, intent(in) :: n_dim               !! of the nodes
+      type(error_t), allocatable, intent(inout) :: error
+
+      call check_number("damping", damping%coefficient, error, 0.0_wp)
+      call check_number("the clearance of damping", damping%clearance, error, 0.0_wp)
+      call check_number("the flat part of damping", damping%flat, error, 0.0_wp, 1.0_wp)
+      call check_number("tangent_fraction", damping%tangent, error, 0.0_wp)
+      call check_that(n_dim == 2 .or. .not. damping%tangent > 0.0_wp, "tangent_fraction: damping " &
+         // "along surfaces in three dimensions is not in this version", error)
+   end subroutine check_damping
 
    pure subroutine check_options(options, error)
       type(contact_options_t), intent(in) :: options
@@ -178,8 +203,7 @@ contains
    end subroutine check_options
 
    !> In space contact is of nodes on faces as they are, or mortar between these.
-   pure subroutine check_space(is_own, formulation, options, error)
-      logical, intent(in) :: is_own              !! a surface is its own master
+   pure subroutine check_space(formulation, options, error)
       integer, intent(in) :: formulation
       type(contact_options_t), intent(in) :: options
       type(error_t), allocatable, intent(inout) :: error
@@ -188,8 +212,6 @@ contains
          "formulation is " // to_text(formulation) // ": contact in three dimensions is node to " &
          // "segment (" // to_text(formulation_nts) // ") or mortar (" // &
          to_text(formulation_mortar) // ")", error)
-      call check_that(.not. is_own, "a surface that is its own master is not in this version in " &
-         // "three dimensions", error)
       call check_that(options%smoothing == smoothing_none, "smoothing is of the plane: surfaces " &
          // "in three dimensions are taken as they are", error)
    end subroutine check_space

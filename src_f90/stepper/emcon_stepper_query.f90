@@ -47,6 +47,7 @@ module emcon_stepper_query
       type(null_space_t) :: null_space           !! of the last `query_null_space`
       type(csr_t), allocatable :: map            !! freedoms of the nodes by the host's unknowns
       logical :: has_tangent = .false.           !! of the last evaluation
+      real(wp) :: frequency = 0.0_wp             !! 1/h of the step of contact; 0: not known [1/T]
       logical :: has_null_space = .false.
       integer, private :: revision = -1          !! of the model that the numbering is that of
    end type query_t

@@ -1,7 +1,8 @@
 !> Constraints over a step that were evaluated: values, gradients, second derivatives.
 module emcon_stepper_report
    use emcon_constraint_rows, only : constraints_rows
-   use emcon_constraints, only : constraint_index, constraints_evaluate, constraints_select
+   use emcon_constraints, only : constraint_index, constraint_set_t, constraints_evaluate, &
+      constraints_select
    use emcon_contact, only : gap_state_t
    use emcon_csr, only : csr_copy_filled, csr_t, csr_transpose
    use emcon_csr_product, only : csr_product
@@ -13,13 +14,14 @@ module emcon_stepper_report
    use emcon_host_check, only : host_check_matrix
    use emcon_stepper, only : stepper_t
    use emcon_stepper_check, only : check_field, check_list, check_that
-   use emcon_gaps, only : gaps_search
+   use emcon_friction, only : friction_select
+   use emcon_gaps, only : gaps_measure, gaps_search
    use emcon_stepper_query, only : query_forget, query_place, query_sync, query_t
    use emcon_steps, only : prescribed_t
    implicit none
    private
    public :: contact_report_t, query_constraints, query_curvature, query_curvature_times, &
-      query_set_map
+      query_pattern, query_set_map
    public :: report_evaluate, report_check_list
 
    !> Constraints over a step, ascending by their numbers: f = mean gap - target. Linearised in the
@@ -72,6 +74,52 @@ contains
       call csr_product(rows, self%map, mapped)
       rows = mapped
    end subroutine apply_map
+
+   !> Which freedoms contact may couple in the step that was begun: those of all contacts that have
+   !> a surface near, with their slips, by the stencils of the last look; 1 where an entry of
+   !> `query_curvature`, or of C^T G, may come. `query_update_active` may choose other stencils.
+   subroutine query_pattern(self, stepper, u0, du, pattern, error)
+      type(query_t), intent(inout) :: self
+      type(stepper_t), intent(in) :: stepper
+      real(wp), intent(in), contiguous :: u0(:, :), du(:, :)   !! (n_dim, n_node) [L]
+      type(csr_t), intent(out) :: pattern        !! over freedoms of nodes, or by the map
+      type(error_t), allocatable, intent(out) :: error
+      type(constraint_set_t) :: set
+      type(gap_state_t), allocatable :: gap(:)
+      type(csr_t) :: own
+      integer :: k
+
+      call check_that(self%has_begun, "no step of contact was begun", error)
+      call query_place(self, stepper, u0, du, error)
+      if (allocated(error)) return
+      associate (march => self%march)
+         call gaps_measure(march%system, march%motion, gap)
+         call constraints_select(set, pack([(k, k = 1, size(gap))], gap%is_near))
+         call friction_select(march%active%friction, set)
+         call constraints_evaluate(set, march%system, march%motion)
+         call curvature_matrix(set, spread(0.0_wp, 1, set%n_row), size(march%motion%x), own)
+      end associate
+      own%value = 1.0_wp
+      call by_map(self, own, pattern)
+      pattern%value = 1.0_wp
+   end subroutine query_pattern
+
+   !> A matrix over the freedoms of the nodes, as the host is to have it.
+   subroutine by_map(self, own, matrix)
+      type(query_t), intent(in) :: self
+      type(csr_t), intent(inout) :: own
+      type(csr_t), intent(out) :: matrix
+      type(csr_t) :: half, turned
+      integer, allocatable :: from(:)
+
+      if (.not. allocated(self%map)) then
+         matrix = own
+         return
+      end if
+      call csr_product(own, self%map, half)
+      call csr_transpose(self%map, turned, from)
+      call csr_product(turned, half, matrix)
+   end subroutine by_map
 
    !> All contact constraints near from displacements `u0` to `u1`. With `keeps_gap` they are those
    !> that hold the mean gap of `u0`, as persistent contact does: integrated gaps have other
@@ -166,16 +214,12 @@ contains
       type(csr_t), intent(out) :: matrix         !! over freedoms of nodes, or by the map
       type(error_t), allocatable, intent(out) :: error
 
-      type(csr_t) :: own, turned
-      integer, allocatable :: from(:)
+      type(csr_t) :: own
 
       call report_check_list(self, "factor", factor, error)
       if (allocated(error)) return
-      call curvature_matrix(self%march%active%set, factor, size(self%march%motion%x), matrix)
-      if (.not. allocated(self%map)) return
-      call csr_product(matrix, self%map, own)
-      call csr_transpose(self%map, turned, from)
-      call csr_product(turned, own, matrix)
+      call curvature_matrix(self%march%active%set, factor, size(self%march%motion%x), own)
+      call by_map(self, own, matrix)
    end subroutine query_curvature
 
    !> The same times `direction`.

@@ -114,20 +114,23 @@ contains
       overlap_names = node == self%node .or. any(node == self%facet)
    end function overlap_names
 
-   !> The bodies and nodes of an overlap, and how deep it is as a length.
+   !> The bodies and nodes of an overlap, and how deep it is as a length. A host has no bodies.
    subroutine overlap_text(self, label, body, text)
       type(overlap_t), intent(in) :: self
       integer, intent(in) :: label(:), body(:)   !! (n_node) the user's numbers, bodies from 1
       character(len=:), allocatable, intent(out) :: text   !! one line
+      logical :: has_bodies
       integer :: k
 
+      has_bodies = any(body > 0)
       associate (facet => self%facet)
          text = "a point of an analytical surface"
-         if (body(self%node) > 0) text = "node " // to_text(label(self%node)) // " of body " // &
-            to_text(body(self%node))
+         if (body(self%node) > 0 .or. .not. has_bodies) text = "node " // &
+            to_text(label(self%node))
+         if (body(self%node) > 0) text = text // " of body " // to_text(body(self%node))
          if (self%is_beside) text = "a point beside " // text
          text = text // " is " // to_text(self%depth*self%length, 3) // " behind "
-         if (body(facet(1)) == 0 .or. count(facet > 0) == 1) then
+         if ((body(facet(1)) == 0 .and. has_bodies) .or. count(facet > 0) == 1) then
             text = text // "an analytical surface"
             return
          end if
@@ -140,7 +143,7 @@ contains
                text = text // ", " // to_text(label(facet(k)))
             end do
          end if
-         text = text // " of body " // to_text(body(facet(1)))
+         if (has_bodies) text = text // " of body " // to_text(body(facet(1)))
       end associate
    end subroutine overlap_text
 

@@ -356,7 +356,7 @@ contains
    end subroutine constraints_add_row_forces
 
    !> What row `k` is computed from, over the motion that was evaluated: epsilon times this is
-   !> round-off of what it lacks, docs/theory.md, eq. (26a).
+   !> round-off of what it lacks, docs/theory.md, eq. (26e).
    pure real(wp) function constraints_rounding(self, motion, k) result(terms)
       type(constraint_set_t), intent(in) :: self
       type(motion_t), intent(in) :: motion

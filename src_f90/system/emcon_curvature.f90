@@ -1,5 +1,5 @@
-!> Second derivatives of the selected conditions, summed with multipliers: what the tangent of a
-!> step gets less of, over all degrees of freedom.
+!> Second derivatives of the selected conditions, summed with multipliers, and those of the laws
+!> beside their rows: what the tangent of a step gets less of, over all degrees of freedom.
 module emcon_curvature
    use emcon_constraint, only : condition_stiffness
    use emcon_constraint_rows, only : constraint_dof
@@ -23,14 +23,14 @@ contains
       integer :: k, i, j, n
 
       n = 0
-      do k = 1, self%n
+      do k = 1, self%n_condition
          n = n + (size(self%item(k)%g, 1)*self%item(k)%n_node)**2
       end do
       allocate(row(n), column(n), value(n))
       n = 0
       call take_friction(self, factor, lam)
-      do k = 1, self%n
-         second = second_of(self, k, factor(k))
+      do k = 1, self%n_condition
+         second = second_of(self, k, factor)
          do j = 1, size(second, 2)
             do i = 1, size(second, 1)
                n = n + 1
@@ -54,8 +54,8 @@ contains
       integer :: k, i, j
 
       call take_friction(self, factor, lam)
-      do k = 1, self%n
-         second = second_of(self, k, factor(k))
+      do k = 1, self%n_condition
+         second = second_of(self, k, factor)
          associate (item => self%item(k), n_dim => size(direction, 1))
             do j = 1, item%n_node
                do i = 1, item%n_node
@@ -89,14 +89,17 @@ contains
    end subroutine put_back
 
    !> The derivative of the forces of condition `k`, coordinates node by node.
-   pure function second_of(self, k, lam) result(second)
+   pure function second_of(self, k, factor) result(second)
       type(constraint_set_t), intent(in) :: self
-      integer, intent(in) :: k                       !! place in the set, 1..n
-      real(wp), intent(in) :: lam                    !! of the row of its gap
+      integer, intent(in) :: k                       !! place in the set, 1..n_condition
+      real(wp), intent(in) :: factor(:)              !! (n_row) multipliers [M L/T^2]
       real(wp), allocatable :: second(:, :)
+      real(wp) :: lam                                ! of the row of its gap
 
+      lam = 0.0_wp
+      if (k <= self%n) lam = factor(k)
       associate (item => self%item(k), n => size(self%item(k)%g, 1)*self%item(k)%n_node)
-         if (item%has_friction) then
+         if (item%has_friction .or. allocated(self%law(k)%beside)) then
             second = -condition_stiffness(item, lam)
          else
             second = lam*item%h(:n, :n)

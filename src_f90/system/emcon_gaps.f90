@@ -8,7 +8,8 @@ module emcon_gaps
    use emcon_system, only : system_t
    implicit none
    private
-   public :: gaps_measure, gaps_search, gaps_forget, pair_search, pair_measure
+   public :: gaps_measure, gaps_search, gaps_forget, gaps_follow_slips, pair_search, &
+      pair_measure
 
 contains
 
@@ -77,5 +78,16 @@ contains
          system%contact(i)%contact%reach = 0.0_wp
       end do
    end subroutine gaps_forget
+
+   !> The step is to be solved again with friction where the motion that was searched for last has
+   !> it.
+   subroutine gaps_follow_slips(system)
+      type(system_t), intent(inout) :: system                     !! its contacts
+      integer :: i
+
+      do i = 1, size(system%contact)
+         call system%contact(i)%contact%follow_slips()
+      end do
+   end subroutine gaps_follow_slips
 
 end module emcon_gaps

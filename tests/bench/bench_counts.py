@@ -124,6 +124,10 @@ def ring_run(ring, block):
         return unknowns, run.verdict["seconds"], run.verdict["counts"], written
 
 
+#: Phases that the table names otherwise than the program.
+NAMES = {"judge": "overlap check"}
+
+
 def phases(sizes):
     """Lines of the table of phases: milliseconds per increment, and shares."""
     columns = [ring_run(*size)[:3] for size in sizes]
@@ -134,7 +138,7 @@ def phases(sizes):
         for _, seconds, _ in columns:
             per = 1e3*seconds[name]/INCREMENTS
             cells.append(f"{per:.3g} ms, {100*seconds[name]/sum(seconds.values()):.1f} %")
-        lines.append(f"| {name} | " + " | ".join(cells) + " |")
+        lines.append(f"| {NAMES.get(name, name)} | " + " | ".join(cells) + " |")
     lines.append("| all | " + " | ".join(
         f"{1e3*sum(seconds.values())/INCREMENTS:.3g} ms" for _, seconds, _ in columns) + " |")
     for name in ("tangents", "residuals", "factorisations", "solutions", "searched", "measured"):

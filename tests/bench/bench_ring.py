@@ -66,9 +66,9 @@ def bench_ring(folder):
 def bench_formulations(folder):
     from book.common import FORMULATIONS     # with what draws: no other process needs that
 
-    print("\nRing scene, formulations of contact; contact: search, gaps, null space; judge: overlap")
+    print("\nRing scene, formulations of contact; contact: search, gaps, null space; overlap: its check")
     row = table("formulation                              ", "h", "CPU [s]", "contact [s]",
-                "share [%]", "judge [%]", "Newton", "cuts", "MB")  # fmt: skip
+                "share [%]", "overlap [%]", "Newton", "cuts", "MB")  # fmt: skip
     for name, choice in FORMULATIONS.items():
         for h in (0.05, 0.01)[: 1 if IS_SHORT else 2]:
             out = folder / "ring"

@@ -112,6 +112,9 @@ static void without_model(void)
    TELL(emcon_begin_contact(m, 1, x, x, 1, i, i));
    TELL(emcon_begin_friction(m, 1, x));
    TELL(emcon_set_map(m, &matrix));
+   TELL(emcon_pattern(m, 1, x, x, &matrix));
+   TELL(emcon_begin_damping(m, 1));
+   TELL(emcon_law_forces(m, 1, x, x));
    TELL(emcon_get_slips(m, 1, i, x, x));
    TELL(emcon_get_gaps(m, 1, x, x, 1, &gap));
    TELL(emcon_select(m, 1, x, x, 1, i, i));

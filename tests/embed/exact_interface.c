@@ -138,6 +138,9 @@ static void differentiate(double *u0, double *du, int n, int m, int *active)
                                       &outcome));
    WORKS(emcon_update_active(face, n_node, u0, du, n, lam, product, m, active, &is_done, &outcome));
    WORKS(emcon_get_slips(face, m, way, slip, friction));
+   WORKS(emcon_begin_damping(face, 0.1));
+   WORKS(emcon_law_forces(face, n_node, product, length));
+   REFUSED_ALL(k, emcon_law_forces(face, k, product, length));
    REFUSED_ALL(k, emcon_get_slips(face, k, way, slip, friction));
    free(way);
    free(slip);
@@ -157,6 +160,10 @@ static void condense(double *u0, double *du, int m, const int *active)
    double *w = numbers(n*n), *opening = numbers(n), *lam = numbers(n);
    for (int i = 0; i < n; ++i) w[(n + 1)*i] = opening[i] = 1;
    WORKS(emcon_solve_contacts(face, n, w, opening, lam));
+   emcon_csr pattern;
+   WORKS(emcon_pattern(face, n_node, u0, du, &pattern));
+   need(pattern.n_row == 2*n_node && pattern.n_column == 2*n_node, "emcon_pattern", "its size");
+   REFUSED_ALL(k, emcon_pattern(face, k, u0, du, &pattern));
    need(lam[0] == 0, "emcon_solve_contacts", "what opens pushes");
    REFUSED_ALL(k, emcon_solve_contacts(face, k, w, opening, lam));
    free(w);

@@ -9,17 +9,19 @@ the deformation gradient in the middle. Lines that contact adds are marked by `e
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from itertools import product
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
-from emcon.interface import Interface, Outcome
+from emcon.interface import Interface
 
 Floats = NDArray[np.float64]
 CORNERS = np.array([[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0], [0, 0, 1], [1, 0, 1], [1, 1, 1], [0, 1, 1]])
-#: Corners of the faces that lie below and above, counter-clockwise as seen from outside.
-BELOW, ABOVE = [0, 3, 2, 1], [4, 5, 6, 7]
+#: Corners of the faces, that below and that above first, counter-clockwise as seen from outside.
+FACES = np.array([[0, 3, 2, 1], [4, 5, 6, 7], [0, 1, 5, 4], [1, 2, 6, 5], [2, 3, 7, 6], [3, 0, 4, 7]])
 
 
 def block(n: tuple[int, int, int], low: Floats, size: Floats, first: int = 0) -> tuple[Floats, NDArray[np.int64]]:
@@ -28,6 +30,13 @@ def block(n: tuple[int, int, int], low: Floats, size: Floats, first: int = 0) ->
     number = {tuple(p): first + k for k, p in enumerate(place)}
     cells = [[number[tuple(p)] for p in cell + CORNERS] for cell in product(*map(range, n))]
     return low + place/n*size, np.array(cells)
+
+
+def skin(cells: NDArray[np.int64]) -> NDArray[np.int64]:
+    """The faces that belong to one cell only."""
+    faces = cells[:, FACES].reshape(-1, 4)
+    _, first, count = np.unique(np.sort(faces), axis=0, return_index=True, return_counts=True)
+    return faces[first[count == 1]]
 
 
 class Solid:
@@ -62,21 +71,26 @@ class Solid:
         e = strain(self.gradient(u))
         return 0.5*float(np.einsum("epab,epab,ep->", e, self.stress(e), self.volume))
 
-    def respond(self, u0: Floats, du: Floats) -> tuple[Floats, Floats]:
-        """Forces over the step and their derivative by du."""
+    def elements(self, u0: Floats, du: Floats) -> tuple[Floats, Floats]:
+        """Forces of each cell over the step, and their derivative by du."""
         d0, d1 = self.gradient(u0), self.gradient(u0 + du)
         s = self.stress(0.5*(strain(d0) + strain(d1)))
         g, w, one, (lam, mu) = self.slope, self.volume, np.eye(3), self.lame
         middle, end = one + 0.5*(d0 + d1), one + d1
-        force = np.zeros(self.x.size)
-        np.add.at(force, self.dof, np.einsum("epab,epbc,epic,ep->eia", middle, s, g, w, optimize=True).reshape(self.dof.shape))
+        force = np.einsum("epab,epbc,epic,ep->eia", middle, s, g, w, optimize=True).reshape(self.dof.shape)
         by_middle, by_end = (np.einsum("epab,epib->epia", f, g) for f in (middle, end))
         k = 0.5*lam*np.einsum("epia,epjb,ep->eiajb", by_middle, by_end, w, optimize=True)
         k += 0.5*mu*np.einsum("epac,epbc,epid,epjd,ep->eiajb", middle, end, g, g, w, optimize=True)
         k += 0.5*mu*np.einsum("epja,epib,ep->eiajb", by_middle, by_end, w, optimize=True)
         k += 0.5*np.einsum("epic,epcd,epjd,ab,ep->eiajb", g, s, g, one, w, optimize=True)
-        tangent = np.zeros((self.x.size, self.x.size))
-        np.add.at(tangent, (self.dof[:, :, None], self.dof[:, None, :]), k.reshape(len(k), 24, 24))
+        return force, k.reshape(len(k), 24, 24)
+
+    def respond(self, u0: Floats, du: Floats) -> tuple[Floats, Floats]:
+        """The sums of these over all cells."""
+        of_cells, tangents = self.elements(u0, du)
+        force, tangent = np.zeros(self.x.size), np.zeros((self.x.size, self.x.size))
+        np.add.at(force, self.dof, of_cells)
+        np.add.at(tangent, (self.dof[:, :, None], self.dof[:, None, :]), tangents)
         return force, tangent
 
 
@@ -93,85 +107,56 @@ class Host:
         self.solid, self.face, self.free = solid, face, np.flatnonzero(~held.ravel())
         self.u, self.v = np.zeros(solid.x.shape), np.zeros(solid.x.shape)
         self.active = np.zeros(face.n_contact, bool)                             # emcon
-        self.lost, self.n_sliding, self.n_sticking = 0.0, 0, 0
+        #: What friction has taken; contacts that were open, stuck and slid, over all steps.
+        self.lost, self.n_status = 0.0, np.zeros(3, int)
 
     def energy(self) -> float:
         """Of motion and strain, and what friction has taken."""
         v = self.v.ravel()
         return 0.5*v @ self.solid.mass @ v + self.solid.energy(self.u) + self.lost
 
+    def respond(self, h: float, du: Floats) -> tuple[Floats, Floats]:
+        """Residual of a step without contact, and its derivative."""
+        force, tangent = self.solid.respond(self.u, du)
+        return force + self.solid.mass @ (2/h*(du/h - self.v)).ravel(), tangent + 2/h**2*self.solid.mass
+
     def step(self, h: float) -> None:
-        """One step, solved with all candidates until none is missing."""
-        face, du, outcome = self.face, h*self.v, None
-        self.active = face.begin_step(self.u, du, self.active, stop=0.5*h*self.v)    # emcon
-        while outcome is None:
-            n = face.select_candidates(self.u, du, self.active)                      # emcon
-            du, lam = self.newton(h, du, np.zeros(n))
-            self.active, outcome = face.update_active(self.u, du, lam, self.active)  # emcon
-        if outcome is not Outcome.DONE:
-            raise ArithmeticError(f"the step cannot be ended: {outcome.name}")
-        slips = face.slips()                                                     # emcon, to the end
+        du, _, self.active = self.face.solve_step(                               # emcon
+            self.u, h*self.v, self.active, self.newton(h), stop=0.5*h*self.v, together=True)
+        slips = self.face.slips()                                                # emcon
         self.lost += float((slips.friction*slips.slip).sum())
-        self.n_sliding += int((slips.status == 2).sum())
-        self.n_sticking += int((slips.status == 1).sum())
+        self.n_status += np.bincount(slips.status, minlength=3)
         self.u, self.v = self.u + du, 2/h*du - self.v
 
-    def newton(self, h: float, du: Floats, lam: Floats) -> tuple[Floats, Floats]:
-        """The motion, and the multipliers that obey the laws of contact.
-
-        In each iterate the equations are condensed to the rows of contact: w is their compliance.
-        """
-        free, last = self.free, np.inf
-        for _ in range(40):
-            force, tangent = self.solid.respond(self.u, du)
-            rows = self.face.evaluate(self.u, du)                                # emcon
-            g, c = rows.g.toarray()[:, free], rows.c.toarray()[:, free]          # emcon
-            residual = (self.solid.mass @ (2/h*(du/h - self.v)).ravel() + force)[free]
-            tangent += 2/h**2*self.solid.mass - self.face.curvature(lam).toarray()   # emcon
-            solved = np.linalg.solve(tangent[np.ix_(free, free)], np.column_stack([g.T, residual]))
-            by_lam, alone = solved[:, :-1], solved[:, -1]
-            if len(lam):
-                lam = self.face.solve_contacts(c @ by_lam, rows.defect - c @ alone)  # emcon
-            motion = by_lam @ lam - alone
-            du = du.copy()
-            du.ravel()[free] += motion
-            size = np.abs(motion).max()
-            if size <= 1e-15 or last <= size < 1e-11:
-                return du, lam
-            last = size
-        raise ArithmeticError(f"Newton's method still moves by {size:g}")
+    def newton(self, h: float) -> Callable[[Floats, int], tuple[Floats, Floats]]:
+        return self.face.newton(self.u, lambda du: self.respond(h, du), self.free)     # emcon
 
 
-def collision(kind: str = "node to segment", friction: float = 0.3) -> Host:
-    """A block that flies askew at a plate, which is held below."""
+def collision(kind: str = "node to segment", friction: float = 0.3, itself: bool = False, **more: Any) -> Host:
+    """A block that flies askew at a plate, which is held below; as two surfaces or as one of both bodies."""
     below, lower = block((3, 3, 1), np.array([-1.5, -1.5, -0.5]), np.array([3.0, 3.0, 0.5]))
     above, upper = block((2, 2, 1), np.array([-0.7, -0.6, 0.03]), np.array([1.2, 1.0, 0.6]), len(below))
-    x = np.concatenate([below, above])
-    x[len(below):] = x[len(below):] @ turn(0.4).T
-    face = Interface(x)                                                          # emcon, to prepare
-    plate = face.add_faces("plate", lower[:, ABOVE])
-    sole = face.add_faces("sole", upper[:, BELOW])
-    face.add_pair(sole, plate, kind, friction=friction)
+    (c, s), x = (np.cos(0.4), np.sin(0.4)), np.concatenate([below, above])
+    x[len(below):] = x[len(below):] @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]]).T
+    face, cells = Interface(x), np.concatenate([lower, upper])                   # emcon, to prepare
+    if itself:
+        slave = master = face.add_faces("skin", skin(cells))
+    else:
+        slave, master = face.add_faces("sole", upper[:, FACES[0]]), face.add_faces("plate", lower[:, FACES[1]])
+    face.add_pair(slave, master, kind, friction=friction, **more)
     held = np.isclose(x[:, 2], -0.5)[:, None] & np.ones(3, bool)
     face.prepare(held)
-    host = Host(Solid(x, np.concatenate([lower, upper]), (600.0, 400.0), 1.0), face, held)
+    host = Host(Solid(x, cells, (600.0, 400.0), 1.0), face, held)
     host.v[len(below):] = [1.0, 0.4, -1.0]
     return host
-
-
-def turn(angle: float) -> Floats:
-    """About the vertical."""
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
 
 
 if __name__ == "__main__":
     for name in ("node to segment", "mortar"):
         bodies = collision(name)
-        start = bodies.energy()
-        drift = 0.0
+        start, drift = bodies.energy(), 0.0
         for _ in range(20):
             bodies.step(0.01)
             drift = max(drift, abs(bodies.energy() - start)/start)
         print(f"{name:16} energy and losses {drift:.0e}, friction took {bodies.lost/start:.3f} of it; contacts "
-              f"that slid {bodies.n_sliding}, stuck {bodies.n_sticking}")
+              f"that slid {bodies.n_status[2]}, stuck {bodies.n_status[1]}")

@@ -19,7 +19,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from emcon.interface import Interface, Outcome
+from emcon.interface import Interface
 
 Floats = NDArray[np.float64]
 EPS = np.finfo(float).eps
@@ -125,15 +125,8 @@ def newton(host: Lattices, face: Interface, h: float, du: Floats) -> tuple[Float
 def advance(host: Lattices, face: Interface, h: float, active: NDArray[np.bool_]
             ) -> NDArray[np.bool_]:
     """One step of size h; `active` are the contacts that act, before and after."""
-    du = h*host.v
-    active = face.begin_step(host.u, du, active)                             # emcon
-    outcome = None
-    while outcome is None:
-        face.select(host.u, du, active)                                      # emcon
-        du, lam, magnitude = newton(host, face, h, du)
-        active, outcome = face.update_active(host.u, du, lam, active, magnitude)   # emcon
-    if outcome is not Outcome.DONE:
-        raise ArithmeticError(f"the step cannot be ended: {outcome.name}")
+    du, _, active = face.solve_step(host.u, h*host.v, active,                # emcon
+                                    lambda du, _: newton(host, face, h, du))
     host.u = host.u + du
     host.v = 2/h*du - host.v
     return active

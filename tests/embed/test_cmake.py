@@ -8,10 +8,14 @@ import re
 import shlex
 import shutil
 import subprocess
+from itertools import product
 from pathlib import Path
 
+import numpy as np
 import pytest
 from embed_tools import HERE, ROOT, SANITIZED, need, run
+
+from emcon import Model, Stepper
 
 RING = ROOT/"input_decks"/"ring.inp"
 PROGRAM = ROOT/"build"/os.environ.get("MODE", "release")/"emcon"
@@ -44,6 +48,52 @@ def test_a_host_in_cpp_by_cmake(prefix: Path, tmp_path: Path) -> None:
     shared, static = (run(tmp_path/name, RING, env=PLAIN) for name in ("host", "host_static"))
     assert shared == static and len(shared.split()) == 2
     assert "libemcon" not in run("ldd", tmp_path/"host_static")
+
+
+@pytest.fixture(scope="module")
+def blocks(prefix: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("blocks")
+    done = configure(prefix, folder, "-DCMAKE_BUILD_TYPE=Release")
+    assert done.returncode == 0, done.stderr
+    run("cmake", "--build", folder, "--target", "blocks")
+    return folder/"blocks"
+
+
+def landing(kind: str, friction: float) -> Model:
+    """The scene of blocks.cpp with linear elements of the library."""
+    n, size, lame = 3, [1/3, 1/3, 0.4], (60.0, 40.0)
+    plate = [(x, y, z) for z in (-1, 0) for x, y in ((-2, -2), (2, -2), (2, 2), (-2, 2))]
+    x = np.array(list(product(range(n + 1), range(n + 1), range(2))))*size - [0.5, 0.5, -0.02]
+    corners = [(a, b, k) for k in range(2) for a, b in ((0, 0), (1, 0), (1, 1), (0, 1))]
+    cells = [[8 + ((i + a)*(n + 1) + j + b)*2 + k for a, b, k in corners] for i, j in product(range(n), repeat=2)]
+    model = Model.from_arrays(np.concatenate([plate, x]), {"C3D8": [list(range(8)), *cells]})
+    lam, mu = lame
+    model.material("M", density=1.0, elastic=(mu*(3*lam + 2*mu)/(lam + mu), lam/(2*(lam + mu)))).section("M")
+    model.surface("PLATE", faces=[(0, 2)])
+    model.surface("SOLE", faces=[(k, 1) for k in range(1, 10)])
+    model.interaction("I", **({"friction": friction} if friction else {}))
+    model.contact_pair("SOLE", "PLATE", interaction="I", edges="NO", guard="NO", sides="ONE", type=kind)
+    model.boundary(list(range(8)), [1, 2, 3])
+    for k, place in enumerate(x, 8):
+        model.initial("VELOCITY", [k], [1, 2, 3], [0.8, 0.3 + 0.4*place[0], -0.5 + 0.2*place[1]])
+    model.step("DYNAMIC", h=0.02, duration=0.24, nlgeom=False, direct=True)
+    return model
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.3, 0.8])
+@pytest.mark.parametrize(("name", "kind"), [("nodes", "NODE TO SURFACE"), ("mortar", "MORTAR")])
+def test_a_solid_in_cpp_does_what_the_program_does(blocks: Path, name: str, kind: str, friction: float) -> None:
+    """Impact, sliding, sticking and parting, by candidates and a map, to round-off."""
+    first, *numbers = run(blocks, name, friction, 12, env=PLAIN).splitlines()
+    words = first.split()
+    drift, lost, n_stuck, n_slid = (float(word) for word in words[1::2])
+    with Stepper(landing(kind, friction)) as program:
+        for _ in range(12):
+            program.step(0.02)
+        np.testing.assert_allclose(np.array(numbers, float).reshape(-1, 3), program.u[8:], rtol=0, atol=1e-13)
+        assert lost == pytest.approx(program.ledger["friction_loss"], abs=1e-13)
+    assert drift < 1e-13 and (n_slid > 0) == (friction > 0) and n_stuck + n_slid > 40
+    assert (n_stuck > 20) == (friction != 0.3)
 
 
 def block_of(language: str) -> str:

@@ -113,6 +113,20 @@ def test_contact_for_a_program_with_its_own_solids(
         assert max(misfit, crossed) <= 100*EPS
 
 
+@pytest.mark.parametrize(("friction", "velocity"), [(0.0, 1.0), (0.3, 0.4), (0.8, 0.0)])
+def test_friction_by_sets_and_with_all_candidates(friction: float, velocity: float, installed: dict[str, str], tmp_path: Path) -> None:
+    """Of the velocity along the floor friction takes twice its coefficient, or all; the energy is in what is left and lost."""
+    program = tmp_path/"fortran_rub"
+    build("gfortran", HERE/"fortran_rub.f90", program, installed, "-std=f2008")
+    lines = run(program, friction, env=installed).splitlines()
+    assert len(lines) == 2
+    for line in lines:
+        *v, left, lost = map(float, line.split())
+        # Twenty steps, whose velocities are differences of ends.
+        assert v == pytest.approx([velocity, 1.0]*2, abs=1e3*EPS)
+        assert (left, left + lost) == pytest.approx((1.0 + velocity**2, 2.0), abs=1e3*EPS)
+
+
 def test_errors_are_values(host: Path, installed: dict[str, str], tmp_path: Path) -> None:
     done = subprocess.run([host, tmp_path/"none.inp"], env=installed, capture_output=True,
                           text=True)

@@ -45,7 +45,7 @@ def foot(n: int = 2, size: float = 1.4, height: float = 0.0
 
 
 def over_the_floor(height: float = 0.02, is_end: bool = False, kind: str = "node to segment",
-                   friction: float = 0.0) -> tuple[Interface, int]:
+                   friction: float = 0.0, **more: object) -> tuple[Interface, int]:
     """A foot over a floor of quadrilaterals and triangles; and the number of nodes of the floor."""
     lower, quads, triangles = floor()
     upper, own = foot(height=height)
@@ -53,7 +53,7 @@ def over_the_floor(height: float = 0.02, is_end: bool = False, kind: str = "node
     face.configure(is_end=is_end)
     master = face.add_faces("floor", quads, triangles)
     slave = face.add_faces("foot", own + len(lower))
-    face.add_pair(slave, master, kind, friction=friction)
+    face.add_pair(slave, master, kind, friction=friction, **more)
     face.prepare()
     return face, len(lower)
 
@@ -277,8 +277,72 @@ def test_what_is_of_the_plane_is_refused() -> None:
         face.add_pair(upper, lower, "segment")
     with pytest.raises(InputError, match="smoothing is of the plane"):
         face.add_pair(upper, lower, "node to segment", smoothing="hermite")
-    with pytest.raises(InputError, match="its own master is not in this version in three"):
-        face.add_pair(upper, upper, "node to segment")
+
+
+@pytest.mark.parametrize("friction", [0.0, 0.4])
+@pytest.mark.parametrize("kind", ["node to segment", "mortar"])
+def test_the_pattern_is_known_before_the_step_is_solved(kind: str, friction: float) -> None:
+    """It has all entries of whatever acts, sticks or slides, and none where nothing is near; also by a map."""
+    face, n = over_the_floor(kind=kind, friction=friction)
+    u0, du = motion(face)
+    with pytest.raises(InputError, match="no step of contact was begun"):
+        face.pattern(u0, du)
+    face.begin_step(u0, du, np.zeros(face.n_contact, bool))
+    known = face.pattern(u0, du).toarray()
+    assert known.shape == (3*face.n_node,)*2 and set(np.unique(known)) == {0.0, 1.0}
+    np.testing.assert_array_equal(known, known.T)
+    random = np.random.default_rng(6)
+    used = np.zeros(known.shape, bool)
+    for _ in range(6):
+        active = random.random(face.n_contact) < 0.6
+        for select in (face.select, face.select_candidates):
+            n_row = select(u0, du, active)
+            rows = face.evaluate(u0, du)
+            second = face.curvature(random.uniform(0.5, 1.0, n_row)).toarray()
+            g, c = (part.toarray() != 0 for part in (rows.g, rows.c))
+            of = [rows.contact == k for k in np.unique(rows.contact)]
+            used |= (second != 0) | np.any([np.einsum("ki,kj->ij", c[k], g[k]) for k in of], axis=0)
+    assert used.any() and not (used & (known == 0)).any()
+    # The pattern is by directions alike; a contact has at least these.
+    assert used.sum() > 0.5*known.sum()
+    a = random.standard_normal((3*face.n_node, 4))
+    a[random.random(a.shape) < 0.6] = 0.0
+    face.set_map(a)
+    np.testing.assert_array_equal(face.pattern(u0, du).toarray(), np.abs(a).T @ known @ np.abs(a) > 0)
+    assert n < face.n_node
+
+
+def test_the_pattern_in_the_plane_has_the_near_contacts_only() -> None:
+    face = Interface([[0, 0], [1, 0], [2, 0], [9, 0], [0.4, 0.01], [0.6, 0.01], [8, 5]])
+    lower = face.add_surface("lower", [[2, 1], [1, 0], [3, 2]])
+    upper = face.add_surface("upper", [[4, 5], [5, 6]])
+    face.add_pair(upper, lower, "node to segment")
+    face.prepare()
+    u0 = np.zeros((7, 2))
+    face.begin_step(u0, u0, np.zeros(face.n_contact, bool))
+    coupled = face.pattern(u0, u0).toarray().reshape(7, 2, 7, 2).any(axis=(1, 3))
+    assert coupled[4, 0] and coupled[5, 1] and not coupled[6].any() and not coupled[3].any()
+
+
+@pytest.mark.parametrize(("kind", "adjust"), [("node to segment", 0.15), ("mortar", 0.15), ("mortar", 0.0)])
+def test_nodes_are_adjusted_onto_faces(kind: str, adjust: float) -> None:
+    """Those up to the distance, and those behind; the others stay. Without, bodies of mortar must not overlap."""
+    height = np.array([0.1, -0.05, 0.15, 0.3])
+    foot = np.column_stack([[0.2, 0.6, 0.2, 0.6], [0.2, 0.2, 0.6, 0.6], height])
+    face = Interface(np.concatenate([[[0, 0, 0], [1, 0, 0], [1, 1, 0], [0, 1, 0]], foot]))
+    lower, upper = face.add_faces("lower", [[0, 1, 2, 3]]), face.add_faces("upper", [[4, 6, 5], [5, 6, 7]])
+    face.add_pair(upper, lower, kind, adjust=adjust)
+    if not adjust:
+        with pytest.raises(InputError, match="node 6 is 0.05 behind the face of nodes 1, 2, 3, 4; move"):
+            face.prepare()
+        return
+    face.prepare()
+    foot[height <= adjust, 2] = 0.0
+    np.testing.assert_allclose(face.positions[4:], foot, rtol=0, atol=1e-15)
+    assert face.notes == ["contact of surfaces upper and lower: adjust moves 3 slave nodes, by 0.15 at most"]
+    other = Interface(face.positions)
+    with pytest.raises(InputError, match="adjust is -1, below 0"):
+        other.add_pair(other.add_faces("upper", [[4, 6, 5]]), 0, adjust=-1.0)
 
 
 def test_tie_of_faces() -> None:

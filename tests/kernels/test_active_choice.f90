@@ -399,7 +399,7 @@ contains
          active%candidates%have_changed = .true.
          active%candidates%one_closes = .true.
          active%is_stale = .true.
-         call candidates_look(active, system, motion, status)
+         call candidates_look(active, system, motion, status, .true.)
          part = [.true., .true., .true., what(k) == "C4"]
          acts = [.true., .true., what(k) == "C3", what(k) == "C4"]
          if (has(what(k), "L")) then
@@ -497,7 +497,7 @@ contains
          active%start%overclosure(3) = row(k)%overclosure
          call candidates_clear(active%candidates)
          active%candidates%takes_part(3) = .true.
-         call candidates_look(active, system, motion, status)
+         call candidates_look(active, system, motion, status, .true.)
          call check_true(error, active%candidates%one_closes .eqv. row(k)%closes, "closes " &
             // to_text(k))
          call check_true(error, active%candidates%acts(3) .eqv. row(k)%closes, "acts " // to_text(k))
@@ -524,7 +524,7 @@ contains
          active%rules%holds_gap = k > 2
          active%start%was_active = [.false.]
          call candidates_clear(active%candidates)
-         call candidates_look(active, system, motion, status)
+         call candidates_look(active, system, motion, status, .true.)
          call check_true(error, active%candidates%takes_part(1), "it closes")
          call check_equal(error, active%friction%law(1)%status%kind, merge(contact_sticks, &
             contact_slides, mod(k, 2) == 1), "slip " // to_text(slip(k)))

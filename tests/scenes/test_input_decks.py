@@ -75,6 +75,16 @@ def test_press_fit(tmp_path):
     assert found[found > 0] == pytest.approx(pressure, rel=1/64)
 
 
+def test_seal(tmp_path):
+    """The force of a small squeeze is that of a linear elastic cylinder between plates; more is stiffer."""
+    deck = DECKS / "seal.inp"
+    (force,) = figures(deck, r"lid ([\d.]+), within")
+    found = [np.abs(run_deck(deck, tmp_path / str(squeeze), squeeze=squeeze).history["pair2_force_y"][-1])
+             for squeeze in (-0.2, -0.4)]
+    assert found[0] == pytest.approx(force, rel=0.05)
+    assert 2.1*found[0] < found[1] < 3.0*found[0]
+
+
 def test_spinning_ring(tmp_path):
     deck = DECKS / "spinning_ring.inp"
     energy, mass = figures(deck, r"total energy (\S+) \(all kinetic at the start\); mass (\S+);")

@@ -37,7 +37,7 @@ def strain_error(run, excess):
     return max(abs(history["strain"][-1]/energy - 1), abs(found/stress - 1))
 
 
-# ---- ratio of Poisson ---------------------------------------------------------------------------
+# ---- Poisson's ratio ----------------------------------------------------------------------------
 
 
 def bent(ratio, kind="CPE4"):
@@ -159,7 +159,7 @@ ROWS = [
     Row("strain", "strain of an element, driven: 1e-12 to 9", (
         1e-12, 1e-9, 1e-6, 1e-3, 0.1, 1.0, 4.0, 9.0), stretched, strain_error,
         "energy and stress, relative", bar=1e-8, reach=8),
-    Row("poisson", "ratio of Poisson of a cantilever, 60 by 6 `CPE4`",
+    Row("poisson", "Poisson's ratio of a cantilever, 60 by 6 `CPE4`",
         (0.3, 0.45, 0.49, 0.499, 0.4999, 0.49999, 0.4999999), bent, deflection_error,
         "deflection by beam theory", bar=0.1, warns="body .* locks.*", reach=2,
         why="plain four-node elements lock: volume is held at four points of each"),

@@ -1,7 +1,7 @@
 """What a row of the table of extremes is, and what one of its runs comes to.
 
 A run *holds* where it ends well and a figure that is computed outside of the program is within its
-bar; it is *told* where the program refuses, stops or calls its own result bad, or warns of what is
+bar; it is *reported* where the program refuses, stops or calls its own result bad, or warns of what is
 wrong. What is neither is silent: a result that is wrong, and nothing says so.
 """
 
@@ -17,7 +17,7 @@ from scene_tools import Deck, Run, emcon, overrides
 from .conditions import conditions
 from .seen import energy_seen, overlap_seen
 
-HOLDS, TOLD, SILENT = "holds", "told", "silent"
+HOLDS, TOLD, SILENT = "holds", "reported", "silent"
 #: Of the largest energy or momentum: what the scheme promises.
 EXACT = 1e-10
 
