@@ -39,6 +39,9 @@ module emcon_contact_sets
 
    !> Sets that are tried by the null space in one step at most, and where trials tell them.
    integer, parameter :: most_tried = 6, most_by_trials = 20
+   !> Sets of which some rows follow from others, and are left out: as these close again such sets
+   !> may take turns for ever.
+   integer, parameter :: most_redundant = 2
    !> With friction trials tell the next set where the problem of all has more rows.
    integer, parameter :: most_rows = 200
    !> By so much of the largest push friction may miss its law: what a solve leaves.
@@ -62,8 +65,9 @@ contains
       type(error_t), allocatable, intent(out) :: error
       logical :: goes_on, has_failed, is_early, is_driven, obeys
       logical, allocatable :: gripped(:)
-      integer :: i
+      integer :: i, n_redundant
 
+      n_redundant = 0
       is_driven = .true.
       has_failed = .false.
       call active_set_open_sets(self)
@@ -86,7 +90,8 @@ contains
          if (status == newton_redundant .and. (newton%convergence%n_iteration == 0 &
             .or. candidates_are_many(self, newton%correction%kept))) then
             call candidates_leave_out(self, newton%correction%redundant, goes_on)
-            if (goes_on .and. i == 1) cycle
+            n_redundant = n_redundant + 1
+            if (goes_on .and. n_redundant <= most_redundant) cycle
             return
          else if (.not. any(status == [newton_converged, newton_early])) then
             has_failed = status == newton_diverged .and. .not. self%rules%has_impacts
