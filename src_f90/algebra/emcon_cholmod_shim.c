@@ -1,5 +1,7 @@
 /* CHOLMOD behind an opaque pointer: cholmod_common differs from release to release, and its
    options are struct members, so Fortran cannot bind to it directly. */
+#define _GNU_SOURCE
+#include <dlfcn.h>
 #include <stdlib.h>
 #include <string.h>
 #include <suitesparse/cholmod.h>
@@ -12,6 +14,8 @@ typedef struct {
    cholmod_sparse *reached;       /* and the entries that a sparse right-hand side reaches */
    int *place;                    /* of each unknown in the order of the factor */
    double *zero;                  /* n zeros between calls */
+   int (*levels)(void);           /* of OpenMP, where CHOLMOD uses it */
+   void (*set_levels)(int);
 } emcon_cholmod_t;
 
 /* View of a full symmetric matrix: CSR is CSC here; CHOLMOD reads the lower triangle only. */
@@ -43,7 +47,20 @@ void *emcon_cholmod_new(int halves)
    h->c.print = 0;       /* a library does not write to stdout */
    h->c.final_ll = 1;    /* else LDL^T accepts indefinite matrices */
    if (halves) h->c.supernodal = CHOLMOD_SIMPLICIAL;
+   *(void **)(&h->levels) = dlsym(RTLD_DEFAULT, "omp_get_max_active_levels");
+   *(void **)(&h->set_levels) = dlsym(RTLD_DEFAULT, "omp_set_max_active_levels");
    return h;
+}
+
+/* Factorise on this thread alone. Fronts here are small: the four threads that CHOLMOD would start,
+   whatever the environment says, wait for each other most of the time. */
+static void factorise(emcon_cholmod_t *h, cholmod_sparse *a, cholmod_factor *l)
+{
+   const int can_set = h->levels != NULL && h->set_levels != NULL;
+   const int levels = can_set ? h->levels() : 0;
+   if (can_set) h->set_levels(0);
+   cholmod_factorize(a, l, &h->c);
+   if (can_set) h->set_levels(levels);
 }
 
 int emcon_cholmod_analyse(void *handle, int n, int *ap, int *ai)
@@ -106,7 +123,7 @@ int emcon_cholmod_factorise(void *handle, int n, int *ap, int *ai, double *ax, d
 {
    emcon_cholmod_t *h = handle;
    cholmod_sparse a = view(n, ap, ai, ax);
-   cholmod_factorize(&a, h->l, &h->c);
+   factorise(h, &a, h->l);
    if (h->c.status != CHOLMOD_OK) return h->c.status;
    if (h->l->minor < h->l->n) return CHOLMOD_NOT_POSDEF;
    *rcond = cholmod_rcond(h->l, &h->c);
