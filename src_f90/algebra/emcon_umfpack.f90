@@ -137,11 +137,12 @@ contains
       type(umfpack_t), intent(inout) :: self     !! analysed by minimum degree
       integer(c_int), intent(out) :: status
       real(c_double) :: fill
+      logical :: is_dense
 
       status = umfpack_ok
-      fill = self%info(info_symmetric_fill)
-      if (.not. (self%seeks_less_fill .or. self%info(info_symmetric_work) >= least_work*fill)) &
-         return
+      fill = self%info(info_symmetric_fill)      ! < 0: not ordered as a symmetric pattern
+      is_dense = fill > 0.0_c_double .and. self%info(info_symmetric_work) >= least_work*fill
+      if (.not. (self%seeks_less_fill .or. is_dense)) return
       call order(self, ordering_metis, status)
       if (status == umfpack_ok .and. self%info(info_symmetric_fill) > fill) call order(self, &
          ordering_amd, status)
