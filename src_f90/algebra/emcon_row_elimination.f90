@@ -176,7 +176,7 @@ contains
       end do
    end subroutine scatter
 
-   !> The present row has the column `j`, and the row of which that is the pivot is to be eliminated.
+   !> The present row has the column `j`: the row of which that is the pivot is to be eliminated.
    pure subroutine enlist(self, j)
       type(row_elimination_t), intent(inout) :: self
       integer, intent(in) :: j
