@@ -46,6 +46,8 @@ module emcon_correction
       logical, allocatable :: is_near(:)         !! (n_redundant) they depend on others nearly only
       logical :: uses_null_space = .false.       !! for the last constraints
       logical :: knows_multipliers = .false.     !! for the last constraints: no unknowns
+      !> For the last constraints, the null space tells them
+      logical, private :: tells_multipliers = .false.
       logical :: fell_back = .false.             !! last factorisation: asked for, but not possible
       integer :: obstacle = obstacle_none        !! and why
       integer :: n_factorisation = 0             !! made so far
@@ -111,6 +113,7 @@ contains
 
       self%n_redundant = 0
       self%knows_multipliers = .true.
+      self%tells_multipliers = .false.
       if (set%n == 0) then
          self%fell_back = .false.
          if (set%n_condition == 0) return
@@ -133,6 +136,7 @@ contains
          self%uses_null_space = self%method == method_null_space
          if (self%uses_null_space) then
             self%uses_null_space = null_space%obstacle == obstacle_none
+            self%tells_multipliers = self%uses_null_space .or. null_space%obstacle == obstacle_fill
          else
             call independent_rows_find(null_space%rows, set, system%space%numbering)
          end if
@@ -142,7 +146,7 @@ contains
             self%is_near = null_space%rows%is_near(:self%n_redundant)
          end if
       end associate
-      self%knows_multipliers = self%uses_null_space
+      self%knows_multipliers = self%tells_multipliers
       call stopwatch_stop(self%clock)
    end subroutine correction_lay_out
 
@@ -360,15 +364,15 @@ contains
       correction_is_lost = self%is_definite .and. .not. self%definite_solver%is_converged
    end function correction_is_lost
 
-   !> The multipliers that belong to `residual` (without contact forces), by null space only: the
-   !> saddle point has them as unknowns.
+   !> The multipliers that belong to `residual` (without contact forces), where the null space tells
+   !> them: Newton's method by the saddle point has them as unknowns.
    subroutine correction_multipliers(self, system, set, residual)
       type(correction_t), intent(in) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(inout) :: set
       real(wp), intent(in), contiguous :: residual(:)      !! (n_unknown)
 
-      if (set%n == 0 .or. .not. self%uses_null_space) return
+      if (set%n == 0 .or. .not. self%tells_multipliers) return
       call null_space_multipliers(self%null_space, set, system%space%numbering, residual, set%lam)
    end subroutine correction_multipliers
 
