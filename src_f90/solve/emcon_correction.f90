@@ -46,8 +46,6 @@ module emcon_correction
       logical, allocatable :: is_near(:)         !! (n_redundant) they depend on others nearly only
       logical :: uses_null_space = .false.       !! for the last constraints
       logical :: knows_multipliers = .false.     !! for the last constraints: no unknowns
-      !> For the last constraints, the null space tells them
-      logical, private :: tells_multipliers = .false.
       logical :: fell_back = .false.             !! last factorisation: asked for, but not possible
       integer :: obstacle = obstacle_none        !! and why
       integer :: n_factorisation = 0             !! made so far
@@ -113,7 +111,6 @@ contains
 
       self%n_redundant = 0
       self%knows_multipliers = .true.
-      self%tells_multipliers = .false.
       if (set%n == 0) then
          self%fell_back = .false.
          if (set%n_condition == 0) return
@@ -136,7 +133,6 @@ contains
          self%uses_null_space = self%method == method_null_space
          if (self%uses_null_space) then
             self%uses_null_space = null_space%obstacle == obstacle_none
-            self%tells_multipliers = self%uses_null_space .or. null_space%obstacle == obstacle_fill
          else
             call independent_rows_find(null_space%rows, set, system%space%numbering)
          end if
@@ -146,9 +142,19 @@ contains
             self%is_near = null_space%rows%is_near(:self%n_redundant)
          end if
       end associate
-      self%knows_multipliers = self%tells_multipliers
+      self%knows_multipliers = tells_multipliers(self, set)
       call stopwatch_stop(self%clock)
    end subroutine correction_lay_out
+
+   !> Does the null space of the constraints, for which there is a layout, tell their multipliers?
+   !> One that is too full does.
+   pure logical function tells_multipliers(self, set)
+      type(correction_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set
+
+      tells_multipliers = self%uses_null_space .or. (self%method == method_null_space &
+         .and. .not. set%penalty%is_on .and. self%null_space%obstacle == obstacle_fill)
+   end function tells_multipliers
 
    !> Contacts that give way depend on no others. Their null space is that of no contact: what they
    !> push is in the saddle point, or in the kept factor.
@@ -372,7 +378,7 @@ contains
       type(constraint_set_t), intent(inout) :: set
       real(wp), intent(in), contiguous :: residual(:)      !! (n_unknown)
 
-      if (set%n == 0 .or. .not. self%tells_multipliers) return
+      if (set%n == 0 .or. .not. tells_multipliers(self, set)) return
       call null_space_multipliers(self%null_space, set, system%space%numbering, residual, set%lam)
    end subroutine correction_multipliers
 
