@@ -34,7 +34,7 @@ module emcon_cholmod
 
    type, extends(sparse_solver_t) :: cholmod_t
       integer, private :: first_slot = 0                     !! of the entry (1, 1); 0: not there
-      type(csr_t), private :: scaled                         !! the pattern, and half_scale*value
+      type(csr_t), private :: scaled             !! the pattern, and half_scale*value where not 1
       real(dp), allocatable, private :: rhs(:), x(:)
       logical :: is_rough = .false.                          !! the last factors have halves alone
       type(supernodes_t), private :: nodes                   !! none: only factors of CHOLMOD
@@ -144,6 +144,7 @@ contains
       call solver_check_square(matrix, error)
       if (allocated(error)) return
       call csr_copy_pattern(matrix, self%scaled)
+      if (self%is_scaled) deallocate(self%scaled%value)      ! those that are given will do
       self%first_slot = csr_find(matrix, 1, 1)
       allocate(self%rhs(matrix%n_row), self%x(matrix%n_row))
       self%handle = emcon_cholmod_new(merge(1_c_int, 0_c_int, self%needs_halves))
@@ -186,9 +187,7 @@ contains
       class(cholmod_t), intent(inout) :: self
       real(dp), intent(in), contiguous :: value(:)
       type(error_t), allocatable, intent(out) :: error
-      integer(c_int) :: status
-      type(ieee_status_type) :: fp_status
-      real(c_double) :: n_factor
+      real(dp), allocatable :: scaled(:)
 
       self%is_singular = .true.
       self%is_factorised = .false.
@@ -197,14 +196,32 @@ contains
       if (allocated(error)) return
       if (self%first_slot == 0 .or. .not. all(ieee_is_finite(value))) return
       if (value(self%first_slot) <= 0.0_dp) return
-      if (.not. self%is_scaled) self%half_scale = power_of_two(-exponent(value(self%first_slot)))
-      self%scaled%value = self%half_scale*value
-      call factorise_nodes(self)
+      if (self%is_scaled) then
+         call factorise_scaled(self, value, error)
+      else
+         self%half_scale = power_of_two(-exponent(value(self%first_slot)))
+         call move_alloc(self%scaled%value, scaled)
+         scaled = self%half_scale*value
+         call factorise_scaled(self, scaled, error)
+         call move_alloc(scaled, self%scaled%value)
+      end if
+   end subroutine cholmod_factorise
+
+   !> Rough factors, or those of CHOLMOD.
+   subroutine factorise_scaled(self, value, error)
+      class(cholmod_t), intent(inout) :: self
+      real(dp), intent(in), contiguous :: value(:)     !! (n_slot) half_scale times the matrix
+      type(error_t), allocatable, intent(out) :: error
+      integer(c_int) :: status
+      type(ieee_status_type) :: fp_status
+      real(c_double) :: n_factor
+
+      call factorise_nodes(self, value)
       if (self%is_rough) return
       call blas_enter(fp_status)
       associate (a => self%scaled)
          status = emcon_cholmod_factorise(self%handle, int(a%n_row, c_int), a%row_start, a%column, &
-            a%value, self%rcond, n_factor)
+            value, self%rcond, n_factor)
       end associate
       call blas_leave(fp_status)
       if (status == cholmod_not_posdef) return
@@ -214,17 +231,18 @@ contains
       self%is_singular = .false.
       self%is_factorised = .true.
       self%n_factor = int(n_factor, int64)
-   end subroutine cholmod_factorise
+   end subroutine factorise_scaled
 
    !> Rough factors, where there are nodes and they are good enough.
-   subroutine factorise_nodes(self)
-      class(cholmod_t), intent(inout) :: self    !! `scaled` is set
+   subroutine factorise_nodes(self, value)
+      class(cholmod_t), intent(inout) :: self
+      real(dp), intent(in), contiguous :: value(:)     !! (n_slot) half_scale times the matrix
 
       self%is_rough = .false.
       if (self%nodes%n_node == 0) return
-      call supernodal_factorise(self%rough, self%nodes, self%scaled%value, self%is_rough)
-      if (self%is_rough) self%is_rough = supernodal_error(self%rough, self%nodes, self%scaled) &
-         <= roughest
+      call supernodal_factorise(self%rough, self%nodes, value, self%is_rough)
+      if (self%is_rough) self%is_rough = supernodal_error(self%rough, self%nodes, self%scaled, &
+         value) <= roughest
       if (.not. self%is_rough) then
          call supernodal_free(self%rough)
          return

@@ -1,5 +1,7 @@
 /* CHOLMOD behind an opaque pointer: cholmod_common differs from release to release, and its
    options are struct members, so Fortran cannot bind to it directly. */
+#define _GNU_SOURCE
+#include <dlfcn.h>
 #include <stdlib.h>
 #include <string.h>
 #include <suitesparse/cholmod.h>
@@ -7,11 +9,13 @@
 typedef struct {
    cholmod_common c;
    cholmod_factor *l;
-   cholmod_factor *nodes;         /* between their analysis and their reading */
+   cholmod_factor *nodes;         /* the pattern of l by columns that are taken together */
    cholmod_dense *x, *y, *e;      /* solution and workspaces of cholmod_solve2, kept */
    cholmod_sparse *reached;       /* and the entries that a sparse right-hand side reaches */
    int *place;                    /* of each unknown in the order of the factor */
    double *zero;                  /* n zeros between calls */
+   int (*levels)(void);           /* of OpenMP, where CHOLMOD uses it */
+   void (*set_levels)(int);
 } emcon_cholmod_t;
 
 /* View of a full symmetric matrix: CSR is CSC here; CHOLMOD reads the lower triangle only. */
@@ -43,7 +47,20 @@ void *emcon_cholmod_new(int halves)
    h->c.print = 0;       /* a library does not write to stdout */
    h->c.final_ll = 1;    /* else LDL^T accepts indefinite matrices */
    if (halves) h->c.supernodal = CHOLMOD_SIMPLICIAL;
+   *(void **)(&h->levels) = dlsym(RTLD_DEFAULT, "omp_get_max_active_levels");
+   *(void **)(&h->set_levels) = dlsym(RTLD_DEFAULT, "omp_set_max_active_levels");
    return h;
+}
+
+/* Factorise on this thread alone. Fronts here are small: the four threads that CHOLMOD would start,
+   whatever the environment says, wait for each other most of the time. */
+static void factorise(emcon_cholmod_t *h, cholmod_sparse *a, cholmod_factor *l)
+{
+   const int can_set = h->levels != NULL && h->set_levels != NULL;
+   const int levels = can_set ? h->levels() : 0;
+   if (can_set) h->set_levels(0);
+   cholmod_factorize(a, l, &h->c);
+   if (can_set) h->set_levels(levels);
 }
 
 int emcon_cholmod_analyse(void *handle, int n, int *ap, int *ai)
@@ -74,6 +91,7 @@ int emcon_cholmod_nodes(void *handle, int n, int *ap, int *ai, int *n_node, int 
    const int supernodal = h->c.supernodal, n_methods = h->c.nmethods,
              ordering = h->c.method[0].ordering;
    int status;
+   cholmod_free_factor(&h->nodes, &h->c);
    h->c.supernodal = CHOLMOD_SUPERNODAL;
    h->c.nmethods = 1;
    h->c.method[0].ordering = CHOLMOD_GIVEN;
@@ -88,7 +106,7 @@ int emcon_cholmod_nodes(void *handle, int n, int *ap, int *ai, int *n_node, int 
    return status;
 }
 
-/* What `emcon_cholmod_nodes` has found, all from 0; it is freed here. */
+/* What `emcon_cholmod_nodes` has found, all from 0. */
 void emcon_cholmod_take_nodes(void *handle, int *order, int *first, int *row_start, int *row)
 {
    emcon_cholmod_t *h = handle;
@@ -97,7 +115,21 @@ void emcon_cholmod_take_nodes(void *handle, int *order, int *first, int *row_sta
    memcpy(first, l->super, (l->nsuper + 1)*sizeof *first);
    memcpy(row_start, l->pi, (l->nsuper + 1)*sizeof *row_start);
    memcpy(row, l->s, l->ssize*sizeof *row);
-   cholmod_free_factor(&h->nodes, &h->c);
+}
+
+/* Factorise by the nodes, on dense blocks. For halves of sparse right-hand sides the factor is then
+   that of single columns, without the zeros that blocks are filled up by. */
+static void factorise_nodes(emcon_cholmod_t *h, cholmod_sparse *a)
+{
+   cholmod_factor *l = cholmod_copy_factor(h->nodes, &h->c);
+   if (l == NULL) return;
+   h->c.final_super = 0;
+   h->c.final_resymbol = 1;
+   factorise(h, a, l);
+   cholmod_free_factor(&h->l, &h->c);
+   free(h->place);
+   h->place = NULL;
+   h->l = l;
 }
 
 /* Status of CHOLMOD; the figures are set if it is 0. */
@@ -106,7 +138,10 @@ int emcon_cholmod_factorise(void *handle, int n, int *ap, int *ai, double *ax, d
 {
    emcon_cholmod_t *h = handle;
    cholmod_sparse a = view(n, ap, ai, ax);
-   cholmod_factorize(&a, h->l, &h->c);
+   if (h->nodes != NULL)
+      factorise_nodes(h, &a);
+   else
+      factorise(h, &a, h->l);
    if (h->c.status != CHOLMOD_OK) return h->c.status;
    if (h->l->minor < h->l->n) return CHOLMOD_NOT_POSDEF;
    *rcond = cholmod_rcond(h->l, &h->c);

@@ -43,6 +43,10 @@ module emcon_row_elimination
       logical, allocatable, private :: is_listed(:)    !! (n_col)
       integer, allocatable, private :: list(:)         !! (n_col) its columns
       integer, private :: n_list = 0
+      !> (rows) earlier rows whose pivots it has, the first one on top: each is before those that
+      !> stand at twice its place and behind that
+      integer, allocatable, private :: heap(:)
+      integer, private :: n_heap = 0
       real(hp), private :: largest_term(n_kind) = 0.0_hp   !! that entered the row
       ! The eliminated rows without their pivots:
       integer, allocatable, private :: pivot_row(:)    !! (n_col) row of the pivot; 0: none
@@ -84,10 +88,11 @@ contains
          do k = 1, self%n_row
             if (self%pivot(k) > 0 .and. self%pivot(k) <= n_col) self%pivot_row(self%pivot(k)) = 0
          end do
-         if (size(self%pivot) /= n_row) deallocate(self%pivot, self%row_start, self%pivot_value)
+         if (size(self%pivot) /= n_row) deallocate(self%pivot, self%row_start, &
+            self%pivot_value, self%heap)
       end if
       if (.not. allocated(self%pivot)) allocate(self%pivot(n_row), self%row_start(n_row + 1), &
-         self%pivot_value(n_kind, n_row))
+         self%pivot_value(n_kind, n_row), self%heap(n_row))
       self%n_free = n_free
       self%n_row = 0
       self%pivot = 0
@@ -104,13 +109,13 @@ contains
       integer, intent(out) :: fate                      !! one of `row_`
       real(hp), intent(in), optional :: made_of(n_kind) !! largest terms that the entries sum up
       real(hp) :: left(n_kind), largest(n_kind)
-      integer :: from, k
+      integer :: k
 
       k = self%n_row + 1
       self%n_row = k
       call clear(self)
-      call scatter(self, column, first, second, k, from)
-      call reduce(self, from, k - 1)
+      call scatter(self, column, first, second)
+      call reduce(self)
       left = largest_left(self)
       self%row_start(k + 1) = self%row_start(k)
       largest = self%largest_term
@@ -152,49 +157,77 @@ contains
       self%work(:, self%list(:self%n_list)) = 0.0_hp
       self%is_listed(self%list(:self%n_list)) = .false.
       self%n_list = 0
+      self%n_heap = 0
       self%largest_term = 0.0_hp
    end subroutine clear
 
-   !> Spread out row `k`; `from` is the first row that has to be eliminated from it.
-   pure subroutine scatter(self, column, first, second, k, from)
+   !> Spread out a row.
+   pure subroutine scatter(self, column, first, second)
       type(row_elimination_t), intent(inout) :: self
       integer, intent(in) :: column(:)
       real(hp), intent(in) :: first(:), second(:)
-      integer, intent(in) :: k
-      integer, intent(out) :: from                      !! k if there is none
       integer :: s, j
 
-      from = k
       do s = 1, size(column)
          j = column(s)
          call enlist(self, j)
          self%work(:, j) = self%work(:, j) + [first(s), second(s)]
          self%largest_term = max(self%largest_term, abs(self%work(:, j)))
-         if (self%pivot_row(j) > 0) from = min(from, self%pivot_row(j))
       end do
    end subroutine scatter
 
+   !> The present row has the column `j`: the row of which that is the pivot is to be eliminated.
    pure subroutine enlist(self, j)
       type(row_elimination_t), intent(inout) :: self
       integer, intent(in) :: j
+      integer :: i
 
       if (self%is_listed(j)) return
       self%is_listed(j) = .true.
       self%n_list = self%n_list + 1
       self%list(self%n_list) = j
+      if (self%pivot_row(j) == 0) return
+      self%n_heap = self%n_heap + 1
+      i = self%n_heap
+      do while (i > 1)
+         if (self%heap(i/2) < self%pivot_row(j)) exit
+         self%heap(i) = self%heap(i/2)
+         i = i/2
+      end do
+      self%heap(i) = self%pivot_row(j)
    end subroutine enlist
 
-   !> Eliminate the rows `from` to `to` from the present one.
-   pure subroutine reduce(self, from, to)
+   !> Take the first of the rows that are to be eliminated.
+   pure subroutine take_first(self, first)
+      type(row_elimination_t), intent(inout) :: self   !! there is one
+      integer, intent(out) :: first
+      integer :: i, k
+
+      associate (heap => self%heap, n => self%n_heap)
+         first = heap(1)
+         i = 1
+         do
+            k = 2*i
+            if (k >= n) exit
+            if (k + 1 < n .and. heap(k + 1) < heap(k)) k = k + 1
+            if (heap(n) < heap(k)) exit
+            heap(i) = heap(k)
+            i = k
+         end do
+         heap(i) = heap(n)
+         n = n - 1
+      end associate
+   end subroutine take_first
+
+   !> Eliminate earlier rows from the present one, in their order: what one leaves is of later ones.
+   pure subroutine reduce(self)
       type(row_elimination_t), intent(inout) :: self
-      integer, intent(in) :: from, to
       real(hp) :: factor(n_kind), term(n_kind)
       integer :: i, j, s
 
-      do i = from, to
+      do while (self%n_heap > 0)
+         call take_first(self, i)
          j = self%pivot(i)
-         if (j == 0) cycle
-         if (.not. self%is_listed(j)) cycle
          factor = self%work(:, j)/self%pivot_value(:, i)
          self%work(:, j) = 0.0_hp
          do s = self%row_start(i) + 1, self%row_start(i + 1)

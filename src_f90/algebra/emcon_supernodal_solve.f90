@@ -241,16 +241,17 @@ contains
 
    !> The largest error of L^-T L^-1 A x for x = 1 everywhere: a motion of a body as a whole, which
    !> has the smallest forces of all, is what is lost first.
-   pure real(dp) function supernodal_error(self, nodes, matrix)
+   pure real(dp) function supernodal_error(self, nodes, pattern, value)
       type(supernodal_factor_t), intent(in) :: self
       type(supernodes_t), intent(in) :: nodes
-      type(csr_t), intent(in) :: matrix
+      type(csr_t), intent(in) :: pattern               !! its values are not read
+      real(dp), intent(in), contiguous :: value(:)     !! (n_slot) those of the matrix
       real(dp), allocatable :: y(:)              ! not on the stack of a thread
       integer :: i
 
       allocate(y(nodes%n))
       do i = 1, nodes%n
-         y(nodes%place(i)) = sum(matrix%value(matrix%row_start(i) + 1:matrix%row_start(i + 1)))
+         y(nodes%place(i)) = sum(value(pattern%row_start(i) + 1:pattern%row_start(i + 1)))
       end do
       call supernodal_forward(self, nodes, y)
       call supernodal_backward(self, nodes, y)

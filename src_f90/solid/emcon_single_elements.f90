@@ -6,6 +6,7 @@ module emcon_single_elements
    use emcon_element_axial_plane, only : axial_element_respond
    use emcon_element_space, only : space_element_respond, space_motion_t, space_part_t
    use emcon_element_frequency, only : element_frequency
+   use emcon_element_places, only : element_places_find, element_places_t
    use emcon_user_space, only : user_space_respond
    use emcon_host_law, only : host_response_t
    use emcon_incompatible_space, only : incompatible_space_respond
@@ -18,17 +19,11 @@ module emcon_single_elements
    use emcon_text, only : to_text
    implicit none
    private
-   public :: element_slots_t, single_respond, single_tangent_times, single_find_fastest
+   public :: single_respond, single_tangent_times, single_find_fastest
    public :: single_rest_tangent, compare_frequency
 
    !> Elements that threads share at a time.
    integer, parameter :: n_block = 1024
-
-   !> Where element matrices go.
-   type :: element_slots_t
-      integer, allocatable :: slot(:)            !! element matrices by columns
-      integer, allocatable :: first(:)           !! (n_element) slot of each
-   end type element_slots_t
 
 contains
 
@@ -37,7 +32,7 @@ contains
    subroutine single_respond(solid, user, slots, motion, response, value, side)
       type(solid_t), intent(in) :: solid
       type(host_response_t), intent(in) :: user !! of the same motion
-      type(element_slots_t), intent(in) :: slots
+      type(element_places_t), intent(in) :: slots      !! of element matrices
       type(motion_t), intent(in) :: motion                     !! placed
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
@@ -68,8 +63,8 @@ contains
             end if
             response%energy(e) = part(k)%energy
             call add_forces(solid, e, motion, local(k), part(k), response)
-            if (present(value)) call add_tangent(slots%slot(slots%first(e):), motion%weight, &
-               solid%n_dim, solid%geometry(e)%n_node, part(k), value, side)
+            if (present(value)) call add_tangent(slots, solid, e, motion%weight, part(k), value, &
+               side)
          end do
       end do
    end subroutine single_respond
@@ -184,19 +179,22 @@ contains
    end subroutine add_forces
 
    !> Add the tangent of an element to its places; its slots run down the columns.
-   pure subroutine add_tangent(slot, factor, n_dim, n, part, value, side)
-      integer, intent(in) :: slot(:)             !! from that of the element on
+   pure subroutine add_tangent(slots, solid, e, factor, part, value, side)
+      type(element_places_t), intent(in) :: slots
+      type(solid_t), intent(in) :: solid
+      integer, intent(in) :: e                   !! 1..n_element
       real(wp), intent(in) :: factor             !! of the tangent
-      integer, intent(in) :: n_dim, n            !! directions, nodes of the element
       type(space_part_t), intent(in) :: part
       real(dp), intent(inout) :: value(:), side(:)             !! slots > 0, slots < 0
+      integer :: slot((solid%n_dim*solid%geometry(e)%n_node)**2)
       integer :: a, c, i, j, k, place
 
+      call element_places_find(slots, e, solid%geometry(e)%n_node, slot)
       k = 0
-      do j = 1, n
-         do c = 1, n_dim
-            do i = 1, n
-               do a = 1, n_dim
+      do j = 1, solid%geometry(e)%n_node
+         do c = 1, solid%n_dim
+            do i = 1, solid%geometry(e)%n_node
+               do a = 1, solid%n_dim
                   k = k + 1
                   place = slot(k)
                   if (place > 0) then

@@ -6,6 +6,7 @@ module emcon_solid_term
    use emcon_element_lists, only : element_lists
    use emcon_element_pack, only : element_pack_t, pack_add_rounding, pack_gather, pack_make_room, &
       pack_motion_t, pack_response_t, pack_scatter
+   use emcon_element_places, only : element_places_find, element_places_init, element_places_t
    use emcon_errors, only : err_analysis, error_t, raise
    use emcon_host_law, only : host_law_t, host_response_t
    use emcon_kinds, only : dp, wp
@@ -17,8 +18,8 @@ module emcon_solid_term
    use emcon_scene, only : scene_t
    use emcon_solid, only : solid_init, solid_t
    use emcon_solid_respond, only : solid_evaluate_user, solid_pack_respond
-   use emcon_single_elements, only : compare_frequency, element_slots_t, single_find_fastest, &
-      single_respond, single_tangent_times
+   use emcon_single_elements, only : compare_frequency, single_find_fastest, single_respond, &
+      single_tangent_times
    use emcon_space, only : lists_append, lists_t, space_t
    use emcon_steps, only : step_square
    use emcon_term, only : fastest_t, response_t, role_internal, term_t
@@ -38,7 +39,7 @@ module emcon_solid_term
       real(wp) :: square = 1.0_wp                !! part of squares in strains; 0: small strains
       logical :: has_linear_laws = .false.       !! all materials of its elements are
       logical, private :: is_empty = .false.     !! no elements are left
-      type(element_slots_t), private :: to       !! places of element matrices
+      type(element_places_t), private :: to      !! of element matrices
       type(host_response_t), private :: user    !! what given laws answer
       type(pack_shares_t), private :: shares    !! of the threads
       type(pack_room_t), allocatable, private :: room(:)   !! (>= n_share)
@@ -94,19 +95,11 @@ contains
       type(space_t), intent(in) :: space
       type(csr_t), intent(in) :: matrix
       integer, intent(in) :: slot(:)             !! element matrices by columns
-      integer :: e, next
 
       self%square = step_square(scene%step(i_step))
       self%user%square = self%square
-      self%to%slot = slot
-      if (allocated(self%to%first)) deallocate(self%to%first)
-      allocate(self%to%first(self%solid%n_element), source=0)
-      next = 1
-      do e = 1, self%solid%n_element
-         if (self%solid%trait%is_small(e)) cycle
-         self%to%first(e) = next
-         next = next + (size(scene%x, 1)*self%solid%geometry(e)%n_node)**2
-      end do
+      call element_places_init(self%to, size(scene%x, 1), merge(0, self%solid%geometry%n_node, &
+         self%solid%trait%is_small), slot)
    end subroutine begin_step
 
    !> Forces of a motion. What displacements are rounded by, forces are too.
@@ -288,17 +281,18 @@ contains
       !> (n_lane, n_dim, >= n_node, n_dim, >= n_node)
       real(wp), intent(in), contiguous :: tangent(:, :, :, :, :)
       real(dp), intent(inout) :: value(:), side(:)             !! slots > 0, slots < 0
-      integer :: a, c, i, j, k, l, place
+      integer :: a, c, i, j, k, l, place, slot((size(tangent, 2)*pack%n_node)**2)
 
       do l = 1, pack%n
-         k = self%to%first(pack%element(l)) - 1
+         call element_places_find(self%to, pack%element(l), pack%n_node, slot)
+         k = 0
          do j = 1, pack%n_node
             do c = 1, size(tangent, 4)
                do i = 1, pack%n_node
                   do a = 1, size(tangent, 2)
                      k = k + 1
                      if (self%shares%turn(pack%node(l, i)) /= turn) cycle
-                     place = self%to%slot(k)
+                     place = slot(k)
                      if (place > 0) then
                         value(place) = value(place) + real(factor*tangent(l, a, i, c, j), dp)
                      else if (place < 0) then

@@ -142,9 +142,19 @@ contains
             self%is_near = null_space%rows%is_near(:self%n_redundant)
          end if
       end associate
-      self%knows_multipliers = self%uses_null_space
+      self%knows_multipliers = tells_multipliers(self, set)
       call stopwatch_stop(self%clock)
    end subroutine correction_lay_out
+
+   !> Does the null space of the constraints, for which there is a layout, tell their multipliers?
+   !> One that is too full does.
+   pure logical function tells_multipliers(self, set)
+      type(correction_t), intent(in) :: self
+      type(constraint_set_t), intent(in) :: set
+
+      tells_multipliers = self%uses_null_space .or. (self%method == method_null_space &
+         .and. .not. set%penalty%is_on .and. self%null_space%obstacle == obstacle_fill)
+   end function tells_multipliers
 
    !> Contacts that give way depend on no others. Their null space is that of no contact: what they
    !> push is in the saddle point, or in the kept factor.
@@ -360,15 +370,15 @@ contains
       correction_is_lost = self%is_definite .and. .not. self%definite_solver%is_converged
    end function correction_is_lost
 
-   !> The multipliers that belong to `residual` (without contact forces), by null space only: the
-   !> saddle point has them as unknowns.
+   !> The multipliers that belong to `residual` (without contact forces), where the null space tells
+   !> them: Newton's method by the saddle point has them as unknowns.
    subroutine correction_multipliers(self, system, set, residual)
       type(correction_t), intent(in) :: self
       type(system_t), intent(in) :: system
       type(constraint_set_t), intent(inout) :: set
       real(wp), intent(in), contiguous :: residual(:)      !! (n_unknown)
 
-      if (set%n == 0 .or. .not. self%uses_null_space) return
+      if (set%n == 0 .or. .not. tells_multipliers(self, set)) return
       call null_space_multipliers(self%null_space, set, system%space%numbering, residual, set%lam)
    end subroutine correction_multipliers
 

@@ -41,6 +41,9 @@ module emcon_kept_factor
    real(dp), parameter :: rounding = 64.0_dp*epsilon(1.0_dp)
    !> Of a correction by conjugate gradients: about what the age of a factor leaves.
    real(dp), parameter :: correction_accuracy = 1.0e-2_dp
+   !> And of gaps in their multipliers alone: they tell which contacts act, and with two digits they
+   !> tell it wrongly too often.
+   real(dp), parameter :: condensed_accuracy = 1.0e-4_dp
 
    type :: kept_factor_t
       logical :: is_made = .false.               !! there is a factor
@@ -182,7 +185,7 @@ contains
    end subroutine kept_factor_take
 
    !> The constraints of `set` in their multipliers alone, by the factor there is: their values
-   !> after a correction are free + w lam. By an incomplete factor w is near to that only.
+   !> after a correction are free + w lam. By an incomplete factor both have some digits.
    subroutine kept_factor_condense(self, set, residual, w, free, error)
       type(kept_factor_t), intent(inout) :: self         !! with a factor that has room for the set
       type(constraint_set_t), intent(in) :: set
@@ -245,7 +248,8 @@ contains
       if (.not. allocated(error)) dq = real(self%blocks%scale*self%x, wp)
    end subroutine kept_factor_move
 
-   !> The same by the motion of each multiplier, where the factor is incomplete.
+   !> The same by the motion of each multiplier, where the factor is incomplete. By the factor alone
+   !> that would be so far off that other contacts act.
    subroutine condense_by_solutions(self, set, w, free, error)
       type(kept_factor_t), intent(inout) :: self         !! `x` is the load
       type(constraint_set_t), intent(in) :: set
@@ -255,6 +259,7 @@ contains
       real(dp) :: load(size(self%x))
       integer :: k
 
+      self%gradients%accuracy = min(self%blocks%accuracy, condensed_accuracy)
       associate (gap_rows => set%gap_rows)
          call factor_rows_begin(self%rows, 0)
          load = self%x
@@ -266,15 +271,15 @@ contains
          do k = 1, set%n_row
             load = 0.0_dp
             associate (first => gap_rows%row_start(k) + 1, last => gap_rows%row_start(k + 1))
-               load(gap_rows%column(first:last) + 1) = self%blocks%scale*gap_rows%value(first:last)
+               load(gap_rows%column(first:last) + 1) = gap_rows%value(first:last)
             end associate
-            call blocks_solve(self%blocks, .false., load, self%y, error)
-            if (.not. allocated(error)) call blocks_solve(self%blocks, .true., self%y, self%x, &
-               error)
+            call projected_solve(self%gradients, self%blocks, self%rows, [real(dp) ::], load, &
+               self%x, error)
             if (allocated(error)) return
             call multiply_rows(gap_rows, set%n_row, self%x, w(:, k))
          end do
       end associate
+      w = 0.5_wp*(w + transpose(w))
    end subroutine condense_by_solutions
 
    !> G x of the first `n` rows.
@@ -432,6 +437,7 @@ contains
 
       if (self%blocks%is_incomplete) then
          self%y = -real(residual, dp)
+         self%gradients%accuracy = self%blocks%accuracy
          call projected_solve(self%gradients, self%blocks, self%rows, &
             real(set%defect(:set%n_row), dp), self%y, self%x, error)
          if (.not. allocated(error)) dq = real(self%x, wp)

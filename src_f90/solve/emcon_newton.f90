@@ -124,13 +124,13 @@ contains
 
       set%penalty%is_under_way = set%penalty%is_on .and. &
          .not. evaluation_is_equilibrium(motion%evaluation)
-      if (set%penalty%is_under_way) lam = set%lam
+      if (set%n > 0) lam = set%lam
       is_done = .false.
       if (self%factor_policy%is_allowed &
          .and. size(self%residual) > 0) call solve_by_kept_factor(self, system, set, motion, &
          status, is_done, error)
       if (is_done .or. allocated(error)) return
-      if (set%penalty%is_under_way) set%lam = lam
+      if (set%n > 0) set%lam = lam
       call solve_by_tangents(self, system, set, motion, status, error)
    end subroutine newton_solve
 
@@ -508,7 +508,8 @@ contains
 
       call newton_pick_residual(self, system, set)
       call phase_enter(system%phases, phase_eliminate, left)
-      call correction_multipliers(self%correction, system, set, self%residual)
+      if (self%correction%uses_null_space .or. self%convergence%is_kept) &
+         call correction_multipliers(self%correction, system, set, self%residual)
       call constraints_take_hold(set)
       call phase_leave(system%phases, left)
       call newton_measure_forces(self, system, set, motion)

@@ -125,10 +125,8 @@ contains
          self%owner = 0
          self%owner(self%present%dependent) = [(k, k = 1, set%n_row)]
       end if
-      if (is_too_full(self)) then
-         self%obstacle = obstacle_fill
-         return
-      end if
+      ! Multipliers follow all the same.
+      if (is_too_full(self)) self%obstacle = obstacle_fill
       call dependent_block_factorise(self%present, set%force_rows)
       if (self%present%bands%is_singular) self%obstacle = obstacle_pivot
    end subroutine null_space_update

@@ -23,6 +23,7 @@ module emcon_projected_gradients
 
    type :: projected_gradients_t
       integer :: n_step = 0                      !! of all corrections so far
+      real(dp) :: accuracy = 0.0_dp              !! of a correction, > 0, set before
       real(dp), allocatable :: root(:)           !! (n_unknown) of the diagonal, > 0
       type(gradients_t), private :: gradients
       real(dp), allocatable, private :: r(:), z(:), y(:)     !! (n_unknown)
@@ -67,7 +68,7 @@ contains
       if (allocated(error)) return
       call gradients_begin(self%gradients, self%r, self%z)
       do while (self%gradients%is_definite .and. self%gradients%n < most_steps)
-         if (gradients_are_done(self%gradients, blocks%accuracy)) exit
+         if (gradients_are_done(self%gradients, self%accuracy)) exit
          call blocks_multiply(blocks, self%gradients%direction, self%y, error)
          if (allocated(error)) return
          call gradients_move(self%gradients, self%y, x, self%r)

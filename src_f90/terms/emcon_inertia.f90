@@ -18,17 +18,21 @@ module emcon_inertia
    use emcon_vectors, only : vector_add, vector_scale, vector_sum
    implicit none
    private
-   public :: inertia_t, inertia_init, inertia_add, inertia_times
+   public :: inertia_t, inertia_init, inertia_add, inertia_times, inertia_values, &
+      inertia_mass
 
    type, extends(term_t) :: inertia_t
-      type(csr_t) :: mass                        !! (n_node x n_node) [M]
-      real(dp), allocatable :: value(:)          !! mass in the pattern of the matrix
+      !> Entries of the matrix that have mass, a third of them in space, and how much
+      integer, allocatable, private :: place(:)
+      real(dp), allocatable, private :: value(:)
+      integer, private :: n_entry = 0            !! of the matrix
       logical, allocatable :: is_massless(:)     !! (n_node) it has given its mass to its neighbours
       logical, allocatable :: without_density(:) !! (n_node) it has none of its own
       type(csr_t), private :: host, added        !! (n_node x n_node) beside it [M]
-      type(csr_t), private :: consistent, lumped     !! (n_node x n_node) one of them is `mass` [M]
-      !> Their values in the precision of the state, and those of `mass`
-      real(wp), allocatable, private :: consistent_value(:), lumped_value(:), mass_value(:)
+      type(csr_t), private :: consistent, lumped     !! (n_node x n_node) [M]
+      logical, private :: is_lumped = .false.    !! in the present step that is the mass
+      !> Their values in the precision of the state
+      real(wp), allocatable, private :: consistent_value(:), lumped_value(:)
       integer, allocatable, private :: pair(:, :)   !! (n_end, any) nodes of these
       real(wp), allocatable, private :: rate(:, :), product(:, :)   !! (n_dim, n_node)
    contains
@@ -87,9 +91,9 @@ contains
       n = size(list)
       list = [list, reshape(self%pair, [size(self%pair)])]
       start = [start, [(n + 1 + 2*i, i = 1, size(self%pair, 2))]]
-      call csr_from_elements(self%mass, solid%n_node, start, list, slot, error)
+      call csr_from_elements(self%consistent, solid%n_node, start, list, slot, error)
       if (allocated(error)) return
-      allocate(value(size(self%mass%column)), source=0.0_hp)
+      allocate(value(size(self%consistent%column)), source=0.0_hp)
       k = 0
       do e = 1, solid%n_element
          n = start(e + 1) - start(e)
@@ -100,12 +104,11 @@ contains
             end do
          end do
       end do
-      call add_beside(self%mass, self%host, value)
-      call add_beside(self%mass, self%added, value)
-      self%mass%value = real(value, dp)
-      self%consistent = self%mass
+      call add_beside(self%consistent, self%host, value)
+      call add_beside(self%consistent, self%added, value)
+      self%consistent%value = real(value, dp)
       self%consistent_value = real(value, wp)
-      self%mass_value = self%consistent_value
+      self%is_lumped = .false.
       call lump(self, solid)
    end subroutine add_up
 
@@ -208,33 +211,66 @@ contains
       type(csr_t), intent(in) :: matrix
       integer, intent(in) :: slot(:)             !! not used: mass is placed node by node
       real(dp) :: side(size(space%reduction%side%value))
+      real(dp), allocatable :: value(:)          ! in the pattern of the matrix
       integer, allocatable :: number(:)
-      integer :: i, k, a, place, n_dim
+      integer :: k, n_dim
 
-      if (scene%step(i_step)%scheme%lumps_mass) then
-         self%mass = self%lumped
-         self%mass_value = self%lumped_value
-      else
-         self%mass = self%consistent
-         self%mass_value = self%consistent_value
-      end if
+      self%is_lumped = scene%step(i_step)%scheme%lumps_mass
       allocate(number, source=freedom_numbers(space%numbering))
       n_dim = size(space%is_alive, 1)
       side = 0.0_dp
-      if (allocated(self%value)) deallocate(self%value)
-      allocate(self%value(size(matrix%column)), source=0.0_dp)
-      do i = 1, self%mass%n_row
-         do k = self%mass%row_start(i) + 1, self%mass%row_start(i + 1)
-            do a = 1, n_dim
-               place = reduction_slot(space%reduction, matrix, number(n_dim*(i - 1) + a), &
-                  number(n_dim*self%mass%column(k) + a))
-               if (place > 0) self%value(place) = self%value(place) + self%mass%value(k)
-               if (place < 0) side(-place) = side(-place) + self%mass%value(k)
+      allocate(value(size(matrix%column)), source=0.0_dp)
+      if (self%is_lumped) then
+         call add_entries(self%lumped)
+      else
+         call add_entries(self%consistent)
+      end if
+      call reduction_fold(space%reduction, matrix, value, side)
+      self%n_entry = size(value)
+      self%place = pack([(k, k = 1, size(value))], abs(value) > 0.0_dp)
+      self%value = value(self%place)
+
+   contains
+
+      !> Add a mass to the values and to those at the side.
+      subroutine add_entries(mass)
+         type(csr_t), intent(in) :: mass         !! (n_node x n_node) [M]
+         integer :: i, j, a, place
+
+         do i = 1, mass%n_row
+            do j = mass%row_start(i) + 1, mass%row_start(i + 1)
+               do a = 1, n_dim
+                  place = reduction_slot(space%reduction, matrix, number(n_dim*(i - 1) + a), &
+                     number(n_dim*mass%column(j) + a))
+                  if (place > 0) value(place) = value(place) + mass%value(j)
+                  if (place < 0) side(-place) = side(-place) + mass%value(j)
+               end do
             end do
          end do
-      end do
-      call reduction_fold(space%reduction, matrix, self%value, side)
+      end subroutine add_entries
+
    end subroutine begin_step
+
+   !> The mass between nodes, as it is in the present step.
+   pure subroutine inertia_mass(self, mass)
+      class(inertia_t), intent(in) :: self
+      type(csr_t), intent(out) :: mass           !! (n_node x n_node) [M]
+
+      if (self%is_lumped) then
+         mass = self%lumped
+      else
+         mass = self%consistent
+      end if
+   end subroutine inertia_mass
+
+   !> The mass in the pattern of the matrix.
+   pure subroutine inertia_values(self, value)
+      class(inertia_t), intent(in) :: self       !! in a step
+      real(dp), allocatable, intent(out) :: value(:)     !! (entries of the matrix) [M]
+
+      allocate(value(self%n_entry), source=0.0_dp)
+      value(self%place) = self%value
+   end subroutine inertia_values
 
    !> s M (b du - w v0), and the sizes of what it consists of; nothing where s = 0.
    subroutine respond(self, motion, response, value, side)
@@ -242,12 +278,17 @@ contains
       type(motion_t), intent(in) :: motion                     !! placed
       type(response_t), intent(inout) :: response
       real(dp), intent(inout), contiguous, optional :: value(:), side(:)   !! slots > 0, slots < 0
-      integer :: n
+      real(dp) :: factor
+      integer :: k, n
 
       associate (evaluation => motion%evaluation, total => response%part(self%role))
          if (.not. evaluation%mass_scale > 0.0_wp) return
-         if (present(value)) value = value + real(evaluation%mass_scale*evaluation%rate, &
-            dp)*self%value
+         factor = real(evaluation%mass_scale*evaluation%rate, dp)
+         if (present(value)) then
+            do k = 1, size(self%place)
+               value(self%place(k)) = value(self%place(k)) + factor*self%value(k)
+            end do
+         end if
          n = size(self%rate)
          call vector_sum(n, motion%du, 1.0_wp, motion%offset, self%rate)
          call vector_scale(n, evaluation%rate, self%rate)
@@ -282,8 +323,13 @@ contains
       real(wp), intent(in), contiguous :: field(:, :)        !! (n_dim, n_node)
       real(wp), intent(out), contiguous :: product(:, :)     !! (n_dim, n_node)
 
-      call rows_times(size(field, 1), self%mass%n_row, self%mass%row_start, self%mass%column, &
-         self%mass_value, field, product)
+      if (self%is_lumped) then
+         call rows_times(size(field, 1), self%lumped%n_row, self%lumped%row_start, &
+            self%lumped%column, self%lumped_value, field, product)
+      else
+         call rows_times(size(field, 1), self%consistent%n_row, self%consistent%row_start, &
+            self%consistent%column, self%consistent_value, field, product)
+      end if
    end subroutine inertia_times
 
    !> Rows of a sparse matrix times vectors, two directions at a time: the rows are read once.

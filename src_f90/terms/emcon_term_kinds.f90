@@ -4,7 +4,8 @@ submodule (emcon_term_registry) emcon_term_kinds
    use emcon_dissipation, only : dissipation_term_init, dissipation_term_t
    use emcon_host_check, only : host_check_mass
    use emcon_host_term, only : host_term_init, host_term_t
-   use emcon_inertia, only : inertia_add, inertia_init, inertia_t, inertia_times
+   use emcon_inertia, only : inertia_add, inertia_init, inertia_t, inertia_times, &
+      inertia_mass, inertia_values
    use emcon_linear_term, only : linear_term_init, linear_term_t
    use emcon_loads, only : loads_init, loads_t
    use emcon_materials, only : kinematics_corotated, kinematics_linear
@@ -142,7 +143,7 @@ contains
    module procedure terms_mass
       select type (part => term(of_inertia)%term)
       type is (inertia_t)
-         mass = part%mass
+         call inertia_mass(part, mass)
       end select
    end procedure terms_mass
 
@@ -182,7 +183,7 @@ contains
    module procedure terms_mass_values
       select type (part => term(of_inertia)%term)
       type is (inertia_t)
-         value = part%value
+         call inertia_values(part, value)
       end select
    end procedure terms_mass_values
 

@@ -57,6 +57,7 @@ program main
    use test_element, only : collect_element
    use test_element_kinds, only : collect_element_kinds
    use test_element_axial, only : collect_element_axial
+   use test_element_places, only : collect_element_places
    use test_element_space, only : collect_element_space
    use test_energy_watch, only : collect_energy_watch
    use test_velocity_jumps, only : collect_velocity_jumps
@@ -294,6 +295,7 @@ program main
    call run("element", collect_element)
    call run("element_kinds", collect_element_kinds)
    call run("element_axial", collect_element_axial)
+   call run("element_places", collect_element_places)
    call run("element_space", collect_element_space)
    call run("corotated", collect_corotated)
    call run("single_elements", collect_single_elements)

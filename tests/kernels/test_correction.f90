@@ -106,15 +106,26 @@ contains
       call correction_free(correction)
    end subroutine test_pivot
 
+   !> Multipliers of forces that constraints make are told all the same: a kept factor may serve.
    subroutine test_fill(error)
       type(error_t), allocatable, intent(out) :: error
       type(problem_t) :: problem
       type(correction_t) :: correction
+      real(wp), allocatable :: dq(:), expected(:)
+      logical :: is_singular
       integer :: k
 
       call make_chain([(k, k = 1, 30)], [1.0_wp, 4.0_wp, 1.0_wp]/6.0_wp, 30, 4, problem)
       call correction_reset(correction, method_null_space, solver_default)
       call compare(correction, problem, .true., error)
+      if (allocated(error)) return
+      expected = [(1.0_wp + modulo(7*k, 5), k = 1, problem%set%n)]
+      call csr_multiply_transposed(problem%set%force_rows, expected, problem%residual)
+      problem%set%lam = 0.0_wp
+      call correct(correction, problem, dq, is_singular, error)
+      if (allocated(error)) return
+      call check_true(error, correction%knows_multipliers, "multipliers are known")
+      call check_near(error, problem%set%lam, expected, tol_dp, maxval(expected), "multipliers")
       call correction_free(correction)
    end subroutine test_fill
 

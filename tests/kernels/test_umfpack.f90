@@ -2,7 +2,7 @@
 module test_umfpack
    use, intrinsic :: ieee_arithmetic, only : ieee_quiet_nan, ieee_value
    use check, only : check_equal, check_error, check_near, check_true, test_case_t
-   use emcon_csr, only : csr_from_entries, csr_multiply, csr_t
+   use emcon_csr, only : csr_find, csr_from_elements, csr_from_entries, csr_multiply, csr_t
    use emcon_errors, only : err_internal, error_t
    use emcon_kinds, only : dp, wp
    use emcon_lapack, only : dense_solve
@@ -26,6 +26,7 @@ contains
          test_case_t("saddle point", test_saddle_point), &
          test_case_t("metis and refinement", test_metis), &
          test_case_t("the ordering that fills less", test_less_fill), &
+         test_case_t("a cube is dissected", test_cube), &
          test_case_t("pattern is analysed once", test_reuse), &
          test_case_t("same bits again", test_same_bits), &
          test_case_t("powers of two keep the bits", test_powers_of_two), &
@@ -114,7 +115,7 @@ contains
    !> On a long strip minimum degree fills much less.
    subroutine test_less_fill(error)
       type(error_t), allocatable, intent(out) :: error
-      integer, parameter :: ordering(3) = [ordering_amd, ordering_metis, ordering_metis]
+      integer, parameter :: ordering(3) = [ordering_amd, ordering_metis, ordering_amd]
       type(csr_t) :: a
       type(umfpack_t) :: solver
       integer :: fill(3), k
@@ -134,6 +135,45 @@ contains
       call check_true(error, fill(1) < fill(2), "the orderings differ")
       call check_equal(error, fill(3), fill(1), "the lesser fill")
    end subroutine test_less_fill
+
+   !> Cells side by side, of an unknown at each corner: minimum degree fills more.
+   subroutine test_cube(error)
+      type(error_t), allocatable, intent(out) :: error
+      integer, parameter :: m = 18, n = m**3
+      type(csr_t) :: a
+      type(umfpack_t) :: solver, dissected
+      integer :: dof(8, (m - 1)**3), i, j, k, e
+      integer, allocatable :: slot(:)
+      real(wp) :: b(n), x(n), y(n)
+
+      e = 0
+      do k = 1, m - 1
+         do j = 1, m - 1
+            do i = 1, m - 1
+               e = e + 1
+               dof(:, e) = i + m*(j - 1) + m*m*(k - 1) + [0, 1, m, m + 1, m*m, m*m + 1, m*m + m, &
+                  m*m + m + 1]
+            end do
+         end do
+      end do
+      call csr_from_elements(a, n, [(8*i + 1, i = 0, e)], reshape(dof, [8*e]), slot, error)
+      if (allocated(error)) return
+      call random_number(a%value)
+      do i = 1, n
+         a%value(csr_find(a, i, i)) = 27.0_dp
+      end do
+      call random_number(b)
+      call solve(solver, a, b, x, error)
+      if (allocated(error)) return
+      call csr_multiply(a, x, y)
+      call check_near(error, y, b, tol, 1.0_wp, "A x")
+      dissected%ordering = ordering_metis
+      if (.not. allocated(error)) call solve(dissected, a, b, y, error)
+      if (.not. allocated(error)) call check_equal(error, int(solver%n_factor), &
+         int(dissected%n_factor), "entries of the factors")
+      call solver%free()
+      call dissected%free()
+   end subroutine test_cube
 
    subroutine test_reuse(error)
       type(error_t), allocatable, intent(out) :: error
