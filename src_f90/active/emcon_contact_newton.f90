@@ -15,6 +15,7 @@ module emcon_contact_newton
    use emcon_contact_parts, only : contact_parts_solve
    use emcon_contact_problem, only : contact_effort_t, contact_problem_create, &
       contact_problem_force, contact_problem_status, contact_problem_stiffness, contact_problem_t
+   use emcon_contact_trials, only : contact_slope_t
    use emcon_convergence, only : convergence_begin, most_rounding, round_off
    use emcon_coulomb_law, only : contact_free, contact_open, contact_rests, contact_slides, &
       contact_trial_t, coulomb_t, coulomb_violation, slip_rounding, slip_status_t
@@ -56,6 +57,7 @@ module emcon_contact_newton
    type :: solve_t
       type(condensation_t) :: condensation
       type(contact_problem_t) :: problem
+      type(contact_slope_t) :: slope             !! of the problem that was solved last
       real(wp), allocatable :: mu(:)             !! (n) of the normal force
       real(wp), allocatable :: push(:, :)        !! (0:n_slip, n) of the condensed contacts
       type(slip_status_t), allocatable :: status(:)      !! (n) in which way the law is to hold
@@ -410,7 +412,7 @@ contains
          call lay_out(self, set)
          self%push = 0.0_wp
          if (level > 0) call soften(self, softer(level))
-         call contact_parts_solve(self%problem, self%push, effort, is_solved, .true.)
+         call contact_parts_solve(self%problem, self%push, effort, is_solved, .true., self%slope)
          if (is_solved) exit
       end do
       self%least_soft = min(level, 1)
