@@ -380,6 +380,28 @@ def test_dominoes_fall_one_after_the_other(count: int, until: float, tmp_path: P
     assert (run.fields().x + run.fields()["displacement"][-1])[:8*count, 2].max() < (.8 if count == 3 else 1.0)
 
 
+@pytest.mark.parametrize(("rows", "until"), [
+    ((3, 2, 1), .6), pytest.param((10, 9), 2.0, marks=pytest.mark.long),
+    pytest.param((8, 7, 6, 5, 4), 2.4, marks=pytest.mark.long)])
+def test_a_pile_comes_to_rest(rows: tuple[int, ...], until: float, tmp_path: Path) -> None:
+    """Each row falls onto the gaps of the one below. Impacts leave a quarter of the energy of what goes along normals, over
+    and over in ever shorter times: after the last one that is further apart than an increment it dies out by increments."""
+    blocks: list[Block] = []
+    pairs: list[tuple[int, int]] = []
+    for r, n in enumerate(rows):
+        below = len(blocks) - rows[r - 1] + 1
+        for k in range(n):
+            corner = np.array([.42*(k - .5*(n - 1)) - .2, -.15, .02 + .32*r])
+            blocks.append(Block("C3D8", (1, 1, 1), size=(.4, .3, .3), place=lambda x, corner=corner: x + corner))
+            i = len(blocks)
+            pairs += [(i - 1, i)]*(k > 0) + ([(below + k, i), (below + k + 1, i)] if r > 0 else [])
+    history = on_each_other(tmp_path, blocks, pairs, .5, until).history
+    kinetic = history["kinetic"]
+    assert kinetic[-1] < 1e-12*kinetic.max()
+    # Nothing stirs it up any more.
+    assert kinetic[-5:].max() < 1e-10*kinetic.max()
+
+
 def test_what_slides_down_has_no_rest(tmp_path: Path) -> None:
     (tmp_path/"deck.inp").write_text(at_rest(.51, 1.0))
     run = run_deck(tmp_path/"deck.inp", tmp_path, 3)
