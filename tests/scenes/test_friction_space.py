@@ -473,6 +473,36 @@ def test_a_twisted_ball_nears_hertz(tmp_path: Path) -> None:
     assert abs(error[1]) < .03
 
 
+@pytest.mark.long
+def test_a_ball_sticks_in_the_middle(tmp_path: Path) -> None:
+    """Cattaneo and Mindlin: under a force Q along the plane what sticks has the radius a (1 - Q/(mu P))^(1/3), and a force to
+    and fro takes the energy of Mindlin and Deresiewicz; with two cells over a, then four.
+
+    Nearly incompressible, so that pushes shift nothing along the plane; small strains. What friction is below its limit adds
+    up to mu P - Q, spread as the pressure of Hertz is over a circle of that radius, whose mean square radius is 2/5 of it.
+    """
+    radius, loss = [], []
+    for cells in (2, 4):
+        ball = Ball(cells, stiffness=1e5, nu=.49, width=.13, height=.19, kind="C3D8H")
+        block = ball.block()
+        run = ran(tmp_path, ball.deck_to_and_fro(block, 1e-4))
+        fields, low, taken = run.fields(), np.array(block.on(2, 0)) - 1, run.history["friction_loss"]
+        assert taken[1] < 1e-5*taken[-1]
+        force = np.abs(fields["contact_force"][-1, low])
+        push = force[:, 2].sum()
+        use = force[:, 0].sum()/(ball.mu*push)
+        below = ball.mu*force[:, 2] - force[:, 0]
+        square = ((block.x[low] + fields["displacement"][-1, low])[:, :2]**2).sum(1)
+        radius.append(np.sqrt(2.5*(below*square).sum()/below.sum())/(ball.contact_radius(push)*(1 - use)**(1/3)) - 1)
+        loss.append((taken[-1] - taken[2])/ball.loop(use, push) - 1)
+        # The first way there is half of each that follows.
+        assert taken[3] - taken[2] == pytest.approx(2*taken[2], rel=1e-3)
+        assert run.verdict["law_violation"] < 1e-8
+    assert abs(radius[1]) < abs(radius[0])
+    assert abs(radius[1]) < .03
+    assert abs(loss[1]) < abs(loss[0])
+
+
 def thrown(card: str, v: tuple = (1., .2, 0)) -> str:
     return on_floor(.3, .01, .3, v, (0, 0, 1.), is_rigid=False).replace("*FRICTION\n0.3\n", card)
 
